@@ -1,6 +1,6 @@
 """The engines: ways to evaluate one and the same system, chosen by name.
 
-Imports: nothing.
+Imports: terms.
 """
 
 from __future__ import annotations

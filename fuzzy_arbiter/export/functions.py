@@ -105,7 +105,8 @@ def in_python(name: str) -> str:
     if name in _PYTHON_OF_ONE:
         return f'def {name}(a):\n    """Return {name} of a number."""\n    {_PYTHON_OF_ONE[name]}'
     if name in _COMPARED:
-        return f'def {name}(a, b):\n    """Return 1 if a {_COMPARED[name]} b, else 0."""\n    return 1.0 if a {_COMPARED[name]} b else 0.0'
+        said = f"a {_COMPARED[name]} b"
+        return f'def {name}(a, b):\n    """Return 1 if {said}, else 0."""\n    return 1.0 if {said} else 0.0'
     source = inspect.getsource(getattr(norms, name)).rstrip()
     return re.sub(r"(?<=[ab]): float|( -> float)(?=:)", "", source)
 

@@ -66,7 +66,10 @@ RICHER = {
     "fcl": replace(RICH, rules=(*RICH.rules, Rule(Is("quality", "poor"), (Is("tip", "low"),), 1.0, Operators("prod")))),
     "fis": replace(
         RICH,
-        inputs=(RICH.inputs[0], replace(_SECOND, terms=(*RICH.inputs[1].terms, Term("s", curve("pi_shape", 1, 2, 3, 4))))),
+        inputs=(
+            RICH.inputs[0],
+            replace(_SECOND, terms=(*RICH.inputs[1].terms, Term("s", curve("pi_shape", 1, 2, 3, 4)))),
+        ),
         rules=(*RICH.rules, "if service is s then tip is high"),
     ),
 }  # fmt: skip
@@ -77,7 +80,10 @@ RICHER["fll"] = replace(
             RICH.outputs[0], default=1.5, lock_range=True, lock_previous=True,
             terms=(*RICH.outputs[0].terms, Term("odd", Formula("sin(quality) / service + 2 ^ quality"))),
         ),
-        Output("mood", (0, 1), (Term("fair", curve("spike", 0.5, 1)), Term("good", curve("s_shape", 0, 1))), None, "bisector", "probor"),
+        Output(
+            "mood", (0, 1), (Term("fair", curve("spike", 0.5, 1)), Term("good", curve("s_shape", 0, 1))), None,
+            "bisector", "probor",
+        ),
     ),
     rules=(
         *RICHER["fcl"].rules, "if quality is very near and service is any then mood is good and tip is odd",
