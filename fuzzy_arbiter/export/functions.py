@@ -18,7 +18,8 @@ _PYTHON = {
     "return math.copysign(math.inf, a) * math.copysign(1.0, b)",
     "power": '"""Return a to the power of b."""|if a == 0.0 and b < 0.0:|    return math.inf|'
     "if a < 0.0 and b != math.floor(b):|    return math.nan|return math.pow(a, b)",
-    "fmod": '"""Return the rest of a / b."""|return math.fmod(a, b) if b != 0.0 and abs(a) < math.inf else math.nan',
+    "fmod": '"""Return the rest of a / b."""|if b == 0.0 or not abs(a) < math.inf:|    return math.nan|'
+    "return math.copysign(abs(a) % abs(b), a)",
 }
 _PYTHON_OF_ONE = {
     "exp": "return math.exp(a) if a < 709.78 else math.inf",
