@@ -1,7 +1,7 @@
 """A fuzzy arbiter of prioritised criteria, which decides to what degree each one matters now.
 
-`Arbiter` loads, saves, decides, explains and verifies. The modules `pictures`, `formats` (files as systems,
-`fold_normalization`) and `export` (C and Python code) are there for those who ask for more.
+`Arbiter` loads, saves, decides, explains and verifies. The modules `terms` (curves, values), `pictures`, `formats`
+(files as systems, `fold_normalization`) and `export` (C and Python code) are there for those who ask for more.
 """
 
 import importlib

@@ -48,8 +48,9 @@ def parse_rules(text: str) -> list[Rule]:
 def parse_rule(text: str) -> Rule:
     """Return the rule that a text says.
 
-    Words of rules may be in any case; the hedges very, somewhat, extremely and seldom stand before a term; ``&``, ``|``, ``~`` stand for *and*, *or*, *not*; *not* binds before *and*, *and*
-    before *or*. Names that are no identifiers stand in double quotes.
+    Words of rules may be in any case. The hedges very, somewhat, extremely and seldom stand before a term. ``&``,
+    ``|``, ``~`` stand for *and*, *or*, *not*; *not* binds before *and*, *and* before *or*. Names that are no
+    identifiers stand in double quotes.
 
     Parameters
     ----------

@@ -160,15 +160,16 @@ class Shape(Membership):
             return np.full(len(places), y[0])
         if len(x) == 2 and x[0] < x[1]:  # a ramp, which is met most often: nothing to look up
             degrees: Array = np.asarray(places - x[0])
-            degrees /= x[1] - x[0]
-            degrees *= y[1] - y[0]
-            degrees += y[0]
+            with np.errstate(over="ignore", invalid="ignore"):  # beyond its ends, which are set below
+                degrees /= x[1] - x[0]
+                degrees *= y[1] - y[0]
+                degrees += y[0]
             np.copyto(degrees, y[0], where=places <= x[0])
             np.copyto(degrees, y[1], where=places >= x[1])
             return degrees
         right = np.clip(np.searchsorted(x, places), 1, len(x) - 1)  # of x[right - 1] < place <= x[right]
         left = right - 1
-        with np.errstate(divide="ignore", invalid="ignore"):  # at jumps, which are set below
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # at jumps, which are set below
             share = (places - x[left]) / (x[right] - x[left])
             degrees = y[left] + (y[right] - y[left]) * share
         degrees[places <= x[0]] = y[0]

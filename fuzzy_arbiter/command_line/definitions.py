@@ -76,9 +76,7 @@ def _described(variable: Variable) -> list[str]:
         default = ", no default" if variable.default is None else f", default {variable.default!r}"
     width = max(map(len, variable.term_names), default=0)
     lines = [f"  {variable.name} in [{low!r}, {high!r}]{default}"]
-    for term in variable.terms:
-        lines.append(f"    {term.name:{width}}  {_numbers(term)}")
-    return lines
+    return [*lines, *(f"    {term.name:{width}}  {_numbers(term)}" for term in variable.terms)]
 
 
 def _numbers(term: Term) -> str:

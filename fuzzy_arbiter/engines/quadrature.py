@@ -134,7 +134,7 @@ class _Joined:
         return height
 
     def _signs(self) -> list[tuple[int, int]]:
-        """Return what may bend the joined terms, as a slot and another or one of `_CUT`, `_REST`, `_FULL`, `_PASSED`."""
+        """Return what may bend the joined terms, as a slot and another, or `_CUT`, `_REST`, `_FULL`, `_PASSED`."""
         signs: list[tuple[int, int]] = []
         for a, i in enumerate(self.active):
             implication = self.of._slots[i].implication

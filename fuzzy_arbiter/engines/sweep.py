@@ -1,13 +1,13 @@
 """The exact centroid of one output: a sweep over the straight pieces of its joined terms.
 
-Between two neighbouring knots, or places where two terms' lines meet, the lines l_1, l_2, .. have one order, the highest
-first. Clipped at their cuts c_1, c_2, .. and joined by the maximum they are a sum of single clipped lines: with C_t the
-greatest of the first t cuts,
+Between two neighbouring knots, or places where two terms' lines meet, the lines l_1, l_2, .. have one order, the
+highest first. Clipped at their cuts c_1, c_2, .. and joined by the maximum they are a sum of single clipped lines: with
+C_t the greatest of the first t cuts,
 
     max_t min(c_t, l_t) = sum_t (clip(l_t, C_(t-1), C_t) - C_(t-1)),
 
-for what fills the heights from C_(t-1) to C_t is line t, or a lower one; the higher ones are cut below them. Each of these
-bands is integrated by itself.
+for what fills the heights from C_(t-1) to C_t is line t, or a lower one; the higher ones are cut below them. Each of
+these bands is integrated by itself.
 
 Scaled by their cuts the lines have no order. They are joined where two of them meet, and integrated as trapezoids.
 

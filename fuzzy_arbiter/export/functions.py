@@ -18,7 +18,8 @@ _PYTHON = {
     "return math.copysign(math.inf, a) * math.copysign(1.0, b)",
     "power": '"""Return a to the power of b."""|if a == 0.0 and b < 0.0:|    return math.inf|'
     "if a < 0.0 and b != math.floor(b):|    return math.nan|return math.pow(a, b)",
-    "fmod": '"""Return the rest of a / b."""|return math.fmod(a, b) if b != 0.0 and abs(a) < math.inf else math.nan',
+    "fmod": '"""Return the rest of a / b."""|if b == 0.0 or not abs(a) < math.inf:|    return math.nan|'
+    "return math.copysign(abs(a) % abs(b), a)",
 }
 _PYTHON_OF_ONE = {
     "exp": "return math.exp(a) if a < 709.78 else math.inf",
@@ -105,7 +106,8 @@ def in_python(name: str) -> str:
     if name in _PYTHON_OF_ONE:
         return f'def {name}(a):\n    """Return {name} of a number."""\n    {_PYTHON_OF_ONE[name]}'
     if name in _COMPARED:
-        return f'def {name}(a, b):\n    """Return 1 if a {_COMPARED[name]} b, else 0."""\n    return 1.0 if a {_COMPARED[name]} b else 0.0'
+        said = f"a {_COMPARED[name]} b"
+        return f'def {name}(a, b):\n    """Return 1 if {said}, else 0."""\n    return 1.0 if {said} else 0.0'
     source = inspect.getsource(getattr(norms, name)).rstrip()
     return re.sub(r"(?<=[ab]): float|( -> float)(?=:)", "", source)
 

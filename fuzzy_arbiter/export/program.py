@@ -149,8 +149,8 @@ def _require_sayable(system: System, engine: Engine) -> None:
             raise UnsupportedError(f"{what} keeps its previous value, which a function of one sample has not")
         if isinstance(engine, ExactEngine) and engine.quadrature(output.name):
             raise UnsupportedError(
-                f"{what} is integrated by quadrature; expected piecewise-linear terms under min or prod, joined by max, "
-                "and their centroid, or values"
+                f"{what} is integrated by quadrature; expected the centroid of piecewise-linear terms under min or "
+                "prod, joined by max, or values"
             )
         for term in output.terms if output.weighted else ():
             if not isinstance(term.shape, Value):

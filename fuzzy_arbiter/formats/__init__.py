@@ -1,6 +1,6 @@
 """Definitions in files: JSON and TOML of our own, FCL of IEC 61131-7, FIS of MATLAB and Octave, FLL of fuzzylite.
 
-Imports: engines, terms.
+Imports: terms, engines.
 """
 
 from __future__ import annotations

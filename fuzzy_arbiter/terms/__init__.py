@@ -2,3 +2,8 @@
 
 Imports: nothing.
 """
+
+from fuzzy_arbiter.terms.curves import Curve, curve
+from fuzzy_arbiter.terms.values import Constant, Formula, Linear
+
+__all__ = ["Constant", "Curve", "Formula", "Linear", "curve"]

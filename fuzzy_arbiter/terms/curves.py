@@ -37,7 +37,7 @@ class Curve(Membership):
 
     Examples
     --------
-    >>> from fuzzy_arbiter.terms.curves import Curve
+    >>> from fuzzy_arbiter.terms import Curve
     >>> Curve("s_shape", (0.0, 2.0))(0.5)
     0.125
     """
@@ -190,7 +190,7 @@ def curve(kind: str, *parameters: float, height: float = 1.0) -> Membership:
 
     Examples
     --------
-    >>> from fuzzy_arbiter.terms.curves import curve
+    >>> from fuzzy_arbiter.terms import curve
     >>> round(curve("gaussian", 5.0, 2.0)(7.0), 4)
     0.6065
     """

@@ -1,4 +1,4 @@
-"""The kinds of smooth membership functions: each is one entry here, with all that any engine, format or export needs."""
+"""The kinds of smooth membership functions: each is one entry, with all that engines, formats and exports need."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ class Constant(Value):
 
     Examples
     --------
-    >>> from fuzzy_arbiter.terms.values import Constant
+    >>> from fuzzy_arbiter.terms import Constant
     >>> Constant(15).value
     15.0
     """
@@ -95,7 +95,7 @@ class Linear(Value):
 
     Examples
     --------
-    >>> from fuzzy_arbiter.terms.values import Linear
+    >>> from fuzzy_arbiter.terms import Linear
     >>> Linear((2.0, 0.5), 1.0).expression(["speed", "depth"]).text
     '2 * speed + 0.5 * depth + 1'
     """
@@ -173,7 +173,7 @@ class Formula(Value, Membership):
 
     Examples
     --------
-    >>> from fuzzy_arbiter.terms.values import Formula
+    >>> from fuzzy_arbiter.terms import Formula
     >>> Formula("1 / (1 + x^2)")(1.0)
     0.5
     """

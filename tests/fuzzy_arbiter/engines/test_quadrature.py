@@ -13,7 +13,7 @@ from scipy.integrate import quad
 
 from fuzzy_arbiter import Arbiter, Output, Rule, System, Term, Variable, falling, rising, triangle
 from fuzzy_arbiter.engines.exact import ExactEngine
-from fuzzy_arbiter.engines.quadrature import BOUND
+from fuzzy_arbiter.engines.quadrature import BOUND, Quadrature
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.norms import AGGREGATIONS, T_NORMS
 from fuzzy_arbiter.propositions import Is
@@ -45,7 +45,7 @@ def system(output, implication="min", blocks=None):
 
 
 def sampled(output, cuts, implications, points=500_000):
-    """Places and joined heights in the middles of many cells, whose centroid is off by no more than their width squared."""
+    """Places and joined heights in the middles of many cells, whose centroid is off by their width squared."""
     low, high = output.universe
     x = low + (high - low) * (np.arange(points) + 0.5) / points
     y = np.zeros(points)
@@ -124,19 +124,13 @@ def area_of(shape, cut):
 @settings(max_examples=examples(40), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(shapes(), min_size=1, max_size=3), st.data())
 def test_on_straight_terms_it_gives_what_the_sweep_gives(drawn, data):
-    """Which is rational, see test_exact: by an operator of its own a rule of all 1 makes the engine take the long way."""
+    """Which is rational, see test_exact."""
     output = Output("y", (0.0, 1.0), tuple(Term(f"t{j}", shape) for j, shape in enumerate(drawn)))
     cuts = [data.draw(st.integers(1, 16)) / 16 for _ in drawn]
     engine = ExactEngine(system(output))
-    engine._ways[0] = type_of_quadrature()(output, engine.firing.slots[0])
+    engine._ways[0] = Quadrature(output, engine.firing.slots[0])
     exact = reference.centroid(output, list(map(Fraction, cuts)))
     assert engine.centroids(cuts)[0] == pytest.approx(float(exact), abs=1e-12)
-
-
-def type_of_quadrature():
-    from fuzzy_arbiter.engines.quadrature import Quadrature
-
-    return Quadrature
 
 
 @pytest.mark.parametrize("aggregation", ["max", "probor", "sum", "drastic_sum", "nilpotent_maximum", "normalized_sum"])

@@ -52,7 +52,7 @@ def test_a_formula_speaks_of_inputs_and_of_outputs_before():
     assert Arbiter(system=made)([3.0, 2.0]) == (9.0, 7.0)
     assert Arbiter(system=made).batch([[3.0, 2.0], [1.0, 4.0]]).tolist() == [[9.0, 7.0], [1.0, 3.0]]
     with pytest.raises(
-        DefinitionError, match="output 'v': .*asks for u, expected inputs, or outputs before its own: x"
+        DefinitionError, match=r"output 'v': .*asks for u, expected inputs, or outputs before its own: x"
     ):
         System((X, Z), (second, first), ("if x is any then u is t and v is t",), normalization="none")
 
@@ -110,7 +110,7 @@ def test_a_condition_may_ask_for_an_output_of_the_rules_before():
         low, high = 1 - x / 10, (x / 10) ** 2
         assert Arbiter(system=made)([x])[1] == pytest.approx((low + 2 * high) / (low + high), abs=1e-14)
         assert Arbiter(system=made).batch([[x]])[0, 1] == pytest.approx((low + 2 * high) / (low + high), abs=1e-14)
-    with pytest.raises(DefinitionError, match="R1 .*asks for output 'power', on which no rule before concludes"):
+    with pytest.raises(DefinitionError, match=r"R1 .*asks for output 'power', on which no rule before concludes"):
         replace(made, rules=(made.rules[2],))
     with pytest.raises(EngineError, match="engine 'grid': R3 asks for the output 'power'"):
         Arbiter(system=made, engine="grid")

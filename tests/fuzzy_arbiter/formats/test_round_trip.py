@@ -6,13 +6,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import ArbiterError, Output, Shape, System, Term, Variable, prioritised
+from fuzzy_arbiter import Arbiter, ArbiterError, Output, Shape, System, Term, Variable, prioritised
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import FORMATS, reads, writes
 from fuzzy_arbiter.hierarchy import FORMS
 from fuzzy_arbiter.propositions import Is, Not
 from tests.examples import examples
-from tests.fuzzy_arbiter.formats.systems import TIPPING, systems
+from tests.fuzzy_arbiter.formats.systems import RICHER, TIPPING, systems
 
 relaxed = settings(max_examples=examples(40), suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 
@@ -22,6 +22,15 @@ relaxed = settings(max_examples=examples(40), suppress_health_check=[HealthCheck
 def test_prioritised_systems_come_back(format, form):
     for system in (prioritised(form=form), prioritised(form=form, normalization="sum", outside="clip", points=77)):
         assert reads(writes(system, format), format) == system
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_richer_systems_come_back_and_give_the_same(format):
+    system = RICHER[format]
+    again = reads(writes(system, format), format)
+    assert again == system
+    rows = [[2.5, 3.0], [6.5, 3.0], [9.0, 9.5]]
+    assert Arbiter(system=again).batch(rows).tolist() == Arbiter(system=system).batch(rows).tolist()
 
 
 @pytest.mark.parametrize("format", FORMATS)
