@@ -134,7 +134,10 @@ def _term(value: str, where: str) -> Shape:
     except ArbiterError as error:
         said = re.sub(r"^criteria\[0\](?:\.membership)?(?:: criterion 'x')?", where, str(error))
         raise ScenarioError(said if said.startswith(where) else f"{where}: {said}") from error
-    return variable.terms[-1].shape
+    term = variable.terms[-1].shape
+    if not getattr(term, "points", ()):
+        raise ScenarioError(f"{where}: expected a term that is straight between points; arbiter.file takes any")
+    return term
 
 
 def check_criteria_of_regions(regions: Sequence[SecondaryRegion], criteria: Sequence[CriterionSetup]) -> None:

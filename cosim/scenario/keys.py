@@ -70,7 +70,9 @@ KEYS = {
     ),
     "arbiter.text": Key("", "what stands in it", "; runs write it into their folder"),
     "arbiter.inputs": Key("", "what each input of these rules gets", default="none"),
-    "criteria": Key("", "what regions may ask attention for", ", see [criteria.md](criteria.md)", default="the paper's three"),
+    "criteria": Key(
+        "", "what regions may ask attention for", ", see [criteria.md](criteria.md)", default="the paper's three"
+    ),
     "criteria[].name": Key("", "its own: a letter, then at most 23 letters, digits and _"),
     "criteria[].order": Key("", "priority: the least comes first", default="its place in the list"),
     "criteria[].colour": Key("", "of figures and pages, `#RRGGBB`", default="one that no other has"),
