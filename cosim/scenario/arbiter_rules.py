@@ -159,8 +159,8 @@ def _require_weights(file: str, system: System) -> None:
     without = [output.name for output in system.outputs if output.default is None]
     if without and not _always_fires(Arbiter(system=system)):
         raise ScenarioError(
-            f"arbiter.file: {file}: output {without[0]!r} has no default, expected one: not for all inputs does a rule fire, "
-            "as far as can be proved"
+            f"arbiter.file: {file}: output {without[0]!r} has no default, expected one: "
+            "it is not proved that a rule fires for all inputs"
         )
 
 
