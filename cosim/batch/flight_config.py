@@ -95,7 +95,7 @@ class Workspace(NamedTuple):
     ticks: NDArray[np.int64]  # (2,)
 
 
-def make_workspace(regions: int, inputs: int, thrusters: int, criteria: int = 3, arbiter_inputs: int = 3) -> Workspace:
+def make_workspace(regions: int, inputs: int, thrusters: int, criteria: int, arbiter_inputs: int) -> Workspace:
     """Return the workspace of a flight.
 
     Parameters

@@ -87,7 +87,7 @@ def _of_flight(goal: PackedRegions, regions: PackedRegions) -> tuple[Any, ...]:
     out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), _FLAT, np.zeros((0, 0)))
     law, allocator = BoundLaw(0, 0, True, _FLAT, _FLAT), Allocator(np.zeros((1, 1, 6)), _TABLE, _TABLE, True)
     arbiter = BoundArbiter(0, 0)
-    return setup, native, native, native, allocator, law, arbiter, make_workspace(1, 1, 1), out
+    return setup, native, native, native, allocator, law, arbiter, make_workspace(1, 1, 1, 3, 3), out
 
 
 def shipped_texts() -> dict[str, str]:

@@ -131,10 +131,13 @@ def _term(value: str, where: str) -> Shape:
     text = f'{{"criteria": [{{"name": "x", "on": "pressing", "off": "satisfied", "membership": {value}}}]}}'
     try:
         (variable,) = reads(text, "json").inputs
-        return variable.terms[-1].straight
     except ArbiterError as error:
         said = re.sub(r"^criteria\[0\](?:\.membership)?(?:: criterion 'x')?", where, str(error))
         raise ScenarioError(said if said.startswith(where) else f"{where}: {said}") from error
+    term = variable.terms[-1].shape
+    if not isinstance(term, Shape):
+        raise ScenarioError(f"{where}: expected a term that is straight between points; arbiter.file takes any")
+    return term
 
 
 def check_criteria_of_regions(regions: Sequence[SecondaryRegion], criteria: Sequence[CriterionSetup]) -> None:

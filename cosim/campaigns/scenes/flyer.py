@@ -26,6 +26,7 @@ from cosim.batch.fused_loop import fly_law
 from cosim.campaigns.scenes.scene import KnownScene, Scene, known_scene, plant_values
 from cosim.errors import RunError
 from cosim.scenario.arbiter_rules import PAPER_RULES
+from cosim.scenario.criteria import PAPER
 from cosim.scenario.sensor_suite import outage_schedule, sensor_model, sensor_parameters
 from cosim.scenario.tables import Outage
 from cosim.scenario.vehicle_model import vehicle_model
@@ -167,8 +168,8 @@ class SceneFlyer:
         losses = plant.native(LOSSES, ())
         losses.inputs[:] = [sensors.get(name, 0.0) for name in LOSSES]
         setup = self._setup(scene, known, sensors)
-        rows = np.zeros((c.controls, 20 + m + law.report.size) if trace else (0, 0))
-        workspace = make_workspace(known.regions.kinds.size, m, m)
+        rows = np.zeros((c.controls, 17 + len(PAPER) + m + law.report.size) if trace else (0, 0))
+        workspace = make_workspace(known.regions.kinds.size, m, m, len(PAPER), len(PAPER_RULES.inputs))
         metrics, _ = fly_law(
             setup, native, effectiveness, losses, self._allocator(), law, PAPER_RULES.system, workspace, rows
         )
