@@ -10,7 +10,6 @@ from typing import Literal, TypeVar, get_args
 
 from fuzzy_arbiter.checks import all_of, finite, require_name, shown
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.references import require_rule, require_values
 from fuzzy_arbiter.rule import Rule
@@ -18,6 +17,7 @@ from fuzzy_arbiter.rule_text import parse_rule
 from fuzzy_arbiter.shapes import Membership
 from fuzzy_arbiter.terms.automatic import AutomaticTerms
 from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from fuzzy_arbiter.terms.term import Term
 from fuzzy_arbiter.terms.values import Formula, Value, invertible
 
@@ -141,7 +141,7 @@ class Output(Variable):
         largest of the places where they are greatest; for terms that are values (Sugeno), or that only rise or only
         fall (Tsukamoto), the mean of the values, weighted by strength, or their sum.
     aggregation : str
-        How the rules' conclusions are joined: one of `fuzzy_arbiter.norms.AGGREGATIONS`. Of values it joins the
+        How the rules' conclusions are joined: one of `fuzzy_arbiter.terms.norms.AGGREGATIONS`. Of values it joins the
         strengths of those rules that conclude one term.
     lock_range : bool
         Whether the value is held within the universe.
@@ -235,9 +235,9 @@ class System:
     name : str
         What the system is called in files.
     conjunction : str
-        Degree of *and*: ``min``, ``prod`` or another of `fuzzy_arbiter.norms.T_NORMS`.
+        Degree of *and*: ``min``, ``prod`` or another of `fuzzy_arbiter.terms.norms.T_NORMS`.
     disjunction : str
-        Degree of *or*: ``max``, ``probor``, which is a + b - a b, or another of `fuzzy_arbiter.norms.S_NORMS`.
+        Degree of *or*: ``max``, ``probor``, which is a + b - a b, or another of `fuzzy_arbiter.terms.norms.S_NORMS`.
     implication : str
         How a rule's strength bounds its output's term: ``min`` clips it, ``prod`` scales it; or another of the first.
     normalization : {"none", "range", "sum", "max"}

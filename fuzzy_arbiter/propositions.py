@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 from fuzzy_arbiter.checks import all_of, shown
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.norms import HEDGES
 from fuzzy_arbiter.shapes import Membership
+from fuzzy_arbiter.terms.norms import HEDGES
 
 MAX_NESTING = 100  # parentheses and negations within each other; what is deeper is no rule that a person wrote
 KEYWORDS = ("if", "then", "and", "or", "not", "is", "with", "any")
@@ -198,7 +198,7 @@ class Hedged(Proposition):
     Attributes
     ----------
     hedge : {"very", "somewhat", "extremely", "seldom"}
-        How it bends the degree, see `fuzzy_arbiter.norms.HEDGES`.
+        How it bends the degree, see `fuzzy_arbiter.terms.norms.HEDGES`.
     part : Proposition
         What is bent.
     """

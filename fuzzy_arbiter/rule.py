@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 from fuzzy_arbiter.checks import all_of, finite, shown
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.norms import S_NORMS, T_NORMS
 from fuzzy_arbiter.propositions import Is, Proposition
+from fuzzy_arbiter.terms.norms import S_NORMS, T_NORMS
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,9 +17,9 @@ class Operators:
     Attributes
     ----------
     conjunction, implication : str
-        One of `fuzzy_arbiter.norms.T_NORMS`.
+        One of `fuzzy_arbiter.terms.norms.T_NORMS`.
     disjunction : str
-        One of `fuzzy_arbiter.norms.S_NORMS`.
+        One of `fuzzy_arbiter.terms.norms.S_NORMS`.
 
     Raises
     ------

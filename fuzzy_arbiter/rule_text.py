@@ -9,9 +9,9 @@ from typing import Any
 
 from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.norms import HEDGES
 from fuzzy_arbiter.propositions import KEYWORDS, MAX_NESTING, And, Anything, Hedged, Is, Not, Or, Proposition
 from fuzzy_arbiter.rule import Rule
+from fuzzy_arbiter.terms.norms import HEDGES
 
 _TOKEN = re.compile(
     r"""\s*(?: (?P<quoted>"[^"]*") | (?P<number>[0-9.]+(?:[eE][+-]?[0-9]+)?(?![A-Za-z_]))

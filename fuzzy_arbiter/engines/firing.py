@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fuzzy_arbiter.definition import Output, System
-from fuzzy_arbiter.norms import AGGREGATIONS, HEDGES, S_NORMS, T_NORMS
 from fuzzy_arbiter.propositions import And, Anything, Hedged, Is, Not, Or, Proposition
 from fuzzy_arbiter.rule import Operators
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, HEDGES, S_NORMS, T_NORMS
 
 Array = NDArray[np.float64]
 D = TypeVar("D")

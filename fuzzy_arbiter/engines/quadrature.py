@@ -16,9 +16,9 @@ import numpy as np
 from fuzzy_arbiter.definition import Output
 from fuzzy_arbiter.engines.firing import Slot
 from fuzzy_arbiter.errors import EngineError
-from fuzzy_arbiter.norms import AGGREGATIONS, T_NORMS
 from fuzzy_arbiter.shapes import Array, Membership
 from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
 
 BOUND = 1e-9  # of the universe's width: more than a centroid is off
 _TOLERANCE = 1e-13  # of the area, for each part

@@ -6,8 +6,8 @@ import inspect
 import re
 from collections.abc import Iterable
 
-from fuzzy_arbiter import norms
 from fuzzy_arbiter.errors import UnsupportedError
+from fuzzy_arbiter.terms import norms
 
 # each as IEEE 754 has it, where Python raises
 _PYTHON = {

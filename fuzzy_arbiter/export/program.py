@@ -23,11 +23,11 @@ from fuzzy_arbiter.engines.sweep import Outline, outline
 from fuzzy_arbiter.errors import DefinitionError, UnsupportedError
 from fuzzy_arbiter.export.functions import called
 from fuzzy_arbiter.hierarchy import DEGREE
-from fuzzy_arbiter.norms import AGGREGATIONS, T_NORMS
 from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.shapes import Membership, Shape
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.expressions import code
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
 from fuzzy_arbiter.terms.values import Formula, Value
 
 _JOINS = {name: norm.code for name, norm in {**T_NORMS, **AGGREGATIONS}.items()}

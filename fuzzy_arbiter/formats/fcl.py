@@ -12,9 +12,9 @@ from fuzzy_arbiter.formats.fcl_terms import say_shape, universe_of
 from fuzzy_arbiter.formats.fcl_words import METHODS, RESERVED, cut
 from fuzzy_arbiter.formats.notation import blocks, cannot_say, require_word, require_words, say_number
 from fuzzy_arbiter.formats.settings import read_settings, say_settings
-from fuzzy_arbiter.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.shapes import Shape
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from fuzzy_arbiter.terms.values import Formula, Linear
 
 _SETTINGS = ("normalization", "outside", "points")

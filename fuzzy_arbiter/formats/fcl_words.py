@@ -6,7 +6,7 @@ import re
 from typing import NamedTuple
 
 from fuzzy_arbiter.formats.notation import refuse
-from fuzzy_arbiter.norms import S_NORMS, T_NORMS
+from fuzzy_arbiter.terms.norms import S_NORMS, T_NORMS
 
 # of IEC 61131-7 and of jFuzzyLogic's grammar
 _WORDS = (

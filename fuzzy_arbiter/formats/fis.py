@@ -10,11 +10,11 @@ from fuzzy_arbiter.formats.fis_reader import read
 from fuzzy_arbiter.formats.fis_words import DEFUZZIFIERS, MATLAB, SETTINGS
 from fuzzy_arbiter.formats.notation import cannot_say, say_number, say_numbers
 from fuzzy_arbiter.formats.settings import say_settings
-from fuzzy_arbiter.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
 from fuzzy_arbiter.shapes import Shape
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.kinds import KINDS
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from fuzzy_arbiter.terms.term import Term
 from fuzzy_arbiter.terms.values import Constant, Linear
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from fuzzy_arbiter.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from fuzzy_arbiter.shapes import falling, rising
 from fuzzy_arbiter.terms.kinds import KINDS
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
 
 SETTINGS = ("normalization", "outside", "points")
 

@@ -9,9 +9,9 @@ from fuzzy_arbiter.formats.fll_terms import RESERVED, say_shape
 from fuzzy_arbiter.formats.fll_words import DEFUZZIFIERS, settings_of
 from fuzzy_arbiter.formats.notation import blocks, cannot_say, require_words, say_number, say_numbers
 from fuzzy_arbiter.formats.settings import say_settings
-from fuzzy_arbiter.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from fuzzy_arbiter.propositions import And, Anything, Hedged, Is, Not, Or, Proposition
 from fuzzy_arbiter.rule import Rule
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
 
 __all__ = ["read", "write"]
 

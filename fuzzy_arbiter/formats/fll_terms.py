@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.notation import read_number, refuse, say_number, say_numbers
-from fuzzy_arbiter.norms import HEDGES
 from fuzzy_arbiter.shapes import Membership, Point, Shape
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.functions import WORDS
 from fuzzy_arbiter.terms.kinds import KINDS
+from fuzzy_arbiter.terms.norms import HEDGES
 from fuzzy_arbiter.terms.values import Constant, Formula, Linear, Value
 
 _FUNCTIONS = "acosh asinh atanh gt lt le ge eq neq abs fabs"

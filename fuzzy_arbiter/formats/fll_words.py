@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fuzzy_arbiter.definition import Output
-from fuzzy_arbiter.norms import AGGREGATIONS, S_NORMS, T_NORMS
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
 
 CONJUNCTIONS = {norm.fll: name for name, norm in T_NORMS.items()}  # and implications
 DISJUNCTIONS = {norm.fll: name for name, norm in S_NORMS.items()}

@@ -1,4 +1,4 @@
-"""Terms beyond straight lines: curves by name, values of Sugeno outputs, and the expressions that both are made of.
+"""What terms are made of beyond straight lines: curves by name, values, expressions; and the norms that join degrees.
 
 Imports: nothing.
 """

@@ -15,10 +15,10 @@ from fuzzy_arbiter import Arbiter, Output, Rule, System, Term, Variable, falling
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.engines.quadrature import BOUND, Quadrature
 from fuzzy_arbiter.errors import EngineError
-from fuzzy_arbiter.norms import AGGREGATIONS, T_NORMS
 from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.rule import Operators
 from fuzzy_arbiter.terms.curves import curve
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
 from fuzzy_arbiter.terms.values import Formula
 from tests.examples import examples
 from tests.fuzzy_arbiter import reference

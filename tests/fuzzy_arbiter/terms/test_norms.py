@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fuzzy_arbiter.norms import AGGREGATIONS, HEDGES, S_NORMS, T_NORMS
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, HEDGES, S_NORMS, T_NORMS
 
 # Klement, Mesiar, Pap: Triangular Norms, 2000; and fuzzylite's manual for the normalized sum
 DEFINED = {
