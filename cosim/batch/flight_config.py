@@ -95,12 +95,14 @@ class Workspace(NamedTuple):
     ticks: NDArray[np.int64]  # (2,)
 
 
-def make_workspace(regions: int, inputs: int, thrusters: int, criteria: int, arbiter_inputs: int) -> Workspace:
+def make_workspace(setup: FlightConfig, criteria: int, inputs: int, thrusters: int) -> Workspace:
     """Return the workspace of a flight.
 
     Parameters
     ----------
-    regions, inputs, thrusters, criteria, arbiter_inputs : int
+    setup : FlightConfig
+        Of the flight.
+    criteria, inputs, thrusters : int
         How many there are.
 
     Returns
@@ -108,13 +110,13 @@ def make_workspace(regions: int, inputs: int, thrusters: int, criteria: int, arb
     Workspace
         All zero, all thrusters healthy.
     """
-    n = regions
+    n = setup.criteria.size
     return Workspace(
         state=VehicleState(np.zeros(3), np.zeros(4), np.zeros(6), np.ones(thrusters), np.zeros(12)),
         measurements=empty_measurements(),
         navigation=empty_memory(),
         now=np.zeros(1),
-        signals=empty_signals(n, criteria, arbiter_inputs),
+        signals=empty_signals(setup.inputs, n, criteria),
         by_criterion=np.zeros(criteria),
         weights=np.zeros(n),
         clearances=np.zeros(n),

@@ -143,7 +143,7 @@ class FusedFlyer:
         decisions = -(-scenario.steps // scenario.control_every)
         criteria, rules = len(scenario.criteria), scenario.rules
         rows = np.zeros((decisions, 17 + criteria + len(inputs) + law.report.size) if trace else (0, 0))
-        workspace = make_workspace(len(scenario.regions), len(inputs), n, criteria, len(rules.inputs))
+        workspace = make_workspace(setup, criteria, len(inputs), n)
         metrics, estimate = fly_law(setup, native, effectiveness, losses, allocator, law, rules.system, workspace, rows)
         return _outcome(metrics, setup, native, estimate), rows
 

@@ -61,10 +61,8 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     yield evaluate_packed, (regions, state.position, state.quaternion, _FLAT, _TABLE, _TABLE, _FLAT)
     yield write_clearances, (regions, _TABLE, _FLAT, _FLAT)
     yield ray_distances, (regions, state.position, _TABLE, 1.0, _FLAT)
-    yield (
-        compute_inputs,
-        (pack_inputs((), PAPER, PAPER_RULES, 1.0), goal, regions, state, _FLAT, _FLAT, empty_signals(1, 3, 3)),
-    )
+    inputs = pack_inputs((), PAPER, PAPER_RULES, 1.0)
+    yield compute_inputs, (inputs, goal, regions, state, _FLAT, _FLAT, empty_signals(inputs, 1, 3))
     yield fly, _of_flight(goal, regions)
 
 
@@ -87,7 +85,7 @@ def _of_flight(goal: PackedRegions, regions: PackedRegions) -> tuple[Any, ...]:
     out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), _FLAT, np.zeros((0, 0)))
     law, allocator = BoundLaw(0, 0, True, _FLAT, _FLAT), Allocator(np.zeros((1, 1, 6)), _TABLE, _TABLE, True)
     arbiter = BoundArbiter(0, 0)
-    return setup, native, native, native, allocator, law, arbiter, make_workspace(1, 1, 1, 3, 3), out
+    return setup, native, native, native, allocator, law, arbiter, make_workspace(setup, 3, 1, 1), out
 
 
 def shipped_texts() -> dict[str, str]:

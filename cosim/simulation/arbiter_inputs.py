@@ -26,7 +26,7 @@ _AHEAD = 1e-5  # s, over which a closing speed is taken: rounding makes 1e-9 m/s
 
 
 class PackedInputs(NamedTuple):
-    """What each of the m inputs of the arbiter's rules gets."""
+    """What each of the m inputs of the arbiter's rules gets; no rows where they are the memberships as they stand."""
 
     memberships: PackedMemberships
     kinds: NDArray[np.int64]  # (m,) in the order of `_KINDS`
@@ -72,12 +72,14 @@ def pack_inputs(
     """
     signals, system = rules.inputs, rules.system
     memberships = pack_memberships(regions, criteria, ramp)
+    if [(signal.kind, signal.of) for signal in signals] == [("membership", i) for i in range(len(criteria))]:
+        signals = ()
     courses = [signal.course for signal in signals]
     return PackedInputs(
         memberships=memberships,
         kinds=np.array([_KINDS.index(signal.kind) for signal in signals], np.int64),
         places=np.array([signal.of for signal in signals], np.int64),
-        upper=np.array([variable.universe[1] for variable in system.inputs]),
+        upper=np.array([variable.universe[1] for variable in system.inputs[: len(signals)]]),
         offsets=np.cumsum([0, *map(len, courses)], dtype=np.int64),
         times=np.array([time for course in courses for time, _ in course], float),
         values=np.array([value for course in courses for _, value in course], float),
@@ -86,11 +88,11 @@ def pack_inputs(
     )
 
 
-def empty_signals(n_regions: int, n_criteria: int, n_inputs: int) -> ArbiterSignals:
+def empty_signals(packed: PackedInputs, n_regions: int, n_criteria: int) -> ArbiterSignals:
     """Return room for what `compute_inputs` works out; nothing is met at first."""
-    return ArbiterSignals(
-        np.zeros(n_criteria), np.zeros(n_inputs), np.zeros(1), np.zeros(n_regions + 1), np.full(n_regions, np.inf)
-    )
+    memberships = np.zeros(n_criteria)
+    inputs = np.zeros(packed.kinds.size) if packed.kinds.size else memberships
+    return ArbiterSignals(memberships, inputs, np.zeros(1), np.zeros(n_regions + 1), np.full(n_regions, np.inf))
 
 
 def compute_inputs(

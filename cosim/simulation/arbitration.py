@@ -54,10 +54,9 @@ class Arbitration:
         self._of_region = np.array(scenario.criterion_places, dtype=np.int64)
         self._arbiter, self._state, self._now, self._clearances = arbiter, state, now, clearances
         self._memberships, self._weights, self._inputs = memberships, weights, inputs
-        self._packed = pack_inputs(scenario.regions, scenario.criteria, scenario.rules, scenario.arbiter.ramp)
-        self._signals: ArbiterSignals = empty_signals(
-            len(scenario.regions), memberships.size, len(scenario.rules.inputs)
-        )
+        packed = pack_inputs(scenario.regions, scenario.criteria, scenario.rules, scenario.arbiter.ramp)
+        self._packed = packed
+        self._signals: ArbiterSignals = empty_signals(packed, len(scenario.regions), memberships.size)
         self._compute = CompiledFunction(compute_inputs)
         self._weighed: list[float] | None = None  # inputs that the weights are of
 

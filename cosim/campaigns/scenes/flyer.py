@@ -169,7 +169,7 @@ class SceneFlyer:
         losses.inputs[:] = [sensors.get(name, 0.0) for name in LOSSES]
         setup = self._setup(scene, known, sensors)
         rows = np.zeros((c.controls, 17 + len(PAPER) + m + law.report.size) if trace else (0, 0))
-        workspace = make_workspace(known.regions.kinds.size, m, m, len(PAPER), len(PAPER_RULES.inputs))
+        workspace = make_workspace(setup, len(PAPER), m, m)
         metrics, _ = fly_law(
             setup, native, effectiveness, losses, self._allocator(), law, PAPER_RULES.system, workspace, rows
         )

@@ -50,7 +50,7 @@ def inputs_of(signals, state, now=0.0):
     goal, regions = pack([GOAL]), pack(REGIONS)
     goal.move_to(now)
     regions.move_to(now)
-    found = empty_signals(len(REGIONS), 3, len(signals))
+    found = empty_signals(packed, len(REGIONS), 3)
     compute_inputs(packed, goal, regions, state, np.array([now]), clearances_of(REGIONS, state, now), found)
     return found
 
