@@ -4,8 +4,8 @@
 # make coverage  how much of the code the tests go through, against floors
 # make docs   the documents as a site, in build/site
 # make laws   the C of all that is run as C, in build/laws
-# make dist   source distribution and wheel, in dist/
-# make packaging  what is shipped: its contents, and runs from the wheel in an empty environment
+# make dist   source distributions and wheels of fuzzy-arbiter and subreach, in dist/
+# make packaging  what is shipped: its contents, and runs from the wheels in an empty environment
 # make tour       every command of README and tutorial as printed, in fresh clones; most of an hour
 # make lowest     tests with the lowest versions of all that is needed, on Python 3.11
 # make portable   the fast tests with other kernels, processors and Pythons: an hour, or make portable PORTABLE='--only zen'
@@ -24,6 +24,8 @@ PORTABLE ?=
 # uv takes seconds where pip takes minutes
 INSTALL := $(if $(shell command -v uv),uv pip install --python $(BIN)/python,$(BIN)/python -m pip install \
 	--disable-pip-version-check) --quiet
+# two distributions: the arbiter's, and that of all the rest, which needs it
+HERE := --editable ./fuzzy_arbiter --editable
 # tests start hundreds of processes: where bytecode is not kept, each compiles what it imports again
 export PYTHONDONTWRITEBYTECODE =
 
@@ -50,7 +52,7 @@ mutation-sample: $(VENV)/extras
 	$(BIN)/python -m tests.mutation --sample 40
 
 docs: $(VENV)/extras
-	$(INSTALL) --editable '.[docs]'
+	$(INSTALL) $(HERE) '.[docs]'
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
 bench: $(VENV)/extras
@@ -62,6 +64,7 @@ laws: $(VENV)/installed
 
 dist: $(VENV)/extras
 	rm -rf dist
+	$(BIN)/python -m build --outdir dist fuzzy_arbiter
 	$(BIN)/python -m build --outdir dist
 	$(PYTHON) -m venv build/twine
 	build/twine/bin/python -m pip install --quiet --disable-pip-version-check twine
@@ -79,27 +82,29 @@ LOWEST_TESTS := tests/controller tests/fuzzy_arbiter tests/plant_fmu tests/cosim
 lowest:
 	$(PYTHON) -m venv $(LOWEST)/uv
 	$(LOWEST)/uv/bin/python -m pip install --quiet --disable-pip-version-check uv
-	$(LOWEST)/uv/bin/uv pip compile --quiet --resolution lowest-direct --python-version 3.11 --extra campaign --extra mcap \
-		--output-file $(LOWEST)/requirements.txt pyproject.toml
+	echo ./fuzzy_arbiter > $(LOWEST)/arbiter.in
+	$(LOWEST)/uv/bin/uv pip compile --quiet --resolution lowest-direct --python-version 3.11 --extra campaign --extra mcap --extra skfuzzy \
+		--no-emit-package fuzzy-arbiter --output-file $(LOWEST)/requirements.txt \
+		pyproject.toml fuzzy_arbiter/pyproject.toml $(LOWEST)/arbiter.in
 	$(LOWEST)/uv/bin/uv venv --quiet --clear --python 3.11 $(LOWEST)/env
 	VIRTUAL_ENV=$(LOWEST)/env $(LOWEST)/uv/bin/uv pip install --quiet --requirement $(LOWEST)/requirements.txt \
 		hypothesis pytest pytest-timeout
-	VIRTUAL_ENV=$(LOWEST)/env $(LOWEST)/uv/bin/uv pip install --quiet --no-deps --editable .
+	VIRTUAL_ENV=$(LOWEST)/env $(LOWEST)/uv/bin/uv pip install --quiet --no-deps $(HERE) .
 	$(LOWEST)/env/bin/python -m pytest -q -o filterwarnings= $(LOWEST_TESTS) $(PYTEST_FLAGS) # old versions warn
 
 portable: $(VENV)/extras
 	$(BIN)/python -m tests.portability $(PORTABLE)
 
 # the product alone: a run needs nothing of what the tests do
-$(VENV)/installed: pyproject.toml
+$(VENV)/installed: pyproject.toml fuzzy_arbiter/pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "Python 3.11 or later is needed")'
 	@echo 'Setting up $(VENV); the first time some hundred MB are downloaded, which takes minutes'
 	$(PYTHON) -m venv $(VENV)
-	$(INSTALL) --editable '.$(addsuffix ],$(addprefix [,$(COMPILER)))'
+	$(INSTALL) $(HERE) '.$(addsuffix ],$(addprefix [,$(COMPILER)))'
 	@touch $@
 
 $(VENV)/extras: $(VENV)/installed
-	$(INSTALL) --editable '.[$(EXTRAS)]'
+	$(INSTALL) $(HERE) '.[$(EXTRAS)]'
 	@touch $@
 
 clean:

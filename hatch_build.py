@@ -2,9 +2,11 @@
 
 With them vehicles' FMUs and the laws need no compiler where the package is used. A source distribution gets those of
 all platforms, compiled by the ziglang package; a wheel that is built from it holds them too, and nothing is compiled
-then. A wheel that is built from a checkout, as ``pip install .`` does, gets those of this machine alone, compiled by
-``cc`` where there is one, and its name says for which machine it is. An editable installation has none and compiles
-when it must.
+then. A wheel that is built from a checkout, as ``pip install ./fuzzy_arbiter .`` does, gets those of this machine
+alone, compiled by ``cc`` where there is one, and its name says for which machine it is. An editable installation has
+none and compiles when it must.
+
+The arbiter is a distribution of its own, which `fuzzy_arbiter/pyproject.toml` describes.
 """
 
 from __future__ import annotations

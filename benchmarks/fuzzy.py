@@ -56,6 +56,9 @@ def measure(steps: int, repeats: int) -> list[Row]:
     for engine in ("auto", "closed", "exact", "grid", "skfuzzy"):
         arbiter = Arbiter(engine=engine)
         add(f"one call: {engine} ({arbiter.engine})", _calls(arbiter, few if engine == "skfuzzy" else steps, repeats))
+    forms = ("a dict", _named), ("an array", np.array), ("keywords", None)
+    for words, form in forms:
+        add(f"one call: closed, {words} in the place of a list", _calls(Arbiter(), steps, repeats, form))
     add("one call: closed, compiled", _compiled(Arbiter(engine="closed"), steps, repeats))
     for n in (3, 10, 40):
         criteria = [Criterion(f"c{i + 1}") for i in range(n)]
@@ -104,9 +107,17 @@ def _stock(function: Callable[[dict[str, Any]], Callable[[int], object]], count:
         return timed(Own(function({"points": POINTS})), count, repeats)
 
 
-def _calls(arbiter: Arbiter, calls: int, repeats: int) -> Timing:
-    inputs = _inputs(len(arbiter.system.inputs))
+def _calls(arbiter: Arbiter, calls: int, repeats: int, form: Callable[[list[float]], Any] | None = list) -> Timing:
+    """Time calls with samples in a form; with none, by keywords."""
+    rows = itertools.islice(_inputs(len(arbiter.system.inputs)), 10_000)
+    inputs = itertools.cycle([(_named if form is None else form)(row) for row in rows])
+    if form is None:
+        return time_calls(lambda: arbiter(**next(inputs)), calls, repeats)
     return time_calls(lambda: arbiter(next(inputs)), calls, repeats)
+
+
+def _named(row: list[float]) -> dict[str, float]:
+    return dict(zip((criterion.name for criterion in SECTION_VI), row, strict=True))
 
 
 def _batch(arbiter: Arbiter, inputs: np.ndarray[Any, np.dtype[np.float64]]) -> Callable[[], object]:

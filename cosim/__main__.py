@@ -11,6 +11,9 @@ try:
 except ModuleNotFoundError as error:  # in a checkout that is not installed
     if (error.name or "").partition(".")[0] in ("cosim", "controller", "fuzzy_arbiter", "plant_fmu"):
         raise
-    print(f"cosim: {error.name} is not installed: run {install_hint('.')} in the checkout of subreach", file=sys.stderr)
+    print(
+        f"cosim: {error.name} is not installed: run {install_hint('./fuzzy_arbiter', '.')} in the checkout of subreach",
+        file=sys.stderr,
+    )
     status = 2
 sys.exit(status)

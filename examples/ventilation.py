@@ -22,7 +22,6 @@ from fuzzy_arbiter import (
     Output,
     Rule,
     System,
-    Term,
     Variable,
     falling,
     pictures,
@@ -48,7 +47,7 @@ arbiter = Arbiter([SMOKE, AIR, ROOM], outside="clip")
 afternoon = {"smoke": 0.1, "co2": 950.0, "temperature": 27.0}
 weights = arbiter(afternoon)
 if __name__ == "__main__":
-    print("afternoon:", ", ".join(f"{name} {w:.3f}" for name, w in zip(("smoke", "air", "room"), weights, strict=True)))
+    print("afternoon:", ", ".join(f"{name} {weight:.3f}" for name, weight in weights._asdict().items()))
 
 # %% [markdown]
 # The air is stale to the degree (950 - 800) / 600 = 0.25, so that the room, hot to the degree 0.75, has most of the
@@ -132,11 +131,11 @@ if __name__ == "__main__":
 
 # %%
 smoke, co2, temperature = SMOKE.variable, AIR.variable, ROOM.variable
-outdoors = Variable("outdoors", (-20.0, 40.0), (Term("cold", falling(0.0, 10.0)), Term("warm", rising(20.0, 30.0))))
+outdoors = Variable("outdoors", (-20.0, 40.0), {"cold": falling(0.0, 10.0), "warm": rising(20.0, 30.0)})
 fan = Output(
     "fan",
     (0.0, 100.0),  # [%]
-    (Term("slow", triangle(0, 20, 40)), Term("half", triangle(30, 50, 70)), Term("full", trapezoid(60, 90, 100, 100))),
+    {"slow": triangle(0, 20, 40), "half": triangle(30, 50, 70), "full": trapezoid(60, 90, 100, 100)},
     default=20.0,
 )
 speed = Arbiter(
@@ -150,12 +149,11 @@ speed = Arbiter(
             "if temperature is hot and not (outdoors is warm or outdoors is cold) then fan is full with 0.6",
         ),
         name="fan",
-        normalization="none",  # the centroid itself: a speed
         outside="clip",
     )
 )
 evening = {"smoke": 0.2, "co2": 1250.0, "temperature": 26.0, "outdoors": 15.0}
-(fan_speed,) = speed(evening)
+fan_speed = speed(evening)["fan"]
 if __name__ == "__main__":
     print(f"evening: {fan_speed:.1f} % of the fan's speed, by the {speed.engine} engine")
     print(speed)

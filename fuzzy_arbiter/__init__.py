@@ -1,7 +1,7 @@
 """A fuzzy arbiter of prioritised criteria, which decides to what degree each one matters now.
 
-`Arbiter` loads, saves, decides, explains and verifies. The modules `pictures`, `formats` (files as systems,
-`fold_normalization`) and `export` (C and Python code) are there for those who ask for more.
+`Arbiter` loads, saves, decides, explains and verifies. The modules `terms` (curves, values), `pictures`, `formats`
+(files as systems, `fold_normalization`) and `export` (C and Python code) are there for those who ask for more.
 """
 
 import importlib
@@ -9,27 +9,39 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from fuzzy_arbiter.arbiter import Arbiter
-    from fuzzy_arbiter.definition import Output, System, Term, Variable
-    from fuzzy_arbiter.errors import ArbiterError, UndefinedOutputError
+    from fuzzy_arbiter.definition import Output, System, Variable
+    from fuzzy_arbiter.errors import ArbiterError
     from fuzzy_arbiter.hierarchy import SECTION_VI, Criterion, prioritised
     from fuzzy_arbiter.hysteresis import HysteresisArbiter
     from fuzzy_arbiter.membership import ramp
-    from fuzzy_arbiter.rule import Rule
+    from fuzzy_arbiter.result import Result
+    from fuzzy_arbiter.rule import Operators, Rule
     from fuzzy_arbiter.shapes import Shape, falling, rising, trapezoid, triangle
+    from fuzzy_arbiter.terms.automatic import auto_terms
+    from fuzzy_arbiter.terms.curves import Curve, curve
+    from fuzzy_arbiter.terms.term import Term
+    from fuzzy_arbiter.terms.values import Constant, Formula, Linear
 
 __all__ = [
     "SECTION_VI",
     "Arbiter",
     "ArbiterError",
+    "Constant",
     "Criterion",
+    "Curve",
+    "Formula",
     "HysteresisArbiter",
+    "Linear",
+    "Operators",
     "Output",
+    "Result",
     "Rule",
     "Shape",
     "System",
     "Term",
-    "UndefinedOutputError",
     "Variable",
+    "auto_terms",
+    "curve",
     "falling",
     "prioritised",
     "ramp",
@@ -41,13 +53,18 @@ __all__ = [
 # imported when asked for, so that the command can say what is not installed
 _HOMES = {
     "arbiter": {"Arbiter"},
-    "definition": {"Output", "System", "Term", "Variable"},
-    "errors": {"ArbiterError", "UndefinedOutputError"},
+    "terms.automatic": {"auto_terms"},
+    "definition": {"Output", "System", "Variable"},
+    "errors": {"ArbiterError"},
     "hierarchy": {"SECTION_VI", "Criterion", "prioritised"},
     "hysteresis": {"HysteresisArbiter"},
     "membership": {"ramp"},
-    "rule": {"Rule"},
+    "result": {"Result"},
+    "rule": {"Operators", "Rule"},
     "shapes": {"Shape", "falling", "rising", "trapezoid", "triangle"},
+    "terms.curves": {"Curve", "curve"},
+    "terms.term": {"Term"},
+    "terms.values": {"Constant", "Formula", "Linear"},
 }
 
 

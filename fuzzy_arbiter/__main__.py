@@ -47,7 +47,7 @@ class _Version(argparse.Action):
         from importlib import metadata
 
         try:
-            version = metadata.version("subreach")
+            version = metadata.version("fuzzy-arbiter")
         except metadata.PackageNotFoundError:
             version = "of a folder that is not installed"
         print(f"fuzzy_arbiter {version}")

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from fuzzy_arbiter.definition import Normalization, Output, Outside, System
+from fuzzy_arbiter.definition import Normalization, Output, Outside, System, variable_names
 from fuzzy_arbiter.engines import choose
 from fuzzy_arbiter.engines.firing import Array
-from fuzzy_arbiter.errors import DefinitionError
+from fuzzy_arbiter.errors import DefinitionError, InputError
 from fuzzy_arbiter.hierarchy import SECTION_VI, WEIGHT, Criterion, Form, prioritised
-from fuzzy_arbiter.samples import Sample, Samples
+from fuzzy_arbiter.result import Result, result_class
+from fuzzy_arbiter.samples import Columns, Sample, Samples
 
 if TYPE_CHECKING:
     from fuzzy_arbiter.explanation import Explanation
@@ -46,8 +49,8 @@ class Arbiter:
     Examples
     --------
     >>> from fuzzy_arbiter import Arbiter
-    >>> Arbiter()([1.0, 1.0, 0.0])
-    (1.0, 0.0, 0.0)
+    >>> Arbiter()(obstacle=1.0, shape=1.0, depth=0.0)
+    Result(obstacle=1.0, shape=0.0, depth=0.0)
     """
 
     def __init__(
@@ -74,6 +77,7 @@ class Arbiter:
         self._engine, self._why = choose(system, engine)
         self._shortcut = self._engine.shortcut()
         self._samples = Samples(system)
+        self._result = result_class(system.result_names)
 
     @property
     def system(self) -> System:
@@ -95,80 +99,112 @@ class Arbiter:
         """What checks the inputs."""
         return self._samples
 
-    def __call__(self, inputs: Sample) -> tuple[float, ...]:
-        """Return the weights for one sample.
+    def __call__(self, inputs: Sample | None = None, /, **named: float) -> Result[float]:
+        """Return the value of each output for one sample.
 
         Parameters
         ----------
-        inputs : sequence of float, or mapping from input's name to float
+        inputs : sequence of float, array of shape (inputs,), mapping from input's name to float, or row of a data frame
             One value for each input; for plain criteria the degree in [0, 1] to which each asks for attention.
+        **named : float
+            The same by keywords, in the place of `inputs`.
 
         Returns
         -------
-        tuple of float
-            One weight for each output.
+        Result of float
+            By position and by name; NaN for an output without default if no rule fires for it.
 
         Raises
         ------
         InputError
-            If an input is missing, unknown, not a number, or outside its universe (unless that clips).
-        UndefinedOutputError
-            If no rule fires for an output without default.
-        """
-        if self._shortcut is not None and (type(inputs) is list or type(inputs) is tuple):
-            weights = self._shortcut(inputs)
-            if weights is not None:
-                return weights
-        return self._engine.weights(self._samples.one(inputs))
+            If an input is missing, unknown, masked, not a number, or outside its universe (unless that clips).
 
-    def batch(self, inputs: ArrayLike) -> Array:
-        """Return the weights for many samples.
+        Examples
+        --------
+        >>> from fuzzy_arbiter import Arbiter
+        >>> Arbiter()({"obstacle": 0.5, "shape": 1.0, "depth": 0.0})["shape"]
+        0.5
+        """
+        if named:
+            inputs = named if inputs is None else _one_of(inputs, named)
+        if self._shortcut is not None:
+            kind = type(inputs)
+            plain = inputs if kind is list or kind is tuple else self._samples.plain(inputs)
+            if plain is not None:
+                weights = self._shortcut(plain)  # type: ignore[arg-type]  # which checks it
+                if weights is not None:
+                    return tuple.__new__(self._result, weights)
+        return tuple.__new__(self._result, self._engine.weights(self._samples.one(inputs)))  # type: ignore[arg-type]
+
+    @overload
+    def batch(self, inputs: Columns, /) -> Result[Array]: ...
+    @overload
+    def batch(self, inputs: ArrayLike, /) -> Array: ...
+    @overload
+    def batch(self, /, **columns: ArrayLike) -> Result[Array]: ...
+    def batch(self, inputs: Any = None, /, **columns: ArrayLike) -> Any:
+        """Return the value of each output for many samples.
 
         Parameters
         ----------
-        inputs : array_like, shape (n, inputs)
-            One sample in each row.
+        inputs : array_like, shape (n, inputs); or mapping, data frame, or array of named fields
+            One sample in each row; or a column for each input, by name. Other columns of a data frame are passed over.
+        **columns : array_like, shape (n,), or float
+            Columns by keywords, in the place of `inputs`; a single value counts for all rows.
 
         Returns
         -------
-        ndarray, shape (n, outputs)
-            Weights, in each row those that the arbiter gives for that sample alone, to rounding.
+        ndarray, shape (n, outputs), or Result of ndarray, shape (n,)
+            Rows for rows, columns by name for columns: what the arbiter gives for each sample alone, to rounding. What
+            comes in masked arrays is masked where an input is.
 
         Raises
         ------
         InputError
-            If the shape is another, or a value is not a number or outside its universe; the first such row is named.
-        UndefinedOutputError
-            If no rule fires for an output without default; the first such row is named.
-        """
-        return self._engine.weights_of_many(self._samples.many(inputs))
+            If the shape is another, a column is missing, or a value is not a number or outside its universe; the first
+            such row is named.
 
-    def centroids(self, inputs: Sample) -> tuple[float, ...]:
+        Examples
+        --------
+        >>> from fuzzy_arbiter import Arbiter
+        >>> Arbiter().batch(obstacle=[0.0, 1.0], shape=1.0, depth=0.5)["obstacle"].tolist()
+        [0.0, 1.0]
+        """
+        if columns:
+            inputs = _one_of(inputs, columns)
+        by_name = self._samples.is_table(inputs)
+        values, masked = self._samples.rows(self._samples.columns(inputs) if by_name else inputs)
+        weights = self._engine.weights_of_many(values)
+        if masked is not None:
+            weights = np.ma.MaskedArray(weights, np.broadcast_to(masked[:, None], weights.shape))
+        return tuple.__new__(self._result, weights.T) if by_name else weights
+
+    def centroids(self, inputs: Sample | None = None, /, **named: float) -> Result[float]:
         """Return the raw value of each output for one sample, before normalization.
 
         Parameters
         ----------
-        inputs : sequence of float, or mapping from input's name to float
+        inputs, **named
             As for a call.
 
         Returns
         -------
-        tuple of float
-            Centroids in the outputs' universes, or the defaults where no rule fires.
+        Result of float
+            Centroids in the outputs' universes; where no rule fires the default, or NaN.
 
         Raises
         ------
-        InputError, UndefinedOutputError
+        InputError
             As for a call.
         """
-        return tuple(self._engine.centroids(self._samples.one(inputs)))
+        return tuple.__new__(self._result, self._engine.centroids(self._samples.one(_one_of(inputs, named))))
 
-    def explain(self, inputs: Sample) -> Explanation:
+    def explain(self, inputs: Sample | None = None, /, **named: float) -> Explanation:
         """Return which rules fired for one sample, how strongly, and which decided.
 
         Parameters
         ----------
-        inputs : sequence of float, or mapping from input's name to float
+        inputs, **named
             As for a call.
 
         Returns
@@ -178,12 +214,12 @@ class Arbiter:
 
         Raises
         ------
-        InputError, UndefinedOutputError
+        InputError
             As for a call.
         """
         from fuzzy_arbiter.explanation import explain
 
-        return explain(self._engine, self._samples.one(inputs))
+        return explain(self._engine, self._samples.one(_one_of(inputs, named)))
 
     def verify(self) -> Verification:
         """Return whether the rules are complete, consistent and exclusive, and the terms without gaps.
@@ -198,7 +234,14 @@ class Arbiter:
         return verify(self._system)
 
     @classmethod
-    def load(cls, path: str | Path, engine: str = "auto") -> Arbiter:
+    def load(
+        cls,
+        path: str | Path,
+        engine: str = "auto",
+        *,
+        outside: Outside | None = None,
+        default: float | Mapping[str, float] | None = None,
+    ) -> Arbiter:
         """Return the arbiter that a file defines.
 
         Parameters
@@ -207,6 +250,10 @@ class Arbiter:
             Of a JSON, TOML, FCL, FIS or FLL file, told by its suffix.
         engine : str
             As of `Arbiter`.
+        outside : {"refuse", "clip"}, optional
+            What happens to an input outside its universe, in the place of what the file says.
+        default : float or mapping from output's name to float, optional
+            Value of all outputs, or of those that are named, where no rule fires, in the place of what the file says.
 
         Returns
         -------
@@ -222,7 +269,13 @@ class Arbiter:
         """
         from fuzzy_arbiter.formats import load
 
-        return cls(system=load(path), engine=engine)
+        system = load(path)
+        try:
+            system = replace(system, outside=system.outside if outside is None else outside)
+            system = _with_defaults(system, default)
+        except DefinitionError as error:
+            raise DefinitionError(f"{path}: {error}") from None
+        return cls(system=system, engine=engine)
 
     def save(self, path: str | Path) -> None:
         """Write the definition to a file.
@@ -257,7 +310,7 @@ class Arbiter:
         EngineError
             If Numba is not installed.
         """
-        from fuzzy_arbiter.compiled import compiled
+        from fuzzy_arbiter.export.compiled import compiled
 
         return compiled(self._system)
 
@@ -290,6 +343,26 @@ class Arbiter:
 
     def __str__(self) -> str:
         return str(self._system)
+
+
+def _one_of(inputs: Any, named: Mapping[str, Any]) -> Any:
+    """Return what came, by position or by keywords."""
+    if not named:
+        return inputs
+    if inputs is not None:
+        raise InputError(f"inputs came by position and {', '.join(named)} by keyword, expected one of the two")
+    return named
+
+
+def _with_defaults(system: System, default: float | Mapping[str, float] | None) -> System:
+    if default is None:
+        return system
+    names = variable_names(system.outputs)
+    each = default if isinstance(default, Mapping) else dict.fromkeys(names, default)
+    for name in each:
+        if name not in names:
+            raise DefinitionError(f"default: no output {name!r}, expected one of {', '.join(names)}")
+    return replace(system, outputs=tuple(replace(o, default=each.get(o.name, o.default)) for o in system.outputs))
 
 
 def _rebuilt(system: System, engine: str) -> Arbiter:

@@ -1,54 +1,37 @@
-"""The definition of a Mamdani system, immutable and standing once for all engines, formats and pictures."""
+"""The definition of a fuzzy system, immutable and standing once for all engines, formats and pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from numbers import Integral
 from typing import Literal, TypeVar, get_args
 
 from fuzzy_arbiter.checks import all_of, finite, require_name, shown
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import Is
+from fuzzy_arbiter.references import require_rule, require_values
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.rule_text import parse_rule
-from fuzzy_arbiter.shapes import Shape
+from fuzzy_arbiter.shapes import Membership
+from fuzzy_arbiter.terms.automatic import AutomaticTerms
+from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
+from fuzzy_arbiter.terms.term import Term
+from fuzzy_arbiter.terms.values import Formula, Value, invertible
 
-Conjunction = Literal["min", "prod"]
-Disjunction = Literal["max", "probor"]
-Implication = Literal["min", "prod"]
-Normalization = Literal["range", "none", "sum", "max"]
+Conjunction = str  # one of norms.T_NORMS, which are those for implication, too
+Disjunction = str  # one of norms.S_NORMS
+Implication = str
+Defuzzifier = Literal["centroid", "bisector", "mom", "som", "lom", "average", "sum"]
+WEIGHTED = ("average", "sum")  # defuzzifiers that take each term's value times its strength
+Normalization = Literal["none", "range", "sum", "max"]
 Outside = Literal["refuse", "clip"]
 
 MAX_POINTS = 1_000_000_000
 # of an output's universe; moments are products of such widths, which must not over- or underflow
 WIDTHS = (1e-100, 1e100)
-
-
-@dataclass(frozen=True, slots=True)
-class Term:
-    """A word for a part of a universe, and to what degree each place belongs to it.
-
-    Raises
-    ------
-    DefinitionError
-        If the shape is none.
-
-    Examples
-    --------
-    >>> from fuzzy_arbiter import Term, triangle
-    >>> Term("medium", triangle(0.0, 0.5, 1.0)).shape(0.25)
-    0.5
-    """
-
-    name: str
-    shape: Shape
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.shape, Shape):
-            raise DefinitionError(
-                f"term {shown(self.name)}: shape is {shown(self.shape)}, expected such as triangle(0, 1, 2)"
-            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +45,8 @@ class Variable:
     universe : (float, float)
         Least and greatest value.
     terms : tuple of Term
-        At least one.
+        At least one, unless it is an input that only the values of outputs depend on. A mapping from names to shapes
+        becomes that, and so does what `auto_terms` gives.
 
     Raises
     ------
@@ -71,10 +55,12 @@ class Variable:
 
     Examples
     --------
-    >>> from fuzzy_arbiter import Term, Variable, falling, rising
-    >>> wind = Variable("wind", (0, 20), (Term("calm", falling(2, 6)), Term("strong", rising(4, 12))))
+    >>> from fuzzy_arbiter import Variable, falling, rising
+    >>> wind = Variable("wind", (0, 20), {"calm": falling(2, 6), "strong": rising(4, 12)})
     >>> print(~wind["calm"])
     wind is not calm
+    >>> wind["calm"](3)  # the degree of 3 m/s
+    0.75
     """
 
     name: str
@@ -88,34 +74,46 @@ class Variable:
         if len(bounds) != 2 or bounds[0] is None or bounds[1] is None:
             raise DefinitionError(f"{what}: universe is {shown(self.universe)}, expected two finite numbers")
         low, high = bounds[0], bounds[1]
-        if not low < high:
+        # of values the universe is no more than what they are held in
+        if not (low < high or (low == high and isinstance(self, Output) and self.weighted)):
             raise DefinitionError(f"{what}: universe is [{low}, {high}], expected the first below the second")
         if finite(high - low) is None:
             raise DefinitionError(f"{what}: universe is [{low}, {high}], expected a finite width")
         object.__setattr__(self, "universe", (low, high))
-        terms = all_of(Term, self.terms, f"{what}: terms", "a sequence of Term")
-        if not terms:
+        given = self.terms.over((low, high)) if isinstance(self.terms, AutomaticTerms) else self.terms
+        if isinstance(given, Mapping):
+            given = tuple(Term(term, shape) for term, shape in given.items())
+        terms = all_of(Term, given, f"{what}: terms", "a mapping from names to shapes, or a sequence of Term")
+        if not terms and isinstance(self, Output):
             raise DefinitionError(f"{what}: no terms came, expected at least one")
         for term in terms:
             require_name(term.name, f"{what}: term")
         twice = _repeated(term.name for term in terms)
         if twice is not None:
             raise DefinitionError(f"{what}: two terms are named {twice!r}, expected each name once")
-        object.__setattr__(self, "terms", tuple(Term(term.name, term.shape.within((low, high))) for term in terms))
+        if not isinstance(self, Output):
+            object.__setattr__(self, "terms", tuple(map(self._within, terms)))
+        else:
+            object.__setattr__(self, "terms", terms)
+
+    def _within(self, term: Term) -> Term:
+        try:
+            return Term(term.name, term.membership.within(self.universe))
+        except DefinitionError as error:
+            raise DefinitionError(f"variable {self.name!r}: term {term.name!r}: {error}") from None
 
     def __getitem__(self, term: str) -> Is:
-        """Return the proposition that this variable is in a term.
+        """Return the proposition that this variable is in a term; called with a value, it gives the term's degree.
 
         Raises
         ------
         DefinitionError
             If there is no such term.
         """
-        if term not in self.term_names:
-            raise DefinitionError(
-                f"{self.name!r} has no term {shown(term)}, expected one of {', '.join(self.term_names)}"
-            )
-        return Is(self.name, term)
+        for known in self.terms:
+            if known.name == term:
+                return Is(self.name, term, known.shape if isinstance(known.shape, Membership) else None)
+        raise DefinitionError(f"{self.name!r} has no term {shown(term)}, expected one of {', '.join(self.term_names)}")
 
     @property
     def term_names(self) -> tuple[str, ...]:
@@ -124,9 +122,10 @@ class Variable:
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Ends of the universe and the places of all points in it, which increase; between two, terms are straight."""
+        """Ends of the universe and all places in it where a term bends or jumps, which increase."""
         low, high = self.universe
-        return (low, *sorted({x for term in self.terms for x, _ in term.shape.points if low < x < high}), high)
+        shapes = [term.shape for term in self.terms if isinstance(term.shape, Membership)]
+        return (low, *sorted({x for shape in shapes for x in shape.breaks((low, high))}), high)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,42 +135,94 @@ class Output(Variable):
     Attributes
     ----------
     default : float or None
-        Value where no rule fires; with None that is an error.
+        Value in the universe where no rule fires; with None that is NaN.
+    defuzzifier : {"centroid", "bisector", "mom", "som", "lom", "average", "sum"}
+        How the joined terms become a number: their centroid, the place that halves their area, or the mean, smallest or
+        largest of the places where they are greatest; for terms that are values (Sugeno), or that only rise or only
+        fall (Tsukamoto), the mean of the values, weighted by strength, or their sum.
+    aggregation : str
+        How the rules' conclusions are joined: one of `fuzzy_arbiter.terms.norms.AGGREGATIONS`. Of values it joins the
+        strengths of those rules that conclude one term.
+    lock_range : bool
+        Whether the value is held within the universe.
+    lock_previous : bool
+        Whether, in a batch, an output for which no rule fires keeps the value of the row before.
 
     Raises
     ------
     DefinitionError
-        If a term has no area in the universe, so that it has no centroid, or the universe is wider than 1e100 or
-        narrower than 1e-100, so that floating point cannot hold its moments.
+        If a term has no area in the universe, and so no centroid, unless it is a singleton, which counts where nothing
+        else fires; if the default lies outside the universe; if that is wider than 1e100 or narrower than 1e-100, so
+        that floating point cannot hold its moments; or if the terms do not suit the defuzzifier.
 
     Examples
     --------
-    >>> from fuzzy_arbiter import Output, Term, falling, rising
-    >>> Output("speed", (0.0, 2.0), (Term("slow", falling(0.0, 2.0)), Term("fast", rising(0.0, 2.0)))).term_names
+    >>> from fuzzy_arbiter import Output, falling, rising
+    >>> Output("speed", (0.0, 2.0), {"slow": falling(0.0, 2.0), "fast": rising(0.0, 2.0)}, default=0.5).term_names
     ('slow', 'fast')
     """
 
     default: float | None = None
+    defuzzifier: Defuzzifier = "centroid"
+    aggregation: str = "max"
+    lock_range: bool = False
+    lock_previous: bool = False
 
     def __post_init__(self) -> None:
         # not super(): the decorator makes the class anew for its slots, and the method keeps the old one
         Variable.__post_init__(self)
         what = f"output {self.name!r}"
-        if not WIDTHS[0] <= self.universe[1] - self.universe[0] <= WIDTHS[1]:
+        if not self.weighted and not WIDTHS[0] <= self.universe[1] - self.universe[0] <= WIDTHS[1]:
             raise DefinitionError(f"{what}: universe is [{_span(self)}], expected a width from 1e-100 to 1e+100")
-        for term in self.terms:
-            if not term.shape.area(self.universe) > 0.0:
-                raise DefinitionError(f"{what}: term {term.name!r} has no area in [{_span(self)}]")
+        for key, known in (("defuzzifier", get_args(Defuzzifier)), ("aggregation", tuple(AGGREGATIONS))):
+            if not isinstance(getattr(self, key), str) or getattr(self, key) not in known:
+                raise DefinitionError(
+                    f"{what}: {key} is {shown(getattr(self, key))}, expected one of {', '.join(known)}"
+                )
+        for key in ("lock_range", "lock_previous"):
+            if not isinstance(getattr(self, key), bool):
+                raise DefinitionError(f"{what}: {key} is {shown(getattr(self, key))}, expected True or False")
+        if not self.weighted:
+            object.__setattr__(self, "terms", tuple(map(self._joinable, self.terms)))
+        for term in self.terms if self.weighted else ():
+            if not isinstance(term.shape, Value) and not invertible(term.shape):
+                raise DefinitionError(
+                    f"{what}: term {term.name!r} is no value, nor does it only rise or only fall, as the defuzzifier "
+                    f"{self.defuzzifier!r} expects it"
+                )
         if self.default is not None:
             default = finite(self.default)
-            if default is None:
-                raise DefinitionError(f"{what}: default is {shown(self.default)}, expected a finite number")
+            if default is None or not self.universe[0] <= default <= self.universe[1]:
+                raise DefinitionError(
+                    f"{what}: default is {shown(self.default)}, expected a number in [{_span(self)}], its universe"
+                )
             object.__setattr__(self, "default", default)
+
+    def _joinable(self, term: Term) -> Term:
+        """Return a term as it is in the universe, if it can be joined with others there."""
+        what = f"output {self.name!r}: term {term.name!r}"
+        if not isinstance(term.shape, Membership) or (isinstance(term.shape, Formula) and term.shape.names - {"x"}):
+            raise DefinitionError(
+                f"{what} is a value, expected a membership function, or one of the defuzzifiers {', '.join(WEIGHTED)}"
+            )
+        made = self._within(term)
+        shape = made.membership
+        point = shape.parameters[0] if isinstance(shape, Curve) and shape.kind == "singleton" else math.nan
+        if not self.universe[0] <= point <= self.universe[1] and not shape.area(self.universe) > 0.0:
+            raise DefinitionError(f"{what} has no area in [{_span(self)}]")
+        return made
+
+    @property
+    def weighted(self) -> bool:
+        """Whether its terms are values, weighted by strength, and not sets that are joined."""
+        return self.defuzzifier in WEIGHTED
 
 
 @dataclass(frozen=True, slots=True)
 class System:
-    """A Mamdani system: clipped (or scaled) output terms, joined by their maximum, of which the centroid is taken.
+    """A fuzzy system: rules, and outputs that join what these conclude and make one number of it.
+
+    By default of Mamdani's kind: clipped output terms, joined by their maximum, of which the centroid is taken.
 
     Attributes
     ----------
@@ -183,19 +234,21 @@ class System:
         At least one; a text such as ``if wind is calm then sail is full`` is a rule too.
     name : str
         What the system is called in files.
-    conjunction : {"min", "prod"}
-        Degree of *and*.
-    disjunction : {"max", "probor"}
-        Degree of *or*; ``probor`` is a + b - a b.
-    implication : {"min", "prod"}
-        Whether an output's term is clipped at a rule's strength, or scaled by it.
-    normalization : {"range", "none", "sum", "max"}
+    conjunction : str
+        Degree of *and*: ``min``, ``prod`` or another of `fuzzy_arbiter.terms.norms.T_NORMS`.
+    disjunction : str
+        Degree of *or*: ``max``, ``probor``, which is a + b - a b, or another of `fuzzy_arbiter.terms.norms.S_NORMS`.
+    implication : str
+        How a rule's strength bounds its output's term: ``min`` clips it, ``prod`` scales it; or another of the first.
+    normalization : {"none", "range", "sum", "max"}
         What is done to the centroids: ``none`` leaves them; ``range`` maps those of the least and of the greatest term
         alone to 0 and 1; ``sum`` and ``max`` then divide by all weights' sum or greatest.
     outside : {"refuse", "clip"}
         What happens to an input outside its universe.
     points : int
         Points of an output's universe, 3 to 1 000 000 000, for those engines and formats that sample it.
+    weights_of : tuple of str
+        Names of the criteria whose weights the outputs are, which results carry; empty if they carry the outputs' own.
 
     Raises
     ------
@@ -206,8 +259,8 @@ class System:
     --------
     >>> from fuzzy_arbiter import Arbiter
     >>> system = Arbiter().system
-    >>> [variable.name for variable in system.inputs], len(system.rules)
-    (['obstacle', 'shape', 'depth'], 8)
+    >>> [variable.name for variable in system.inputs], len(system.rules), system["shape"].term_names
+    (['obstacle', 'shape', 'depth'], 8, ('simple', 'complex'))
     """
 
     inputs: tuple[Variable, ...]
@@ -217,9 +270,10 @@ class System:
     conjunction: Conjunction = "min"
     disjunction: Disjunction = "max"
     implication: Implication = "min"
-    normalization: Normalization = "range"
+    normalization: Normalization = "none"
     outside: Outside = "refuse"
     points: int = 101
+    weights_of: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         rules: tuple[Rule | str, ...] = all_of((Rule, str), self.rules, "rules", "a sequence of Rule or text")
@@ -237,45 +291,67 @@ class System:
                 f"points is {shown(self.points)}, expected a whole number, 3 or more, to {MAX_POINTS}"
             )
         object.__setattr__(self, "points", int(self.points))
+        self._require_names_of_weights()
         for key in ("inputs", "outputs", "rules"):
             if not getattr(self, key):
                 raise DefinitionError(f"{key}: none came, expected at least one")
         twice = _repeated(v.name for v in (*self.inputs, *self.outputs))
         if twice is not None:
             raise DefinitionError(f"variables: two are named {twice!r}, expected each name once")
-        inputs = {v.name: frozenset(v.term_names) for v in self.inputs}
-        outputs = {v.name: frozenset(v.term_names) for v in self.outputs}
         for i, rule in enumerate(self.rules):
-            where = f"R{i + 1} {str(rule)!r}"
-            for statement in rule.condition.terms():
-                _require_known(statement, inputs, "input", where)
-            for statement in rule.conclusions:
-                _require_known(statement, outputs, "output", where)
-            if len({statement.variable for statement in rule.conclusions}) < len(rule.conclusions):
-                raise DefinitionError(f"{where}: two conclusions on one output, expected each output once")
+            require_rule(self, i, rule)
+        require_values(self)
+
+    def _require_names_of_weights(self) -> None:
+        names = all_of(str, self.weights_of, "weights_of", "names of criteria")
+        for name in names:
+            require_name(name, "weights_of")
+        if len(names) not in (0, len(self.outputs)) or _repeated(names) is not None:
+            raise DefinitionError(
+                f"weights_of is {shown(names)}, expected a name for each of the {len(self.outputs)} outputs, each once"
+            )
+        object.__setattr__(self, "weights_of", names)
+
+    @property
+    def result_names(self) -> tuple[str, ...]:
+        """Names that results carry: those of the criteria whose weights the outputs are, else the outputs' own."""
+        return self.weights_of or variable_names(self.outputs)
+
+    def __getitem__(self, variable: str) -> Variable:
+        """Return the input or output of a name.
+
+        Raises
+        ------
+        DefinitionError
+            If there is none.
+        """
+        for known in (*self.inputs, *self.outputs):
+            if known.name == variable:
+                return known
+        expected = ", ".join(variable_names((*self.inputs, *self.outputs)))
+        raise DefinitionError(f"no variable {shown(variable)}, expected one of {expected}")
 
     def __str__(self) -> str:
         return "\n".join(f"R{i + 1}: {rule}" for i, rule in enumerate(self.rules))
 
+    def __repr__(self) -> str:
+        """Return what makes an equal system; rules are texts, and settings at their defaults are left out."""
+        rules = tuple(str(rule) if rule.operators is None else rule for rule in self.rules)
+        said = [
+            f"{key.name}={getattr(self, key.name)!r}" for key in fields(self) if getattr(self, key.name) != key.default
+        ]
+        said[2] = f"rules={rules!r}"
+        return f"System({', '.join(said)})"
+
 
 CHOICES = {
-    "conjunction": get_args(Conjunction),
-    "disjunction": get_args(Disjunction),
-    "implication": get_args(Implication),
+    "conjunction": tuple(T_NORMS),
+    "disjunction": tuple(S_NORMS),
+    "implication": tuple(T_NORMS),
     "normalization": get_args(Normalization),
     "outside": get_args(Outside),
 }
 _N = TypeVar("_N", bound=str)
-
-
-def _require_known(statement: Is, known: dict[str, frozenset[str]], kind: str, where: str) -> None:
-    if statement.variable not in known:
-        raise DefinitionError(f"{where}: no {kind} {statement.variable!r}, expected one of {', '.join(known)}")
-    if statement.term not in known[statement.variable]:
-        expected = ", ".join(sorted(known[statement.variable]))
-        raise DefinitionError(
-            f"{where}: {statement.variable!r} has no term {statement.term!r}, expected one of {expected}"
-        )
 
 
 def _repeated(names: Iterable[_N]) -> _N | None:

@@ -38,12 +38,12 @@ class UnsupportedError(ArbiterError):
     """A definition that the wished format cannot say."""
 
 
+class PictureError(ArbiterError):
+    """Pictures where Matplotlib is not installed."""
+
+
 class InputError(ArbiterError):
     """An input that is missing, unknown, not a number, or outside its universe."""
-
-
-class UndefinedOutputError(ArbiterError):
-    """An output for which no rule fires and which has no default."""
 
 
 def one_line(said: object) -> str:

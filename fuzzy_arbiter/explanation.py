@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from fuzzy_arbiter.definition import System, variable_names
+from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.engines.engine import Engine
+from fuzzy_arbiter.result import Result, result_class
 from fuzzy_arbiter.table import aligned
 
 TIE = 1e-12  # weights that are nearer to each other than this are equal, but for rounding
@@ -57,13 +58,15 @@ class OutputDecision:
     Attributes
     ----------
     name : str
-        Name of the output.
+        As results carry it: the name of the criterion whose weight the output is, else its own.
+    variable : str
+        Name of the output in the rules.
     cuts : dict from str to float
         For each term, the greatest strength of the rules that conclude it.
     centroid : float
         Value in the universe, before it is normalized.
     weight : float
-        As the arbiter gives it.
+        As the arbiter gives it; NaN if no rule fired and there is no default.
     decided_by : str or None
         Label of the rule that gives the greatest cut, of several the first; None if no rule fired.
     runner_up : str or None
@@ -71,10 +74,11 @@ class OutputDecision:
     margin : float
         Strength of the one less that of the other; 0 is a tie.
     default_used : bool
-        Whether no rule fired, so that the centroid is the output's default.
+        Whether no rule fired, so that the centroid is the output's default, or NaN if it has none.
     """
 
     name: str
+    variable: str
     cuts: dict[str, float]
     centroid: float
     weight: float
@@ -97,7 +101,8 @@ class Explanation:
     outputs : tuple of OutputDecision
         In the system's order.
     winner : str or None
-        The output with the greatest weight; None if that is shared, or all weights are 0.
+        The output with the greatest weight, by its name in results; None if that is shared, or all weights are 0. An
+        output that is NaN takes no part.
     runner_up : str or None
         The output with the next weight; None without a winner, or if there is no other output.
     margin : float
@@ -115,9 +120,9 @@ class Explanation:
     tied: tuple[str, ...]
 
     @property
-    def weights(self) -> tuple[float, ...]:
+    def weights(self) -> Result[float]:
         """The weights, as the arbiter gives them."""
-        return tuple(output.weight for output in self.outputs)
+        return tuple.__new__(result_class([o.name for o in self.outputs]), [o.weight for o in self.outputs])
 
     def as_dict(self) -> dict[str, Any]:
         """Return all of it as JSON knows it.
@@ -125,9 +130,11 @@ class Explanation:
         Returns
         -------
         dict
-            Of texts, numbers, booleans, lists and dicts.
+            Of texts, numbers, booleans, lists and dicts, and None for NaN.
         """
         whole = asdict(self)
+        for item in whole["outputs"]:
+            item |= {key: None for key in ("centroid", "weight") if item[key] != item[key]}
         for rule, item in zip(self.rules, whole["rules"], strict=True):
             item["fired"] = rule.fired
         return {key: list(item) if isinstance(item, tuple) else item for key, item in whole.items()}
@@ -139,7 +146,7 @@ class Explanation:
         lines.append(f"rules that fired, {len(fired)} of {len(self.rules)}" if fired else "no rule fired")
         lines += aligned([(rule.label, f"{rule.strength:.6g}", _short(rule.text)) for rule in fired])
         lines.append("outputs")
-        lines += aligned([(o.name, f"{o.weight:.6g}", _pairs(o.cuts), _decision(o)) for o in self.outputs])
+        lines += aligned([(_title(o), f"{o.weight:.6g}", _pairs(o.cuts), _decision(o)) for o in self.outputs])
         if len(self.outputs) == 1:  # that is all there is to say
             return "\n".join(lines)
         if self.winner is not None:
@@ -166,11 +173,6 @@ def explain(engine: Engine, inputs: Sequence[float]) -> Explanation:
     -------
     Explanation
         As data; its text is for people.
-
-    Raises
-    ------
-    UndefinedOutputError
-        If no rule fires for an output without default.
     """
     system, firing = engine.system, engine.firing
     weights, centroids = engine.weights(inputs), engine.centroids(inputs)
@@ -180,14 +182,14 @@ def explain(engine: Engine, inputs: Sequence[float]) -> Explanation:
         for i, (rule, strength) in enumerate(zip(system.rules, strengths, strict=True))
     )
     outputs = tuple(
-        _decided(system, rules, k, cut, centroid, weight)
-        for k, (cut, centroid, weight) in enumerate(zip(firing.cuts(strengths), centroids, weights, strict=True))
+        _decided(system, rules, k, firing.term_cuts(k, strengths), centroid, weight)
+        for k, (centroid, weight) in enumerate(zip(centroids, weights, strict=True))
     )
     degrees = tuple(
-        InputDegrees(v.name, float(x), {t.name: t.shape(x) for t in v.terms})
+        InputDegrees(v.name, float(x), {t.name: t.membership(x) for t in v.terms})
         for v, x in zip(system.inputs, inputs, strict=True)
     )
-    return Explanation(degrees, rules, outputs, *_ranking(variable_names(system.outputs), weights))
+    return Explanation(degrees, rules, outputs, *_ranking(system.result_names, weights))
 
 
 def _decided(
@@ -201,6 +203,7 @@ def _decided(
     ]
     second = max(others, key=_strength, default=None)
     return OutputDecision(
+        system.result_names[k],
         output.name,
         dict(zip(output.term_names, cuts, strict=True)),
         centroid,
@@ -218,6 +221,10 @@ def _strength(rule: FiredRule) -> float:
 
 def _ranking(names: Sequence[str], weights: Sequence[float]) -> tuple[str | None, str | None, float, tuple[str, ...]]:
     """Winner, runner-up, margin, and those who tie."""
+    known = [(name, weight) for name, weight in zip(names, weights, strict=True) if weight == weight]
+    if not known:
+        return None, None, 0.0, ()
+    names, weights = zip(*known, strict=True)
     order = sorted(range(len(names)), key=lambda k: -weights[k])
     greatest = weights[order[0]]
     margin = greatest - weights[order[1]] if len(names) > 1 else greatest
@@ -230,12 +237,17 @@ def _ranking(names: Sequence[str], weights: Sequence[float]) -> tuple[str | None
 
 def _decision(output: OutputDecision) -> str:
     if output.decided_by is None:
-        return f"no rule fired: its default {output.centroid:.6g}"
+        has_default = output.centroid == output.centroid
+        return f"no rule fired: its default {output.centroid:.6g}" if has_default else "no rule fired, and no default"
     if output.runner_up is None:
         return f"by {output.decided_by} alone"
     if output.margin == 0.0:
         return f"by {output.decided_by} and {output.runner_up} alike"
     return f"by {output.decided_by}, {output.margin:.6g} above {output.runner_up}"
+
+
+def _title(output: OutputDecision) -> str:
+    return output.name if output.name == output.variable else f"{output.name} ({output.variable})"
 
 
 def _pairs(degrees: dict[str, float]) -> str:

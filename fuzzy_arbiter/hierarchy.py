@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from fuzzy_arbiter.checks import all_of, require_name, shown
-from fuzzy_arbiter.definition import Normalization, Output, Outside, System, Term, Variable
+from fuzzy_arbiter.definition import Normalization, Output, Outside, System, Variable
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import And, Is, Or, Proposition
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.shapes import Shape, falling, rising
+from fuzzy_arbiter.terms.term import Term
 
 Form = Literal["hierarchical", "minimal", "conjunctive", "complete"]
 FORMS: tuple[str, ...] = get_args(Form)
@@ -45,8 +46,9 @@ class Criterion:
     --------
     >>> from fuzzy_arbiter import Arbiter, Criterion, rising
     >>> arbiter = Arbiter([Criterion("battery", membership=rising(0.0, 1.0)), Criterion("survey")])
-    >>> [round(weight, 3) for weight in arbiter({"battery": 0.9, "survey": 1.0})]
-    [0.972, 0.028]
+    >>> weights = arbiter(battery=0.9, survey=1.0)
+    >>> round(weights["battery"], 3), round(weights["survey"], 3)
+    (0.972, 0.028)
     """
 
     name: str
@@ -104,7 +106,8 @@ def prioritised(
         N + N (N + 1) / 2 without any *or*; or as the complete table of N 2^N. The first three give the same weights
         always, the complete table on crisp inputs (see ``docs/arbiter.md``).
     weight : Output
-        Pattern of the outputs, whose names get the criterion's number: the first term is the low one.
+        Pattern of the outputs, whose names get the criterion's number: the first term is the low one. Results carry the
+        names of the criteria.
     normalization, outside, points, name
         As of `System`.
 
@@ -138,7 +141,10 @@ def prioritised(
     off = tuple(Is(c.name, c.off) for c in criteria)
     rules = _RULES[form](on, off, outputs)
     inputs = tuple(c.variable for c in criteria)
-    return System(inputs, outputs, rules, name, normalization=normalization, outside=outside, points=points)
+    names = tuple(c.name for c in criteria)
+    return System(
+        inputs, outputs, rules, name, normalization=normalization, outside=outside, points=points, weights_of=names
+    )
 
 
 Statements = tuple[Is, ...]

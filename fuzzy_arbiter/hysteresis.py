@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import System, Variable, variable_names
-from fuzzy_arbiter.engines.firing import Array, degrees_of_many
+from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError, InputError
 from fuzzy_arbiter.propositions import Is
+from fuzzy_arbiter.result import Result
 from fuzzy_arbiter.samples import Sample
 from fuzzy_arbiter.shapes import Shape
 from fuzzy_arbiter.verification.cells import stretches
@@ -122,7 +123,7 @@ class HysteresisArbiter:
         """Whether each criterion's latch is closed, by the input's name."""
         return dict(zip(self._names, self._closed, strict=True))
 
-    def __call__(self, inputs: Sample, time: float | None = None) -> tuple[float, ...]:
+    def __call__(self, inputs: Sample, time: float | None = None) -> Result[float]:
         """Return the weights for the next sample.
 
         Parameters
@@ -134,16 +135,14 @@ class HysteresisArbiter:
 
         Returns
         -------
-        tuple of float
-            One weight for each output.
+        Result of float
+            One weight for each output, by position and by name.
 
         Raises
         ------
         InputError
             If the time is missing and needed, is not finite or decreases, or an input is missing, unknown, not a
             number, or outside its universe; the state is then as before.
-        UndefinedOutputError
-            If no rule fires for an output without default; the state is then as before.
         """
         now = self._time if time is None and not any(self._dwell) else _validate_time(time, self._time)
         values = self.arbiter.samples.one(inputs)
@@ -173,15 +172,13 @@ class HysteresisArbiter:
         InputError
             If a shape is another, a time is not finite or decreases, or a value is not a number or outside its
             universe; the first such row is named, and the state is as before.
-        UndefinedOutputError
-            If no rule fires for an output without default; the state is then as before.
         """
         values = self.arbiter.samples.many(inputs)
         if times is None and not any(self._dwell):
             moments = np.full(len(values), self._time)
         else:
             moments = _validate_times(times, len(values), self._time)
-        degrees = np.column_stack([degrees_of_many(s, values[:, i]) for i, s in enumerate(self._shapes)])
+        degrees = np.column_stack([s.of_many(values[:, i]) for i, s in enumerate(self._shapes)])
         closed, since = self._closed, self._since
         places = np.empty_like(values)
         for i, (row, degree, now) in enumerate(zip(values.tolist(), degrees.tolist(), moments.tolist(), strict=True)):
@@ -292,7 +289,7 @@ def _on_terms(system: System, on: Mapping[str, str] | None) -> list[str]:
 
 
 def _shape(variable: Variable, term: str) -> Shape:
-    return next(t.shape for t in variable.terms if t.name == term)
+    return next(t.straight for t in variable.terms if t.name == term)
 
 
 def _place(variable: Variable, shape: Shape, degree: float) -> float:

@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 
 from fuzzy_arbiter.checks import all_of, shown
 from fuzzy_arbiter.errors import DefinitionError
+from fuzzy_arbiter.shapes import Membership
+from fuzzy_arbiter.terms.norms import HEDGES
 
 MAX_NESTING = 100  # parentheses and negations within each other; what is deeper is no rule that a person wrote
-KEYWORDS = ("if", "then", "and", "or", "not", "is", "with")
+KEYWORDS = ("if", "then", "and", "or", "not", "is", "with", "any")
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
@@ -77,14 +79,27 @@ class Proposition:
 
 @dataclass(frozen=True, slots=True)
 class Is(Proposition):
-    """A variable is in a term."""
+    """A variable is in a term; one that a variable gave knows the term's shape and can be called with a value."""
 
     variable: str
     term: str
+    shape: Membership | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not (isinstance(self.variable, str) and isinstance(self.term, str)):
             raise DefinitionError(f"{shown(self.variable)} is {shown(self.term)}: expected the names of both")
+
+    def __call__(self, value: float) -> float:
+        """Return the degree to which a value is in the term.
+
+        Raises
+        ------
+        DefinitionError
+            If the statement was made of names alone, and so knows no shape.
+        """
+        if self.shape is None:
+            raise DefinitionError(f"{self}: made of names alone, expected such as variable['term'], to be called")
+        return self.shape(value)
 
     def terms(self) -> Iterator[Is]:
         """Yield this statement."""
@@ -152,12 +167,105 @@ class Not(Proposition):
         yield from self.part.terms()
 
     def __str__(self) -> str:
-        if isinstance(self.part, Is):
-            return f"{quoted(self.part.variable)} is not {quoted(self.part.term)}"
+        if not isinstance(self.part, Not) and _on_one(self.part):
+            variable, words = _said(self.part)
+            return f"{quoted(variable)} is not {words}"
         return f"not ({self.part})"
 
 
-def _set_nesting(proposition: _Join | Not, nesting: int) -> None:
+@dataclass(frozen=True, slots=True)
+class Anything(Proposition):
+    """A variable is in any term: this always holds."""
+
+    variable: str
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.variable, str):
+            raise DefinitionError(f"{shown(self.variable)} is any: expected the name of an input")
+
+    def terms(self) -> Iterator[Is]:
+        """Yield nothing."""
+        yield from ()
+
+    def __str__(self) -> str:
+        return f"{quoted(self.variable)} is any"
+
+
+@dataclass(frozen=True, slots=True)
+class Hedged(Proposition):
+    """A statement or a whole condition, bent by a hedge: ``service is very poor``, ``very (a is b or c is d)``.
+
+    Attributes
+    ----------
+    hedge : {"very", "somewhat", "extremely", "seldom"}
+        How it bends the degree, see `fuzzy_arbiter.terms.norms.HEDGES`.
+    part : Proposition
+        What is bent.
+    """
+
+    hedge: str
+    part: Proposition
+    nesting: int = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.hedge, str) or self.hedge not in HEDGES:
+            raise DefinitionError(f"hedge is {shown(self.hedge)}, expected one of {', '.join(HEDGES)}")
+        if not isinstance(self.part, Proposition):
+            raise DefinitionError(f"{self.hedge}: {shown(self.part)} came, expected such as variable['term']")
+        _set_nesting(self, self.part.nesting + (1 if _on_one(self.part) else 2))
+
+    def terms(self) -> Iterator[Is]:
+        """Yield the statement of the part."""
+        yield from self.part.terms()
+
+    def __str__(self) -> str:
+        if not _on_one(self.part):
+            return f"{self.hedge} ({self.part})"
+        variable, words = _said(self)
+        return f"{quoted(variable)} is {words}"
+
+
+def anything(p: Proposition) -> Iterator[str]:
+    """Yield the variables of which a proposition says that they are in any term.
+
+    Parameters
+    ----------
+    p : Proposition
+        A condition.
+
+    Yields
+    ------
+    str
+        Names, from left to right.
+    """
+    if isinstance(p, Anything):
+        yield p.variable
+    elif isinstance(p, Not | Hedged):
+        yield from anything(p.part)
+    elif isinstance(p, _Join):
+        for part in p.parts:
+            yield from anything(part)
+
+
+def _on_one(p: Proposition) -> bool:
+    """Return whether a proposition is a statement on one term, perhaps with hedges and negations."""
+    while isinstance(p, Not | Hedged):
+        p = p.part
+    return isinstance(p, Is | Anything)
+
+
+def _said(p: Proposition) -> tuple[str, str]:
+    """Return the variable of a statement on one term, and what is said after *is*."""
+    if isinstance(p, Is):
+        return p.variable, quoted(p.term)
+    if isinstance(p, Anything):
+        return p.variable, "any"
+    assert isinstance(p, Hedged | Not)
+    variable, words = _said(p.part)
+    return variable, f"{p.hedge if isinstance(p, Hedged) else 'not'} {words}"
+
+
+def _set_nesting(proposition: _Join | Not | Hedged, nesting: int) -> None:
     # Python's own stack is the limit of whatever goes through a proposition, so that it stays far from it
     if nesting > MAX_NESTING:
         raise DefinitionError(f"nested deeper than {MAX_NESTING} parentheses and negations")

@@ -2,11 +2,46 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fuzzy_arbiter.checks import all_of, finite, shown
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import Is, Proposition
+from fuzzy_arbiter.terms.norms import S_NORMS, T_NORMS
+
+
+@dataclass(frozen=True, slots=True)
+class Operators:
+    """The norms of a block of rules.
+
+    Attributes
+    ----------
+    conjunction, implication : str
+        One of `fuzzy_arbiter.terms.norms.T_NORMS`.
+    disjunction : str
+        One of `fuzzy_arbiter.terms.norms.S_NORMS`.
+
+    Raises
+    ------
+    DefinitionError
+        If there is no such norm.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Operators, Rule
+    >>> Rule.parse("if wind is calm then sail is full", Operators("prod")).operators.conjunction
+    'prod'
+    """
+
+    conjunction: str = "min"
+    disjunction: str = "max"
+    implication: str = "min"
+
+    def __post_init__(self) -> None:
+        for key, known in (("conjunction", T_NORMS), ("disjunction", S_NORMS), ("implication", T_NORMS)):
+            word = getattr(self, key)
+            if not isinstance(word, str) or word not in known:
+                raise DefinitionError(f"{key} is {shown(word)}, expected one of {', '.join(known)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +56,8 @@ class Rule:
         On outputs, at least one.
     weight : float
         Above 0, at most 1.
+    operators : Operators or None
+        Those of its block, where a system has several; None for those of the system.
 
     Raises
     ------
@@ -38,6 +75,7 @@ class Rule:
     condition: Proposition
     conclusions: tuple[Is, ...]
     weight: float = 1.0
+    operators: Operators | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.condition, Proposition):
@@ -50,8 +88,39 @@ class Rule:
         if weight is None or not 0.0 < weight <= 1.0:
             rule = str(Rule(self.condition, conclusions))
             raise DefinitionError(f"{rule!r}: weight is {shown(self.weight)}, expected above 0 and at most 1")
+        if not isinstance(self.operators, Operators | None):
+            raise DefinitionError(f"rule: operators are {shown(self.operators)}, expected Operators or None")
         object.__setattr__(self, "conclusions", conclusions)
         object.__setattr__(self, "weight", weight)
+
+    @staticmethod
+    def parse(text: str, operators: Operators | None = None) -> Rule:
+        """Return the rule that a text says.
+
+        Parameters
+        ----------
+        text : str
+            Such as ``if wind is calm then sail is full with 0.5``.
+        operators : Operators, optional
+            Those of its block.
+
+        Returns
+        -------
+        Rule
+            As the text says it; only a system knows whether its variables and terms are there.
+
+        Raises
+        ------
+        DefinitionError
+            If it is no rule.
+        """
+        from fuzzy_arbiter.rule_text import parse_rule
+
+        return replace(parse_rule(text), operators=operators)
+
+    def __repr__(self) -> str:
+        operators = "" if self.operators is None else f", {self.operators!r}"
+        return f"Rule.parse({str(self)!r}{operators})"
 
     def __str__(self) -> str:
         conclusions = " and ".join(map(str, self.conclusions))

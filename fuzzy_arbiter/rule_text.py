@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.propositions import KEYWORDS, MAX_NESTING, And, Is, Not, Or, Proposition
+from fuzzy_arbiter.propositions import KEYWORDS, MAX_NESTING, And, Anything, Hedged, Is, Not, Or, Proposition
 from fuzzy_arbiter.rule import Rule
+from fuzzy_arbiter.terms.norms import HEDGES
 
 _TOKEN = re.compile(
     r"""\s*(?: (?P<quoted>"[^"]*") | (?P<number>[0-9.]+(?:[eE][+-]?[0-9]+)?(?![A-Za-z_]))
@@ -19,11 +21,36 @@ _TOKEN = re.compile(
 _SIGNS = {"&": "and", "|": "or", "~": "not", ",": ","}
 
 
+def parse_rules(text: str) -> list[Rule]:
+    """Return the rules that a text says whose conclusions may have hedges, as fuzzylite takes them.
+
+    A hedge in a conclusion bends the strength with which that is drawn, and those after it, as one on the whole
+    condition does. So what is concluded with other hedges becomes a rule of its own.
+
+    Parameters
+    ----------
+    text : str
+        One rule.
+
+    Returns
+    -------
+    list of Rule
+        In the order of their first conclusions.
+
+    Raises
+    ------
+    DefinitionError
+        If the text is no rule; or a weight other than 1 meets a hedge, which would bend it too.
+    """
+    return _Parser(text).bent_rules()
+
+
 def parse_rule(text: str) -> Rule:
     """Return the rule that a text says.
 
-    Words of rules may be in any case; ``&``, ``|``, ``~`` stand for *and*, *or*, *not*; *not* binds before *and*, *and*
-    before *or*. Names that are no identifiers stand in double quotes.
+    Words of rules may be in any case. The hedges very, somewhat, extremely and seldom stand before a term. ``&``,
+    ``|``, ``~`` stand for *and*, *or*, *not*; *not* binds before *and*, *and* before *or*. Names that are no
+    identifiers stand in double quotes.
 
     Parameters
     ----------
@@ -86,15 +113,37 @@ class _Parser:
         return token
 
     def rule(self) -> Rule:
+        condition, conclusions, weight = self.parts(self.conclusion)
+        return Rule(condition, tuple(conclusions), weight)
+
+    def parts(self, conclusion: Callable[[], Any]) -> tuple[Proposition, list[Any], float]:
         self.take("if", "'if'")
         condition = self.disjunction()
         self.take("then", "'then', 'and' or 'or'")
-        conclusions = [self.conclusion()]
+        conclusions = [conclusion()]
         while self.accept("and") or self.accept(","):
-            conclusions.append(self.conclusion())
+            conclusions.append(conclusion())
         weight = self.number() if self.accept("with") else 1.0
         self.take("end", "'and', 'with' or the end")
-        return Rule(condition, tuple(conclusions), weight)
+        return condition, conclusions, weight
+
+    def bent_rules(self) -> list[Rule]:
+        condition, conclusions, weight = self.parts(self.bent_conclusion)
+        if weight != 1.0 and any(hedges for hedges, _ in conclusions):
+            raise self.fault("a hedge in a conclusion of a rule with a weight, expected the weight 1")
+        return bent_rules(condition, conclusions, weight)
+
+    def bent_conclusion(self) -> tuple[tuple[str, ...], Is]:
+        """Read a conclusion, and the hedges in it."""
+        variable = self.take("name", "an output's name")
+        self.take("is", "'is'")
+        hedges: list[str] = []
+        while self.tokens[self.at][0] == "not" or (
+            self.tokens[self.at][1].lower() in HEDGES and self.tokens[self.at + 1][0] in ("name", "not")
+        ):
+            hedges.append(self.tokens[self.at][1].lower())
+            self.at += 1
+        return tuple(hedges), Is(variable, self.take("name", "a term's name"))
 
     def number(self) -> float:
         token = self.take("number", "the rule's weight")
@@ -106,6 +155,8 @@ class _Parser:
     def conclusion(self) -> Is:
         variable = self.take("name", "an output's name")
         self.take("is", "'is'")
+        if self.accept("any"):  # which in a conclusion is a name like others
+            return Is(variable, self.tokens[self.at - 1][1])
         return Is(variable, self.take("name", "a term's name"))
 
     def disjunction(self) -> Proposition:
@@ -137,6 +188,13 @@ class _Parser:
             inner = self.made(Not, self.statement())
             self.depth -= 1
             return inner
+        if self.tokens[self.at][1].lower() in HEDGES and self.tokens[self.at + 1][0] == "(":
+            word = self.tokens[self.at][1].lower()
+            self.at += 1
+            self.deeper()
+            inner = self.made(partial(Hedged, word), self.statement())
+            self.depth -= 1
+            return inner
         if self.accept("("):
             self.deeper()
             inner = self.disjunction()
@@ -145,10 +203,54 @@ class _Parser:
             return inner
         variable = self.take("name", "an input's name, 'not' or '('")
         self.take("is", "'is'")
-        negations = 0
-        while self.accept("not"):
-            negations += 1
-        statement: Proposition = Is(variable, self.take("name", "a term's name"))
-        for _ in range(negations):
-            statement = self.made(Not, statement)
+        return self.term(variable)
+
+    def term(self, variable: str) -> Proposition:
+        """Read what is said of a variable: a term, or *any*, perhaps with hedges or *not* before it."""
+        bends: list[str] = []
+        while True:
+            if self.accept("not"):
+                bends.append("not")
+            elif self.tokens[self.at][1].lower() in HEDGES and self.tokens[self.at + 1][0] in ("name", "not", "any"):
+                bends.append(self.tokens[self.at][1].lower())
+                self.at += 1
+            else:
+                break
+        anything = self.accept("any")
+        statement: Proposition = Anything(variable) if anything else Is(variable, self.take("name", "a term's name"))
+        for word in reversed(bends):
+            statement = self.made(Not if word == "not" else partial(Hedged, word), statement)
         return statement
+
+
+def bent_rules(condition: Proposition, conclusions: Sequence[tuple[tuple[str, ...], Is]], weight: float) -> list[Rule]:
+    """Return a rule whose conclusions have hedges as rules whose conclusions have none, as fuzzylite takes it.
+
+    Parameters
+    ----------
+    condition : Proposition
+        Of the rule.
+    conclusions : sequence of (tuple of str, Is)
+        The hedges of each conclusion, *not* among them, and the conclusion; they go on to those after it.
+    weight : float
+        Of the rule.
+
+    Returns
+    -------
+    list of Rule
+        One for each row of hedges, each bending the condition.
+    """
+    rows: dict[tuple[tuple[str, ...], int], list[Is]] = {}
+    carried: tuple[str, ...] = ()
+    for k, (hedges, conclusion) in enumerate(conclusions):
+        carried = hedges + carried
+        # a second conclusion on one output is another rule, too
+        before = sum(c.variable == conclusion.variable for _, c in conclusions[:k])
+        rows.setdefault((carried, before), []).append(conclusion)
+    rules = []
+    for (row, _), concluded in rows.items():
+        bent = condition
+        for word in reversed(row):
+            bent = Not(bent) if word == "not" else Hedged(word, bent)
+        rules.append(Rule(bent, tuple(concluded), weight))
+    return rules

@@ -2,18 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from numbers import Real
+from operator import itemgetter
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.definition import System, variable_names
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import InputError
 
-Sample = Sequence[float] | Mapping[str, float]
 _NUMBER = (Real, np.bool_)
+
+
+class Frame(Protocol):
+    """A table with columns by name, as pandas and polars have it."""
+
+    @property
+    def columns(self) -> Any:
+        """Names of the columns."""
+        ...
+
+    def __getitem__(self, name: Any, /) -> Any: ...
+
+
+Sample = Sequence[float] | Mapping[str, float] | NDArray[Any]
+Columns = Mapping[str, ArrayLike] | Frame | NDArray[np.void]
 
 
 class Samples:
@@ -29,13 +46,36 @@ class Samples:
         self._clips = system.outside == "clip"
         self._limits = tuple(v.universe for v in system.inputs)
         self._names = variable_names(system.inputs)
+        self._by_name = itemgetter(*self._names)
+
+    def plain(self, inputs: Any) -> Sequence[float] | None:
+        """Return the values of a dict, an array or a sequence as they came, for those who check them themselves.
+
+        Parameters
+        ----------
+        inputs : object
+            What came.
+
+        Returns
+        -------
+        sequence, or None
+            In the order of the inputs; None for what has other names or is of another type.
+        """
+        kind = type(inputs)
+        if kind is dict and len(inputs) == len(self._names):
+            try:
+                values = self._by_name(inputs)
+            except KeyError:
+                return None
+            return values if len(self._names) > 1 else (values,)
+        return inputs.tolist() if kind is np.ndarray and inputs.ndim == 1 else None
 
     def one(self, inputs: Sample) -> Sequence[float]:
         """Return the values of one sample.
 
         Parameters
         ----------
-        inputs : sequence of float, or mapping from input's name to float
+        inputs : sequence of float, array, or mapping from input's name to float
             One value for each input.
 
         Returns
@@ -73,27 +113,115 @@ class Samples:
         Raises
         ------
         InputError
-            If the shape is another, or a value is not a number or outside its universe (unless that clips); the first
-            such row is named.
+            If the shape is another, or a value is masked, not a number or outside its universe (unless that clips); the
+            first such row is named.
+        """
+        values, masked = self.rows(inputs)
+        if masked is not None and masked.any():
+            raise InputError(f"row {int(np.argmax(masked))}: a value is masked, expected none")
+        return values
+
+    def rows(self, inputs: ArrayLike) -> tuple[Array, NDArray[np.bool_] | None]:
+        """Return the values of many samples, and which of the samples are masked.
+
+        Parameters
+        ----------
+        inputs : array_like, shape (n, inputs)
+            One sample in each row, in a masked array too.
+
+        Returns
+        -------
+        values : ndarray, shape (n, inputs)
+            In their universes; of masked rows their least ends.
+        masked : ndarray of bool, shape (n,), or None
+            Whether a value of the row is masked; None unless a masked array came.
+
+        Raises
+        ------
+        InputError
+            As of `many`, but for masked values.
         """
         try:
             received = np.asarray(inputs)
             if received.dtype.kind not in "biufO":  # NumPy would read numbers from texts, too
                 raise TypeError(f"values of the type {received.dtype.name} came")
+            if received.dtype.kind == "O" and any(isinstance(x, str | bytes) for x in received.flat):
+                raise TypeError("a text came among the values")
+            masked = self._masked(inputs)
+            if masked is not None and masked.shape == received.shape == (len(received), len(self._names)):
+                masked = np.asarray(masked.any(axis=1))
+                received = np.where(masked[:, None], np.array(self._limits).T[0], received)
             values = received.astype(np.float64, copy=False)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise InputError(f"inputs: {error}; expected rows of numbers for {', '.join(self._names)}") from None
         if values.ndim != 2 or values.shape[1] != len(self._names):
             raise InputError(f"inputs have the shape {values.shape}, expected (n, {len(self._names)})")
         low, high = np.array(self._limits).T
         if values.size and low.max() <= values.min() and values.max() <= high.min():  # for NaN neither holds
-            return values
+            return values, masked
         good = ~np.isnan(values) if self._clips else (low <= values) & (values <= high)
         if not good.all():
             row, i = np.argwhere(~good)[0]
             expected = f"expected a number in [{low[i]:g}, {high[i]:g}]"
             raise InputError(f"row {row}: {self._names[i]} is {float(values[row, i])!r}, {expected}")
-        return np.clip(values, low, high) if self._clips else values
+        return np.clip(values, low, high) if self._clips else values, masked
+
+    def columns(self, inputs: Columns) -> Array:
+        """Return columns by name as rows, in a masked array if one of them is masked.
+
+        Parameters
+        ----------
+        inputs : mapping from input's name to array_like, data frame, or array of named fields
+            A column for each input, all of one length; single values count for all rows. Other columns of a data frame
+            or an array are passed over.
+
+        Returns
+        -------
+        ndarray or masked array, shape (n, inputs)
+            As they came, for `rows`.
+
+        Raises
+        ------
+        InputError
+            If a column is missing or unknown, or has another length than the others.
+        """
+        if isinstance(inputs, Mapping):
+            self._require_names(inputs)
+        else:
+            names: Any = inputs.dtype.names if isinstance(inputs, np.ndarray) else inputs.columns
+            self._require_columns(list(map(str, names)))
+        received = [inputs[name] for name in self._names]
+        columns = [x if isinstance(x, np.ma.MaskedArray) else np.asarray(x) for x in received]
+        lengths = {len(x) for x in columns if x.ndim == 1}
+        if any(x.ndim > 1 for x in columns) or len(lengths) != 1:
+            shapes = ", ".join(f"{name} {x.shape}" for name, x in zip(self._names, columns, strict=True))
+            raise InputError(f"columns have the shapes {shapes}, expected one length, or a single value for all rows")
+        (n,) = lengths
+        values = np.stack([np.broadcast_to(np.ma.getdata(x), n) for x in columns], axis=1)
+        if not any(isinstance(x, np.ma.MaskedArray) for x in columns):
+            return values
+        masks = np.stack([np.broadcast_to(np.ma.getmaskarray(x), n) for x in columns], axis=1)
+        return np.ma.MaskedArray(values, masks)
+
+    def is_table(self, inputs: object) -> bool:
+        """Return whether inputs are columns by name, and not rows.
+
+        Parameters
+        ----------
+        inputs : object
+            What came.
+
+        Returns
+        -------
+        bool
+            True for a mapping, a data frame, and an array of named fields.
+        """
+        if isinstance(inputs, np.ndarray):
+            return inputs.dtype.names is not None
+        return isinstance(inputs, Mapping) or hasattr(inputs, "columns")
+
+    def _masked(self, inputs: object) -> NDArray[np.bool_] | None:
+        return np.ma.getmaskarray(inputs) if isinstance(inputs, np.ma.MaskedArray) else None
 
     def _converted(self, values: Sequence[float]) -> list[float]:
         """Return values as floats, in their universes: a number of another type would bring its own rounding along."""
@@ -105,14 +233,13 @@ class Samples:
             values = [min(max(x, low), high) for x, (low, high) in zip(values, self._limits, strict=True)]
         return list(map(float, values))
 
-    def _in_order(self, inputs: Sample) -> list[float]:
+    def _in_order(self, inputs: Any) -> list[float]:
         if isinstance(inputs, Mapping):
-            for name in inputs:  # first, for a misspelt one is missing, too
-                if name not in self._names:
-                    raise InputError(f"{name}: unknown input, expected {', '.join(self._names)}")
-            for name in self._names:
-                if name not in inputs:
-                    raise InputError(f"{name}: input is missing, expected {', '.join(self._names)}")
+            self._require_names(inputs)
+            return [inputs[name] for name in self._names]
+        if hasattr(inputs, "keys"):  # a row of a data frame, of which other columns are passed over
+            known = set(inputs.keys())
+            self._require_names({name: None for name in self._names if name in known})
             return [inputs[name] for name in self._names]
         if isinstance(inputs, np.ndarray):
             return list(inputs.tolist())
@@ -120,8 +247,23 @@ class Samples:
             return list(inputs)
         raise TypeError(inputs)
 
+    def _require_names(self, inputs: Mapping[str, object]) -> None:
+        for name in inputs:  # first, for a misspelt one is missing, too
+            if name not in self._names:
+                raise InputError(f"{name}: unknown input, expected {', '.join(self._names)}")
+        for name in self._names:
+            if name not in inputs:
+                raise InputError(f"{name}: input is missing, expected {', '.join(self._names)}")
+
+    def _require_columns(self, columns: Sequence[str]) -> None:
+        for name in self._names:
+            if columns.count(name) != 1:
+                fault = "stands twice" if name in columns else "is missing"
+                raise InputError(f"{name}: column {fault} in {', '.join(columns)}; expected {', '.join(self._names)}")
+
     def _fault(self, inputs: Sample) -> InputError:
         """Find out what is wrong with a sample that was refused."""
+        masked = isinstance(inputs, np.ma.MaskedArray)
         try:
             values = self._in_order(inputs)
         except TypeError:
@@ -130,5 +272,7 @@ class Samples:
             return InputError(f"inputs: {len(values)} came, expected {len(self._names)}: {', '.join(self._names)}")
         for name, x, (low, high) in zip(self._names, values, self._limits, strict=True):
             if not isinstance(x, _NUMBER) or x != x or (not self._clips and not low <= x <= high):
-                return InputError(f"{name}: input is {x!r}, expected a number in [{low:g}, {high:g}]")
+                came = "masked" if masked and x is None else shown(x)
+                hint = "; for columns there is batch" if isinstance(x, Sized) and not isinstance(x, str) else ""
+                return InputError(f"{name}: input is {came}, expected a number in [{low:g}, {high:g}]{hint}")
         return InputError(f"inputs are {inputs!r}, expected {len(self._names)} numbers")

@@ -1,20 +1,64 @@
-"""Membership functions: piecewise-linear, given by their points."""
+"""Membership functions: what all of them can do, and those that are piecewise linear, given by their points."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fuzzy_arbiter.checks import finite, shown
 from fuzzy_arbiter.errors import DefinitionError
 
+Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 
+class Membership(ABC):
+    """A membership function: to what degree each place belongs to a term.
+
+    Attributes
+    ----------
+    polynomial : bool
+        Whether it is a polynomial between its breaks, so that it can be integrated exactly.
+    """
+
+    __slots__ = ()
+    polynomial: ClassVar[bool] = False
+
+    @abstractmethod
+    def __call__(self, x: float) -> float:
+        """Return the degree at a place."""
+
+    @abstractmethod
+    def of_many(self, places: Array) -> Array:
+        """Return the degrees at many places, each as a call gives it, to rounding."""
+
+    @abstractmethod
+    def breaks(self, universe: tuple[float, float]) -> tuple[float, ...]:
+        """Return the places within a universe where it bends or jumps, in rising order; between them it is smooth."""
+
+    def within(self, universe: tuple[float, float]) -> Membership:
+        """Return what it is in a universe, where what does not matter there is left out."""
+        return self
+
+    def area(self, universe: tuple[float, float]) -> float:
+        """Return the integral of the degree over a universe, by quadrature."""
+        low, high = universe
+        places = np.unique([*np.linspace(low, high, 65), *self.breaks(universe)])
+        nodes, weights = np.polynomial.legendre.leggauss(8)
+        middle, half = (places[:-1] + places[1:]) / 2, np.diff(places) / 2
+        degrees = self.of_many((middle + nodes[:, None] * half).ravel()).reshape(len(nodes), -1)
+        return float((weights @ degrees) @ half)
+
+
 @dataclass(frozen=True, slots=True)
-class Shape:
+class Shape(Membership):
     """A piecewise-linear membership function, constant beyond its first and its last point.
 
     Points that change nothing are dropped at both ends, so that equal functions of the usual kinds are equal shapes.
@@ -38,6 +82,7 @@ class Shape:
     """
 
     points: tuple[Point, ...]
+    polynomial: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         points = list(self._pairs())
@@ -96,6 +141,47 @@ class Shape:
             return right
         a, left = points[i - 1]
         return left + (right - left) * ((x - a) / (b - a))
+
+    def of_many(self, places: Array) -> Array:
+        """Return the degrees at many places, each as a call gives it.
+
+        Parameters
+        ----------
+        places : ndarray, shape (n,)
+            Finite.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Degrees in [0, 1].
+        """
+        x, y = np.array(self.points).T
+        if len(x) == 1:
+            return np.full(len(places), y[0])
+        if len(x) == 2 and x[0] < x[1]:  # a ramp, which is met most often: nothing to look up
+            degrees: Array = np.asarray(places - x[0])
+            with np.errstate(over="ignore", invalid="ignore"):  # beyond its ends, which are set below
+                degrees /= x[1] - x[0]
+                degrees *= y[1] - y[0]
+                degrees += y[0]
+            np.copyto(degrees, y[0], where=places <= x[0])
+            np.copyto(degrees, y[1], where=places >= x[1])
+            return degrees
+        right = np.clip(np.searchsorted(x, places), 1, len(x) - 1)  # of x[right - 1] < place <= x[right]
+        left = right - 1
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # at jumps, which are set below
+            share = (places - x[left]) / (x[right] - x[left])
+            degrees = y[left] + (y[right] - y[left]) * share
+        degrees[places <= x[0]] = y[0]
+        degrees[places >= x[-1]] = y[-1]
+        for i in range(len(x) - 1):
+            if x[i] == x[i + 1]:
+                degrees[places == x[i]] = max(y[i], y[i + 1])
+        return np.asarray(degrees)
+
+    def breaks(self, universe: tuple[float, float]) -> tuple[float, ...]:
+        """Return the places of the points within a universe."""
+        return tuple(sorted({x for x, _ in self.points if universe[0] < x < universe[1]}))
 
     @property
     def jumps(self) -> bool:

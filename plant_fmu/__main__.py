@@ -15,7 +15,8 @@ from plant_fmu.installing import install_hint
 
 
 def _missing(error: ModuleNotFoundError) -> str:
-    return f"plant_fmu: {error.name} is not installed: run {install_hint('.')} in the checkout of subreach"
+    command = install_hint("./fuzzy_arbiter", ".")
+    return f"plant_fmu: {error.name} is not installed: run {command} in the checkout of subreach"
 
 
 try:

@@ -214,6 +214,8 @@ def _mistyped(text: str, at: str, table: Any, kind: Any, where: str) -> TableErr
         "`array`": "a list",
         "`float`": "a number",
         "`int`": "a whole number",
+        "`float | null`": "a number",
+        "`int | null`": "a whole number",
     }
     for word, plain in words.items():
         text = text.replace(word, plain)

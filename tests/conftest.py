@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import importlib.util
 import os
 import signal
 import time
@@ -62,7 +63,8 @@ def fmu_cache(tmp_path_factory):
     folder = (base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base) / "cache"
     folder.mkdir(exist_ok=True)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("platformdirs.user_cache_dir", lambda *_, **__: str(folder))
+        if importlib.util.find_spec("platformdirs") is not None:  # else these are the arbiter's tests alone
+            patch.setattr("platformdirs.user_cache_dir", lambda *_, **__: str(folder))
         yield folder
 
 

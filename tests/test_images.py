@@ -44,7 +44,7 @@ def test_the_rooms_that_are_drawn_are_those_of_the_code(draw):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("maker", ["arbiter", "fmu"])
+@pytest.mark.parametrize("maker", ["arbiter", "criteria", "fmu"])
 def test_pictures_are_those_that_their_script_draws(maker, draw):
     from PIL import Image
 
@@ -73,6 +73,7 @@ def test_the_page_of_the_readme_is_that_of_a_run(draw):
     from PIL import Image
 
     drawn = draw("pages")
-    assert drawn.keys() == {"replay-docking.png"}
-    with Image.open(drawn["replay-docking.png"]) as fresh, Image.open(IMAGES / "replay-docking.png") as kept:
-        assert fresh.size == kept.size
+    assert drawn.keys() == {"replay-docking.png", "replay-inspection.png"}
+    for name, path in drawn.items():
+        with Image.open(path) as fresh, Image.open(IMAGES / name) as kept:
+            assert fresh.size == kept.size

@@ -201,7 +201,7 @@ def test_a_balance_of_pull_and_push_is_an_equilibrium_with_w_0():
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     if importlib.util.find_spec("mkdocs") is None or importlib.util.find_spec("mkdocstrings") is None:
-        pytest.skip("mkdocs, mkdocs-material and mkdocstrings are not installed: pip install '.[docs]'")
+        pytest.skip("mkdocs, mkdocs-material and mkdocstrings are not installed: pip install ./fuzzy_arbiter '.[docs]'")
     folder = tmp_path_factory.mktemp("site")
     build = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", folder]
     done = subprocess.run(

@@ -13,6 +13,7 @@ from controller.law import Diagnostic
 from controller.navigation.estimate import NavigationMemory, empty_memory
 from controller.navigation.measurements import SENSORS, VALUES, Measurements, SensorModel, empty_measurements
 from controller.regions.region_set import PackedRegions
+from cosim.simulation.arbiter_inputs import ArbiterSignals, PackedInputs, empty_signals
 
 Array = NDArray[np.float64]
 
@@ -23,7 +24,7 @@ class FlightConfig(NamedTuple):
     goal: PackedRegions
     regions: PackedRegions
     criteria: NDArray[np.int64]  # (n,) of each region
-    ramp: float  # m, width of the memberships
+    inputs: PackedInputs  # what the arbiter decides by
     step: float  # s, of the plant
     steps: int  # of the plant
     control_every: int  # plant steps
@@ -67,6 +68,13 @@ class BoundLaw(NamedTuple):
     report: Array  # (r,) likewise
 
 
+class BoundArbiter(NamedTuple):
+    """An arbiter as the loop calls it: a function of C, with the workspace's signals and weights as its arguments."""
+
+    address: int
+    words: int
+
+
 class Workspace(NamedTuple):
     """Where a flight is computed."""
 
@@ -74,8 +82,8 @@ class Workspace(NamedTuple):
     measurements: Measurements
     navigation: NavigationMemory
     now: Array  # (1,) s
-    memberships: Array  # (3,)
-    by_criterion: Array  # (3,) weights
+    signals: ArbiterSignals
+    by_criterion: Array  # (criteria,) weights
     weights: Array  # (n,)
     clearances: Array  # (n,) true ones
     seen: Array  # (n,) those that the arbiter is told
@@ -87,12 +95,14 @@ class Workspace(NamedTuple):
     ticks: NDArray[np.int64]  # (2,)
 
 
-def make_workspace(regions: int, inputs: int, thrusters: int) -> Workspace:
+def make_workspace(setup: FlightConfig, criteria: int, inputs: int, thrusters: int) -> Workspace:
     """Return the workspace of a flight.
 
     Parameters
     ----------
-    regions, inputs, thrusters : int
+    setup : FlightConfig
+        Of the flight.
+    criteria, inputs, thrusters : int
         How many there are.
 
     Returns
@@ -100,14 +110,14 @@ def make_workspace(regions: int, inputs: int, thrusters: int) -> Workspace:
     Workspace
         All zero, all thrusters healthy.
     """
-    n = regions
+    n = setup.criteria.size
     return Workspace(
         state=VehicleState(np.zeros(3), np.zeros(4), np.zeros(6), np.ones(thrusters), np.zeros(12)),
         measurements=empty_measurements(),
         navigation=empty_memory(),
         now=np.zeros(1),
-        memberships=np.zeros(3),
-        by_criterion=np.zeros(3),
+        signals=empty_signals(setup.inputs, n, criteria),
+        by_criterion=np.zeros(criteria),
         weights=np.zeros(n),
         clearances=np.zeros(n),
         seen=np.zeros(n),
@@ -144,8 +154,8 @@ class FlightOutputs(NamedTuple):
 
     metrics: Array  # (14,) in the order of `FlightMetrics`
     estimate: Array  # (4,) that the last decision rests on
-    trace: Array  # (control steps, 20 + i + r), or (0, 0) if none is kept; a row: time, true position, quaternion and
-    # velocity, position as measured, the weights of the three criteria, the i inputs, the law's r reports
+    trace: Array  # (control steps, 17 + c + i + r), or (0, 0) if none is kept; a row: time, true position, quaternion
+    # and velocity, position as measured, the weights of the c criteria, the i inputs, the law's r reports
 
 
 SENSOR_OUTPUTS = (

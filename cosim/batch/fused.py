@@ -28,10 +28,12 @@ from cosim.batch.variation import Variation
 from cosim.errors import RunError, ScenarioError
 from cosim.results.summary import SETTLED_FOR
 from cosim.scenario.law_factory import law_of, require_builtin_law
-from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.scenario.scenario import Scenario
 from cosim.scenario.sensor_suite import outage_schedule, scenario_sensors, sensor_model
 from cosim.scenario.start_values import start_values
+from cosim.simulation.arbiter_inputs import pack_inputs
 from cosim.simulation.sensor import STREAM
+from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant, PlantError
 from plant_fmu.running.native import Native
 
@@ -51,7 +53,7 @@ class FusedFlyer:
     Raises
     ------
     RunError
-        If the scenario has what the loop does not: commands from outside, another arbiter than the closed one, the
+        If the scenario has what the loop does not: commands from outside, an engine of the arbiter that samples, the
         order of Jacobi, FMI 2.0.
     BuildError, PlantError
         If there is no FMU of the vehicle.
@@ -61,7 +63,7 @@ class FusedFlyer:
         self.variation = variation
         base = variation.base
         for key, received, expected in (
-            ("arbiter.engine", base.arbiter.engine, "closed"),
+            ("arbiter.engine", base.arbiter.engine, Arbiter(system=base.rules.system).engine),
             ("master.order", base.master.order, "gauss-seidel"),
             ("plant.fmi", base.plant.fmi, 3),
             ("commands.enabled", base.commands.enabled, False),
@@ -139,9 +141,10 @@ class FusedFlyer:
         setup = _setup(scenario, n if through else 0)
         allocator = _allocator(scenario, setup) if through else _NONE
         decisions = -(-scenario.steps // scenario.control_every)
-        rows = np.zeros((decisions, 20 + len(inputs) + law.report.size) if trace else (0, 0))
-        workspace = make_workspace(len(scenario.regions), len(inputs), n)
-        metrics, estimate = fly_law(setup, native, effectiveness, losses, allocator, law, workspace, rows)
+        criteria, rules = len(scenario.criteria), scenario.rules
+        rows = np.zeros((decisions, 17 + criteria + len(inputs) + law.report.size) if trace else (0, 0))
+        workspace = make_workspace(setup, criteria, len(inputs), n)
+        metrics, estimate = fly_law(setup, native, effectiveness, losses, allocator, law, rules.system, workspace, rows)
         return _outcome(metrics, setup, native, estimate), rows
 
     def close(self) -> None:
@@ -173,8 +176,8 @@ def _setup(scenario: Scenario, thrusters: int) -> FlightConfig:
     return FlightConfig(
         goal=pack([scenario.goal_region]),
         regions=pack([secondary.region for secondary in scenario.regions]),
-        criteria=np.array([CRITERIA.index(secondary.criterion) for secondary in scenario.regions], np.int64),
-        ramp=scenario.arbiter.ramp,
+        criteria=np.array(scenario.criterion_places, np.int64),
+        inputs=pack_inputs(scenario.regions, scenario.criteria, scenario.rules, scenario.arbiter.ramp),
         step=step,
         steps=scenario.steps,
         control_every=scenario.control_every,

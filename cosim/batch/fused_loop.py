@@ -20,9 +20,18 @@ from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_of_pose, clearance_of_sphere
 from controller.translator.foreign import POINTER, call_c
 from cosim.batch.c_calls import fmi_do_step, fmi_get, fmi_set, seconds
-from cosim.batch.flight_config import Allocator, BoundLaw, FlightConfig, FlightMetrics, FlightOutputs, Workspace
-from cosim.simulation.closed_arbiter import weigh
-from cosim.simulation.memberships import compute_memberships
+from cosim.batch.flight_config import (
+    Allocator,
+    BoundArbiter,
+    BoundLaw,
+    FlightConfig,
+    FlightMetrics,
+    FlightOutputs,
+    Workspace,
+)
+from cosim.simulation.arbiter_inputs import compute_inputs
+from cosim.simulation.compiled_rules import BoundRules
+from fuzzy_arbiter import System
 from plant_fmu.running.native import Native
 
 Array = NDArray[np.float64]
@@ -38,6 +47,7 @@ def fly(  # noqa: C901 - one loop, as a whole
     losses: Native,
     allocator: Allocator,
     law: BoundLaw,
+    arbiter: BoundArbiter,
     workspace: Workspace,
     out: FlightOutputs,
 ) -> None:
@@ -59,6 +69,8 @@ def fly(  # noqa: C901 - one loop, as a whole
     law : BoundLaw
         Bound to the workspace's state and weights, to goal and regions of the setup, and to the plant's inputs as its
         forces; to the workspace's wrench if thrusters carry that.
+    arbiter : BoundArbiter
+        Bound to the workspace's inputs of the rules and weights of the criteria.
     workspace : Workspace
         Of `make_workspace`, anew for each flight.
     out : FlightOutputs
@@ -66,7 +78,7 @@ def fly(  # noqa: C901 - one loop, as a whole
     """
     m, n, inputs = setup.thrusters, setup.regions.kinds.size, native.inputs
     state, weights, clearances, seen = workspace.state, workspace.weights, workspace.clearances, workspace.seen
-    memberships, by_criterion, goal_clearance = workspace.memberships, workspace.by_criterion, workspace.goal_clearance
+    by_criterion, goal_clearance = workspace.by_criterion, workspace.goal_clearance
     position, quaternion = native.outputs[:3], native.outputs[3:7]
     first_inside, last_entered, inside = -1, -1, False
     least, least_angle, most = np.inf, np.inf, -np.inf
@@ -139,8 +151,11 @@ def fly(  # noqa: C901 - one loop, as a whole
             if not setup.exact:
                 _clearances(setup.regions, state.position, state.quaternion, seen, workspace.at)
                 told_clearances = seen
-            compute_memberships(told_clearances, setup.criteria, setup.ramp, memberships)
-            weigh(memberships, by_criterion)
+            workspace.now[0] = now
+            compute_inputs(
+                setup.inputs, setup.goal, setup.regions, state, workspace.now, told_clearances, workspace.signals
+            )
+            call_c(arbiter.address, _LAW, arbiter.words)
             for i in range(n):
                 weights[i] = by_criterion[setup.criteria[i]]
         # law and allocation
@@ -248,9 +263,10 @@ def _trace(row: Array, now: float, native: Native, position: Array, weights: Arr
     row[0] = now
     row[1:14] = native.outputs[:13]
     row[14:17] = position
-    row[17:20] = weights
-    row[20 : 20 + m] = native.inputs
-    row[20 + m :] = report
+    c = weights.size
+    row[17 : 17 + c] = weights
+    row[17 + c : 17 + c + m] = native.inputs
+    row[17 + c + m :] = report
 
 
 def fly_law(
@@ -260,6 +276,7 @@ def fly_law(
     losses: Native,
     allocator: Allocator,
     law: CompiledLaw,
+    rules: System,
     workspace: Workspace,
     trace: Array,
 ) -> tuple[FlightMetrics, Array]:
@@ -271,6 +288,8 @@ def fly_law(
         As for `fly`.
     law : CompiledLaw
         Anew for each flight.
+    rules : System
+        By which the arbiter weighs the workspace's inputs.
     trace : ndarray
         As of `FlightOutputs`.
 
@@ -288,8 +307,11 @@ def fly_law(
     forces = workspace.wrench if setup.thrusters and is_wrench else native.inputs
     decide = law.bound(workspace.state, setup.goal, setup.regions, workspace.weights, forces)
     bound = BoundLaw(decide.address, decide.words, is_wrench, law.estimate, law.report)
+    weigh = BoundRules(rules, workspace.signals.inputs, workspace.by_criterion)
+    arbiter = BoundArbiter(weigh.address, weigh.words)
     out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), np.zeros(4), trace)
-    BoundCall(fly, (setup, native, effectiveness, losses, allocator, bound, workspace, out)).call()
+    BoundCall(fly, (setup, native, effectiveness, losses, allocator, bound, arbiter, workspace, out)).call()
     decide.raise_error()
+    weigh.raise_error()
     metrics = FlightMetrics(*out.metrics.tolist())
     return metrics._replace(inside=bool(metrics.inside)), out.estimate

@@ -20,7 +20,6 @@ from cosim.batch.lanes_rows import Array, Rows, require_lanes
 from cosim.batch.outcome import Flown, Outcomes, nothing
 from cosim.batch.variation import Variation
 from cosim.results.summary import SETTLED_FOR
-from cosim.scenario.scenario import CRITERIA
 
 _REFUSAL = 512  # bytes of a message
 _MARKS = (
@@ -52,8 +51,8 @@ class LanesFlyer:
     Parameters
     ----------
     variation : Variation
-        What is flown: by the paper's law and the closed arbiter, any shapes, by wrench or thrusters, without noise,
-        failures and commands.
+        What is flown: by the paper's law, criteria and closed arbiter, any shapes, by wrench or thrusters, without
+        noise, failures and commands.
 
     Raises
     ------
@@ -82,13 +81,12 @@ class LanesFlyer:
         b.n_regions, b.n_numbers = packed.kinds.size, packed.numbers.size
         b.steps, b.control_every, b.arbiter_every = base.steps, base.control_every, base.arbiter_every
         b.step, b.period, b.substep = base.time.step, base.time.control, base.plant.substep
-        criteria = [CRITERIA.index(secondary.criterion) for secondary in base.regions]
         self._point("reals", rows.references(rows.reals))
         self._point("integers", rows.references(rows.integers))
         self._point("kinds", packed.kinds.astype(np.intc))
         self._point("signs", packed.signs)
         self._point("offsets", packed.offsets.astype(np.intc))
-        self._point("criteria", np.array([-1, *criteria], np.intc))
+        self._point("criteria", np.array([-1, *base.criterion_places], np.intc))
         self._point("hard", packed.hard.astype(np.intc))
         if thrusters:
             v = base.vehicle

@@ -37,6 +37,7 @@ _CLOCKED = ("depth_sensor.rate", "dvl.rate", "imu.rate", "compass.rate", "usbl.r
 # numbers that are not checked each by itself: of a unit quaternion, and of shapes whose points must not meet
 _JOINT = ("initial.quaternion.", "law.desired_quaternion.")
 _JOINT_SHAPES = (Pipe, Prism)
+_PAPER = "the paper's"
 _SEEDS = (0, 2**31 - 1)  # that the plant takes
 
 
@@ -208,6 +209,8 @@ def require_lanes(scenario: Scenario) -> None:
     for key, received, expected in (
         ("law.name", s.law.name, "ismail_dunnigan"),
         ("arbiter.engine", s.arbiter.engine, "closed"),
+        ("arbiter.file", s.arbiter.file, ""),
+        ("criteria", _said(s), _PAPER),
         ("master.order", s.master.order, "gauss-seidel"),
         ("commands.enabled", s.commands.enabled, False),
         ("sensing", "noisy" if not s.sensing.exact else "exact", "exact"),
@@ -222,6 +225,10 @@ def require_lanes(scenario: Scenario) -> None:
         raise RunError(f"{error}; the fused loop flies it") from error
     if s.time.step / s.plant.substep > 1e6:
         raise RunError(f"plant.substep is {s.plant.substep} s, expected a millionth of time.step or more for lanes")
+
+
+def _said(scenario: Scenario) -> str:
+    return _PAPER if scenario.has_paper_criteria else f"one's own ({', '.join(scenario.criterion_names)})"
 
 
 def _require_variable(key: str, clocked: tuple[str, ...]) -> None:

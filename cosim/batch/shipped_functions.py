@@ -25,11 +25,22 @@ from controller.regions import Region, Sphere, pack
 from controller.regions.rays import ray_distances
 from controller.regions.region_set import PackedRegions, evaluate_packed, write_clearances
 from cosim.batch.c_calls import Clock
-from cosim.batch.flight_config import Allocator, BoundLaw, FlightConfig, FlightMetrics, FlightOutputs, make_workspace
+from cosim.batch.flight_config import (
+    Allocator,
+    BoundArbiter,
+    BoundLaw,
+    FlightConfig,
+    FlightMetrics,
+    FlightOutputs,
+    make_workspace,
+)
 from cosim.batch.fused_loop import fly
+from cosim.scenario.arbiter_rules import PAPER_RULES
+from cosim.scenario.criteria import PAPER
 from cosim.scenario.vehicle_model import vehicle_model
+from cosim.simulation.arbiter_inputs import compute_inputs, empty_signals, pack_inputs
+from cosim.simulation.compiled_rules import rules_text
 from cosim.simulation.environment import RegionEvaluation, RegionPlaces, evaluate_places
-from cosim.simulation.memberships import compute_memberships
 from plant_fmu.compiling.compiler import cross_compiler, find_compiler
 from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
 from plant_fmu.running.native import Native
@@ -53,7 +64,8 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     yield write_clearances, (regions, _TABLE, _FLAT, _FLAT)
     yield ray_distances, (regions, state.position, _TABLE, 1.0, _FLAT)
     yield search_path, (empty_plan(1, 1), state.position, goal, regions, PathLimits(1.0, 1.0, 1.0, 1.0), 1.0, _INTEGERS)
-    yield compute_memberships, (_FLAT, _INTEGERS, 1.0, _FLAT)
+    inputs = pack_inputs((), PAPER, PAPER_RULES, 1.0)
+    yield compute_inputs, (inputs, goal, regions, state, _FLAT, _FLAT, empty_signals(inputs, 1, 3))
     yield fly, _of_flight(goal, regions)
 
 
@@ -68,13 +80,24 @@ def _of_law(
 def _of_flight(goal: PackedRegions, regions: PackedRegions) -> tuple[Any, ...]:
     references = np.zeros(1, np.uint32)
     native = Native(0, 0, 0, 0, references, _FLAT, references, _FLAT, _INTEGERS)
+    inputs = pack_inputs((), PAPER, PAPER_RULES, 1.0)
     setup = FlightConfig(
-        goal, regions, _INTEGERS, 1.0, 1.0, 1, 1, 1, False, True, np.zeros((0, 6)), 0.0, 0.0, False,
+        goal, regions, _INTEGERS, inputs, 1.0, 1, 1, 1, False, True, np.zeros((0, 6)), 0.0, 0.0, False,
         False, SensorModel(), _INTEGERS, _INTEGERS, _FLAT, _INTEGERS, _INTEGERS, _FLAT, False, 1, -1, Clock().numbers,
     )  # fmt: skip
     out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), _FLAT, np.zeros((0, 0)))
     law, allocator = BoundLaw(0, 0, True, _FLAT, _FLAT), Allocator(np.zeros((1, 1, 6)), _TABLE, _TABLE, True)
-    return setup, native, native, native, allocator, law, make_workspace(1, 1, 1), out
+    arbiter = BoundArbiter(0, 0)
+    return setup, native, native, native, allocator, law, arbiter, make_workspace(setup, 3, 1, 1), out
+
+
+def shipped_texts() -> dict[str, str]:
+    """Return the C of each function, and of the paper's arbiter, by the name of its file."""
+    texts = {
+        f"{function.__module__.rpartition('.')[2]}_{function.__name__}": c_text(function, arguments)
+        for function, arguments in shipped_functions()
+    }
+    return texts | {"arbiter": rules_text(PAPER_RULES.system)}
 
 
 def write_libraries(platforms: str, folder: Path) -> None:
@@ -98,7 +121,7 @@ def write_libraries(platforms: str, folder: Path) -> None:
         compilers = [(platform, cross_compiler(platform)) for platform in cross_platforms(platforms)]
     for platform, _ in compilers:
         (folder / platform.name).mkdir()
-    texts = sorted({c_text(function, arguments) for function, arguments in shipped_functions()})
+    texts = sorted(set(shipped_texts().values()))
     with tempfile.TemporaryDirectory(prefix="subreach-") as scratch, ThreadPoolExecutor(os.cpu_count()) as pool:
         sources = [_written(text, Path(scratch)) for text in texts]
         made = [pool.submit(_compile, source, folder, *compiler) for source in sources for compiler in compilers]
@@ -122,9 +145,8 @@ def _compile(source: Path, folder: Path, platform: Platform, compiler: list[str]
 def write_sources(folder: Path) -> None:
     """Write the C of each into a folder, which is made if it is not there."""
     folder.mkdir(parents=True, exist_ok=True)
-    for function, arguments in shipped_functions():
-        stem = f"{function.__module__.rpartition('.')[2]}_{function.__name__}"
-        (folder / f"{stem}.c").write_text(c_text(function, arguments), encoding="utf-8")
+    for stem, text in shipped_texts().items():
+        (folder / f"{stem}.c").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +19,6 @@ from cosim.replay.activity import active_regions
 from cosim.replay.header import header_of
 from cosim.replay.steering import changes_of, log_of
 from cosim.scenario.colours import colour_of
-from cosim.scenario.scenario import CRITERIA
 from cosim.simulation.signals import Array
 
 NED, PLACE, BODY = "ned", "place", "body"  # the world; the vehicle's place, not turned; the vehicle
@@ -95,12 +95,12 @@ class Scene:
         limits = self._limits([shape for i, shape in all_shapes if i not in waiting])
         self.solids = tuple(self._solid(i, shape, limits) for i, shape in enumerate(begun))
         self.changes = tuple((time, i, self._solid(i, shape, limits)) for time, i, shape in later)
-        self._criteria = [secondary.criterion for secondary in scenario.regions]
-        self._memberships = self.places([f"membership.{name}" for name in CRITERIA])
-        self._weights = self.places([f"weight.{name}" for name in CRITERIA])
+        self._criteria, criteria = scenario.criterion_places, scenario.criterion_names
+        self._memberships = self.places([f"membership.{name}" for name in criteria])
+        self._weights = self.places([f"weight.{name}" for name in criteria])
         self._clearances = self.places([f"{solid.name}.clearance" for solid in self.solids[1:]])
 
-    def places(self, names: list[str] | tuple[str, ...]) -> list[int]:
+    def places(self, names: Sequence[str]) -> list[int]:
         """Return where signals are in a row of the record."""
         return [self._at[name] for name in names]
 
@@ -128,7 +128,7 @@ class Scene:
         return Solid(
             region.name,
             f"{region.name}: keep {region.keep}",
-            _rgb(colour_of(secondary.criterion if secondary else None)),
+            _rgb(colour_of(scenario, secondary.criterion if secondary else None)),
             shape,
             self._mesh(shape, limits),
             {Orientation: PLACE, Visibility: BODY}.get(type(shape), NED),

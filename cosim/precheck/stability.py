@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from controller import VehicleState
 from controller.paper_law import Gains, primary_error
-from controller.regions import Region, Sphere
+from controller.regions import Region, Sphere, pack
 from controller.theory import (
     Fit,
     Model,
@@ -26,9 +27,10 @@ from controller.theory.conditions import least_of_potential_test
 from controller.theory.model import asymmetry, damping, least_inertia, restoring_defect, skew_defect
 from cosim.precheck.finding import Finding, status
 from cosim.precheck.region_values import evaluated
-from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_model, true_vehicle
-from fuzzy_arbiter import Arbiter, ramp
+from cosim.simulation.arbitration import Arbitration
+from fuzzy_arbiter import Arbiter
 
 Array = NDArray[np.float64]
 
@@ -109,15 +111,16 @@ def start_weights(scenario: Scenario) -> Array:
     DefinitionError
         If the arbiter cannot be set up.
     """
-    arbiter = Arbiter(engine=scenario.arbiter.engine, points=scenario.arbiter.points)
     initial = scenario.initial
-    clearances = evaluated([r.region for r in scenario.regions], initial.position, initial.quaternion)[2]
-    of = [CRITERIA.index(r.criterion) for r in scenario.regions]
-    memberships = [0.0] * len(CRITERIA)
-    for criterion, clearance in zip(of, clearances.tolist(), strict=True):
-        memberships[criterion] = max(memberships[criterion], ramp(clearance, scenario.arbiter.ramp))
-    weights = arbiter(memberships)
-    return np.array([weights[criterion] for criterion in of], dtype=float)
+    secondary = [r.region for r in scenario.regions]
+    clearances = evaluated(secondary, initial.position, initial.quaternion)[2]
+    position, quaternion, velocity = map(np.array, (initial.position, initial.quaternion, initial.velocity))
+    state = VehicleState(position, quaternion, velocity, np.ones(scenario.vehicle.n_thrusters))
+    arbiter = Arbiter(system=scenario.rules.system, engine=scenario.arbiter.engine)
+    n = len(scenario.criteria)
+    arbitration = Arbitration(scenario, arbiter, state, np.zeros(1), clearances, np.zeros(n), np.zeros(n))
+    arbitration.decide(pack([scenario.goal_region]), pack(secondary))
+    return arbitration.region_weights
 
 
 def gain_findings(scenario: Scenario, weights: Array) -> Iterator[Finding]:

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.scenario.scenario import CRITERIA
 from cosim.simulation.signals import Array
 
 
 def active_regions(
-    criteria: Sequence[str], memberships: Array, weights: Array, clearances: Array
+    criteria: Sequence[int], memberships: Array, weights: Array, clearances: Array
 ) -> NDArray[np.float64]:
     """Return which region the arbiter gives way to.
 
@@ -21,10 +20,10 @@ def active_regions(
 
     Parameters
     ----------
-    criteria : sequence of str
-        Of each of the n secondary regions.
-    memberships, weights : ndarray, shape (rows, 3)
-        In the order of `CRITERIA`.
+    criteria : sequence of int
+        Place of the criterion of each of the n secondary regions.
+    memberships, weights : ndarray, shape (rows, criteria)
+        Of each criterion.
     clearances : ndarray, shape (rows, n)
         Of the secondary regions [m or rad].
 
@@ -35,7 +34,7 @@ def active_regions(
     """
     rows = np.arange(len(weights))
     criterion = np.argmax(np.where(np.isnan(weights), -np.inf, weights), axis=1)
-    of = np.array([CRITERIA.index(name) for name in criteria], dtype=int)
+    of = np.array(criteria, dtype=int)
     if not of.size:
         return np.zeros(len(rows))
     belongs = of[None, :] == criterion[:, None]

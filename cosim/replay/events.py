@@ -16,7 +16,6 @@ from cosim.replay.command_words import command_events
 from cosim.replay.steering import Log
 from cosim.results.run_result import Run
 from cosim.results.spans import Flags, Span, Spans
-from cosim.scenario.scenario import CRITERIA
 from cosim.scenario.sensor_suite import SENSOR_NAMES
 from cosim.simulation.signals import Array
 
@@ -96,9 +95,25 @@ def _violations(run: Run) -> Iterator[Event]:
             yield Event(span.start, "violation", text, span.end)
 
 
+def turns_of(run: Run) -> list[tuple[float, int]]:
+    """Return when the arbiter gave way to another region and which, the goal being 0; of many turns the longest.
+
+    Parameters
+    ----------
+    run : Run
+        Finished, interrupted or killed.
+
+    Returns
+    -------
+    list of (float, int)
+        Time [s] and region; the first is what was so at first.
+    """
+    return _turns(_takeovers(run))
+
+
 def _active(run: Run) -> Iterator[Event]:
     regions = run.scenario.regions
-    for i, (time, index) in enumerate(_turns(_takeovers(run))):
+    for i, (time, index) in enumerate(turns_of(run)):
         if index:
             secondary = regions[index - 1]
             yield Event(time, "active", f"Gives way to {secondary.region.name} ({secondary.criterion})")
@@ -109,12 +124,14 @@ def _active(run: Run) -> Iterator[Event]:
 def _takeovers(run: Run) -> Iterator[tuple[float, int]]:
     """Yield when another region takes over and which, the goal being 0; first what is so at first."""
     regions, before = run.scenario.regions, -1
-    memberships, weights = ([f"{of}.{name}" for name in CRITERIA] for of in ("membership", "weight"))
+    memberships, weights = (
+        [f"{of}.{name}" for name in run.scenario.criterion_names] for of in ("membership", "weight")
+    )
     clearances = [f"{secondary.region.name}.clearance" for secondary in regions]
     for block in run.record.blocks(["time", *memberships, *weights, *clearances]):
         by_region = block.stack(clearances) if clearances else np.empty((len(block), 0))
-        criteria = [secondary.criterion for secondary in regions]
-        active = active_regions(criteria, block.stack(memberships), block.stack(weights), by_region).astype(int)
+        places = run.scenario.criterion_places
+        active = active_regions(places, block.stack(memberships), block.stack(weights), by_region).astype(int)
         for row in np.flatnonzero(np.diff(active, prepend=before)).tolist():
             yield float(block["time"][row]), int(active[row])
         before = int(active[-1])

@@ -11,9 +11,10 @@ import numpy as np
 from controller.regions.region_set import name_of, of_attitude, shape_entry, surface_of
 from controller.regions.shape import Bounds, Shape
 from cosim.results.wording import asked
+from cosim.scenario.colours import colour_of
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Column
-from fuzzy_arbiter import Arbiter, System
+from fuzzy_arbiter import System
 from plant_fmu import Vehicle
 from plant_fmu.thruster_lines import thruster_lines
 
@@ -41,7 +42,7 @@ def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = Fa
     dict
         Of texts, numbers, booleans, lists and dicts.
     """
-    system, limits = Arbiter(engine="closed").system, limits_of(scenario)
+    limits = limits_of(scenario)
     return {
         "version": VERSION,
         "name": scenario.name,
@@ -54,8 +55,9 @@ def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = Fa
         "commands": commands,
         "through": scenario.actuation.through,
         "vehicle": _vehicle(scenario.vehicle),
+        "criteria": [{"name": criterion.name, "colour": criterion.colour} for criterion in scenario.criteria],
         "regions": [_region(scenario, i, limits) for i in range(len(scenario.regions) + 1)],
-        "rules": rules_of(system),
+        "rules": rules_of(scenario.rules.system),
         "truth": {"estimate": [float(phi) for phi in scenario.true_restoring_parameters]},
         "signals": [dataclasses.asdict(column) for column in columns],
     }
@@ -118,6 +120,7 @@ def _region(scenario: Scenario, index: int, limits: Bounds) -> dict[str, Any]:
     return {
         "name": region.name,
         "criterion": secondary.criterion if secondary else None,
+        "colour": colour_of(scenario, secondary.criterion if secondary else None),
         "keep": region.keep,
         "hard": region.hard,
         "gain": region.gain,

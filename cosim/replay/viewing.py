@@ -7,14 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from cosim.replay.activity import active_regions
-from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array, Column
-from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter.engines.firing import Firing
 
 _DRAWN = (  # beginnings of the names of what a view draws
-    "time", "position.", "quaternion.", "velocity.", "attitude.", "membership.", "weight.", "estimate.", "command.",
-    "thruster_force[", "actuation.", "commands.", "target.", "wrench_saturated", "allocation_saturated",
+    "time", "position.", "quaternion.", "velocity.", "attitude.", "membership.", "weight.", "arbiter.", "estimate.",
+    "command.", "thruster_force[", "actuation.", "commands.", "target.", "wrench_saturated", "allocation_saturated",
 )  # fmt: skip
 _DRAWN_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")
 
@@ -38,13 +37,17 @@ class Viewing:
     def __init__(self, scenario: Scenario, columns: Sequence[Column]) -> None:
         names = [column.name for column in columns]
         self.picked = [i for i, name in enumerate(names) if _drawn(name)]
-        self._criteria = [secondary.criterion for secondary in scenario.regions]
+        self._criteria, names_of_criteria = scenario.criterion_places, scenario.criterion_names
         drawn = [names[i] for i in self.picked]
-        self._memberships = [drawn.index(f"membership.{name}") for name in CRITERIA]
-        self._weights = [drawn.index(f"weight.{name}") for name in CRITERIA]
+        self._memberships = [drawn.index(f"membership.{name}") for name in names_of_criteria]
+        self._weights = [drawn.index(f"weight.{name}") for name in names_of_criteria]
         self._clearances = [drawn.index(f"{secondary.region.name}.clearance") for secondary in scenario.regions]
-        system = Arbiter(engine="closed").system
+        system = scenario.rules.system
+        self._inputs = self._memberships  # of the rules
+        if scenario.arbiter.file:
+            self._inputs = [drawn.index(f"arbiter.{signal.name}") for signal in scenario.rules.inputs]
         self._firing, rules = Firing(system), system.rules
+        self._low, self._high = np.array([variable.universe for variable in system.inputs]).T
         self.columns = (
             *(columns[i] for i in self.picked),
             Column("active", "", "Region that the arbiter gives way to: 0 the goal, then the regions in their order"),
@@ -62,14 +65,17 @@ class Viewing:
         Returns
         -------
         ndarray, shape (rows, columns)
-            With activity and strengths; NaN where a membership is no number.
+            With activity and strengths; NaN where an input of the rules is no number.
         """
         memberships = picked[:, self._memberships]
         active = active_regions(self._criteria, memberships, picked[:, self._weights], picked[:, self._clearances])
-        numbers = ((memberships >= 0.0) & (memberships <= 1.0)).all(axis=1)
+        inputs = picked[:, self._inputs]
+        numbers = np.isfinite(inputs).all(axis=1)
         strengths = np.full((len(picked), len(self.columns) - len(self.picked) - 1), np.nan)
         if numbers.any():
-            strengths[numbers] = np.column_stack(self._firing.strengths_of_many(memberships[numbers]))
+            strengths[numbers] = np.column_stack(
+                self._firing.strengths_of_many(np.clip(inputs[numbers], self._low, self._high))
+            )
         return np.column_stack([picked, active, strengths])
 
 

@@ -2,5 +2,5 @@
 
 Sentences, tables and figures as one HTML file, as PDF, or as pictures. Public: `write_report`.
 
-Imports: controller, results, scenario, simulation.
+Imports: controller, replay, results, scenario, simulation.
 """

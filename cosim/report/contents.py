@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from controller.laws import LAWS
+from cosim.replay.events import turns_of
 from cosim.results.paper_claims import paper_claims
 from cosim.results.record import PARTS, RECORD
 from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY, Run
 from cosim.results.spans import Spans
 from cosim.results.wording import asked, kind_of, number, verdict
+from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import Sensing
 from cosim.simulation.signals import Array
+
+_TURNS = 6  # of a criterion that a table names
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,9 @@ def contents_of(run: Run) -> Contents:
         remarks=_remarks(run),
         claims=_claims(run),
         regions=_regions(run),
-        numbers=tuple(table for table in (_goal(run), _effort(run), _estimates(run), _lyapunov(run)) if table),
+        numbers=tuple(
+            table for table in (_criteria(run), _goal(run), _effort(run), _estimates(run), _lyapunov(run)) if table
+        ),
         setting=_setting(run),
         scenario=run.scenario.toml(),
         repeat=commands,
@@ -150,6 +157,29 @@ class _Violation:
         return self._ended + (still.end - still.start if still else 0.0) if self._least < 0.0 else None
 
 
+def _criteria(run: Run) -> Table | None:
+    """Return when the arbiter gave way to regions of each criterion, and why this asks."""
+    scenario = run.scenario
+    if not scenario.regions:
+        return None
+    turns, end = turns_of(run), run.record.value("time", -1)
+    rows = []
+    for i, criterion in enumerate(scenario.criteria):
+        spans = [
+            (start, stop, scenario.regions[index - 1].region.name)
+            for (start, index), (stop, _) in pairwise([*turns, (end, 0)])
+            if index and scenario.criterion_places[index - 1] == i
+        ]
+        shown = ", ".join(f"{start:.2f} to {stop:.2f} ({name})" for start, stop, name in spans[:_TURNS])
+        more = f", and {len(spans) - _TURNS} more" if len(spans) > _TURNS else ""
+        why = "; ".join(reason.words(scenario.arbiter.ramp) for reason in criterion.reasons)
+        lasting = sum(stop - start for start, stop, _ in spans)
+        rows.append((f"{i + 1} {criterion.name}", why, f"{lasting:.2f}" if spans else "never", f"{shown}{more}" or "–"))
+    return Table(
+        "Criteria", ("By priority", "Asks", "Led for [s]", "From and to [s]"), tuple(rows), (0.9, 1.6, 0.7, 2.2)
+    )
+
+
 def _goal(run: Run) -> Table:
     s = run.summary
     outside = s["closest_to_goal"]
@@ -230,7 +260,7 @@ def _setting(run: Run) -> Table:
     rows = [
         ("vehicle", f"{s.vehicle.title}. {s.vehicle.source}".strip()),
         ("law, and what it acts through", f"{s.law.name}; {through}"),
-        ("arbiter", f"{s.arbiter.engine}; memberships fall to 0 over {s.arbiter.ramp:g} m (rad for attitude)"),
+        ("arbiter", f"{s.arbiter.engine}; {_weighed(s)}"),
         ("planned for [s], in steps of [s]", f"{s.time.duration:g}, {s.time.step:g}"),
         ("start: north, east, down [m]", ", ".join(number(x, 6) for x in s.initial.position)),
         ("current: north, east, down [m/s]", ", ".join(number(x, 6) for x in s.plant.current)),
@@ -247,6 +277,15 @@ def _setting(run: Run) -> Table:
     if s.commands.enabled:
         rows.append(("commands", f"could be given while it ran; {run.summary.get('commands', 0)} were"))
     return Table("Scenario", (), tuple(rows), (1.0, 2.4))
+
+
+def _weighed(scenario: Scenario) -> str:
+    """Return how the criteria are weighed."""
+    if scenario.arbiter.file:
+        inputs = ", ".join(f"{signal.name} ({signal.what})" for signal in scenario.rules.inputs)
+        return f"the rules of {scenario.arbiter.file}, of {inputs}"
+    ramp = f"memberships fall to 0 over {scenario.arbiter.ramp:g} m (rad for attitude)"
+    return ramp if scenario.has_paper_criteria else f"{', '.join(scenario.criterion_names)}, in this order"
 
 
 def _told(sensing: Sensing) -> str:

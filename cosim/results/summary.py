@@ -12,7 +12,7 @@ from controller.regions.region_set import of_attitude
 from cosim.results.lyapunov_summary import summarise_lyapunov
 from cosim.results.record import Rows
 from cosim.results.spans import Span, Spans
-from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
 SETTLED_FOR = 10.0  # s, that the vehicle must be inside at the end
@@ -24,7 +24,6 @@ _ASKED = [f"command.{axis}" for axis in "XYZ"]
 _SPEED = [f"velocity.{axis}" for axis in "uvw"]
 _PLACE = [f"position.{axis}" for axis in "xyz"]
 _ESTIMATE = [f"estimate.phi{i}" for i in range(1, 5)]
-_WEIGHTS = [f"weight.{name}" for name in CRITERIA]
 
 
 def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | None) -> dict[str, Any]:
@@ -113,9 +112,10 @@ class _Course:
         self._together = [self._clearances[i] for i in scenario.intersection]
         of_all = ("wrench_saturated", "allocation_saturated")
         self._flags = [name for name in record.units if name.startswith("thrust_saturated[") or name in of_all]
+        self._weights = [f"weight.{name}" for name in scenario.criterion_names]
         self.signals = [
-            "time", "goal.clearance", *self._clearances, *_FORCE, *_ASKED, *_SPEED, *_PLACE, *_ESTIMATE, *_WEIGHTS,
-            *self._flags,
+            "time", "goal.clearance", *self._clearances, *_FORCE, *_ASKED, *_SPEED, *_PLACE, *_ESTIMATE,
+            *self._weights, *self._flags,
         ]  # fmt: skip
         # rows that come; the last row of a whole run decides, but acts no more
         self._acting = math.ceil(scenario.steps / max(1, round(period / scenario.time.step)))
@@ -151,7 +151,7 @@ class _Course:
         force = np.linalg.norm(block.stack(_FORCE), axis=1)[acted]
         self.force.add(force)
         self.saturated += int(np.count_nonzero(np.logical_or.reduce([block[n][acted] > 0.0 for n in self._flags])))
-        weights = block.stack(_WEIGHTS)
+        weights = block.stack(self._weights)
         self._stretch(self.greatest, np.fmax, {
             "goal.clearance": goal,
             "force": force,

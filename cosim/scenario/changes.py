@@ -14,9 +14,10 @@ from plant_fmu.errors import one_line
 from plant_fmu.toml_tables import hint
 from plant_fmu.vehicle import Vehicle
 
-# what no title speaks of: the texts beside it, what is recorded and reported, what may be commanded from outside, seeds
+# what no title speaks of: the texts beside it, what is recorded and reported, what may be commanded from outside;
+# seeds, and the text of a file that has a name
 _BESIDE = ("title", "changed", "compare", "intersection", "record", "commands")
-_SEEDS = ("sensing.seed", "plant.parameters.seed")
+_SILENT = ("sensing.seed", "plant.parameters.seed", "arbiter.text")
 _NAMED = 3  # changes that a title spells out
 
 
@@ -95,7 +96,7 @@ def joined(before: Sequence[str], more: Iterable[str]) -> tuple[str, ...]:
     tuple of str
         In their order.
     """
-    varied = (key for key in more if key.partition(".")[0] not in _BESIDE and key not in _SEEDS)
+    varied = (key for key in more if key.partition(".")[0] not in _BESIDE and key not in _SILENT)
     return tuple(dict.fromkeys([*before, *varied]))
 
 

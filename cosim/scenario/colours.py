@@ -1,17 +1,19 @@
-"""The colours of the criteria and the goal, in every figure, page and export."""
+"""The colours of regions, in every figure, page and export."""
 
 from __future__ import annotations
 
-# Okabe and Ito's, which colour-blind people can tell apart
-CRITERION_COLOURS = {"obstacle": "#D55E00", "shape": "#E69F00", "depth": "#56B4E9"}
-GOAL_COLOUR = "#009E73"
+from cosim.scenario.scenario import Scenario
+
+GOAL_COLOUR = "#009E73"  # Okabe and Ito's
 
 
-def colour_of(criterion: str | None) -> str:
+def colour_of(scenario: Scenario, criterion: str | None) -> str:
     """Return the colour of the regions of a criterion, as ``#RRGGBB``.
 
     Parameters
     ----------
+    scenario : Scenario
+        Whose criterion it is.
     criterion : str, optional
         None for the goal.
 
@@ -19,10 +21,7 @@ def colour_of(criterion: str | None) -> str:
     -------
     str
         Such as ``"#D55E00"``.
-
-    Raises
-    ------
-    KeyError
-        If there is no such criterion.
     """
-    return GOAL_COLOUR if criterion is None else CRITERION_COLOURS[criterion]
+    if criterion is None:
+        return GOAL_COLOUR
+    return scenario.criteria[scenario.criterion_names.index(criterion)].colour

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from cosim.scenario.criteria import QUANTITIES
 from cosim.scenario.keys import KEYS, unit_of_gain, unit_of_shape
 from plant_fmu.variables import variables
 from plant_fmu.vehicle import Vehicle
@@ -84,6 +85,11 @@ def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
         return _of_region("the goal", table["goal"] | {"shape": table["goal"]}, rest if own else ["shape", *rest])
     if head in ("failures", "outages") and len(rest) == 2:
         return KeyName(f"{rest[1]} of {head[:-1]} {rest[0]}", KEYS[f"{head}[].{rest[1]}"].unit)
+    if head == "criteria" and len(rest) > 1:
+        criteria = table["criteria"]
+        at = next((c for c in criteria if c["name"] == rest[0]), None) or criteria[int(rest[0])]
+        unit = QUANTITIES.get(rest[2], "").partition(",")[0] if rest[1] == "membership" and len(rest) > 2 else ""
+        return KeyName(f"{' '.join(rest[1:]).replace('_', ' ')} of {at['name']}", unit)
     if key not in KEYS and (vector := key.rpartition(".")[0]) in _WORDS:
         place, count = int(rest[-1]), len(table[head][rest[0]])
         linear, _, angular = KEYS[vector].unit.partition(", ")

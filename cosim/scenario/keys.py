@@ -64,6 +64,20 @@ KEYS = {
     "arbiter.engine": Key("", "`closed`, `exact`, `grid` or `skfuzzy`", "; see [arbiter.md](arbiter.md#engines)"),
     "arbiter.ramp": Key("m", "width over which a membership falls outside its region; rad for regions of attitude"),
     "arbiter.points": Key("", "of the output universe, for `grid` and `skfuzzy`"),
+    "arbiter.file": Key(
+        "", "rules of one's own, beside the file that names it",
+        ": any format of [fuzzy_arbiter](arbiter.md#formats), see [criteria.md](criteria.md#rules-of-ones-own)",
+    ),
+    "arbiter.text": Key("", "what stands in it", "; runs write it into their folder"),
+    "arbiter.inputs": Key("", "what each input of these rules gets", default="none"),
+    "criteria": Key(
+        "", "what regions may ask attention for", ", see [criteria.md](criteria.md)", default="the paper's three"
+    ),
+    "criteria[].name": Key("", "its own: a letter, then at most 23 letters, digits and _"),
+    "criteria[].order": Key("", "priority: the least comes first", default="its place in the list"),
+    "criteria[].colour": Key("", "of figures and pages, `#RRGGBB`", default="one that no other has"),
+    "criteria[].membership": Key("", "why it asks: of `ramp`, `clearance`, `angle`, `approach_time` the strongest",
+        default="`arbiter.ramp`"),
     "limit.force": Key(
         "N", "on the norm of the direct body force", "; direction kept, moment left alone; not with thrusters"
     ),
@@ -112,7 +126,7 @@ KEYS = {
     "outages[].duration": Key("s", "for how long"),
     "regions": Key("", "secondary regions", default="none"),
     "regions[].name": Key("", "its own: letters, digits, blanks, - and _"),
-    "regions[].criterion": Key("", "`obstacle`, `shape` or `depth`", ": whose weight multiplies its gain"),
+    "regions[].criterion": Key("", "one of criteria", ": whose weight multiplies its gain"),
     "regions[].keep": Key("", "`in` or `out`"),
     "regions[].gain": Key("", "alpha of section VII"),
     "regions[].shape": Key("", "a shape", ", below"),

@@ -18,10 +18,12 @@ from controller.regions import Orientation, Region
 from controller.regions.shape import Shape
 from controller.restoring import parameters
 from cosim.errors import ScenarioError
+from cosim.scenario.arbiter_rules import ArbiterRules, check_rules, read_rules
 from cosim.scenario.changes import changed_keys, differing_keys, joined, shown_title
+from cosim.scenario.criteria import PAPER, CriterionSetup, check_criteria, check_criteria_of_regions
 from cosim.scenario.keys import comments
 from cosim.scenario.tables import (
-    CRITERIA,
+    PAPER_CRITERIA,
     Actuation,
     ArbiterSetup,
     Commands,
@@ -61,7 +63,7 @@ from plant_fmu.errors import PlantFmuError
 from plant_fmu.toml_tables import decode, hint, require_modest
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
-__all__ = ["CRITERIA", "VEHICLE_COPY", "Limit", "Scenario", "Time", "load_scenario"]
+__all__ = ["VEHICLE_COPY", "Limit", "Scenario", "Time", "load_scenario"]
 
 VEHICLE_COPY = "vehicle.toml"  # name in a run folder of a vehicle that is not shipped
 
@@ -89,6 +91,8 @@ class Scenario:
     initial: Initial
     law: LawSetup
     arbiter: ArbiterSetup
+    criteria: tuple[CriterionSetup, ...]  # the first in priority first
+    rules: ArbiterRules  # that weigh them
     limit: Limit
     actuation: Actuation
     sensing: Sensing
@@ -169,6 +173,22 @@ class Scenario:
         return shown_title(self.table, self.vehicle, self.law.name)
 
     @property
+    def criterion_names(self) -> tuple[str, ...]:
+        """Names of the criteria, the first in priority first."""
+        return tuple(criterion.name for criterion in self.criteria)
+
+    @property
+    def criterion_places(self) -> tuple[int, ...]:
+        """Of each secondary region the place of its criterion among all."""
+        names = self.criterion_names
+        return tuple(names.index(secondary.criterion) for secondary in self.regions)
+
+    @property
+    def has_paper_criteria(self) -> bool:
+        """Whether the criteria are the paper's three, weighed by its rules, with one ramp for all."""
+        return not self.arbiter.file and self.criteria == PAPER
+
+    @property
     def goal_region(self) -> Region:
         """The goal as a region among others."""
         return Region("goal", self.goal, "in", self.goal_velocity)
@@ -224,6 +244,8 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Sc
         raise ScenarioError(f"scenario {text!r} is unknown; {known} (or a file ending in .toml)")
     try:
         table, name, titled = read_table(text)
+        for one in (table, titled):  # so that keys of the default can be set
+            one.setdefault("criteria", [dataclasses.asdict(entry) for entry in PAPER_CRITERIA])
         for change in overrides:
             override(table, change)
         require_modest(table)
@@ -278,8 +300,12 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
     check_numbers(file)
     goal, goal_velocity, goal_streamed = check_goal(file.goal)
     regions = check_regions(file.regions)
+    criterion_entries, criteria = check_criteria(file.criteria)
     overlapping = check_intersection(file.intersection, regions)
     seen = check_commands(file.commands, file.record, file.law.name, tuple(r.region.name for r in regions))
+    check_criteria_of_regions(regions + seen, criteria)
+    arbiter = read_rules(file.arbiter)
+    rules = check_rules(arbiter, criteria, regions)
     vehicle_file = Path(file.vehicle) if file.vehicle.endswith(".toml") else None
     vehicle = vehicle or load_vehicle(vehicle_file or file.vehicle)
     check_parameters(file.plant.parameters, vehicle)
@@ -293,6 +319,8 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
         title=file.title or name,
         time=TimeEntry(time.duration, time.step, time.control, time.arbiter),
         law=dataclasses.replace(file.law, gains=law.gains._asdict()),
+        arbiter=arbiter,
+        criteria=criterion_entries,
         intersection=tuple(regions[i].region.name for i in overlapping),
     )
     return Scenario(
@@ -306,7 +334,9 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
         plant=file.plant,
         initial=file.initial,
         law=law,
-        arbiter=file.arbiter,
+        arbiter=arbiter,
+        criteria=criteria,
+        rules=rules,
         limit=file.limit,
         actuation=file.actuation,
         sensing=file.sensing,

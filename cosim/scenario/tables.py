@@ -7,13 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from controller.regions import Region
-from fuzzy_arbiter import SECTION_VI
 
 Vector3 = tuple[float, float, float]
 Vector4 = tuple[float, float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
-
-CRITERIA = tuple(c.name for c in SECTION_VI)
 
 PARKED_POSITION: Vector3 = (0.0, 0.0, -1e5)  # m, NED: where obstacles are that have not come
 
@@ -42,11 +39,14 @@ class Initial:
 
 @dataclass(frozen=True)
 class ArbiterSetup:
-    """How memberships become weights."""
+    """How memberships, or the signals that a file asks for, become weights."""
 
     engine: Literal["closed", "exact", "grid", "skfuzzy"] = "closed"
     ramp: float = 0.2  # m (rad for regions of attitude), width over which a membership falls from 1 to 0 outside
     points: int = 101  # of the output universe, for grid and skfuzzy
+    file: str = ""  # of a system that fuzzy_arbiter reads; else the criteria are weighed by their order
+    text: str = ""  # what stands in it
+    inputs: dict[str, Any] = field(default_factory=dict)  # of that system: the signal, number or course that each gets
 
 
 @dataclass(frozen=True)
@@ -163,11 +163,29 @@ class LawEntry:
 
 
 @dataclass(frozen=True)
+class CriterionEntry:
+    """A criterion: what regions may ask attention for."""
+
+    name: str
+    order: int | None = None  # the least comes first; default: its place in the list
+    colour: str = ""  # #RRGGBB; default: one that no other has
+    membership: dict[str, Any] = field(default_factory=dict)  # reasons to ask; default: the arbiter's ramp
+
+
+# section VI of the paper; the colours are Okabe and Ito's, which colour-blind people can tell apart
+PAPER_CRITERIA = (
+    CriterionEntry("obstacle", 1, "#D55E00"),
+    CriterionEntry("shape", 2, "#E69F00"),
+    CriterionEntry("depth", 3, "#56B4E9"),
+)
+
+
+@dataclass(frozen=True)
 class RegionEntry:
     """A secondary region; the keys of its shape depend on the shape."""
 
     name: str
-    criterion: Literal["obstacle", "shape", "depth"]
+    criterion: str  # the name of one
     keep: Literal["in", "out"]
     gain: float
     shape: dict[str, Any]
@@ -193,6 +211,7 @@ class File:
     plant: PlantSetup = PlantSetup()
     law: LawEntry = LawEntry()
     arbiter: ArbiterSetup = ArbiterSetup()
+    criteria: tuple[CriterionEntry, ...] = PAPER_CRITERIA
     limit: Limit = Limit()
     actuation: Actuation = Actuation()
     sensing: Sensing = Sensing()
@@ -245,7 +264,7 @@ class SecondaryRegion:
     """A region and the criterion it belongs to."""
 
     region: Region
-    criterion: str  # one of CRITERIA
+    criterion: str  # the name of one of the scenario's
     streamed: bool = False  # moved from outside while the run goes on
     is_dynamic: bool = False  # stands for an obstacle that may come in while the run goes on
 

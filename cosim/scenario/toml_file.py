@@ -78,6 +78,11 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
         vehicle = table.get("vehicle")
         if isinstance(vehicle, str) and vehicle.endswith(".toml"):  # beside the file that names it
             table["vehicle"] = str(folder / vehicle)
+        arbiter = table.get("arbiter")
+        if isinstance(arbiter, dict) and not arbiter.get("text"):
+            rules = arbiter.get("file")
+            if rules and isinstance(rules, str):  # likewise
+                arbiter["file"] = str(folder / rules)
     elif name_or_file in list_scenarios():
         with resources.as_file(_folder() / f"{name_or_file}.toml") as shipped:
             table, name, folder = read_toml(shipped), name_or_file, Path()
@@ -93,6 +98,9 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
         law = table.get("law")
         if isinstance(law, dict) and "name" in law:
             _name_law(below, law["name"])
+        arbiter = table.get("arbiter")
+        if isinstance(arbiter, dict) and "file" in arbiter:
+            _name_rules(below)
         if "title" in table:  # it is of what the file says, whatever was changed before
             below.pop("changed", None)
         over, table = table, _merge(below, table)
@@ -107,6 +115,14 @@ def _name_law(table: dict[str, Any], name: object) -> None:
     if isinstance(law, dict) and law.get("name", "ismail_dunnigan") != name:
         law.pop("gains", None)
         law["name"] = name
+
+
+def _name_rules(table: dict[str, Any]) -> None:
+    """Drop what is of the arbiter's file in a scenario, which gets another one."""
+    arbiter = table.get("arbiter")
+    if isinstance(arbiter, dict):
+        arbiter.pop("text", None)
+        arbiter.pop("inputs", None)
 
 
 def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
@@ -126,7 +142,7 @@ def override(table: dict[str, Any], text: str) -> None:
         A scenario's.
     text : str
         ``key=value``, with dots between the keys and a TOML value, or a bare word; items of lists go by index or name.
-        Another ``law.name`` drops the gains of the law before.
+        Another ``law.name`` drops the gains of the law before, another ``arbiter.file`` its inputs.
 
     Raises
     ------
@@ -167,7 +183,7 @@ def set_key(table: dict[str, Any], key: str, value: Any) -> None:
         A scenario's.
     key : str
         With dots between its parts; items of lists go by index or name. Another ``law.name`` drops the gains of the law
-        before.
+        before, another ``arbiter.file`` its inputs.
     value : object
         Of a type that TOML has.
 
@@ -179,6 +195,8 @@ def set_key(table: dict[str, Any], key: str, value: Any) -> None:
     *path, last = key.strip().split(".")
     if key.strip() == "law.name":
         _name_law(table, value)
+    if key.strip() == "arbiter.file":
+        _name_rules(table)
     at: Any = table
     for part in path:
         if isinstance(at, list):

@@ -10,6 +10,7 @@ import tomli_w
 from cosim.scenario.keys import unit_of_shape
 
 _WIDE = 100  # characters of a value in one line
+_INLINE = ("shape", "membership")  # tables in one line, if they fit
 _COMMENT_AT = 40  # column that comments begin at, where the value leaves room
 
 
@@ -41,7 +42,7 @@ def _lines(table: Mapping[str, Any], said: Mapping[str, str], head: str = "", pa
     for key, value in table.items():
         if value and isinstance(value, list | tuple) and all(isinstance(item, Mapping) for item in value):
             lists.append((key, value))
-        elif value and isinstance(value, Mapping) and (key != "shape" or len(_value(value)) > _WIDE):
+        elif value and isinstance(value, Mapping) and (key not in _INLINE or len(_value(value)) > _WIDE):
             tables.append((key, value))
         else:
             values.append((key, value))

@@ -1,79 +1,95 @@
-"""The arbiter within a run: clearances in, memberships and weights out, into the row of the step."""
+"""The arbiter within a run: clearances and the state in, memberships and weights out, into the row of the step."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from controller import VehicleState
 from controller.compiling.function import CompiledFunction
-from cosim.simulation.memberships import compute_memberships
+from controller.regions.region_set import PackedRegions
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.arbiter_inputs import ArbiterSignals, compute_inputs, empty_signals, pack_inputs
 from cosim.simulation.signals import Array
 from fuzzy_arbiter import Arbiter
 
 
 class Arbitration:
-    """Decides by the clearances of the regions; arrays are read and written in place.
+    """Decides by the regions and the state; arrays are read and written in place.
 
     Parameters
     ----------
+    scenario : Scenario
+        Its criteria, and what its rules get.
     arbiter : Arbiter
-        Of as many criteria as there are.
+        Of these rules.
+    state : VehicleState
+        As the arbiter is told it.
+    now : ndarray, shape (1,)
+        Time [s].
     clearances : ndarray, shape (n,)
-        Of each region [m], or [rad] of attitude.
-    criteria : ndarray of int, shape (n,)
-        Of each region.
-    ramp : float
-        Clearance at which memberships reach 0 [m].
+        Of each region at that pose [m], or [rad] of attitude.
     memberships, weights : ndarray, shape (criteria,)
         Receive those of each criterion.
+    inputs : ndarray, shape (m,), optional
+        Receives those of the rules.
 
     Attributes
     ----------
-    ramp : float
-        As given; may be set.
     region_weights : ndarray, shape (n,)
         Weight of the criterion of each region.
     """
 
     def __init__(
         self,
+        scenario: Scenario,
         arbiter: Arbiter,
+        state: VehicleState,
+        now: Array,
         clearances: Array,
-        criteria: NDArray[np.int64],
-        ramp: float,
         memberships: Array,
         weights: Array,
+        inputs: Array | None = None,
     ) -> None:
-        self.ramp = ramp
-        self.region_weights: Array = np.zeros(criteria.size)
-        self._arbiter, self._clearances, self._criteria = arbiter, clearances, criteria
-        self._memberships, self._weights = memberships, weights
-        self._computed: Array = np.zeros(memberships.size)
-        self._compute = CompiledFunction(compute_memberships)
-        self._weighed: list[float] | None = None  # memberships that the weights are of
+        self.region_weights: Array = np.zeros(len(scenario.regions))
+        self._of_region = np.array(scenario.criterion_places, dtype=np.int64)
+        self._arbiter, self._state, self._now, self._clearances = arbiter, state, now, clearances
+        self._memberships, self._weights, self._inputs = memberships, weights, inputs
+        packed = pack_inputs(scenario.regions, scenario.criteria, scenario.rules, scenario.arbiter.ramp)
+        self._packed = packed
+        self._signals: ArbiterSignals = empty_signals(packed, len(scenario.regions), memberships.size)
+        self._compute = CompiledFunction(compute_inputs)
+        self._weighed: list[float] | None = None  # inputs that the weights are of
 
-    def decide(self) -> None:
-        """Write the memberships and their weights."""
-        memberships = self._current()
-        # the same memberships have the same weights, which stand in the row still
-        if memberships != self._weighed:
-            self._weighed = memberships
-            self._memberships[:] = memberships
-            self._weigh(memberships)
+    def set_ramp(self, width: float) -> None:
+        """Let memberships that have no reason of their own reach 0 at another clearance [m or rad]."""
+        memberships = self._packed.memberships
+        memberships.ramps[memberships.follows] = width
+
+    def decide(self, goal: PackedRegions, regions: PackedRegions) -> None:
+        """Write the memberships and the weights, by goal and regions where they are now."""
+        inputs = self._update(goal, regions)
+        # the same inputs have the same weights, which stand in the row still
+        if inputs != self._weighed:
+            self._weighed = inputs
+            self._weigh(inputs)
 
     def weigh(self) -> None:
-        """Write the weights of the memberships that stand in the row."""
-        self._weigh(self._memberships.tolist())
+        """Write the weights of what was worked out last."""
+        self._weigh(self._signals.inputs.tolist())
 
-    def update_memberships(self) -> None:
-        """Write the memberships, and leave the weights as they are."""
-        self._memberships[:] = self._current()
+    def update(self, goal: PackedRegions, regions: PackedRegions) -> None:
+        """Write the memberships, by goal and regions where they are now, and leave the weights as they are."""
+        self._update(goal, regions)
 
-    def _current(self) -> list[float]:
-        self._compute(self._clearances, self._criteria, self.ramp, self._computed)
-        memberships: list[float] = self._computed.tolist()
-        return memberships
+    def _update(self, goal: PackedRegions, regions: PackedRegions) -> list[float]:
+        signals = self._signals
+        self._compute(self._packed, goal, regions, self._state, self._now, self._clearances, signals)
+        self._memberships[:] = signals.memberships
+        if self._inputs is not None:
+            self._inputs[:] = signals.inputs
+        inputs: list[float] = signals.inputs.tolist()
+        return inputs
 
-    def _weigh(self, memberships: list[float]) -> None:
-        self._weights[:] = self._arbiter(memberships)
-        self.region_weights[:] = self._weights[self._criteria]
+    def _weigh(self, inputs: list[float]) -> None:
+        self._weights[:] = self._arbiter(inputs)
+        self.region_weights[:] = self._weights[self._of_region]

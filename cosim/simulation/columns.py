@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from controller import LAWS, Law
 from controller.law import Diagnostic
 from controller.regions.region_set import of_attitude
-from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.commands import MODES
 from cosim.simulation.lyapunov_signals import lyapunov_columns
 from cosim.simulation.signals import Column
@@ -82,9 +82,12 @@ def _columns(
         ),
         *(
             Column(f"membership.{name}", "", f"Degree to which criterion {name} asks for attention")
-            for name in CRITERIA
+            for name in scenario.criterion_names
         ),
-        *(Column(f"weight.{name}", "", f"Weight of the criterion {name} from the arbiter") for name in CRITERIA),
+        *(
+            Column(f"weight.{name}", "", f"Weight of the criterion {name} from the arbiter")
+            for name in scenario.criterion_names
+        ),
         *(Column(f"estimate.phi{i + 1}", "N.m" if i else "N", f"Estimate of phi {i + 1} in (12)") for i in range(4)),
         *(
             Column(f"command.{name}", unit, "Wrench that the law asks for, body frame")
@@ -101,7 +104,15 @@ def _columns(
         *_ordered(scenario),
         *(Column(f"law.{d.name}", d.unit, d.description) for d in diagnostics),
         *lyapunov_columns(scenario),
+        *_rules(scenario),
     ]
+
+
+def _rules(scenario: Scenario) -> Iterator[Column]:
+    """Yield what the arbiter decides by, where that is not the memberships alone."""
+    if scenario.arbiter.file:
+        for signal in scenario.rules.inputs:
+            yield Column(f"arbiter.{signal.name}", signal.unit, f"Input {signal.name} of the arbiter: {signal.what}")
 
 
 def _sensed(scenario: Scenario) -> Iterator[Column]:

@@ -1,4 +1,4 @@
-"""The goal and the regions of a run: where each is now, what they say of a pose, and how much each criterion asks."""
+"""The goal and the regions of a run: where each is now, and what they say of a pose."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from controller.regions import Sphere, pack
 from controller.regions.region_set import PackedRegions, evaluate_packed
 from controller.regions.shape import Shape
 from cosim.errors import CommandError, RunError
-from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import PARKED_POSITION, Vector3
 from cosim.simulation.signals import Array
 
@@ -60,14 +60,11 @@ class RegionEnvironment:
     ----------
     regions : PackedRegions
         The n secondary ones, where they are now.
-    criteria : ndarray of int, shape (n,)
-        Of each of them, as an index of `CRITERIA`.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         secondary = [region.region for region in scenario.regions]
         self.regions = pack(secondary)
-        self.criteria = np.array([CRITERIA.index(region.criterion) for region in scenario.regions], dtype=np.int64)
         self._goal_region, self._middle = scenario.goal_region, shape_center(scenario.goal)
         self._target = self._reached = self._new_target(None, self._middle)
         self._places = RegionPlaces(self.goal, self.regions)

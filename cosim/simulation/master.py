@@ -17,7 +17,7 @@ import numpy as np
 from controller import CompiledLaw, FunctionLaw, Law, VehicleState
 from controller.quaternion import from_axis_angle
 from cosim.scenario.law_factory import law_of, with_custom_law
-from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.scenario.scenario import Scenario
 from cosim.scenario.start_values import start_values
 from cosim.simulation.actuators import Actuators
 from cosim.simulation.arbitration import Arbitration
@@ -92,7 +92,7 @@ class Master:
         if isinstance(law, FunctionLaw):
             scenario = with_custom_law(law, scenario)  # refuses what such a law cannot have
         self.scenario = scenario
-        self.arbiter = Arbiter(engine=scenario.arbiter.engine, points=scenario.arbiter.points)
+        self.arbiter = Arbiter(system=scenario.rules.system, engine=scenario.arbiter.engine)
         self.law: Law = law_of(scenario) if law is None else law
         self._jacobi = scenario.master.order == "jacobi"
         self._failures = bool(scenario.failures)
@@ -139,10 +139,11 @@ class Master:
             self._given_evaluation = self.environment.empty_evaluation(np.zeros(n + 1), np.zeros(n + 1))
         moving = self.scenario.moving
         self._shifts = s.view(f"{moving[0]}.shift.x", 3 * len(moving)).reshape(-1, 3) if moving else np.empty((0, 3))
-        count, first = len(CRITERIA), CRITERIA[0]
+        names, inputs = self.scenario.criterion_names, self.scenario.rules.inputs
         self._arbitration = Arbitration(
-            self.arbiter, self._given_evaluation.clearances[1:], self.environment.criteria, self.scenario.arbiter.ramp,
-            s.view(f"membership.{first}", count), s.view(f"weight.{first}", count),
+            self.scenario, self.arbiter, self.state, s.row[:1], self._given_evaluation.clearances[1:],
+            s.view(f"membership.{names[0]}", len(names)), s.view(f"weight.{names[0]}", len(names)),
+            s.view(f"arbiter.{inputs[0].name}", len(inputs)) if self.scenario.arbiter.file else None,
         )  # fmt: skip
         self._estimate = s.view("estimate.phi1", 4)
         n_reports = len(self.law.diagnostics)
@@ -303,7 +304,7 @@ class Master:
             if command_handler.heading is not None:
                 self.law.set_attitude(from_axis_angle(_DOWN, command_handler.heading))
         if command_handler.changed:
-            self._arbitration.ramp = command_handler.settings["arbiter.ramp"]
+            self._arbitration.set_ramp(command_handler.settings["arbiter.ramp"])
         command_handler.mark_applied()
 
     def _evaluate_regions(self) -> None:
@@ -316,14 +317,14 @@ class Master:
     def _arbitrate(self) -> None:
         """Decide by the regions as they stand; while the position is lost, the last weights hold."""
         if self._position_known:
-            self._arbitration.decide()
+            self._arbitration.decide(self.environment.goal, self.environment.regions)
 
     def _exchange_delayed(self, before: int) -> None:
         """Hand on what regions and arbiter made, in the step `before`, of what stood at its beginning (Jacobi)."""
         if before % self.scenario.arbiter_every == 0:
             self._arbitration.weigh()
         if self._position_known:
-            self._arbitration.update_memberships()
+            self._arbitration.update(self.environment.goal, self.environment.regions)
 
     @property
     def _position_known(self) -> bool:

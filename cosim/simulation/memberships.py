@@ -1,29 +1,112 @@
-"""How much each criterion asks for attention, from the clearances of its regions: for the master and the fused loop."""
+"""How much each criterion asks for attention, by its regions: for the master and the fused loop."""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cosim.scenario.criteria import CriterionSetup
+from cosim.scenario.tables import SecondaryRegion
 from cosim.simulation.signals import Array
 from fuzzy_arbiter import ramp
 
+_APPROACH_TIME = 1
 
-def compute_memberships(clearances: Array, criteria: NDArray[np.int64], width: float, memberships: Array) -> None:
+
+class PackedMemberships(NamedTuple):
+    """Why regions ask for attention: a reason of a region's criterion in each of r rows."""
+
+    regions: NDArray[np.int64]  # (r,) whose reason it is
+    criteria: NDArray[np.int64]  # (r,) of that region
+    quantities: NDArray[np.int64]  # (r,) 0 its clearance, 1 the time to contact
+    ramps: Array  # (r,) m or rad, where the membership reaches 0; NaN: it goes by points
+    follows: NDArray[np.bool_]  # (r,) whether the ramp is the arbiter's
+    offsets: NDArray[np.int64]  # (r + 1,) into the points
+    places: Array  # m, rad or s: of the points, one row's behind the other's
+    degrees: Array  # of the points
+    by_time: bool  # whether any row asks for the time to contact
+
+
+def pack_memberships(
+    regions: Sequence[SecondaryRegion], criteria: Sequence[CriterionSetup], width: float
+) -> PackedMemberships:
+    """Turn the reasons of regions into arrays.
+
+    Parameters
+    ----------
+    regions : sequence of SecondaryRegion
+        Any number.
+    criteria : sequence of CriterionSetup
+        Theirs, in order.
+    width : float
+        Of the ramp that the arbiter has [m or rad].
+
+    Returns
+    -------
+    PackedMemberships
+        Rows in the order of the regions.
+    """
+    names = [criterion.name for criterion in criteria]
+    rows = [
+        (i, names.index(region.criterion), reason)
+        for i, region in enumerate(regions)
+        for reason in criteria[names.index(region.criterion)].reasons
+        if reason.is_of(region)
+    ]
+    points = [reason.term.points if reason.term else () for _, _, reason in rows]
+    widths = [width if r.ramp is None else r.ramp for _, _, r in rows]
+    return PackedMemberships(
+        regions=np.array([i for i, _, _ in rows], np.int64),
+        criteria=np.array([c for _, c, _ in rows], np.int64),
+        quantities=np.array([_APPROACH_TIME * (r.quantity == "approach_time") for _, _, r in rows], np.int64),
+        ramps=np.array([math.nan if r.term else w for w, (_, _, r) in zip(widths, rows, strict=True)], float),
+        follows=np.array([r.term is None and r.ramp is None for _, _, r in rows], np.bool_),
+        offsets=np.cumsum([0, *map(len, points)], dtype=np.int64),
+        places=np.array([place for of in points for place, _ in of], float),
+        degrees=np.array([degree for of in points for _, degree in of], float),
+        by_time=any(r.quantity == "approach_time" for _, _, r in rows),
+    )
+
+
+def compute_memberships(
+    packed: PackedMemberships, clearances: Array, approach_times: Array, memberships: Array
+) -> None:
     """Write the membership of each criterion, that of its most pressing region.
 
     Parameters
     ----------
+    packed : PackedMemberships
+        Of n regions.
     clearances : ndarray, shape (n,)
         Of each region [m], or [rad] of attitude; what is no number asks for nothing.
-    criteria : ndarray of int, shape (n,)
-        Of each region.
-    width : float
-        Where memberships reach 0 [m].
+    approach_times : ndarray, shape (n,)
+        In which each is met [s]; (0,) where nothing asks for it.
     memberships : ndarray, shape (criteria,)
         Receives them, in [0, 1].
     """
     for i in range(memberships.size):
         memberships[i] = 0.0
-    for i in range(criteria.size):
-        memberships[criteria[i]] = max(memberships[criteria[i]], ramp(clearances[i], width))
+    for k in range(packed.regions.size):
+        i, criterion, width = packed.regions[k], packed.criteria[k], packed.ramps[k]
+        x = clearances[i] if packed.quantities[k] == 0 else approach_times[i]
+        degree = ramp(x, width) if width >= 0.0 else _degree(packed, k, x)
+        memberships[criterion] = max(memberships[criterion], degree)
+
+
+def _degree(packed: PackedMemberships, k: int, x: float) -> float:
+    """Return the degree of a row at a place, as `fuzzy_arbiter.Shape` does: straight between points, held beyond."""
+    first, end = packed.offsets[k], packed.offsets[k + 1]
+    degree: float = packed.degrees[end - 1] if x == x else x
+    for i in range(end - 1, first, -1):
+        a, b, left, right = packed.places[i - 1], packed.places[i], packed.degrees[i - 1], packed.degrees[i]
+        if x == b:
+            degree = right
+        elif x < b:
+            degree = left + (right - left) * ((x - a) / (b - a))
+    if x <= packed.places[first]:
+        degree = packed.degrees[first]
+    return degree

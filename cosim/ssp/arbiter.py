@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 
-from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.scenario.scenario import Scenario
 from cosim.ssp.c_sources import c_files, under_own_names
 from cosim.ssp.documentation import contents
-from fuzzy_arbiter import Arbiter
+from fuzzy_arbiter import System
 from fuzzy_arbiter.export import to_c
 from plant_fmu import quantities as q
 from plant_fmu.component import Component
@@ -41,11 +41,11 @@ def arbiter_component(scenario: Scenario) -> Component:
         *(
             Variable(f"membership.{name}", "input", f"memberships[{i}]", q.FRACTION,
                      f"Degree to which criterion {name} asks for attention")
-            for i, name in enumerate(CRITERIA)
+            for i, name in enumerate(scenario.criterion_names)
         ),
         *(
             Variable(f"weight.{name}", "output", f"weights[{i}]", q.unbounded(""), f"Weight of criterion {name}")
-            for i, name in enumerate(CRITERIA)
+            for i, name in enumerate(scenario.criterion_names)
         ),
         Variable("time.arbiter", "parameter", "period", Quantity("s", 1e-6, 1e6), "Period of the arbiter",
                  scenario.time.arbiter),
@@ -54,16 +54,16 @@ def arbiter_component(scenario: Scenario) -> Component:
         name="arbiter",
         description="Fuzzy arbiter: which criterion matters now",
         variables=rows,
-        sources=_sources(),
+        sources=_sources(scenario.rules.system),
         contents=lambda fmi: contents("Arbiter", _WORDS, rows, fmi),
-        constants={"N_CRITERIA": len(CRITERIA)},
+        constants={"N_CRITERIA": len(scenario.criteria)},
         stop_time=scenario.time.duration,
         step=scenario.time.step,
     )
 
 
-def _sources() -> dict[str, bytes]:
-    code = to_c(Arbiter(engine="closed").system)
+def _sources(system: System) -> dict[str, bytes]:
+    code = to_c(system)
     declared = _DECLARATION.search(code)
     if declared is None:
         raise AssertionError("the arbiter's C code declares no function that evaluates it")

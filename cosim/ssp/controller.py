@@ -9,7 +9,7 @@ from controller.regions import Region, pack
 from controller.regions.in_c import c_sources
 from controller.regions.numbers import constraints
 from controller.regions.region_set import PackedRegions, name_of, of_attitude
-from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.scenario.scenario import Scenario
 from cosim.ssp.c_sources import c_files, under_own_names
 from cosim.ssp.documentation import contents
 from cosim.ssp.shape_parameters import shape_numbers
@@ -52,7 +52,7 @@ def controller_component(scenario: Scenario) -> Component:
         Without states, for co-simulation.
     """
     regions = [scenario.goal_region, *(secondary.region for secondary in scenario.regions)]
-    criteria = [0, *(CRITERIA.index(secondary.criterion) for secondary in scenario.regions)]
+    criteria = [0, *scenario.criterion_places]
     packed = pack(regions)
     rows = tuple(_variables(scenario, regions))
     return Component(
@@ -64,7 +64,7 @@ def controller_component(scenario: Scenario) -> Component:
         constants={
             "N_REGIONS": len(scenario.regions),
             "N_NUMBERS": packed.numbers.size,
-            "N_CRITERIA": len(CRITERIA),
+            "N_CRITERIA": len(scenario.criteria),
         },
         stop_time=scenario.time.duration,
         step=scenario.time.step,
@@ -131,7 +131,7 @@ def _constraints(regions: Sequence[Region], packed: PackedRegions) -> Iterator[s
 def _variables(scenario: Scenario, regions: Sequence[Region]) -> Iterator[Variable]:
     yield Variable("time", "time", "time", q.TIME, "Simulated time")
     yield from _motion("", "input", "inputs.motion", [0.0] * 13, "The vehicle's")
-    for i, name in enumerate(CRITERIA):
+    for i, name in enumerate(scenario.criterion_names):
         yield Variable(f"weight.{name}", "input", f"inputs.weights[{i}]", q.FRACTION, f"Weight of criterion {name}")
     yield from _outputs(scenario, regions)
     yield from _parameters(scenario)
@@ -159,7 +159,7 @@ def _outputs(scenario: Scenario, regions: Sequence[Region]) -> Iterator[Variable
     for i, name in enumerate(FORCES):
         what = f"{'Force along' if i < 3 else 'Moment about'} body {AXES[i % 3]} that the law asks for"
         yield output(f"wrench.{name}", f"wrench[{i}]", "N" if i < 3 else "N.m", what)
-    for i, name in enumerate(CRITERIA):
+    for i, name in enumerate(scenario.criterion_names):
         what = f"Degree to which criterion {name} asks for attention"
         yield output(f"membership.{name}", f"memberships[{i}]", "", what)
     for i in range(4):

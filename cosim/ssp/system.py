@@ -8,7 +8,7 @@ from pathlib import Path
 from controller.errors import RegionError
 from controller.regions.in_c import require_in_c
 from cosim.errors import RunError
-from cosim.scenario.scenario import CRITERIA, VEHICLE_COPY, Scenario
+from cosim.scenario.scenario import VEHICLE_COPY, Scenario
 from cosim.scenario.start_values import start_values
 from cosim.ssp.arbiter import arbiter_component
 from cosim.ssp.controller import controller_component
@@ -28,14 +28,6 @@ MOTION = (
     *(f"velocity.{name}" for name in VELOCITIES),
 )
 WRENCH = tuple(f"wrench.{name}" for name in FORCES)
-_MEMBERSHIPS = tuple(f"membership.{name}" for name in CRITERIA)
-_WEIGHTS = tuple(f"weight.{name}" for name in CRITERIA)
-_WIRES = (
-    Wire("plant", "controller", MOTION),
-    Wire("controller", "plant", WRENCH),
-    Wire("controller", "arbiter", _MEMBERSHIPS),
-    Wire("arbiter", "controller", _WEIGHTS),
-)
 
 
 def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str = NATIVE) -> Path:
@@ -71,15 +63,24 @@ def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str =
     out = Path(out)
     require_place(out)
     controller, arbiter = controller_component(scenario), arbiter_component(scenario)
+    memberships, weights = (
+        tuple(f"{what}.{name}" for name in scenario.criterion_names) for what in ("membership", "weight")
+    )
     outputs = tuple(v.name for v in controller.variables if v.role == "output")
     parts = (
         Part("plant", "resources/plant.fmu", plant_component(scenario), (*MOTION, *WRENCH)),
-        Part("controller", "resources/controller.fmu", controller, (*MOTION, *_WEIGHTS, *outputs)),
-        Part("arbiter", "resources/arbiter.fmu", arbiter, (*_MEMBERSHIPS, *_WEIGHTS)),
+        Part("controller", "resources/controller.fmu", controller, (*MOTION, *weights, *outputs)),
+        Part("arbiter", "resources/arbiter.fmu", arbiter, (*memberships, *weights)),
+    )
+    wires = (
+        Wire("plant", "controller", MOTION),
+        Wire("controller", "plant", WRENCH),
+        Wire("controller", "arbiter", memberships),
+        Wire("arbiter", "controller", weights),
     )
     time = scenario.time
     members = {part.source: _fmu(part.component, fmi, platforms) for part in parts}
-    described = structure(scenario.name, scenario.title, parts, _WIRES, time.duration, time.step)
+    described = structure(scenario.name, scenario.title, parts, wires, time.duration, time.step)
     members["SystemStructure.ssd"] = described.encode()
     write_archive(out, members | _origin(scenario))
     return out
@@ -121,6 +122,7 @@ def _fmu(component: Component, fmi: int, platforms: str) -> bytes:
 
 def _require(scenario: Scenario) -> None:
     """Refuse what the FMUs of a system have not."""
+    own = next((c.name for c in scenario.criteria if any(r.term or r.ramp is not None for r in c.reasons)), None)
     streamed = [r.region.name for r in scenario.regions if r.streamed]
     for good, key, received, expected in (
         (
@@ -141,6 +143,8 @@ def _require(scenario: Scenario) -> None:
             repr(scenario.arbiter.engine),
             "'closed' or 'exact', such as by --set arbiter.engine=closed",
         ),
+        (not scenario.arbiter.file, "arbiter.file", repr(scenario.arbiter.file), "none: rules get memberships alone"),
+        (own is None, f"criteria.{own}.membership", "given", "none: there is one ramp for all"),
         (scenario.sensing.exact, "sensing", "not exact", "neither noise nor gaps"),
         (not scenario.failures, "failures", "given", "none"),
         (not scenario.commands.enabled, "commands.enabled", "true", "false: nobody steers a system from outside"),

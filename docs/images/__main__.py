@@ -11,6 +11,7 @@ from pathlib import Path
 
 import arbiter
 import architecture
+import criteria
 import fmu
 import pages
 import paths
@@ -31,6 +32,7 @@ def reference() -> None:
 MAKERS = {
     "arbiter": arbiter.main,
     "architecture": architecture.main,
+    "criteria": criteria.main,
     "fmu": fmu.main,
     "pages": pages.main,
     "paths": paths.main,

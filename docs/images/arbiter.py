@@ -26,48 +26,10 @@ SHOWN = (
 
 def main() -> None:
     """Draw all of them."""
-    paper = Arbiter()
-    save(paper_terms(paper), "paper-terms")
-    save(paper_surfaces(paper), "paper-surface")
     building = Arbiter([SMOKE, AIR, ROOM])
-    save(pictures.terms(building, "co2", at=1280.0), "terms")
-    save(pictures.rules(building, PLACE, "alpha_2"), "rules")
-    save(pictures.surface(building, "alpha_2", ("smoke", "co2"), {"temperature": 26.0}), "surface")
+    save(pictures.rules(building, PLACE, "co2"), "rules")
     save(pictures.decisions(building, ("smoke", "co2"), {"temperature": 25.6}), "decisions")
-    at = {"co2": 1280.0, "temperature": 25.2}
-    save(next(iter(pictures.normalizations(building, "smoke", at).values())), "normalizations")
-    save(forms(), "forms")
     save(chatter(), "chatter")
-
-
-def paper_terms(paper: Arbiter) -> Axes:
-    """Draw the terms of the paper's inputs, and of one of its three like outputs."""
-    figure = Figure(figsize=(9.6, 4.6), layout="constrained")
-    for ax, name in zip(figure.subplots(2, 2).flat, ("obstacle", "shape", "depth", "alpha_1"), strict=True):
-        pictures.terms(paper, name, ax=ax)
-    return ax
-
-
-def paper_surfaces(paper: Arbiter) -> Axes:
-    """Draw the control surface of each of the paper's weights, over the two inputs that it varies most with."""
-    figure = Figure(figsize=(12.4, 3.9), layout="constrained")
-    over = {"alpha_1": ("obstacle", "shape"), "alpha_2": ("obstacle", "shape"), "alpha_3": ("shape", "depth")}
-    fixed = {"alpha_1": {"depth": 0.0}, "alpha_2": {"depth": 0.0}, "alpha_3": {"obstacle": 0.0}}
-    for ax, output in zip(figure.subplots(1, 3), over, strict=True):
-        pictures.surface(paper, output, over[output], fixed[output], ax=ax)
-    return ax
-
-
-def forms() -> Axes:
-    """Compare the hierarchical rules and the complete table, of two criteria."""
-    figure = Figure(figsize=(8.2, 3.0), layout="constrained")
-    criteria = (Criterion("a"), Criterion("b"))
-    for ax, form in zip(figure.subplots(1, 2, sharey=True), ("hierarchical", "complete"), strict=True):
-        pictures.profile(Arbiter(criteria, form=form), "b", {"a": 0.9}, ax=ax)  # type: ignore[arg-type]
-        ax.set_title(f"{form}, a = 0.9", fontsize=10, pad=26)
-        ax.get_legend().set_title("")
-        ax.label_outer()
-    return ax
 
 
 def chatter() -> Axes:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.scenario.keys import KEYS
-from cosim.scenario.tables import File, RegionEntry
+from cosim.scenario.tables import CriterionEntry, File, RegionEntry
 from plant_fmu.toml_tables import dataclass_of
 
 PAGE = Path(__file__).parents[1] / "scenarios.md"
@@ -38,7 +38,8 @@ def defaults(kind: type, path: str = "") -> Iterator[tuple[str, Any]]:
     """Yield the path to each key of a table, and its default."""
     hints = typing.get_type_hints(kind)
     for field in dataclasses.fields(kind):
-        inner = RegionEntry if hints[field.name] == tuple[RegionEntry, ...] else dataclass_of(hints[field.name])
+        listed = [kind for kind in (CriterionEntry, RegionEntry) if hints[field.name] == tuple[kind, ...]]
+        inner = listed[0] if listed else dataclass_of(hints[field.name])
         if inner is None or hints[field.name] is not inner:
             factory = field.default_factory
             yield f"{path}{field.name}", field.default if factory is dataclasses.MISSING else factory()

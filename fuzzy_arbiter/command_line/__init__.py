@@ -1,4 +1,4 @@
 """What the verbs of the command line do; it alone prints.
 
-Imports: engines, export, formats, pictures.
+Imports: terms, engines, formats, export, pictures.
 """

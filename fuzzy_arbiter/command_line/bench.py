@@ -9,8 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fuzzy_arbiter.arbiter import Arbiter
+from fuzzy_arbiter.command_line.domain import random_samples
 from fuzzy_arbiter.definition import System
-from fuzzy_arbiter.domain import random_samples
 from fuzzy_arbiter.engines import ENGINES
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import ArbiterError, EngineError

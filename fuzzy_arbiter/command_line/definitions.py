@@ -9,6 +9,10 @@ from fuzzy_arbiter.command_line.files import require_suffix
 from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.files import write_atomic
 from fuzzy_arbiter.hierarchy import prioritised
+from fuzzy_arbiter.shapes import Shape
+from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.term import Term
+from fuzzy_arbiter.terms.values import Constant, Formula, Linear
 
 BUILT_IN = "section-vi"
 EXPORTS = ("c", "py")
@@ -70,12 +74,24 @@ def _described(variable: Variable) -> list[str]:
     default = ""
     if isinstance(variable, Output):
         default = ", no default" if variable.default is None else f", default {variable.default!r}"
-    width = max(map(len, variable.term_names))
+    width = max(map(len, variable.term_names), default=0)
     lines = [f"  {variable.name} in [{low!r}, {high!r}]{default}"]
-    for term in variable.terms:
-        points = " ".join(f"({x!r}, {degree!r})" for x, degree in term.shape.points)
-        lines.append(f"    {term.name:{width}}  {points}")
-    return lines
+    return [*lines, *(f"    {term.name:{width}}  {_numbers(term)}" for term in variable.terms)]
+
+
+def _numbers(term: Term) -> str:
+    """Say what makes a term: its points, or its kind and numbers."""
+    shape = term.shape
+    if isinstance(shape, Shape):
+        return " ".join(f"({x!r}, {degree!r})" for x, degree in shape.points)
+    if isinstance(shape, Curve):
+        height = f", height {shape.height!r}" if shape.height != 1.0 else ""
+        return f"{shape.kind} {' '.join(map(repr, shape.parameters))}{height}"
+    if isinstance(shape, Linear):
+        return f"linear {' '.join(map(repr, (*shape.coefficients, shape.constant)))}"
+    return (
+        shape.text if isinstance(shape, Formula) else repr(shape.value) if isinstance(shape, Constant) else repr(shape)
+    )
 
 
 def convert(file: str, out: str, native: bool) -> None:

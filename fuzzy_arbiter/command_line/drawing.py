@@ -61,8 +61,9 @@ def draw(
         If a value is refused, the number of inputs or outputs does not fit, or the picture heeds no such option.
     """
     from fuzzy_arbiter import pictures
-    from fuzzy_arbiter.pictures.style import new_axes
+    from fuzzy_arbiter.pictures.style import new_axes, require_matplotlib
 
+    require_matplotlib()
     received = {"--input": inputs, "--output": outputs, "--at": at, "--relief": relief}
     for option, value in received.items():
         if value and option not in PICTURES[kind]:

@@ -91,12 +91,11 @@ def evaluated(arbiter: Arbiter, inputs: Sequence[float] | Mapping[str, float], a
     Returns
     -------
     str
-        Weights, in all digits.
+        Weights, in all digits; one that is undefined is nan, in JSON null.
     """
-    names = variable_names(arbiter.system.outputs)
-    weights = dict(zip(names, map(float, arbiter(inputs)), strict=True))
+    weights = arbiter(inputs)._asdict()
     if as_json:
-        return json.dumps(weights, ensure_ascii=False)
+        return json.dumps({name: _or_null(weight) for name, weight in weights.items()}, ensure_ascii=False)
     return "\n".join(f"{name} = {weight!r}" for name, weight in weights.items())
 
 
@@ -117,17 +116,15 @@ def evaluated_table(arbiter: Arbiter, text: str, where: str, as_json: bool) -> s
     Returns
     -------
     str
-        A column for each output, a row for each row.
+        A column for each output, a row for each row; what is undefined is nan, in JSON null.
 
     Raises
     ------
     InputError
         If a column is missing or there twice, or a line has a value that the arbiter refuses; the line is named.
-    UndefinedOutputError
-        If an output is undefined; the line is named.
     """
     lines, rows = _rows(text, where, variable_names(arbiter.system.inputs))
-    names = variable_names(arbiter.system.outputs)
+    names = arbiter.system.result_names
     weights: list[list[float]] = []
     if rows:
         try:
@@ -140,12 +137,17 @@ def evaluated_table(arbiter: Arbiter, text: str, where: str, as_json: bool) -> s
                     raise type(error)(f"{where}: line {line}: {error}") from None
             raise
     if as_json:
-        return json.dumps([dict(zip(names, row, strict=True)) for row in weights], ensure_ascii=False)
+        table = [dict(zip(names, map(_or_null, row), strict=True)) for row in weights]
+        return json.dumps(table, ensure_ascii=False)
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(names)
     writer.writerows([repr(weight) for weight in row] for row in weights)
     return out.getvalue().removesuffix("\n")
+
+
+def _or_null(weight: float) -> float | None:
+    return weight if weight == weight else None
 
 
 def _rows(text: str, where: str, names: Sequence[str]) -> tuple[list[int], list[list[float]]]:

@@ -1,6 +1,6 @@
 """The engines: ways to evaluate one and the same system, chosen by name.
 
-Imports: nothing.
+Imports: terms.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Literal, get_args
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.engines.closed import ClosedEngine, NoClosedFormError
 from fuzzy_arbiter.engines.engine import Engine
-from fuzzy_arbiter.engines.exact import ExactEngine
+from fuzzy_arbiter.engines.exact import EXACTLY, ExactEngine
 from fuzzy_arbiter.errors import EngineError
 
 EngineName = Literal["auto", "closed", "exact", "grid", "skfuzzy"]
@@ -45,7 +45,9 @@ def choose(system: System, engine: str) -> tuple[Engine, str]:
                 system
             ), "the outputs' cuts are h and 1 - h for all inputs, so that there is a closed form"
         except NoClosedFormError as error:
-            return ExactEngine(system), f"there is no closed form: {error.reason}"
+            engine_found = ExactEngine(system)
+            said = [f"{name!r}: {how}" for name, how in engine_found.methods.items() if how != EXACTLY]
+            return engine_found, "; ".join([f"there is no closed form: {error.reason}", *said])
     if engine not in ENGINES:
         raise EngineError(f"engine is {engine!r}, expected one of {', '.join(ENGINES)}")
     return _engine(engine)(system), "it was asked for"
@@ -64,6 +66,6 @@ def _engine(name: str) -> type[Engine]:
         from fuzzy_arbiter.engines.scikit import ScikitEngine  # a second of imports, for those who ask for it
     except ModuleNotFoundError as error:
         raise EngineError(
-            f"engine 'skfuzzy': {error.name} is not installed, expected scikit-fuzzy, SciPy and networkx"
+            f"engine 'skfuzzy': {error.name} is not installed, expected the extra fuzzy-arbiter[skfuzzy]"
         ) from None
     return ScikitEngine

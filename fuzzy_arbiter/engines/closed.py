@@ -23,9 +23,10 @@ import numpy as np
 
 from fuzzy_arbiter.definition import Output, System
 from fuzzy_arbiter.engines.engine import Engine, Shortcut, normalize_weights, normalize_weights_of_many
-from fuzzy_arbiter.engines.firing import Array, degrees_of_many
+from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.engines.normal_form import Clause, Literal, high_clauses, ladder
 from fuzzy_arbiter.engines.pieces import Piece, pieces
+from fuzzy_arbiter.engines.plain import beyond_plain
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.hierarchy import DEGREE
 
@@ -79,7 +80,7 @@ class ClosedEngine(Engine):
         self.scaled = self.raw if system.normalization == "none" else scaled
         super().__init__(system)
         self._index = {v.name: i for i, v in enumerate(system.inputs)}
-        self._shapes = {(v.name, t.name): t.shape for v in system.inputs for t in v.terms}
+        self._shapes = {(v.name, t.name): t.membership for v in system.inputs for t in v.terms}
         self._cubic = _one_cubic(self.scaled)
         self.clips = system.normalization != "none" and self._cubic != SMOOTHSTEP
         # prioritised criteria in the order of the inputs, which are the degrees themselves: nothing to look up
@@ -172,12 +173,14 @@ class ClosedEngine(Engine):
 
     def _degrees(self, literal: Literal, inputs: Array) -> Array:
         variable, term, affirmed = literal
-        degrees = degrees_of_many(self._shapes[variable, term], inputs[:, self._index[variable]])
+        degrees = self._shapes[variable, term].of_many(inputs[:, self._index[variable]])
         return degrees if affirmed else 1.0 - degrees
 
 
 def _proved(system: System) -> tuple[tuple[Clause, ...], ...] | str:
     """Return the clauses of each output's h, or why there is no h."""
+    if reason := beyond_plain(system, curved_inputs=True):
+        return reason
     if (system.conjunction, system.disjunction, system.implication) != ("min", "max", "min"):
         return f"norms are {system.conjunction}, {system.disjunction}, {system.implication}, expected min, max, min"
     for i, rule in enumerate(system.rules):
@@ -207,7 +210,7 @@ def _one_cubic(forms: Sequence[tuple[Piece, ...]]) -> tuple[float, ...] | None:
 def _smooth_ladder(n: int, n2: float, n3: float) -> Shortcut:
     """Return what gives the weights (n2 + n3 h) h^2 of n criteria."""
 
-    def weights(degrees: Sequence[float]) -> tuple[float, ...] | None:
+    def weights(degrees: Sequence[float]) -> list[float] | None:
         if len(degrees) != n:
             return None
         result = []
@@ -219,7 +222,7 @@ def _smooth_ladder(n: int, n2: float, n3: float) -> Shortcut:
             result.append((n2 + n3 * h) * h * h)
             if 1.0 - m < unclaimed:
                 unclaimed = 1.0 - m
-        return tuple(result)
+        return result
 
     return weights
 

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import functools
+import math
 import operator
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
-from typing import ClassVar
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 
-from fuzzy_arbiter.definition import Output, System, variable_names
+from fuzzy_arbiter.definition import Output, System
 from fuzzy_arbiter.engines.firing import Array, Firing
-from fuzzy_arbiter.errors import EngineError, UndefinedOutputError
+from fuzzy_arbiter.errors import EngineError
+from fuzzy_arbiter.terms.values import Constant, Value
 
-Shortcut = Callable[[Sequence[float]], tuple[float, ...] | None]
+Shortcut = Callable[[Sequence[float]], list[float] | None]
+_BLOCK = 8192  # samples at a time, so that what is worked on stays in the cache
 _EACH_BY_ITSELF = ("range", "none")  # normalizations that look at one output at a time
 
 
@@ -91,20 +94,50 @@ class Engine(ABC):
         Returns
         -------
         list of float
-            Centroids, or the output's default where no rule fires.
-
-        Raises
-        ------
-        UndefinedOutputError
-            If no rule fires for an output without default.
+            Centroids; where no rule fires the output's default, or NaN.
         """
         cuts = self.firing.cuts(self.firing.strengths(inputs))
-        return [
-            self.centroid(k, cut)
-            if any(cut)
-            else default_of(output, dict(zip(variable_names(self.system.inputs), inputs, strict=True)))
-            for k, (output, cut) in enumerate(zip(self.system.outputs, cuts, strict=True))
-        ]
+        result: list[float] = []
+        for k, (output, cut) in enumerate(zip(self.system.outputs, cuts, strict=True)):
+            value = self.value(k, cut, (*inputs, *result)) if any(cut) else math.nan
+            if not math.isfinite(value):
+                value = default_of(output)
+            result.append(min(max(value, output.universe[0]), output.universe[1]) if output.lock_range else value)
+        return result
+
+    def value(self, k: int, cuts: Sequence[float], inputs: Sequence[float]) -> float:
+        """Return the raw value of an output for one sample.
+
+        Parameters
+        ----------
+        k, cuts
+            As of `centroid`.
+        inputs : sequence of float
+            The sample, and the values of the outputs before; of these the terms of some outputs are functions.
+
+        Returns
+        -------
+        float
+            The centroid; not finite where there is none.
+        """
+        return self.centroid(k, cuts)
+
+    def values(self, k: int, cuts: Array, inputs: Array) -> Array:
+        """Return the raw values of an output for many samples.
+
+        Parameters
+        ----------
+        k, cuts
+            As of `centroid_of_many`.
+        inputs : ndarray, shape (n, inputs and k outputs)
+            The samples, and the values of the outputs before.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Each as of `value`.
+        """
+        return self.centroid_of_many(k, cuts)
 
     def centroids_of_many(self, inputs: Array) -> Array:
         """Return the raw value of each output for many samples.
@@ -117,25 +150,44 @@ class Engine(ABC):
         Returns
         -------
         ndarray, shape (n, outputs)
-            Centroids, or the output's default where no rule fires.
-
-        Raises
-        ------
-        UndefinedOutputError
-            If no rule fires for an output without default; the first such row is named.
+            Centroids; where no rule fires the output's default, or NaN.
         """
-        result = np.empty((len(inputs), len(self.system.outputs)))
+        outputs = self.system.outputs
+        if not any(output.weighted for output in outputs):  # whose values may depend on those before
+            result = np.empty((len(inputs), len(outputs)))
+            for start in range(0, len(inputs), _BLOCK):
+                block = slice(start, start + _BLOCK)
+                for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(inputs[block]))):
+                    self._some(k, cuts, inputs[block], result[block, k])
+            for k in range(len(outputs)):
+                self._complete(k, result[:, k])
+            return result
+        result = np.empty((len(inputs), len(outputs)))
         for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(inputs))):
-            fires = cuts.any(axis=0)
-            if fires.all():
-                result[:, k] = self.centroid_of_many(k, cuts)
-                continue
-            row = int(np.argmin(fires))
-            names = variable_names(self.system.inputs)
-            default = default_of(self.system.outputs[k], dict(zip(names, inputs[row].tolist(), strict=True)), row)
-            result[~fires, k] = default
-            result[fires, k] = self.centroid_of_many(k, cuts[:, fires])
+            self._some(k, cuts, np.column_stack([inputs, result[:, :k]]), result[:, k])
+            self._complete(k, result[:, k])
         return result
+
+    def _some(self, k: int, cuts: Array, known: Array, values: Array) -> None:
+        """Fill in the values of an output where rules fire, and NaN where none does."""
+        fires = np.asarray(cuts.any(axis=0))
+        if fires.all():
+            values[:] = self.values(k, cuts, known)
+        else:
+            values[:] = math.nan
+            values[fires] = self.values(k, cuts[:, fires], known[fires])
+
+    def _complete(self, k: int, values: Array) -> None:
+        """Fill in the values before or the default of an output where it has no value, and hold it in its range."""
+        output = self.system.outputs[k]
+        defined = np.isfinite(values)
+        if output.lock_previous and defined.any():
+            last = np.maximum.accumulate(np.where(defined, np.arange(len(values)), -1))
+            values[last >= 0] = values[last[last >= 0]]
+            defined = last >= 0
+        values[~defined] = default_of(output)
+        if output.lock_range:
+            np.clip(values, *output.universe, out=values)
 
     def weights(self, inputs: Sequence[float]) -> tuple[float, ...]:
         """Return the normalized value of each output for one sample.
@@ -148,12 +200,7 @@ class Engine(ABC):
         Returns
         -------
         tuple of float
-            As the system's normalization says.
-
-        Raises
-        ------
-        UndefinedOutputError
-            If no rule fires for an output without default.
+            As the system's normalization says; NaN for an output without default if no rule fires for it.
         """
         raw = self.centroids(inputs)
         if not self.scale:
@@ -172,12 +219,7 @@ class Engine(ABC):
         Returns
         -------
         ndarray, shape (n, outputs)
-            As the system's normalization says.
-
-        Raises
-        ------
-        UndefinedOutputError
-            If no rule fires for an output without default; the first such row is named.
+            As the system's normalization says; NaN where no rule fires for an output without default.
         """
         raw = self.centroids_of_many(inputs)
         if not self.scale:
@@ -191,15 +233,27 @@ class Engine(ABC):
         Returns
         -------
         callable, or None
-            Takes a list or tuple of anything; gives its weights, or None unless it is a sample with all inputs in their
+            Takes a sequence of anything; gives its weights, or None unless it is a sample with all inputs in their
             universes.
         """
         return None
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.system,)
+
+    def _concluded(self, k: int) -> Sequence[int]:
+        """Return the terms of an output that can be joined alone."""
+        return sorted({slot.term for slot in self.firing.slots[k]})
+
     def _ends(self, k: int) -> tuple[float, float]:
         """Return the centroids that become 0 and 1: of the least and of the greatest term, each alone and whole."""
         output = self.system.outputs[k]
-        alone = [self.centroid(k, [float(i == j) for i in range(len(output.terms))]) for j in range(len(output.terms))]
+        if any(isinstance(term.shape, Value) and not isinstance(term.shape, Constant) for term in output.terms):
+            raise EngineError(
+                f"output {output.name!r}: its terms depend on the inputs, which leaves no range to normalize; expected "
+                "normalization 'none'"
+            )
+        alone = [self.centroid(k, [float(slot.term == j) for slot in self.firing.slots[k]]) for j in self._concluded(k)]
         low, high = min(alone), max(alone)
         if not low < high:
             raise EngineError(
@@ -215,8 +269,8 @@ def normalize_weights(weights: Sequence[float], normalization: str) -> tuple[flo
     Parameters
     ----------
     weights : sequence of float
-        In [0, 1].
-    normalization : {"range", "none", "sum", "max"}
+        In [0, 1], or NaN, which stays and counts for nothing.
+    normalization : {"none", "range", "sum", "max"}
         The first two leave them.
 
     Returns
@@ -226,9 +280,10 @@ def normalize_weights(weights: Sequence[float], normalization: str) -> tuple[flo
     """
     if normalization in _EACH_BY_ITSELF:
         return tuple(weights)
+    known = [w for w in weights if w == w] or [0.0]
     # not sum(), which newer Pythons round otherwise than exported code
-    whole = functools.reduce(operator.add, weights) if normalization == "sum" else max(weights)
-    return tuple(w / whole for w in weights) if whole > 0.0 else (0.0,) * len(weights)
+    whole = functools.reduce(operator.add, known) if normalization == "sum" else max(known)
+    return tuple(w / whole if whole > 0.0 else w * 0.0 for w in weights)
 
 
 def normalize_weights_of_many(weights: Array, normalization: str) -> Array:
@@ -237,8 +292,8 @@ def normalize_weights_of_many(weights: Array, normalization: str) -> Array:
     Parameters
     ----------
     weights : ndarray, shape (n, outputs)
-        In [0, 1].
-    normalization : {"range", "none", "sum", "max"}
+        In [0, 1], or NaN, which stays and counts for nothing.
+    normalization : {"none", "range", "sum", "max"}
         The first two leave them.
 
     Returns
@@ -248,34 +303,22 @@ def normalize_weights_of_many(weights: Array, normalization: str) -> Array:
     """
     if normalization in _EACH_BY_ITSELF:
         return weights
-    whole = (np.sum if normalization == "sum" else np.max)(weights, axis=1, keepdims=True)
-    return np.asarray(np.divide(weights, whole, out=np.zeros_like(weights), where=whole > 0.0))
+    known = np.where(np.isnan(weights), 0.0, weights)
+    whole = (np.sum if normalization == "sum" else np.max)(known, axis=1, keepdims=True)
+    return np.asarray(np.divide(weights, whole, out=weights * 0.0, where=whole > 0.0))
 
 
-def default_of(output: Output, inputs: Mapping[str, float], row: int | None = None) -> float:
-    """Return the value of an output for which no rule fires.
+def default_of(output: Output) -> float:
+    """Return the value of an output for which no rule fires, or what the rules conclude is no number.
 
     Parameters
     ----------
     output : Output
         Of which no rule fires.
-    inputs : mapping from input's name to float
-        Where that is.
-    row : int, optional
-        Which of many samples.
 
     Returns
     -------
     float
-        Its default.
-
-    Raises
-    ------
-    UndefinedOutputError
-        If it has none.
+        Its default; NaN if it has none.
     """
-    if output.default is not None:
-        return output.default
-    where = "" if row is None else f"row {row}, "
-    values = ", ".join(f"{name} = {value:g}" for name, value in inputs.items())
-    raise UndefinedOutputError(f"output {output.name!r}: no rule fires at {where}{values}, and it has no default")
+    return math.nan if output.default is None else output.default

@@ -1,74 +1,122 @@
-"""The exact centroid of any piecewise-linear Mamdani system."""
+"""The engine of any system, exact wherever there is an exact value."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 
-from fuzzy_arbiter.definition import System
+from fuzzy_arbiter.definition import System, variable_names
+from fuzzy_arbiter.engines.bands import centroids
 from fuzzy_arbiter.engines.engine import Engine
-from fuzzy_arbiter.engines.firing import Array
+from fuzzy_arbiter.engines.firing import Array, slots_of
+from fuzzy_arbiter.engines.plain import curved
+from fuzzy_arbiter.engines.quadrature import BOUND, Quadrature
 from fuzzy_arbiter.engines.sweep import LARGER, TINY, Outline, centroid, outline
+from fuzzy_arbiter.engines.weighted import Weighted
 
-_BLOCK = 1024  # samples evaluated at a time
+EXACTLY = "exact integrals, to rounding"
+_BLOCK = 8192  # samples evaluated at a time
 
 
 class ExactEngine(Engine):
-    """Integrates the joined output terms exactly, over all their breakpoints."""
+    """Evaluates any system: straight terms exactly, over all their breakpoints; values as they are; else by quadrature.
+
+    Attributes
+    ----------
+    methods : dict from str to str
+        For each output how it is evaluated, and how far that may be off.
+    """
 
     name: ClassVar[str] = "exact"
 
     def __init__(self, system: System) -> None:
-        self._outlines = [outline(v) for v in system.outputs]
-        self._scaled = system.implication == "prod"
+        self.methods: dict[str, str] = {}
+        self._ways: list[Outline | Weighted | Quadrature] = []
+        self._scaled: list[bool] = []
+        inputs = variable_names(system.inputs)
+        for k, output in enumerate(system.outputs):
+            slots = slots_of(system, output)
+            implications = {slot.implication for slot in slots}
+            self._scaled.append(implications == {"prod"})
+            straight = not curved(output) and implications <= {"min", "prod"} and len(implications) == 1
+            if output.weighted:
+                self._ways.append(Weighted(output, inputs, variable_names(system.outputs[:k])))
+                self.methods[output.name] = "weighted values, to rounding"
+            elif straight and (output.defuzzifier, output.aggregation) == ("centroid", "max"):
+                self._ways.append(outline(output))
+                self.methods[output.name] = EXACTLY
+            else:
+                way = Quadrature(output, slots)
+                self._ways.append(way)
+                self.methods[output.name] = (
+                    "integrals of polynomials, to rounding"
+                    if way.exact
+                    else f"adaptive quadrature, within {BOUND:g} of the universe's width"
+                )
         super().__init__(system)
 
+    def quadrature(self, name: str) -> bool:
+        """Return whether an output is integrated by quadrature."""
+        return any(
+            o.name == name and isinstance(w, Quadrature) for o, w in zip(self.system.outputs, self._ways, strict=True)
+        )
+
     def centroid(self, k: int, cuts: Sequence[float]) -> float:
-        """Return the centroid of an output, exact to rounding."""
-        return float(centroid(cuts, *self._outlines[k], self._scaled))
+        """Return the value of an output, as exact as `methods` says."""
+        way = self._ways[k]
+        if isinstance(way, Quadrature):
+            return way.value(cuts)
+        if isinstance(way, Weighted):
+            return way.value(cuts, [math.nan] * (len(self.system.inputs) + k))
+        return float(centroid(cuts, *way, self._scaled[k]))
 
     def centroid_of_many(self, k: int, cuts: Array) -> Array:
-        """Return the centroids of an output for many samples, exact to rounding."""
+        """Return the values of an output for many samples, as exact as `methods` says."""
+        way = self._ways[k]
+        if isinstance(way, Quadrature):
+            return np.array([way.value(column) for column in cuts.T.tolist()])
+        assert not isinstance(way, Weighted)
         cuts = np.where(cuts.max(axis=0) < TINY, cuts * LARGER, cuts)
         result = np.empty(cuts.shape[1])
         for start in range(0, len(result), _BLOCK):
             block = slice(start, start + _BLOCK)
-            result[block] = _centroids(cuts[:, block], self._outlines[k], self._scaled)
+            result[block] = _centroids(cuts[:, block], way) if self._scaled[k] else centroids(cuts[:, block], way)
         return result
 
+    def value(self, k: int, cuts: Sequence[float], inputs: Sequence[float]) -> float:
+        """Return the value of an output for a sample."""
+        way = self._ways[k]
+        return way.value(cuts, inputs) if isinstance(way, Weighted) else self.centroid(k, cuts)
 
-def _centroids(cuts: Array, shape: Outline, scaled: bool) -> Array:
-    """Return what `sweep.centroid` does, for each column of the cuts."""
+    def values(self, k: int, cuts: Array, inputs: Array) -> Array:
+        """Return the values of an output for many samples."""
+        way = self._ways[k]
+        return way.values(cuts, inputs) if isinstance(way, Weighted) else self.centroid_of_many(k, cuts)
+
+
+def _centroids(cuts: Array, shape: Outline) -> Array:
+    """Return what `sweep.scaled` does, as centroids, for each column of the cuts."""
     terms, n = cuts.shape
     area, moment = np.zeros(n), np.zeros(n)
     left, right = (np.reshape(side, (-1, terms, 1)) for side in (shape.left, shape.right))
     for piece, (a, b) in enumerate(zip(left, right, strict=True)):
         start, width = shape.places[piece] - shape.places[0], shape.places[piece + 1] - shape.places[piece]
-        start_at, end_at = (a * cuts, b * cuts) if scaled else (a, b)
-        levels = [] if scaled else [(a, b, cut, cut) for cut in cuts]  # each term against each cut
-        # and each against those before it
+        start_at, end_at = a * cuts, b * cuts
+        # each against those before it
         others = [(start_at[t], end_at[t], start_at[:t], end_at[:t]) for t in range(1, terms)]
-        breaks = [np.zeros((1, n)), np.ones((1, n)), *(_crossings(*pair, n) for pair in (*levels, *others))]
+        breaks = [np.zeros((1, n)), np.ones((1, n)), *(_crossings(*pair, n) for pair in others)]
         places = np.sort(np.concatenate(breaks), axis=0)
         middles = (places[:-1] + places[1:]) / 2
         heights, starts, ends = np.zeros((3, *middles.shape))
         for t in range(terms):
             cut, rise = cuts[t], b[t] - a[t]
-            degrees = a[t] + rise * middles
-            lines = a[t] + rise * places
-            if scaled:
-                degrees, lines = degrees * cut, lines * cut
-                greatest = degrees > heights
-                np.copyto(starts, lines[:-1], where=greatest)
-                np.copyto(ends, lines[1:], where=greatest)
-            else:
-                level = degrees >= cut
-                degrees = np.minimum(degrees, cut)
-                greatest = degrees > heights
-                np.copyto(starts, np.where(level, cut, lines[:-1]), where=greatest)
-                np.copyto(ends, np.where(level, cut, lines[1:]), where=greatest)
+            degrees, lines = (a[t] + rise * middles) * cut, (a[t] + rise * places) * cut
+            greatest = degrees > heights
+            np.copyto(starts, lines[:-1], where=greatest)
+            np.copyto(ends, lines[1:], where=greatest)
             np.maximum(heights, degrees, out=heights)
         x, w = start + places * width, np.diff(places, axis=0) * width
         for i, (width_i, y0, y1) in enumerate(zip(w, starts, ends, strict=True)):

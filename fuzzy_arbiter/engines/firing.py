@@ -5,14 +5,15 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fuzzy_arbiter.definition import Conjunction, Disjunction, System
-from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
-from fuzzy_arbiter.shapes import Shape
+from fuzzy_arbiter.definition import Output, System
+from fuzzy_arbiter.propositions import And, Anything, Hedged, Is, Not, Or, Proposition
+from fuzzy_arbiter.rule import Operators
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, HEDGES, S_NORMS, T_NORMS
 
 Array = NDArray[np.float64]
 D = TypeVar("D")
@@ -20,11 +21,13 @@ D = TypeVar("D")
 
 @dataclass(frozen=True, slots=True)
 class Logic(Generic[D]):
-    """What *and*, *or* and *not* do with degrees of one kind: numbers, arrays, or others."""
+    """What *and*, *or*, *not* and hedges do with degrees of one kind: numbers, arrays, or others."""
 
     conjunction: Callable[[D, D], D]
     disjunction: Callable[[D, D], D]
     negation: Callable[[D], D]
+    hedge: Callable[[str, D], D] | None = None
+    certain: Callable[[], D] | None = None
 
     def degree(self, proposition: Proposition, of: Callable[[Is], D]) -> D:
         """Return the degree to which a proposition holds.
@@ -45,55 +48,107 @@ class Logic(Generic[D]):
             return of(proposition)
         if isinstance(proposition, Not):
             return self.negation(self.degree(proposition.part, of))
+        if isinstance(proposition, Hedged):
+            assert self.hedge is not None
+            return self.hedge(proposition.hedge, self.degree(proposition.part, of))
+        if isinstance(proposition, Anything):
+            assert self.certain is not None
+            return self.certain()
         assert isinstance(proposition, And | Or)
         join = self.conjunction if isinstance(proposition, And) else self.disjunction
         return functools.reduce(join, (self.degree(part, of) for part in proposition.parts))
 
 
-_NUMBERS: dict[str, Callable[[float, float], float]] = {
-    "min": min,
-    "prod": lambda a, b: a * b,
-    "max": max,
-    "probor": lambda a, b: a + b - a * b,
-}
-_ARRAYS: dict[str, Callable[[Array, Array], Array]] = {
-    "min": np.minimum,
-    "prod": np.multiply,
-    "max": np.maximum,
-    "probor": lambda a, b: a + b - a * b,
-}
-
-
-def number_logic(conjunction: Conjunction, disjunction: Disjunction) -> Logic[float]:
+def number_logic(operators: System | Operators) -> Logic[float]:
     """Return the logic of single degrees.
 
     Parameters
     ----------
-    conjunction, disjunction
-        As of `System`.
+    operators : System or Operators
+        Which has the norms.
 
     Returns
     -------
     Logic of float
         On degrees in [0, 1].
     """
-    return Logic(_NUMBERS[conjunction], _NUMBERS[disjunction], lambda a: 1.0 - a)
+    conjunction, disjunction = T_NORMS[operators.conjunction], S_NORMS[operators.disjunction]
+    return Logic(
+        conjunction.number, disjunction.number, lambda a: 1.0 - a, lambda word, a: HEDGES[word].number(a), lambda: 1.0
+    )
 
 
-def array_logic(conjunction: Conjunction, disjunction: Disjunction) -> Logic[Array]:
+def array_logic(operators: System | Operators, n: int = 1) -> Logic[Array]:
     """Return the logic of arrays of degrees.
 
     Parameters
     ----------
-    conjunction, disjunction
-        As of `System`.
+    operators : System or Operators
+        Which has the norms.
+    n : int
+        Length of the arrays.
 
     Returns
     -------
     Logic of ndarray
         On arrays of one shape, degrees in [0, 1].
     """
-    return Logic(_ARRAYS[conjunction], _ARRAYS[disjunction], lambda a: 1.0 - a)
+    conjunction, disjunction = T_NORMS[operators.conjunction], S_NORMS[operators.disjunction]
+    return Logic(
+        conjunction.array,
+        disjunction.array,
+        lambda a: 1.0 - a,
+        lambda word, a: HEDGES[word].array(a),
+        lambda: np.ones(n),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """One of the sets or values that an output joins.
+
+    Attributes
+    ----------
+    term : int
+        Which of the output's terms it is.
+    rules : tuple of int
+        The rules that conclude it, of which the joined strength is the slot's degree.
+    implication : str
+        Of these rules.
+    """
+
+    term: int
+    rules: tuple[int, ...]
+    implication: str
+
+
+def slots_of(system: System, output: Output) -> tuple[Slot, ...]:
+    """Return what an output joins: each of its terms once where that is all the same, else each conclusion.
+
+    Parameters
+    ----------
+    system : System
+        Whose rules conclude.
+    output : Output
+        One of its outputs.
+
+    Returns
+    -------
+    tuple of Slot
+        Of the terms in their order, or of the rules in theirs.
+    """
+    names = output.term_names
+    concluded = [
+        (i, names.index(c.term), (rule.operators or system).implication)
+        for i, rule in enumerate(system.rules)
+        for c in rule.conclusions
+        if c.variable == output.name
+    ]
+    implications = {implication for _, _, implication in concluded}
+    if output.weighted or (output.aggregation == "max" and len(implications) <= 1):
+        implication = next(iter(implications), system.implication)
+        return tuple(Slot(j, tuple(i for i, t, _ in concluded if t == j), implication) for j in range(len(names)))
+    return tuple(Slot(j, (i,), implication) for i, j, implication in concluded)
 
 
 class Firing:
@@ -107,9 +162,12 @@ class Firing:
 
     def __init__(self, system: System) -> None:
         self.system = system
+        self.slots = tuple(slots_of(system, output) for output in system.outputs)
         self._inputs = {v.name: i for i, v in enumerate(system.inputs)}
-        self._shapes = {(v.name, t.name): t.shape for v in system.inputs for t in v.terms}
-        self._outputs = {v.name: {t.name: j for j, t in enumerate(v.terms)} for v in system.outputs}
+        self._shapes = {(v.name, t.name): t.membership for v in system.inputs for t in v.terms}
+        logics = {o: number_logic(o or system) for o in {rule.operators for rule in system.rules}}
+        self._rules = [(rule.condition, logics[rule.operators], rule.weight) for rule in system.rules]
+        self._joins = [AGGREGATIONS[output.aggregation] for output in system.outputs]
 
     def strengths(self, inputs: Sequence[float]) -> list[float]:
         """Return how strongly each rule fires for one sample.
@@ -124,12 +182,25 @@ class Firing:
         list of float
             Degree of each rule's condition times its weight, in the order of the rules.
         """
-        logic = number_logic(self.system.conjunction, self.system.disjunction)
 
         def of(statement: Is) -> float:
-            return self._shapes[statement.variable, statement.term](inputs[self._inputs[statement.variable]])
+            place = self._inputs.get(statement.variable)
+            if place is None:  # an output, as the rules before have concluded on it
+                return float(self._concluded(statement, result, number=True))
+            return self._shapes[statement.variable, statement.term](inputs[place])
 
-        return [logic.degree(rule.condition, of) * rule.weight for rule in self.system.rules]
+        result: list[float] = []
+        for condition, logic, weight in self._rules:
+            result.append(logic.degree(condition, of) * weight)
+        return result
+
+    def _concluded(self, statement: Is, strengths: Sequence[Any], number: bool) -> Any:
+        """Return how strongly the rules so far conclude that an output is in a term."""
+        found = [s for s, rule in zip(strengths, self.system.rules, strict=False) if statement in rule.conclusions]
+        if not found:
+            return 0.0 if number else np.zeros_like(strengths[0])
+        k = next(k for k, output in enumerate(self.system.outputs) if output.name == statement.variable)
+        return functools.reduce(self._joins[k].number if number else self._joins[k].array, found)
 
     def strengths_of_many(self, inputs: Array) -> list[Array]:
         """Return how strongly each rule fires for each of many samples.
@@ -144,19 +215,24 @@ class Firing:
         list of ndarray, shape (n,)
             For each rule, in the order of the rules.
         """
-        logic = array_logic(self.system.conjunction, self.system.disjunction)
         known: dict[tuple[str, str], Array] = {}
 
         def of(statement: Is) -> Array:
             key = (statement.variable, statement.term)
+            if statement.variable not in self._inputs:
+                return np.asarray(self._concluded(statement, result, number=False))
             if key not in known:
-                known[key] = degrees_of_many(self._shapes[key], inputs[:, self._inputs[statement.variable]])
+                known[key] = self._shapes[key].of_many(inputs[:, self._inputs[statement.variable]])
             return known[key]
 
-        return [logic.degree(rule.condition, of) * rule.weight for rule in self.system.rules]
+        result: list[Array] = []
+        for rule in self.system.rules:
+            logic = array_logic(rule.operators or self.system, len(inputs))
+            result.append(logic.degree(rule.condition, of) * rule.weight)
+        return result
 
     def cuts(self, strengths: Sequence[float]) -> list[list[float]]:
-        """Return the greatest strength with which each output term is concluded.
+        """Return the strength of each slot of each output.
 
         Parameters
         ----------
@@ -166,18 +242,19 @@ class Firing:
         Returns
         -------
         list of list of float
-            For each output, the cut of each of its terms; 0 where no rule fires.
+            For each output, and each of its slots: of its terms, if they are joined by their maximum; 0 where no rule
+            fires.
         """
-        result = [[0.0] * len(v.terms) for v in self.system.outputs]
-        cuts = dict(zip(self._outputs, result, strict=True))
-        for rule, strength in zip(self.system.rules, strengths, strict=True):
-            for conclusion in rule.conclusions:
-                j = self._outputs[conclusion.variable][conclusion.term]
-                cuts[conclusion.variable][j] = max(cuts[conclusion.variable][j], strength)
+        result = []
+        for slots, norm in zip(self.slots, self._joins, strict=True):
+            join = norm.number
+            result.append(
+                [functools.reduce(join, [strengths[i] for i in slot.rules]) if slot.rules else 0.0 for slot in slots]
+            )
         return result
 
     def cuts_of_many(self, strengths: Sequence[Array]) -> list[Array]:
-        """Return the greatest strength with which each output term is concluded, for each of many samples.
+        """Return the strength of each slot of each output, for each of many samples.
 
         Parameters
         ----------
@@ -186,45 +263,34 @@ class Firing:
 
         Returns
         -------
-        list of ndarray, shape (terms, n)
+        list of ndarray, shape (slots, n)
             For each output.
         """
-        n = len(strengths[0])
-        result = [np.zeros((len(v.terms), n)) for v in self.system.outputs]
-        cuts = dict(zip(self._outputs, result, strict=True))
-        for rule, strength in zip(self.system.rules, strengths, strict=True):
-            for conclusion in rule.conclusions:
-                row = cuts[conclusion.variable][self._outputs[conclusion.variable][conclusion.term]]
-                np.maximum(row, strength, out=row)
+        result = []
+        for slots, norm in zip(self.slots, self._joins, strict=True):
+            cuts = np.zeros((len(slots), len(strengths[0])))
+            for row, slot in zip(cuts, slots, strict=True):
+                if slot.rules:
+                    row[:] = functools.reduce(norm.array, [strengths[i] for i in slot.rules])
+            result.append(cuts)
         return result
 
+    def term_cuts(self, k: int, strengths: Sequence[float]) -> list[float]:
+        """Return the greatest strength with which each term of an output is concluded.
 
-def degrees_of_many(shape: Shape, places: Array) -> Array:
-    """Return the degrees of a shape at many places, each as the shape itself gives it.
+        Parameters
+        ----------
+        k : int
+            Which output.
+        strengths : sequence of float
+            Of each rule, as from `strengths`.
 
-    Parameters
-    ----------
-    shape : Shape
-        A membership function.
-    places : ndarray, shape (n,)
-        Finite.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Degrees in [0, 1].
-    """
-    x, y = np.array(shape.points).T
-    if len(x) == 1:
-        return np.full(len(places), y[0])
-    right = np.clip(np.searchsorted(x, places), 1, len(x) - 1)  # of x[right - 1] < place <= x[right]
-    left = right - 1
-    with np.errstate(divide="ignore", invalid="ignore"):  # at jumps, which are set below
-        share = (places - x[left]) / (x[right] - x[left])
-        degrees = y[left] + (y[right] - y[left]) * share
-    degrees[places <= x[0]] = y[0]
-    degrees[places >= x[-1]] = y[-1]
-    for i in range(len(x) - 1):
-        if x[i] == x[i + 1]:
-            degrees[places == x[i]] = max(y[i], y[i + 1])
-    return np.asarray(degrees)
+        Returns
+        -------
+        list of float
+            In the order of its terms; 0 where no rule fires.
+        """
+        result = [0.0] * len(self.system.outputs[k].terms)
+        for slot in self.slots[k]:
+            result[slot.term] = max([result[slot.term], *(strengths[i] for i in slot.rules)])
+        return result

@@ -19,7 +19,8 @@ import numpy as np
 
 from fuzzy_arbiter.definition import Output, System
 from fuzzy_arbiter.engines.engine import Engine
-from fuzzy_arbiter.engines.firing import Array, degrees_of_many
+from fuzzy_arbiter.engines.firing import Array
+from fuzzy_arbiter.engines.plain import beyond_plain
 from fuzzy_arbiter.errors import EngineError
 
 LEAST_AREA = float(np.finfo(np.float64).eps)  # scikit-fuzzy divides by no area less than this
@@ -45,7 +46,7 @@ class GridEngine(Engine):
     name: ClassVar[str] = "grid"
 
     def __init__(self, system: System) -> None:
-        require_clipping(system, self.name)
+        require_plain(system, self.name, curved_inputs=True)
         self._pieces = [_pieces(output, system.points) for output in system.outputs]
         super().__init__(system)
 
@@ -115,8 +116,8 @@ class _Piece:
     foreign: tuple[Line, ...]  # those that may cross the cut of a higher term, with that cut's index
 
 
-def require_clipping(system: System, engine: str) -> None:
-    """Refuse an implication that scikit-fuzzy does not know.
+def require_plain(system: System, engine: str, curved_inputs: bool) -> None:
+    """Refuse what scikit-fuzzy does not know.
 
     Parameters
     ----------
@@ -124,17 +125,21 @@ def require_clipping(system: System, engine: str) -> None:
         What is to be evaluated.
     engine : str
         Name for the message.
+    curved_inputs : bool
+        Whether terms of inputs may be any membership functions.
 
     Raises
     ------
     EngineError
-        If the implication is not the minimum.
+        If the implication is not the minimum, or there are norms, terms or defuzzifiers beyond the plain ones.
     """
     if system.implication != "min":
         raise EngineError(
             f"engine {engine!r}: implication is {system.implication!r}, which scikit-fuzzy does not know; "
             "expected 'min', or engine 'exact'"
         )
+    if reason := beyond_plain(system, curved_inputs):
+        raise EngineError(f"engine {engine!r}: {reason}, or engine 'exact'")
 
 
 def sampled(output: Output, points: int) -> tuple[Array, Array]:
@@ -162,7 +167,7 @@ def sampled(output: Output, points: int) -> tuple[Array, Array]:
     grid = np.linspace(*output.universe, points)
     if not (np.diff(grid) > 0.0).all():
         raise EngineError(f"output {output.name!r}: {points} points do not fit in {output.universe}")
-    samples = np.array([degrees_of_many(term.shape, grid) for term in output.terms])
+    samples = np.array([term.membership.of_many(grid) for term in output.terms])
     for term, degrees in zip(output.terms, samples, strict=True):
         if not degrees.any():
             raise EngineError(
@@ -190,7 +195,7 @@ def _pieces(output: Output, points: int) -> tuple[_Piece, ...]:
 def _bends(output: Output, grid: Array, samples: Array) -> list[int]:
     """Return the grid's ends and the grid places where a sampled term bends by more than rounding."""
     last = len(grid) - 1
-    knots = [x for term in output.terms for x, _ in term.shape.points]
+    knots = [x for term in output.terms for x, _ in term.straight.points]
     # of a cell with a knot both ends may bend; of a jump at a grid place the cells on both sides
     nearest = {int(i) + side for i in np.searchsorted(grid, knots) for side in (-1, 0, 1)}
     candidates = [*sorted(i for i in nearest if 0 < i < last), last]

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Sequence
 
 from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
+from fuzzy_arbiter.shapes import Shape
 
 Literal = tuple[str, str, bool]  # variable, term, and whether it is affirmed
 Clause = frozenset[Literal]
@@ -36,6 +37,8 @@ def complementary(variable: Variable) -> bool:
     if len(variable.terms) != 2:
         return False
     first, second = (term.shape for term in variable.terms)
+    if not isinstance(first, Shape) or not isinstance(second, Shape):
+        return False
     return not first.jumps and second == first.complement() and first == second.complement()
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from fuzzy_arbiter.definition import Output
-from fuzzy_arbiter.engines.sweep import Outline, alone, area_and_moment, outline
+from fuzzy_arbiter.engines.sweep import Outline, alone, clipped, outline
 
 Polynomial = tuple[Fraction, ...]  # coefficients of t^0, t^1, ..
 
@@ -75,7 +75,7 @@ def pieces(output: Output) -> tuple[tuple[Piece, ...], tuple[Piece, ...]]:
     events = _events(shape)
     for start, end in zip(events, events[1:], strict=False):
         at = [start + (end - start) * Fraction(i, 3) for i in range(4)]
-        areas, moments = zip(*(area_and_moment((1 - h, h), *shape, False) for h in at), strict=True)
+        areas, moments = zip(*(clipped((1 - h, h), *shape) for h in at), strict=True)
         fit = (_fitted(at, areas), _fitted(at, moments))
         if not fits or fit != fits[-1][1:]:
             fits.append((start, *fit))
@@ -129,9 +129,6 @@ def _events(shape: Outline) -> list[Fraction]:
     for i in range(0, len(shape.left), 2):
         (a, c), (b, d) = shape.left[i : i + 2], shape.right[i : i + 2]
         levels |= {Fraction(y) for y in (a, b, c, d)}
-        # where the terms are one minus each other only one of the two breakpoints is seen, unless both cuts are 1/2
-        if (a - c) * (b - d) < 0:
-            levels.add(Fraction(a + (b - a) * (a - c) / (a - c - b + d)))
     return sorted({h for level in levels for h in (level, 1 - level)})
 
 

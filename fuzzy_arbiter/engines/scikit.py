@@ -17,7 +17,7 @@ from skfuzzy.fuzzymath.fuzzy_ops import _interp_universe_fast, interp_membership
 from fuzzy_arbiter.definition import System, Variable, variable_names
 from fuzzy_arbiter.engines.engine import Engine, default_of
 from fuzzy_arbiter.engines.firing import Array
-from fuzzy_arbiter.engines.grid import require_clipping, sampled
+from fuzzy_arbiter.engines.grid import require_plain, sampled
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
 
@@ -43,10 +43,10 @@ class ScikitEngine(Engine):
     name: ClassVar[str] = "skfuzzy"
 
     def __init__(self, system: System) -> None:
-        require_clipping(system, self.name)
+        require_plain(system, self.name, curved_inputs=False)
         for variable in system.inputs:
             for term in variable.terms:
-                if term.shape.jumps:
+                if term.straight.jumps:
                     raise EngineError(
                         f"engine {self.name!r}: input {variable.name!r}: term {term.name!r} jumps, where scikit-fuzzy "
                         "interpolates; expected a continuous shape, or engine 'exact' or 'grid'"
@@ -70,22 +70,17 @@ class ScikitEngine(Engine):
 
     def centroids_of_many(self, inputs: Array) -> Array:
         """Return the raw value of each output for many samples, one by one."""
-        rows = [self._centroids(inputs, row) for row, inputs in enumerate(inputs.tolist())]
+        rows = [self._centroids(row) for row in inputs.tolist()]
         return np.array(rows).reshape(len(rows), len(self.system.outputs))
 
-    def _centroids(self, inputs: Sequence[float], row: int | None = None) -> list[float]:
+    def _centroids(self, inputs: Sequence[float]) -> list[float]:
         # each thread has a simulation, since scikit-fuzzy keeps inputs and results in the system itself
         if not hasattr(self._local, "runner"):
             self._local.runner = _Runner(self.system, self._samples)
         return [
-            default_of(output, dict(zip(variable_names(self.system.inputs), inputs, strict=True)), row)
-            if value is None
-            else value
+            default_of(output) if value is None else value
             for output, value in zip(self.system.outputs, self._local.runner(inputs), strict=True)
         ]
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return ScikitEngine, (self.system,)
 
 
 class _Runner:
@@ -184,7 +179,7 @@ def _antecedent(variable: Variable) -> Any:
     """Return an input, sampled at its ends and at the knots of its terms, between which all are straight lines."""
     antecedent = control.Antecedent(np.array(variable.knots), variable.name)
     for term in variable.terms:
-        antecedent[term.name] = np.array([term.shape(x) for x in variable.knots])
+        antecedent[term.name] = np.array([term.straight(x) for x in variable.knots])
     return antecedent
 
 

@@ -1,8 +1,15 @@
-"""The exact centroid of one output: a sweep over the breakpoints of its joined terms.
+"""The exact centroid of one output: a sweep over the straight pieces of its joined terms.
 
-Between two neighbouring knots of its terms each term is a straight line. Clipped at (or scaled by) their cuts and
-joined by the maximum they make a piecewise-linear envelope, which can break only where a line meets a cut - its own or
-another term's - or another line. Between these places it is integrated as a trapezoid.
+Between two neighbouring knots, or places where two terms' lines meet, the lines l_1, l_2, .. have one order, the
+highest first. Clipped at their cuts c_1, c_2, .. and joined by the maximum they are a sum of single clipped lines: with
+C_t the greatest of the first t cuts,
+
+    max_t min(c_t, l_t) = sum_t (clip(l_t, C_(t-1), C_t) - C_(t-1)),
+
+for what fills the heights from C_(t-1) to C_t is line t, or a lower one; the higher ones are cut below them. Each of
+these bands is integrated by itself.
+
+Scaled by their cuts the lines have no order. They are joined where two of them meet, and integrated as trapezoids.
 
 The functions work on floats and on fractions alike; Numba compiles them as they are.
 """
@@ -28,11 +35,14 @@ class Outline(NamedTuple):
         Knots of the variable.
     left, right : tuple of float, length pieces * terms
         Degree of each term just right of each piece's start, and just left of its end; those of a piece stand together.
+    order : tuple of int, length pieces * terms
+        The terms of each piece, the highest first.
     """
 
     places: tuple[Any, ...]
     left: tuple[Any, ...]
     right: tuple[Any, ...]
+    order: tuple[int, ...]
 
 
 def outline(variable: Variable, number: Callable[[float], Any] = float) -> Outline:
@@ -50,32 +60,53 @@ def outline(variable: Variable, number: Callable[[float], Any] = float) -> Outli
     Outline
         In these numbers.
     """
-    places = tuple(map(number, variable.knots))
-    shapes = [[(number(x), number(y)) for x, y in term.shape.points] for term in variable.terms]
-    left, right = [], []
-    for a, b in zip(places, places[1:], strict=False):
+    knots = tuple(map(number, variable.knots))
+    shapes = [[(number(x), number(y)) for x, y in term.straight.points] for term in variable.terms]
+    places, left, right, order = [knots[0]], [], [], []
+    for a, b in zip(knots, knots[1:], strict=False):
+        starts, ends = [], []
         for points in shapes:
             # the last point before and the first one after, so that at a jump each piece sees its own side
             before = [p for p in points if p[0] <= a] or points[:1]
             after = [p for p in points if p[0] >= b] or points[-1:]
             (x0, y0), (x1, y1) = before[-1], after[0]
             slope = (y1 - y0) / (x1 - x0) if x0 < x1 else y1 - y1
-            left.append(y0 + slope * (a - x0) if x0 < a else y0)
-            right.append(y1 + slope * (b - x1) if b < x1 else y1)
-    return Outline(places, tuple(left), tuple(right))
+            starts.append(y0 + slope * (a - x0) if x0 < a else y0)
+            ends.append(y1 + slope * (b - x1) if b < x1 else y1)
+        # parts in which no two lines meet
+        meet = (_meeting(starts, ends, t, u) for t in range(len(starts)) for u in range(t))
+        shares = sorted({starts[0] * 0, starts[0] * 0 + 1, *(share for share in meet if share is not None)})
+        for s0, s1 in zip(shares, shares[1:], strict=False):
+            at, to = _between(starts, ends, s0), _between(starts, ends, s1)
+            places.append(b if s1 == 1 else a + s1 * (b - a))
+            left += at
+            right += to
+            order += sorted(range(len(at)), key=lambda t: -(at[t] + to[t]))
+    return Outline(tuple(places), tuple(left), tuple(right), tuple(order))
 
 
-def area_and_moment(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, scaled: bool) -> tuple[Any, Any]:
-    """Return the area under the envelope of clipped (or scaled) terms, and its moment.
+def _meeting(starts: Numbers, ends: Numbers, t: int, u: int) -> Any:
+    """Return where two lines meet within a piece, in shares of it; None if they do not."""
+    before, after = starts[t] - starts[u], ends[t] - ends[u]
+    return before / (before - after) if before * after < 0 else None
+
+
+def _between(starts: Numbers, ends: Numbers, share: Any) -> list[Any]:
+    """Return the heights of lines within a piece."""
+    if share == 0:
+        return list(starts)
+    return [b if share == 1 else a + share * (b - a) for a, b in zip(starts, ends, strict=True)]
+
+
+def clipped(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, order: Sequence[int]) -> tuple[Any, Any]:
+    """Return the area under the envelope of clipped terms, and its moment.
 
     Parameters
     ----------
     cuts : sequence of float, length terms
         Degree at which each term is clipped.
-    places, left, right
+    places, left, right, order
         As of `Outline`.
-    scaled : bool
-        Whether a cut scales its term in the place of clipping it.
 
     Returns
     -------
@@ -92,26 +123,70 @@ def area_and_moment(cuts: Numbers, places: Numbers, left: Numbers, right: Number
         first = piece * terms
         width = places[piece + 1] - places[piece]
         start = places[piece] - places[0]
+        below = zero  # the greatest cut of the lines above
+        for i in range(terms):
+            t = order[first + i]
+            if cuts[t] > below:
+                a, b = left[first + t], right[first + t]
+                low, high = min(a, b), max(a, b)  # as if it rose; a fall is seen from the other end
+                y0 = max(min(cuts[t], low), below)
+                y1 = max(min(cuts[t], high), below)
+                h0, h1 = y0 - below, y1 - below
+                # where the line has these heights, in shares of the piece
+                s0 = min(max((y0 - low) / (high - low), zero), one) if low < high else zero
+                s1 = min(max((y1 - low) / (high - low), zero), one) if low < high else zero
+                band = (s1 - s0) * (h0 + h1) / 2 + (one - s1) * h1
+                lever = (s1 - s0) * (s0 * (2 * h0 + h1) + s1 * (h0 + 2 * h1)) / 6 + (one - s1) * (one + s1) / 2 * h1
+                if a > b:
+                    lever = band - lever
+                area += width * band
+                moment += width * (start * band + width * lever)
+                below = cuts[t]
+    return area, moment
+
+
+def scaled(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers) -> tuple[Any, Any]:
+    """Return the area under the envelope of scaled terms, and its moment.
+
+    Parameters
+    ----------
+    cuts : sequence of float, length terms
+        Degree by which each term is scaled.
+    places, left, right
+        As of `Outline`.
+
+    Returns
+    -------
+    area, moment : float
+        As of `clipped`.
+    """
+    zero = cuts[0] * 0
+    one = zero + 1
+    terms = len(cuts)
+    area = moment = zero
+    for piece in range(len(places) - 1):
+        first = piece * terms
+        width = places[piece + 1] - places[piece]
+        start = places[piece] - places[0]
         # where the envelope may break, in shares of the piece
         breaks = [zero, one]
         for t in range(terms):
-            a, b = left[first + t], right[first + t]
-            if scaled:
-                a, b = a * cuts[t], b * cuts[t]
-            for u in range(terms):
-                if not scaled and (a < cuts[u]) != (b < cuts[u]):
-                    breaks.append((a - cuts[u]) / ((a - cuts[u]) - (b - cuts[u])))
-                if u < t:
-                    c, d = left[first + u], right[first + u]
-                    if scaled:
-                        c, d = c * cuts[u], d * cuts[u]
-                    if (a < c) != (b < d):  # so that the two differences have not one sign, nor are both 0
-                        breaks.append((a - c) / ((a - c) - (b - d)))
+            for u in range(t):
+                a, b = left[first + t] * cuts[t], right[first + t] * cuts[t]
+                c, d = left[first + u] * cuts[u], right[first + u] * cuts[u]
+                if (a < c) != (b < d):  # so that the two differences have not one sign, nor are both 0
+                    breaks.append((a - c) / ((a - c) - (b - d)))
         breaks.sort()
         x0 = zero
         for x1 in breaks:
             if x0 < x1:
-                y0, y1 = envelope(cuts, left, right, first, x0, x1, scaled)
+                # the middle tells which line is the greatest; at an end it would be lost to rounding
+                height = y0 = y1 = zero
+                for t in range(terms):
+                    a, rise, cut = left[first + t], right[first + t] - left[first + t], cuts[t]
+                    degree = (a + rise * ((x0 + x1) / 2)) * cut
+                    if degree > height:
+                        height, y0, y1 = degree, (a + rise * x0) * cut, (a + rise * x1) * cut
                 w = (x1 - x0) * width
                 area += w * (y0 + y1) / 2
                 moment += w * ((start + x0 * width) * (2 * y0 + y1) + (start + x1 * width) * (y0 + 2 * y1)) / 6
@@ -119,54 +194,17 @@ def area_and_moment(cuts: Numbers, places: Numbers, left: Numbers, right: Number
     return area, moment
 
 
-def envelope(
-    cuts: Numbers, left: Numbers, right: Numbers, first: int, x0: Any, x1: Any, scaled: bool
-) -> tuple[Any, Any]:
-    """Return the heights of the envelope at both ends of a part of a piece, in which it is one straight line.
-
-    Which line that is the middle tells. At an end it would be lost to rounding: where a term falls to its low cut its
-    degree is known to no more than the rounding of 1, and may seem far below the cut.
-
-    Parameters
-    ----------
-    cuts, left, right, scaled
-        As of `area_and_moment`.
-    first : int
-        Where the piece's degrees begin.
-    x0, x1 : float
-        Ends of the part, in shares of the piece.
-
-    Returns
-    -------
-    y0, y1 : float
-        Clipped (or scaled) degrees of the term that is the greatest between them.
-    """
-    middle = (x0 + x1) / 2
-    height = y0 = y1 = cuts[0] * 0
-    for t in range(len(cuts)):
-        a, cut = left[first + t], cuts[t]
-        rise = right[first + t] - a
-        degree = a + rise * middle
-        if scaled:
-            if degree * cut > height:
-                height, y0, y1 = degree * cut, (a + rise * x0) * cut, (a + rise * x1) * cut
-        elif degree >= cut:
-            if cut > height:
-                height, y0, y1 = cut, cut, cut
-        elif degree > height:
-            height, y0, y1 = degree, a + rise * x0, a + rise * x1
-    return y0, y1
-
-
-def centroid(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, scaled: bool) -> Any:
+def centroid(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, order: Sequence[int], scales: bool) -> Any:
     """Return the centroid of clipped (or scaled) terms, joined by their maximum.
 
     Parameters
     ----------
     cuts : sequence of float, length terms
         Degree at which each term is clipped; not all are 0.
-    places, left, right, scaled
-        As of `area_and_moment`.
+    places, left, right, order
+        As of `Outline`.
+    scales : bool
+        Whether a cut scales its term in the place of clipping it.
 
     Returns
     -------
@@ -178,9 +216,14 @@ def centroid(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, scal
         largest = max(largest, cut)
     if largest < TINY:
         larger = [cut * LARGER for cut in cuts]
-        area, moment = area_and_moment(larger, places, left, right, scaled)
+        if scales:
+            area, moment = scaled(larger, places, left, right)
+        else:
+            area, moment = clipped(larger, places, left, right, order)
+    elif scales:
+        area, moment = scaled(cuts, places, left, right)
     else:
-        area, moment = area_and_moment(cuts, places, left, right, scaled)
+        area, moment = clipped(cuts, places, left, right, order)
     return places[0] + moment / area
 
 

@@ -1,6 +1,6 @@
 """Export to code that needs nothing of this package.
 
-Imports: engines.
+Imports: terms, engines.
 """
 
 from fuzzy_arbiter.export.c import to_c

@@ -7,13 +7,8 @@ from collections.abc import Iterator, Sequence
 from importlib.resources import files
 
 from fuzzy_arbiter.definition import System
+from fuzzy_arbiter.export.functions import in_c
 from fuzzy_arbiter.export.program import Assign, Choose, Program, Return, Statement, Sweep, program
-
-_HEAD = """
-static inline double least(double a, double b) { return a < b ? a : b; }
-static inline double greatest(double a, double b) { return a > b ? a : b; }
-static inline double either(double a, double b) { return a + b - a * b; }
-"""
 
 
 def to_c(system: System) -> str:
@@ -31,7 +26,8 @@ def to_c(system: System) -> str:
         0, or -i if the i-th input is not in its universe, or k if no rule fires for the k-th output; NAME is the
         system's, with an underscore for each sign that C has not in names. Files of different names go into one
         program. It gives what the arbiter's own engine does, to the last bit if the compiler does not contract
-        operations (``-ffp-contract=off``) and keeps to the rules of NaN (no ``-ffast-math``).
+        operations (``-ffp-contract=off``) and keeps to the rules of NaN (no ``-ffast-math``); functions of ``math.h``
+        to their rounding.
 
     Examples
     --------
@@ -57,16 +53,23 @@ def _file(code: Program) -> Iterator[str]:
     yield f"{signature};"
     text = "\n".join(_block(code.statements, system, "    "))
     yield ""
-    yield from (line for line in _HEAD.strip().splitlines() if f"{line.split('(')[0].split()[-1]}(" in text)
-    if code.outlines:
+    yield from (["#include <math.h>", ""] if code.mathematical else [])
+    yield from filter(None, map(in_c, code.functions))
+    if any(code.outlines):
         for k, shape in enumerate(code.outlines, 1):
+            if shape is None:
+                continue
             name = _safe(system.outputs[k - 1].name)
             yield f"\n/* knots of the terms of {name}, and degrees right and left of them */"
-            for table, side in zip(("PLACES", "LEFT", "RIGHT"), shape, strict=True):
-                yield f"static const double {table}_{k}[] = {{{', '.join(map(repr, side))}}};"
+            for table, side in zip(("PLACES", "LEFT", "RIGHT", "ORDER"), shape, strict=True):
+                kind = "int" if table == "ORDER" else "double"
+                yield f"static const {kind} {table}_{k}[] = {{{', '.join(map(repr, side))}}};"
         terms = max(len(output.terms) for output in system.outputs)
-        yield f"\n#define TERMS {terms} /* the most of any output */"
-        yield (files("fuzzy_arbiter.export") / "sweep.c").read_text().rstrip()
+        if "centroid_of_scaled(" in text:
+            yield f"\n#define TERMS {terms} /* the most of any output */"
+        for name in ("clip", "scale"):
+            if f"centroid_of_{name}" in text:
+                yield (files("fuzzy_arbiter.export") / f"{name}.c").read_text().rstrip()
     yield "\n/* Fills the outputs; returns 0, or -i if the i-th input is bad, or k if the k-th output is undefined. */"
     yield signature
     yield "{"
@@ -92,11 +95,12 @@ def _block(
                 kind = "" if name in known else "double "
                 known.add(name)
                 yield f"{indent}{kind}{name} = {expression};" + (f" /* {_safe(words)} */" if words else "")
-            case Sweep(name, k, cuts):
+            case Sweep(name, k, cuts, scales):
                 pieces = f"sizeof PLACES_{k} / sizeof *PLACES_{k} - 1"
-                tables = f"{pieces}, PLACES_{k}, LEFT_{k}, RIGHT_{k}, {int(system.implication == 'prod')}"
+                tables = f"{pieces}, PLACES_{k}, LEFT_{k}, RIGHT_{k}, ORDER_{k}"
                 yield f"{indent}const double cuts_{k}[] = {{{', '.join(cuts)}}};"
-                yield f"{indent}{name} = centroid(cuts_{k}, {len(cuts)}, {tables});"
+                function = f"centroid_of_{'scaled' if scales else 'clipped'}"
+                yield f"{indent}{name} = {function}(cuts_{k}, {len(cuts)}, {tables});"
             case Return(status):
                 yield f"{indent}return {status};"
             case Choose(branches):

@@ -5,25 +5,32 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial, reduce
 from itertools import accumulate
 
 from fuzzy_arbiter.checks import shown
-from fuzzy_arbiter.definition import System
+from fuzzy_arbiter.definition import Output, System, variable_names
 from fuzzy_arbiter.engines import choose
 from fuzzy_arbiter.engines.closed import ClosedEngine
 from fuzzy_arbiter.engines.engine import Engine
+from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.engines.firing import Logic
 from fuzzy_arbiter.engines.pieces import Piece
 from fuzzy_arbiter.engines.sweep import Outline, outline
-from fuzzy_arbiter.errors import DefinitionError
+from fuzzy_arbiter.errors import DefinitionError, UnsupportedError
+from fuzzy_arbiter.export.functions import called
 from fuzzy_arbiter.hierarchy import DEGREE
 from fuzzy_arbiter.propositions import Is
-from fuzzy_arbiter.shapes import Shape
+from fuzzy_arbiter.shapes import Membership, Shape
+from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.expressions import code
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
+from fuzzy_arbiter.terms.values import Formula, Value
 
-_JOINS = {"min": "least({}, {})", "max": "greatest({}, {})", "prod": "({} * {})", "probor": "either({}, {})"}
+_JOINS = {name: norm.code for name, norm in {**T_NORMS, **AGGREGATIONS}.items()}
 _DEEPEST = 20  # parentheses within each other; parsers give up at some hundred
 _LONGEST = 16  # branches after each other, likewise
 
@@ -51,6 +58,7 @@ class Sweep:
     name: str
     k: int
     cuts: tuple[str, ...]
+    scales: bool  # whether a cut scales its term in the place of clipping it
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,13 +81,22 @@ class Program:
         What is said.
     statements : tuple of Statement
         From the inputs ``x1``, ``x2``, .. to the outputs ``y1``, ``y2``, ..
-    outlines : tuple of Outline
-        Of the outputs, if they are swept; else none.
+    outlines : tuple of Outline or None
+        Of the outputs, if they are swept; None for one of values; empty where there is a closed form.
+    functions : tuple of str
+        Names of the functions that the statements call.
     """
 
     system: System
     statements: tuple[Statement, ...]
-    outlines: tuple[Outline, ...]
+    outlines: tuple[Outline | None, ...]
+    functions: tuple[str, ...]
+
+    @property
+    def mathematical(self) -> bool:
+        """Whether it needs more than arithmetic."""
+        plain = {"least", "greatest", "either"}
+        return not set(self.functions) <= plain or any(o.weighted for o in self.system.outputs)
 
 
 def program(system: System) -> Program:
@@ -99,14 +116,54 @@ def program(system: System) -> Program:
     ------
     DefinitionError
         If it is no system.
+    UnsupportedError
+        If an output needs quadrature, or the value before, or a condition asks for an output.
     """
     if not isinstance(system, System):
         raise DefinitionError(f"system is {shown(system)}, expected a System, such as arbiter.system")
     engine, _ = choose(system, "auto")
+    _require_sayable(system, engine)
     closed = isinstance(engine, ClosedEngine)
     statements = (*_inputs(system), *(_closed(engine) if isinstance(engine, ClosedEngine) else _swept(engine)))
-    outlines = () if closed else tuple(map(outline, system.outputs))
-    return Program(system, (*statements, *_shared(system)), outlines)
+    outlines = () if closed else tuple(None if o.weighted else outline(o) for o in system.outputs)
+    whole = (*statements, *_shared(system))
+    return Program(system, whole, outlines, tuple(called(_texts(whole))))
+
+
+def _texts(statements: Sequence[Statement]) -> Iterator[str]:
+    """Yield all expressions."""
+    for statement in statements:
+        if isinstance(statement, Assign):
+            yield statement.expression
+        elif isinstance(statement, Choose):
+            for condition, inner in statement.branches:
+                yield condition
+                yield from _texts(inner)
+
+
+def _require_sayable(system: System, engine: Engine) -> None:
+    """Refuse what the exported code does not do."""
+    for output, slots in zip(system.outputs, engine.firing.slots, strict=True):
+        what = f"export: output {output.name!r}"
+        if output.lock_previous:
+            raise UnsupportedError(f"{what} keeps its previous value, which a function of one sample has not")
+        if isinstance(engine, ExactEngine) and engine.quadrature(output.name):
+            raise UnsupportedError(
+                f"{what} is integrated by quadrature; expected the centroid of piecewise-linear terms under min or "
+                "prod, joined by max, or values"
+            )
+        for term in output.terms if output.weighted else ():
+            if not isinstance(term.shape, Value):
+                raise UnsupportedError(f"{what}: term {term.name!r} is {term.kind}, expected a value")
+            names = term.shape.expression(variable_names(system.inputs), variable_names(system.outputs)).names
+            if names & set(variable_names(system.outputs)):
+                raise UnsupportedError(f"{what}: term {term.name!r} asks for another output, expected inputs alone")
+        if len({slot.implication for slot in slots}) > 1:
+            raise UnsupportedError(f"{what} has rules of several implications, expected one")
+    outputs = set(variable_names(system.outputs))
+    for i, rule in enumerate(system.rules, 1):
+        if any(s.variable in outputs for s in rule.condition.terms()):
+            raise UnsupportedError(f"export: R{i} asks for an output, expected conditions on inputs")
 
 
 def _inputs(system: System) -> Iterator[Statement]:
@@ -123,7 +180,7 @@ class _Degrees:
     """Degrees of the inputs' terms, each worked out once."""
 
     def __init__(self, system: System) -> None:
-        self._terms = {(v.name, t.name): (i, v, t.shape) for i, v in enumerate(system.inputs, 1) for t in v.terms}
+        self._terms = {(v.name, t.name): (i, v, t.membership) for i, v in enumerate(system.inputs, 1) for t in v.terms}
         self._names: dict[tuple[str, str], str] = {}
         self.statements: list[Statement] = []
 
@@ -186,8 +243,16 @@ def _first(name: str, values: Sequence[tuple[str, str]]) -> Choose:
     return Choose(((condition, (_first(name, below),)), ("", (_first(name, above),))))
 
 
-def _degree(x: str, shape: Shape, universe: tuple[float, float]) -> list[tuple[str, str]]:
+def _degree(x: str, shape: Membership, universe: tuple[float, float]) -> list[tuple[str, str]]:
     """Say a membership function in its universe, as the shape itself evaluates it."""
+    if isinstance(shape, Curve):
+        return [
+            ("" if end == math.inf else f"{x} < {end!r}", f"least(greatest({code(tree, {'x': x})}, 0.0), 1.0)")
+            for end, tree in zip(shape.ends, shape.trees, strict=True)
+        ]
+    if isinstance(shape, Formula):
+        return [("", f"least(greatest({code(shape.expression(['x']).tree, {'x': x})}, 0.0), 1.0)")]
+    assert isinstance(shape, Shape)
     if shape == DEGREE and universe == (0.0, 1.0):
         return [("", x)]
     knots: list[tuple[float, float, float]] = []  # place, degree left and right of it
@@ -269,13 +334,16 @@ def _swept(engine: Engine) -> Iterator[Statement]:
     """Work out the strength of each rule, the cut of each output's term, and the centroids."""
     system = engine.system
     degrees, logic = _Degrees(system), _Expressions()
-    operators: Logic[str] = Logic(
-        partial(logic.said, _JOINS[system.conjunction]),
-        partial(logic.said, _JOINS[system.disjunction]),
-        partial(logic.said, "(1.0 - {})"),
-    )
     rules: list[Statement] = []
     for i, rule in enumerate(system.rules, 1):
+        norms = rule.operators or system
+        operators: Logic[str] = Logic(
+            partial(logic.said, _JOINS[norms.conjunction]),
+            partial(logic.said, _JOINS[norms.disjunction]),
+            partial(logic.said, "(1.0 - {})"),
+            lambda word, degree: logic.said(f"{word}({{}})", degree),
+            lambda: "1.0",
+        )
         degree = operators.degree(rule.condition, degrees.of)
         weighted = degree if rule.weight == 1.0 else f"{degree} * {rule.weight!r}"
         rules += logic.assign(f"r{i}", weighted, str(rule))
@@ -286,15 +354,34 @@ def _swept(engine: Engine) -> Iterator[Statement]:
         for j, term in enumerate(output.term_names, 1):
             fires = [f"r{i}" for i, rule in enumerate(system.rules, 1) if output[term] in rule.conclusions]
             cuts.append(f"c{k}_{j}")
-            yield from logic.assign(cuts[-1], logic.join("max", fires or ["0.0"]), str(output[term]))
+            yield from logic.assign(cuts[-1], logic.join(output.aggregation, fires or ["0.0"]), str(output[term]))
         default = Return(k) if output.default is None else Assign(f"y{k}", repr(output.default))
         yield Assign(f"y{k}", "0.0", output.name)
         any_fires = " or ".join(f"{cut} > 0.0" for cut in cuts)
-        yield Choose(((any_fires, (Sweep(f"y{k}", k, tuple(cuts)),)), ("", (default,))))
+        scales = any(slot.implication == "prod" for slot in engine.firing.slots[k - 1])
+        fired = _valued(output, k, cuts, system) if output.weighted else (Sweep(f"y{k}", k, tuple(cuts), scales),)
+        yield Choose(((any_fires, fired), ("", (default,))))
+        if output.weighted:  # which may be no number
+            yield Choose(((f"not (fabs(y{k}) < INFINITY)", (default,)),))
+        if output.lock_range:
+            low, high = output.universe
+            yield Assign(f"y{k}", f"least(greatest(y{k}, {low!r}), {high!r})")
         if engine.scale:
             low, high = engine.scale[k - 1]
             scaled = f"(y{k} - {low!r}) / {high - low!r}"
             yield Assign(f"y{k}", f"least(greatest({scaled}, 0.0), 1.0)")
+
+
+def _valued(output: Output, k: int, cuts: Sequence[str], system: System) -> tuple[Statement, ...]:
+    """Work out the mean of an output's values, weighted by their strengths, or the sum."""
+    names = {v.name: f"x{i}" for i, v in enumerate(system.inputs, 1)}
+    statements: list[Statement] = [Assign(f"w{k}", "0.0")]
+    for cut, term in zip(cuts, output.terms, strict=True):
+        assert isinstance(term.shape, Value)
+        value = code(term.shape.expression(tuple(names)).tree, names)
+        added = (Assign(f"y{k}", f"y{k} + {cut} * {value}"), Assign(f"w{k}", f"w{k} + {cut}"))
+        statements.append(Choose(((f"{cut} > 0.0", added),)))
+    return (*statements, *((Assign(f"y{k}", f"y{k} / w{k}"),) if output.defuzzifier == "average" else ()))
 
 
 def _shared(system: System) -> Iterator[Statement]:

@@ -7,26 +7,15 @@ from collections.abc import Iterator, Sequence
 
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.engines import sweep
+from fuzzy_arbiter.export.functions import in_python
 from fuzzy_arbiter.export.program import Assign, Choose, Program, Return, Statement, Sweep, program
 
-_HEAD = '''
-from __future__ import annotations
-
-
-def least(a, b):
-    """Return the lesser of two degrees."""
-    return a if a < b else b
-
-
-def greatest(a, b):
-    """Return the greater of two degrees."""
-    return a if a > b else b
-
-
-def either(a, b):
-    """Return the probabilistic sum of two degrees."""
-    return a + b - a * b
-'''
+_TABLES = ("PLACES", "LEFT", "RIGHT", "ORDER")
+_MATH = """
+import math
+from math import inf as INFINITY
+from math import nan as NAN
+"""
 _TAIL = '''
 
 def weights(inputs):
@@ -73,13 +62,19 @@ def _module(code: Program) -> Iterator[str]:
     yield "#"  # a name in the first two lines could be taken for a declaration of the file's encoding
     yield f"#     {system.name}"
     yield from (f"#     R{i}: {rule}" for i, rule in enumerate(system.rules, 1))
-    yield _HEAD.rstrip()
-    if code.outlines:
+    yield "\nfrom __future__ import annotations"
+    if code.mathematical:
+        yield _MATH.rstrip()
+    for name in code.functions:
+        yield f"\n\n{in_python(name)}"
+    if any(code.outlines):
         yield f"\n\nTINY = {sweep.TINY!r}\nLARGER = {sweep.LARGER!r}"
         for k, shape in enumerate(code.outlines, 1):
+            if shape is None:
+                continue
             yield f"\n# knots of the terms of {system.outputs[k - 1].name}, and degrees right and left of them"
-            yield from (f"{name}_{k} = {side!r}" for name, side in zip(("PLACES", "LEFT", "RIGHT"), shape, strict=True))
-        for function in (sweep.area_and_moment, sweep.envelope, sweep.centroid):
+            yield from (f"{name}_{k} = {side!r}" for name, side in zip(_TABLES, shape, strict=True))
+        for function in (sweep.clipped, sweep.scaled, sweep.centroid):
             yield f"\n\n{inspect.getsource(function).rstrip()}"
     yield "\n\ndef evaluate(inputs, outputs):"
     yield '    """Fill the outputs; return 0, or -i if the i-th input is bad, or k if the k-th output is undefined."""'
@@ -95,8 +90,8 @@ def _block(statements: Sequence[Statement], system: System, indent: str) -> Iter
         match statement:
             case Assign(name, expression, words):
                 yield f"{indent}{name} = {expression}" + (f"  # {words}" if words else "")
-            case Sweep(name, k, cuts):
-                tables = f"PLACES_{k}, LEFT_{k}, RIGHT_{k}, {system.implication == 'prod'}"
+            case Sweep(name, k, cuts, scales):
+                tables = f"{', '.join(f'{table}_{k}' for table in _TABLES)}, {scales}"
                 yield f"{indent}{name} = centroid(({', '.join(cuts)},), {tables})"
             case Return(status):
                 yield f"{indent}return {status}"

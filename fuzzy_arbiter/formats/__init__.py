@@ -1,6 +1,6 @@
 """Definitions in files: JSON and TOML of our own, FCL of IEC 61131-7, FIS of MATLAB and Octave, FLL of fuzzylite.
 
-Imports: engines.
+Imports: terms, engines.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def writes(system: System, format: str) -> str:
     >>> system = Arbiter().system
     >>> from fuzzy_arbiter.formats import writes
     >>> print(writes(system, "fll").splitlines()[0])
-    # fuzzy_arbiter: normalization = range
+    # fuzzy_arbiter: normalization = range, weights_of = "obstacle" "shape" "depth"
     """
     _require_format(format, f"format is {format!r}")
     if not isinstance(system, System):

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import re
 
-from fuzzy_arbiter.definition import System, Variable, variable_names
+from fuzzy_arbiter.definition import Output, System, Variable, variable_names
+from fuzzy_arbiter.engines.plain import bent
 from fuzzy_arbiter.errors import UnsupportedError
-from fuzzy_arbiter.formats.fcl_reader import system_of, universe_of
-from fuzzy_arbiter.formats.fcl_words import CONJUNCTIONS, DISJUNCTIONS, PAIRS, RESERVED, cut
-from fuzzy_arbiter.formats.notation import require_word, require_words, say_number
+from fuzzy_arbiter.formats.fcl_reader import system_of
+from fuzzy_arbiter.formats.fcl_terms import say_shape, universe_of
+from fuzzy_arbiter.formats.fcl_words import METHODS, RESERVED, cut
+from fuzzy_arbiter.formats.notation import blocks, cannot_say, require_word, require_words, say_number
 from fuzzy_arbiter.formats.settings import read_settings, say_settings
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.shapes import Shape
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
+from fuzzy_arbiter.terms.values import Formula, Linear
 
 _SETTINGS = ("normalization", "outside", "points")
 
@@ -32,52 +36,66 @@ def write(system: System) -> str:
     Raises
     ------
     UnsupportedError
-        If a name is no word of the language, or *and* and *or* are no pair of the standard.
+        If a name is no word of the language, or it has none for a term, a hedge or a defuzzifier.
     """
     require_word(system.name, "fcl", RESERVED)
     require_words(system, "fcl", RESERVED)
     _require_one_case(system)
-    if PAIRS[system.conjunction] != system.disjunction:
-        raise UnsupportedError(
-            f"fcl cannot say the conjunction {system.conjunction!r} with the disjunction {system.disjunction!r}: "
-            "expected 'min' with 'max', or 'prod' with 'probor'"
-        )
     lines = [f"(* {text} *)" for text in say_settings(system, _SETTINGS)]
     lines += [f"FUNCTION_BLOCK {system.name}", "", "VAR_INPUT"]
+    names = variable_names(system.inputs)
     for v in system.inputs:
         # jFuzzyLogic's place for it; the standard has none for inputs
-        known = universe_of([x for t in v.terms for x, _ in t.shape.points]) == v.universe
+        points = [x for t in v.terms if isinstance(t.shape, Shape) for x, _ in t.shape.points]
+        known = universe_of(points) == v.universe and all(isinstance(t.shape, Shape) for t in v.terms)
         lines.append(f"  {v.name} : REAL;" + ("" if known else f" {_say_range(v)}"))
     lines += ["END_VAR", "", "VAR_OUTPUT", *(f"  {v.name} : REAL;" for v in system.outputs), "END_VAR", ""]
     for v in system.inputs:
-        lines += [f"FUZZIFY {v.name}", *_say_terms(v), "END_FUZZIFY", ""]
+        lines += [f"FUZZIFY {v.name}", *_say_terms(v, names), "END_FUZZIFY", ""]
     for output in system.outputs:
-        default = "NC" if output.default is None else say_number(output.default)
-        lines += [f"DEFUZZIFY {output.name}", *_say_terms(output), "  METHOD : COG;", f"  DEFAULT := {default};"]
-        lines += [f"  {_say_range(output)}", "END_DEFUZZIFY", ""]
-    lines += ["RULEBLOCK rules", f"  AND : {_said(CONJUNCTIONS, system.conjunction)};"]
-    lines += [f"  OR : {_said(DISJUNCTIONS, system.disjunction)};"]
-    lines += [f"  ACT : {_said(CONJUNCTIONS, system.implication)};", "  ACCU : MAX;"]
-    lines += [f"  RULE {i + 1} : {_say_rule(rule)};" for i, rule in enumerate(system.rules)]
-    return "\n".join([*lines, "END_RULEBLOCK", "", "END_FUNCTION_BLOCK", ""])
-
-
-def _said(words: dict[str, str], value: str) -> str:
-    return next(word for word, said in words.items() if said == value)
+        lines += [
+            f"DEFUZZIFY {output.name}",
+            *_say_terms(output, names),
+            *_say_output(output, system),
+            "END_DEFUZZIFY",
+            "",
+        ]
+    accumulations = {AGGREGATIONS[output.aggregation].fcl for output in system.outputs}
+    for k, (operators, rules) in enumerate(blocks(system)):
+        lines += [f"RULEBLOCK rules{k + 1 if k else ''}", f"  AND : {T_NORMS[operators.conjunction].fcl};"]
+        lines += [f"  OR : {S_NORMS[operators.disjunction].fcl};", f"  ACT : {T_NORMS[operators.implication].fcl};"]
+        lines += [f"  ACCU : {word};" for word in accumulations if len(accumulations) == 1]
+        lines += [f"  RULE {i + 1} : {_say_rule(i, rule)};" for i, rule in rules]
+        lines += ["END_RULEBLOCK", ""]
+    return "\n".join([*lines, "END_FUNCTION_BLOCK", ""])
 
 
 def _say_range(v: Variable) -> str:
     return f"RANGE := ({say_number(v.universe[0])} .. {say_number(v.universe[1])});"
 
 
-def _say_terms(v: Variable) -> list[str]:
-    def points(shape: Shape) -> str:
-        return " ".join(f"({say_number(x)}, {say_number(degree)})" for x, degree in shape.points)
-
-    return [f"  TERM {term.name} := {points(term.shape)};" for term in v.terms]
+def _say_terms(v: Variable, inputs: tuple[str, ...]) -> list[str]:
+    return [f"  TERM {term.name} := {say_shape(term.shape, term.name, inputs)};" for term in v.terms]
 
 
-def _say_rule(rule: Rule) -> str:
+def _say_output(output: Output, system: System) -> list[str]:
+    method = next(word for word, name in METHODS.items() if name == output.defuzzifier)
+    if method == "COGSS":
+        raise UnsupportedError(f"fcl cannot say the defuzzifier 'sum' of output {output.name!r}: expected 'average'")
+    if any(isinstance(term.shape, Formula | Linear) for term in output.terms):
+        method = "COGF" if output.weighted else method
+    lines = [f"  METHOD : {method};"]
+    # an aggregation that is not that of all outputs is said here, as fuzzylite does
+    if len({other.aggregation for other in system.outputs}) > 1:
+        lines.append(f"  ACCU : {AGGREGATIONS[output.aggregation].fcl};")
+    lines.append(f"  DEFAULT := {'NC' if output.default is None else say_number(output.default)};")
+    locks = [word for word, on in (("PREVIOUS", output.lock_previous), ("RANGE", output.lock_range)) if on]
+    return [*lines, *([f"  LOCK : {' | '.join(locks)};"] if locks else []), f"  {_say_range(output)}"]
+
+
+def _say_rule(i: int, rule: Rule) -> str:
+    if bent(rule.condition):
+        raise cannot_say("fcl", i, rule, "no hedges")
     text = str(Rule(rule.condition, rule.conclusions[:1]))
     text = re.sub(r"\b(if|then|and|or|not|is)\b", lambda m: m[0].upper(), text)  # no name is one of these words
     text += "".join(f", {c.variable} IS {c.term}" for c in rule.conclusions[1:])
@@ -98,7 +116,8 @@ def _require_one_case(system: System) -> None:
 def read(text: str) -> System:
     """Return the system that a function block defines.
 
-    A variable without RANGE has the universe of its points. NC becomes a missing default.
+    A variable without RANGE has the universe of its points. NC becomes a missing default. What is not said is as
+    jFuzzyLogic takes it: ACT is MIN, ACCU is MAX, METHOD is COG; where fuzzylite wrote the text, values are added.
 
     Parameters
     ----------
@@ -108,7 +127,7 @@ def read(text: str) -> System:
     Returns
     -------
     System
-        Mamdani, with the centroid.
+        Of any kind.
 
     Raises
     ------
@@ -118,4 +137,5 @@ def read(text: str) -> System:
         If what it defines cannot be.
     """
     tokens, comments = cut(text)
-    return system_of(tokens, read_settings(comments, _SETTINGS))
+    fuzzylite = any("generated with fuzzylite" in text for _, text in comments)
+    return system_of(tokens, fuzzylite, read_settings(comments, _SETTINGS))

@@ -3,38 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any, NoReturn
+from dataclasses import dataclass, field, replace
+from typing import Any
 
-from fuzzy_arbiter.definition import Output, System, Term, Variable
-from fuzzy_arbiter.formats.fcl_words import CONJUNCTIONS, DISJUNCTIONS, PAIRS, RESERVED, Token
-from fuzzy_arbiter.formats.notation import assembled, located, read_number, refuse
-from fuzzy_arbiter.rule import Rule
-from fuzzy_arbiter.rule_text import parse_rule
-from fuzzy_arbiter.shapes import Point, Shape, trapezoid, triangle
+from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable
+from fuzzy_arbiter.formats.fcl_cursor import Cursor
+from fuzzy_arbiter.formats.fcl_terms import universe_of
+from fuzzy_arbiter.formats.fcl_words import CONJUNCTIONS, DISJUNCTIONS, JOINS, METHODS, PAIRS, Token
+from fuzzy_arbiter.formats.notation import assembled, located, refuse
+from fuzzy_arbiter.propositions import quoted
+from fuzzy_arbiter.rule import Operators, Rule
+from fuzzy_arbiter.rule_text import parse_rules
+from fuzzy_arbiter.terms.term import Term
+from fuzzy_arbiter.terms.values import Formula, Value
+
+_SECTIONS = ("VAR_INPUT", "VAR_OUTPUT", "FUZZIFY", "DEFUZZIFY", "RULEBLOCK", "END_FUNCTION_BLOCK")
+_RULE_WORDS = frozenset(("if", "then", "and", "or", "not", "is", "with"))
 
 
-def system_of(tokens: list[Token], settings: dict[str, Any]) -> System:
+def system_of(tokens: list[Token], fuzzylite: bool, settings: dict[str, Any]) -> System:
     """Return the system of one function block.
 
     Parameters
     ----------
     tokens : list of Token
         Of all of the text.
+    fuzzylite : bool
+        Whether a comment says that fuzzylite wrote it.
     settings : dict
         Further attributes of `System`, of the comment.
 
     Returns
     -------
     System
-        Mamdani, with the centroid.
+        What is not said in it is as jFuzzyLogic takes it, or fuzzylite where the text is as that writes it.
 
     Raises
     ------
     FormatError, DefinitionError
         As of `fuzzy_arbiter.formats.reads`.
     """
-    return _Reader(tokens).system(settings)
+    return _Reader(tokens, fuzzylite=fuzzylite).system(settings)
 
 
 @dataclass
@@ -46,55 +55,39 @@ class _Draft:
     default: float | None = None
     terms: list[Term] | None = None
     places: list[float] = field(default_factory=list)
-    accumulates: bool = False
+    method: str | None = None
+    accumulation: str | None = None
+    locks: set[str] = field(default_factory=set)
 
 
 @dataclass
-class _Reader:
+class _Block:
+    """A rule block, as it is said."""
+
+    line: int
+    said: dict[str, str] = field(default_factory=dict)
+    rules: list[tuple[int, Rule]] = field(default_factory=list)
+
+    def operators(self) -> Operators:
+        """Return its operators; of AND and OR the one makes the other, and ACT is MIN, where nothing is said."""
+        conjunction = self.said.get("AND") or next((a for a, b in PAIRS.items() if b == self.said.get("OR")), "min")
+        return Operators(conjunction, self.said.get("OR", PAIRS[conjunction]), self.said.get("ACT", "min"))
+
+
+@dataclass
+class _Reader(Cursor):
     """Reads one text by recursive descent."""
 
-    tokens: list[Token]
-    at: int = 0
     inputs: dict[str, _Draft] = field(default_factory=dict)
     outputs: dict[str, _Draft] = field(default_factory=dict)
-    rules: list[tuple[int, Rule]] = field(default_factory=list)
-    norms: dict[str, str] | None = None
+    blocks: list[_Block] = field(default_factory=list)
 
-    @property
-    def here(self) -> Token:
-        return self.tokens[self.at]
-
-    def unexpected(self, expected: str) -> NoReturn:
-        before = f" after {self.tokens[self.at - 1].text!r}" if self.at else ""
-        found = self.here.text if self.here.kind == "end" else repr(self.here.text)
-        refuse(self.here.line, f"{found} came{before}, expected {expected}")
-
-    def accept(self, *words: str) -> Token | None:
-        """Take the next token if it is one of these words or signs."""
-        token = self.here
-        if token.kind in ("name", "sign") and token.text.upper() in words:
-            self.at += 1
-            return token
-        return None
-
-    def take(self, *words: str) -> Token:
-        return self.accept(*words) or self.unexpected(" or ".join(words))
-
-    def name(self, what: str) -> Token:
-        if self.here.kind != "name" or self.here.text.lower() in RESERVED:
-            self.unexpected(what)
-        self.at += 1
-        return self.tokens[self.at - 1]
-
-    def number(self, what: str) -> float:
-        if self.here.kind != "number":
-            self.unexpected(f"a number, {what}")
-        self.at += 1
-        return read_number(self.tokens[self.at - 1].text, self.tokens[self.at - 1].line, what)
+    def input_names(self) -> tuple[str, ...]:
+        return tuple(self.inputs)
 
     def system(self, settings: dict[str, Any]) -> System:
         begin = self.take("FUNCTION_BLOCK")
-        name = self.name("the block's name").text if self.here.text.lower() not in RESERVED else "arbiter"
+        name = self.title(begin.line) or "arbiter"
         sections: dict[str, Callable[[], None]] = {
             "VAR_INPUT": lambda: self.variables(self.inputs),
             "VAR_OUTPUT": lambda: self.variables(self.outputs),
@@ -106,25 +99,57 @@ class _Reader:
             sections[self.take(*sections, "END_FUNCTION_BLOCK").text.upper()]()
         if self.here.kind != "end":
             self.unexpected("the end of the file; one function block makes a system")
+        accumulations = {block.said["ACCU"]: block.line for block in self.blocks if "ACCU" in block.said}
+        if len(accumulations) > 1:
+            refuse(max(accumulations.values()), "RULEBLOCK has another ACCU than that before it, expected the same")
+        accumulation = next(iter(accumulations), None)
         inputs, outputs = [], []
         for variable, draft in self.inputs.items():
             with located(f"line {draft.line}"):
-                inputs.append(Variable(*self.parts(variable, draft, "FUZZIFY")))
+                inputs.append(Variable(*self.parts(variable, draft, "FUZZIFY", False)))
         for variable, draft in self.outputs.items():
-            with located(f"line {draft.line}"):
-                outputs.append(Output(*self.parts(variable, draft, "DEFUZZIFY"), draft.default))
-        return assembled(begin.line, inputs, outputs, self.rules, name=name, **(self.norms or {}), **settings)
+            outputs.append(self.output(variable, draft, accumulation))
+        operators = [block.operators() for block in self.blocks]
+        first = operators[0] if operators else Operators()
+        rules = [
+            (line, rule if own == first else replace(rule, operators=own))
+            for block, own in zip(self.blocks, operators, strict=True)
+            for line, rule in block.rules
+        ]
+        norms = {key: getattr(first, key) for key in ("conjunction", "disjunction", "implication")}
+        return assembled(begin.line, inputs, outputs, rules, name=name, **norms, **settings)
 
-    def parts(self, name: str, draft: _Draft, section: str) -> tuple[str, tuple[float, float], tuple[Term, ...]]:
+    def title(self, line: int) -> str:
+        """Take the block's name: all that stands in its line, up to a word of the language."""
+        words: list[str] = []
+        while self.here.line == line and self.here.text.upper() not in _SECTIONS and self.here.kind != "end":
+            words += [" "] * (self.here.spaced and bool(words)) + [self.here.text]
+            self.at += 1
+        return "".join(words)
+
+    def output(self, name: str, draft: _Draft, accumulation: str | None) -> Output:
+        values = any(isinstance(term.shape, Value) for term in draft.terms or ())
+        sets = any(not isinstance(term.shape, Value) or isinstance(term.shape, Formula) for term in draft.terms or ())
+        method: Any = draft.method or ("average" if values and not sets else "centroid")  # as jFuzzyLogic takes it
+        weighted = method in WEIGHTED
+        own = draft.accumulation or accumulation or ("sum" if weighted and self.fuzzylite else "max")
+        with located(f"line {draft.line}"):
+            parts = self.parts(name, draft, "DEFUZZIFY", weighted)
+            return Output(*parts, draft.default, method, own, "RANGE" in draft.locks, "PREVIOUS" in draft.locks)
+
+    def parts(
+        self, name: str, draft: _Draft, section: str, weighted: bool
+    ) -> tuple[str, tuple[float, float], tuple[Term, ...]]:
         if draft.terms is None:
             refuse(draft.line, f"{name!r} has no {section}")
         universe = draft.universe or universe_of(draft.places)
+        if universe is None and weighted:  # which does not matter to values
+            low, high = min(draft.places, default=0.0), max(draft.places, default=0.0)
+            universe = (low - 1.0, high + 1.0)
         if universe is None:
             refuse(
                 draft.line, f"{name!r} has no range, and its points make none; expected RANGE := (least .. greatest);"
             )
-        with located(f"line {draft.line}"):
-            Variable(name, universe, tuple(draft.terms))
         return name, universe, tuple(draft.terms)
 
     def variables(self, into: dict[str, _Draft]) -> None:
@@ -141,16 +166,6 @@ class _Reader:
                     refuse(token.line, f"{token.text!r} is declared twice")
                 into[token.text] = _Draft(token.line, universe)
 
-    def range(self) -> tuple[float, float]:
-        self.accept(":=")  # which some texts of the standard leave out
-        self.take("(")
-        low = self.number("the least value")
-        self.take("..")
-        high = self.number("the greatest value")
-        self.take(")")
-        self.take(";")
-        return low, high
-
     def draft(self, known: dict[str, _Draft], section: str) -> _Draft:
         token = self.name("a variable's name")
         if token.text not in known:
@@ -166,10 +181,14 @@ class _Reader:
     def fuzzify(self) -> None:
         draft = self.draft(self.inputs, "FUZZIFY")
         while not self.accept("END_FUZZIFY"):
-            if self.take("TERM", "RANGE", "END_FUZZIFY").text.upper() == "TERM":
-                self.term(draft)
+            word = self.take("TERM", "RANGE", "ENABLED", "END_FUZZIFY").text.upper()
+            if word == "TERM":
+                self.term(draft, None)
+            elif word == "ENABLED":
+                self.choice({"TRUE": True})
             else:
                 self.only_range(draft)
+                self.fuzzylite = True
 
     def only_range(self, draft: _Draft) -> None:
         if draft.universe is not None:
@@ -180,10 +199,10 @@ class _Reader:
         draft = self.draft(self.outputs, "DEFUZZIFY")
         seen: set[str] = set()
         while not self.accept("END_DEFUZZIFY"):
-            key = self.take("TERM", "METHOD", "DEFAULT", "RANGE", "ACCU", "END_DEFUZZIFY")
+            key = self.take("TERM", "METHOD", "DEFAULT", "RANGE", "ACCU", "LOCK", "ENABLED", "END_DEFUZZIFY")
             word = key.text.upper()
             if word == "TERM":
-                self.term(draft)
+                self.term(draft, len(self.inputs))
                 continue
             if word in seen:
                 refuse(key.line, f"{word} came twice")
@@ -191,100 +210,84 @@ class _Reader:
             if word == "RANGE":
                 self.only_range(draft)
             elif word == "DEFAULT":
-                self.take(":=")
-                draft.default = None if self.accept("NC") else self.number("the default, or NC")
-                self.take(";")
+                self.default(draft)
             elif word == "ACCU":
-                draft.accumulates = bool(self.choice({"MAX": "max"}))
+                draft.accumulation = self.choice(JOINS)
+            elif word == "LOCK":
+                draft.locks |= self.flags(("PREVIOUS", "RANGE"))
+            elif word == "ENABLED":
+                self.choice({"TRUE": True})
             else:
-                self.choice({"COG": ""})
-        if "METHOD" not in seen:
-            refuse(draft.line, "DEFUZZIFY without METHOD, expected METHOD : COG;")
+                draft.method = self.choice(METHODS)
 
-    def choice(self, words: dict[str, str]) -> str:
-        self.take(":")
-        word = self.take(*words)
+    def default(self, draft: _Draft) -> None:
+        """Take a default: a number, or none; fuzzylite adds NC where the value before is kept."""
+        self.take(":=")
+        if not self.accept("NC", "NAN"):
+            draft.default = self.number("the default, or NC")
+        if self.accept("|"):
+            self.take("NC")
+            draft.locks.add("PREVIOUS")
         self.take(";")
-        return words[word.text.upper()]
 
-    def term(self, draft: _Draft) -> None:
+    def term(self, draft: _Draft, inputs: int | None) -> None:
         assert draft.terms is not None
         token = self.name("a term's name")
         self.take(":=")
         with located(f"line {token.line}: term {token.text!r}"):
-            shape, places = self.shape()
+            shape, places = self.shape(inputs)
             draft.terms.append(Term(token.text, shape))
         draft.places += places
         self.take(";")
 
-    def shape(self) -> tuple[Shape, list[float]]:
-        if self.accept("TRIAN"):
-            a, b, c = (self.number("a place") for _ in range(3))
-            return triangle(a, b, c), [a, c]
-        if self.accept("TRAPE"):
-            a, b, c, d = (self.number("a place") for _ in range(4))
-            return trapezoid(a, b, c, d), [a, d]
-        points: list[Point] = []
-        while self.accept("("):
-            place = self.number("a place")
-            self.take(",")
-            points.append((place, self.number("a degree")))
-            self.take(")")
-            self.accept(",")  # which examples of the standard have
-        if not points:
-            self.unexpected("points such as (0, 0) (5, 1); a singleton or another function is not known here")
-        return Shape(tuple(points)), [x for x, _ in points]
-
     def rule_block(self) -> None:
-        first = self.name("the rule block's name")
-        choices = {"AND": CONJUNCTIONS, "OR": DISJUNCTIONS, "ACT": CONJUNCTIONS, "ACCU": {"MAX": "max"}}
-        said: dict[str, str] = {}
+        block = _Block(self.here.line)
+        self.blocks.append(block)
+        choices = {"AND": CONJUNCTIONS, "OR": DISJUNCTIONS, "ACT": CONJUNCTIONS, "ACCU": JOINS}
+        if self.here.text.upper() not in (*choices, "RULE", "ENABLED", "END_RULEBLOCK"):
+            self.name("the rule block's name")
         while not self.accept("END_RULEBLOCK"):
-            key = self.take(*choices, "RULE", "END_RULEBLOCK")
+            key = self.take(*choices, "RULE", "ENABLED", "END_RULEBLOCK")
             word = key.text.upper()
             if word == "RULE":
-                self.rule(key.line)
-            elif word in said:
+                self.rule(key.line, block)
+            elif word == "ENABLED":
+                self.choice({"TRUE": True})
+            elif word in block.said:
                 refuse(key.line, f"{word} came twice")
             else:
-                said[word] = self.choice(choices[word])
-        # some tools say it of each output
-        if "ACCU" not in said and not all(draft.accumulates for draft in self.outputs.values()):
-            refuse(first.line, f"RULEBLOCK {first.text!r} without ACCU, expected ACCU : MAX;")
-        conjunction = said.get("AND") or next((a for a, b in PAIRS.items() if b == said.get("OR")), "min")
-        if said.get("OR", PAIRS[conjunction]) != PAIRS[conjunction]:
-            refuse(first.line, "AND and OR are no pair of the standard, expected MIN with MAX, or PROD with ASUM")
-        norms = {"conjunction": conjunction, "disjunction": PAIRS[conjunction], "implication": said.get("ACT", "min")}
-        if self.norms not in (None, norms):
-            refuse(first.line, f"RULEBLOCK {first.text!r} has other AND, OR or ACT than that before it")
-        self.norms = norms
+                block.said[word] = self.choice(choices[word])
 
-    def rule(self, line: int) -> None:
-        if self.here.kind not in ("name", "number"):
+    def rule(self, line: int, block: _Block) -> None:
+        if self.here.kind in ("name", "number"):
+            self.at += 1
+        elif self.here.text != ":":
             self.unexpected("the rule's number")
-        self.at += 1
         self.take(":")
         start = self.at
         while self.here.text != ";" and self.here.kind != "end":
+            if self.at > start and self.here.line > self.tokens[self.at - 1].line and self.next_statement():
+                self.fuzzylite = True  # which ends a rule with its line
+                break
             self.at += 1
-        text = " ".join(token.text for token in self.tokens[start : self.at])
-        self.take(";")
+        # as names, except the words of rules, for the language has no others
+        words = [
+            token if token.text.lower() in _RULE_WORDS else self.as_name(token)
+            for token in self.tokens[start : self.at]
+        ]
+        if not self.fuzzylite or self.here.text == ";":
+            self.take(";")
         with located(f"line {line}"):
-            self.rules.append((line, parse_rule(text)))
+            block.rules += [(line, rule) for rule in parse_rules(" ".join(token.text for token in words))]
 
+    def next_statement(self) -> bool:
+        """Return whether another statement of a rule block begins here."""
+        after = self.tokens[self.at + 1] if self.here.kind != "end" else self.here
+        word = self.here.text.upper()
+        return word in ("RULE", "END_RULEBLOCK") and (word != "RULE" or after.kind in ("name", "number", "sign"))
 
-def universe_of(places: list[float]) -> tuple[float, float] | None:
-    """Return the universe that points make, where none is said.
-
-    Parameters
-    ----------
-    places : list of float
-        Of all terms of a variable.
-
-    Returns
-    -------
-    (float, float) or None
-        Least and greatest; None if they are not two.
-    """
-    low, high = min(places, default=0.0), max(places, default=0.0)
-    return (low, high) if low < high else None
+    def as_name(self, token: Token) -> Token:
+        own = token.text.lower() == "any" and any(
+            term.name == token.text for draft in self.inputs.values() for term in draft.terms or ()
+        )
+        return token._replace(text=quoted(token.text)) if own else token

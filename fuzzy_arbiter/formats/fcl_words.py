@@ -6,6 +6,7 @@ import re
 from typing import NamedTuple
 
 from fuzzy_arbiter.formats.notation import refuse
+from fuzzy_arbiter.terms.norms import S_NORMS, T_NORMS
 
 # of IEC 61131-7 and of jFuzzyLogic's grammar
 _WORDS = (
@@ -17,14 +18,46 @@ _WORDS = (
 )
 RESERVED = frozenset(_WORDS.split())
 
-CONJUNCTIONS = {"MIN": "min", "PROD": "prod"}  # of AND, and of ACT
-DISJUNCTIONS = {"MAX": "max", "ASUM": "probor"}
-PAIRS = {"min": "max", "prod": "probor"}  # which the standard pairs, so that De Morgan's law holds
+# jFuzzyLogic's words; fuzzylite has others for some
+CONJUNCTIONS = {
+    **{norm.fcl: name for name, norm in T_NORMS.items()},
+    "DPROD": "drastic_product",
+    "HPROD": "hamacher_product",
+    "NMIN": "nilpotent_minimum",
+}  # of AND, and of ACT
+DISJUNCTIONS = {
+    **{norm.fcl: name for name, norm in S_NORMS.items()},
+    "DSUM": "drastic_sum",
+    "ESUM": "einstein_sum",
+    "NMAX": "nilpotent_maximum",
+    "PROBOR": "probor",
+}
+JOINS = {**DISJUNCTIONS, "SUM": "sum"}
+# which the standard and jFuzzyLogic pair, where one alone is said
+PAIRS = {
+    "min": "max",
+    "prod": "probor",
+    "bounded_difference": "bounded_sum",
+    "drastic_product": "drastic_sum",
+    "nilpotent_minimum": "nilpotent_maximum",
+    "hamacher_product": "einstein_sum",
+    "einstein_product": "einstein_sum",
+}
+METHODS = {
+    "COG": "centroid",
+    "COA": "bisector",
+    "MM": "mom",
+    "LM": "som",
+    "RM": "lom",
+    "COGS": "average",
+    "COGF": "average",
+    "COGSS": "sum",
+}
 
 _TOKEN = re.compile(
     r"""(?P<space>\s+) | (?P<comment>\(\*.*?\*\) | /\*.*?\*/ | //[^\n]*) | (?P<open>\(\*|/\*)
-    | (?P<name>[A-Za-z_][A-Za-z0-9_]*) | (?P<number>[+-]?[0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?)
-    | (?P<sign>:=|\.\.|[:;,()]) | (?P<other>.)""",
+    | (?P<name>[A-Za-z_][A-Za-z0-9_]*) | (?P<number>[+-]?(?:[0-9]+(?:\.(?!\.)[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)
+    | (?P<sign>:=|\.\.|[:;,()|+*/^%-]) | (?P<other>.)""",
     re.VERBOSE | re.DOTALL,
 )
 
@@ -35,6 +68,7 @@ class Token(NamedTuple):
     kind: str
     text: str
     line: int
+    spaced: bool = False  # whether a space or a comment stands before it
 
 
 def cut(text: str) -> tuple[list[Token], list[tuple[int, str]]]:
@@ -59,7 +93,7 @@ def cut(text: str) -> tuple[list[Token], list[tuple[int, str]]]:
     """
     tokens: list[Token] = []
     comments: list[tuple[int, str]] = []
-    line = 1
+    line, spaced = 1, False
     for match in _TOKEN.finditer(text):
         kind, found = str(match.lastgroup), match.group()
         if kind == "comment":
@@ -69,7 +103,8 @@ def cut(text: str) -> tuple[list[Token], list[tuple[int, str]]]:
         elif kind == "other":
             refuse(line, f"{found!r} is no sign of FCL")
         elif kind != "space":
-            tokens.append(Token(kind, found, line))
+            tokens.append(Token(kind, found, line, spaced))
+        spaced = kind in ("space", "comment")
         line += found.count("\n")
     tokens.append(Token("end", "the end of the file", line))
     return tokens, comments

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import math
 
-from fuzzy_arbiter.definition import Output, System, Term, Variable, variable_names
+from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable, variable_names
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fis_reader import read
-from fuzzy_arbiter.formats.fis_words import SETTINGS
+from fuzzy_arbiter.formats.fis_words import DEFUZZIFIERS, MATLAB, SETTINGS
 from fuzzy_arbiter.formats.notation import cannot_say, say_number, say_numbers
 from fuzzy_arbiter.formats.settings import say_settings
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
+from fuzzy_arbiter.shapes import Shape
+from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.kinds import KINDS
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
+from fuzzy_arbiter.terms.term import Term
+from fuzzy_arbiter.terms.values import Constant, Linear
 
 __all__ = ["read", "write"]
 
@@ -23,8 +29,8 @@ def write(system: System) -> str:
     Parameters
     ----------
     system : System
-        Any that the format can say: terms that are triangles, trapezoids or their halves, at most one connective in a
-        rule, no defaults.
+        Any that the format can say: terms that are triangles, trapezoids or their halves, MATLAB's curves, constants
+        and linear values, at most one connective in a rule, no hedges, no defaults.
 
     Returns
     -------
@@ -37,16 +43,40 @@ def write(system: System) -> str:
         If the format cannot say a name, a term, a rule or a default; it is quoted.
     """
     _require_names(system)
+    kind, method, aggregation = _method(system)
     lines = [f"% {text}" for text in say_settings(system, SETTINGS)]
-    lines += ["[System]", f"Name='{system.name}'", "Type='mamdani'", "Version=2.0"]
+    lines += ["[System]", f"Name='{system.name}'", f"Type='{kind}'", "Version=2.0"]
     lines += [f"NumInputs={len(system.inputs)}", f"NumOutputs={len(system.outputs)}", f"NumRules={len(system.rules)}"]
-    lines += [f"AndMethod='{system.conjunction}'", f"OrMethod='{system.disjunction}'"]
-    lines += [f"ImpMethod='{system.implication}'", "AggMethod='max'", "DefuzzMethod='centroid'", ""]
+    lines += [f"AndMethod='{T_NORMS[system.conjunction].fis}'", f"OrMethod='{_or(system)}'"]
+    lines += [f"ImpMethod='{T_NORMS[system.implication].fis}'", f"AggMethod='{aggregation}'"]
+    lines += [f"DefuzzMethod='{method}'", ""]
     for kind, variables in (("Input", system.inputs), ("Output", system.outputs)):
         for k, v in enumerate(variables):
-            lines += [f"[{kind}{k + 1}]", *_variable(v), ""]
+            lines += [f"[{kind}{k + 1}]", *_variable(v, system), ""]
     lines += ["[Rules]", *(_rule(system, i) for i in range(len(system.rules)))]
     return "\n".join([*lines, ""])
+
+
+def _or(system: System) -> str:
+    word = S_NORMS[system.disjunction].fis
+    if not word:
+        raise UnsupportedError(f"fis cannot say the disjunction {system.disjunction!r}")
+    return word
+
+
+def _method(system: System) -> tuple[str, str, str]:
+    """Return the type of a system, and the words of its defuzzifier and aggregation, which all outputs share."""
+    pairs = dict.fromkeys((o.defuzzifier, o.aggregation) for o in system.outputs)
+    if len(pairs) > 1:
+        said = "; ".join(f"{defuzzifier}, {aggregation}" for defuzzifier, aggregation in pairs)
+        raise UnsupportedError(f"fis cannot say outputs of several defuzzifiers and aggregations, {said}: expected one")
+    ((defuzzifier, aggregation),) = pairs
+    method = next(word for word, name in DEFUZZIFIERS.items() if name == defuzzifier)
+    if defuzzifier not in WEIGHTED:
+        return "mamdani", method, AGGREGATIONS[aggregation].fis
+    if aggregation != "sum":
+        raise UnsupportedError(f"fis cannot say the aggregation {aggregation!r} of values: expected 'sum'")
+    return "sugeno", method, "sum"
 
 
 def _require_names(system: System) -> None:
@@ -56,9 +86,11 @@ def _require_names(system: System) -> None:
             raise UnsupportedError(f"fis cannot say the name {name!r}: expected none of {' '.join(_SIGNS)}")
 
 
-def _variable(v: Variable) -> list[str]:
-    if isinstance(v, Output) and v.default is not None:
-        raise UnsupportedError(f"fis cannot say the default {v.default!r} of output {v.name!r}")
+def _variable(v: Variable, system: System) -> list[str]:
+    if isinstance(v, Output):
+        for key in ("default", "lock_range", "lock_previous"):
+            if getattr(v, key) is not (None if key == "default" else False):
+                raise UnsupportedError(f"fis cannot say the {key} {getattr(v, key)!r} of output {v.name!r}")
     lines = [f"Name='{v.name}'", f"Range=[{say_numbers(v.universe)}]", f"NumMFs={len(v.terms)}"]
     for j, term in enumerate(v.terms):
         lines.append(f"MF{j + 1}='{term.name}':{_function(term, v)}")
@@ -67,6 +99,8 @@ def _variable(v: Variable) -> list[str]:
 
 def _function(term: Term, v: Variable) -> str:
     """Say a term's function and places; half a triangle gets its other foot beyond the range, as Octave wants it."""
+    if not isinstance(term.shape, Shape):
+        return _named(term, v)
     low, high = v.universe
     width = high - low
 
@@ -97,7 +131,27 @@ def _function(term: Term, v: Variable) -> str:
     return f"'{'trimf' if len(places) == 3 else 'trapmf'}',[{say_numbers(places)}]"
 
 
+def _named(term: Term, v: Variable) -> str:
+    """Say a curve or a value."""
+    shape, what = term.shape, f"fis cannot say the term {term.name!r} of {v.name!r}"
+    if isinstance(shape, Constant):
+        return f"'constant',[{say_number(shape.value)}]"
+    if isinstance(shape, Linear):
+        return f"'linear',[{say_numbers((*shape.coefficients, shape.constant))}]"
+    if not isinstance(shape, Curve):
+        raise UnsupportedError(f"{what}, a formula: expected a function of MATLAB's, a constant or a linear term")
+    if shape.kind == "singleton" and shape.height == 1.0:
+        return f"'trimf',[{say_numbers(shape.parameters * 3)}]"
+    word, order = KINDS[shape.kind].fis
+    if word not in MATLAB or shape.height != 1.0:
+        raise UnsupportedError(
+            f"{what}, {shape.kind} of the height {shape.height:g}: expected one of {', '.join(MATLAB)}"
+        )
+    return f"'{word}',[{say_numbers(shape.parameters[i] for i in order)}]"
+
+
 def _no_function(term: Term, v: Variable) -> str:
+    assert isinstance(term.shape, Shape)
     points = " ".join(f"({say_number(x)}, {say_number(degree)})" for x, degree in term.shape.points)
     return f"fis cannot say the term {term.name!r} of {v.name!r}, {points}: expected a triangle, a trapezoid or a half"
 
@@ -105,13 +159,15 @@ def _no_function(term: Term, v: Variable) -> str:
 def _rule(system: System, i: int) -> str:
     rule = system.rules[i]
     condition = rule.condition
+    if rule.operators is not None:
+        raise cannot_say("fis", i, rule, "those of the system", "operators")
     parts = condition.parts if isinstance(condition, And | Or) else (condition,)
     row = [0] * len(system.inputs)
     names = variable_names(system.inputs)
     last = -1
     for part in parts:
         statement = _statement(part)
-        if statement is None:
+        if statement is None or statement.variable not in names:
             raise cannot_say("fis", i, rule, "one connective per rule, and only terms negated")
         k = names.index(statement.variable)
         if k <= last:

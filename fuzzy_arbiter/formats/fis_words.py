@@ -1,26 +1,52 @@
-"""The words of MATLAB's text: keys, operators and membership functions."""
+"""The words of MATLAB's text, with those that Octave and fuzzylite add: keys, operators, defuzzifiers and functions."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-from fuzzy_arbiter.shapes import Shape, falling, rising, trapezoid, triangle
+from fuzzy_arbiter.shapes import falling, rising
+from fuzzy_arbiter.terms.kinds import KINDS
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
 
 SETTINGS = ("normalization", "outside", "points")
 
-# what a key may say, and what it means; algebraic_... are Octave's words, and fuzzylite leaves empty what no rule needs
-METHODS: dict[str, dict[str, str]] = {
-    "Type": {"mamdani": ""},
-    "AndMethod": {"min": "min", "prod": "prod", "algebraic_product": "prod", "": "min"},
-    "OrMethod": {"max": "max", "probor": "probor", "algebraic_sum": "probor", "": "max"},
-    "ImpMethod": {"min": "min", "prod": "prod", "algebraic_product": "prod"},
-    "AggMethod": {"max": ""},
-    "DefuzzMethod": {"centroid": ""},
+TYPES = ("mamdani", "sugeno", "tsukamoto", "hybrid")  # the last two are fuzzylite's
+# Octave's words where MATLAB has others; fuzzylite leaves empty what no rule needs
+T_WORDS = {**{norm.fis: name for name, norm in T_NORMS.items()}, "algebraic_product": "prod", "": "min"}
+S_WORDS = {**{norm.fis: name for name, norm in S_NORMS.items()}, "algebraic_sum": "probor", "": "max"}
+JOINS = {**{norm.fis: name for name, norm in AGGREGATIONS.items()}, "algebraic_sum": "probor", "": "max"}
+DEFUZZIFIERS = {
+    "centroid": "centroid",
+    "bisector": "bisector",
+    "mom": "mom",
+    "som": "som",
+    "lom": "lom",
+    "wtaver": "average",
+    "wtsum": "sum",
 }
+METHODS = {"AndMethod": T_WORDS, "OrMethod": S_WORDS, "ImpMethod": T_WORDS, "AggMethod": JOINS}
 
-FUNCTIONS: dict[str, tuple[int, Callable[..., Shape]]] = {  # number of places, and what they make
-    "trimf": (3, triangle),
-    "trapmf": (4, trapezoid),
-    "linsmf": (2, rising),
-    "linzmf": (2, falling),
+# straight functions: the fuzzylite type that they are, and how many numbers
+STRAIGHT = {
+    "trimf": ("Triangle", 3),
+    "trapmf": ("Trapezoid", 4),
+    "rampmf": ("Ramp", 2),
+    "rectmf": ("Rectangle", 2),
+    "binarymf": ("Binary", 2),
+    "discretemf": ("Discrete", 0),
 }
+MATLAB = ("gaussmf", "gauss2mf", "gbellmf", "sigmf", "dsigmf", "psigmf", "zmf", "smf", "pimf")  # which it has, too
+CURVES = {kind.fis[0]: (name, kind.fis[1]) for name, kind in KINDS.items() if kind.fis[0]}
+VALUES = ("constant", "linear", "function")
+SHOULDERS = {"linsmf": rising, "linzmf": falling}
+FUNCTIONS = (*STRAIGHT, *SHOULDERS, *CURVES, *VALUES)
+# what stands after the point of a term's number, as Octave writes hedges: ten times that is the power
+OCTAVE_HEDGES: dict[str, tuple[str, ...]] = {"": (), "05": ("somewhat",), "2": ("very",), "4": ("very", "very")}
+HEDGES: dict[str, tuple[str, ...]] = {
+    "": (),
+    "01": ("seldom",),
+    "05": ("somewhat",),
+    "2": ("very",),
+    "3": ("extremely",),
+    "4": ("very", "very"),
+    "99": ("any",),
+}
+"""And as fuzzylite does, whose *extremely* is another."""

@@ -6,11 +6,12 @@ from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fll_reader import read
 from fuzzy_arbiter.formats.fll_terms import RESERVED, say_shape
-from fuzzy_arbiter.formats.fll_words import CONJUNCTIONS, DISJUNCTIONS, SETTINGS
-from fuzzy_arbiter.formats.notation import cannot_say, require_words, say_number, say_numbers
+from fuzzy_arbiter.formats.fll_words import DEFUZZIFIERS, settings_of
+from fuzzy_arbiter.formats.notation import blocks, cannot_say, require_words, say_number, say_numbers
 from fuzzy_arbiter.formats.settings import say_settings
-from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
+from fuzzy_arbiter.propositions import And, Anything, Hedged, Is, Not, Or, Proposition
 from fuzzy_arbiter.rule import Rule
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
 
 __all__ = ["read", "write"]
 
@@ -37,25 +38,35 @@ def write(system: System) -> str:
         raise UnsupportedError(f"fll cannot say the name {system.name!r}: what follows # is a comment")
     require_words(system, "fll", RESERVED)
     lock = "true" if system.outside == "clip" else "false"
-    lines = [f"# {text}" for text in say_settings(system, SETTINGS)]
+    lines = [f"# {text}" for text in say_settings(system, settings_of(system.outputs))]
     lines.append(f"Engine: {system.name}")
     for v in system.inputs:
         lines += [f"InputVariable: {v.name}", "  enabled: true", f"  range: {say_numbers(v.universe)}"]
         lines += [f"  lock-range: {lock}", *_terms(v)]
     for output in system.outputs:
         lines += [f"OutputVariable: {output.name}", "  enabled: true", f"  range: {say_numbers(output.universe)}"]
-        lines += ["  lock-range: false", "  aggregation: Maximum", f"  defuzzifier: Centroid {system.points}"]
-        lines += [f"  default: {_default(output)}", "  lock-previous: false", *_terms(output)]
-    lines += ["RuleBlock: rules", "  enabled: true"]
-    lines += [f"  conjunction: {_said(CONJUNCTIONS, system.conjunction)}"]
-    lines += [f"  disjunction: {_said(DISJUNCTIONS, system.disjunction)}"]
-    lines += [f"  implication: {_said(CONJUNCTIONS, system.implication)}", "  activation: General"]
-    lines += [f"  rule: {_rule(i, rule)}" for i, rule in enumerate(system.rules)]
+        lines += [f"  lock-range: {_truth(output.lock_range)}"]
+        lines += [
+            f"  aggregation: {AGGREGATIONS[output.aggregation].fll}",
+            f"  defuzzifier: {_defuzzifier(output, system)}",
+        ]
+        lines += [f"  default: {_default(output)}", f"  lock-previous: {_truth(output.lock_previous)}", *_terms(output)]
+    for k, (operators, rules) in enumerate(blocks(system)):
+        lines += [f"RuleBlock: rules{k + 1 if k else ''}", "  enabled: true"]
+        lines += [f"  conjunction: {T_NORMS[operators.conjunction].fll}"]
+        lines += [f"  disjunction: {S_NORMS[operators.disjunction].fll}"]
+        lines += [f"  implication: {T_NORMS[operators.implication].fll}", "  activation: General"]
+        lines += [f"  rule: {_rule(i, rule)}" for i, rule in rules]
     return "\n".join([*lines, ""])
 
 
-def _said(words: dict[str, str], value: str) -> str:
-    return next(word for word, said in words.items() if said == value)
+def _truth(value: bool) -> str:
+    return "true" if value else "false"
+
+
+def _defuzzifier(output: Output, system: System) -> str:
+    word = next(word for word, name in DEFUZZIFIERS.items() if name == output.defuzzifier)
+    return f"{word} Automatic" if output.weighted else f"{word} {system.points}"
 
 
 def _terms(v: Variable) -> list[str]:
@@ -77,9 +88,10 @@ def _condition(p: Proposition, i: int, rule: Rule) -> str:
         word = " and " if isinstance(p, And) else " or "
         texts = ((part, _condition(part, i, rule)) for part in p.parts)
         return word.join(f"({text})" if isinstance(part, And | Or) else text for part, text in texts)
-    negations = 0
-    while isinstance(p, Not):
-        p, negations = p.part, negations + 1
-    if not isinstance(p, Is):
+    bends: list[str] = []
+    while isinstance(p, Not | Hedged):
+        bends.append(p.hedge if isinstance(p, Hedged) else "not")
+        p = p.part
+    if not isinstance(p, Is | Anything):
         raise cannot_say("fll", i, rule, "only terms negated")
-    return f"{p.variable} is {'not ' * negations}{p.term}"
+    return f"{p.variable} is {' '.join([*bends, p.term if isinstance(p, Is) else 'any'])}"

@@ -4,18 +4,29 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fuzzy_arbiter.definition import Output, System, Term, Variable
+from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.errors import FormatError
-from fuzzy_arbiter.formats.fll_terms import HEDGES, read_shape
-from fuzzy_arbiter.formats.fll_words import CONJUNCTIONS, DISJUNCTIONS, KEYS, MANY, RESOLUTION, SETTINGS
+from fuzzy_arbiter.formats.fll_terms import VALUES, read_shape
+from fuzzy_arbiter.formats.fll_words import (
+    CONJUNCTIONS,
+    DEFUZZIFIERS,
+    DISJUNCTIONS,
+    JOINS,
+    KEYS,
+    MANY,
+    OLD,
+    RESOLUTION,
+    settings_of,
+)
 from fuzzy_arbiter.formats.notation import assembled, located, read_number, refuse
 from fuzzy_arbiter.formats.settings import read_settings
 from fuzzy_arbiter.propositions import And, Not, Or, Proposition
-from fuzzy_arbiter.rule import Rule
-from fuzzy_arbiter.rule_text import parse_rule
+from fuzzy_arbiter.rule import Operators, Rule
+from fuzzy_arbiter.rule_text import parse_rules
+from fuzzy_arbiter.terms.term import Term
 
 
 @dataclass
@@ -43,7 +54,8 @@ class _Block:
 def read(text: str) -> System:
     """Return the system that a text in the FuzzyLite Language defines.
 
-    The points are those of the centroid; an output's default of ``nan`` is none; ranges that are locked clip inputs.
+    The points are the most of any output's defuzzifier; an output's default of ``nan`` is none; ranges that are locked
+    clip inputs. An aggregation of ``none`` adds the strengths of values, as fuzzylite does.
 
     Parameters
     ----------
@@ -53,7 +65,7 @@ def read(text: str) -> System:
     Returns
     -------
     System
-        Mamdani, with the centroid.
+        Of any kind.
 
     Raises
     ------
@@ -63,28 +75,33 @@ def read(text: str) -> System:
         If what it defines cannot be.
     """
     blocks, comments = _blocks(text)
-    settings = read_settings(comments, SETTINGS)
     engines = [b for b in blocks if b.kind == "Engine"]
     if len(engines) != 1:
         raise FormatError(f"expected one Engine in a FLL file, {len(engines) or 'none'} came")
     inputs = [b for b in blocks if b.kind == "InputVariable"]
     outputs = [b for b in blocks if b.kind == "OutputVariable"]
     rule_blocks = [b for b in blocks if b.kind == "RuleBlock"]
-    variables = [_variable(b) for b in inputs]
-    results = [_output(b) for b in outputs]
+    variables = [Variable(*_variable(b)) for b in inputs]
+    made = [_output(b, len(inputs)) for b in outputs]
+    results = [output for output, _ in made]
     clips = _alike(inputs, [b.word("lock-range", {"true": "clip", "false": "refuse"}, "false") for b in inputs])
-    points = _alike(outputs, [_resolution(b) for b in outputs])
-    rules: list[tuple[int, Rule]] = []
-    norms = None
-    for block in rule_blocks:
-        found = _rules(block)
-        said = _norms(block, found)
-        if norms not in (None, said):
-            refuse(block.line, f"RuleBlock {block.name!r} has other operators than that before it, expected the same")
-        norms = said
-        rules += found
+    settings = read_settings(comments, settings_of(results))
+    values = {output.name for output in results if output.weighted}
+    said = [_rules(block, values) for block in rule_blocks]
+    # the system has the operators of the first block, and a rule of another its own
+    first = said[0][1] if said else Operators()
+    rules = [
+        (line, rule if norms == first else replace(rule, operators=norms))
+        for found, norms in said
+        for line, rule in found
+    ]
     name = engines[0].name or "arbiter"
-    options = {"outside": clips or "refuse", "points": points or RESOLUTION, **(norms or {}), **settings}
+    options = {
+        "outside": clips or "refuse",
+        "points": max((points for _, points in made), default=0) or RESOLUTION,
+        **{key: getattr(first, key) for key in ("conjunction", "disjunction", "implication")},
+        **settings,
+    }
     return assembled(engines[0].line, variables, results, rules, name=name, **options)
 
 
@@ -106,6 +123,7 @@ def _blocks(text: str) -> tuple[list[_Block], list[tuple[int, str]]]:
         if not blocks:
             refuse(line, f"{key!r} came, expected Engine first")
         block = blocks[-1]
+        key = OLD.get(key, key)
         if key not in KEYS[block.kind]:
             refuse(line, f"{key!r} is not known in {block.kind}, expected one of {', '.join(KEYS[block.kind])}")
         if key in MANY:
@@ -121,12 +139,12 @@ def _alike(blocks: Sequence[_Block], values: Sequence[Any]) -> Any:
     """Return what all variables say; None if there are none."""
     for block, value in zip(blocks, values, strict=True):
         if value != values[0]:
-            key = "lock-range" if block.kind == "InputVariable" else "defuzzifier"
-            refuse(block.line, f"{block.name!r} has another {key} than {blocks[0].name!r}, expected the same for all")
+            where = f"{block.name!r} has another lock-range than {blocks[0].name!r}"
+            refuse(block.line, f"{where}, expected the same for all")
     return values[0] if values else None
 
 
-def _variable(block: _Block) -> Variable:
+def _variable(block: _Block, inputs: int | None = None) -> tuple[str, tuple[float, float], tuple[Term, ...]]:
     block.require_enabled()
     line, value = block.entries.get("range", (block.line, ""))
     bounds = [read_number(part, line, "range") for part in value.split()]
@@ -136,58 +154,74 @@ def _variable(block: _Block) -> Variable:
     for line, content in block.many:
         name, kind, numbers = (*content.split(maxsplit=2), "", "", "")[:3]
         with located(f"line {line}: term {name!r}"):
-            terms.append(Term(name, read_shape(kind, numbers, line)))
-    with located(f"line {block.line}"):
-        return Variable(block.name, (bounds[0], bounds[1]), tuple(terms))
+            terms.append(Term(name, read_shape(kind, numbers, line, inputs)))
+    parts = block.name, (bounds[0], bounds[1]), tuple(terms)
+    if inputs is None:
+        with located(f"line {block.line}"):
+            Variable(*parts)
+    return parts
 
 
-def _output(block: _Block) -> Output:
-    v = _variable(block)
-    block.word("aggregation", {"Maximum": None})
-    block.word("lock-previous", {"false": None}, "false")
-    locked = block.word("lock-range", {"true": True, "false": False}, "false")
+def _output(block: _Block, inputs: int) -> tuple[Output, int]:
+    """Return an output, and the points of its defuzzifier, 0 for values."""
+    parts = _variable(block, inputs)
+    defuzzifier, points = _defuzzifier(block)
+    none = {"none": "sum", "": "sum"} if defuzzifier in ("average", "sum") else {}
+    aggregation = block.word("aggregation", JOINS | none)
+    locks = {"true": True, "false": False}
+    locked, previous = block.word("lock-range", locks, "false"), block.word("lock-previous", locks, "false")
     line, value = block.entries.get("default", (block.line, "nan"))
     default = None if value == "nan" else read_number(value, line, f"default of {block.name!r}")
-    if locked and default is not None and not v.universe[0] <= default <= v.universe[1]:
+    if locked and default is not None and not parts[1][0] <= default <= parts[1][1]:
         refuse(line, f"default of {block.name!r} is {value}, outside the range that lock-range holds it to")
     with located(f"line {block.line}"):
-        return Output(v.name, v.universe, v.terms, default)
+        return Output(*parts, default, defuzzifier, aggregation, locked, previous), points
 
 
-def _resolution(block: _Block) -> int:
+def _defuzzifier(block: _Block) -> tuple[Any, int]:
     line, value = block.entries.get("defuzzifier", (block.line, ""))
-    match = re.fullmatch(r"Centroid(?:\s+([0-9]{1,4000}))?", value)
-    if not match:
-        refuse(line, f"defuzzifier of {block.name!r} is {value or 'missing'}, expected Centroid and its resolution")
-    return int(match[1] or RESOLUTION)
+    word, _, option = value.partition(" ")
+    option = option.strip()
+    if word not in DEFUZZIFIERS:
+        refuse(
+            line, f"defuzzifier of {block.name!r} is {value or 'missing'}, expected one of {', '.join(DEFUZZIFIERS)}"
+        )
+    name = DEFUZZIFIERS[word]
+    if name in ("average", "sum"):
+        if option not in ("", "Automatic", "TakagiSugeno", "Tsukamoto"):
+            refuse(line, f"{word} has the type {option!r}, expected Automatic, TakagiSugeno or Tsukamoto")
+        kinds = {content.split(maxsplit=2)[1] in VALUES for _, content in block.many if len(content.split()) > 1}
+        wrong = {"TakagiSugeno": False, "Tsukamoto": True}.get(option)
+        if wrong in kinds:
+            refuse(line, f"{word} has the type {option}, for which a term of {block.name!r} is not made")
+        return name, 0
+    if not re.fullmatch(r"[0-9]{0,4000}", option):
+        refuse(line, f"defuzzifier of {block.name!r} is {value}, expected {word} and its resolution")
+    return name, int(option or RESOLUTION)
 
 
-def _norms(block: _Block, rules: Sequence[tuple[int, Rule]]) -> dict[str, str]:
+def _rules(block: _Block, values: set[str]) -> tuple[list[tuple[int, Rule]], Operators]:
+    """Return the rules of a block, and its operators; one that no rule needs may be none."""
     block.require_enabled()
-    block.word("activation", {"General": None})
-    # an operator that no rule needs may be none
+    rules: list[tuple[int, Rule]] = []
+    for line, content in block.many:
+        with located(f"line {line}"):
+            rules += [(line, rule) for rule in parse_rules(content)]
+    if block.entries.get("activation", (0, ""))[1] in CONJUNCTIONS and "implication" not in block.entries:
+        block.entries["implication"] = block.entries.pop("activation")  # the word of fuzzylite 5
+    block.word("activation", {"General": None, "": None})
     joins = {kind for _, rule in rules for kind in _joins(rule.condition)}
+    implied = any(c.variable not in values for _, rule in rules for c in rule.conclusions)
     none_and = {} if And in joins else {"none": "min", "": "min"}
     none_or = {} if Or in joins else {"none": "max", "": "max"}
-    return {
-        "conjunction": block.word("conjunction", CONJUNCTIONS | none_and),
-        "disjunction": block.word("disjunction", DISJUNCTIONS | none_or),
-        "implication": block.word("implication", CONJUNCTIONS),
-    }
+    return rules, Operators(
+        block.word("conjunction", CONJUNCTIONS | none_and),
+        block.word("disjunction", DISJUNCTIONS | none_or),
+        block.word("implication", CONJUNCTIONS | ({} if implied else {"none": "min", "": "min"})),
+    )
 
 
 def _joins(p: Proposition) -> set[type[Proposition]]:
     if isinstance(p, Not):
         return _joins(p.part)
     return {type(p)}.union(*map(_joins, p.parts)) if isinstance(p, And | Or) else set()
-
-
-def _rules(block: _Block) -> list[tuple[int, Rule]]:
-    rules: list[tuple[int, Rule]] = []
-    for line, content in block.many:
-        hedge = next((word for word in content.split() if word in HEDGES and word != "not"), None)
-        if hedge is not None:
-            refuse(line, f"rule {content!r}: the hedge {hedge!r} is not known here, expected only 'not'")
-        with located(f"line {line}"):
-            rules.append((line, parse_rule(content)))
-    return rules

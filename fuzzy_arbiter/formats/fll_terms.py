@@ -1,37 +1,58 @@
-"""The terms of the FuzzyLite Language that are piecewise linear, and the words that it keeps for itself."""
+"""The terms of the FuzzyLite Language, which fuzzylite's FIS and FCL share, and the words that it keeps for itself."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
-from fuzzy_arbiter.formats.notation import read_number, refuse, say_numbers
-from fuzzy_arbiter.shapes import Point, Shape
+from fuzzy_arbiter.errors import UnsupportedError
+from fuzzy_arbiter.formats.notation import read_number, refuse, say_number, say_numbers
+from fuzzy_arbiter.shapes import Membership, Point, Shape
+from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.functions import WORDS
+from fuzzy_arbiter.terms.kinds import KINDS
+from fuzzy_arbiter.terms.norms import HEDGES
+from fuzzy_arbiter.terms.values import Constant, Formula, Linear, Value
 
-HEDGES = frozenset(("any", "extremely", "not", "seldom", "somewhat", "very"))
-_FUNCTIONS = (
-    "abs acos acosh asin asinh atan atan2 atanh ceil cos cosh eq exp fabs floor fmod ge gt le log log10 log1p lt max "
-    "min neq pi pow round sin sinh sqrt tan tanh"
-)
-RESERVED = HEDGES | frozenset(_FUNCTIONS.split())
+_FUNCTIONS = "acosh asinh atanh gt lt le ge eq neq abs fabs"
+RESERVED = frozenset((*HEDGES, "any", "not", *WORDS, *_FUNCTIONS.split()))
 # each with the number of its places; a height may follow
 _PLACES = {"Triangle": 3, "Trapezoid": 4, "Ramp": 2, "Rectangle": 2, "Binary": 2}
-_KNOWN = ", ".join((*_PLACES, "Discrete"))
+CURVES = {kind.fll[0]: (name, kind.fll[1]) for name, kind in KINDS.items() if kind.fll[0]}
+VALUES = ("Constant", "Linear", "Function")
+TYPES = (*_PLACES, "Discrete", *CURVES, *VALUES)
 
 
-def say_shape(shape: Shape) -> str:
-    """Return a shape as a term's type and numbers.
+def say_shape(shape: Membership | Value) -> str:
+    """Return a term's shape as its type and numbers.
 
     Parameters
     ----------
-    shape : Shape
+    shape : Membership or Value
         What is written.
 
     Returns
     -------
     str
         A triangle, a trapezoid or a ramp where it is one, else its points.
+
+    Raises
+    ------
+    UnsupportedError
+        If the language has no word for it.
     """
+    if isinstance(shape, Curve):
+        word, order = ("Triangle", (0, 0, 0)) if shape.kind == "singleton" else KINDS[shape.kind].fll
+        height = "" if shape.height == 1.0 else f" {say_number(shape.height)}"
+        return f"{word} {say_numbers(shape.parameters[i] for i in order)}{height}"
+    if isinstance(shape, Constant):
+        return f"Constant {say_number(shape.value)}"
+    if isinstance(shape, Linear):
+        return f"Linear {say_numbers((*shape.coefficients, shape.constant))}"
+    if isinstance(shape, Formula):
+        return f"Function {shape.text}"
+    if not isinstance(shape, Shape):
+        raise UnsupportedError(f"fll cannot say {shape!r}")
     places = [x for x, _ in shape.points]
     match [degree for _, degree in shape.points]:
         case [0.0, 1.0, 0.0]:
@@ -45,21 +66,23 @@ def say_shape(shape: Shape) -> str:
     return f"Discrete {say_numbers(x for point in shape.points for x in point)}"
 
 
-def read_shape(kind: str, text: str, line: int) -> Shape:
-    """Return the shape that a term's type and numbers say.
+def read_shape(kind: str, text: str, line: int, inputs: int | None = None) -> Membership | Value:
+    """Return what a term's type and numbers say.
 
     Parameters
     ----------
     kind : str
         Type of the term.
     text : str
-        Its numbers.
+        Its numbers, or the text of a function.
     line : int
         Where it stands.
+    inputs : int, optional
+        How many inputs there are; only terms of outputs can be values.
 
     Returns
     -------
-    Shape
+    Membership or Value
         With degrees up to the term's height.
 
     Raises
@@ -69,9 +92,16 @@ def read_shape(kind: str, text: str, line: int) -> Shape:
     DefinitionError
         If they make no shape.
     """
-    if kind != "Discrete" and kind not in _PLACES:
-        refuse(line, f"term type {kind!r} is not known here, expected one of {_KNOWN}")
+    if kind not in TYPES:
+        refuse(line, f"term type {kind!r} is not known here, expected one of {', '.join(TYPES)}")
+    if kind == "Function":
+        return Formula(text)
     numbers = [_number(part, line, kind) for part in text.split()]
+    if kind in VALUES:
+        return read_value(kind, numbers, line, inputs)
+    if kind in CURVES:
+        name, order = CURVES[kind]
+        return curve_of(name, order, numbers, line, kind)
     if kind == "Discrete":
         height = numbers.pop() if len(numbers) % 2 else 1.0
         points = list(zip(numbers[::2], numbers[1::2], strict=True))
@@ -80,10 +110,82 @@ def read_shape(kind: str, text: str, line: int) -> Shape:
         if len(numbers) not in (count, count + 1):
             refuse(line, f"{kind} has the numbers {text!r}, expected {count}, and perhaps a height")
         height = numbers.pop() if len(numbers) > count else 1.0
+        if len(set(numbers)) == 1 and kind in ("Triangle", "Trapezoid", "Rectangle") and height > 0.0:
+            return Curve("singleton", (numbers[0],), height)
         points = _points(kind, numbers, line)
     if not 0.0 <= height <= 1.0:
         refuse(line, f"{kind} has the height {height!r}, expected 0 to 1")
     return Shape(tuple((x, degree * height) for x, degree in points))
+
+
+def read_value(kind: str, numbers: Sequence[float], line: int, inputs: int | None) -> Value:
+    """Return the value that a constant's or linear term's numbers say.
+
+    Parameters
+    ----------
+    kind : str
+        Its type, such as ``Constant``.
+    numbers : sequence of float
+        The number; or a coefficient for each input, and perhaps what is added.
+    line : int
+        Where it stands.
+    inputs : int or None
+        How many inputs there are; None for a term of an input.
+
+    Returns
+    -------
+    Value
+        Of these.
+
+    Raises
+    ------
+    FormatError
+        If there are more numbers, or fewer.
+    """
+    if inputs is None:
+        refuse(line, f"an input's term is {kind}, which is a value, expected a membership function")
+    if kind.lower() == "constant":
+        if len(numbers) != 1:
+            refuse(line, f"{kind} has {len(numbers)} numbers, expected 1")
+        return Constant(numbers[0])
+    if len(numbers) not in (inputs, inputs + 1):
+        refuse(line, f"{kind} has {len(numbers)} numbers, expected {inputs} or {inputs + 1} for {inputs} inputs")
+    return Linear(tuple(numbers[:inputs]), *numbers[inputs:])
+
+
+def curve_of(name: str, order: Sequence[int], numbers: Sequence[float], line: int, word: str) -> Curve:
+    """Return the curve that a format's word and numbers say.
+
+    Parameters
+    ----------
+    name : str
+        Kind of the curve.
+    order : sequence of int
+        Which of its parameters each number is.
+    numbers : sequence of float
+        Parameters, and perhaps a height.
+    line : int
+        Where it stands.
+    word : str
+        What the format calls it.
+
+    Returns
+    -------
+    Curve
+        Of that kind.
+
+    Raises
+    ------
+    FormatError
+        If there are more numbers, or fewer.
+    DefinitionError
+        If they make none.
+    """
+    count = len(order)
+    if len(numbers) not in (count, count + 1):
+        refuse(line, f"{word} has {len(numbers)} numbers, expected {count}, and perhaps a height")
+    parameters = [number for _, number in sorted(zip(order, numbers, strict=False))]
+    return Curve(name, tuple(parameters), *numbers[count:])
 
 
 def _number(text: str, line: int, kind: str) -> float:

@@ -1,11 +1,25 @@
-"""The words of the FuzzyLite Language: keys of its blocks, and operators."""
+"""The words of the FuzzyLite Language: keys of its blocks, operators and defuzzifiers."""
 
 from __future__ import annotations
 
-SETTINGS = ("normalization",)
-CONJUNCTIONS = {"Minimum": "min", "AlgebraicProduct": "prod"}  # and implications
-DISJUNCTIONS = {"Maximum": "max", "AlgebraicSum": "probor"}
-RESOLUTION = 1000  # of fuzzylite's Centroid, where none is said
+from collections.abc import Sequence
+
+from fuzzy_arbiter.definition import Output
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
+
+CONJUNCTIONS = {norm.fll: name for name, norm in T_NORMS.items()}  # and implications
+DISJUNCTIONS = {norm.fll: name for name, norm in S_NORMS.items()}
+JOINS = {norm.fll: name for name, norm in AGGREGATIONS.items()}
+RESOLUTION = 1000  # of fuzzylite's defuzzifiers, where none is said
+DEFUZZIFIERS = {
+    "Centroid": "centroid",
+    "Bisector": "bisector",
+    "MeanOfMaximum": "mom",
+    "SmallestOfMaximum": "som",
+    "LargestOfMaximum": "lom",
+    "WeightedAverage": "average",
+    "WeightedSum": "sum",
+}
 
 KEYS: dict[str, tuple[str, ...]] = {
     "Engine": ("description",),
@@ -17,3 +31,20 @@ KEYS: dict[str, tuple[str, ...]] = {
     "RuleBlock": ("description", "enabled", "conjunction", "disjunction", "implication", "activation", "rule"),
 }
 MANY = ("term", "rule")  # keys that may come again in one block
+OLD = {"accumulation": "aggregation"}  # keys of fuzzylite 5
+
+
+def settings_of(outputs: Sequence[Output]) -> tuple[str, ...]:
+    """Return the settings of a system that the language has no words for.
+
+    Parameters
+    ----------
+    outputs : sequence of Output
+        Of the system; where all are of values, none has points.
+
+    Returns
+    -------
+    tuple of str
+        Names of attributes of `System`.
+    """
+    return ("normalization", "points") if all(output.weighted for output in outputs) else ("normalization",)

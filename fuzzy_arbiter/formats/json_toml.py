@@ -5,13 +5,19 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from collections.abc import Callable, Iterator
+from dataclasses import fields
 from typing import Any, NoReturn
 
 from fuzzy_arbiter.definition import Output, System, Variable
-from fuzzy_arbiter.errors import FormatError
+from fuzzy_arbiter.errors import FormatError, UnsupportedError
 from fuzzy_arbiter.formats.schema import system_of
-from fuzzy_arbiter.shapes import Shape
+from fuzzy_arbiter.rule import Rule
+from fuzzy_arbiter.shapes import Membership, Shape
+from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.values import Constant, Formula, Linear, Value
 
+_OPERATORS = ("conjunction", "disjunction", "implication")
 _SETTINGS = ("name", "conjunction", "disjunction", "implication", "normalization", "outside", "points")
 
 
@@ -97,18 +103,22 @@ def write_json(system: System) -> str:
     str
         Indented, with the points of a term on one line.
     """
-    lines = [f"  {_text(key)}: {_text(getattr(system, key))}," for key in _SETTINGS]
+    lines = [f"  {_text(key)}: {_text(value)}," for key, value in _settings(system)]
     for key, variables in (("inputs", system.inputs), ("outputs", system.outputs)):
         lines += [f'  "{key}": [', ",\n".join(map(_json_variable, variables)), "  ],"]
-    lines += ['  "rules": [', ",\n".join(f"    {_text(str(rule))}" for rule in system.rules), "  ]"]
+    lines += ['  "rules": [', ",\n".join(f"    {_rule(rule, ': ', _quoted)}" for rule in system.rules), "  ]"]
     return "\n".join(["{", *lines, "}", ""])
+
+
+def _settings(system: System) -> list[tuple[str, Any]]:
+    names = [("weights_of", list(system.weights_of))] if system.weights_of else []
+    return [*((key, getattr(system, key)) for key in _SETTINGS), *names]
 
 
 def _json_variable(v: Variable) -> str:
     lines = [f'      "name": {_text(v.name)},', f'      "universe": {_text(list(v.universe))},']
-    if isinstance(v, Output) and v.default is not None:
-        lines.append(f'      "default": {_text(v.default)},')
-    terms = ",\n".join(f"        {_text(t.name)}: {_points(t.shape)}" for t in v.terms)
+    lines += [f"      {_text(key)}: {_text(value)}," for key, value in _options(v)]
+    terms = ",\n".join(f"        {_text(t.name)}: {_shape(t.shape, ': ', _quoted)}" for t in v.terms)
     return "\n".join(["    {", *lines, '      "terms": {', terms, "      }", "    }"])
 
 
@@ -126,15 +136,14 @@ def write_toml(system: System) -> str:
         With a table for each variable, and the points of a term on one line.
     """
     # by hand, for tomli_w gives every number in a list a line of its own, and with that a triangle 14
-    lines = [f"{key} = {_text(getattr(system, key))}" for key in _SETTINGS]
-    lines += ["rules = [", *(f"  {_text(str(rule))}," for rule in system.rules), "]"]
+    lines = [f"{key} = {_text(value)}" for key, value in _settings(system)]
+    lines += ["rules = [", *(f"  {_rule(rule, ' = ', str)}," for rule in system.rules), "]"]
     for key, variables in (("inputs", system.inputs), ("outputs", system.outputs)):
         for v in variables:
             lines += ["", f"[[{key}]]", f"name = {_text(v.name)}", f"universe = {_text(list(v.universe))}"]
-            if isinstance(v, Output) and v.default is not None:
-                lines.append(f"default = {_text(v.default)}")
+            lines += [f"{key} = {_text(value)}" for key, value in _options(v)]
             lines.append(f"[{key}.terms]")
-            lines += [f"{_key(t.name)} = {_points(t.shape)}" for t in v.terms]
+            lines += [f"{_key(t.name)} = {_shape(t.shape, ' = ', str)}" for t in v.terms]
     return "\n".join([*lines, ""])
 
 
@@ -142,8 +151,44 @@ def _key(name: str) -> str:
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _text(name)
 
 
-def _points(shape: Shape) -> str:
-    return _text([list(point) for point in shape.points])
+def _options(v: Variable) -> Iterator[tuple[str, Any]]:
+    """Yield what an output has beyond a plain one."""
+    if isinstance(v, Output):
+        for key in ("default", "defuzzifier", "aggregation", "lock_range", "lock_previous"):
+            plain = next(field.default for field in fields(Output) if field.name == key)
+            if getattr(v, key) != plain:
+                yield key, getattr(v, key)
+
+
+def _rule(rule: Rule, sign: str, key: Callable[[str], str]) -> str:
+    """Say a rule: its text, or a table where it has operators of its own."""
+    text = _text(str(rule))
+    if rule.operators is None:
+        return text
+    said = [f"{key(name)}{sign}{_text(getattr(rule.operators, name))}" for name in _OPERATORS]
+    return "{" + ", ".join([f"{key('rule')}{sign}{text}", *said]) + "}"
+
+
+def _shape(shape: Membership | Value, sign: str, key: Callable[[str], str]) -> str:
+    """Say a term: its points, or a table of its kind and numbers."""
+    if isinstance(shape, Shape):
+        return _text([list(point) for point in shape.points])
+    if isinstance(shape, Curve):
+        pairs: list[tuple[str, Any]] = [(shape.kind, list(shape.parameters))]
+        pairs += [("height", shape.height)] if shape.height != 1.0 else []
+    elif isinstance(shape, Formula):
+        pairs = [("formula", shape.text)]
+    elif isinstance(shape, Constant):
+        pairs = [("constant", shape.value)]
+    elif isinstance(shape, Linear):
+        pairs = [("linear", [*shape.coefficients, shape.constant])]
+    else:
+        raise UnsupportedError(f"cannot say the term {shape!r}")
+    return "{" + ", ".join(f"{key(name)}{sign}{_text(value)}" for name, value in pairs) + "}"
+
+
+def _quoted(word: str) -> str:
+    return f'"{word}"'
 
 
 def _text(value: Any) -> str:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 
-from fuzzy_arbiter.definition import Output, System, Term
+from fuzzy_arbiter.definition import Output, System
 from fuzzy_arbiter.engines.sweep import alone
 from fuzzy_arbiter.errors import DefinitionError, UnsupportedError
 from fuzzy_arbiter.shapes import Shape
+from fuzzy_arbiter.terms.term import Term
 
 
 def fold_normalization(system: System) -> System:
@@ -84,7 +85,7 @@ def _mapped(output: Output) -> Output:
         return float((Fraction(x) - low) / (high - low))
 
     try:
-        terms = tuple(Term(t.name, Shape(tuple((place(x), y) for x, y in t.shape.points))) for t in output.terms)
+        terms = tuple(Term(t.name, Shape(tuple((place(x), y) for x, y in t.straight.points))) for t in output.terms)
         default = None if output.default is None else min(max(place(output.default), 0.0), 1.0)
         return Output(output.name, (place(output.universe[0]), place(output.universe[1])), terms, default)
     except (OverflowError, DefinitionError):

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.propositions import is_identifier
-from fuzzy_arbiter.rule import Rule
+from fuzzy_arbiter.rule import Operators, Rule
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
@@ -236,3 +236,26 @@ def cannot_say(format: str, i: int, rule: Rule, expected: str, what: str = "cond
         To be raised.
     """
     return UnsupportedError(f"{format} cannot say the {what} of R{i + 1} {shortened(str(rule))!r}: expected {expected}")
+
+
+def blocks(system: System) -> list[tuple[Operators, list[tuple[int, Rule]]]]:
+    """Return a system's rules in blocks of the same operators.
+
+    Parameters
+    ----------
+    system : System
+        What is to be written.
+
+    Returns
+    -------
+    list of (Operators, list of (int, Rule))
+        In the rules' order; each rule with its number from 0.
+    """
+    own = Operators(system.conjunction, system.disjunction, system.implication)
+    result: list[tuple[Operators, list[tuple[int, Rule]]]] = []
+    for i, rule in enumerate(system.rules):
+        operators = rule.operators or own
+        if not result or result[-1][0] != operators:
+            result.append((operators, []))
+        result[-1][1].append((i, rule))
+    return result

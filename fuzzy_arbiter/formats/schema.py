@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NoReturn
 
 from fuzzy_arbiter.checks import finite, shown
-from fuzzy_arbiter.definition import Output, System, Term, Variable
+from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.formats.notation import located
 from fuzzy_arbiter.hierarchy import DEGREE, WEIGHT, Criterion, prioritised
 from fuzzy_arbiter.propositions import is_identifier
+from fuzzy_arbiter.rule import Operators, Rule
 from fuzzy_arbiter.rule_text import parse_rule
-from fuzzy_arbiter.shapes import Shape, falling, rising, trapezoid, triangle
+from fuzzy_arbiter.shapes import Membership, Shape, falling, rising, trapezoid, triangle
+from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.kinds import KINDS
+from fuzzy_arbiter.terms.term import Term
+from fuzzy_arbiter.terms.values import Constant, Formula, Linear, Value
 
 _SETTINGS = ("conjunction", "disjunction", "implication", "normalization", "outside", "points")
-_LONG = ("name", *_SETTINGS, "inputs", "outputs", "rules")
+_LONG = ("name", *_SETTINGS, "weights_of", "inputs", "outputs", "rules")
 _SHORT = ("name", "criteria", "form", "weight", "normalization", "outside", "points")
 _VARIABLE = ("name", "universe", "terms")
+_OUTPUT = (*_VARIABLE, "default", "defuzzifier", "aggregation", "lock_range", "lock_previous")
+_OPERATORS = ("conjunction", "disjunction", "implication")
 _CRITERION = ("name", "on", "off", "membership")
 _SHAPES: dict[str, tuple[int, Callable[..., Shape]]] = {
     "triangle": (3, triangle),
@@ -26,14 +34,18 @@ _SHAPES: dict[str, tuple[int, Callable[..., Shape]]] = {
     "rising": (2, rising),
     "falling": (2, falling),
 }
+_VALUES = ("constant", "linear", "formula")
+_KINDS = (*_SHAPES, *KINDS, *_VALUES)
 
 
 def system_of(data: object) -> System:
     """Return the system that the values of a file define.
 
     Either ``inputs``, ``outputs`` and ``rules`` are given, with the keys of `System`; or, in short, ``criteria`` in
-    order of priority, with the keys of `prioritised`. Terms are given by their points, or as one of ``triangle``,
-    ``trapezoid``, ``rising`` and ``falling`` with its places.
+    order of priority, with the keys of `prioritised`. Terms are given by their points; as one of ``triangle``,
+    ``trapezoid``, ``rising`` and ``falling`` with its places; as a curve with its parameters, such as ``gaussian``,
+    and perhaps a ``height``; or, of an output, as a ``constant``, as ``linear`` with a coefficient for each input and
+    what is added, or as a ``formula``. A rule is a text, or a table of it and of the operators of its block.
 
     Parameters
     ----------
@@ -69,18 +81,31 @@ def system_of(data: object) -> System:
     rules = []
     for i, text in enumerate(_list(table, "rules", "")):
         with located(f"rules[{i}]"):
-            rules.append(parse_rule(_string(text, f"rules[{i}]")))
+            rules.append(_rule(text, f"rules[{i}]"))
+    if "weights_of" in table:
+        names = _list(table, "weights_of", "")
+        settings["weights_of"] = tuple(_string(name, f"weights_of[{i}]") for i, name in enumerate(names))
     return System(inputs, outputs, tuple(rules), **settings)
 
 
+def _rule(data: object, where: str) -> Rule:
+    if isinstance(data, str):
+        return parse_rule(data)
+    if not isinstance(data, dict):
+        _refuse(where, data, "text, or a table of a rule and its operators")
+    table = _table(data, where, ("rule", *_OPERATORS))
+    operators = Operators(**{key: _string(table[key], f"{where}.{key}") for key in _OPERATORS if key in table})
+    return replace(parse_rule(_string(_needed(table, "rule", where), f"{where}.rule")), operators=operators)
+
+
 def _variable(data: object, where: str, kind: type[Variable]) -> Any:
-    table = _table(data, where, (*_VARIABLE, "default") if kind is Output else _VARIABLE)
+    table = _table(data, where, _OUTPUT if kind is Output else _VARIABLE)
     name = _string(_needed(table, "name", where), f"{where}.name")
     bounds = _numbers(_needed(table, "universe", where), 2, f"{where}.universe")
     terms = []
     for term, shape in _table(_needed(table, "terms", where), f"{where}.terms").items():
         terms.append(Term(term, _shape(shape, _path(f"{where}.terms", term))))
-    options = {}
+    options: dict[str, Any] = {key: table[key] for key in _OUTPUT[4:] if key in table}
     if table.get("default") is not None:
         options["default"] = _number(table["default"], f"{where}.default")
     with located(where):
@@ -93,19 +118,32 @@ def _criterion(data: object, where: str) -> Criterion:
     words = {key: _string(table[key], f"{where}.{key}") for key in ("name", "on", "off") if key in table}
     membership = _shape(table["membership"], f"{where}.membership") if "membership" in table else DEGREE
     with located(where):
-        return Criterion(**words, membership=membership)
+        return Criterion(**words, membership=membership)  # type: ignore[arg-type]  # which it checks itself
 
 
-def _shape(data: object, where: str) -> Shape:
+def _shape(data: object, where: str) -> Membership | Value:
     with located(where):
         if isinstance(data, list):
             points = (_numbers(point, 2, f"{where}[{i}]") for i, point in enumerate(data))
             return Shape(tuple((x, degree) for x, degree in points))
-        if not isinstance(data, dict) or len(data) != 1:
-            _refuse(where, data, f"a list of points, or a table with one of {', '.join(_SHAPES)}")
-        ((kind, places),) = _table(data, where, tuple(_SHAPES)).items()
+        found = [key for key in data if key != "height"] if isinstance(data, dict) else []
+        if not isinstance(data, dict) or len(found) != 1:
+            _refuse(where, data, f"a list of points, or a table with one of {', '.join(_KINDS)}")
+        (kind,) = found
+        _table(data, where, (*_KINDS, "height") if kind in KINDS or kind not in _KINDS else _KINDS)
+        at, value = f"{where}.{kind}", data[kind]
+        if kind in KINDS:
+            height = _number(data["height"], f"{where}.height") if "height" in data else 1.0
+            return Curve(kind, tuple(_numbers(value, len(KINDS[kind].parameters), at)), height)
+        if kind == "formula":
+            return Formula(_string(value, at))
+        if kind == "constant":
+            return Constant(_number(value, at))
+        if kind == "linear":
+            *coefficients, constant = _numbers(value, max(len(value), 1) if isinstance(value, list) else 1, at)
+            return Linear(tuple(coefficients), constant)
         count, make = _SHAPES[kind]
-        return make(*_numbers(places, count, f"{where}.{kind}"))
+        return make(*_numbers(value, count, at))
 
 
 def _table(data: object, where: str, known: tuple[str, ...] = ()) -> dict[str, Any]:

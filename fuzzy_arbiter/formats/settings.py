@@ -8,12 +8,15 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from fuzzy_arbiter.definition import CHOICES, System
+from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.native import range_ends
 from fuzzy_arbiter.formats.notation import refuse, say_number
 
 MARK = "fuzzy_arbiter:"
 # what a file means that says nothing of it
 PLAIN: dict[str, Any] = {"normalization": "none", "outside": "refuse", "points": 101}
+_NAMES = "weights_of"
+_PART = re.compile(r'(?:[^,"]|"[^"]*"|")+')  # between commas that stand outside of quotes
 
 
 def say_settings(system: System, keys: Sequence[str]) -> list[str]:
@@ -33,6 +36,8 @@ def say_settings(system: System, keys: Sequence[str]) -> list[str]:
         centroids that other tools give become weights.
     """
     said = [f"{key} = {getattr(system, key)}" for key in keys if getattr(system, key) != PLAIN[key]]
+    if system.weights_of:
+        said.append(f"{_NAMES} = {' '.join(map(_quoted, system.weights_of))}")
     texts = [f"{MARK} {', '.join(said)}"] if said else []
     if system.normalization == "none":
         return texts
@@ -60,14 +65,14 @@ def read_settings(comments: Iterable[tuple[int, str]], keys: Sequence[str]) -> d
     Returns
     -------
     dict
-        A value for each key.
+        A value for each key, and the names of the criteria whose weights the outputs are.
 
     Raises
     ------
     FormatError
         If a comment that begins as ours, or almost so, says what there is not, or there are two.
     """
-    settings = {key: PLAIN[key] for key in keys}
+    settings = {**{key: PLAIN[key] for key in keys}, _NAMES: ()}
     first: int | None = None
     for line, text in comments:
         if not text.strip().startswith(MARK):
@@ -79,16 +84,26 @@ def read_settings(comments: Iterable[tuple[int, str]], keys: Sequence[str]) -> d
             refuse(line, f"{text.strip()!r} is the second such comment after line {first}, expected one")
         first = line
         seen: set[str] = set()
-        for part in text.strip().removeprefix(MARK).split(","):
+        for part in _PART.findall(text.strip().removeprefix(MARK)) or [""]:
             key, equals, value = (s.strip() for s in part.partition("="))
             if key not in settings or not equals or key in seen:
-                refuse(line, f"{part.strip()!r}, expected each once, with = and its value: {', '.join(keys)}")
+                refuse(line, f"{part.strip()!r}, expected each once, with = and its value: {', '.join(settings)}")
             seen.add(key)
             settings[key] = _value(key, value, line)
     return settings
 
 
+def _quoted(name: str) -> str:
+    if "*)" in name or "(*" in name:
+        raise UnsupportedError(f"weights_of: {name!r} would end a comment, expected a name without (* and *)")
+    return f'"{name}"'
+
+
 def _value(key: str, value: str, line: int) -> Any:
+    if key == _NAMES:
+        if not re.fullmatch(r'"[^"]+"(\s+"[^"]+")*', value):
+            refuse(line, f"{key} is {value!r}, expected names in double quotes, with spaces between them")
+        return tuple(re.findall(r'"([^"]+)"', value))
     if key == "points":
         if not re.fullmatch(r"\d{1,4000}", value, re.ASCII):
             refuse(line, f"points is {value!r}, expected a whole number, 3 or more")

@@ -3,7 +3,7 @@
 Every function draws on the axes that it is given, or on those of a new figure, and returns them; none shows or saves
 anything. Matplotlib is needed only when one is called.
 
-Imports: engines.
+Imports: terms, engines.
 """
 
 from fuzzy_arbiter.pictures.fields import decisions, surface

@@ -10,8 +10,8 @@ import numpy as np
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.pictures.places import fixed_inputs, one_of, said, weights_at
-from fuzzy_arbiter.pictures.style import INK, colour, hatch, new_axes, room, wrapped
+from fuzzy_arbiter.pictures.places import fixed_inputs, one_of, output_place, said, weights_at
+from fuzzy_arbiter.pictures.style import INK, colour, hatch, new_axes, require_matplotlib, room, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,7 +36,7 @@ def surface(
     arbiter : Arbiter
         What is drawn.
     output : str
-        Name of the output.
+        Name of the output, in results or its own.
     over : (str, str)
         Names of the inputs along the two axes.
     at : mapping from str to float, optional
@@ -62,10 +62,10 @@ def surface(
     --------
     >>> from fuzzy_arbiter import Arbiter
     >>> from fuzzy_arbiter.pictures import surface
-    >>> surface(Arbiter(), "alpha_1", over=("obstacle", "shape")).get_xlabel()
+    >>> surface(Arbiter(), "obstacle", over=("obstacle", "shape")).get_xlabel()
     'obstacle'
     """
-    k = one_of(arbiter.system.outputs, output, "output")
+    k = output_place(arbiter.system, output)
     x, y, weights, where = _field(arbiter, over, at, points)
     z = np.ma.masked_invalid(weights[..., k])
     relief = ax is not None and ax.name == "3d"
@@ -132,6 +132,7 @@ def decisions(
     >>> decisions(Arbiter(), over=("obstacle", "shape")).get_xlabel()
     'obstacle'
     """
+    require_matplotlib()
     from matplotlib.colors import to_rgb
     from matplotlib.patches import Patch
 
@@ -152,7 +153,7 @@ def decisions(
     if undefined.any():
         ax.contourf(x, y, undefined.astype(float), levels=[0.5, 1.5], colors=[_UNDEFINED])
     keys: list[Patch] = []
-    for k, output in enumerate(outputs):
+    for k, name in enumerate(arbiter.system.result_names):
         others = np.delete(known, k, axis=-1).max(axis=-1)
         ahead = np.ma.masked_where(undefined, known[..., k] - others)
         if ahead.count() == 0 or not ahead.max() > levels[0]:
@@ -164,7 +165,7 @@ def decisions(
         # two neighbours are ahead of each other by opposite amounts, so that their borders fall on one line
         if ahead.min() < levels[0]:
             ax.contour(x, y, ahead, levels=levels[:1], colors=INK, linewidths=1.1)
-        keys.append(Patch(label=wrapped(output.name, 24), facecolor=shades[-1], edgecolor="white", hatch=hatch(k)))
+        keys.append(Patch(label=wrapped(name, 24), facecolor=shades[-1], edgecolor="white", hatch=hatch(k)))
     equal = ~undefined & (ranked[..., -1] - ranked[..., -2] <= levels[0])
     if equal.sum() > 2 * points:  # fewer are the line between two regions
         keys.append(Patch(label="shared", facecolor="white", edgecolor=INK))

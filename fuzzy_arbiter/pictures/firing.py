@@ -9,10 +9,10 @@ import numpy as np
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import Output, variable_names
-from fuzzy_arbiter.engines.firing import Array, Firing, degrees_of_many
-from fuzzy_arbiter.errors import UndefinedOutputError
+from fuzzy_arbiter.engines.firing import Array, Firing
+from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.pictures.lines import corners
-from fuzzy_arbiter.pictures.places import one_of, places_in, said
+from fuzzy_arbiter.pictures.places import output_place, places_in, said
 from fuzzy_arbiter.pictures.style import FAINT, INK, colour, hatch, new_axes, wrapped
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.samples import Sample
@@ -64,10 +64,16 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
     'alpha_1'
     """
     system = arbiter.system
-    k = one_of(system.outputs, system.outputs[0].name if output is None else output, "output")
+    k = 0 if output is None else output_place(system, output)
     drawn = system.outputs[k]
     values = arbiter.samples.one(inputs)
     firing = Firing(system)
+    implications = {slot.implication for slot in firing.slots[k]}
+    if drawn.weighted or drawn.aggregation != "max" or not implications < {"min", "prod"}:
+        raise UnsupportedError(
+            f"rules of {drawn.name!r}: its values, or terms under {', '.join(sorted(implications))} joined by "
+            f"{drawn.aggregation}, are not drawn; expected terms under min or prod, joined by max"
+        )
     strengths = firing.strengths(values)
     cuts = firing.cuts(strengths)[k]
 
@@ -86,11 +92,11 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
     ax = new_axes(7.2, 1.3 + 0.58 * len(rows) + 0.1 * lines + 0.95) if ax is None else ax
 
     x = places_in(drawn, 801)
-    scaled = system.implication == "prod"
-    clipped = [_cut(degrees_of_many(term.shape, x), cut, scaled) for term, cut in zip(drawn.terms, cuts, strict=True)]
+    scaled = implications == {"prod"}
+    clipped = [_cut(term.membership.of_many(x), cut, scaled) for term, cut in zip(drawn.terms, cuts, strict=True)]
     for place, row in enumerate(rows):  # rows are counted downwards
-        shape = drawn.terms[row.term].shape
-        _draw_row(ax, drawn, place, row, (x, _cut(degrees_of_many(shape, x), row.strength, scaled)), cuts[row.term])
+        shape = drawn.terms[row.term].membership
+        _draw_row(ax, drawn, place, row, (x, _cut(shape.of_many(x), row.strength, scaled)), cuts[row.term])
     foot = len(rows) + _TALL - 0.6
     tall = _TALL * _HEIGHT
     joined = np.max(clipped, axis=0)
@@ -170,10 +176,7 @@ def _centroid(ax: Axes, arbiter: Arbiter, values: Sample, k: int, place: tuple[f
         ha="right" if side < 0 else "left", va="top", fontsize=9.5, color=INK,
         bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85},
     )  # fmt: skip
-    try:
-        return f"{output.name} = {arbiter(values)[k]:.4g}"
-    except UndefinedOutputError:
-        return f"{output.name}: another output is undefined"
+    return f"{output.name} = {arbiter(values)[k]:.4g}"
 
 
 def _alone(arbiter: Arbiter, output: Output) -> Arbiter:
@@ -181,5 +184,5 @@ def _alone(arbiter: Arbiter, output: Output) -> Arbiter:
     system = arbiter.system
     parts = [(rule, tuple(c for c in rule.conclusions if c.variable == output.name)) for rule in system.rules]
     rules = tuple(replace(rule, conclusions=conclusions) for rule, conclusions in parts if conclusions)
-    alone = replace(system, outputs=(output,), rules=rules, normalization="none")
+    alone = replace(system, outputs=(output,), rules=rules, normalization="none", weights_of=())
     return Arbiter(system=alone, engine=arbiter.engine)

@@ -6,11 +6,25 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.definition import Normalization, Term, variable_names
+from fuzzy_arbiter.definition import Normalization
 from fuzzy_arbiter.errors import DefinitionError, InputError
 from fuzzy_arbiter.pictures.places import fixed_inputs, one_of, places_in, said, weights_at
-from fuzzy_arbiter.pictures.style import FAINT, INK, legend_above, legend_style, line_style, new_axes, room, tidy
+from fuzzy_arbiter.pictures.style import (
+    FAINT,
+    INK,
+    legend_above,
+    legend_style,
+    line_style,
+    new_axes,
+    require_matplotlib,
+    room,
+    tidy,
+)
+from fuzzy_arbiter.shapes import Shape
+from fuzzy_arbiter.terms.term import Term
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,7 +80,7 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
         x, y = corners(term, (low, high))
         ax.plot(x, y, label=term.name, clip_on=False, **line_style(i))
         if at is not None:
-            ax.plot(at, term.shape(at), "o", color=line_style(i)["color"], clip_on=False, zorder=4)
+            ax.plot(at, term.membership(at), "o", color=line_style(i)["color"], clip_on=False, zorder=4)
     if at is not None:
         ax.axvline(at, color=FAINT, linewidth=1.0, zorder=1)
     ax.set(xlim=(low, high), ylim=(0.0, 1.0), xlabel=variable, ylabel="degree")
@@ -91,8 +105,11 @@ def corners(term: Term, universe: tuple[float, float]) -> tuple[list[float], lis
         From one end of the universe to the other.
     """
     low, high = universe
-    inside = [(x, y) for x, y in term.shape.points if low < x < high]
-    x, y = zip((low, term.shape(low)), *inside, (high, term.shape(high)), strict=True)
+    if not isinstance(term.shape, Shape):  # as many corners as make it look smooth
+        places = np.unique([*np.linspace(low, high, 401), *term.membership.breaks((low, high))])
+        return places.tolist(), term.membership.of_many(places).tolist()
+    inside = [(x, y) for x, y in term.straight.points if low < x < high]
+    x, y = zip((low, term.straight(low)), *inside, (high, term.straight(high)), strict=True)
     return list(x), list(y)
 
 
@@ -141,13 +158,13 @@ def profile(
     x = places_in(variable, 301)
     weights = weights_at(arbiter, fixed, {over: x})
     ax = new_axes(6.0, 3.2) if ax is None else ax
-    for k, output in enumerate(system.outputs):
-        ax.plot(x, weights[:, k], label=output.name, clip_on=False, **line_style(k))
+    for k, name in enumerate(system.result_names):
+        ax.plot(x, weights[:, k], label=name, clip_on=False, **line_style(k))
     ax.set(xlim=(low, high), xlabel=over, ylabel="centroid" if system.normalization == "none" else "weight")
     if system.normalization != "none":
         ax.set_ylim(0.0, 1.0)
     tidy(ax)
-    legend_above(ax, variable_names(system.outputs), f"at {said(fixed)}" if fixed else "")
+    legend_above(ax, system.result_names, f"at {said(fixed)}" if fixed else "")
     return ax
 
 
@@ -192,6 +209,7 @@ def normalizations(
     fixed = fixed_inputs(arbiter, (over,), at)
     new = axes is None
     if axes is None:
+        require_matplotlib()
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(8.2, 5.4), layout="constrained")

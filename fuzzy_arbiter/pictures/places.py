@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.definition import Variable, variable_names
-from fuzzy_arbiter.domain import defined
+from fuzzy_arbiter.definition import System, Variable, variable_names
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError
 
@@ -39,6 +38,32 @@ def one_of(variables: Sequence[Variable], name: str, kind: str) -> int:
     if name not in names:
         raise DefinitionError(f"no {kind} {name!r}, expected one of {', '.join(names)}")
     return names.index(name)
+
+
+def output_place(system: System, name: str) -> int:
+    """Return the place of the output of a name.
+
+    Parameters
+    ----------
+    system : System
+        Whose outputs.
+    name : str
+        The output's own, or that which results carry.
+
+    Returns
+    -------
+    int
+        Its index.
+
+    Raises
+    ------
+    DefinitionError
+        If there is none; those that there are, are listed.
+    """
+    for names in (system.result_names, variable_names(system.outputs)):
+        if name in names:
+            return names.index(name)
+    raise DefinitionError(f"no output {name!r}, expected one of {', '.join(system.result_names)}")
 
 
 def fixed_inputs(arbiter: Arbiter, over: Sequence[str], at: Mapping[str, float] | None) -> dict[str, float]:
@@ -101,11 +126,7 @@ def weights_at(arbiter: Arbiter, fixed: Mapping[str, float], over: Mapping[str, 
     samples = np.empty((n, len(system.inputs)))
     for i, variable in enumerate(system.inputs):
         samples[:, i] = over[variable.name] if variable.name in over else fixed[variable.name]
-    known = defined(system, samples)
-    weights = np.full((n, len(system.outputs)), np.nan)
-    if known.any():
-        weights[known] = arbiter.batch(samples[known])
-    return weights
+    return arbiter.batch(samples)
 
 
 def said(values: Mapping[str, float]) -> str:
@@ -140,7 +161,7 @@ def places_in(variable: Variable, count: int) -> Array:
         Increasing, from one end of the universe to the other.
     """
     low, high = variable.universe
-    knots = np.array([x for term in variable.terms for x, _ in term.shape.points])
+    knots = np.array(variable.knots)
     beside = (high - low) * 1e-9
     x: Array = np.unique(np.concatenate([np.linspace(low, high, count), knots, knots - beside, knots + beside]))
     return x[(low <= x) & (x <= high)]

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
+
+from fuzzy_arbiter.errors import PictureError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -15,6 +18,18 @@ DASHES = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 
 HATCHES = ("////", "....", "\\\\\\\\", "xx", "----", "||||")
 INK, FAINT = "#333333", "#999999"
 _LETTERS = 14  # of a legend or title to an inch of the axes
+
+
+def require_matplotlib() -> None:
+    """Refuse to draw where Matplotlib is not installed.
+
+    Raises
+    ------
+    PictureError
+        It names the extra that brings it.
+    """
+    if find_spec("matplotlib") is None:
+        raise PictureError("pictures: Matplotlib is not installed, expected the extra fuzzy-arbiter[plot]")
 
 
 def new_axes(width: float, height: float, **keywords: Any) -> Axes:
@@ -32,6 +47,7 @@ def new_axes(width: float, height: float, **keywords: Any) -> Axes:
     Axes
         Alone in the figure.
     """
+    require_matplotlib()
     from matplotlib.figure import Figure
 
     ax: Axes = Figure(figsize=(width, height), layout="constrained").add_subplot(**keywords)

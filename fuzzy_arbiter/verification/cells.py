@@ -221,9 +221,9 @@ def _exact(variable: Variable) -> list[Degree]:
     """Return each term's exact degree just before or just after a place, complements as one minus the other."""
     result: list[Degree] = []
     for i, term in enumerate(variable.terms):
-        of = _limit(term.shape)
+        of = _limit(term.straight)
         for j, earlier in enumerate(variable.terms[:i]):
-            if _opposite(earlier.shape, term.shape):
+            if _opposite(earlier.straight, term.straight):
                 of = _complement(result[j])
                 break
         result.append(of)

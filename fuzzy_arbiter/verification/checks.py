@@ -10,7 +10,10 @@ import numpy as np
 
 from fuzzy_arbiter.definition import System, variable_names
 from fuzzy_arbiter.engines.firing import array_logic
+from fuzzy_arbiter.engines.plain import beyond_plain
+from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.propositions import Is
+from fuzzy_arbiter.rule import Operators
 from fuzzy_arbiter.verification.cells import Stretch, stretches
 from fuzzy_arbiter.verification.questions import (
     ANY,
@@ -50,6 +53,12 @@ def verify(system: System, effort: int = EFFORT) -> Verification:
     Verification
         As data; its text is for people.
 
+    Raises
+    ------
+    UnsupportedError
+        If the system has more than the checks know: piecewise-linear terms, *min* and *max* or their products, the
+        centroid.
+
     Examples
     --------
     >>> from fuzzy_arbiter import Arbiter
@@ -58,6 +67,8 @@ def verify(system: System, effort: int = EFFORT) -> Verification:
     >>> verify(system).complete
     True
     """
+    if reason := beyond_plain(system):
+        raise UnsupportedError(f"verify: {reason}")
     checks = _Checks(system, effort)
     checks.rows()
     checks.support()
@@ -220,7 +231,7 @@ def _rows(system: System) -> Iterator[Row]:
     names = variable_names(system.inputs)
     rows = list(itertools.product(*(v.term_names[::-1] for v in system.inputs)))
     columns = dict(zip(names, np.array(rows, dtype=object).T, strict=True))
-    logic = array_logic("min", "max")
+    logic = array_logic(Operators())
     labelled = {Is(v.name, t): (columns[v.name] == t).astype(np.float64) for v in system.inputs for t in v.term_names}
     fires = [logic.degree(rule.condition, labelled.__getitem__) > 0.0 for rule in system.rules]
     for i, terms in enumerate(rows):

@@ -25,7 +25,7 @@ def row_strengths(system: System, place: Mapping[str, float | str]) -> list[floa
         In the order of the rules.
     """
     row = {v.name: place.get(v.name, v.term_names[-1]) for v in system.inputs}
-    logic = number_logic(system.conjunction, system.disjunction)
+    logic = number_logic(system)
     return [
         rule.weight * logic.degree(rule.condition, lambda s: float(row[s.variable] == s.term)) for rule in system.rules
     ]

@@ -37,7 +37,7 @@ ONE_PLACE = {
     "libcosimpy": {"plant_fmu.importers.libcosim"},
     "mcap": {"cosim.export.mcap_writer"},
     "mcap_protobuf": {"cosim.export.mcap_writer"},
-    "numba": {"fuzzy_arbiter.compiled"},
+    "numba": {"fuzzy_arbiter.export.compiled"},
     "pandas": {"cosim.results.run_result"},
     "pymavlink": {"cosim.mavlink.wire.dialect"},
     "rerun": {"cosim.export.rrd_writer"},

@@ -17,8 +17,12 @@ REQUIREMENT = re.compile(r"[A-Za-z][\w.-]*>=[\d.]+")
 
 def required():
     """Requirements by extra, without their markers; those of the base under ""."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    extras = {"": project["dependencies"], **project["optional-dependencies"]}
+    project, arbiter = (
+        tomllib.loads((ROOT / file).read_text(encoding="utf-8"))["project"]
+        for file in ("pyproject.toml", "fuzzy_arbiter/pyproject.toml")
+    )
+    base = [*project["dependencies"], *arbiter["dependencies"], *arbiter["optional-dependencies"]["skfuzzy"]]
+    extras = {"": base, **project["optional-dependencies"]}
     return {extra: {text.partition(";")[0] for text in texts} for extra, texts in extras.items()}
 
 

@@ -37,9 +37,10 @@ def test_the_reference_shows_what_is_public():
 
 
 def test_nothing_public_takes_keywords_that_nobody_knows():
-    """So Python itself refuses an unknown one."""
+    """So Python itself refuses an unknown one; an arbiter's inputs alone may be keywords, and it refuses others."""
+    by_input = {f"fuzzy_arbiter.arbiter.Arbiter.{method}" for method in ("batch", "centroids", "explain")}
     for name in public.names():
         what = public.target(name)
         for function in [what, *public.members(what)] if what.is_class else [what] if what.is_function else []:
-            if function.is_function or function.is_class:
+            if (function.is_function or function.is_class) and function.path not in by_input:
                 assert all(p.kind is not griffe.ParameterKind.var_keyword for p in function.parameters), function.path

@@ -54,9 +54,11 @@ def _is_literal(text: str) -> bool:
 
 
 def _plain(value: object) -> object:
-    """Return a value whose numbers are Python's."""
+    """Return a value whose numbers are Python's; pages show a named tuple by its values."""
     if isinstance(value, np.generic):
         return value.item()
+    if isinstance(value, tuple) and hasattr(value, "_fields"):
+        return tuple(map(_plain, value))
     if type(value) in (tuple, list, set):
         return type(value)(map(_plain, value))
     if type(value) is dict:

@@ -18,7 +18,7 @@ _COMMENT = re.compile(r"<!--(.*?)-->", re.S)
 
 def all_pages() -> list[Path]:
     """Return every page of Markdown that a reader may meet."""
-    return sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+    return sorted([*ROOT.glob("*.md"), ROOT / "fuzzy_arbiter" / "README.md", *(ROOT / "docs").rglob("*.md")])
 
 
 def page_name(page: Path) -> str:

@@ -108,12 +108,13 @@ def check_foreign(words: list[str]) -> bool:
     What pip changes belongs to the machine, and make calls pip: extras and targets must exist.
     """
     if words[:2] == ["pip", "install"] or words[1:4] == ["-m", "pip", "install"]:
-        known = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-        for word in words:
-            if match := re.fullmatch(rf"(?:\.|{known['name']}(?: @ \S+)?)\[([^]]*)\](?: @ \S+)?", word):
-                unknown = set(match[1].split(",")) - set(known["optional-dependencies"])
-                if unknown:
-                    raise PageError(f"pyproject.toml has no extra {', '.join(sorted(unknown))}")
+        for file, place in (("pyproject.toml", r"\."), ("fuzzy_arbiter/pyproject.toml", r"\./fuzzy_arbiter")):
+            known = tomllib.loads((ROOT / file).read_text())["project"]
+            for word in words:
+                if match := re.fullmatch(rf"(?:{place}|{known['name']}(?: @ \S+)?)\[([^]]*)\](?: @ \S+)?", word):
+                    unknown = set(match[1].split(",")) - set(known["optional-dependencies"])
+                    if unknown:
+                        raise PageError(f"{file} has no extra {', '.join(sorted(unknown))}")
         return True
     if words[0] == "make":
         targets = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.M)

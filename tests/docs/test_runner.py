@@ -98,6 +98,7 @@ WRONG = {
     "an open quote": (fence("sh", "ls 'a"), "No closing quotation"),
     "a line that ends": (fence("sh", "ls \\"), "nothing follows"),
     "an extra of nobody": (fence("sh", "pip install '.[sails]'"), "no extra sails"),
+    "an extra of the other": (fence("sh", "pip install './fuzzy_arbiter[mcap]'"), "fuzzy_arbiter/.* no extra mcap"),
     "a target of nobody": (fence("sh", "make sail"), "no target sail"),
     "wrong output": (fence("python", "print(1)") + fence("text", "2"), "printed was"),
     "output of nobody": (fence("text", "2"), "output of no block"),

@@ -90,7 +90,7 @@ def test_show_says_all_of_a_definition(run):
     ],
 )
 def test_eval_gives_the_weights_in_all_digits(run, words):
-    assert run("eval", "section-vi", *words) == (0, "alpha_1 = 0.84375\nalpha_2 = 0.15625\nalpha_3 = 0.0\n", "")
+    assert run("eval", "section-vi", *words) == (0, "obstacle = 0.84375\nshape = 0.15625\ndepth = 0.0\n", "")
 
 
 def test_eval_gives_json(run, tmp_path):
@@ -98,7 +98,7 @@ def test_eval_gives_json(run, tmp_path):
     assert status == 0
     assert tuple(json.loads(out).values()) == Arbiter()([0.1, 0.2, 0.3])
     assert run("eval", "section-vi", "1", "0", "0", "--json", "--out", "w.json")[:2] == (0, "")
-    assert json.loads((tmp_path / "w.json").read_text()) == {"alpha_1": 1.0, "alpha_2": 0.0, "alpha_3": 0.0}
+    assert json.loads((tmp_path / "w.json").read_text()) == {"obstacle": 1.0, "shape": 0.0, "depth": 0.0}
 
 
 TABLE = 'time,"depth", obstacle,shape\n0,0.5,0.25,1\n\n1,1,0,1e-1\n'
@@ -110,13 +110,13 @@ def test_eval_of_a_table_takes_columns_by_name(run, tmp_path):
     for words, stdin in ((["day.csv"], ""), (["-"], TABLE)):
         status, out, _ = run("eval", "section-vi", "--csv", *words, stdin=stdin)
         header, *rows = csv.reader(io.StringIO(out))
-        assert status == 0 and header == ["alpha_1", "alpha_2", "alpha_3"]
+        assert status == 0 and header == ["obstacle", "shape", "depth"]
         assert [[float(cell) for cell in row] for row in rows] == weights
     assert run("eval", "section-vi", "--csv", "day.csv", "--out", "out.csv") == (0, "", "")
     assert (tmp_path / "out.csv").read_text() == out
     listed = json.loads(run("eval", "section-vi", "--csv", "day.csv", "--json")[1])
     assert [list(row.values()) for row in listed] == weights
-    assert run("eval", "section-vi", "--csv", "-", stdin="shape,depth,obstacle\n")[1] == "alpha_1,alpha_2,alpha_3\n"
+    assert run("eval", "section-vi", "--csv", "-", stdin="shape,depth,obstacle\n")[1] == "obstacle,shape,depth\n"
 
 
 @pytest.mark.parametrize(
@@ -182,9 +182,12 @@ def test_a_definition_of_no_format_is_refused_in_one_line(refused, tmp_path):
     assert "bad.fcl" in refused("show", "bad.fcl")
 
 
-def test_an_undefined_output_is_said(refused, gap):
-    assert "no rule fires" in refused("eval", gap, "7")
-    assert "line 3: output 'sail': no rule fires" in refused("eval", gap, "--csv", "-", stdin="wind\n1\n7\n")
+def test_an_undefined_output_is_nan_and_explained(run, gap):
+    assert run("eval", gap, "7")[:2] == (0, "sail = nan\n")
+    assert run("eval", gap, "7", "--json")[:2] == (0, '{"sail": null}\n')
+    assert run("eval", gap, "--csv", "-", stdin="wind\n1\n7\n")[1].splitlines()[2] == "nan"
+    assert json.loads(run("eval", gap, "--csv", "-", "--json", stdin="wind\n7\n")[1]) == [{"sail": None}]
+    assert "no rule fired, and no default" in run("explain", gap, "7")[1]
 
 
 def test_explain_says_what_fired(run):

@@ -13,7 +13,11 @@ from fuzzy_arbiter import Arbiter, Criterion, Rule, Shape, Term, prioritised
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.hierarchy import FORMS
-from fuzzy_arbiter.propositions import And, Is, Not, Or
+from fuzzy_arbiter.propositions import And, Hedged, Is, Not, Or
+from fuzzy_arbiter.rule import Operators
+from fuzzy_arbiter.terms.curves import curve
+from fuzzy_arbiter.terms.values import Constant, Linear
+from tests.fuzzy_arbiter.test_inputs_and_results import TIPPING
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "ventilation.py"
@@ -94,10 +98,12 @@ def test_the_definitions_of_the_manual_are_those_of_its_code():
         for statement in ast.parse(block).body:  # its expressions are compared with what they show where all pages are
             if not isinstance(statement, ast.Expr):
                 exec(compile(ast.Module([statement], []), "arbiter.md", "exec"), names)
-    of_criteria, of_rules = (reads(text, "toml") for text in re.findall(r"```toml\n(.*?)```", MANUAL, re.S))
+    (of_criteria,) = (reads(text, "toml") for text in re.findall(r"```toml\n(.*?)```", MANUAL, re.S))
     assert of_criteria == names["arbiter"].system
-    assert of_rules.inputs == names["system"].inputs[:1]
-    assert of_rules.outputs == (replace(names["sail"], default=None),)
+    assert names["system"] == TIPPING
+    poor = names["service"]["poor"]
+    assert names["system"].rules[0] == Rule(poor | names["food"]["poor"], names["tip"]["low"])
+    assert poor(3) == pytest.approx(0.4)  # as the text says
 
 
 def table(heading):
@@ -181,6 +187,29 @@ def changed(what):
         return replace(system, inputs=(replace(first, terms=terms), *system.inputs[1:]))
     if what == "prod with max":
         return replace(system, conjunction="prod")
+    if what == "hedges":
+        return replace(system, rules=(*system.rules, Rule(Hedged("very", obstacle), low)))
+    if what == "blocks of other operators":
+        return replace(
+            system, rules=(*system.rules, Rule(obstacle, low, operators=Operators("prod", "probor", "prod")))
+        )
+    if what == "Gaussians, bells, sigmoids":
+        terms = (*first.terms, Term("odd", curve("gaussian", 0.5, 0.1)), Term("even", curve("sigmoid", 0.5, 9.0)))
+        return replace(system, inputs=(replace(first, terms=terms), *system.inputs[1:]))
+    if what == "S, Z, Pi shapes":
+        terms = (*first.terms, Term("odd", curve("s_shape", 0.2, 0.8)))
+        return replace(system, inputs=(replace(first, terms=terms), *system.inputs[1:]))
+    if what == "other curves":
+        terms = (*first.terms, Term("odd", curve("spike", 0.2, 0.8)))
+        return replace(system, inputs=(replace(first, terms=terms), *system.inputs[1:]))
+    if what == "constant and linear values":
+        values = (Term("low", Constant(0.0)), Term("high", Linear((1.0, 0.5, 0.0), 2.0)))
+        changed = (replace(v, terms=values, defuzzifier="average", aggregation="sum") for v in system.outputs)
+        return replace(system, outputs=tuple(changed))
+    if what == "bisector, means of maxima":
+        return replace(system, outputs=tuple(replace(v, defuzzifier="bisector") for v in system.outputs))
+    if what == "keeping the value before":
+        return replace(system, outputs=tuple(replace(v, lock_previous=True) for v in system.outputs))
     assert what == "names with spaces"
     return prioritised([Criterion("a wall", on="near by", off="far off")], normalization="none")
 

@@ -1,10 +1,11 @@
 """Explanations: what fired, how strongly, and what decided."""
 
 import json
+import math
 
 import pytest
 
-from fuzzy_arbiter import Arbiter, Criterion, Output, System, Term, UndefinedOutputError, Variable, falling, rising
+from fuzzy_arbiter import Arbiter, Criterion, Output, System, Term, Variable, falling, rising
 from fuzzy_arbiter.engines.firing import Firing
 
 SAMPLES = [(0.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.3, 0.6, 0.5), (0.5, 0.5, 0.5), (0.25, 1.0, 0.75)]
@@ -38,7 +39,7 @@ def test_strengths_and_decisions_by_hand():
         alpha = 3 * h**2 - 2 * h**3
         assert output.weight == pytest.approx(alpha, abs=1e-15)
         assert output.centroid == pytest.approx((1 + alpha) / 3, abs=1e-15)
-    assert (e.winner, e.runner_up) == ("alpha_2", "alpha_3")
+    assert (e.winner, e.runner_up) == ("shape", "depth")
     assert e.margin == pytest.approx(0.648 - 0.352)
 
 
@@ -70,8 +71,8 @@ def test_no_winner_where_all_are_zero_and_where_two_tie():
     assert (rest.winner, rest.runner_up, rest.margin, rest.tied) == (None, None, 0.0, ())
     assert "all weights are 0" in str(rest)
     tie = Arbiter().explain([0.5, 0.5, 0.0])
-    assert (tie.winner, tie.tied) == (None, ("alpha_1", "alpha_2"))
-    assert "alpha_1, alpha_2 are equal" in str(tie)
+    assert (tie.winner, tie.tied) == (None, ("obstacle", "shape"))
+    assert "obstacle, shape are equal" in str(tie)
     assert tie.outputs[0].margin == 0.0
     assert "alike" in str(tie)
 
@@ -115,9 +116,18 @@ def test_a_default_is_said():
     assert not arbiter.explain([1.0]).outputs[0].default_used
 
 
-def test_an_undefined_output_is_an_error():
-    with pytest.raises(UndefinedOutputError, match="lamp_1"):
-        lamp(("if light is dark then lamp_1 is high", "if light is bright then lamp_1 is low")).explain([5.0])
+def test_an_output_without_a_firing_rule_says_so_and_the_others_are_decided():
+    rules = ("if light is dark then lamp_1 is high", "if light is bright then lamp_1 is low")
+    whole = "if light is dark or light is not dark then lamp_2 is high"
+    e = lamp((*rules, whole), outputs=2).explain([5.0])
+    first, second = e.outputs
+    assert math.isnan(first.weight) and math.isnan(first.centroid) and first.default_used and first.decided_by is None
+    assert (second.decided_by, e.winner, e.runner_up) == ("R3", "lamp_2", None)
+    assert "no rule fired, and no default" in str(e)
+    data = json.loads(json.dumps(e.as_dict(), allow_nan=False))
+    assert data["outputs"][0]["weight"] is data["outputs"][0]["centroid"] is None
+    nothing = lamp(rules).explain([5.0])
+    assert (nothing.winner, nothing.tied) == (None, ())
 
 
 def test_text_shows_what_fired_and_nothing_else():
@@ -126,7 +136,7 @@ def test_text_shows_what_fired_and_nothing_else():
     assert "rules that fired, 5 of 8" in lines
     assert "R1" not in text
     assert "  R5  0.25  if obstacle is not_exist and shape is complex then alpha_2 is high" in lines
-    assert lines[-1] == "winner: alpha_2, 0.15625 above alpha_1"
+    assert lines[-1] == "winner: shape, 0.15625 above obstacle"
     assert all(line == line.rstrip() for line in lines)
     ten = str(Arbiter([Criterion(f"c{i}") for i in range(10)]).explain([0.3] * 10))
     assert max(map(len, ten.splitlines())) <= 120
@@ -137,7 +147,7 @@ def test_as_dict_is_json():
     e = Arbiter().explain([0.3, 0.6, 0.5])
     data = json.loads(json.dumps(e.as_dict()))
     assert data == e.as_dict()
-    assert data["winner"] == "alpha_2"
+    assert data["winner"] == "shape"
     assert data["rules"][7] == {
         "label": "R8",
         "text": "if obstacle is not_exist and shape is simple and depth is not_maintain then alpha_3 is high",

@@ -19,7 +19,6 @@ from fuzzy_arbiter import (
     Shape,
     System,
     Term,
-    UndefinedOutputError,
     Variable,
     falling,
     propositions,
@@ -108,7 +107,7 @@ def plain(rules, shapes=CROSSED):
     terms = tuple(Term(name, shape) for name, shape in zip(("off", "on", "more"), shapes, strict=False))
     x = Variable("x", (0, 1), terms)
     y = Output("y", (0, 1), (Term("low", falling(0, 1)), Term("high", rising(0, 1))))
-    return Arbiter(system=System((x,), (y,), rules))
+    return Arbiter(system=System((x,), (y,), rules, normalization="range"))
 
 
 def test_terms_can_be_given_where_the_rules_do_not_tell():
@@ -229,14 +228,10 @@ def test_bad_scans_leave_the_state(inputs, times, match):
     assert h([0.5, 0, 0], 1) == (1, 0, 0)
 
 
-def test_an_undefined_output_leaves_the_state():
+def test_an_output_without_a_firing_rule_is_nan():
     h = HysteresisArbiter(plain(("if x is off then y is low",)), enter=0.5, release=0, on={"x": "on"})
-    for _ in range(2):
-        with pytest.raises(UndefinedOutputError):
-            h([1.0], 0.0)
-        with pytest.raises(UndefinedOutputError):
-            h.scan([[1.0]], [0.0])
-        assert h.active == {"x": False}
+    assert np.isnan(h([1.0], 0.0)).tolist() == np.isnan(h.scan([[1.0]], [0.0])[0]).tolist() == [True]
+    assert h.active == {"x": True}
 
 
 @pytest.mark.parametrize(

@@ -41,6 +41,7 @@ SAIL = System(
         "if wind is calm then sail is full and keel is up",
         "if wind is fresh or waves is high then sail is half and keel is down with 0.7",
     ),
+    normalization="range",
 )
 
 
@@ -98,10 +99,16 @@ def test_the_package_comes_without_matplotlib():
         "import sys; sys.modules['matplotlib'] = None\n"
         "from fuzzy_arbiter import Arbiter, pictures\n"
         "try: pictures.terms(Arbiter(engine='exact'), 'obstacle')\n"
-        "except ImportError: print('only when it draws')"
-    )
+        "except ArbiterError as error: print(error)\n"
+        "try: pictures.decisions(Arbiter(), ('obstacle', 'shape'))\n"
+        "except ArbiterError as error: print(error)\n"
+        "from fuzzy_arbiter.__main__ import main\n"
+        "main(['plot', 'section-vi', 'terms', '--out', 'no.png'])"
+    ).replace("import Arbiter", "import Arbiter, ArbiterError")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "only when it draws"
+    line = "pictures: Matplotlib is not installed, expected the extra fuzzy-arbiter[plot]"
+    assert done.stdout.splitlines() == [line, line]
+    assert done.stderr == f"fuzzy_arbiter: {line}\n"
 
 
 @pytest.mark.parametrize(
@@ -128,7 +135,7 @@ def test_unknown_inputs_are_answered_with_the_known(arbiter, draw):
     ],
 )
 def test_unknown_outputs_are_answered_with_the_known(arbiter, draw):
-    with pytest.raises(DefinitionError, match=r"no output 'beta', expected one of alpha_1, alpha_2, alpha_3"):
+    with pytest.raises(DefinitionError, match=r"no output 'beta', expected one of obstacle, shape, depth"):
         draw(arbiter)
 
 
@@ -237,9 +244,11 @@ def test_of_many_rules_those_that_do_not_fire_are_left_out():
 def test_rules_that_do_not_fire_are_said(sail):
     said = texts(pictures.rules(sail, [15.0, 0.5], "sail"))
     assert any(text.endswith("sail: no rule fires") for text in said)
-    with_default = replace(SAIL, outputs=(replace(SAIL.outputs[0], default=50.0), SAIL.outputs[1]))
-    said = texts(pictures.rules(Arbiter(system=with_default, engine="exact"), [15.0, 0.5], "sail"))
-    assert "default 50" in said and any(text.endswith("sail: another output is undefined") for text in said)
+    with_default = replace(SAIL, outputs=(replace(SAIL.outputs[0], default=72.0), SAIL.outputs[1]))
+    other = Arbiter(system=with_default, engine="exact")
+    said = texts(pictures.rules(other, [15.0, 0.5], "sail"))
+    weight = other([15.0, 0.5])["sail"]
+    assert "default 72" in said and any(text.endswith(f"sail = {weight:.4g}") for text in said)
 
 
 def test_a_surface_holds_the_weights(arbiter):
@@ -271,9 +280,9 @@ def keys(ax):
 
 
 def test_decisions_name_the_regions_that_there_are(arbiter, sail):
-    assert keys(pictures.decisions(arbiter, ("obstacle", "shape"), {"depth": 0.4})) == ["alpha_1", "alpha_2", "alpha_3"]
-    assert keys(pictures.decisions(arbiter, ("obstacle", "shape"), {"depth": 0.0})) == ["alpha_1", "alpha_2"]
-    assert keys(pictures.decisions(arbiter, ("shape", "depth"), {"obstacle": 1.0})) == ["alpha_1"]
+    assert keys(pictures.decisions(arbiter, ("obstacle", "shape"), {"depth": 0.4})) == ["obstacle", "shape", "depth"]
+    assert keys(pictures.decisions(arbiter, ("obstacle", "shape"), {"depth": 0.0})) == ["obstacle", "shape"]
+    assert keys(pictures.decisions(arbiter, ("shape", "depth"), {"obstacle": 1.0})) == ["obstacle"]
     six = Arbiter(MEASURED, engine="exact")
     at = {f"criterion_{i}": 0.5 for i in range(1, 5)}
     assert keys(pictures.decisions(six, ("distance to the nearest obstacle ahead", "criterion_0"), at))[-1] == "shared"

@@ -1,4 +1,7 @@
-"""What is shipped, built once from a clean copy of the tracked files, and installed once in an empty environment."""
+"""What is shipped, built once from a clean copy of the tracked files, and installed once in an empty environment.
+
+Two distributions: fuzzy-arbiter from its folder, and subreach, which needs it.
+"""
 
 from __future__ import annotations
 
@@ -30,14 +33,14 @@ def run(*command: object, **more: object) -> str:
     return done.stdout
 
 
-def build(tracked: list[str], folder: Path, *flags: str) -> None:
-    """Build what is shipped, in a folder, from a clean copy of the checkout."""
+def build(tracked: list[str], folder: Path, *flags: str, project: str = ".") -> None:
+    """Build what is shipped of a project, in a folder, from a clean copy of the checkout."""
     copy = folder / "copy"
     for name in tracked:
         (copy / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, copy / name)
     clean = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-    run(sys.executable, "-m", "build", "--no-isolation", *flags, "--outdir", folder, copy, env=clean)
+    run(sys.executable, "-m", "build", "--no-isolation", *flags, "--outdir", folder, copy / project, env=clean)
     assert sorted(path.relative_to(copy).as_posix() for path in copy.rglob("*.zip")) == [], "left in the checkout"
 
 
@@ -57,8 +60,21 @@ def wheel(dist) -> Path:
 
 
 @pytest.fixture(scope="session")
+def arbiter_dist(tracked, once) -> Path:
+    """Return a folder with the source distribution of fuzzy-arbiter and the wheel that is built from it."""
+    return once("arbiter-dist", lambda folder: build(tracked, folder, project="fuzzy_arbiter"))
+
+
+@pytest.fixture(scope="session")
+def arbiter_wheel(arbiter_dist) -> Path:
+    """Return the wheel of fuzzy-arbiter."""
+    (path,) = arbiter_dist.glob("*.whl")
+    return path
+
+
+@pytest.fixture(scope="session")
 def own_wheel(tracked, once) -> Path:
-    """Return a wheel that is built from a checkout, as ``pip install .`` does."""
+    """Return a wheel that is built from a checkout, as ``pip install ./fuzzy_arbiter .`` does."""
     (path,) = once("own-wheel", lambda folder: build(tracked, folder, "--wheel")).glob("*.whl")
     return path
 
@@ -78,11 +94,12 @@ def program(folder: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def installed(wheel, once) -> Path:
-    """Return an environment with the wheel and what it asks for, and nothing else."""
+def installed(wheel, arbiter_wheel, once) -> Path:
+    """Return an environment with both wheels and what they ask for, and nothing else."""
 
     def install(folder: Path) -> None:
         run(sys.executable, "-m", "venv", folder / "env")
-        run(program(folder), "-m", "pip", "install", "--quiet", "--no-compile", "--disable-pip-version-check", wheel)
+        pip = [program(folder), "-m", "pip", "install", "--quiet", "--no-compile", "--disable-pip-version-check"]
+        run(*pip, arbiter_wheel, wheel)
 
     return program(once("installed", install))

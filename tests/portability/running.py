@@ -141,7 +141,10 @@ def _python_of(version: str, extras: Sequence[str]) -> Path:
         _asked(pip, BrokenError, "uv")
     wanted = [word for extra in extras for word in ("--extra", extra)]
     resolve = ["pip", "compile", "--quiet", "--only-binary", ":all:", "--python-version", version, *wanted]
-    resolve += ["--output-file", str(requirements), "pyproject.toml"]
+    arbiter = folder / "arbiter.in"  # which is in no index
+    arbiter.write_text("./fuzzy_arbiter\n", encoding="utf-8")
+    resolve += ["--no-emit-package", "fuzzy-arbiter", "--output-file", str(requirements)]
+    resolve += ["pyproject.toml", str(arbiter)]
     _asked([str(uv), *resolve], NotToBeHadError, f"wheels of all that is needed on Python {version}")
     _asked(
         [str(uv), "venv", "--quiet", "--clear", "--seed", "--python", version, str(python.parents[1])],
@@ -150,7 +153,8 @@ def _python_of(version: str, extras: Sequence[str]) -> Path:
     )
     install = [str(uv), "pip", "install", "--quiet", "--python", str(python)]
     _asked([*install, "--only-binary", ":all:", "--requirement", str(requirements)], BrokenError, "the dependencies")
-    _asked([*install, "--no-deps", "--editable", str(ROOT)], BrokenError, "the project")
+    own = ["--editable", str(ROOT / "fuzzy_arbiter"), "--editable", str(ROOT)]
+    _asked([*install, "--no-deps", *own], BrokenError, "the project")
     return python
 
 

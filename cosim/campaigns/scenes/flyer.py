@@ -25,6 +25,8 @@ from cosim.batch.flight_config import (
 from cosim.batch.fused_loop import fly_law
 from cosim.campaigns.scenes.scene import KnownScene, Scene, known_scene, plant_values
 from cosim.errors import RunError
+from cosim.scenario.arbiter_rules import PAPER_RULES
+from cosim.scenario.criteria import PAPER
 from cosim.scenario.sensor_suite import outage_schedule, sensor_model, sensor_parameters
 from cosim.scenario.tables import Outage
 from cosim.scenario.vehicle_model import vehicle_model
@@ -149,7 +151,7 @@ class SceneFlyer:
             If the plant cannot be as the scene has it. The flyer can go on with another scene.
         """
         c, m = self.conditions, self._vehicle.n_thrusters
-        plant, known = self._plant, known_scene(scene)
+        plant, known = self._plant, known_scene(scene, c.ramp)
         law = self._law(known.regions.kinds.size)
         plant.reset()
         values, sensors = plant_values(scene, self._vehicle, c.plant_step), {}
@@ -166,9 +168,11 @@ class SceneFlyer:
         losses = plant.native(LOSSES, ())
         losses.inputs[:] = [sensors.get(name, 0.0) for name in LOSSES]
         setup = self._setup(scene, known, sensors)
-        rows = np.zeros((c.controls, 20 + m + law.report.size) if trace else (0, 0))
-        workspace = make_workspace(known.regions.kinds.size, m, m)
-        metrics, _ = fly_law(setup, native, effectiveness, losses, self._allocator(), law, workspace, rows)
+        rows = np.zeros((c.controls, 17 + len(PAPER) + m + law.report.size) if trace else (0, 0))
+        workspace = make_workspace(setup, len(PAPER), m, m)
+        metrics, _ = fly_law(
+            setup, native, effectiveness, losses, self._allocator(), law, PAPER_RULES.system, workspace, rows
+        )
         return self._score(metrics, setup), rows
 
     def _score(self, metrics: FlightMetrics, setup: FlightConfig) -> Score:
@@ -198,7 +202,7 @@ class SceneFlyer:
             goal=known.goal,
             regions=known.regions,
             criteria=known.criteria,
-            ramp=c.ramp,
+            inputs=known.inputs,
             step=c.plant_step,
             steps=c.controls * c.plant_steps,
             control_every=c.plant_steps,

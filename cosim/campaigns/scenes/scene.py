@@ -18,7 +18,10 @@ from controller.regions import DepthBand, Region, Sphere, pack
 from controller.regions.region_set import PackedRegions
 from controller.regions.shape import GREATEST
 from cosim.errors import ScenarioError
-from cosim.scenario.scenario import CRITERIA
+from cosim.scenario.arbiter_rules import PAPER_RULES
+from cosim.scenario.criteria import PAPER
+from cosim.scenario.tables import SecondaryRegion
+from cosim.simulation.arbiter_inputs import PackedInputs, pack_inputs
 from plant_fmu import PlantFmuError
 from plant_fmu.toml_tables import decode
 from plant_fmu.vehicle import Vehicle
@@ -91,27 +94,32 @@ class KnownScene(NamedTuple):
 
     goal: PackedRegions
     regions: PackedRegions  # obstacles, then the depth band
-    criteria: NDArray[np.int64]  # (n,) index into CRITERIA of each of the regions
+    criteria: NDArray[np.int64]  # (n,) place of each region's criterion among the paper's
+    inputs: PackedInputs  # what the arbiter decides by
 
 
-def known_scene(scene: Scene) -> KnownScene:
+def known_scene(scene: Scene, ramp: float = 0.2) -> KnownScene:
     """Return what the law is told of a scene.
 
     Parameters
     ----------
     scene : Scene
         With all that the plant needs.
+    ramp : float
+        Width of the arbiter's memberships [m].
 
     Returns
     -------
-    Told
+    KnownScene
         Arrays of its own.
     """
+    names = [criterion.name for criterion in PAPER]
     regions, criteria = zip(*scene_regions(scene), strict=True)
     return KnownScene(
         goal=pack([Region("goal", Sphere(scene.goal.centre, scene.goal.radius), "in")]),
         regions=pack(regions),
-        criteria=np.array([CRITERIA.index(criterion) for criterion in criteria], dtype=np.int64),
+        criteria=np.array([names.index(criterion) for criterion in criteria], dtype=np.int64),
+        inputs=pack_inputs(list(map(SecondaryRegion, regions, criteria)), PAPER, PAPER_RULES, ramp),
     )
 
 

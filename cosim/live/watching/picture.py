@@ -10,10 +10,11 @@ from rich.text import Text
 
 from cosim.live.watching.bars import Bars
 from cosim.live.watching.sources import Look
-from cosim.scenario.scenario import CRITERIA
 from cosim.simulation.commands.commands import MODES
 
-_STYLES = {"obstacle": "red", "shape": "yellow", "depth": "blue", None: "green"}
+_STYLES = {"#D55E00": "red", "#E69F00": "yellow", "#56B4E9": "blue"}  # of the terminal, for colours of criteria
+_OF_GOAL = "green"
+_LONGEST_NAME = 12  # characters of a criterion
 _FIRED = 0.005  # strength of a rule below which it does not count
 _WIDE = 120  # characters, from which on three columns have room
 
@@ -96,10 +97,10 @@ def _now(look: Look) -> Text:
     region = look.header["regions"][int(index)]
     criterion, keep = region["criterion"], "stay within" if region["keep"] == "in" else "keep out"
     if criterion is None:
-        line.append("Heads for the goal", style="bold green")
+        line.append("Heads for the goal", style=f"bold {_OF_GOAL}")
     else:
-        line.append(f"Gives way to {plain(region['name'])}", style=f"bold {_STYLES[criterion]}")
-        line.append(f" ({criterion}, {keep})")
+        line.append(f"Gives way to {plain(region['name'])}", style=f"bold {_style(look, criterion)}")
+        line.append(f" ({plain(criterion)}, {keep})")
     mode, armed = look["commands.mode"], look["commands.armed"]
     if 0 <= mode < len(MODES):
         line.append(f"; mode {MODES[int(mode)]}, {'armed' if armed else 'DISARMED'}")
@@ -116,11 +117,21 @@ def _foot(look: Look) -> list[Text]:
 # ---- columns -------------------------------------------------------------------------------------------------------
 
 
+def _style(look: Look, criterion: str | None) -> str:
+    """Return the style of a criterion, None for the goal."""
+    colours = {one["name"]: one["colour"].upper() for one in look.header["criteria"]}
+    colour = colours.get(criterion) if criterion is not None else None
+    return _OF_GOAL if colour is None else _STYLES.get(colour, colour)
+
+
 def _weights(look: Look, width: int, bars: Bars) -> list[Text]:
     lines = [_title("Weights of the arbiter")]
-    for name in CRITERIA:
+    names = [plain(criterion["name"]) for criterion in look.header["criteria"]]
+    wide = min(max(9, *map(len, names)), _LONGEST_NAME)
+    for name in names:
         weight, asks = look[f"weight.{name}"], look[f"membership.{name}"]
-        line = Text(f"{name:<9}").append_text(bars.part(weight, width - 26, _STYLES[name]))
+        line = Text(f"{name[:wide]:<{wide}}")
+        line.append_text(bars.part(weight, width - 17 - wide, _style(look, name)))
         lines.append(line.append(f" {weight:4.2f} asks {asks:4.2f}"))
     return lines
 
@@ -138,7 +149,7 @@ def _distances(look: Look, width: int, bars: Bars, room: int | None) -> list[Tex
     lines = [_title(f"Distances, bars to {scale:g} m")]
     shown = found if room is None or len(found) < room else found[: max(1, room - 2)]
     for _, _, clearance, i, region in shown:
-        style = _STYLES[region["criterion"]]
+        style = _style(look, region["criterion"])
         name = plain(region["name"])[:9]
         mark = ">" if i == active else " "
         line = Text(f"{mark}{name:<9} ", style="bold" if i == active else "")

@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any
 from urllib.parse import urlsplit
 
 import msgspec
@@ -23,6 +23,7 @@ from cosim.results.record import PARTS, RECORD, Record
 from cosim.results.required_columns import require_columns
 from cosim.results.run_result import SCENARIO, SUMMARY, load_run
 from cosim.results.wording import verdict
+from cosim.scenario.criteria import MAX_CRITERIA
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.signals import Array
 
@@ -38,9 +39,14 @@ class _Signal(msgspec.Struct):
     name: str
 
 
+class _Criterion(msgspec.Struct):
+    name: str
+    colour: Annotated[str, msgspec.Meta(pattern="^#[0-9A-Fa-f]{6}$")]
+
+
 class _Region(msgspec.Struct):
     name: str
-    criterion: Literal["obstacle", "shape", "depth"] | None
+    criterion: str | None
     keep: str
     unit: str
     comes: bool
@@ -62,6 +68,7 @@ class _Header(msgspec.Struct):
     law: str
     duration: float
     ramp: float
+    criteria: Annotated[list[_Criterion], msgspec.Meta(max_length=MAX_CRITERIA)]
     regions: list[_Region]
     rules: list[_Rule]
     signals: list[_Signal]

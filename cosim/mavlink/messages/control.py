@@ -9,10 +9,10 @@ from typing import Any
 from cosim.mavlink.messages.pose import degrees
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.encode import wrapped
-from cosim.scenario.scenario import CRITERIA
 
 _CENTRE, _SWING = 1500, 400  # µs of PWM: at rest, and to either end
 _SERVOS, _OUTPUTS = 16, 32
+_LONGEST_NAME = 10  # characters of a named value
 _POSITION_AND_VELOCITY = 0b110111000000  # type_mask: all but these is ignored
 
 # what a law reports of itself that is worth watching, if it does
@@ -75,7 +75,7 @@ def position_target_local_ned(context: VehicleContext) -> list[Any]:
 def named_values(context: VehicleContext) -> list[tuple[str, float]]:
     """Return the few quantities to be watched, by a name of up to ten characters."""
     view = context.view
-    values = [(f"w_{name}", weight) for name, weight in zip(CRITERIA, view.weights, strict=True)]
+    values = list(zip(weight_names(view.criteria), view.weights, strict=True))
     values += [(f"phi{i}", phi) for i, phi in enumerate(view.estimate, 1)]
     clearances = view.clearances
     values.append(("g_goal", view.region_values[0]))
@@ -89,6 +89,20 @@ def named_values(context: VehicleContext) -> list[tuple[str, float]]:
     return values
 
 
+def weight_names(criteria: Sequence[str]) -> list[str]:
+    """Return what the weights of criteria are called, in ten characters: ``w_obstacle``, ``w_visibili``.
+
+    A name that is taken ends in a number.
+    """
+    names: list[str] = []
+    for criterion in criteria:
+        name, number = f"w_{criterion}"[:_LONGEST_NAME], 2
+        while name in names:
+            name, number = f"w_{criterion}"[: _LONGEST_NAME - len(str(number))] + str(number), number + 1
+        names.append(name)
+    return names
+
+
 def named_value_float(context: VehicleContext) -> list[Any]:
     """NAMED_VALUE_FLOAT: one for each of `named_values`."""
     time = wrapped(context.view.boot_us)
@@ -98,9 +112,9 @@ def named_value_float(context: VehicleContext) -> list[Any]:
 def debug_float_array(context: VehicleContext) -> list[Any]:
     """DEBUG_FLOAT_ARRAY: all that law and arbiter say, by array_id.
 
-    1, ``weights``: memberships, then weights, of obstacle, shape and depth. 2, ``values``: g of the goal, then of each
-    region as the scenario has them. 3, ``clearances``: in the same order. 4, ``thrusts``: the force of each thruster
-    [N], then what is asked of each. 5, ``law``: what the law reports of itself, in the order of the run's columns.
+    1, ``weights``: memberships, then weights, of the criteria by their order. 2, ``values``: g of the goal, then of
+    each region as the scenario has them. 3, ``clearances``: in the same order. 4, ``thrusts``: the force of each
+    thruster [N], then what is asked of each. 5, ``law``: what the law reports of itself, in the order of the columns.
     58 numbers at the most.
     """
     view = context.view

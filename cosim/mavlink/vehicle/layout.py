@@ -29,6 +29,7 @@ class Layout:
         self.at = {column.name: i for i, column in enumerate(columns)}
         self.length = len(columns)
         self.thrusters = scenario.vehicle.n_thrusters
+        self.criteria = scenario.criterion_names
         self.regions = tuple(region.region.name for region in scenario.regions)
         self.reports = tuple(column.name for column in columns if column.name.startswith("law."))
         self.goal_middle = shape_center(scenario.goal)

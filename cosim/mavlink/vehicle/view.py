@@ -6,7 +6,6 @@ import math
 from functools import cached_property
 
 from cosim.mavlink.vehicle.layout import Layout
-from cosim.scenario.scenario import CRITERIA
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import MODES, Mode
 from cosim.simulation.signals import Array
@@ -178,14 +177,19 @@ class View:
         return self._several("goal.clearance", 1 + len(self._layout.regions))
 
     @property
+    def criteria(self) -> tuple[str, ...]:
+        """Names of the criteria, the first in priority first."""
+        return self._layout.criteria
+
+    @property
     def memberships(self) -> list[float]:
-        """Of the criteria."""
-        return self._several(f"membership.{CRITERIA[0]}", len(CRITERIA))
+        """Of the criteria, the first in priority first."""
+        return self._several(f"membership.{self.criteria[0]}", len(self.criteria))
 
     @property
     def weights(self) -> list[float]:
-        """Of the criteria."""
-        return self._several(f"weight.{CRITERIA[0]}", len(CRITERIA))
+        """Of the criteria, likewise."""
+        return self._several(f"weight.{self.criteria[0]}", len(self.criteria))
 
     @property
     def estimate(self) -> list[float]:

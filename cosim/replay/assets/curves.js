@@ -11,7 +11,8 @@ const HUES = {
     blue: "#8fa8ff", purple: "#e79ac8", ink: "#e8eef4", grey: "#5b6a78",
   },
 };
-const OF_CRITERION = { obstacle: "vermillion", shape: "orange", depth: "sky" };
+// criteria in colours of the palette get the hue that a theme has of it, others their own
+const HUE_OF = { "#D55E00": "vermillion", "#E69F00": "orange", "#56B4E9": "sky", "#CC79A7": "purple", "#009E73": "green" };
 const IN_TURN = ["blue", "vermillion", "green", "purple"];
 const DASHES = [[], [7, 4], [2, 3], [10, 3, 2, 3], [14, 4], [4, 2, 1, 2, 1, 2]];
 const TOWARDS_INK = [0, 0.5, 0.25, 0.65]; // how far to ink regions of one criterion go, in turn
@@ -22,9 +23,21 @@ function runDash(index) {
   return DASHES[index % DASHES.length];
 }
 
-/** The CSS colour of a hue in a theme, moved by `shade` towards the ink. */
+/** The hue of a colour that the header has, "#RRGGBB". */
+function hueOf(colour) {
+  return HUE_OF[colour.toUpperCase()] ?? colour;
+}
+
+/** The criteria of some runs by their names, in the order of priority, each with its colour. */
+function criteriaOf(runs) {
+  const found = new Map();
+  for (const run of runs) for (const one of run.header.criteria) if (!found.has(one.name)) found.set(one.name, one);
+  return [...found.values()];
+}
+
+/** The CSS colour of a hue in a theme, or of "#rrggbb", moved by `shade` towards the ink. */
 function hueColour(hue, theme, shade = 0) {
-  const base = HUES[theme][hue];
+  const base = HUES[theme][hue] ?? hue;
   if (!shade) return base;
   const [from, to] = [base, HUES[theme].ink].map((hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16)));
   return `rgb(${from.map((x, i) => Math.round(x + shade * (to[i] - x))).join(" ")})`;
@@ -80,7 +93,7 @@ function clearances(runs, unit) {
   return [...found.values()].map(({ region }) => {
     const faint = Boolean(region.criterion) && !named.has(region.name);
     const nth = faint ? 0 : (seen[region.criterion] = (seen[region.criterion] ?? -1) + 1);
-    return signal(`${region.name}.clearance`, region.name, faint ? "grey" : OF_CRITERION[region.criterion] ?? "green", {
+    return signal(`${region.name}.clearance`, region.name, faint ? "grey" : hueOf(region.colour), {
       shade: faint ? 0 : TOWARDS_INK[nth % TOWARDS_INK.length],
       dash: faint ? [] : DASHES[told++ % DASHES.length],
       faint,
@@ -112,7 +125,9 @@ function estimates(indices) {
  */
 function chartsOf(runs) {
   const criteria = (kind) =>
-    Object.entries(OF_CRITERION).map(([name, hue], i) => signal(`${kind}.${name}`, name, hue, { dash: DASHES[i] }));
+    criteriaOf(runs).map(({ name, colour }, i) =>
+      signal(`${kind}.${name}`, name, hueOf(colour), { dash: DASHES[i % DASHES.length] }),
+    );
   const axes = (kind, letters, words = letters) => inTurn([...letters].map((a) => `${kind}.${a}`), [...words]);
   const size = (kind) => derived((run) => sizes(run, ["X", "Y", "Z"].map((axis) => `${kind}.${axis}`)));
   const driven = runs.filter((run) => run.header.through === "thrusters"); // the others would be level at 0

@@ -1,6 +1,5 @@
 // Colours: of Okabe and Ito, whom colour-blind readers can follow, on paper and in the dark.
 
-const CRITERION_COLOURS = { obstacle: "#D55E00", shape: "#E69F00", depth: "#56B4E9" };
 const GOAL_COLOUR = "#009E73";
 
 /** Of the ways of several runs: first those that no criterion has. */
@@ -57,7 +56,7 @@ function mixedColour(from, to, part) {
 
 /** The full colour of a region: that of its criterion; the goal has its own. */
 function fullColour(region) {
-  return region.criterion ? CRITERION_COLOURS[region.criterion] : GOAL_COLOUR;
+  return region.colour;
 }
 
 /**

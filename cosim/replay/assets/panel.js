@@ -1,5 +1,17 @@
 // The side panel: what matters now, in words and bars.
 
+/** A hue for style sheets: one of the page's, or "#rrggbb". */
+function cssHue(hue) {
+  return hue.startsWith("#") ? hue : `var(--${hue})`;
+}
+
+/** Give a mark the shape and colour of a region's criterion; none of no region. */
+function setMark(mark, run, region) {
+  const place = run.header.criteria.findIndex((one) => one.name === region?.criterion);
+  mark.className = `mark ${region ? (place < 0 ? "goal" : `of-${place % 4}`) : "unknown"}`;
+  mark.style.background = region ? cssHue(hueOf(region.colour)) : "";
+}
+
 /** A row with a bar: built once, then only told new numbers. */
 class BarRow {
   constructor(label, hue) {
@@ -7,7 +19,7 @@ class BarRow {
     this.name = element("span", "name", label);
     this.value = element("span", "value");
     this.fill = element("span", "fill");
-    if (hue) this.fill.style.setProperty("--hue", `var(--${hue})`);
+    if (hue) this.fill.style.setProperty("--hue", cssHue(hue));
     const track = element("span", "track");
     this.tick = element("span", "tick");
     this.tick.hidden = true;
@@ -59,7 +71,7 @@ class Panel {
     const { run } = this;
     const t = this.player.t;
     const active = activeWords(run, t);
-    this.mark.className = `mark ${active.region ? active.region.criterion ?? "goal" : "unknown"}`;
+    setMark(this.mark, this.run, active.region);
     setText(this.who, active.name);
     setText(this.what, active.region ? regionWords(active.region) : "");
     setText(this.why, active.sentence);
@@ -124,7 +136,9 @@ class Panel {
   _weights() {
     const { section, heading } = this._section("Weights", "weights");
     heading.append(element("span", "note", "bar: weight, tick: attention asked"));
-    this.weights = Object.entries(OF_CRITERION).map(([name, hue], i) => [name, new BarRow(`${name} α${i + 1}`, hue)]);
+    this.weights = this.run.header.criteria.map(({ name, colour }, i) => {
+      return [name, new BarRow(`${name} α${i + 1}`, hueOf(colour))];
+    });
     section.append(listOf(this.weights.map(([, row]) => row.element)));
   }
 
@@ -145,7 +159,8 @@ class Panel {
     heading.append(element("span", "note", "most pressing first"));
     this.distances = this.run.header.regions.map((region) => {
       const item = element("li");
-      const mark = element("span", `mark ${region.criterion ?? "goal"}`);
+      const mark = element("span");
+      setMark(mark, this.run, region);
       const name = element("span", "name", region.name);
       const value = element("span", "value");
       name.title = regionWords(region);

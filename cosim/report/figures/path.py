@@ -34,8 +34,7 @@ from cosim.report.figures.style import (
     places_of,
 )
 from cosim.report.figures.trajectory import SampledPath, way_of
-from cosim.scenario.colours import CRITERION_COLOURS, GOAL_COLOUR
-from cosim.scenario.scenario import CRITERIA
+from cosim.scenario.colours import GOAL_COLOUR
 from cosim.simulation.signals import Array
 
 SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # north and depth, as one looks west
@@ -71,7 +70,7 @@ def path_3d(data: FigureData) -> Figure:
         labels.offer(name, (box.view @ feature)[None])
     floor = np.column_stack([way.points[:, :2], np.full(len(way.points), high[2])])
     ax.plot(*(floor @ box.view.T).T, color=BLACK, linewidth=0.8, alpha=0.25)
-    _path(ax, way, box.view)
+    _path(ax, data, way, box.view)
     labels.put(way.points @ box.view.T)
     legend(figure, entries)
     return figure
@@ -115,7 +114,7 @@ def path_plane(data: FigureData) -> Figure:
             ax.plot(*(view @ feature), "*", color=colour, markersize=9)
             labels.offer(name, (view @ feature)[None])
         _targets(ax, way, view)
-        _path(ax, way, view)
+        _path(ax, data, way, view)
         labels.put(way.points @ view.T)
     ax.set_xlabel("north, NED x [m]")
     ax.xaxis.set_label_coords(0.5, (0.17 - BOTTOM) / (scale * (high - low)[1]))
@@ -153,15 +152,15 @@ def _frame(low: Array, high: Array) -> Array:
     return np.array([low, [high[0], low[1]], high, [low[0], high[1]], low])
 
 
-def _path(ax: Axes, way: SampledPath, view: Array) -> None:
+def _path(ax: Axes, data: FigureData, way: SampledPath, view: Array) -> None:
     """Draw where the vehicle went, in the colour of a criterion while the arbiter gives way to a region of it."""
     flat = way.points @ view.T
     ax.plot(*flat.T, color=PATH_COLOUR, linewidth=1.6)
-    for i, name in enumerate(CRITERIA):
+    for i, criterion in enumerate(data.scenario.criteria):
         there = way.given_way == i
         if there.any():
             there[:-1] |= there[1:]  # up to where the next piece begins
-            ax.plot(*np.where(there[:, None], flat, np.nan).T, color=CRITERION_COLOURS[name], linewidth=2.4)
+            ax.plot(*np.where(there[:, None], flat, np.nan).T, color=criterion.colour, linewidth=2.4)
     if way.overlap.any():
         ax.plot(*np.where(way.overlap[:, None], flat, np.nan).T, color=BLACK, linewidth=3)
     ax.plot(*flat[0], "x", color=BLACK, mew=2, markersize=7)
@@ -188,11 +187,11 @@ def _entries(data: FigureData, way: SampledPath) -> dict[str, Artist]:
     """Return what the legend of a picture in space tells, only of what there is."""
     shown = {secondary.criterion for secondary in data.scenario.regions}
     entries: dict[str, Artist] = {"goal": Patch(color=GOAL_COLOUR, alpha=0.4)}
-    entries |= {name: Patch(color=CRITERION_COLOURS[name], alpha=0.4) for name in CRITERIA if name in shown}
+    entries |= {c.name: Patch(color=c.colour, alpha=0.4) for c in data.scenario.criteria if c.name in shown}
     entries["path"] = Line2D([], [], color=PATH_COLOUR, linewidth=1.6)
-    for i, name in enumerate(CRITERIA):
+    for i, criterion in enumerate(data.scenario.criteria):
         if (way.given_way == i).any():
-            entries[f"gives way to {name}"] = Line2D([], [], color=CRITERION_COLOURS[name], linewidth=2.4)
+            entries[f"gives way to {criterion.name}"] = Line2D([], [], color=criterion.colour, linewidth=2.4)
     if way.overlap.any():
         entries["in the overlap"] = Line2D([], [], color=BLACK, linewidth=3)
     entries["start"] = Line2D([], [], color=BLACK, linestyle="", marker="x", mew=2)

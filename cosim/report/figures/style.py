@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from controller.regions import Region, Visibility
 from controller.regions.region_set import of_attitude
 from cosim.results.record import Rows
-from cosim.scenario.colours import CRITERION_COLOURS, GOAL_COLOUR
+from cosim.scenario.colours import GOAL_COLOUR, colour_of
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
@@ -115,7 +115,7 @@ def regions_of(scenario: Scenario) -> Iterator[tuple[Region, str]]:
     """
     yield scenario.goal_region, GOAL_COLOUR
     for secondary in scenario.regions:
-        yield secondary.region, CRITERION_COLOURS[secondary.criterion]
+        yield secondary.region, colour_of(scenario, secondary.criterion)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -29,8 +30,8 @@ from cosim.report.figures.style import (
 )
 from cosim.results.record import Rows
 from cosim.results.spans import spans
-from cosim.scenario.colours import CRITERION_COLOURS, GOAL_COLOUR
-from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.scenario.colours import GOAL_COLOUR
+from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.commands import MODES
 from cosim.simulation.signals import Array
 
@@ -153,16 +154,17 @@ def attitude(data: FigureData) -> Figure:
 def weights_overlap(data: FigureData) -> Figure:
     """Draw the weights around each window in which the regions overlap, at most the first three."""
     windows = data.summary["intersection_windows"][:_WINDOWS]
-    labels = [f"α{i + 1} {name}" for i, name in enumerate(CRITERIA)]
+    criteria = data.scenario.criteria
+    labels = [f"α{i + 1} {criterion.name}" for i, criterion in enumerate(criteria)]
     figure, axes = panels([2.0], [1.0] * len(windows), [*labels, "overlap"], titles=0.2)
     time = data.record["time"]
     for ax, (start, end) in zip(axes[0], windows, strict=True):
         first, last = _around(data, start, end)
         shown = (time >= first) & (time <= last)
         entries: dict[str, Artist] = {}
-        for label, name, dashes in zip(labels, CRITERIA, DASHES, strict=False):
-            curve = thin(time[shown], data.record[f"weight.{name}"][shown])
-            (entries[label],) = ax.plot(*curve, color=CRITERION_COLOURS[name], linestyle=dashes)
+        for label, criterion, dashes in zip(labels, criteria, cycle(DASHES), strict=False):
+            curve = thin(time[shown], data.record[f"weight.{criterion.name}"][shown])
+            (entries[label],) = ax.plot(*curve, color=criterion.colour, linestyle=dashes)
         entries["overlap"] = ax.axvspan(start, end, color=BLACK, alpha=0.08, linewidth=0)
         ax.set_title(f"{start:.3f} s to {end:.3f} s", fontsize=8, pad=3)
         ax.set_xlim(float(time[shown][0]), float(time[shown][-1]) + 1e-9)
@@ -177,10 +179,12 @@ def weights_overlap(data: FigureData) -> Figure:
 def weights(data: FigureData) -> Figure:
     """Draw memberships and weights of each criterion."""
     labels = ["weight, in its criterion's colour", "membership"]
-    figure, axes = _zoomed(data, [0.95] * len(CRITERIA), labels)
-    for i, (row, name) in enumerate(zip(axes, CRITERIA, strict=True)):
+    criteria = data.scenario.criteria
+    figure, axes = _zoomed(data, [0.95] * len(criteria), labels)
+    for i, (row, criterion) in enumerate(zip(axes, criteria, strict=True)):
+        name = criterion.name
         lines = [
-            curve(row, data, data.record[f"weight.{name}"], color=CRITERION_COLOURS[name], linewidth=1.8),
+            curve(row, data, data.record[f"weight.{name}"], color=criterion.colour, linewidth=1.8),
             curve(row, data, data.record[f"membership.{name}"], color=BLACK, linestyle=":", linewidth=1.0),
         ]
         row[0].set(ylim=(-0.06, 1.06), yticks=(0.0, 0.5, 1.0))

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from cosim.replay.activity import active_regions
 from cosim.report.figures.style import POINTS, FigureData, overlap_of
-from cosim.scenario.scenario import CRITERIA
 from cosim.simulation.signals import Array
 
 _TARGETS = 12  # that are drawn on the way at the most
@@ -79,15 +78,15 @@ def _given_way(data: FigureData, at: NDArray[np.intp]) -> NDArray[np.intp]:
     regions = data.scenario.regions
     if not regions:
         return np.full(len(at), -1)
-    criteria = [secondary.criterion for secondary in regions]
+    names, criteria = data.scenario.criterion_names, data.scenario.criterion_places
     memberships, weights, clearances = (
         np.column_stack([data.record[name][at] for name in names])
         for names in (
-            [f"membership.{name}" for name in CRITERIA],
-            [f"weight.{name}" for name in CRITERIA],
+            [f"membership.{name}" for name in names],
+            [f"weight.{name}" for name in names],
             [f"{secondary.region.name}.clearance" for secondary in regions],
         )
     )
     active = active_regions(criteria, memberships, weights, clearances).astype(int)
-    given_way: NDArray[np.intp] = np.array([-1, *map(CRITERIA.index, criteria)])[active]
+    given_way: NDArray[np.intp] = np.array([-1, *criteria])[active]
     return given_way

@@ -15,7 +15,6 @@ from cosim.batch.c_calls import Clock, fmi_do_step, seconds
 from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
 from cosim.campaigns.scenes.scene import Failure, Obstacle, SphereSpec, known_scene, plant_values, read_scenes
 from cosim.errors import RunError, ScenarioError
-from cosim.scenario.scenario import CRITERIA
 from cosim.scenario.vehicle_model import vehicle_model
 from fuzzy_arbiter import Arbiter, ramp
 from plant_fmu import Plant, PlantError, load_vehicle
@@ -79,7 +78,7 @@ class Readable:
                     self.rotation_gradients,
                     self.clearances,
                 )
-                memberships = [0.0] * len(CRITERIA)
+                memberships = [0.0] * 3
                 for criterion, clearance in zip(self.known.criteria, self.clearances, strict=True):
                     memberships[criterion] = max(memberships[criterion], ramp(clearance, c.ramp))
                 weights[:] = np.array(arbiter(memberships))[self.known.criteria]

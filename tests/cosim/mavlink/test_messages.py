@@ -9,9 +9,13 @@ from packaging.version import Version
 from pymavlink.dialects.v20 import all as mavlink
 
 from controller.quaternion import from_axis_angle, multiply, rotation_matrix
+from cosim.mavlink.messages.control import weight_names
 from cosim.mavlink.vehicle.geodesy import LocalFrame
-from cosim.mavlink.vehicle.layout import euler_of
+from cosim.mavlink.vehicle.layout import Layout, euler_of
+from cosim.mavlink.vehicle.view import View
 from cosim.mavlink.wire.encode import Encoder, float32, whole, wrapped
+from cosim.simulation.columns import names_of
+from cosim.simulation.signals import Column
 from tests.cosim.mavlink.station import Station, scenario
 
 TURN = from_axis_angle(np.array([0.0, 0.0, 1.0]), 2.0)
@@ -246,3 +250,21 @@ def test_euler_angles_are_those_of_the_plant():
         parts = [from_axis_angle(np.eye(3)[i], angle) for i, angle in enumerate((roll, pitch, yaw))]
         whole_turn = multiply(parts[2], multiply(parts[1], parts[0]))
         assert euler_of(whole_turn.tolist()) == pytest.approx((roll, pitch, yaw), abs=1e-9)
+
+
+def test_weights_of_criteria_of_ones_own_have_names_that_differ():
+    assert weight_names(("obstacle", "shape", "depth")) == ["w_obstacle", "w_shape", "w_depth"]
+    assert weight_names(("visibility", "visibilitx", "v")) == ["w_visibili", "w_visibil2", "w_v"]
+
+
+def test_the_weights_and_memberships_of_four_criteria_are_sent():
+    four = scenario(name="inspection-visibility")
+    columns = [Column(name, "", "") for name in names_of(four)]
+    weights, memberships = (0.5, 0.25, 0.125, 0.75), (1.0, 0.0, 0.5, 0.25)
+    row = np.zeros(len(columns))
+    for of, values in (("weight", weights), ("membership", memberships)):
+        at = [column.name for column in columns].index(f"{of}.obstacle")
+        row[at : at + 4] = values
+    view = View(Layout(four, columns), row)
+    assert (view.weights, view.memberships) == (list(weights), list(memberships))
+    assert dict(zip(weight_names(view.criteria), view.weights, strict=True))["w_visibili"] == 0.75

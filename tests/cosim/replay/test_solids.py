@@ -29,8 +29,7 @@ from controller.regions.shapes import ENTRIES
 from cosim.replay import header
 from cosim.replay.header import OF_ATTITUDE
 from cosim.replay.page import SCENE_SCRIPTS
-from cosim.scenario.colours import CRITERION_COLOURS, GOAL_COLOUR
-from cosim.scenario.scenario import CRITERIA
+from cosim.scenario.colours import GOAL_COLOUR
 
 ASSETS = Path(str(resources.files("cosim.replay"))) / "assets"
 NODE = shutil.which("node")
@@ -95,9 +94,8 @@ def test_the_page_draws_every_shape_of_attitude_and_knows_no_other():
     assert {name for name in ENTRIES if f'"{name}"' in scripts} == {"depth_band"}  # which is dragged up and down alone
 
 
-def test_the_page_has_the_colours_of_all_others():
-    assert run("return [CRITERION_COLOURS, GOAL_COLOUR];") == [CRITERION_COLOURS, GOAL_COLOUR]
-    assert set(CRITERION_COLOURS) == set(CRITERIA)
+def test_the_page_has_the_colour_of_the_goal_as_all_others():
+    assert run("return GOAL_COLOUR;") == GOAL_COLOUR
 
 
 def test_a_mesh_is_drawn_as_it_comes():

@@ -13,7 +13,6 @@ from cosim.replay.trace import nan_to_none, trace_of
 from cosim.replay.viewing import Viewing
 from cosim.results.record import Rows
 from cosim.results.run_result import load_run
-from cosim.scenario.scenario import CRITERIA
 from cosim.simulation.signals import Column
 from fuzzy_arbiter import Arbiter
 from tests.cosim.replay.decoding import active_of
@@ -68,12 +67,12 @@ def test_who_is_active_agrees_with_a_reading_row_by_row(docking):
 def test_nothing_is_active_where_nothing_asks_or_is_known():
     nan, zero = np.nan, np.zeros((1, 3))
     one = np.array([[1.0, 0.0, 0.0]])
-    assert active_regions(["obstacle"], zero, zero, np.array([[-1.0]])).tolist() == [0.0]
+    assert active_regions([0], zero, zero, np.array([[-1.0]])).tolist() == [0.0]
     assert active_regions([], one, one, np.empty((1, 0))).tolist() == [0.0]
-    assert active_regions(["depth"], one, one, np.array([[-1.0]])).tolist() == [0.0]
-    assert active_regions(["obstacle", "obstacle"], one, one, np.array([[nan, 3.0]])).tolist() == [2.0]
-    assert active_regions(["obstacle"], one, one, np.array([[nan]])).tolist() == [0.0]
-    assert active_regions(["obstacle"], one * nan, one * nan, np.array([[1.0]])).tolist() == [0.0]
+    assert active_regions([2], one, one, np.array([[-1.0]])).tolist() == [0.0]
+    assert active_regions([0, 0], one, one, np.array([[nan, 3.0]])).tolist() == [2.0]
+    assert active_regions([0], one, one, np.array([[nan]])).tolist() == [0.0]
+    assert active_regions([0], one * nan, one * nan, np.array([[1.0]])).tolist() == [0.0]
 
 
 def test_rule_strengths_are_minima_and_maxima_of_degrees(docking):
@@ -82,7 +81,7 @@ def test_rule_strengths_are_minima_and_maxima_of_degrees(docking):
     samples = np.random.default_rng(7).uniform(size=(50, 3))
     samples[:4] = [[0, 0, 0], [1, 1, 1], [0, 1, 1], [0, 0, 1]]
     rows = np.zeros((50, len(names)))
-    rows[:, [names.index(f"membership.{name}") for name in CRITERIA]] = samples
+    rows[:, [names.index(f"membership.{name}") for name in docking.scenario.criterion_names]] = samples
     strengths = viewing.extended(rows)[:, -8:]
     arbiter = Arbiter(engine="closed")
     for (o, s, d), got in zip(samples.tolist(), strengths.tolist(), strict=True):

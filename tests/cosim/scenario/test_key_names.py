@@ -36,6 +36,7 @@ def label(key, name="paper-limited", overrides=()):
         ("regions.0.velocity.2", "velocity z of SR1 [m/s]"),
         ("regions.SR1.shape.centre.0", "centre x of SR1 [m]"),
         ("regions.SR3.shape.tolerance", "tolerance of SR3 [m]"),
+        ("criteria.depth.order", "order of depth"),
         ("goal.radius", "radius of the goal [m]"),
         ("goal.centre.2", "centre z of the goal [m]"),
         ("plant.parameters.weight", "weight of the plant [N]"),

@@ -26,8 +26,8 @@ def saved(tmp_path, text, name="mine.toml"):
 
 def test_shipped_scenarios_load():
     assert list_scenarios() == [
-        "dense-field", "depth-transit", "docking", "harbour", "moving-obstacle", "paper", "paper-calibrated",
-        "paper-deployable", "paper-limited", "pipe-inspection", "sitl",
+        "dense-field", "depth-transit", "docking", "harbour", "inspection-visibility", "moving-obstacle", "paper",
+        "paper-calibrated", "paper-deployable", "paper-limited", "pipe-inspection", "sitl",
     ]  # fmt: skip
     for name in list_scenarios():
         assert load_scenario(name).title
@@ -166,7 +166,7 @@ def test_overrides_reach_every_depth(tmp_path):
         ("regions.SR1.gain=-1", ["regions.SR1.gain"]),
         ("regions.SR1.name=SR2", ["SR2", "own"]),
         ("regions.SR1.keep=on", ["keep", "'in', 'out'"]),
-        ("regions.SR1.criterion=fear", ["criterion", "'obstacle', 'shape', 'depth'"]),
+        ("regions.SR1.criterion=fear", ["criterion", "expected one of depth, obstacle, shape"]),
         ("regions.SR1.shape.radius=nan", ["SR1", "radius", "nan"]),
         ('intersection=["SR7"]', ["intersection", "SR7"]),
         ("tme.duration=3", ["tme", "'time'"]),

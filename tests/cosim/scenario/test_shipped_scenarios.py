@@ -13,6 +13,7 @@ DEPLOYABLE = [
     "depth-transit",
     "docking",
     "harbour",
+    "inspection-visibility",
     "moving-obstacle",
     "paper-deployable",
     "pipe-inspection",

@@ -70,7 +70,9 @@ def load_vehicle_file(name):
 def test_a_vector_takes_one_line_and_a_key_of_one_region_says_what_it_means(name, shown):
     text = shown(name)
     assert not re.search(r"^\s*[-\d.]+,?$", text, re.M)
-    head = text.partition("\n[[regions]]")[0] + text.partition("\n[[regions]]")[2].partition("\n[[regions]]")[0]
+    tables = re.split(r"\n(?=\[\[)", text)
+    # the first of each list of tables says what its keys mean
+    head = "\n".join(one for i, one in enumerate(tables) if not i or one.split("]]")[0] != tables[i - 1].split("]]")[0])
     bare = ("type", "shape", *WITHOUT_UNIT)  # a long list has its comment above
     lines = [line for line in head.splitlines() if "=" in line and not line.startswith("#") and not line.endswith("[")]
     unexplained = [line for line in lines if line.split(" = ")[0] not in bare and "  # " not in line]

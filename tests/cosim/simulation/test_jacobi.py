@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.scenario.scenario import CRITERIA, load_scenario
+from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 from tests.cosim.ssp.jacobi import jacobi as by_parts
 
@@ -39,7 +39,7 @@ def test_jacobi_is_three_parts_that_exchange_at_the_end_of_each_step(scenario):
     rows, signals = rows_of(loaded)
     at = signals.index("position.x")
     np.testing.assert_array_equal(rows[:, at : at + 13], by_parts(loaded))
-    at = signals.index(f"weight.{CRITERIA[0]}")
+    at = signals.index("weight.obstacle")
     assert rows[:, at : at + 3].max() > 0.5
 
 

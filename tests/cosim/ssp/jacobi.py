@@ -5,7 +5,6 @@ import numpy as np
 from controller import VehicleState
 from controller.regions import pack
 from cosim.scenario.law_factory import law_of
-from cosim.scenario.scenario import CRITERIA
 from cosim.scenario.start_values import start_values
 from cosim.ssp.system import MOTION, WRENCH
 from fuzzy_arbiter import Arbiter, ramp
@@ -18,7 +17,7 @@ class Parts:
     def __init__(self, scenario):
         self.scenario, self.law = scenario, law_of(scenario)
         self.goal, self.regions = pack([scenario.goal_region]), pack([r.region for r in scenario.regions])
-        self.criterion_of = [CRITERIA.index(r.criterion) for r in scenario.regions]
+        self.criterion_of = list(scenario.criterion_places)
         self.arbiter = Arbiter(engine="closed")
         self.wrench, self.weights, self.estimate = np.zeros(6), np.zeros(3), np.zeros(4)
 

@@ -23,6 +23,7 @@ from cosim.simulation.master import Master
 from cosim.ssp import package_system
 from cosim.ssp.system import MOTION
 from plant_fmu.running.co_simulation_instance import CoSimulationInstance
+from tests.cosim.scenario.test_criteria import RULES, SCENARIO
 from tests.cosim.ssp.masters import fmpy as run_in_fmpy
 
 ROOT = Path(__file__).parents[3]
@@ -243,3 +244,27 @@ def test_the_command_says_what_stands_against_it(tmp_path, capsys):
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and "arbiter.engine" in said
     assert not list(tmp_path.iterdir())
+
+
+CRITERIA = 'criteria=[{name="obstacle"},{name="depth",order=0},{name="shape"},{name="visibility"}]'
+
+
+def test_a_system_has_as_many_criteria_as_the_scenario(tmp_path):
+    settings = ["time.duration=0.5", CRITERIA]
+    scenario = load_scenario(ALL_SHAPES, settings)
+    path = package_system(scenario, tmp_path / "four.ssp")
+    compared(jacobi(ALL_SHAPES, settings), run_in_fmpy(path, scenario.steps, scenario.time.step))
+    with zipfile.ZipFile(path) as archive, zipfile.ZipFile(io.BytesIO(archive.read("resources/arbiter.fmu"))) as fmu:
+        described = fmu.read("modelDescription.xml").decode()
+    assert re.findall(r'name="weight\.(\w+)"', described) == ["depth", "obstacle", "shape", "visibility"]
+
+
+def test_memberships_and_rules_of_ones_own_are_refused(tmp_path):
+    with pytest.raises(RunError, match=r"criteria.shape.membership is given, expected none"):
+        package_system(load_scenario(ALL_SHAPES, ["criteria.shape.membership.ramp=0.3"]), tmp_path / "s.ssp")
+    (tmp_path / "mine.toml").write_text(RULES)
+    (tmp_path / "scenario.toml").write_text(SCENARIO)
+    changes = ["law.name=ismail_dunnigan", "actuation.through=wrench"]
+    with pytest.raises(RunError, match=r"arbiter.file is 'mine.toml', expected none"):
+        package_system(load_scenario(tmp_path / "scenario.toml", changes), tmp_path / "s.ssp")
+    assert not (tmp_path / "s.ssp").exists()

@@ -1,9 +1,14 @@
 """Systems for the tests of the formats: the tipping problem, and random ones."""
 
+from dataclasses import replace
+
 from hypothesis import strategies as st
 
 from fuzzy_arbiter import Output, Rule, Shape, System, Term, Variable, falling, rising, trapezoid, triangle
 from fuzzy_arbiter.propositions import And, Is, Not, Or
+from fuzzy_arbiter.rule import Operators
+from fuzzy_arbiter.terms.curves import curve
+from fuzzy_arbiter.terms.values import Constant, Formula, Linear
 
 
 def _grades(low, mid, high):
@@ -32,6 +37,60 @@ TIPPING = System(
     name="tipping",
     normalization="none",
 )
+
+# what only richer systems have, without what one of the formats cannot say
+_FIRST, _SECOND = TIPPING.inputs
+RICH = replace(
+    TIPPING,
+    inputs=(
+        replace(
+            _FIRST, terms=(*_FIRST.terms, Term("near", curve("gaussian", 5, 2)), Term("far", curve("bell", 5, 2, 3)))
+        ),
+        replace(
+            _SECOND, terms=(*_SECOND.terms, Term("slow", curve("sigmoid", 4, -2)), Term("at", curve("singleton", 3)))
+        ),
+    ),
+    outputs=(
+        Output("tip", (0, 25), (Term("low", Constant(5)), Term("high", Linear((1, 0.5), 2))), None, "average", "sum"),
+    ),
+    rules=(
+        "if quality is poor or service is poor then tip is low",
+        "if quality is near and service is not slow then tip is high with 0.5",
+        "if quality is far then tip is low",
+        "if service is at then tip is high",
+    ),
+    conjunction="einstein_product",
+)
+# and what a format can say beyond, by format
+RICHER = {
+    "fcl": replace(RICH, rules=(*RICH.rules, Rule(Is("quality", "poor"), (Is("tip", "low"),), 1.0, Operators("prod")))),
+    "fis": replace(
+        RICH,
+        inputs=(
+            RICH.inputs[0],
+            replace(_SECOND, terms=(*RICH.inputs[1].terms, Term("s", curve("pi_shape", 1, 2, 3, 4)))),
+        ),
+        rules=(*RICH.rules, "if service is s then tip is high"),
+    ),
+}  # fmt: skip
+RICHER["fll"] = replace(
+    RICHER["fcl"],
+    outputs=(
+        replace(
+            RICH.outputs[0], default=1.5, lock_range=True, lock_previous=True,
+            terms=(*RICH.outputs[0].terms, Term("odd", Formula("sin(quality) / service + 2 ^ quality"))),
+        ),
+        Output(
+            "mood", (0, 1), (Term("fair", curve("spike", 0.5, 1)), Term("good", curve("s_shape", 0, 1))), None,
+            "bisector", "probor",
+        ),
+    ),
+    rules=(
+        *RICHER["fcl"].rules, "if quality is very near and service is any then mood is good and tip is odd",
+        "if quality is extremely not near then mood is fair", "if mood is good then tip is low",
+    ),
+)  # fmt: skip
+RICHER["json"] = RICHER["toml"] = RICHER["fll"]
 
 WORDS = ("low", "high", "a", "B2", "wind_speed", "x__y", "Zz", "mid")
 NAMES = (
@@ -84,7 +143,7 @@ def variables(draw, name, names, plain, output=False):
         terms.append(Term(term, shape))
     if not output:
         return Variable(name, (low, high), tuple(terms))
-    default = None if plain else draw(st.none() | places)
+    default = None if plain else draw(st.none() | st.sampled_from((low, high)) | st.floats(low, high))
     return Output(name, (low, high), tuple(terms), default)
 
 
@@ -128,6 +187,7 @@ def systems(draw, plain=False):
         conclusions = tuple(Is(o.name, draw(st.sampled_from(o.term_names))) for o in chosen)
         weight = draw(st.just(1.0) | st.floats(0, 1, exclude_min=True))
         rules.append(Rule(draw(conditions(inputs, plain)), conclusions, weight))
+    weights_of = draw(st.just(()) | st.just(tuple(f"criterion of {o.name}" for o in outputs)))
     conjunction, disjunction = draw(st.sampled_from((("min", "max"), ("prod", "probor"))))
     return System(
         inputs,
@@ -140,4 +200,5 @@ def systems(draw, plain=False):
         draw(st.sampled_from(("range", "none", "sum", "max"))),
         draw(st.sampled_from(("refuse", "clip"))),
         draw(st.integers(3, 2000)),
+        weights_of,
     )

@@ -4,9 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import Shape, Term, Variable, falling, prioritised, rising, triangle
+from fuzzy_arbiter import Output, Shape, Term, Variable, falling, prioritised, rising, triangle
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
+from fuzzy_arbiter.rule import Operators
+from fuzzy_arbiter.terms.curves import curve
+from fuzzy_arbiter.terms.values import Constant
 from tests.fuzzy_arbiter.formats.systems import TIPPING
 
 # in the manner of jFuzzyLogic's example: comments of three kinds, no ranges, no OR
@@ -64,8 +67,17 @@ def test_several_rule_blocks_of_like_operators_are_one():
     parts = OTHERS.split("    RULE 2")
     text = f"{parts[0]}END_RULEBLOCK RULEBLOCK No2 OR : MAX; ACCU : MAX;    RULE 2{parts[1]}"
     assert reads(text, "fcl").rules == reads(OTHERS, "fcl").rules
-    with pytest.raises(FormatError, match="RULEBLOCK 'No2' has other AND, OR or ACT than that before it"):
-        reads(text.replace("OR : MAX; ACCU", "OR : ASUM; ACCU"), "fcl")
+    with pytest.raises(FormatError, match="RULEBLOCK has another ACCU than that before it, expected the same"):
+        reads(text.replace("OR : MAX; ACCU : MAX", "OR : MAX; ACCU : BSUM"), "fcl")
+
+
+def test_rules_of_a_block_of_other_operators_keep_them():
+    parts = OTHERS.split("    RULE 2")
+    text = f"{parts[0]}END_RULEBLOCK RULEBLOCK No2 OR : ASUM; ACT : PROD; ACCU : MAX;    RULE 2{parts[1]}"
+    system = reads(text, "fcl")
+    own = Operators("prod", "probor", "prod")
+    assert [rule.operators for rule in system.rules] == [None, own, own]
+    assert reads(writes(system, "fcl"), "fcl") == system
 
 
 def test_accumulation_may_be_said_of_each_output():
@@ -113,15 +125,20 @@ def test_numbers_are_those_of_the_standard():
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [
-        ("METHOD : COG", "METHOD : COGS", r"line 23: 'COGS' came after ':', expected COG"),
-        ("METHOD : COG;", "", r"line 19: DEFUZZIFY without METHOD, expected METHOD : COG;"),
-        ("ACCU : MAX", "ACCU : BSUM", r"line 29: 'BSUM' came after ':', expected MAX"),
-        ("ACCU : MAX;", "", r"line 26: RULEBLOCK 'No1' without ACCU, expected ACCU : MAX;"),
-        ("AND : MIN", "AND : BDIF", r"line 27: 'BDIF' came after ':', expected MIN or PROD"),
-        ("ACT : MIN;", "OR : ASUM;", r"line 26: AND and OR are no pair of the standard, expected MIN with MAX"),
+        ("METHOD : COG", "METHOD : COGS", r"line 19: output 'tip': term 'cheap' is no value"),
+        ("METHOD : COG", "METHOD : COM", r"line 23: 'COM' came after ':', expected COG or COA"),
+        ("METHOD : COG;", "", None),
+        ("ACCU : MAX", "ACCU : DIFF", r"line 29: 'DIFF' came after ':', expected MAX or ASUM"),
+        ("ACCU : MAX;", "", None),
+        ("AND : MIN", "AND : MINIMUM", r"line 27: 'MINIMUM' came after ':', expected MIN or PROD"),
+        ("AND : MIN;", "ENABLED : FALSE;", r"line 27: 'FALSE' came after ':', expected TRUE"),
         ("AND : MIN;", "AND : MIN; AND : MIN;", r"line 27: AND came twice"),
-        ("TERM poor := (0, 1) (4, 0)", "TERM poor := GAUSS 0 2", r"line 11: 'GAUSS' came after ':=', expected points"),
-        ("TERM poor := (0, 1) (4, 0)", "TERM poor := 4", r"line 11: '4' came after ':=', expected points"),
+        ("TERM poor := (0, 1) (4, 0)", "TERM poor := GAUS 0 2", r"line 11: 'GAUS' is no membership function, exp"),
+        ("TERM poor := (0, 1) (4, 0)", "TERM poor := GAUSS 0", r"line 11: ';' came after '0', expected a number"),
+        ("TERM poor := (0, 1) (4, 0)", "TERM poor := GAUSS 0 0", r"line 11: .*\(0.0, 0.0\) came, expected a dev"),
+        ("TERM poor := (0, 1) (4, 0)", "TERM poor := Constant 4", r"line 11: an input's term is Constant, which"),
+        ("TRIAN 0 5 10", "FUNCTION 2 * service", r"line 19: output 'tip': term 'cheap' is a value, expected a"),
+        ("TRIAN 0 5 10", "5", r"line 19: output 'tip': term 'cheap' is a value, expected a membership function"),
         ("(0, 1) (4, 0)", "(0, 1) (low, 0)", r"line 11: 'low' came after '\(', expected a number, a place"),
         ("(0, 1) (4, 0)", "(0, 1) (-4, 0)", r"line 11: term 'poor': shape: place -4.0 comes after 0.0"),
         ("(0, 1) (4, 0)", "(0, 1) (4, 2)", r"line 11: term 'poor': shape: point \(4.0, 2.0\)"),
@@ -139,8 +156,11 @@ def test_numbers_are_those_of_the_standard():
         ("tip IS average", "tip", r"line 31: rule 'IF service IS good THEN tip WITH 0.5': 'WITH' came after 'tip'"),
         ("WITH 0.5", "WITH 1.5", r"line 31: 'if service .*': weight is 1.5"),
         ("WITH 0.5", "WITH x", r"line 31: rule .*'x' came after 'WITH', expected the rule's weight"),
-        ("average WITH 0.5;", "average", r"line 31: rule .*avera \.\.\. .*': ':' cannot stand in a rule"),
-        ("DEFAULT := 0;", "DEFAULT := nan;", r"line 24: 'nan' came after ':=', expected a number, the default, or NC"),
+        ("average WITH 0.5;", "average WITH 0.5", None),
+        ("average WITH 0.5;", "average WITH 0.5 ACCU : MAX;", r"line 31: rule .*':' cannot stand in a rule"),
+        ("DEFAULT := 0;", "DEFAULT := none;", r"line 24: 'none' came after ':=', expected a number, the default"),
+        ("DEFAULT := 0;", "DEFAULT := 0 | 1;", r"line 24: '1' came after '\|', expected NC"),
+        ("DEFAULT := 0;", "DEFAULT := 0; LOCK : ALL;", r"line 24: 'ALL' came after ':', expected PREVIOUS or RANGE"),
         ("(* Center", "(* Center (*", None),
         ("Gravity *)", "Gravity", r"line 23: the comment that begins here with '\(\*' has no end"),
         ("ACT : MIN;", "ACT = MIN;", r"line 28: '=' is no sign of FCL"),
@@ -164,9 +184,20 @@ def test_what_is_not_known_is_refused_with_its_line(old, new, fault):
         ({"name": "not exist"}, "the name 'not exist': expected letters, digits and _, a letter first"),
         ({"name": "_x"}, "the name '_x': expected letters, digits and _, a letter first"),
         ({"name": "Range"}, "the name 'Range': it is a word of the language"),
-        ({"conjunction": "prod"}, "the conjunction 'prod' with the disjunction 'max': expected 'min' with 'max'"),
+        ({"rules": ("if quality is very poor then tip is low",)}, "the condition of R1 .*: expected no hedges"),
+        *(
+            ({"inputs": (Variable("quality", (0, 10), (Term("poor", shape),)),),
+              "rules": ("if quality is poor then tip is low",)}, fault)
+            for shape, fault in (
+                (curve("spike", 3, 1), "the kind 'spike' of term 'poor': expected points, or one of gaussian"),
+                (curve("gaussian", 3, 1, height=0.5), "the height 0.5 of term 'poor': expected 1"),
+                (curve("sigmoid_difference", 8, 1, 1, 3), "term 'poor', a sigmoid_difference of which the second"),
+            )
+        ),
+        ({"outputs": (Output("tip", (0, 1), (Term("low", Constant(1)),), None, "sum"),),
+          "rules": ("if quality is poor then tip is low",)}, "the defuzzifier 'sum' of output 'tip': expected 'av"),
     ],
-)
+)  # fmt: skip
 def test_what_it_cannot_say_is_named(change, fault):
     with pytest.raises(UnsupportedError, match=f"^fcl cannot say {fault}"):
         writes(replace(TIPPING, **change), "fcl")

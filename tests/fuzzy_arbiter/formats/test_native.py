@@ -69,7 +69,7 @@ def test_terms_with_one_centroid_are_refused():
 
 
 def test_terms_too_close_for_floating_point_are_refused():
-    near = Output("w", (0, 1), (Term("low", falling(0, 1e-200)), Term("high", falling(0, 2e-200))), 1e300)
+    near = Output("w", (0, 1), (Term("low", falling(0, 1e-200)), Term("high", falling(0, 2e-200))))
     with pytest.raises(UnsupportedError, match="too far apart, or too close"):
         fold_normalization(prioritised(weight=near))
 

@@ -6,13 +6,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import ArbiterError, Output, Shape, System, Term, Variable, prioritised
+from fuzzy_arbiter import Arbiter, ArbiterError, Output, Shape, System, Term, Variable, prioritised
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import FORMATS, reads, writes
 from fuzzy_arbiter.hierarchy import FORMS
 from fuzzy_arbiter.propositions import Is, Not
 from tests.examples import examples
-from tests.fuzzy_arbiter.formats.systems import TIPPING, systems
+from tests.fuzzy_arbiter.formats.systems import RICHER, TIPPING, systems
 
 relaxed = settings(max_examples=examples(40), suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 
@@ -22,6 +22,15 @@ relaxed = settings(max_examples=examples(40), suppress_health_check=[HealthCheck
 def test_prioritised_systems_come_back(format, form):
     for system in (prioritised(form=form), prioritised(form=form, normalization="sum", outside="clip", points=77)):
         assert reads(writes(system, format), format) == system
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_richer_systems_come_back_and_give_the_same(format):
+    system = RICHER[format]
+    again = reads(writes(system, format), format)
+    assert again == system
+    rows = [[2.5, 3.0], [6.5, 3.0], [9.0, 9.5]]
+    assert Arbiter(system=again).batch(rows).tolist() == Arbiter(system=system).batch(rows).tolist()
 
 
 @pytest.mark.parametrize("format", FORMATS)
@@ -151,7 +160,7 @@ def test_settings_stand_in_one_comment_that_is_read_back(format):
     text = writes(prioritised(), format)
     assert "fuzzy_arbiter: normalization = range" in text.splitlines()[0]
     assert "(c - 0.3333333333333333) / 0.3333333333333333, held within [0, 1], for alpha_1" in text
-    plain = replace(prioritised(), normalization="none")
+    plain = replace(prioritised(), normalization="none", weights_of=())
     assert "fuzzy_arbiter" not in writes(plain, format)
     assert reads(writes(plain, format), format) == plain
 
@@ -162,7 +171,7 @@ def test_settings_stand_in_one_comment_that_is_read_back(format):
     [
         (
             "fuzzy_arbiter: normalization = ranje",
-            "line 1: normalization is 'ranje', expected one of range, none, sum, max",
+            "line 1: normalization is 'ranje', expected one of none, range, sum, max",
         ),
         ("fuzzy_arbiter: scale = range", "line 1: 'scale = range', expected each once, with = and its value: normaliz"),
         ("fuzzy_arbiter: normalization", "line 1: 'normalization', expected each once"),
@@ -170,6 +179,7 @@ def test_settings_stand_in_one_comment_that_is_read_back(format):
             "fuzzy_arbiter: normalization = sum, normalization = sum",
             "line 1: 'normalization = sum', expected each once",
         ),
+        ("fuzzy_arbiter: normalization = range, normalization", "line 1: 'normalization', expected each once"),
         ("fuzy_arbiter: normalization = range", "line 1: .* is almost such a comment, expected 'fuzzy_arbiter:'"),
         ("fuzzy_arbiter normalization = range", "line 1: .* is almost such a comment, expected 'fuzzy_arbiter:'"),
     ],

@@ -23,6 +23,7 @@ from fuzzy_arbiter.command_line.values import evaluated_table
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.description import model_description
 from plant_fmu.importers import read_fmu
+from tests.fuzzy_arbiter.formats.systems import RICHER
 from tests.security.fuzzing.registry import KINDS, ROOT, SCENES, Case, Seeds, reader
 
 # ---- files for people ----------------------------------------------------------------------------------------------
@@ -53,7 +54,8 @@ def vehicle(seeds: Seeds) -> Case:
 def _arbiter(format: str, seeds: Seeds) -> Case:
     own = () if format == "fis" else (arbiters.writes(Arbiter().system, format).encode(),)
     tipping = (ROOT / "tests" / "data" / "fuzzy" / f"tipping.{format}").read_bytes()
-    return seeds.file(f"it.{format}", arbiters.load, tipping, *own)
+    rich = arbiters.writes(RICHER[format], format).encode()
+    return seeds.file(f"it.{format}", arbiters.load, tipping, rich, *own)
 
 
 for _format, _kind, _parser in (

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from types import FunctionType
 from typing import Any
 
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.errors import EngineError
-from fuzzy_arbiter.export import to_python
+from fuzzy_arbiter.export.python import to_python
 
 
 def compiled(system: System) -> Any:
@@ -30,12 +31,12 @@ def compiled(system: System) -> Any:
     try:
         import numba
     except ImportError:
-        raise EngineError("compiled: Numba is not installed") from None
+        raise EngineError("compiled: Numba is not installed, expected the extra fuzzy-arbiter[numba]") from None
     namespace: dict[str, Any] = {}
 
     exec(compile(to_python(system), f"<{system.name}>", "exec"), namespace)  # noqa: S102
     # each function finds those it calls in the same namespace
-    for name in ("least", "greatest", "either", "envelope", "area_and_moment", "centroid", "evaluate"):
-        if name in namespace:
-            namespace[name] = numba.njit(namespace[name])
+    for name, function in list(namespace.items()):
+        if isinstance(function, FunctionType) and name != "weights":
+            namespace[name] = numba.njit(function)
     return namespace["evaluate"]

@@ -1,0 +1,235 @@
+"""The rules that weigh a scenario's criteria: by their order, or of a file whose inputs are named signals."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from controller.regions.region_set import of_attitude
+from cosim.errors import ScenarioError
+from cosim.scenario.criteria import PAPER, CriterionSetup, ordered_rules
+from cosim.scenario.tables import ArbiterSetup, SecondaryRegion
+from fuzzy_arbiter import Arbiter, ArbiterError, System
+from fuzzy_arbiter.formats import FORMATS, reads
+from plant_fmu.toml_tables import hint
+
+MAX_TEXT = 200_000  # characters of a file of rules
+MAX_INPUTS = 32
+
+Kind = Literal["given", "time", "depth", "speed", "membership", "clearance", "closing_speed", "approach_time"]
+VEHICLE: dict[str, str] = {"time": "s", "depth": "m", "speed": "m/s"}  # signals of the vehicle, and their units
+OF_REGIONS: dict[str, tuple[str, str]] = {  # of a region, or the goal; the second unit is that of regions of attitude
+    "clearance": ("m", "rad"),
+    "closing_speed": ("m/s", "rad/s"),
+    "approach_time": ("s", "s"),
+}
+
+
+@dataclass(frozen=True)
+class InputSignal:
+    """What an input of the rules gets."""
+
+    name: str  # of the input
+    kind: Kind
+    of: int = 0  # criterion; or region, 0 for the goal
+    unit: str = ""
+    course: tuple[tuple[float, float], ...] = ()  # s, value: of a given one; straight between, held beyond
+    what: str = ""  # in words
+
+
+@dataclass(frozen=True)
+class ArbiterRules:
+    """How criteria are weighed."""
+
+    system: System  # one output for each criterion, in their order
+    inputs: tuple[InputSignal, ...]  # one for each input
+
+
+def read_rules(setup: ArbiterSetup) -> ArbiterSetup:
+    """Return the setup with the text of its file, which is read unless it is there, and the file's own name.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such file, or it is no text for people.
+    """
+    if not setup.file:
+        if setup.text:
+            raise ScenarioError(
+                "arbiter.text is given, expected none without arbiter.file, whose suffix names its format"
+            )
+        return setup
+    path = Path(setup.file)
+    if path.suffix.lower().removeprefix(".") not in FORMATS:
+        raise ScenarioError(f"arbiter.file is {setup.file!r}, expected a suffix of .{', .'.join(FORMATS)}")
+    text = setup.text or _text(path)
+    if len(text) > MAX_TEXT:
+        raise ScenarioError(f"arbiter.file: {path.name} has more than {MAX_TEXT} characters, expected rules for people")
+    return replace(setup, file=path.name, text=text)
+
+
+def _text(path: Path) -> str:
+    try:
+        if path.exists() and not path.is_file():  # to open a pipe would wait for its other end
+            raise ScenarioError(f"arbiter.file: {path} is a folder, a pipe or a device, expected a file")
+        with path.open("rb") as file:
+            return file.read(4 * MAX_TEXT + 1).decode("utf-8").removeprefix("\ufeff").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        raise ScenarioError(f"arbiter.file: {path}: byte {error.start} is no UTF-8, expected text") from error
+    except (OSError, ValueError) as error:  # the latter for a name with a null in it
+        raise ScenarioError(f"arbiter.file: {path}: {getattr(error, 'strerror', None) or error}") from error
+
+
+def check_rules(
+    setup: ArbiterSetup, criteria: tuple[CriterionSetup, ...], regions: Sequence[SecondaryRegion]
+) -> ArbiterRules:
+    """Return the rules of an arbiter whose file has been read.
+
+    Parameters
+    ----------
+    setup : ArbiterSetup
+        Of `read_rules`.
+    criteria : tuple of CriterionSetup
+        Each needs a weight.
+    regions : sequence of SecondaryRegion
+        That signals may be of.
+
+    Raises
+    ------
+    ScenarioError
+        If an input has no signal, a criterion no output, or a weight may be none.
+    """
+    if not setup.file:
+        if setup.inputs:
+            first = next(iter(setup.inputs))
+            raise ScenarioError(f"arbiter.inputs.{first} is given, expected none without arbiter.file")
+        inputs = (InputSignal(c.name, "membership", i) for i, c in enumerate(criteria))
+        return ArbiterRules(ordered_rules(criteria, setup.points), tuple(inputs))
+    system = _system(setup.file, setup.text, tuple(criterion.name for criterion in criteria), setup.points)
+    try:
+        engine = Arbiter(system=system, engine=setup.engine).engine
+    except ArbiterError as error:
+        raise ScenarioError(
+            f"arbiter.engine is {setup.engine!r}, expected another one for {setup.file}: {error}"
+        ) from error
+    assert engine == setup.engine
+    known = [variable.name for variable in system.inputs]
+    for name in setup.inputs:
+        if name not in known:
+            raise ScenarioError(f"arbiter.inputs.{name}: {setup.file} has no such input; {hint(name, known)}")
+    return ArbiterRules(system, tuple(_signals(setup, known, criteria, regions)))
+
+
+@functools.lru_cache(maxsize=8)
+def _system(file: str, text: str, criteria: tuple[str, ...], points: int) -> System:
+    """Return the system of a file: its outputs in the order of the criteria, its inputs clipped."""
+    try:
+        system = reads(text, Path(file).suffix.lower().removeprefix("."))
+        if len(system.inputs) > MAX_INPUTS:
+            raise ScenarioError(f"arbiter.file: {file} has {len(system.inputs)} inputs, expected at most {MAX_INPUTS}")
+        outputs = dict(zip(system.result_names, system.outputs, strict=True))
+        for name in outputs:
+            if name not in criteria:
+                raise ScenarioError(
+                    f"arbiter.file: {file} has the output {name!r}, no criterion; {hint(name, criteria)}"
+                )
+        for name in criteria:
+            if name not in outputs:
+                raise ScenarioError(f"arbiter.file: {file} has no output {name!r}, expected one for each of criteria")
+        named = criteria if system.weights_of else ()
+        ordered = tuple(outputs[name] for name in criteria)
+        system = replace(system, outputs=ordered, outside="clip", points=points, weights_of=named)
+        _require_weights(file, system)
+    except ArbiterError as error:
+        raise ScenarioError(f"arbiter.file: {file}: {error}") from error
+    return system
+
+
+def _require_weights(file: str, system: System) -> None:
+    """Refuse a system of which some output may be outside [0, 1], or none at all."""
+    for output in system.outputs:
+        low, high = output.universe
+        if system.normalization == "none" and not 0.0 <= low < high <= 1.0:
+            raise ScenarioError(
+                f"arbiter.file: {file}: output {output.name!r} is of [{low:g}, {high:g}], expected weights in [0, 1], "
+                'or normalization "range"'
+            )
+    without = [output.name for output in system.outputs if output.default is None]
+    if without and not _always_fires(Arbiter(system=system)):
+        raise ScenarioError(
+            f"arbiter.file: {file}: output {without[0]!r} has no default, expected one: "
+            "it is not proved that a rule fires for all inputs"
+        )
+
+
+def _always_fires(arbiter: Arbiter) -> bool:
+    """Return whether it is proved that each output has a rule that fires, for all inputs."""
+    if arbiter.engine == "closed":
+        return True
+    try:
+        return bool(arbiter.verify().graded_complete)
+    except ArbiterError:  # of terms that no proof is known of
+        return False
+
+
+def _signals(
+    setup: ArbiterSetup,
+    names: Sequence[str],
+    criteria: Sequence[CriterionSetup],
+    regions: Sequence[SecondaryRegion],
+) -> Iterator[InputSignal]:
+    places = {"goal": (0, "m")} | {
+        region.region.name: (i, "rad" if of_attitude(region.region.shape) else "m")
+        for i, region in enumerate(regions, 1)
+    }
+    of_criteria = {criterion.name: i for i, criterion in enumerate(criteria)}
+    for name in names:
+        key, value = f"arbiter.inputs.{name}", setup.inputs.get(name, name if name in VEHICLE else None)
+        if value is None:
+            raise ScenarioError(
+                f"{key} is missing, expected a signal, a number, or points [time, value]: {setup.file} has this input"
+            )
+        if not isinstance(value, str):
+            yield InputSignal(name, "given", course=_course(value, key), what="given")
+            continue
+        kind, _, of = value.partition(".")
+        if kind in VEHICLE and not of:
+            yield InputSignal(name, kind, unit=VEHICLE[kind], what=value)  # type: ignore[arg-type]
+        elif kind == "membership":
+            _require_known(of, of_criteria, key, value, "criterion")
+            yield InputSignal(name, "membership", of_criteria[of], what=value)
+        elif kind in OF_REGIONS:
+            _require_known(of, places, key, value, "region")
+            place, unit = places[of]
+            yield InputSignal(name, kind, place, OF_REGIONS[kind][unit == "rad"], what=value)  # type: ignore[arg-type]
+        else:
+            forms = (*VEHICLE, "membership.CRITERION", *(f"{form}.REGION" for form in OF_REGIONS))
+            raise ScenarioError(f"{key} is {value!r}, expected one of {', '.join(forms)}, or a number")
+
+
+def _require_known(name: str, known: dict[str, Any], key: str, value: str, what: str) -> None:
+    if name not in known:
+        raise ScenarioError(f"{key} is {value!r}, of no {what}; {hint(name, known)}")
+
+
+def _course(value: Any, key: str) -> tuple[tuple[float, float], ...]:
+    """Return the course of a given signal: a number for all times, or points of time [s] and value."""
+    points = value if isinstance(value, list | tuple) else [[0.0, value]]
+    good = bool(points) and all(isinstance(point, list | tuple) and len(point) == 2 for point in points)
+    if not (good and all(_is_finite(x) for point in points for x in point)):
+        raise ScenarioError(f"{key} is {value!r}, expected a signal, a finite number, or a list of [time, value]")
+    times = [float(time) for time, _ in points]
+    if any(after <= before for before, after in zip(times, times[1:], strict=False)):
+        raise ScenarioError(f"{key} has the times {times}, expected each above the one before")
+    return tuple((float(time), float(x)) for time, x in points)
+
+
+def _is_finite(x: Any) -> bool:
+    return not isinstance(x, bool) and isinstance(x, int | float) and math.isfinite(x)
+
+
+PAPER_RULES = check_rules(ArbiterSetup(), PAPER, ())

@@ -1,0 +1,169 @@
+"""The criteria of a scenario, in the order of their priority: what pages, columns and the arbiter know of them."""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from controller.regions.region_set import of_attitude
+from cosim.errors import ScenarioError
+from cosim.scenario.tables import PAPER_CRITERIA, CriterionEntry, SecondaryRegion
+from fuzzy_arbiter import SECTION_VI, ArbiterError, Criterion, Shape, System, prioritised
+from fuzzy_arbiter.formats import reads
+from fuzzy_arbiter.propositions import is_identifier
+from plant_fmu.toml_tables import hint
+
+Quantity = Literal["ramp", "clearance", "angle", "approach_time"]
+QUANTITIES: dict[str, str] = {  # what a membership may be of, and the unit that its numbers are in
+    "ramp": "m, rad",
+    "clearance": "m",
+    "angle": "rad",
+    "approach_time": "s",
+}
+MAX_CRITERIA = 16
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,23}")  # part of a column's name, and a variable in every format of rules
+_COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
+# of criteria without one: Okabe and Ito's purple, then muted ones of Tol's
+_COLOURS = ("#CC79A7", "#882255", "#44AA99", "#999933", "#332288", "#88CCEE", "#AA4499", "#117733")
+_PAPER = {criterion.name: criterion for criterion in SECTION_VI}
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why a criterion may ask for attention: how far a region is, or how soon it will be met."""
+
+    quantity: Quantity
+    term: Shape | None  # degree by the quantity; None for a ramp
+    ramp: float | None = None  # m or rad, width of a ramp; None for the arbiter's
+
+    def is_of(self, region: SecondaryRegion) -> bool:
+        """Return whether it is of such a region: a clearance is of regions in space, an angle of those of attitude."""
+        other = "clearance" if of_attitude(region.region.shape) else "angle"
+        return self.quantity != other
+
+    def words(self, width: float) -> str:
+        """Return it in words; `width` is that of the arbiter's ramp [m or rad]."""
+        if self.term is None:
+            return f"within {width if self.ramp is None else self.ramp:g} m or rad"
+        unit = QUANTITIES[self.quantity]
+        points = ", ".join(f"{degree:g} at {place:g} {unit}" for place, degree in self.term.points)
+        return f"{self.quantity.replace('_', ' ')}: {points}"
+
+
+@dataclass(frozen=True)
+class CriterionSetup:
+    """What regions may ask attention for."""
+
+    name: str
+    colour: str  # #RRGGBB
+    reasons: tuple[Reason, ...]  # the strongest counts
+
+    @property
+    def fuzzy(self) -> Criterion:
+        """The same as an input of an arbiter, which is the degree itself."""
+        return _PAPER.get(self.name) or Criterion(self.name, on="pressing", off="satisfied")
+
+
+def check_criteria(
+    entries: tuple[CriterionEntry, ...],
+) -> tuple[tuple[CriterionEntry, ...], tuple[CriterionSetup, ...]]:
+    """Return the entries with what was left out filled in, and the criteria, the first in priority first.
+
+    Raises
+    ------
+    ScenarioError
+        At the first key that cannot be.
+    """
+    if not 1 <= len(entries) <= MAX_CRITERIA:
+        raise ScenarioError(f"criteria: {len(entries)} came, expected 1 to {MAX_CRITERIA}")
+    names = [entry.name for entry in entries]
+    filled = tuple(_filled(entry, i, entries) for i, entry in enumerate(entries))
+    for i, entry in enumerate(filled):
+        key = f"criteria.{entry.name}"
+        if not (_NAME.fullmatch(entry.name) and is_identifier(entry.name)):
+            expected = "a letter, then at most 23 letters, digits and _, no word of rules"
+            raise ScenarioError(f"criteria.{i}.name is {entry.name!r}, expected {expected}")
+        if names.count(entry.name) > 1:
+            raise ScenarioError(f"{key}.name is used twice, expected a name of its own")
+        if not _COLOUR.fullmatch(entry.colour):
+            raise ScenarioError(f"{key}.colour is {entry.colour!r}, expected #RRGGBB")
+        before = next((other for other in filled[:i] if other.order == entry.order), None)
+        if before is not None:
+            raise ScenarioError(f"{key}.order is {entry.order}, as that of {before.name}: expected one of its own")
+    setups = [CriterionSetup(e.name, e.colour, tuple(_reasons(e.membership, f"criteria.{e.name}"))) for e in filled]
+    order = sorted(range(len(filled)), key=lambda i: filled[i].order or 0)
+    return filled, tuple(setups[i] for i in order)
+
+
+def _filled(entry: CriterionEntry, place: int, entries: Sequence[CriterionEntry]) -> CriterionEntry:
+    taken = {other.colour.upper() for other in entries}
+    free = [colour for colour in _COLOURS if colour not in taken] or list(_COLOURS)
+    of_paper = {c.name: c.colour for c in PAPER_CRITERIA if c.colour not in taken}
+    without = sum(not other.colour and other.name not in of_paper for other in entries[:place])
+    order = place + 1 if entry.order is None else entry.order
+    return replace(entry, order=order, colour=entry.colour or of_paper.get(entry.name) or free[without % len(free)])
+
+
+def _reasons(membership: dict[str, Any], key: str) -> Iterator[Reason]:
+    if not membership:
+        yield Reason("ramp", None)
+    for quantity, value in membership.items():
+        where = f"{key}.membership.{quantity}"
+        if quantity not in QUANTITIES:
+            raise ScenarioError(f"{where}: unknown key; {hint(quantity, QUANTITIES)}")
+        if quantity == "ramp":
+            number = not isinstance(value, bool) and isinstance(value, int | float)
+            if not (number and 0.0 <= value < math.inf):
+                raise ScenarioError(f"{where} is {value!r}, expected a width of 0 m or above")
+            yield Reason("ramp", None, float(value))
+        else:
+            yield Reason(quantity, _term(json.dumps(value, default=str), where))  # type: ignore[arg-type]
+
+
+@functools.lru_cache(maxsize=64)
+def _term(value: str, where: str) -> Shape:
+    """Return a term as `fuzzy_arbiter` reads it of JSON."""
+    text = f'{{"criteria": [{{"name": "x", "on": "pressing", "off": "satisfied", "membership": {value}}}]}}'
+    try:
+        (variable,) = reads(text, "json").inputs
+    except ArbiterError as error:
+        said = re.sub(r"^criteria\[0\](?:\.membership)?(?:: criterion 'x')?", where, str(error))
+        raise ScenarioError(said if said.startswith(where) else f"{where}: {said}") from error
+    term = variable.terms[-1].shape
+    if not isinstance(term, Shape):
+        raise ScenarioError(f"{where}: expected a term that is straight between points; arbiter.file takes any")
+    return term
+
+
+def check_criteria_of_regions(regions: Sequence[SecondaryRegion], criteria: Sequence[CriterionSetup]) -> None:
+    """Raise `ScenarioError` unless each region has a criterion, and this has a reason that is of it."""
+    known = {criterion.name: criterion for criterion in criteria}
+    for region in regions:
+        key, name = f"regions.{region.region.name}.criterion", region.criterion
+        if name not in known and region.is_dynamic:
+            raise ScenarioError(
+                f"commands.obstacles is above 0, expected 0 without a criterion {name!r}, which they have"
+            )
+        if name not in known:
+            raise ScenarioError(f"{key} is {name!r}, which is none of criteria; {hint(name, known)}")
+        if not any(reason.is_of(region) for reason in known[name].reasons):
+            angle = of_attitude(region.region.shape)
+            wanted, unit = ("angle", "rad: it is of attitude") if angle else ("clearance", "m: it is in space")
+            raise ScenarioError(
+                f"criteria.{name}.membership has no {wanted}, expected one, or ramp or approach_time, "
+                f"for region {region.region.name!r}, whose clearance is in {unit}"
+            )
+
+
+@functools.lru_cache(maxsize=16)
+def ordered_rules(criteria: tuple[CriterionSetup, ...], points: int) -> System:
+    """Return the system that weighs criteria by their order, as section VI weighs its three, with `points` samples."""
+    return prioritised([criterion.fuzzy for criterion in criteria], points=points)
+
+
+PAPER = check_criteria(PAPER_CRITERIA)[1]

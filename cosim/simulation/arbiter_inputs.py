@@ -1,0 +1,199 @@
+"""What the arbiter decides by, made of clearances and the state that is told: for the master and the fused loop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller import VehicleState
+from controller.arithmetic import length3
+from controller.quaternion import rate_parts, rotation_rows
+from controller.regions.region_set import PackedRegions, clearance_of_pose
+from controller.stack_array import zeros
+from cosim.scenario.arbiter_rules import ArbiterRules
+from cosim.scenario.criteria import CriterionSetup
+from cosim.scenario.tables import SecondaryRegion
+from cosim.simulation.memberships import PackedMemberships, compute_memberships, pack_memberships
+from cosim.simulation.signals import Array
+
+_KINDS = ("membership", "clearance", "closing_speed", "approach_time", "depth", "speed", "time", "given")
+_MEMBERSHIP, _CLEARANCE, _CLOSING_SPEED, _APPROACH_TIME, _DEPTH, _SPEED, _TIME, _GIVEN = range(len(_KINDS))
+_AHEAD = 1e-5  # s, over which a closing speed is taken: rounding makes 1e-9 m/s of it, a curved surface as much
+
+
+class PackedInputs(NamedTuple):
+    """What each of the m inputs of the arbiter's rules gets; no rows where they are the memberships as they stand."""
+
+    memberships: PackedMemberships
+    kinds: NDArray[np.int64]  # (m,) in the order of `_KINDS`
+    places: NDArray[np.int64]  # (m,) criterion, or region: 0 the goal
+    upper: Array  # (m,) end of the universe: of what is never met, or no number
+    offsets: NDArray[np.int64]  # (m + 1,) into the courses
+    times: Array  # s: of the points of given signals, one course behind the other
+    values: Array  # of these points
+    of_goal: bool  # whether any is of the goal
+    by_speed: bool  # whether any, or any membership, asks how fast a region comes nearer
+
+
+class ArbiterSignals(NamedTuple):
+    """What is worked out of it, n regions beside the goal."""
+
+    memberships: Array  # (criteria,)
+    inputs: Array  # (m,)
+    goal_clearance: Array  # (1,) m
+    closing_speeds: Array  # (n + 1,) m/s or rad/s, the goal's first; above 0 where the region comes nearer
+    approach_times: Array  # (n,) s, 0 where violated, inf where it is not met
+
+
+def pack_inputs(
+    regions: Sequence[SecondaryRegion], criteria: Sequence[CriterionSetup], rules: ArbiterRules, ramp: float
+) -> PackedInputs:
+    """Return what an arbiter decides by.
+
+    Parameters
+    ----------
+    regions : sequence of SecondaryRegion
+        Of the scenario.
+    criteria : sequence of CriterionSetup
+        Theirs.
+    rules : ArbiterRules
+        That weigh them.
+    ramp : float
+        Of memberships that have no reason of their own [m or rad].
+
+    Returns
+    -------
+    PackedInputs
+        Its ramps may be set.
+    """
+    signals, system = rules.inputs, rules.system
+    memberships = pack_memberships(regions, criteria, ramp)
+    if [(signal.kind, signal.of) for signal in signals] == [("membership", i) for i in range(len(criteria))]:
+        signals = ()
+    courses = [signal.course for signal in signals]
+    return PackedInputs(
+        memberships=memberships,
+        kinds=np.array([_KINDS.index(signal.kind) for signal in signals], np.int64),
+        places=np.array([signal.of for signal in signals], np.int64),
+        upper=np.array([variable.universe[1] for variable in system.inputs[: len(signals)]]),
+        offsets=np.cumsum([0, *map(len, courses)], dtype=np.int64),
+        times=np.array([time for course in courses for time, _ in course], float),
+        values=np.array([value for course in courses for _, value in course], float),
+        of_goal=any(s.of == 0 and s.kind in ("clearance", "closing_speed", "approach_time") for s in signals),
+        by_speed=memberships.by_time or any(s.kind in ("closing_speed", "approach_time") for s in signals),
+    )
+
+
+def empty_signals(packed: PackedInputs, n_regions: int, n_criteria: int) -> ArbiterSignals:
+    """Return room for what `compute_inputs` works out; nothing is met at first."""
+    memberships = np.zeros(n_criteria)
+    inputs = np.zeros(packed.kinds.size) if packed.kinds.size else memberships
+    return ArbiterSignals(memberships, inputs, np.zeros(1), np.zeros(n_regions + 1), np.full(n_regions, np.inf))
+
+
+def compute_inputs(
+    packed: PackedInputs,
+    goal: PackedRegions,
+    regions: PackedRegions,
+    state: VehicleState,
+    now: Array,
+    clearances: Array,
+    signals: ArbiterSignals,
+) -> None:
+    """Write memberships, and what the inputs of the arbiter's rules get.
+
+    Parameters
+    ----------
+    packed : PackedInputs
+        What they get.
+    goal, regions : PackedRegions
+        The goal alone, and the n regions, where they are now.
+    state : VehicleState
+        As it is told.
+    now : ndarray, shape (1,)
+        Time [s].
+    clearances : ndarray, shape (n,)
+        Of the regions at that pose [m or rad].
+    signals : ArbiterSignals
+        Filled.
+    """
+    if packed.of_goal:
+        signals.goal_clearance[0] = clearance_of_pose(goal, 0, state.position, state.quaternion, zeros(3))
+    if packed.by_speed:
+        speeds = signals.closing_speeds
+        if packed.of_goal:
+            speeds[0] = _closing_speed(goal, 0, state, signals.goal_clearance[0])
+        for i in range(clearances.size):
+            speeds[1 + i] = _closing_speed(regions, i, state, clearances[i])
+            signals.approach_times[i] = _approach_time(clearances[i], speeds[1 + i])
+    compute_memberships(packed.memberships, clearances, signals.approach_times, signals.memberships)
+    for k in range(packed.kinds.size):
+        x = _input(packed, k, state, now[0], clearances, signals)
+        signals.inputs[k] = x if x <= packed.upper[k] else packed.upper[k]  # what is no number too
+
+
+def _input(
+    packed: PackedInputs, k: int, state: VehicleState, now: float, clearances: Array, signals: ArbiterSignals
+) -> float:
+    kind, at = packed.kinds[k], packed.places[k]
+    x: float = now
+    if kind == _MEMBERSHIP:
+        x = signals.memberships[at]
+    elif kind == _DEPTH:
+        x = state.position[2]
+    elif kind == _SPEED:
+        x = length3(state.velocity_body[0], state.velocity_body[1], state.velocity_body[2])
+    elif kind == _GIVEN:
+        x = _given(packed, k, now)
+    elif kind == _CLOSING_SPEED:
+        x = signals.closing_speeds[at]
+    elif kind != _TIME:
+        x = signals.goal_clearance[0] if at == 0 else clearances[at - 1]
+        if kind == _APPROACH_TIME:
+            x = _approach_time(x, signals.closing_speeds[at])
+    return x
+
+
+def _given(packed: PackedInputs, k: int, now: float) -> float:
+    """Return what a given signal is at a time [s]: straight between its points, held beyond them."""
+    first, end = packed.offsets[k], packed.offsets[k + 1]
+    value: float = packed.values[first]
+    for i in range(first + 1, end):
+        before, left, right = packed.times[i - 1], packed.values[i - 1], packed.values[i]
+        if now > before:
+            share = min((now - before) / (packed.times[i] - before), 1.0)
+            value = left + (right - left) * share
+    return value
+
+
+def _approach_time(clearance: float, speed: float) -> float:
+    """Return when a region is met [s] if the clearance shrinks on as fast as now: 0 where violated, inf for never."""
+    time: float = 0.0
+    if clearance > 0.0:
+        time = clearance / speed if speed > 0.0 else math.inf
+    return time
+
+
+def _closing_speed(regions: PackedRegions, i: int, state: VehicleState, clearance: float) -> float:
+    """Return how fast the clearance of a region shrinks [m/s or rad/s], by the motion of vehicle and region."""
+    ahead, turned, room, omega = zeros(3), zeros(4), zeros(3), zeros(3)
+    u, v, w = state.velocity_body[0], state.velocity_body[1], state.velocity_body[2]
+    rows = rotation_rows(state.quaternion)
+    ahead[0] = rows[0][0] * u + rows[0][1] * v + rows[0][2] * w
+    ahead[1] = rows[1][0] * u + rows[1][1] * v + rows[1][2] * w
+    ahead[2] = rows[2][0] * u + rows[2][1] * v + rows[2][2] * w
+    for axis in range(3):
+        ahead[axis] = state.position[axis] + _AHEAD * (ahead[axis] - regions.velocities[i, axis])
+        omega[axis] = state.velocity_body[3 + axis]
+    rate = rate_parts(state.quaternion, omega)
+    for j in range(4):
+        turned[j] = state.quaternion[j] + _AHEAD * rate[j]
+    size = math.sqrt(turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2] + turned[3] * turned[3])
+    for j in range(4):
+        turned[j] /= size
+    speed: float = (clearance - clearance_of_pose(regions, i, ahead, turned, room)) / _AHEAD
+    return speed

@@ -1,0 +1,82 @@
+"""Rules of an arbiter as a function of C, for loops that are run as C themselves."""
+
+from __future__ import annotations
+
+import ctypes
+import dataclasses
+import os
+from typing import Any
+
+import numpy as np
+
+from controller.compiling.function import INTERPRETED, BoundCall
+from controller.compiling.library import library_of
+from cosim.simulation.signals import Array
+from fuzzy_arbiter import Arbiter, System
+from fuzzy_arbiter.export import to_c
+
+_ENTRY = """
+#include <stdint.h>
+
+/* The addresses of inputs and outputs are in words. */
+void entry(const void *words)
+{
+    const uint64_t *address = words;
+    rules_evaluate((const double *)(uintptr_t)address[0], (double *)(uintptr_t)address[1]);
+}
+"""
+
+
+def rules_text(system: System) -> str:
+    """Return the C of rules, as their library is compiled from it, with ``entry``."""
+    return to_c(dataclasses.replace(system, name="rules")) + _ENTRY
+
+
+class BoundRules:
+    """Rules with their inputs and outputs, which stay alive as long as it does.
+
+    Parameters
+    ----------
+    system : System
+        Whose inputs clip, and whose outputs all have a rule that fires or a default.
+    inputs, outputs : ndarray
+        C-contiguous; the outputs are filled with what the arbiter's exact engine gives, to the last bit.
+
+    Attributes
+    ----------
+    address, words : int
+        Of the C function ``void (*)(const void *)``, and of what it is given.
+
+    Raises
+    ------
+    CompilationError
+        If it has to be compiled, and there is no compiler.
+    """
+
+    def __init__(self, system: System, inputs: Array, outputs: Array) -> None:
+        self._kept: Any
+        self.address: int
+        self.words: int
+        if os.environ.get(INTERPRETED):
+            call = BoundCall(_Interpreted(system), (inputs, outputs))
+            self._kept, self.address, self.words = call, call.address, call.words
+        else:
+            entry = library_of(rules_text(system)).entry
+            words = np.array([inputs.ctypes.data, outputs.ctypes.data], np.uint64)
+            self._kept, self.words = (entry, words, inputs, outputs), words.ctypes.data
+            self.address = ctypes.cast(entry, ctypes.c_void_p).value or 0
+
+    def raise_error(self) -> None:
+        """Raise what they raised when they were called by their address, if Python runs them and they did."""
+        if isinstance(self._kept, BoundCall):
+            self._kept.raise_error()
+
+
+class _Interpreted:
+    """The same in Python."""
+
+    def __init__(self, system: System) -> None:
+        self._arbiter = Arbiter(system=system)
+
+    def __call__(self, inputs: Array, outputs: Array) -> None:
+        outputs[:] = self._arbiter(inputs.tolist())

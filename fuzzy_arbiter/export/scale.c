@@ -1,0 +1,59 @@
+
+/* Puts a place where the envelope may break among those before it, in rising order. */
+static void insert(double *breaks, int n, double place)
+{
+    while (n > 0 && breaks[n - 1] > place) {
+        breaks[n] = breaks[n - 1];
+        n--;
+    }
+    breaks[n] = place;
+}
+
+/* Centroid of scaled terms, joined by their maximum; not all cuts are 0. */
+static double centroid_of_scaled(const double *given, int terms, int pieces, const double *places,
+                                 const double *left, const double *right, const int *order)
+{
+    double cuts[TERMS], largest = 0.0, area = 0.0, moment = 0.0;
+    (void)order;
+    for (int t = 0; t < terms; t++) {
+        largest = given[t] > largest ? given[t] : largest;
+    }
+    for (int t = 0; t < terms; t++) {
+        /* if no cut is greater, all are made larger alike: the centroid stays, and nothing underflows */
+        cuts[t] = largest < 1e-120 ? given[t] * 0x1p266 : given[t];
+    }
+    for (int piece = 0; piece < pieces; piece++, left += terms, right += terms) {
+        double width = places[piece + 1] - places[piece], start = places[piece] - places[0];
+        /* where the envelope may break, in shares of the piece */
+        double breaks[2 + TERMS * TERMS] = {0.0, 1.0};
+        int n = 2;
+        for (int t = 0; t < terms; t++) {
+            for (int u = 0; u < t; u++) {
+                double a = left[t] * cuts[t], b = right[t] * cuts[t], c = left[u] * cuts[u], d = right[u] * cuts[u];
+                if ((a < c) != (b < d)) {
+                    insert(breaks, n++, (a - c) / ((a - c) - (b - d)));
+                }
+            }
+        }
+        double x0 = 0.0;
+        for (int i = 0; i < n; i++) {
+            double x1 = breaks[i];
+            if (x0 < x1) {
+                /* the middle tells which line is the greatest; at an end it would be lost to rounding */
+                double height = 0.0, y0 = 0.0, y1 = 0.0, w = (x1 - x0) * width;
+                for (int t = 0; t < terms; t++) {
+                    double rise = right[t] - left[t], degree = (left[t] + rise * ((x0 + x1) / 2)) * cuts[t];
+                    if (degree > height) {
+                        height = degree;
+                        y0 = (left[t] + rise * x0) * cuts[t];
+                        y1 = (left[t] + rise * x1) * cuts[t];
+                    }
+                }
+                area += w * (y0 + y1) / 2;
+                moment += w * ((start + x0 * width) * (2 * y0 + y1) + (start + x1 * width) * (y0 + 2 * y1)) / 6;
+                x0 = x1;
+            }
+        }
+    }
+    return places[0] + moment / area;
+}

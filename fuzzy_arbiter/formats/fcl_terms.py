@@ -1,0 +1,167 @@
+"""Membership functions and values in the Fuzzy Control Language: the standard's, jFuzzyLogic's and fuzzylite's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fuzzy_arbiter.errors import UnsupportedError
+from fuzzy_arbiter.formats.notation import refuse, say_number, say_numbers
+from fuzzy_arbiter.shapes import Membership, Shape, trapezoid, triangle
+from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.kinds import KINDS
+from fuzzy_arbiter.terms.values import Constant, Formula, Linear, Value
+
+CURVES = {kind.fcl[0]: (name, kind.fcl[1]) for name, kind in KINDS.items() if kind.fcl}
+COUNTS = {"TRIAN": 3, "TRAPE": 4, "COSINE": 2, **{word: len(order) for word, (_, order) in CURVES.items()}}
+"""How many numbers each of jFuzzyLogic's functions has."""
+
+
+def read_curve(word: str, numbers: Sequence[float]) -> tuple[Membership, list[float]]:
+    """Return what one of jFuzzyLogic's functions and its numbers say.
+
+    Parameters
+    ----------
+    word : str
+        One of `COUNTS`.
+    numbers : sequence of float
+        As many as it has.
+
+    Returns
+    -------
+    Membership
+        Of these.
+    list of float
+        Least and greatest place of the universe that jFuzzyLogic takes where none is said.
+
+    Raises
+    ------
+    DefinitionError
+        If the numbers make none.
+    """
+    if word in ("TRIAN", "TRAPE"):
+        places = [numbers[0], numbers[-1]]
+        if len(set(numbers)) == 1:
+            return Curve("singleton", (numbers[0],)), places
+        return (triangle if word == "TRIAN" else trapezoid)(*numbers), places
+    if word == "COSINE":
+        half, center = numbers
+        return Curve("cosine", (center, 2.0 * half)), [center - half, center + half]
+    if word == "DSIGM" and not _rises_first(*numbers):
+        rising, left, falling, right = map(say_number, numbers)  # where jFuzzyLogic takes 0 for what is below 0
+        first, second = f"1/(1+exp(-({rising})*(x-({left}))))", f"1/(1+exp(-({falling})*(x-({right}))))"
+        return Formula(f"max({first} - {second}, 0)"), _extent(
+            "sigmoid_difference", (numbers[1], *numbers[::2], numbers[3])
+        )
+    name, order = CURVES[word]
+    parameters = tuple(number for _, number in sorted(zip(order, numbers, strict=True)))
+    return Curve(name, parameters), _extent(name, parameters)
+
+
+def _rises_first(rising: float, left: float, falling: float, right: float) -> bool:
+    """Return whether the first sigmoid is never below the second."""
+    return rising == falling and (left <= right if rising > 0.0 else left >= right)
+
+
+def _extent(name: str, p: Sequence[float]) -> list[float]:
+    """Return the universe that jFuzzyLogic takes for a curve."""
+    if name == "gaussian":
+        return [p[0] - 4.0 * p[1], p[0] + 4.0 * p[1]]
+    if name == "gaussian2":
+        return [p[0] - 4.0 * p[1], p[2] + 4.0 * p[3]]
+    if name == "bell":
+        reach = 999.0 ** (1.0 / (2.0 * p[2])) * p[1] if p[2] else 0.0
+        return [p[0] - reach, p[0] + reach]
+    if name == "sigmoid":
+        reach = 9.0 / abs(p[1]) if p[1] else 0.0
+        return [p[0] - reach, p[0] + reach]
+    reaches = [9.0 / abs(slope) if slope else 0.0 for slope in (p[1], p[2])]
+    return [min(p[0] - reaches[0], p[3] - reaches[1]), max(p[0] + reaches[0], p[3] + reaches[1])]
+
+
+def say_shape(shape: Membership | Value, term: str, inputs: Sequence[str]) -> str:
+    """Return a term's shape as the standard and jFuzzyLogic say it.
+
+    Parameters
+    ----------
+    shape : Membership or Value
+        What is written.
+    term : str
+        Its name, for the fault.
+    inputs : sequence of str
+        Names of the system's inputs.
+
+    Returns
+    -------
+    str
+        Points, a number, or a function with its numbers.
+
+    Raises
+    ------
+    UnsupportedError
+        If the language has no word for it.
+    """
+    if isinstance(shape, Shape):
+        return " ".join(f"({say_number(x)}, {say_number(degree)})" for x, degree in shape.points)
+    if isinstance(shape, Constant):
+        return say_number(shape.value)
+    if isinstance(shape, Formula | Linear):
+        text = shape.text if isinstance(shape, Formula) else shape.expression(inputs).text
+        return f"FUNCTION {text}"
+    assert isinstance(shape, Curve)
+    if shape.height != 1.0:
+        raise UnsupportedError(f"fcl cannot say the height {shape.height!r} of term {term!r}: expected 1")
+    if shape.kind == "cosine":
+        return f"COSINE {say_numbers((shape.parameters[1] / 2.0, shape.parameters[0]))}"
+    if shape.kind == "singleton":
+        return f"TRIAN {say_numbers(shape.parameters * 3)}"
+    spelled = KINDS[shape.kind].fcl
+    if spelled is None:
+        raise UnsupportedError(
+            f"fcl cannot say the kind {shape.kind!r} of term {term!r}: expected points, or one of "
+            f"{', '.join(name for name, _ in CURVES.values())}, cosine"
+        )
+    word, order = spelled
+    if word == "DSIGM" and not _rises_first(*(shape.parameters[i] for i in order)):
+        raise UnsupportedError(
+            f"fcl cannot say term {term!r}, a sigmoid_difference of which the second sigmoid may be above the first"
+        )
+    return f"{word} {say_numbers(shape.parameters[i] for i in order)}"
+
+
+def universe_of(places: Sequence[float]) -> tuple[float, float] | None:
+    """Return the universe that points make, where none is said.
+
+    Parameters
+    ----------
+    places : sequence of float
+        Of all terms of a variable.
+
+    Returns
+    -------
+    (float, float) or None
+        Least and greatest; None if they are not two.
+    """
+    low, high = min(places, default=0.0), max(places, default=0.0)
+    return (low, high) if low < high else None
+
+
+def require_known(word: str, line: int, known: Sequence[str]) -> None:
+    """Refuse a word that is no function.
+
+    Parameters
+    ----------
+    word : str
+        What came.
+    line : int
+        Where it stands.
+    known : sequence of str
+        What was expected.
+
+    Raises
+    ------
+    FormatError
+        Unless it is known.
+    """
+    if word not in known:
+        expected = f"points such as (0, 0) (5, 1), a number, or one of {', '.join(known)}"
+        refuse(line, f"{word!r} is no membership function, expected {expected}")

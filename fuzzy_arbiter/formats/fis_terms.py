@@ -1,0 +1,124 @@
+"""Membership functions and values in MATLAB's text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from fuzzy_arbiter.formats.fis_words import CURVES, FUNCTIONS, SHOULDERS, STRAIGHT, VALUES
+from fuzzy_arbiter.formats.fll_terms import curve_of, read_shape, read_value
+from fuzzy_arbiter.formats.notation import read_number, refuse, say_numbers
+from fuzzy_arbiter.shapes import Membership, Shape
+from fuzzy_arbiter.terms.expressions import Expression
+from fuzzy_arbiter.terms.values import Formula, Value
+
+
+def read_function(function: str, text: str, line: int, term: str, inputs: int | None) -> Membership | Value:
+    """Return what a function's name and numbers say.
+
+    Parameters
+    ----------
+    function : str
+        Such as ``trimf``.
+    text : str
+        What stands in its brackets.
+    line : int
+        Where it stands.
+    term : str
+        Name of the term.
+    inputs : int or None
+        How many inputs there are; None for a term of an input, which cannot be a value.
+
+    Returns
+    -------
+    Membership or Value
+        Of these.
+
+    Raises
+    ------
+    FormatError
+        If the function is not known, or its numbers are not as it wants them.
+    DefinitionError
+        If they make none.
+    """
+    if function not in FUNCTIONS:
+        refuse(line, f"term {term!r} is {function!r}, which is not known here; expected {', '.join(FUNCTIONS)}")
+    if function == "function":
+        return Formula(text)
+    numbers = numbers_of(text, line, f"place of {term!r}")
+    if function in VALUES:
+        return read_value(function, numbers, line, inputs)
+    if function in CURVES:
+        name, order = CURVES[function]
+        numbers = _unpadded(numbers, len(order))
+        if function in ("zmf", "smf") and len(numbers) == 2 and numbers[0] > numbers[1]:
+            numbers = [sum(numbers) / 2] * 2  # where MATLAB lets it jump
+        return curve_of(name, order, numbers, line, function)
+    kind, count = STRAIGHT.get(function, ("", 2))
+    numbers = _unpadded(numbers, count) if count else numbers
+    if len(numbers) not in (count or len(numbers), count + 1 if function in ("rampmf", "rectmf") else count):
+        refuse(line, f"term {term!r} has the places [{text}], expected {count} for {function}")
+    if function in SHOULDERS:
+        return SHOULDERS[function](*numbers)
+    if function == "trapmf" and numbers[1] > numbers[2]:
+        return _crossed(*numbers)
+    return read_shape(kind, say_numbers(numbers), line)
+
+
+def numbers_of(text: str, line: int, what: str) -> list[float]:
+    """Return the numbers that stand in brackets, which may be worked out as in ``-pi/4``.
+
+    Parameters
+    ----------
+    text : str
+        Numbers with spaces, commas or semicolons between them.
+    line : int
+        Where they stand.
+    what : str
+        What they are, for the fault.
+
+    Returns
+    -------
+    list of float
+        Finite.
+
+    Raises
+    ------
+    FormatError
+        If one is none.
+    """
+    return [_number(part, line, what) for part in re.split(r"[\s,;]+", text.strip()) if part]
+
+
+def _number(text: str, line: int, what: str) -> float:
+    if "pi" not in text:
+        return read_number(text, line, what)
+    whole = Expression(text)
+    return whole({}) if not whole.names else read_number(text, line, what)
+
+
+def _unpadded(numbers: list[float], count: int) -> list[float]:
+    """Return numbers without the zeros with which MATLAB's old files fill all up to four."""
+    return numbers[:count] if len(numbers) == 4 > count and not any(numbers[count:]) else numbers
+
+
+def _crossed(a: float, b: float, c: float, d: float) -> Shape:
+    """Return the lesser of a rise from a to b and a fall from c to d that cross below 1."""
+    place = (a * (d - c) + d * (b - a)) / ((b - a) + (d - c))
+    return Shape(((a, 0.0), (place, (place - a) / (b - a)), (d, 0.0)))
+
+
+def line_of(numbers: Sequence[float]) -> str:
+    """Return numbers in brackets.
+
+    Parameters
+    ----------
+    numbers : sequence of float
+        Finite.
+
+    Returns
+    -------
+    str
+        As MATLAB writes them.
+    """
+    return f"[{say_numbers(numbers)}]"

@@ -1,0 +1,88 @@
+"""What rules and values of a system refer to: refused where it is not there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fuzzy_arbiter.errors import DefinitionError
+from fuzzy_arbiter.propositions import Is, anything
+from fuzzy_arbiter.terms.values import Linear, Value
+
+if TYPE_CHECKING:
+    from fuzzy_arbiter.definition import System
+    from fuzzy_arbiter.rule import Rule
+
+
+def require_rule(system: System, i: int, rule: Rule) -> None:
+    """Refuse a rule that speaks of what there is not.
+
+    Parameters
+    ----------
+    system : System
+        Whose variables are known.
+    i : int
+        Place of the rule; it may ask for outputs on which rules before it conclude.
+    rule : Rule
+        What is looked at.
+
+    Raises
+    ------
+    DefinitionError
+        If a variable or a term is not there, or two conclusions are on one output.
+    """
+    inputs = {v.name: frozenset(v.term_names) for v in system.inputs}
+    outputs = {v.name: frozenset(v.term_names) for v in system.outputs}
+    where = f"R{i + 1} {str(rule)!r}"
+    before = {c.variable for earlier in system.rules[:i] for c in earlier.conclusions}
+    for statement in rule.condition.terms():
+        if statement.variable not in outputs:
+            _require_known(statement, inputs, "input", where)
+            continue
+        _require_known(statement, outputs, "output", where)
+        if statement.variable not in before:
+            raise DefinitionError(f"{where}: asks for output {statement.variable!r}, on which no rule before concludes")
+    for name in anything(rule.condition):
+        if name not in inputs:
+            raise DefinitionError(f"{where}: no input {name!r}, expected one of {', '.join(inputs)}")
+    for statement in rule.conclusions:
+        _require_known(statement, outputs, "output", where)
+    if len({statement.variable for statement in rule.conclusions}) < len(rule.conclusions):
+        raise DefinitionError(f"{where}: two conclusions on one output, expected each output once")
+
+
+def require_values(system: System) -> None:
+    """Refuse values that speak of what there is not, and inputs that nothing speaks of.
+
+    Parameters
+    ----------
+    system : System
+        Whose outputs may have terms that are values.
+
+    Raises
+    ------
+    DefinitionError
+        If a value is no function of inputs and outputs before its own, or an input has no terms and no value uses it.
+    """
+    inputs, outputs = ([v.name for v in variables] for variables in (system.inputs, system.outputs))
+    used: set[str] = set()
+    for k, output in enumerate(system.outputs):
+        for term in output.terms if output.weighted else ():
+            if isinstance(term.shape, Value):
+                try:
+                    whole = term.shape.expression(inputs, outputs[:k])
+                except DefinitionError as error:
+                    raise DefinitionError(f"output {output.name!r}: term {term.name!r}: {error}") from None
+                used |= whole.names | (set(inputs) if isinstance(term.shape, Linear) else set())
+    for variable in system.inputs:
+        if not variable.terms and variable.name not in used:
+            raise DefinitionError(f"variable {variable.name!r}: no terms came, expected at least one")
+
+
+def _require_known(statement: Is, known: dict[str, frozenset[str]], kind: str, where: str) -> None:
+    if statement.variable not in known:
+        raise DefinitionError(f"{where}: no {kind} {statement.variable!r}, expected one of {', '.join(known)}")
+    if statement.term not in known[statement.variable]:
+        expected = ", ".join(sorted(known[statement.variable]))
+        raise DefinitionError(
+            f"{where}: {statement.variable!r} has no term {statement.term!r}, expected one of {expected}"
+        )

@@ -1,0 +1,79 @@
+"""What an arbiter gives: the value of each output, by position and by name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar, TypeVar
+
+from fuzzy_arbiter.errors import DefinitionError
+
+T = TypeVar("T")
+
+
+class Result(tuple[T, ...]):
+    """A named tuple of the outputs' values, one number each or one column each.
+
+    ``result["tip"]`` and ``result.tip`` are the value of an output, ``result[0]`` that of the first. It equals the
+    plain tuple of its values.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> result = Arbiter()(obstacle=0.25, shape=0.0, depth=0.0)
+    >>> result["obstacle"], result[0], result == (0.15625, 0.0, 0.0)
+    (0.15625, 0.15625, True)
+    """
+
+    __slots__ = ()
+    _fields: ClassVar[tuple[str, ...]] = ()
+    _places: ClassVar[dict[str, int]] = {}
+
+    def __getitem__(self, key: Any) -> Any:
+        """Return the value of an output.
+
+        Raises
+        ------
+        DefinitionError
+            If there is no output of this name.
+        """
+        if isinstance(key, str):
+            if key not in self._places:
+                raise DefinitionError(f"no output {key!r}, expected one of {', '.join(self._fields)}")
+            key = self._places[key]
+        return super().__getitem__(key)
+
+    def __getattr__(self, name: str) -> T:
+        if name not in self._places:
+            raise AttributeError(f"no output {name!r}, expected one of {', '.join(self._fields)}")
+        return super().__getitem__(self._places[name])
+
+    def _asdict(self) -> dict[str, T]:
+        """Return the values by name, as named tuples do."""
+        return dict(zip(self._fields, self, strict=True))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _rebuilt, (self._fields, tuple(self))
+
+    def __repr__(self) -> str:
+        return f"Result({', '.join(f'{name}={value!r}' for name, value in self._asdict().items())})"
+
+
+def result_class(names: Sequence[str]) -> type[Result[Any]]:
+    """Return the class of results with these names, so that a single result carries no more than its values.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the outputs, in their order.
+
+    Returns
+    -------
+    type
+        A subclass of `Result`.
+    """
+    places = {name: k for k, name in enumerate(names)}
+    return type("Result", (Result,), {"__slots__": (), "_fields": tuple(names), "_places": places})
+
+
+def _rebuilt(names: Sequence[str], values: tuple[T, ...]) -> Result[T]:
+    return tuple.__new__(result_class(names), values)

@@ -1,0 +1,77 @@
+"""Terms that cover a universe evenly, for those who only want to name them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from fuzzy_arbiter.checks import all_of, shown
+from fuzzy_arbiter.errors import DefinitionError
+from fuzzy_arbiter.shapes import Shape, triangle
+
+_NAMES = {
+    3: ("poor", "average", "good"),
+    5: ("poor", "mediocre", "average", "decent", "good"),
+    7: ("dismal", "poor", "mediocre", "average", "decent", "good", "excellent"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class AutomaticTerms:
+    """Names of terms whose shapes follow from the universe of the variable that they are given to."""
+
+    names: tuple[str, ...]
+
+    def over(self, universe: tuple[float, float]) -> dict[str, Shape]:
+        """Return the shapes over a universe.
+
+        Parameters
+        ----------
+        universe : (float, float)
+            Least and greatest value.
+
+        Returns
+        -------
+        dict from str to Shape
+            Triangles whose feet are the peaks of their neighbours, the first and the last peak at the ends.
+        """
+        low, high = map(Fraction, universe)
+        step = (high - low) / (len(self.names) - 1)
+        peaks = [float(low + i * step) for i in range(-1, len(self.names) + 1)]
+        return {name: triangle(*peaks[i : i + 3]) for i, name in enumerate(self.names)}
+
+
+def auto_terms(terms: int | Sequence[str]) -> AutomaticTerms:
+    """Return triangles at equal distances, to be given to a variable in the place of its terms.
+
+    Parameters
+    ----------
+    terms : {3, 5, 7} or sequence of str
+        How many, named as in scikit-fuzzy, such as ``poor``, ``average``, ``good``; or two or more names of one's own.
+
+    Returns
+    -------
+    AutomaticTerms
+        Their degrees add up to 1 everywhere.
+
+    Raises
+    ------
+    DefinitionError
+        If it is another number, or fewer than two names.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Variable, auto_terms
+    >>> service = Variable("service", (0, 10), auto_terms(3))
+    >>> service.term_names, service["average"](4)
+    (('poor', 'average', 'good'), 0.8)
+    """
+    if isinstance(terms, int) and not isinstance(terms, bool):
+        if terms not in _NAMES:
+            raise DefinitionError(f"auto_terms: {shown(terms)} came, expected 3, 5 or 7, or the terms' names")
+        return AutomaticTerms(_NAMES[terms])
+    names = all_of(str, terms, "auto_terms", "3, 5 or 7, or the terms' names")
+    if len(names) < 2:
+        raise DefinitionError(f"auto_terms: {len(names)} names came, expected two or more")
+    return AutomaticTerms(names)

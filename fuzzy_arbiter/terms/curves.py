@@ -1,0 +1,215 @@
+"""Smooth membership functions by name, of the kinds that stand in `fuzzy_arbiter.terms.kinds`."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fuzzy_arbiter.checks import finite, shown
+from fuzzy_arbiter.errors import DefinitionError
+from fuzzy_arbiter.shapes import Array, Membership, Shape
+from fuzzy_arbiter.terms.expressions import Expression, array_function, number_function
+from fuzzy_arbiter.terms.kinds import KINDS
+from fuzzy_arbiter.terms.parser import Node
+
+
+@dataclass(frozen=True, slots=True)
+class Curve(Membership):
+    """A membership function of a named kind.
+
+    Attributes
+    ----------
+    kind : str
+        Such as ``gaussian``; `KINDS` has them all.
+    parameters : tuple of float
+        As many as the kind has, in its order.
+    height : float
+        By which all degrees are multiplied, above 0 and at most 1.
+
+    Raises
+    ------
+    DefinitionError
+        If there is no such kind, or the parameters make none.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter.terms import Curve
+    >>> Curve("s_shape", (0.0, 2.0))(0.5)
+    0.125
+    """
+
+    kind: str
+    parameters: tuple[float, ...]
+    height: float = 1.0
+    ends: tuple[float, ...] = field(init=False, repr=False, compare=False)
+    trees: tuple[Node, ...] = field(init=False, repr=False, compare=False)
+    _numbers: tuple[Callable[..., float], ...] = field(init=False, repr=False, compare=False)
+    _arrays: tuple[Callable[..., Any], ...] = field(init=False, repr=False, compare=False)
+    _jumps: tuple[float, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        kind = KINDS.get(self.kind) if isinstance(self.kind, str) else None
+        if kind is None:
+            raise DefinitionError(f"curve is {shown(self.kind)}, expected one of {', '.join(KINDS)}")
+        words = f"{self.kind} of {', '.join(kind.parameters)}"
+        given = (
+            self.parameters if isinstance(self.parameters, Sequence) and not isinstance(self.parameters, str) else ()
+        )
+        numbers = tuple(x for x in map(finite, given) if x is not None)
+        if len(numbers) != len(given) or len(numbers) != len(kind.parameters):
+            raise DefinitionError(
+                f"{words}: {shown(self.parameters)} came, expected {len(kind.parameters)} finite numbers"
+            )
+        height = finite(self.height)
+        if height is None or not 0.0 < height <= 1.0:
+            raise DefinitionError(f"{words}: height is {shown(self.height)}, expected above 0 and at most 1")
+        if not kind.good(*numbers):
+            raise DefinitionError(f"{words}: {shown(numbers)} came, expected {kind.expected}")
+        named = dict(zip(kind.parameters, numbers, strict=True))
+        pieces = [(end, _tree(text, named, height)) for end, text in kind.pieces(*numbers)]
+        object.__setattr__(self, "parameters", numbers)
+        object.__setattr__(self, "height", height)
+        object.__setattr__(self, "ends", tuple(end for end, _ in pieces))
+        object.__setattr__(self, "trees", tuple(tree for _, tree in pieces))
+        object.__setattr__(self, "_numbers", tuple(map(number_function, self.trees)))
+        object.__setattr__(self, "_arrays", tuple(map(array_function, self.trees)))
+        object.__setattr__(self, "_jumps", tuple(x for i, x in enumerate(self.ends[:-1]) if self._jump(i, x)))
+
+    @property
+    def polynomial(self) -> bool:  # type: ignore[override]  # by kind
+        """Whether its pieces are polynomials."""
+        return KINDS[self.kind].polynomial
+
+    @property
+    def jumps(self) -> bool:
+        """Whether there is a jump."""
+        return bool(self._jumps)
+
+    def _side(self, i: int, x: float) -> float:
+        return self._numbers[i]({"x": x})
+
+    def _jump(self, i: int, end: float) -> bool:
+        return abs(self._side(i, end) - self._side(i + 1, end)) > 1e-9
+
+    def __call__(self, x: float) -> float:
+        """Return the degree at a place; of a jump the greater one; NaN for a place that is NaN."""
+        if x != x:
+            return x
+        i = bisect_left(self.ends, x)
+        degree = self._side(i, x)
+        if x == self.ends[i] and i + 1 < len(self.ends):
+            degree = max(degree, self._side(i + 1, x))
+        return min(max(degree, 0.0), 1.0)
+
+    def of_many(self, places: Array) -> Array:
+        """Return the degrees at many places, each as a call gives it, to rounding."""
+        result = np.empty(len(places))
+        with np.errstate(all="ignore"):
+            if len(self._arrays) == 1:
+                result[:] = self._arrays[0]({"x": places})
+            else:
+                piece = np.searchsorted(self.ends, places)
+                for i, of in enumerate(self._arrays):
+                    inside = piece == i
+                    if inside.any():
+                        result[inside] = of({"x": places[inside]})
+        for end in self._jumps:
+            result[places == end] = self(end)
+        np.minimum(np.maximum(result, 0.0, out=result), 1.0, out=result)
+        if len(self._arrays) > 1:
+            result[places != places] = np.nan
+        return result
+
+    def breaks(self, universe: tuple[float, float]) -> tuple[float, ...]:
+        """Return the ends of its pieces within a universe."""
+        return tuple(sorted({end for end in self.ends if universe[0] < end < universe[1]}))
+
+    def place_of(self, degree: float) -> float:
+        """Return where a curve that only rises or only falls has a degree, as Tsukamoto's method asks.
+
+        Parameters
+        ----------
+        degree : float
+            Above 0, at most the height.
+
+        Returns
+        -------
+        float
+            The place, perhaps infinite.
+        """
+        inverse = KINDS[self.kind].inverse
+        assert inverse is not None, self.kind
+        named = dict(zip(KINDS[self.kind].parameters, self.parameters, strict=True))
+        w = degree / self.height
+        text = next(text for end, text in inverse(*self.parameters) if w <= end)
+        return Expression(text)({**named, "w": w})
+
+    @property
+    def invertible(self) -> bool:
+        """Whether it only rises or only falls, so that `place_of` knows a place."""
+        return KINDS[self.kind].inverse is not None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Curve, (self.kind, self.parameters, self.height)
+
+
+def _tree(text: str, named: dict[str, float], height: float) -> Node:
+    tree = Expression(text).bound(named).tree
+    return tree if height == 1.0 else tree * height if isinstance(tree, float) else ("*", height, tree)
+
+
+def curve(kind: str, *parameters: float, height: float = 1.0) -> Membership:
+    """Return a membership function of a named kind.
+
+    Parameters
+    ----------
+    kind : str
+        One of ``gaussian`` (mean, deviation), ``gaussian2`` (mean1, deviation1, mean2, deviation2), ``bell`` (center,
+        width, slope), ``sigmoid`` (inflection, slope), ``sigmoid_difference`` and ``sigmoid_product`` (left, rising,
+        falling, right), ``z_shape``, ``s_shape`` (start, end), ``pi_shape`` (foot1, top1, top2, foot2), ``cosine`` and
+        ``spike`` (center, width), ``concave`` (inflection, end), ``arc`` and ``semi_ellipse`` (start, end), and
+        ``singleton`` (place), which is 1 there and 0 elsewhere.
+    *parameters : float
+        As many as the kind has.
+    height : float
+        By which all degrees are multiplied.
+
+    Returns
+    -------
+    Membership
+        Which gives the degree at a place when called.
+
+    Raises
+    ------
+    DefinitionError
+        If there is no such kind, or the parameters make none.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter.terms import curve
+    >>> round(curve("gaussian", 5.0, 2.0)(7.0), 4)
+    0.6065
+    """
+    return Curve(kind, parameters, height)
+
+
+def heightened(shape: Shape, height: float) -> Shape:
+    """Return a shape with all degrees multiplied.
+
+    Parameters
+    ----------
+    shape : Shape
+        Any.
+    height : float
+        From 0 to 1.
+
+    Returns
+    -------
+    Shape
+        Of the same places.
+    """
+    return shape if height == 1.0 else Shape(tuple((x, degree * height) for x, degree in shape.points))

@@ -1,0 +1,214 @@
+"""Arithmetic in text, as files and terms say it: read by a parser of its own, never run as Python.
+
+One tree serves all: it is evaluated on numbers and on arrays, and written as text, or as C and Python alike.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fuzzy_arbiter.terms.functions import ALL
+from fuzzy_arbiter.terms.parser import Node, parsed
+
+_BINDS = {"+": 1, "-": 1, "*": 2, "/": 2, "%": 2, "~": 3, "^": 4}
+
+
+@dataclass(frozen=True, slots=True)
+class Expression:
+    """Arithmetic on named numbers.
+
+    Attributes
+    ----------
+    text : str
+        With ``+ - * / % ^``, parentheses, names, and functions such as ``sin(x)``; two that say the same are equal.
+
+    Raises
+    ------
+    DefinitionError
+        If the text is none, is longer than 2000 characters, or nests deeper than 50 parentheses.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter.terms.expressions import Expression
+    >>> Expression("2 * speed ^ 2 + 1")({"speed": 3.0})
+    19.0
+    """
+
+    text: str
+    tree: Node = None  # type: ignore[assignment]  # read from the text
+    _number: Callable[[Mapping[str, float]], float] = field(init=False, repr=False, compare=False)
+    _array: Callable[[Mapping[str, Any]], Any] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        tree = parsed(self.text) if self.tree is None else self.tree
+        object.__setattr__(self, "tree", tree)
+        object.__setattr__(self, "text", said(tree))
+        object.__setattr__(self, "_number", number_function(tree))
+        object.__setattr__(self, "_array", array_function(tree))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Expression, (self.text, self.tree)
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The names whose numbers it needs."""
+        return frozenset(_names(self.tree))
+
+    def __call__(self, values: Mapping[str, float]) -> float:
+        """Return the value for numbers, by IEEE 754: 0/0 is NaN, 1/0 infinite."""
+        return float(self._number(values))
+
+    def of_many(self, values: Mapping[str, Any]) -> Any:
+        """Return the values for arrays of one shape."""
+        with np.errstate(all="ignore"):
+            return self._array(values)
+
+    def bound(self, values: Mapping[str, float]) -> Expression:
+        """Return the expression with numbers in the place of some names, worked out as far as they go."""
+        return Expression("", _bound(self.tree, values))
+
+
+def _names(node: Node) -> list[str]:
+    if isinstance(node, tuple):
+        return [name for part in node[1:] for name in _names(part)]
+    return [node] if isinstance(node, str) else []
+
+
+def _bound(node: Node, values: Mapping[str, float]) -> Node:
+    if isinstance(node, str):
+        return values.get(node, node)
+    if isinstance(node, float):
+        return node
+    parts = [_bound(part, values) for part in node[1:]]
+    if all(isinstance(part, float) for part in parts):
+        return float(ALL[node[0]].number(*parts))
+    return (node[0], *parts)
+
+
+def number_function(node: Node) -> Callable[[Mapping[str, float]], float]:
+    """Return what evaluates a tree on numbers.
+
+    Parameters
+    ----------
+    node : Node
+        Of an `Expression`.
+
+    Returns
+    -------
+    callable
+        From names to numbers, to a number.
+    """
+    if isinstance(node, float):
+        return lambda values: node
+    if isinstance(node, str):
+        return lambda values: values[node]
+    function, parts = ALL[node[0]].number, [number_function(part) for part in node[1:]]
+    if len(parts) == 1:
+        (one,) = parts
+        return lambda values: function(one(values))
+    first, second = parts
+    return lambda values: function(first(values), second(values))
+
+
+def array_function(node: Node) -> Callable[[Mapping[str, Any]], Any]:
+    """Return what evaluates a tree on arrays.
+
+    Parameters
+    ----------
+    node : Node
+        Of an `Expression`.
+
+    Returns
+    -------
+    callable
+        From names to arrays, to an array, or to a number where nothing depends on the names.
+    """
+    if isinstance(node, float):
+        return lambda values: node
+    if isinstance(node, str):
+        return lambda values: values[node]
+    function, parts = ALL[node[0]].array, [array_function(part) for part in node[1:]]
+    return lambda values: function(*(part(values) for part in parts))
+
+
+def said(node: Node) -> str:
+    """Return a tree as text that reads as the same tree again.
+
+    Parameters
+    ----------
+    node : Node
+        Of an `Expression`.
+
+    Returns
+    -------
+    str
+        With no more parentheses than are needed.
+    """
+    return _said(node)[0]
+
+
+def _said(node: Node) -> tuple[str, int]:
+    """Return a node's text, and how strongly its outermost operator binds."""
+    if isinstance(node, str):
+        return node, 9
+    if isinstance(node, float):
+        text = repr(node).removesuffix(".0")
+        return (text, 9) if node >= 0.0 or node != node else (text, 3)
+    word, *parts = node
+    texts = [_said(part) for part in parts]
+    if word not in _BINDS:
+        return f"{word}({', '.join(text for text, _ in texts)})", 9
+    binds = _BINDS[word]
+    if word == "~":
+        return f"-{_within(texts[0], binds)}", binds
+    left, right = texts
+    # of equal ones the left is first, but for powers
+    first, second = (
+        (_within(left, binds + 1), _within(right, binds))
+        if word == "^"
+        else (
+            _within(left, binds),
+            _within(right, binds + 1),
+        )
+    )
+    return (f"{first}^{second}" if word == "^" else f"{first} {word} {second}"), binds
+
+
+def _within(part: tuple[str, int], binds: int) -> str:
+    text, own = part
+    return text if own >= binds else f"({text})"
+
+
+def code(node: Node, names: Mapping[str, str]) -> str:
+    """Return a tree as C and Python alike say it.
+
+    Parameters
+    ----------
+    node : Node
+        Of an `Expression`.
+    names : mapping from name to str
+        What each name is called there.
+
+    Returns
+    -------
+    str
+        Calls of functions of C's ``math.h``, of which Python's ``math`` has the same; comparisons and ``quotient`` and
+        ``power`` are functions that the exported code brings along.
+    """
+    if isinstance(node, float):
+        return repr(node) if math.isfinite(node) else "INFINITY" if node > 0 else "-INFINITY" if node < 0 else "NAN"
+    if isinstance(node, str):
+        return names[node]
+    word, *parts = node
+    texts = [code(part, names) for part in parts]
+    if word == "~":
+        return f"(-{texts[0]})"
+    if word in ("+", "-", "*"):
+        return f"({texts[0]} {word} {texts[1]})"
+    called = {"/": "quotient", "%": "fmod", "^": "power", "pow": "power", "abs": "fabs", "min": "least"}
+    return f"{called.get(word, 'greatest' if word == 'max' else word)}({', '.join(texts)})"

@@ -1,0 +1,275 @@
+"""The kinds of smooth membership functions: each is one entry, with all that engines, formats and exports need."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+Pieces = list[tuple[float, str]]  # where each ends, the last at infinity, and its expression
+Word = tuple[str, tuple[int, ...]]  # what a format calls it, and which parameters it names, in its order
+
+_END = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class CurveKind:
+    """A kind of membership function, with all its faces.
+
+    Attributes
+    ----------
+    parameters : tuple of str
+        Their names, in the order of `Curve.parameters`.
+    pieces : callable
+        From the parameters to its smooth pieces, whose expressions speak of ``x`` and of the parameters' names.
+    good : callable
+        Whether there is such a function.
+    expected : str
+        What the parameters have to be, in words.
+    fll, fis, fcl : Word, optional
+        How fuzzylite, MATLAB or fuzzylite, and jFuzzyLogic spell it; an empty word is none.
+    polynomial : bool
+        Whether its pieces are polynomials.
+    inverse : callable, optional
+        For one that only rises or only falls: pieces over its degree ``w``, which give the place.
+    """
+
+    parameters: tuple[str, ...]
+    pieces: Callable[..., Pieces]
+    good: Callable[..., bool]
+    expected: str
+    fll: Word
+    fis: Word
+    fcl: Word | None = None
+    polynomial: bool = False
+    inverse: Callable[..., Pieces] | None = None
+
+
+def _same(count: int) -> tuple[int, ...]:
+    return tuple(range(count))
+
+
+def _multiplied(first: Pieces, second: Pieces) -> Pieces:
+    """Return the product of two functions in pieces."""
+    ends = sorted({end for end, _ in (*first, *second)})
+
+    def at(pieces: Pieces, end: float) -> str:
+        return next(text for other, text in pieces if end <= other)
+
+    return [(end, f"({at(first, end)}) * ({at(second, end)})") for end in ends]
+
+
+def _s(start: float, end: float, names: tuple[str, str] = ("start", "end")) -> Pieces:
+    if start == end:
+        return [(start, "0"), (_END, "1")]
+    a, b = names
+    return [
+        (start, "0"),
+        ((start + end) / 2, f"2 * ((x - {a}) / ({b} - {a})) ^ 2"),
+        (end, f"1 - 2 * ((x - {b}) / ({b} - {a})) ^ 2"),
+        (_END, "1"),
+    ]
+
+
+def _z(start: float, end: float, names: tuple[str, str] = ("start", "end")) -> Pieces:
+    return [(place, text if text in ("0", "1") else f"1 - ({text})") for place, text in _flipped(_s(start, end, names))]
+
+
+def _flipped(pieces: Pieces) -> Pieces:
+    return [(end, {"0": "1", "1": "0"}.get(text, text)) for end, text in pieces]
+
+
+def _gaussian(mean: str, deviation: str) -> str:
+    return f"exp(-(x - {mean}) ^ 2 / (2 * {deviation} ^ 2))"
+
+
+def _sigmoid(inflection: str, slope: str) -> str:
+    return f"1 / (1 + exp(-{slope} * (x - {inflection})))"
+
+
+def _difference(left: float, rising: float, falling: float, right: float) -> Pieces:
+    text = f"abs({_sigmoid('left', 'rising')} - {_sigmoid('right', 'falling')})"
+    if rising == falling:
+        return [(_END, text)]
+    return [((rising * left - falling * right) / (rising - falling), text), (_END, text)]
+
+
+def _concave(inflection: float, end: float) -> Pieces:
+    if inflection == end:
+        return [(end, "0"), (_END, "1")]
+    if inflection < end:
+        return [(end, "(end - inflection) / (2 * end - inflection - x)"), (_END, "1")]
+    return [(end, "1"), (_END, "(inflection - end) / (inflection - 2 * end + x)")]
+
+
+def _arc(start: float, end: float) -> Pieces:
+    curve = "sqrt(max(0, (end - start) ^ 2 - (x - end) ^ 2)) / abs(end - start)"
+    return [(start, "0"), (end, curve), (_END, "1")] if start < end else [(end, "1"), (start, curve), (_END, "0")]
+
+
+def _ellipse(start: float, end: float) -> Pieces:
+    curve = "sqrt(max(0, (x - start) * (end - x))) / (abs(end - start) / 2)"
+    return [(min(start, end), "0"), (max(start, end), curve), (_END, "0")]
+
+
+KINDS: dict[str, CurveKind] = {
+    "gaussian": CurveKind(
+        ("mean", "deviation"),
+        lambda mean, deviation: [(_END, _gaussian("mean", "deviation"))],
+        lambda mean, deviation: deviation != 0.0,
+        "a deviation other than 0",
+        fll=("Gaussian", (0, 1)),
+        fis=("gaussmf", (1, 0)),
+        fcl=("GAUSS", (0, 1)),
+    ),
+    "gaussian2": CurveKind(
+        ("mean1", "deviation1", "mean2", "deviation2"),
+        lambda mean1, deviation1, mean2, deviation2: _multiplied(
+            [(mean1, _gaussian("mean1", "deviation1")), (_END, "1")],
+            [(mean2, "1"), (_END, _gaussian("mean2", "deviation2"))],
+        ),
+        lambda mean1, deviation1, mean2, deviation2: deviation1 != 0.0 and deviation2 != 0.0,
+        "deviations other than 0",
+        fll=("GaussianProduct", (0, 1, 2, 3)),
+        fis=("gauss2mf", (1, 0, 3, 2)),
+        fcl=("GAUSS2", (0, 1, 2, 3)),
+    ),
+    "bell": CurveKind(
+        ("center", "width", "slope"),
+        lambda center, width, slope: [
+            (center, "1 / (1 + abs((x - center) / width) ^ (2 * slope))"),
+            (_END, "1 / (1 + abs((x - center) / width) ^ (2 * slope))"),
+        ],
+        lambda center, width, slope: width != 0.0,
+        "a width other than 0",
+        fll=("Bell", (0, 1, 2)),
+        fis=("gbellmf", (1, 2, 0)),
+        fcl=("GBELL", (1, 2, 0)),
+    ),
+    "sigmoid": CurveKind(
+        ("inflection", "slope"),
+        lambda inflection, slope: [(_END, _sigmoid("inflection", "slope"))],
+        lambda inflection, slope: True,
+        "two numbers",
+        fll=("Sigmoid", (0, 1)),
+        fis=("sigmf", (1, 0)),
+        fcl=("SIGM", (1, 0)),
+        inverse=lambda inflection, slope: [(_END, "inflection - log(1 / w - 1) / slope")],
+    ),
+    "sigmoid_difference": CurveKind(
+        ("left", "rising", "falling", "right"),
+        _difference,
+        lambda left, rising, falling, right: True,
+        "four numbers",
+        fll=("SigmoidDifference", (0, 1, 2, 3)),
+        fis=("dsigmf", (1, 0, 2, 3)),
+        fcl=("DSIGM", (1, 0, 2, 3)),
+    ),
+    "sigmoid_product": CurveKind(
+        ("left", "rising", "falling", "right"),
+        lambda left, rising, falling, right: [
+            (_END, f"({_sigmoid('left', 'rising')}) * ({_sigmoid('right', 'falling')})")
+        ],
+        lambda left, rising, falling, right: True,
+        "four numbers",
+        fll=("SigmoidProduct", (0, 1, 2, 3)),
+        fis=("psigmf", (1, 0, 2, 3)),
+    ),
+    "z_shape": CurveKind(
+        ("start", "end"),
+        _z,
+        lambda start, end: start <= end,
+        "a start that is not above the end",
+        fll=("ZShape", (0, 1)),
+        fis=("zmf", (0, 1)),
+        polynomial=True,
+        inverse=lambda start, end: [
+            (0.5, "end - (end - start) * sqrt(w / 2)"),
+            (_END, "start + (end - start) * sqrt((1 - w) / 2)"),
+        ],
+    ),
+    "s_shape": CurveKind(
+        ("start", "end"),
+        _s,
+        lambda start, end: start <= end,
+        "a start that is not above the end",
+        fll=("SShape", (0, 1)),
+        fis=("smf", (0, 1)),
+        polynomial=True,
+        inverse=lambda start, end: [
+            (0.5, "start + (end - start) * sqrt(w / 2)"),
+            (_END, "end - (end - start) * sqrt((1 - w) / 2)"),
+        ],
+    ),
+    "pi_shape": CurveKind(
+        ("foot1", "top1", "top2", "foot2"),
+        lambda foot1, top1, top2, foot2: _multiplied(
+            _s(foot1, top1, ("foot1", "top1")), _z(top2, foot2, ("top2", "foot2"))
+        ),
+        lambda foot1, top1, top2, foot2: foot1 <= top1 and top2 <= foot2,
+        "each foot on the outer side of its top",
+        fll=("PiShape", (0, 1, 2, 3)),
+        fis=("pimf", (0, 1, 2, 3)),
+        polynomial=True,
+    ),
+    "cosine": CurveKind(
+        ("center", "width"),
+        lambda center, width: [
+            (center - width / 2, "0"),
+            (center + width / 2, "0.5 * (1 + cos(2 / width * pi * (x - center)))"),
+            (_END, "0"),
+        ],
+        lambda center, width: width > 0.0,
+        "a width above 0",
+        fll=("Cosine", (0, 1)),
+        fis=("cosinemf", (0, 1)),
+    ),
+    "spike": CurveKind(
+        ("center", "width"),
+        lambda center, width: [
+            (center, "exp(-abs(10 / width * (x - center)))"),
+            (_END, "exp(-abs(10 / width * (x - center)))"),
+        ],
+        lambda center, width: width != 0.0,
+        "a width other than 0",
+        fll=("Spike", (0, 1)),
+        fis=("spikemf", (0, 1)),
+    ),
+    "concave": CurveKind(
+        ("inflection", "end"),
+        _concave,
+        lambda inflection, end: True,
+        "two numbers",
+        fll=("Concave", (0, 1)),
+        fis=("concavemf", (0, 1)),
+        inverse=lambda inflection, end: [(_END, "(inflection - end) / w + 2 * end - inflection")],
+    ),
+    "arc": CurveKind(
+        ("start", "end"),
+        _arc,
+        lambda start, end: start != end,
+        "two places",
+        fll=("Arc", (0, 1)),
+        fis=("arcmf", (0, 1)),
+        inverse=lambda start, end: [
+            (_END, f"end {'-' if start < end else '+'} sqrt((end - start) ^ 2 * (1 - w ^ 2))"),
+        ],
+    ),
+    "singleton": CurveKind(
+        ("place",),
+        lambda place: [(place, "eq(x, place)"), (_END, "0")],
+        lambda place: True,
+        "a place",
+        fll=("", (0,)),
+        fis=("", (0,)),
+    ),
+    "semi_ellipse": CurveKind(
+        ("start", "end"),
+        _ellipse,
+        lambda start, end: start != end,
+        "two places",
+        fll=("SemiEllipse", (0, 1)),
+        fis=("semiellipsemf", (0, 1)),
+    ),
+}
+"""All kinds, by name."""

@@ -1,0 +1,275 @@
+"""Terms of outputs that are values, not sets of places: constant, linear in the inputs, or any expression of them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fuzzy_arbiter.checks import all_of, finite, shown
+from fuzzy_arbiter.errors import DefinitionError
+from fuzzy_arbiter.shapes import Array, Membership, Shape
+from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.expressions import Expression
+from fuzzy_arbiter.terms.parser import Node
+
+
+class Value(ABC):
+    """What a rule of Sugeno's kind concludes: a number for each sample."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
+        """Return it as arithmetic on the names of the inputs, and of the outputs that come before its own.
+
+        Raises
+        ------
+        DefinitionError
+            If it does not fit these inputs.
+        """
+
+    def number(self, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Sequence[float]], float]:
+        """Return what gives the number for one sample, of the inputs and these outputs."""
+        whole, names = self.expression(inputs, outputs), (*inputs, *outputs)
+        return lambda sample: whole(dict(zip(names, sample, strict=True)))
+
+    def array(self, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Array], Array]:
+        """Return what gives the numbers for many samples, shape (n, inputs and outputs)."""
+        whole, names = self.expression(inputs, outputs), (*inputs, *outputs)
+
+        def numbers(samples: Array) -> Array:
+            values: Mapping[str, Any] = dict(zip(names, samples.T, strict=True))
+            return np.broadcast_to(whole.of_many(values), len(samples))
+
+        return numbers
+
+
+@dataclass(frozen=True, slots=True)
+class Constant(Value):
+    """One number, whatever the inputs are: a singleton.
+
+    Raises
+    ------
+    DefinitionError
+        If it is not finite.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter.terms import Constant
+    >>> Constant(15).value
+    15.0
+    """
+
+    value: float
+
+    def __post_init__(self) -> None:
+        value = finite(self.value)
+        if value is None:
+            raise DefinitionError(f"constant is {shown(self.value)}, expected a finite number")
+        object.__setattr__(self, "value", value)
+
+    def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
+        """Return the number."""
+        return Expression("", self.value)
+
+
+@dataclass(frozen=True, slots=True)
+class Linear(Value):
+    """A sum of the inputs, each times its coefficient, and of a constant.
+
+    Attributes
+    ----------
+    coefficients : tuple of float
+        One for each input, in the order of the system's inputs.
+    constant : float
+        What is added.
+
+    Raises
+    ------
+    DefinitionError
+        If one is not finite.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter.terms import Linear
+    >>> Linear((2.0, 0.5), 1.0).expression(["speed", "depth"]).text
+    '2 * speed + 0.5 * depth + 1'
+    """
+
+    coefficients: tuple[float, ...]
+    constant: float = 0.0
+
+    def __post_init__(self) -> None:
+        given = all_of(object, self.coefficients, "linear", "a sequence of numbers")
+        numbers = tuple(map(finite, (*given, self.constant)))
+        if None in numbers:
+            raise DefinitionError(f"linear: {shown((*given, self.constant))} came, expected finite numbers")
+        object.__setattr__(self, "coefficients", numbers[:-1])
+        object.__setattr__(self, "constant", numbers[-1])
+
+    def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
+        """Return the sum, if there are as many inputs as coefficients."""
+        if len(inputs) != len(self.coefficients):
+            raise DefinitionError(
+                f"linear of {len(self.coefficients)} coefficients, expected one for each input: {', '.join(inputs)}"
+            )
+        tree: Any = None
+        for name, coefficient in zip(inputs, self.coefficients, strict=True):
+            if coefficient:
+                part = ("*", coefficient, name)
+                tree = part if tree is None else ("+", tree, part)
+        if tree is None:
+            return Expression("", self.constant)
+        return Expression("", ("+", tree, self.constant) if self.constant else tree)
+
+    @classmethod
+    def of(cls, tree: Node, inputs: Sequence[str]) -> Linear | None:
+        """Return the linear value that a tree says, if it says it as `expression` does.
+
+        Parameters
+        ----------
+        tree : Node
+            Of an expression.
+        inputs : sequence of str
+            Names of the inputs.
+
+        Returns
+        -------
+        Linear or None
+            None if the tree says something else, or the same in another way.
+        """
+        coefficients = dict.fromkeys(inputs, 0.0)
+        constant = 0.0
+        node: Node | None = tree
+        while node is not None:
+            node, part = (node[1], node[2]) if isinstance(node, tuple) and node[0] == "+" else (None, node)
+            if isinstance(part, float):
+                constant = part
+            elif isinstance(part, tuple) and part[0] == "*" and isinstance(part[1], float) and part[2] in coefficients:
+                coefficients[part[2]] = part[1]
+            else:
+                return None
+        made = cls(tuple(coefficients.values()), constant)
+        return made if made.expression(inputs).tree == tree else None
+
+
+@dataclass(frozen=True, slots=True)
+class Formula(Value, Membership):
+    """Any arithmetic: of an output's term on the inputs' names, or of a membership function on the place ``x``.
+
+    Attributes
+    ----------
+    text : str
+        As of `fuzzy_arbiter.terms.expressions.Expression`.
+
+    Raises
+    ------
+    DefinitionError
+        If the text is no expression.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter.terms import Formula
+    >>> Formula("1 / (1 + x^2)")(1.0)
+    0.5
+    """
+
+    text: str
+    _whole: Expression = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        whole = Expression(self.text)
+        object.__setattr__(self, "text", whole.text)
+        object.__setattr__(self, "_whole", whole)
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The names whose numbers it needs."""
+        return self._whole.names
+
+    def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
+        """Return it, if it speaks of these names alone."""
+        whole, known = self._whole, (*inputs, *outputs)
+        unknown = sorted(whole.names - set(known))
+        if unknown:
+            raise DefinitionError(
+                f"expression {shown(self.text)} asks for {', '.join(unknown)}, expected inputs, or outputs before its "
+                f"own: {', '.join(known)}"
+            )
+        return whole
+
+    def __call__(self, x: float) -> float:
+        """Return the degree at a place, held within [0, 1]; NaN for a place that is NaN."""
+        return x if x != x else min(max(self._whole({"x": x}), 0.0), 1.0)
+
+    def of_many(self, places: Array) -> Array:
+        """Return the degrees at many places, each as a call gives it, to rounding."""
+        values = self._whole.of_many({"x": places})
+        return np.clip(np.broadcast_to(np.asarray(values, dtype=np.float64), np.shape(places)), 0.0, 1.0)
+
+    def breaks(self, universe: tuple[float, float]) -> tuple[float, ...]:
+        """Return none: where it bends is not known."""
+        return ()
+
+    def within(self, universe: tuple[float, float]) -> Formula:
+        """Return it, if it gives degrees in a universe.
+
+        Raises
+        ------
+        DefinitionError
+            If at one of 1001 places it gives no number, or one above 1; below 0 it counts as 0.
+        """
+        places = np.linspace(*universe, 1001)
+        values = np.broadcast_to(self.expression(["x"]).of_many({"x": places}), places.shape)
+        bad = ~(values <= 1.0 + 1e-9) | ~np.isfinite(values)
+        if bad.any():
+            i = int(np.argmax(bad))
+            raise DefinitionError(
+                f"expression {shown(self.text)} gives {float(values[i]):g} at x = {places[i]:g}, expected at most 1"
+            )
+        return self
+
+
+def invertible(shape: object) -> bool:
+    """Return whether a term only rises or only falls, so that each degree has a place, as Tsukamoto's method asks.
+
+    Parameters
+    ----------
+    shape : object
+        Of a term.
+
+    Returns
+    -------
+    bool
+        True for curves such as sigmoids, and for ramps.
+    """
+    return (isinstance(shape, Curve) and shape.invertible) or (isinstance(shape, Shape) and _is_ramp(shape))
+
+
+def _is_ramp(shape: Shape) -> bool:
+    return len(shape.points) == 2 and not shape.jumps and min(y for _, y in shape.points) == 0.0
+
+
+def place_of(shape: Curve | Shape, degree: float) -> float:
+    """Return where a term that only rises or only falls has a degree.
+
+    Parameters
+    ----------
+    shape : Curve or Shape
+        See `invertible`.
+    degree : float
+        Above 0. One above the term's height is taken as it is: a line goes on, a curve may have no place.
+
+    Returns
+    -------
+    float
+        The place; NaN or infinite where there is none.
+    """
+    if isinstance(shape, Curve):
+        return shape.place_of(degree)
+    (a, left), (b, right) = shape.points
+    return a + (b - a) * ((degree - left) / (right - left))

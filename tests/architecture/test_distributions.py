@@ -1,0 +1,33 @@
+"""Two distributions come from this repository; what both must agree on stands in both."""
+
+import itertools
+import re
+import tomllib
+
+from tests.architecture.modules import ROOT
+
+
+def project(file):
+    return tomllib.loads((ROOT / file).read_text(encoding="utf-8"))["project"]
+
+
+def test_both_have_one_version_and_the_one_needs_the_other_at_it():
+    whole, arbiter = project("pyproject.toml"), project("fuzzy_arbiter/pyproject.toml")
+    assert whole["version"] == arbiter["version"]
+    needed = [text for text in whole["dependencies"] if text.startswith("fuzzy-arbiter")]
+    assert needed == [f"fuzzy-arbiter[skfuzzy]=={arbiter['version']}"]
+    assert re.findall("^version: (.*)$", (ROOT / "CITATION.cff").read_text(), re.M) == [whole["version"]]
+
+
+def test_numpy_is_all_that_the_arbiter_needs_at_one_bound():
+    whole, arbiter = project("pyproject.toml"), project("fuzzy_arbiter/pyproject.toml")
+    assert arbiter["dependencies"] == [text for text in whole["dependencies"] if text.startswith("numpy>=")]
+    for texts in arbiter["optional-dependencies"].values():
+        for text in texts:
+            name = text.partition(">=")[0] + ">="
+            others = [*whole["dependencies"], *itertools.chain(*whole["optional-dependencies"].values())]
+            assert text in others or not any(other.startswith(name) for other in others), text
+
+
+def test_the_licence_is_one():
+    assert (ROOT / "fuzzy_arbiter" / "LICENSE").read_bytes() == (ROOT / "LICENSE").read_bytes()

@@ -1,0 +1,256 @@
+"""Criteria and rules of a scenario: what stands in its file, what is filled in, and what is refused."""
+
+import tomllib
+
+import pytest
+
+from cosim.errors import ScenarioError
+from cosim.scenario.scenario import load_scenario
+from fuzzy_arbiter import Arbiter, Criterion, falling, prioritised
+from fuzzy_arbiter.formats import save
+
+FOUR = "inspection-visibility"
+RULES = """
+name = "mine"
+normalization = "range"
+rules = [
+  "if distance is near or soon is now then obstacle is high",
+  "if distance is far and soon is later then obstacle is low",
+  "if charge is full and depth_asks is yes then depth is high",
+  "if charge is low or depth_asks is no then depth is low",
+]
+[[inputs]]
+name = "distance"
+universe = [0, 5]
+terms = { near = { falling = [0.2, 1.5] }, far = { rising = [0.2, 1.5] } }
+[[inputs]]
+name = "soon"
+universe = [0, 10]
+terms = { now = { falling = [1, 5] }, later = { rising = [1, 5] } }
+[[inputs]]
+name = "charge"
+universe = [0, 1]
+terms = { low = { falling = [0.2, 0.5] }, full = { rising = [0.2, 0.5] } }
+[[inputs]]
+name = "depth_asks"
+universe = [0, 1]
+terms = { no = { falling = [0, 1] }, yes = { rising = [0, 1] } }
+[[outputs]]
+name = "depth"
+universe = [0, 1]
+terms = { low = { falling = [0, 1] }, high = { rising = [0, 1] } }
+[[outputs]]
+name = "obstacle"
+universe = [0, 1]
+terms = { low = { falling = [0, 1] }, high = { rising = [0, 1] } }
+"""
+SCENARIO = """
+base = "depth-transit"
+title = "Rules of one's own"
+criteria = [{ name = "obstacle" }, { name = "depth" }]
+[arbiter]
+file = "mine.toml"
+[arbiter.inputs]
+distance = "clearance.mooring"
+soon = "approach_time.mooring"
+charge = [[0.0, 1.0], [10.0, 0.6], [20.0, 0.1]]
+depth_asks = "membership.depth"
+"""
+
+
+@pytest.fixture
+def own(tmp_path):
+    (tmp_path / "mine.toml").write_text(RULES)
+    (tmp_path / "scenario.toml").write_text(SCENARIO)
+    return tmp_path / "scenario.toml"
+
+
+def test_without_criteria_they_are_the_papers():
+    scenario = load_scenario("docking")
+    assert scenario.criterion_names == ("obstacle", "shape", "depth") and scenario.has_paper_criteria
+    assert scenario.rules.system == Arbiter().system
+    assert [signal.kind for signal in scenario.rules.inputs] == ["membership"] * 3
+    assert not load_scenario("docking", ["criteria.shape.membership.ramp=0.2"]).has_paper_criteria
+
+
+def test_four_criteria_are_weighed_as_section_vi_weighs_three():
+    system = load_scenario(FOUR).rules.system
+    arbiter = Arbiter([Criterion(name) for name in "abcd"])
+    for sample in ([1, 1, 1, 1], [0, 0, 0, 1], [0.2, 0.5, 0.1, 0.9], [0, 0.7, 1, 0.4]):
+        assert Arbiter(system=system)(sample) == arbiter(sample)
+
+
+def test_order_is_the_priority_and_the_order_of_columns():
+    assert load_scenario(FOUR).criterion_names == ("obstacle", "shape", "depth", "visibility")
+    first = load_scenario(FOUR, ["criteria.visibility.order=0"])
+    assert first.criterion_names == ("visibility", "obstacle", "shape", "depth")
+    assert "criteria.visibility.order = 0" in first.title
+    assert [first.criterion_names[i] for i in first.criterion_places] == ["obstacle", "shape", "depth", "visibility"]
+
+
+def test_colours_that_are_left_out_differ():
+    names = ["obstacle", "a", "b", "depth"]
+    criteria = ", ".join(f'{{name = "{name}"}}' for name in names)
+    scenario = load_scenario("sitl", [f"criteria=[{criteria}]"])
+    colours = [criterion.colour for criterion in scenario.criteria]
+    assert colours[0] == "#D55E00" and colours[3] == "#56B4E9" and len(set(colours)) == 4
+
+
+def test_keys_of_the_default_can_be_set():
+    scenario = load_scenario("paper", ["criteria.depth.order=0", "criteria.depth.membership.ramp=0.5"])
+    assert scenario.criterion_names == ("depth", "obstacle", "shape")
+    assert scenario.criteria[0].reasons[0].ramp == 0.5
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("criteria=[]", "criteria: 0 came, expected 1 to 16"),
+        ("criteria.visibility.order=2", "criteria.visibility.order is 2, as that of shape"),
+        ("criteria.visibility.order=1.5", "criteria.3.order: expected a whole number"),
+        ("criteria.visibility.name=shape", "criteria.shape.name is used twice"),
+        ('criteria.visibility.name="a b"', "criteria.3.name is 'a b', expected a letter"),
+        ("criteria.visibility.name=then", "no word of rules"),
+        ("criteria.visibility.colour=red", "criteria.visibility.colour is 'red', expected #RRGGBB"),
+        ("criteria.visibility.membership={clarance={falling=[0,1]}}", "clarance: unknown key; did you mean 'clear"),
+        ("criteria.visibility.membership={clearance={faling=[0,1]}}", "membership.clearance.faling: unknown key"),
+        ("criteria.visibility.membership={clearance={falling=[1,0]}}", "visibility.membership.clearance: shape: place"),
+        ("criteria.visibility.membership={clearance=[[0,1],[0,0]]}", "expected a change without jumps"),
+        ("criteria.visibility.membership={clearance=[[0,nan],[1,0]]}", "visibility.membership.clearance: NaN"),
+        ("criteria.visibility.membership={clearance=3}", "criteria.visibility.membership.clearance: 3 came"),
+        ("criteria.visibility.membership={ramp=-0.1}", "criteria.visibility.membership.ramp is -0.1, expected a width"),
+        ("criteria.visibility.membership={ramp=true}", "criteria.visibility.membership.ramp is True, expected a width"),
+        (
+            "criteria.visibility.membership={angle={falling=[0,1]}}",
+            "membership has no clearance, expected one, or ramp or approach_time, for region 'view', whose",
+        ),
+        ("regions.view.criterion=visability", "view.criterion is 'visability', which is none of criteria; did you"),
+        ("arbiter.inputs.x=3", "arbiter.inputs.x is given, expected none without arbiter.file"),
+        ("arbiter.text=abc", "arbiter.text is given, expected none without arbiter.file"),
+        ("arbiter.file=mine.txt", "arbiter.file is 'mine.txt', expected a suffix of .json, .toml, .fcl, .fis, .fll"),
+        ("arbiter.file=nowhere.fcl", "arbiter.file: nowhere.fcl: No such file"),
+    ],
+)  # fmt: skip
+def test_a_fault_is_one_line_that_names_the_key(change, words):
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(FOUR, [change])
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_obstacles_that_come_in_need_their_criterion():
+    criteria = 'criteria=[{name="depth"}]'
+    with pytest.raises(
+        ScenarioError, match=r"commands.obstacles is above 0, expected 0 without a criterion 'obstacle'"
+    ):
+        load_scenario("sitl", [criteria, "regions=[]", "commands.enabled=true"])
+    load_scenario("sitl", [criteria, "regions=[]", "commands.enabled=true", "commands.obstacles=0"])
+
+
+def test_a_file_of_rules_goes_with_the_scenario(own, tmp_path):
+    scenario = load_scenario(own)
+    assert scenario.rules.system.outside == "clip"
+    assert [output.name for output in scenario.rules.system.outputs] == ["obstacle", "depth"]
+    assert [(signal.name, signal.what, signal.unit) for signal in scenario.rules.inputs] == [
+        ("distance", "clearance.mooring", "m"), ("soon", "approach_time.mooring", "s"), ("charge", "given", ""),
+        ("depth_asks", "membership.depth", ""),
+    ]  # fmt: skip
+    text = scenario.toml()
+    assert tomllib.loads(text)["arbiter"]["file"] == "mine.toml" and tomllib.loads(text)["arbiter"]["text"] == RULES
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "again.toml").write_text(text)
+    again = load_scenario(tmp_path / "elsewhere" / "again.toml")
+    assert again.rules == scenario.rules and again.toml() == text
+
+
+def test_another_file_drops_the_inputs_of_the_one_before(own):
+    assert load_scenario(own, ['arbiter.file=""']).rules.system == prioritised(
+        [Criterion("obstacle", "exist", "not_exist"), Criterion("depth", "not_maintain", "maintain")]
+    )
+
+
+def test_titles_do_not_quote_the_file(own):
+    other = own.parent / "other.toml"
+    other.write_text(RULES.replace("1.5", "1.4"))
+    inputs = ['arbiter.inputs={distance="speed",soon="time",charge=1,depth_asks="depth"}']
+    title = load_scenario(own, [f"arbiter.file={other}", *inputs]).title
+    assert "arbiter.file = other.toml" in title and "rules" not in title
+
+
+@pytest.mark.parametrize("suffix", ["json", "toml", "fcl", "fll", "fis"])
+def test_a_file_of_saved_criteria_has_weights_by_their_names(own, suffix):
+    path = own.parent / f"saved.{suffix}"
+    saved = Arbiter([Criterion("depth"), Criterion("obstacle")])  # in another order than the scenario's
+    saved.save(path)
+    inputs = '{ depth = "membership.depth", obstacle = "membership.obstacle" }'
+    loaded = load_scenario(own, [f"arbiter.file={path}", f"arbiter.inputs={inputs}"])
+    weights = Arbiter(system=loaded.rules.system)([0.25, 1.0])
+    assert weights._fields == ("obstacle", "depth")
+    assert weights._asdict() == pytest.approx(saved([0.25, 1.0])._asdict(), abs=1e-12)
+
+
+@pytest.mark.parametrize("suffix", ["json", "fcl", "fll", "fis"])
+def test_every_format_is_read(own, suffix):
+    path = own.parent / f"mine.{suffix}"
+    system = load_scenario(own).rules.system
+    save(system, path)
+    inputs = tomllib.loads(SCENARIO)["arbiter"]["inputs"]
+    said = ", ".join(f"{key} = {value!r}" for key, value in inputs.items()).replace("'", '"')
+    loaded = load_scenario(own, [f"arbiter.file={path}", f"arbiter.inputs={{{said}}}"])
+    for sample in ([0.3, 2.0, 0.4, 0.7], [4.0, 9.0, 0.1, 1.0]):
+        assert Arbiter(system=loaded.rules.system)(sample) == pytest.approx(Arbiter(system=system)(sample), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("arbiter.inputs.distance=foo", "arbiter.inputs.distance is 'foo', expected one of time, depth, speed"),
+        ("arbiter.inputs.distance=clearance.mast", "arbiter.inputs.distance is 'clearance.mast', of no region"),
+        ("arbiter.inputs.depth_asks=membership.dpth", "of no criterion; did you mean 'depth'?"),
+        ("arbiter.inputs.chrge=1", "arbiter.inputs.chrge: mine.toml has no such input; did you mean 'charge'?"),
+        ("arbiter.inputs.charge=nan", "arbiter.inputs.charge is nan, expected a signal, a finite number"),
+        ("arbiter.inputs.charge=[[0,1],[0,2]]", "arbiter.inputs.charge has the times [0.0, 0.0]"),
+        ("arbiter.inputs.charge=[[0,1,2]]", "arbiter.inputs.charge is [[0, 1, 2]], expected a signal"),
+        ("arbiter.inputs={}", "arbiter.inputs.distance is missing"),
+        ('criteria=[{name="obstacle"},{name="depth"},{name="shape"}]', "mine.toml has no output 'shape'"),
+    ],
+)
+def test_faults_of_inputs_and_outputs_are_named(own, change, words):
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(own, [change])
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("depth is", "deep is", "mine.toml has the output 'deep', no criterion"),
+        ("if distance", "if distanc", "arbiter.file: mine.toml: "),
+        ("no then depth is low", "no then depth is low with 0.5", "arbiter.engine is 'closed'"),
+        ('"range"', '"none"', "output 'obstacle' is of [0, 2], expected weights in [0, 1]"),
+        ('  "if distance is far and soon is later then obstacle is low",\n', "", "output 'obstacle' has no default"),
+    ],
+)  # fmt: skip
+def test_faults_of_the_file_are_named(own, old, new, words):
+    text = RULES.replace(old, new)
+    if "deep" in new:
+        text = text.replace('name = "depth"', 'name = "deep"')
+    if '"none"' in new:
+        text = text.replace('name = "obstacle"\nuniverse = [0, 1]', 'name = "obstacle"\nuniverse = [0, 2]')
+    (own.parent / "mine.toml").write_text(text)
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(own)
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_no_text_is_refused(own):
+    (own.parent / "mine.toml").write_bytes(b"\xff\xfe")
+    with pytest.raises(ScenarioError, match="is no UTF-8"):
+        load_scenario(own)
+    (own.parent / "mine.toml").write_text("#" * 200_001)
+    with pytest.raises(ScenarioError, match="more than 200000 characters"):
+        load_scenario(own)
+
+
+def test_terms_are_those_of_the_arbiter():
+    reasons = load_scenario(FOUR).criteria[3].reasons
+    assert [(reason.quantity, reason.term) for reason in reasons] == [("clearance", falling(-0.4, 0.1))]

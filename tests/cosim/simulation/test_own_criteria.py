@@ -1,0 +1,178 @@
+"""Runs with criteria and rules of one's own: against independent computation, and in the fused loop to the last bit."""
+
+import functools
+
+import numpy as np
+import pytest
+
+from cosim.batch.fused import FusedFlyer
+from cosim.batch.lanes import LanesFlyer
+from cosim.batch.variation import Variation
+from cosim.errors import RunError
+from cosim.results.record import load_record
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.master import Master
+from fuzzy_arbiter import Arbiter, Criterion
+from fuzzy_arbiter.formats import load
+from tests.cosim.scenario.test_criteria import RULES, SCENARIO
+
+FOUR = "inspection-visibility"
+NOISY = ["sensing.position_noise=0.02", "sensing.velocity_noise=0.01"]
+
+
+@pytest.fixture
+def own(tmp_path):
+    """A scenario with rules of its own, whose centroids are in closed form."""
+    (tmp_path / "mine.toml").write_text(RULES)
+    (tmp_path / "scenario.toml").write_text(SCENARIO)
+    return tmp_path / "scenario.toml"
+
+
+@pytest.fixture
+def swept(own):
+    """The same with a rule of weight 0.9, so that centroids are swept."""
+    (own.parent / "mine.toml").write_text(
+        RULES.replace("depth_asks is yes then depth is high", "depth_asks is yes then depth is high with 0.9")
+    )
+    own.write_text(SCENARIO.replace("[arbiter]", '[arbiter]\nengine = "exact"'))
+    return own
+
+
+class Rows:
+    def __init__(self, scenario):
+        self.rows = []
+        with Master(scenario) as master:
+            master.run([self])
+            self._at = master.signals.index
+        self.rows = np.array(self.rows)
+
+    def observe(self, k, row):
+        self.rows.append(row.copy())
+
+    def __getitem__(self, name):
+        return self.rows[:, self._at(name)]
+
+
+@functools.lru_cache
+def flown(*changes):
+    return Rows(load_scenario(FOUR, list(changes)))
+
+
+def test_weights_are_those_of_numpy_and_scikit_fuzzy():
+    """Memberships by NumPy from what is recorded; weights by scikit-fuzzy, whose samples at D leave it D²/6 off."""
+    run = flown("time.duration=14.0")
+    every = slice(0, None, 38)  # rows at which the arbiter decides, every 0.38 s
+    # an upright pillar: what its distance does, of the recorded place and velocity
+    pillar = np.stack([run["position.x"] - 4.2, run["position.y"] - 2.7])
+    distance = np.linalg.norm(pillar, axis=0)
+    w, x, y, z = (run[f"quaternion.e{i}"] for i in range(4))
+    u, v, s = (run[f"velocity.{name}"] for name in "uvw")
+    north = (1 - 2 * (y * y + z * z)) * u + 2 * (x * y - w * z) * v + 2 * (x * z + w * y) * s
+    east = 2 * (x * y + w * z) * u + (1 - 2 * (x * x + z * z)) * v + 2 * (y * z - w * x) * s
+    closing = -(pillar[0] * north + pillar[1] * east) / distance
+    time = np.where(closing > 0.0, (distance - 0.6) / np.where(closing > 0.0, closing, 1.0), np.inf)
+    memberships = {
+        "obstacle": np.maximum(
+            np.interp(distance - 0.6, [0.0, 0.3], [1.0, 0.0]), np.interp(time, [1.0, 3.0], [1.0, 0.0])
+        ),
+        "shape": np.interp(np.hypot(run["position.x"] - 7.4, run["position.y"] - 2.2) - 1.0, [0.0, 0.3], [1.0, 0.0]),
+        "depth": np.interp(5.5 - run["position.z"], [0.0, 0.2], [1.0, 0.0]),
+        "visibility": np.interp(run["view.clearance"], [-0.4, 0.1], [1.0, 0.0]),
+    }
+    points = 501
+    reference = Arbiter([Criterion(name) for name in memberships], engine="skfuzzy", points=points)
+    samples = np.column_stack([values[every] for values in memberships.values()])
+    for name, values in memberships.items():
+        np.testing.assert_allclose(run[f"membership.{name}"][every], values[every], atol=1e-4)
+    weights = np.column_stack([run[f"weight.{name}"][every] for name in memberships])
+    expected = np.array([reference(np.clip(sample, 0.0, 1.0).tolist()) for sample in samples])
+    np.testing.assert_allclose(weights, expected, atol=1.5e-4 + (1.0 / (points - 1)) ** 2)  # slopes of 1.5 at the most
+    assert weights[:, 0].max() > 0.9 and weights[:, 3].max() > 0.99  # not all of them nothing
+
+
+def assert_same_to_the_last_bit(scenario):
+    run = Rows(scenario)
+    with FusedFlyer(Variation(scenario, ())) as flyer:
+        _, trace = flyer.fly_one(scenario, trace=True)
+    n, decisions = len(scenario.criteria), slice(0, scenario.steps, scenario.control_every)
+    for i, axis in enumerate("xyz"):
+        np.testing.assert_array_equal(trace[:, 1 + i], run[f"position.{axis}"][decisions])
+    weights = np.column_stack([run[f"weight.{name}"][decisions] for name in scenario.criterion_names])
+    np.testing.assert_array_equal(trace[:, 17 : 17 + n], weights)
+    assert np.ptp(weights, axis=0).max() > 0.05
+    return run
+
+
+def test_the_fused_loop_flies_four_criteria_as_the_master_does():
+    assert_same_to_the_last_bit(load_scenario(FOUR, ["time.duration=14.0", *NOISY]))
+
+
+def test_the_fused_loop_flies_rules_of_a_file_as_the_master_does(own):
+    changes = ["initial.position=[6.5, 0.0, 4.2]", "time.duration=6.0", "arbiter.inputs.charge=[[1, 1], [4, 0.1]]"]
+    assert_same_to_the_last_bit(load_scenario(own, changes))
+
+
+def test_the_fused_loop_sweeps_centroids_as_the_master_does(swept):
+    changes = ["initial.position=[6.5, 0.0, 4.2]", "time.duration=6.0"]
+    assert_same_to_the_last_bit(load_scenario(swept, changes))
+
+
+def test_the_fused_loop_through_sensors_is_the_same(own):
+    changes = ["initial.position=[6.5, 0.0, 4.2]", "time.duration=6.0", "sensing.through=sensors"]
+    assert_same_to_the_last_bit(
+        load_scenario(own, [*changes, *(f"sensing.{key}=0.0" for key in ("position_noise", "velocity_noise"))])
+    )
+
+
+def test_the_record_has_what_the_rules_got(own, tmp_path):
+    scenario = load_scenario(
+        own,
+        [
+            "initial.position=[6.5, 0.0, 4.2]",
+            "time.duration=4.0",
+            *(c.replace("0.02", "0").replace("0.01", "0") for c in NOISY),
+        ],
+    )
+    record = load_record(run_scenario(scenario, tmp_path / "run", report=False).folder)
+    inputs = [record[f"arbiter.{name}"] for name in ("distance", "soon", "charge", "depth_asks")]
+    arbiter = Arbiter(system=load(own.parent / "mine.toml"))
+    names = [output.name for output in arbiter.system.outputs]
+    for k in range(0, len(record), 20):
+        weights = dict(zip(names, arbiter(np.clip([x[k] for x in inputs], 0.0, [5, 10, 1, 1]).tolist()), strict=True))
+        assert {name: record[f"weight.{name}"][k] for name in names} == weights
+    np.testing.assert_allclose(inputs[0][::2], np.minimum(record["mooring.clearance"], 5.0)[::2])
+    np.testing.assert_allclose(inputs[2][::2], np.interp(record["time"], [0, 10, 20], [1.0, 0.6, 0.1])[::2], atol=1e-12)
+    again = run_scenario(load_scenario(tmp_path / "run" / "scenario.toml"), tmp_path / "again", report=False)
+    assert (again.folder / "record.parquet").read_bytes() == (tmp_path / "run" / "record.parquet").read_bytes()
+
+
+def test_lanes_refuse_what_they_have_not(own):
+    for scenario, words in (
+        (load_scenario(FOUR, ["law.name=ismail_dunnigan"]), "criteria is"),
+        (load_scenario(own, ["law.name=ismail_dunnigan"]), "arbiter.file is 'mine.toml'"),
+    ):
+        with pytest.raises(RunError, match=f"{words}.*for lanes; the fused loop flies it"):
+            LanesFlyer(Variation(scenario, ()))
+
+
+def test_a_sampling_engine_is_refused_by_the_fused_loop(own):
+    with pytest.raises(RunError, match=r"arbiter.engine is 'grid', expected 'closed'"):
+        FusedFlyer(Variation(load_scenario(own, ["arbiter.engine=grid"]), ()))
+
+
+def test_visibility_changes_what_the_vehicle_does():
+    """With it the joint comes into view within six seconds, without its pull not at all."""
+    seen = flown("time.duration=14.0")
+    assert (seen["view.clearance"][600:] > 0.0).all()
+    assert (Rows(load_scenario(FOUR, ["time.duration=14.0", "regions.view.gain=0"]))["view.clearance"] < -0.4).all()
+
+
+@pytest.mark.slow
+def test_its_place_among_the_criteria_changes_what_the_vehicle_does():
+    """First instead of last, it holds the view where the risers press, and enters them deeper."""
+    last, first = flown(), flown("criteria.visibility.order=0")
+    assert (last["view.clearance"] > 0.0).mean() > 0.55
+    assert first["view.clearance"][3400:].min() > -0.3 > last["view.clearance"][3400:].min()
+    assert first["risers.clearance"].min() < -0.15 < -0.1 < last["risers.clearance"].min()
+    assert min(last["pillar.clearance"].min(), first["pillar.clearance"].min()) > 0.0

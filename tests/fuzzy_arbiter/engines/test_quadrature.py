@@ -1,0 +1,230 @@
+"""Outputs of any terms, norms and defuzzifiers, against SciPy's quadrature, sampling, and rational numbers."""
+
+import itertools
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+from fuzzy_arbiter import Arbiter, Output, Rule, System, Term, Variable, falling, rising, triangle
+from fuzzy_arbiter.engines.exact import ExactEngine
+from fuzzy_arbiter.engines.quadrature import BOUND, Quadrature
+from fuzzy_arbiter.errors import EngineError
+from fuzzy_arbiter.propositions import Is
+from fuzzy_arbiter.rule import Operators
+from fuzzy_arbiter.terms.curves import curve
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
+from fuzzy_arbiter.terms.values import Formula
+from tests.examples import examples
+from tests.fuzzy_arbiter import reference
+from tests.fuzzy_arbiter.systems import shapes
+
+TERMS = (
+    Term("a", curve("gaussian", 2.0, 1.0)),
+    Term("b", curve("bell", 5.0, 1.5, 2.0)),
+    Term("c", curve("sigmoid", 7.5, 3.0)),
+    Term("d", triangle(3.0, 4.0, 8.0)),
+)
+
+
+def system(output, implication="min", blocks=None):
+    """Inputs that are the strengths of rules, one for each term of an output."""
+    terms = output.term_names
+    inputs = tuple(Variable(f"x{j}", (0, 1), (Term("on", rising(0, 1)),)) for j in range(len(terms)))
+    blocks = blocks or [None] * len(terms)
+    rules = tuple(
+        Rule(Is(f"x{j}", "on"), (Is("y", t),), operators=block)
+        for j, (t, block) in enumerate(zip(terms, blocks, strict=True))
+    )
+    return System(inputs, (output,), rules, implication=implication, normalization="none")
+
+
+def sampled(output, cuts, implications, points=500_000):
+    """Places and joined heights in the middles of many cells, whose centroid is off by their width squared."""
+    low, high = output.universe
+    x = low + (high - low) * (np.arange(points) + 0.5) / points
+    y = np.zeros(points)
+    for term, cut, word in zip(output.terms, cuts, implications, strict=True):
+        bounded = T_NORMS[word].array(np.full(points, cut), term.shape.of_many(x))
+        y = AGGREGATIONS[output.aggregation].array(y, bounded)
+    return x, y
+
+
+@pytest.mark.parametrize("implication", ["min", "prod", "einstein_product", "hamacher_product"])
+@pytest.mark.parametrize("aggregation", ["max", "probor", "sum", "einstein_sum", "hamacher_sum", "bounded_sum"])
+def test_a_centroid_is_what_sampling_tends_to(implication, aggregation):
+    output = Output("y", (0, 10), TERMS, aggregation=aggregation)
+    engine = ExactEngine(system(output, implication))
+    cuts = [0.9, 0.35, 0.6, 0.75]
+    x, y = sampled(output, cuts, [implication] * 4)
+    assert engine.centroids(cuts)[0] == pytest.approx((x * y).sum() / y.sum(), abs=2e-9)
+    assert BOUND == 1e-9
+    assert "within 1e-09" in engine.methods["y"]
+
+
+def test_a_centroid_is_that_of_scipy_between_known_bends():
+    """Of a Gaussian, clipped where it is known to meet its cut, and a logistic curve by its antiderivative."""
+    output = Output("y", (0, 10), (Term("a", curve("gaussian", 4.0, 1.5)),))
+    reach = 1.5 * math.sqrt(-2 * math.log(0.6))
+    ends = (0.0, 4 - reach, 4 + reach, 10.0)
+    parts = [(lambda x: math.exp(-((x - 4) ** 2) / 4.5)), (lambda x: 0.6), (lambda x: math.exp(-((x - 4) ** 2) / 4.5))]
+    area, moment = (
+        sum(
+            quad(lambda x, f=f, p=p: f(x) * x**p, a, b, epsabs=1e-14)[0]
+            for f, (a, b) in zip(parts, itertools.pairwise(ends), strict=True)
+        )
+        for p in (0, 1)
+    )
+    assert ExactEngine(system(output)).centroids([0.6])[0] == pytest.approx(moment / area, abs=1e-12)
+    rise = Output("y", (0, 10), (Term("a", curve("sigmoid", 0.0, -1.0)),))
+    # of 1 / (1 + e^x) the area is log 2 - log(1 + e^-10), the moment pi^2 / 12 less the tail
+    area = math.log(2) - math.log1p(math.exp(-10))
+    tail = sum((-1) ** (n + 1) * math.exp(-10 * n) * (10 / n + 1 / n**2) for n in range(1, 9))
+    assert ExactEngine(system(rise)).centroids([1.0])[0] == pytest.approx((math.pi**2 / 12 - tail) / area, abs=1e-12)
+
+
+@settings(max_examples=examples(40), deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.lists(shapes(), min_size=1, max_size=3), st.data())
+def test_a_sum_of_straight_terms_is_rational(drawn, data):
+    terms = tuple(Term(f"t{j}", shape) for j, shape in enumerate(drawn))
+    output = Output("y", (0.0, 1.0), terms, aggregation="sum")
+    cuts = [data.draw(st.integers(1, 16)) / 16 for _ in terms]
+    # the centroid of a sum is the mean of the centroids, weighted by the areas
+    area = moment = Fraction(0)
+    for term, cut in zip(terms, cuts, strict=True):
+        alone = replace(output, terms=(term,), aggregation="max")
+        own = area_of(term.shape, Fraction(cut))
+        area, moment = area + own, moment + own * reference.centroid(alone, [Fraction(cut)])
+    engine = ExactEngine(system(output))
+    assert engine.methods["y"] == "integrals of polynomials, to rounding"
+    assert engine.centroids(cuts)[0] == pytest.approx(float(moment / area), abs=1e-13)
+
+
+def area_of(shape, cut):
+    """Exact area of a clipped shape over [0, 1], by its levels: the length of where it is above each is linear."""
+    knots = sorted({Fraction(0), Fraction(1), *(Fraction(x) for x, _ in shape.points if 0 < x < 1)})
+    area = Fraction(0)
+    for a, b in itertools.pairwise(knots):
+        third = (b - a) / 3
+        y1, y2 = reference.degree(shape, a + third), reference.degree(shape, a + 2 * third)
+        left, right = 2 * y1 - y2, 2 * y2 - y1
+        if left == right or max(left, right) <= cut or min(left, right) >= cut:
+            area += (b - a) * (min(left, cut) + min(right, cut)) / 2
+        else:
+            share = (cut - left) / (right - left)
+            area += (b - a) * (share * (min(left, cut) + cut) + (1 - share) * (cut + min(right, cut))) / 2
+    return area
+
+
+@settings(max_examples=examples(40), deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.lists(shapes(), min_size=1, max_size=3), st.data())
+def test_on_straight_terms_it_gives_what_the_sweep_gives(drawn, data):
+    """Which is rational, see test_exact."""
+    output = Output("y", (0.0, 1.0), tuple(Term(f"t{j}", shape) for j, shape in enumerate(drawn)))
+    cuts = [data.draw(st.integers(1, 16)) / 16 for _ in drawn]
+    engine = ExactEngine(system(output))
+    engine._ways[0] = Quadrature(output, engine.firing.slots[0])
+    exact = reference.centroid(output, list(map(Fraction, cuts)))
+    assert engine.centroids(cuts)[0] == pytest.approx(float(exact), abs=1e-12)
+
+
+@pytest.mark.parametrize("aggregation", ["max", "probor", "sum", "drastic_sum", "nilpotent_maximum", "normalized_sum"])
+@pytest.mark.parametrize("implication", ["min", "prod", "bounded_difference", "drastic_product", "nilpotent_minimum"])
+@pytest.mark.parametrize("defuzzifier", ["centroid", "bisector", "mom", "som", "lom"])
+def test_every_defuzzifier_is_what_sampling_tends_to(defuzzifier, implication, aggregation):
+    output = Output("y", (0, 10), TERMS, None, defuzzifier, aggregation)
+    cuts = [0.9, 0.35, 0.6, 0.75]
+    x, y = sampled(output, cuts, [implication] * 4, 40_000)
+    jumps = "drastic" in implication + aggregation or "nilpotent" in implication + aggregation
+    if defuzzifier == "centroid":
+        expected, off = (x * y).sum() / y.sum(), 1e-3 if jumps else 1e-6
+    elif defuzzifier == "bisector":
+        expected, off = x[np.searchsorted(np.cumsum(y), y.sum() / 2)], 1e-3
+    else:
+        top = x[y >= y.max() * (1 - 1e-9)]
+        expected, off = {"mom": top.mean(), "som": top[0], "lom": top[-1]}[defuzzifier], 6e-3
+    if implication == "drastic_product" and not (y > 0).sum() > 3:
+        return
+    assert ExactEngine(system(output, implication)).centroids(cuts)[0] == pytest.approx(expected, abs=off)
+
+
+@pytest.mark.parametrize(
+    ("defuzzifier", "value"), [("bisector", 5 - math.sqrt(0.5)), ("mom", 4.0), ("som", 4.0), ("lom", 4.0)]
+)
+def test_a_triangle_alone_has_what_geometry_says(defuzzifier, value):
+    # a right triangle of the legs 6 and 1, standing at 4, has half its area beyond 4 + 6 (1 - sqrt(1/2))
+    value = 4 + 6 * (1 - math.sqrt(0.5)) if defuzzifier == "bisector" else value
+    output = Output("y", (0, 10), (Term("t", triangle(4.0, 4.0, 10.0)),), None, defuzzifier)
+    assert ExactEngine(system(output)).centroids([1.0])[0] == pytest.approx(value, abs=1e-10)
+
+
+def test_a_clipped_triangle_has_a_plateau():
+    ends = {"som": 2.5, "lom": 6.5, "mom": 4.5}
+    for defuzzifier, value in ends.items():
+        output = Output("y", (0, 10), (Term("t", triangle(0.0, 5.0, 8.0)),), None, defuzzifier)
+        assert ExactEngine(system(output)).centroids([0.5])[0] == pytest.approx(value, abs=1e-9)
+
+
+def test_between_two_equal_halves_the_bisector_is_in_the_middle_of_the_gap():
+    output = Output("y", (0, 10), (Term("a", triangle(0, 1, 2)), Term("b", triangle(8, 9, 10))), None, "bisector")
+    assert ExactEngine(system(output)).centroids([0.7, 0.7])[0] == pytest.approx(5.0, abs=1e-9)
+
+
+def test_singletons_count_where_nothing_else_fires():
+    terms = (Term("a", curve("singleton", 2.0)), Term("b", curve("singleton", 8.0)), Term("c", triangle(3, 4, 5)))
+    engine = ExactEngine(system(Output("y", (0, 10), terms)))
+    assert engine.centroids([0.25, 0.75, 0.0])[0] == pytest.approx(6.5)
+    assert engine.centroids([1.0, 1.0, 0.5])[0] == pytest.approx(4.0)
+
+
+def test_rules_of_two_blocks_bound_by_their_own_implication():
+    output = Output("y", (0, 10), TERMS[:2])
+    blocks = [Operators(implication="prod"), Operators(implication="min")]
+    x, y = sampled(output, [0.5, 0.5], ["prod", "min"])
+    made = system(output, blocks=blocks)
+    assert ExactEngine(made).centroids([0.5, 0.5])[0] == pytest.approx((x * y).sum() / y.sum(), abs=2e-9)
+
+
+def test_one_term_concluded_twice_counts_twice_in_a_sum():
+    output = Output("y", (0, 10), (Term("a", triangle(0, 2, 4)), Term("b", triangle(6, 8, 10))), aggregation="sum")
+    made = system(output)
+    again = replace(made, rules=(*made.rules, Rule(Is("x0", "on"), (Is("y", "a"),))))
+    assert ExactEngine(made).centroids([0.5, 0.5])[0] == pytest.approx(5.0)
+    assert ExactEngine(again).centroids([0.5, 0.5])[0] == pytest.approx((2 * 2 + 8) / 3)
+    most = replace(again, outputs=(replace(output, aggregation="max"),))
+    assert ExactEngine(most).centroids([0.5, 0.5])[0] == pytest.approx(5.0)
+
+
+def test_batches_give_what_samples_give():
+    made = system(Output("y", (0, 10), TERMS))
+    rows = np.random.default_rng(0).random((20, 4))
+    engine = ExactEngine(made)
+    assert engine.centroids_of_many(rows)[:, 0].tolist() == [engine.centroids(row)[0] for row in rows.tolist()]
+
+
+def test_what_has_no_area_has_no_value():
+    output = Output("y", (0, 10), (Term("a", falling(0, 10)),))
+    made = system(output, "bounded_difference")
+    assert ExactEngine(made).centroids([1.0])[0] == pytest.approx(10 / 3)
+    # a cut and a degree that never sum to more than 1 leave nothing
+    low = replace(made, outputs=(Output("y", (0, 10), (Term("a", curve("gaussian", 5, 1, height=0.5)),)),))
+    assert math.isnan(ExactEngine(low).centroids([0.25])[0])
+
+
+def test_what_is_too_rough_is_refused():
+    output = Output("y", (0, 1), (Term("a", Formula("0.5 + 0.5 * sin(1e6 * x * x)")),))
+    with pytest.raises(EngineError, match="output 'y': its joined terms are too rough to be integrated to 1e-09"):
+        ExactEngine(system(output)).centroids([0.6])
+
+
+def test_the_arbiter_says_how_each_output_is_evaluated():
+    made = system(Output("y", (0, 10), TERMS))
+    assert Arbiter(system=made).engine_reason.endswith("'y': adaptive quadrature, within 1e-09 of the universe's width")
+    straight = system(Output("y", (0, 10), TERMS[3:]))
+    assert Arbiter(system=straight).engine_reason.startswith("there is no closed form: ")
+    assert "quadrature" not in Arbiter(system=straight).engine_reason

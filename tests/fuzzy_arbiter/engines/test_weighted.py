@@ -1,0 +1,166 @@
+"""Values: Sugeno's and Tsukamoto's outputs, against sums worked out here; defaults, locks, chains, hedges."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fuzzy_arbiter import Arbiter, Output, Rule, System, Term, Variable, falling, rising, triangle
+from fuzzy_arbiter.errors import DefinitionError, EngineError
+from fuzzy_arbiter.propositions import Anything, Hedged, Is, Not
+from fuzzy_arbiter.terms.curves import curve
+from fuzzy_arbiter.terms.values import Constant, Formula, Linear
+
+X = Variable("x", (0, 10), (Term("low", falling(0, 10)), Term("high", rising(0, 10))))
+Z = Variable("z", (-5, 5), (Term("near", curve("gaussian", 0, 2)),))
+
+
+def output(*shapes, **options):
+    terms = tuple(Term(f"t{j}", shape) for j, shape in enumerate(shapes))
+    return Output("y", (-100, 100), terms, **{"defuzzifier": "average", "aggregation": "sum", **options})
+
+
+def system(made, *rules, **options):
+    return System((X, Z), (made,), rules, normalization="none", **options)
+
+
+RULES = ("if x is low then y is t0", "if x is high and z is near then y is t1", "if x is high then y is t1")
+
+
+@pytest.mark.parametrize("defuzzifier", ["average", "sum"])
+@pytest.mark.parametrize("aggregation", ["sum", "max", "probor"])
+def test_values_are_weighted_by_the_strengths_of_their_rules(defuzzifier, aggregation):
+    made = output(Constant(3.0), Linear((2.0, -1.0), 0.5), defuzzifier=defuzzifier, aggregation=aggregation)
+    arbiter = Arbiter(system=system(made, *RULES))
+    for x, z in ((2.0, 1.0), (7.5, -3.0), (10.0, 0.0)):
+        low, high = 1 - x / 10, x / 10
+        both = min(high, math.exp(-z * z / 8))
+        w1 = {"sum": both + high, "max": max(both, high), "probor": both + high - both * high}[aggregation]
+        total = low * 3.0 + w1 * (2.0 * x - z + 0.5)
+        expected = total / (low + w1) if defuzzifier == "average" else total
+        assert arbiter([x, z]) == pytest.approx((expected,), abs=1e-13)
+        assert arbiter.batch([[x, z]])[0] == pytest.approx([expected], abs=1e-13)
+    assert arbiter.engine == "exact"
+    assert "'y': weighted values, to rounding" in arbiter.engine_reason
+
+
+def test_a_formula_speaks_of_inputs_and_of_outputs_before():
+    first = Output("u", (0, 10), (Term("t", Formula("x * x")),), None, "average", "sum")
+    second = Output("v", (0, 10), (Term("t", Formula("abs(u - z)")),), None, "average", "sum")
+    made = System((X, Z), (first, second), ("if x is any then u is t and v is t",), normalization="none")
+    assert Arbiter(system=made)([3.0, 2.0]) == (9.0, 7.0)
+    assert Arbiter(system=made).batch([[3.0, 2.0], [1.0, 4.0]]).tolist() == [[9.0, 7.0], [1.0, 3.0]]
+    with pytest.raises(
+        DefinitionError, match=r"output 'v': .*asks for u, expected inputs, or outputs before its own: x"
+    ):
+        System((X, Z), (second, first), ("if x is any then u is t and v is t",), normalization="none")
+
+
+def test_tsukamoto_takes_the_place_that_has_the_strength():
+    made = output(rising(0.0, 50.0), curve("sigmoid", 20.0, -2.0), falling(-10.0, 10.0))
+    arbiter = Arbiter(
+        system=system(made, "if x is low then y is t0", "if x is high then y is t1 ", "if x is high then y is t2")
+    )
+    w0, w1 = 0.75, 0.25
+    places = (50 * w0, 20.0 - math.log(w1 / (1 - w1)) / 2.0, 10.0 - 20.0 * w1)
+    expected = (w0 * places[0] + w1 * places[1] + w1 * places[2]) / (w0 + w1 + w1)
+    assert arbiter([2.5, 0.0]) == pytest.approx((expected,), abs=1e-12)
+    assert arbiter.batch([[2.5, 0.0]])[0] == pytest.approx([expected], abs=1e-12)
+    with pytest.raises(
+        DefinitionError, match="'t0' is no value, nor does it only rise or only fall, as the defuzzifier"
+    ):
+        output(triangle(0, 1, 2))
+    with pytest.raises(DefinitionError, match="'t0' is a value, expected a membership function, or one of the defuz"):
+        output(Constant(1.0), defuzzifier="centroid")
+
+
+def test_where_there_is_no_value_there_is_the_default_or_none():
+    made = output(Formula("1 / (x - 5)"))
+    arbiter = Arbiter(system=system(made, "if x is high then y is t0"))
+    assert arbiter([9.0, 0.0]) == (0.25,)
+    assert math.isnan(arbiter([5.0, 0.0])[0])
+    assert np.isnan(arbiter.batch([[9.0, 0.0], [0.0, 0.0]])[:, 0]).tolist() == [False, True]
+    settled = Arbiter(system=system(replace(made, default=-1.0), "if x is high then y is t0"))
+    assert settled.batch([[5.0, 0.0], [9.0, 0.0], [0.0, 0.0]])[:, 0].tolist() == [-1.0, 0.25, -1.0]
+
+
+def test_a_locked_value_stays_in_its_range_or_at_the_one_before():
+    held = replace(output(Constant(150.0)), lock_range=True)
+    assert Arbiter(system=system(held, "if x is high then y is t0"))([9.0, 0.0]) == (100.0,)
+    kept = replace(output(Linear((1.0, 0.0))), lock_previous=True, default=-1.0)
+    arbiter = Arbiter(system=system(kept, "if x is high and z is near then y is t0"))
+    rows = [[0.0, 0.0], [4.0, 0.0], [0.0, 1.0], [6.0, 0.0], [0.0, 0.0]]
+    assert arbiter.batch(rows)[:, 0].tolist() == [-1.0, 4.0, 4.0, 6.0, 6.0]
+    assert arbiter([0.0, 0.0]) == (-1.0,)  # a sample alone has none before it
+    free = Arbiter(system=system(replace(kept, default=None), "if x is high and z is near then y is t0"))
+    assert np.isnan(free.batch(rows)[:, 0]).tolist() == [True, False, False, False, False]
+
+
+def test_a_condition_may_ask_for_an_output_of_the_rules_before():
+    power = Output("power", (0, 1), (Term("less", falling(0, 1)), Term("more", rising(0, 1))))
+    made = System(
+        (X,),
+        (power, replace(output(Constant(1.0), Constant(2.0)), name="fan")),
+        ("if x is low then power is less", "if x is high then power is more", "if power is less then fan is t0",
+         "if power is very more then fan is t1"),
+        normalization="none",
+    )  # fmt: skip
+    for x in (2.0, 5.0, 9.0):
+        low, high = 1 - x / 10, (x / 10) ** 2
+        assert Arbiter(system=made)([x])[1] == pytest.approx((low + 2 * high) / (low + high), abs=1e-14)
+        assert Arbiter(system=made).batch([[x]])[0, 1] == pytest.approx((low + 2 * high) / (low + high), abs=1e-14)
+    with pytest.raises(DefinitionError, match=r"R1 .*asks for output 'power', on which no rule before concludes"):
+        replace(made, rules=(made.rules[2],))
+    with pytest.raises(EngineError, match="engine 'grid': R3 asks for the output 'power'"):
+        Arbiter(system=made, engine="grid")
+
+
+@pytest.mark.parametrize(
+    ("condition", "degree"),
+    [
+        (Hedged("very", Is("x", "low")), 0.36),
+        (Hedged("somewhat", Is("x", "low")), math.sqrt(0.6)),
+        (Not(Hedged("very", Is("x", "low"))), 0.64),
+        (Hedged("very", Not(Is("x", "low"))), 0.16),
+        (Hedged("very", Hedged("very", Is("x", "low"))), 0.1296),
+        (Hedged("extremely", Is("x", "low") & Is("x", "high")), 0.32),
+        (Anything("x"), 1.0),
+        (Not(Anything("x")), 0.0),
+    ],
+)
+def test_hedges_bend_strengths(condition, degree):
+    made = output(Constant(1.0), defuzzifier="sum", default=0.0)
+    arbiter = Arbiter(system=system(made, Rule(condition, (Is("y", "t0"),))))
+    assert arbiter([4.0, 0.0]) == pytest.approx((degree,), abs=1e-15)
+    assert arbiter.batch([[4.0, 0.0]])[0] == pytest.approx([degree], abs=1e-15)
+    assert Arbiter(system=system(made, str(arbiter.system.rules[0]))).system == arbiter.system
+
+
+def test_an_input_without_terms_is_one_that_values_speak_of():
+    bare = Variable("w", (0, 1), ())
+    made = output(Linear((0.0, 0.0, 1.0)))
+    whole = System((X, Z, bare), (made,), ("if x is any then y is t0",), normalization="none")
+    assert Arbiter(system=whole)([0.0, 0.0, 0.5]) == (0.5,)
+    with pytest.raises(DefinitionError, match="variable 'w': no terms came, expected at least one"):
+        System((X, Z, bare), (output(Constant(1.0)),), ("if x is any then y is t0",), normalization="none")
+
+
+def test_values_of_inputs_leave_no_range_to_normalize():
+    made = system(output(Linear((1.0, 0.0))), "if x is high then y is t0")
+    with pytest.raises(EngineError, match="output 'y': its terms depend on the inputs"):
+        Arbiter(system=replace(made, normalization="range"))
+    two = system(output(Constant(2.0), Constant(6.0)), "if x is low then y is t0", "if x is high then y is t1")
+    assert Arbiter(system=replace(two, normalization="range"))([2.5, 0.0]) == pytest.approx((0.25,))
+
+
+def test_engines_and_checks_that_know_only_plain_systems_say_so():
+    made = system(output(Constant(2.0)), "if x is low then y is t0")
+    for engine in ("closed", "grid", "skfuzzy"):
+        with pytest.raises(EngineError, match=f"engine '{engine}': output 'y' has the defuzzifier average"):
+            Arbiter(system=made, engine=engine)
+    from fuzzy_arbiter.errors import UnsupportedError
+
+    with pytest.raises(UnsupportedError, match="verify: output 'y' has the defuzzifier average"):
+        Arbiter(system=made).verify()
+    assert np.isfinite(Arbiter(system=made).explain([1.0, 0.0]).weights).all()

@@ -1,0 +1,139 @@
+"""Expressions: against Python's own arithmetic on sound ones, and refused otherwise."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fuzzy_arbiter.errors import DefinitionError
+from fuzzy_arbiter.terms.expressions import Expression
+from fuzzy_arbiter.terms.functions import FUNCTIONS
+from fuzzy_arbiter.terms.values import Constant, Formula, Linear
+
+leaves = st.sampled_from(["a", "b", "2", "0.5", "3e-2", "pi"])
+texts = st.recursive(
+    leaves,
+    lambda inner: st.one_of(
+        st.tuples(inner, st.sampled_from("+-*/"), inner).map(" ".join).map("({})".format),
+        inner.map("-{}".format),
+        inner.map("sin({})".format),
+        inner.map("({}) ^ 2".format),
+        st.tuples(inner, inner).map(lambda pair: f"max({pair[0]}, {pair[1]})"),
+    ),
+    max_leaves=12,
+)
+
+
+@given(texts, st.floats(-3, 3), st.floats(-3, 3))
+def test_it_is_what_python_makes_of_the_same_text(text, a, b):
+    known = {"a": a, "b": b, "pi": math.pi, "sin": math.sin, "max": max}
+    try:
+        expected = eval(text.replace("^", "**"), {"__builtins__": {}}, known)
+    except (ZeroDivisionError, OverflowError, ValueError):
+        return
+    made = Expression(text)
+    assert made({"a": a, "b": b}) == pytest.approx(expected, rel=1e-12, abs=1e-300, nan_ok=True)
+    many = np.broadcast_to(made.of_many({"a": np.array([a, a]), "b": np.array([b, b])}), 2)
+    assert many[0] == pytest.approx(expected, rel=1e-9, abs=1e-12, nan_ok=True)
+    assert Expression(made.text) == made
+    assert made.bound({"a": a})({"b": b}) == pytest.approx(expected, rel=1e-12, abs=1e-300, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("2 ^ 3 ^ 2", 512.0), ("-2 ^ 2", -4.0), ("2 ^ -1", 0.5), ("7 % 4", 3.0), ("2 - 3 - 4", -5.0),
+        ("8 / 4 / 2", 1.0),
+        ("+3", 3.0), ("1 / 0", math.inf), ("-1 / 0", -math.inf), ("exp(1e9)", math.inf), ("log(0)", -math.inf),
+        ("lt(1, 2) + ge(1, 2)", 1.0), ("fabs(-2)", 2.0), ("LN(exp(1))", 1.0), ("pi()", math.pi), (".5e1", 5.0),
+    ],
+)  # fmt: skip
+def test_values_that_are_known(text, value):
+    assert Expression(text)({}) == pytest.approx(value)
+    assert float(Expression(text).of_many({})) == pytest.approx(value)
+
+
+@pytest.mark.parametrize("text", ["0 / 0", "sqrt(-1)", "log(-1)", "acos(2)", "(-8) ^ 0.5", "sin(1 / 0)", "fmod(1, 0)"])
+def test_what_has_no_value_is_no_number(text):
+    assert math.isnan(Expression(text)({}))
+
+
+@pytest.mark.parametrize("name", sorted(FUNCTIONS))
+@given(data=st.data())
+def test_numbers_and_arrays_have_the_same_functions(name, data):
+    function = FUNCTIONS[name]
+    values = [data.draw(st.floats(-20, 20)) for _ in range(function.arguments)]
+    with np.errstate(all="ignore"):
+        many = function.array(*(np.array([v]) for v in values))[0]
+    one = function.number(*values)
+    assert many == pytest.approx(one, rel=1e-12, abs=1e-12, nan_ok=True) or (math.isinf(one) and many > 1e300)
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("", "the end came, expected a number, a name"),
+        ("2 +", "the end came, expected a number, a name"),
+        ("2 3", "'3' came, expected an operator or the end"),
+        ("(2", r"the end came, expected '\)' or an operator"),
+        ("sin 2", r"'2' came, expected '\(' after the function 'sin'"),
+        ("sine(2)", "no function 'sine', expected one of abs"),
+        ("sin(1, 2)", "sin of 2 numbers, expected 1"),
+        ("__import__('os')", "no function '__import__'"),
+        ("a.b", "'.' came, expected an operator"),
+        ("a[0]", "'.' came, expected|'\\[' came, expected an operator"),
+        ("lambda: 0", "':' came, expected an operator"),
+        ("'text'", '"\'" came, expected a number'),
+        ("1e999", "1e999 came, expected a finite number"),
+        ("(" * 60 + "1" + ")" * 60, "nested deeper than 50 parentheses"),
+        ("-" * 60 + "1", "nested deeper than 50"),
+        ("^".join("1" * 60), "nested deeper than 50"),
+        ("+".join("1" * 300), "has 299 operators within each other, expected at most 200"),
+        ("1+" * 1001, "2002 characters came, expected at most 2000"),
+        (5, "5 came, expected text"),
+    ],
+)
+def test_what_is_no_expression_is_refused(text, fault):
+    with pytest.raises(DefinitionError, match=fault):
+        Expression(text)
+
+
+@given(st.text(max_size=60))
+def test_no_text_ends_in_a_traceback(text):
+    fault = None
+    try:
+        Expression(text)
+    except DefinitionError as error:
+        fault = str(error)
+    assert fault is None or fault.isprintable()
+
+
+def test_linear_values_read_back_from_their_sum():
+    made = Linear((2.0, 0.0, -0.5), 1.5)
+    names = ("a", "b", "c")
+    assert made.number(names, ())([1.0, 9.0, 4.0]) == 1.5
+    assert Linear.of(made.expression(names).tree, names) == made
+    assert Linear.of(Expression("a * 2").tree, names) is None
+    assert Linear.of(Expression("sin(a)").tree, names) is None
+
+
+@pytest.mark.parametrize(
+    ("make", "fault"),
+    [
+        (lambda: Constant(math.nan), "constant is nan, expected a finite number"),
+        (lambda: Linear((1.0, math.inf)), "linear: .* came, expected finite numbers"),
+        (lambda: Linear(3.0), "linear: 3.0 came, expected a sequence of numbers"),
+        (lambda: Linear((1.0,)).expression(("a", "b")), "linear of 1 coefficients, expected one for each input: a, b"),
+        (
+            lambda: Formula("a + c").expression(("a", "b")),
+            "asks for c, expected inputs, or outputs before its own: a, b",
+        ),
+        (lambda: Formula("2 * x").within((0, 1)), "gives 1.002 at x = 0.501, expected at most 1"),
+        (lambda: Formula("1 / x").within((0, 1)), "gives inf at x = 0, expected at most 1"),
+    ],
+)
+def test_what_is_no_value_is_refused(make, fault):
+    with pytest.raises(DefinitionError, match=fault):
+        make()

@@ -1,0 +1,295 @@
+"""Inputs by position, by name and in tables; results by name; terms by name; files read with other settings."""
+
+import copy
+import math
+import pickle
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import fuzzy_arbiter
+from fuzzy_arbiter import (
+    Arbiter,
+    ArbiterError,
+    Constant,
+    Criterion,
+    Formula,
+    Linear,
+    Operators,
+    Output,
+    Result,
+    Rule,
+    System,
+    Variable,
+    auto_terms,
+    curve,
+    falling,
+    prioritised,
+    rising,
+    triangle,
+)
+from fuzzy_arbiter.errors import DefinitionError, FormatError, InputError
+from fuzzy_arbiter.formats import FORMATS, reads, writes
+
+EXACT = float(Fraction(12118694, 610275))  # of the tip at service 9.8, food 6.5
+SERVICE = Variable("service", (0, 10), auto_terms(3))
+FOOD = Variable("food", (0, 10), auto_terms(3))
+TIP = Output("tip", (0, 25), {"low": triangle(0, 0, 13), "medium": triangle(0, 13, 25), "high": triangle(13, 25, 25)})
+RULES = (
+    "if service is poor or food is poor then tip is low",
+    "if service is average then tip is medium",
+    "if service is good or food is good then tip is high",
+)
+TIPPING = System((SERVICE, FOOD), (TIP,), RULES)
+ROWS = [[9.8, 6.5], [3.0, 8.0], [0.0, 0.0]]
+
+
+@pytest.fixture
+def tipping():
+    return Arbiter(system=TIPPING)
+
+
+def test_a_system_gives_the_quantity_and_prioritised_criteria_a_share(tipping):
+    assert tipping([9.8, 6.5])[0] == pytest.approx(EXACT, abs=1e-13)
+    for text in (writes(TIPPING, "toml").replace('normalization = "none"\n', ""), '{"criteria": [{"name": "a"}]}'):
+        system = reads(text, "json" if text.startswith("{") else "toml")
+        assert system.normalization == ("range" if text.startswith("{") else "none")
+    assert prioritised().normalization == Arbiter().system.normalization == "range"
+
+
+@pytest.mark.parametrize(
+    "sample",
+    [(9.8, 6.5), {"food": 6.5, "service": 9.8}, np.array([9.8, 6.5])],
+)
+def test_a_sample_comes_in_any_of_these_forms(tipping, sample):
+    assert tipping(sample) == tipping(service=9.8, food=6.5) == tipping([9.8, 6.5])
+    assert tipping.centroids(sample) == tipping.centroids(food=6.5, service=9.8)
+    assert tipping.explain(sample) == tipping.explain(food=6.5, service=9.8)
+
+
+def test_results_are_named_tuples(tipping):
+    result = tipping(service=9.8, food=6.5)
+    assert isinstance(result, Result) and isinstance(result, tuple)
+    assert result["tip"] == result.tip == result[0] == result[-1]
+    (tip,) = result
+    assert tip == pytest.approx(EXACT, abs=1e-13)
+    assert (result == (tip,), hash(result) == hash((tip,)), result[:1]) == (True, True, (tip,))
+    assert result._asdict() == {"tip": tip} and result._fields == ("tip",)
+    assert repr(result) == f"Result(tip={tip!r})"
+    for other in (pickle.loads(pickle.dumps(result)), copy.deepcopy(result)):
+        assert other == result and other["tip"] == tip and repr(other) == repr(result)
+    with pytest.raises(DefinitionError, match="no output 'tp', expected one of tip"):
+        result["tp"]
+    with pytest.raises(AttributeError, match="no output 'tp', expected one of tip"):
+        result.tp  # noqa: B018
+
+
+def test_weights_go_by_the_names_of_the_criteria(tmp_path):
+    arbiter = Arbiter([Criterion("obstacle"), Criterion("shape"), Criterion("depth"), Criterion("visibility")])
+    sample = {"obstacle": 0.1, "shape": 0.0, "depth": 0.2, "visibility": 0.9}
+    weights = arbiter(sample)
+    assert weights._fields == ("obstacle", "shape", "depth", "visibility")
+    assert weights["visibility"] == weights[3] == max(weights)
+    explanation = arbiter.explain(sample)
+    assert (explanation.winner, explanation.runner_up) == ("visibility", "depth")
+    assert explanation.weights["visibility"] == weights["visibility"]
+    assert (explanation.outputs[3].name, explanation.outputs[3].variable) == ("visibility", "alpha_4")
+    assert "visibility (alpha_4)" in str(explanation)
+    for suffix in FORMATS:
+        arbiter.save(tmp_path / f"a.{suffix}")
+        assert Arbiter.load(tmp_path / f"a.{suffix}").explain(sample).winner == "visibility"
+
+
+@pytest.mark.parametrize("names", ["a", ("a",), ("a", "a", "b"), ("a", "b", ""), (1, 2, 3)])
+def test_names_of_weights_are_one_for_each_output(names):
+    with pytest.raises(DefinitionError, match="weights_of"):
+        replace(prioritised(), weights_of=names)
+
+
+@pytest.mark.parametrize("format", ["fcl", "fis", "fll"])
+def test_names_of_weights_may_hold_what_the_comment_is_made_of(format):
+    system = replace(prioritised(), weights_of=("a, b", "c = d", "fuzzy_arbiter: points = 7"))
+    assert reads(writes(system, format), format) == system
+    with pytest.raises(ArbiterError, match="weights_of"):
+        writes(replace(system, weights_of=("a *)", "b", "c")), format)
+    for said in ("weights_of = obstacle", 'weights_of = ""', "weights_of = "):
+        text = writes(prioritised(), format).replace('weights_of = "obstacle" "shape" "depth"', said)
+        with pytest.raises(FormatError, match="line 1"):
+            reads(text, format)
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        {"food": [6.5, 8.0, 0.0], "service": np.array([9.8, 3.0, 0.0])},
+        np.array([(6.5, 1, 9.8), (8, 2, 3), (0, 3, 0)], dtype=[("food", "f4"), ("n", "i4"), ("service", "f8")]),
+    ],
+)
+def test_columns_go_in_and_come_out_by_name(tipping, table):
+    rows = tipping.batch(ROWS)
+    assert type(rows) is np.ndarray and rows.shape == (3, 1)
+    columns = tipping.batch(table)
+    assert isinstance(columns, Result) and columns["tip"].tolist() == columns[0].tolist() == rows[:, 0].tolist()
+    assert [tipping(row)["tip"] for row in ROWS] == pytest.approx(rows[:, 0].tolist(), abs=1e-13)
+
+
+def test_columns_by_keyword_and_one_value_for_all_rows(tipping):
+    assert (
+        tipping.batch(service=[9.8, 3.0], food=6.5)["tip"].tolist()
+        == tipping.batch([[9.8, 6.5], [3.0, 6.5]])[:, 0].tolist()
+    )
+    weights = Arbiter().batch(obstacle=[0.0, 0.25], shape=1, depth=np.float32(0))
+    assert [column.tolist() for column in weights] == [[0.0, 0.15625], [1.0, 0.84375], [0.0, 0.0]]
+
+
+@pytest.mark.parametrize(
+    ("ask", "fault"),
+    [
+        (lambda a: a([1, 2], service=3), "inputs came by position and service by keyword"),
+        (lambda a: a(service=3), "food: input is missing, expected service, food"),
+        (lambda a: a(service=3, food=4, fod=4), "fod: unknown input, expected service, food"),
+        (lambda a: a(service=[3, 4], food=[4, 5]), r"service: input is \[3, 4\], .*; for columns there is batch"),
+        (lambda a: a(), "inputs are None, expected 2 numbers"),
+        (lambda a: a.batch(service=[3]), "food: input is missing"),
+        (lambda a: a.batch(service=[3], food=[4], fod=[4]), "fod: unknown input"),
+        (lambda a: a.batch(service=[3], food=[4, 5]), r"columns have the shapes service \(1,\), food \(2,\), expected"),
+        (lambda a: a.batch(service=3, food=4), r"columns have the shapes service \(\), food \(\), expected"),
+        (lambda a: a.batch(service=[3, 11], food=[4, 5]), r"row 1: service is 11.0, expected a number in \[0, 10\]"),
+        (lambda a: a.batch(service=["3"], food=["4"]), "values of the type str"),
+        (lambda a: a.batch({"service": [3, None], "food": [4, 5]}), "row 1: service is nan"),
+        (lambda a: a(np.ma.array([3, 4], mask=[0, 1])), "food: input is masked, expected a number"),
+    ],
+)
+def test_inputs_that_do_not_fit_are_named(tipping, ask, fault):
+    with pytest.raises(InputError, match=fault):
+        ask(tipping)
+
+
+def test_what_is_masked_stays_masked(tipping):
+    mask = [[0, 0], [1, 0], [0, 0]]
+    rows = tipping.batch(np.ma.array([[9.8, 6.5], [99.0, math.nan], [0.0, 0.0]], mask=mask))
+    assert rows.mask[:, 0].tolist() == [False, True, False]
+    assert rows.compressed().tolist() == tipping.batch([ROWS[0], ROWS[2]])[:, 0].tolist()
+    columns = tipping.batch(service=np.ma.masked_greater([9.8, 99.0], 10), food=[6.5, 5.0])
+    assert columns["tip"].mask.tolist() == [False, True] and columns["tip"][0] == rows[0, 0]
+    assert not np.ma.getmaskarray(tipping.batch(np.ma.array(ROWS))).any()
+    with pytest.raises(InputError, match="row 1: food is nan"):
+        tipping.batch(np.ma.array([[1.0, 2.0], [1.0, math.nan]], mask=[[1, 0], [0, 0]]))
+
+
+def test_one_output_without_a_firing_rule_refuses_nothing():
+    wind = Variable("wind", (0, 20), {"calm": falling(2, 6), "strong": rising(10, 12)})
+    terms = {"low": falling(0, 100), "high": rising(0, 100)}
+    sail, keel = Output("sail", (0, 100), terms), Output("keel", (0, 100), terms, default=40.0)
+    always = Output("lamp", (0, 100), terms)
+    rules = (
+        "if wind is calm then sail is high and keel is low",
+        "if wind is strong then sail is low and keel is high",
+        "if wind is calm or wind is not calm then lamp is high",
+    )
+    for engine in ("exact", "grid", "skfuzzy"):
+        arbiter = Arbiter(system=System((wind,), (sail, keel, always), rules), engine=engine)
+        result = arbiter(wind=8.0)
+        assert math.isnan(result["sail"]) and result["keel"] == 40.0 and result["lamp"] == pytest.approx(200 / 3)
+        rows = arbiter.batch(wind=[0.0, 8.0, 15.0])
+        assert np.isnan(rows["sail"]).tolist() == [False, True, False] and rows["keel"][1] == 40.0
+        assert not np.isnan(rows["lamp"]).any()
+        why = str(arbiter.explain(wind=8.0))
+        assert "no rule fired, and no default" in why and "no rule fired: its default 40" in why
+    for normalization, shares in (("range", [0.2, 1]), ("sum", [1 / 6, 5 / 6]), ("max", [0.2, 1.0])):
+        shared = Arbiter(system=System((wind,), (sail, keel, always), rules, normalization=normalization))
+        for weights in (shared(wind=8.0), shared.batch([[8.0]])[0]):
+            assert math.isnan(weights[0]) and list(weights[1:]) == pytest.approx(shares)
+
+
+def test_terms_by_name_and_callable():
+    temperature = Variable("temperature", (0, 40), {"cold": falling(10, 20), "warm": triangle(15, 22, 30)})
+    assert temperature["cold"](17) == pytest.approx(0.3)
+    assert (temperature["cold"] & ~temperature["warm"]) == replace_names(temperature)
+    assert TIPPING["service"]["good"](7.5) == 0.5 and TIPPING["tip"]["low"](6.5) == 0.5
+    with pytest.raises(DefinitionError, match="no variable 'servce', expected one of service, food, tip"):
+        TIPPING["servce"]
+    statement = next(TIPPING.rules[0].condition.terms())  # of a text, which knows no shape
+    with pytest.raises(DefinitionError, match="made of names alone"):
+        statement(1.0)
+
+
+def replace_names(variable):
+    """Return the same proposition as rules in text have it."""
+    text = f"if {variable.name} is cold and {variable.name} is not warm then tip is low"
+    return fuzzy_arbiter.rule_text.parse_rule(text).condition
+
+
+@pytest.mark.parametrize("count", [3, 5, 7])
+def test_automatic_terms_are_those_of_scikit_fuzzy(count):
+    control = pytest.importorskip("skfuzzy.control")
+    places = np.linspace(-3.0, 10.0, 14)
+    theirs = control.Antecedent(places, "x")
+    theirs.automf(count)
+    ours = Variable("x", (-3, 10), auto_terms(count))
+    assert ours.term_names == tuple(theirs.terms)
+    for name, term in theirs.terms.items():
+        peaks = term.mf == 1.0
+        assert [ours[name](x) for x in places[peaks]] == pytest.approx([1.0] * peaks.sum())
+    for x in np.linspace(-3, 10, 27):
+        assert sum(ours[name](x) for name in ours.term_names) == pytest.approx(1.0, abs=1e-15)
+    for i, name in enumerate(ours.term_names):  # in rational numbers
+        peak = Fraction(-3) + Fraction(13 * i, count - 1)
+        assert ours[name](float(peak)) == pytest.approx(1.0, abs=1e-15)
+
+
+def test_automatic_terms_of_ones_own_names_and_what_they_cannot_be():
+    assert Variable("x", (0, 1), auto_terms(["low", "high"])) == Variable(
+        "x", (0, 1), {"low": falling(0, 1), "high": rising(0, 1)}
+    )
+    assert Output("y", (0, 1), auto_terms(("a", "b", "c", "d"))).term_names == ("a", "b", "c", "d")
+    for bad in (4, True, 3.0, "abc", ["a"], [1, 2], None):
+        with pytest.raises(DefinitionError, match="auto_terms"):
+            auto_terms(bad)
+
+
+def test_a_file_may_be_read_with_another_default_and_outside(tmp_path):
+    lamp = Output("lamp", (0, 10), {"on": rising(0, 10)})
+    x = Variable("x", (0, 1), {"low": falling(0, 0.5)})
+    Arbiter(system=System((x,), (lamp,), ("if x is low then lamp is on",))).save(tmp_path / "a.fis")
+    path = tmp_path / "a.fis"
+    assert math.isnan(Arbiter.load(path)(x=1.0)["lamp"])
+    assert Arbiter.load(path, default=2)(x=1.0)["lamp"] == Arbiter.load(path, default={"lamp": 2})(x=1.0)["lamp"] == 2.0
+    assert Arbiter.load(path, outside="clip", default=2.0)(x=99.0)["lamp"] == 2.0
+    with pytest.raises(InputError):
+        Arbiter.load(path)(x=99.0)
+    for asked, fault in (
+        ({"default": 11.0}, r"a.fis: output 'lamp': default is 11.0, expected a number in \[0, 10\], its universe"),
+        ({"default": {"lmp": 1.0}}, "a.fis: default: no output 'lmp', expected one of lamp"),
+        ({"outside": "wrap"}, "a.fis: outside is 'wrap', expected one of refuse, clip"),
+    ):
+        with pytest.raises(DefinitionError, match=fault):
+            Arbiter.load(path, **asked)
+
+
+@pytest.mark.parametrize(
+    "system",
+    [
+        TIPPING,
+        prioritised(),
+        prioritised([Criterion("a wall", on="near by", off="far off")], outside="clip", points=7),
+        System(
+            (SERVICE,), (replace(TIP, default=3.0),), ("if not (service is poor) then tip is low with 0.25",), "x y"
+        ),
+        System(
+            (Variable("x", (0, 1), {"a": curve("gaussian", 0.3, 0.1)}),),
+            (
+                Output("y", (0, 10), {"c": Constant(2.0), "f": Formula("2*x")}, defuzzifier="average"),
+                Output("z", (0, 10), {"l": Linear((1.0,), 0.5)}, defuzzifier="sum", aggregation="sum"),
+            ),
+            (Rule.parse("if x is very a then y is c and z is l", Operators("prod", "probor")), "if x is a then y is f"),
+        ),
+    ],
+)
+def test_what_a_system_shows_makes_it_again_from_public_names(system):
+    public = {name: getattr(fuzzy_arbiter, name) for name in fuzzy_arbiter.__all__}
+    again = eval(repr(system), {"__builtins__": {}} | public)
+    assert again == system and hash(again) == hash(system)
+    assert eval(repr(Arbiter(system=system)), {"__builtins__": {}} | public) == Arbiter(system=system)
