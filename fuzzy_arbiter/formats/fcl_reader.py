@@ -15,7 +15,7 @@ from fuzzy_arbiter.propositions import quoted
 from fuzzy_arbiter.rule import Operators, Rule
 from fuzzy_arbiter.rule_text import parse_rules
 from fuzzy_arbiter.terms.term import Term
-from fuzzy_arbiter.terms.values import Formula, Value
+from fuzzy_arbiter.terms.values import Constant, Linear, Value
 
 _SECTIONS = ("VAR_INPUT", "VAR_OUTPUT", "FUZZIFY", "DEFUZZIFY", "RULEBLOCK", "END_FUNCTION_BLOCK")
 _RULE_WORDS = frozenset(("if", "then", "and", "or", "not", "is", "with"))
@@ -128,8 +128,9 @@ class _Reader(Cursor):
         return "".join(words)
 
     def output(self, name: str, draft: _Draft, accumulation: str | None) -> Output:
-        values = any(isinstance(term.shape, Value) for term in draft.terms or ())
-        sets = any(not isinstance(term.shape, Value) or isinstance(term.shape, Formula) for term in draft.terms or ())
+        shapes = [term.shape for term in draft.terms or ()]
+        values = any(isinstance(shape, Constant | Linear) for shape in shapes)
+        sets = any(not isinstance(shape, Value) for shape in shapes)
         method: Any = draft.method or ("average" if values and not sets else "centroid")  # as jFuzzyLogic takes it
         weighted = method in WEIGHTED
         own = draft.accumulation or accumulation or ("sum" if weighted and self.fuzzylite else "max")

@@ -17,7 +17,7 @@ from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.rule_text import bent_rules
 from fuzzy_arbiter.shapes import Membership
 from fuzzy_arbiter.terms.term import Term
-from fuzzy_arbiter.terms.values import Formula, Value
+from fuzzy_arbiter.terms.values import Formula
 
 _SECTION = re.compile(r"\[\s*(System|Input|Output|Rules)\s*([1-9][0-9]{0,8})?\s*\]", re.ASCII)
 _ENTRY = re.compile(r"(\w+)\s*=\s*(.*)", re.ASCII)
@@ -54,7 +54,7 @@ class _Section:
 def read(text: str) -> System:
     """Return the system that MATLAB's text defines.
 
-    Values of one name are numbered, as rules speak of them by their place. The strengths of rules that conclude one
+    Terms of one name are numbered, as rules speak of them by their place. The strengths of rules that conclude one
     value are added, whatever AggMethod says, as MATLAB does it.
 
     Parameters
@@ -223,9 +223,7 @@ def _variable(section: _Section, inputs: int | None) -> _Parts:
 
 
 def _told_apart(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """Return values with a number after a name that came before, for rules speak of their places."""
-    if not all(isinstance(term.shape, Value) for term in terms):
-        return tuple(terms)
+    """Return terms with a number after a name that came before, for rules speak of their places."""
     found: list[Term] = []
     for term in terms:
         name, names = term.name, {other.name for other in found}

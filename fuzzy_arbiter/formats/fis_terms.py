@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 
 from fuzzy_arbiter.formats.fis_words import CURVES, FUNCTIONS, SHOULDERS, STRAIGHT, VALUES
 from fuzzy_arbiter.formats.fll_terms import curve_of, read_shape, read_value
@@ -106,19 +105,3 @@ def _crossed(a: float, b: float, c: float, d: float) -> Shape:
     """Return the lesser of a rise from a to b and a fall from c to d that cross below 1."""
     place = (a * (d - c) + d * (b - a)) / ((b - a) + (d - c))
     return Shape(((a, 0.0), (place, (place - a) / (b - a)), (d, 0.0)))
-
-
-def line_of(numbers: Sequence[float]) -> str:
-    """Return numbers in brackets.
-
-    Parameters
-    ----------
-    numbers : sequence of float
-        Finite.
-
-    Returns
-    -------
-    str
-        As MATLAB writes them.
-    """
-    return f"[{say_numbers(numbers)}]"

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.definition import Normalization
-from fuzzy_arbiter.errors import DefinitionError, InputError
+from fuzzy_arbiter.definition import Normalization, Output
+from fuzzy_arbiter.errors import DefinitionError, InputError, UnsupportedError
 from fuzzy_arbiter.pictures.places import fixed_inputs, one_of, places_in, said, weights_at
 from fuzzy_arbiter.pictures.style import (
     FAINT,
@@ -62,6 +62,8 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
         If there is no such variable.
     InputError
         If the place is outside the universe.
+    UnsupportedError
+        If the variable has no terms, or its terms are values.
 
     Examples
     --------
@@ -75,6 +77,8 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
     low, high = drawn.universe
     if at is not None and not low <= at <= high:
         raise InputError(f"{variable}: place is {at!r}, expected a number in [{low:g}, {high:g}]")
+    if not drawn.terms or (isinstance(drawn, Output) and drawn.weighted):
+        raise UnsupportedError(f"terms of {variable!r}: it has values or none, which are not drawn; expected sets")
     ax = new_axes(6.0, 2.7) if ax is None else ax
     for i, term in enumerate(drawn.terms):
         x, y = corners(term, (low, high))

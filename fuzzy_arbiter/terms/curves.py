@@ -11,7 +11,7 @@ import numpy as np
 
 from fuzzy_arbiter.checks import finite, shown
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.shapes import Array, Membership, Shape
+from fuzzy_arbiter.shapes import Array, Membership
 from fuzzy_arbiter.terms.expressions import Expression, array_function, number_function
 from fuzzy_arbiter.terms.kinds import KINDS
 from fuzzy_arbiter.terms.parser import Node
@@ -195,21 +195,3 @@ def curve(kind: str, *parameters: float, height: float = 1.0) -> Membership:
     0.6065
     """
     return Curve(kind, parameters, height)
-
-
-def heightened(shape: Shape, height: float) -> Shape:
-    """Return a shape with all degrees multiplied.
-
-    Parameters
-    ----------
-    shape : Shape
-        Any.
-    height : float
-        From 0 to 1.
-
-    Returns
-    -------
-    Shape
-        Of the same places.
-    """
-    return shape if height == 1.0 else Shape(tuple((x, degree * height) for x, degree in shape.points))

@@ -8,7 +8,7 @@ from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.shapes import Membership, Shape
 from fuzzy_arbiter.terms.curves import Curve
-from fuzzy_arbiter.terms.values import Value
+from fuzzy_arbiter.terms.values import Formula, Value
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,8 @@ class Term:
         DefinitionError
             If it is a value.
         """
-        if not isinstance(self.shape, Membership):
+        value = isinstance(self.shape, Formula) and self.shape.names - {"x"}
+        if value or not isinstance(self.shape, Membership):
             raise DefinitionError(f"term {shown(self.name)} is a value, expected a membership function")
         return self.shape
 

@@ -21,8 +21,9 @@ from fuzzy_arbiter import (
     trapezoid,
     triangle,
 )
-from fuzzy_arbiter.errors import DefinitionError, InputError
+from fuzzy_arbiter.errors import DefinitionError, InputError, UnsupportedError
 from fuzzy_arbiter.pictures.style import colour, hatch, line_style, wrapped
+from tests.fuzzy_arbiter.formats.systems import RICHER
 
 MEASURED = (
     Criterion("distance to the nearest obstacle ahead", membership=falling(0.0, 5.0)),
@@ -302,3 +303,20 @@ def test_a_decision_is_that_of_the_greatest_weight(arbiter):
                     assert first - second < 0.01
                     found += 1
     assert found > 50
+
+
+def test_curves_are_drawn_and_values_are_refused():
+    system = RICHER["fll"]
+    arbiter = Arbiter(system=system)
+    for name in ("quality", "mood"):
+        ax = pictures.terms(arbiter, name)
+        variable = next(v for v in (*system.inputs, *system.outputs) if v.name == name)
+        for line, term in zip(ax.get_lines(), variable.terms, strict=True):
+            x, y = line.get_data()
+            assert y == pytest.approx(term.shape.of_many(np.asarray(x)), abs=1e-12)
+    with pytest.raises(UnsupportedError, match="terms of 'tip': it has values or none, which are not drawn"):
+        pictures.terms(arbiter, "tip")
+    with pytest.raises(UnsupportedError, match="rules of 'tip': its values, or terms under"):
+        pictures.rules(arbiter, [5.0, 5.0], "tip")
+    with pytest.raises(UnsupportedError, match=r"rules of 'mood': .* joined by probor, are not drawn"):
+        pictures.rules(arbiter, [5.0, 5.0], "mood")

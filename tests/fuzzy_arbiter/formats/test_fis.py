@@ -139,7 +139,6 @@ def test_all_shapes_of_0_and_1_come_back(shape):
         ("MF2='good'", "MF4='good'", r"line 21: MF4 came in \[Input1\], expected MF2"),
         ("MF2='good'", "MF1='good'", r"line 21: MF1 came twice in \[Input1\]"),
         ("MF2='good':", "MF2=good:", "line 21: good:.*, expected a membership function such as"),
-        ("'good'", "'bad'", "line 16: variable 'service': two terms are named 'bad'"),
         ("Range = [0 10]", "Range = [0 10 20]", r"line 18: Range is \[0 10 20\], expected two numbers in brackets"),
         ("Range = [0 10]\n", "", r"line 16: \[Input1\] without Range"),
         ("[Input2]", "[Input3]", r"\[Input3\] came, and no \[Input2\]; expected them numbered from 1"),
@@ -163,6 +162,13 @@ def test_what_is_not_known_is_refused_with_its_line(old, new, fault):
     assert old in OTHERS
     with pytest.raises((FormatError, DefinitionError), match=fault):
         reads(OTHERS.replace(old, new, 1), "fis")
+
+
+def test_terms_of_one_name_are_told_apart_for_rules_speak_of_their_places():
+    named = reads(OTHERS, "fis").inputs[0].term_names
+    again = reads(OTHERS.replace("'good'", f"'{named[0]}'", 1), "fis")
+    assert again.inputs[0].term_names == (named[0], f"{named[0]}_2", *named[2:])
+    assert [term.shape for term in again.inputs[0].terms] == [t.shape for t in reads(OTHERS, "fis").inputs[0].terms]
 
 
 def bent():

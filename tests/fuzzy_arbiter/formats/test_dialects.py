@@ -1,0 +1,230 @@
+"""What jFuzzyLogic, fuzzylite, MATLAB and Octave write beyond the standard, in their manner."""
+
+import math
+
+import pytest
+
+from fuzzy_arbiter import Arbiter
+from fuzzy_arbiter.errors import DefinitionError, FormatError
+from fuzzy_arbiter.formats import reads
+from fuzzy_arbiter.terms import Constant, Curve, Formula, Linear
+
+JFUZZYLOGIC = """
+FUNCTION_BLOCK heater
+VAR_INPUT x : REAL; z : REAL; END_VAR
+VAR_OUTPUT y : REAL; END_VAR
+FUZZIFY x
+    TERM a := COSINE 3 4; TERM b := GBELL 2 4 5; TERM c := SIGM 2 3; TERM d := DSIGM 2 1 2 5;
+    TERM e := DSIGM 1 5 2 3; TERM f := GAUSS2 2 1 4 2; TERM g := TRIAN 3 3 3; TERM h := 6;
+END_FUZZIFY
+FUZZIFY z TERM on := (0, 0) (1, 1); END_FUZZIFY
+DEFUZZIFY y
+    TERM low := 5; TERM mid := FUNCTION 2 * x + 0.5 * z + 1; TERM high := FUNCTION LOG(x) + x ^ 2 % 4;
+END_DEFUZZIFY
+RULEBLOCK only
+    RULE 1 : IF z IS on THEN y IS low;
+    RULE 2 : IF NOT (z IS on) THEN y IS mid;
+    RULE 3 : IF NOT z IS on THEN y IS mid;
+END_RULEBLOCK
+END_FUNCTION_BLOCK
+"""
+
+
+def test_jfuzzylogics_functions_and_what_it_takes_where_nothing_is_said():
+    system = reads(JFUZZYLOGIC, "fcl")
+    of = {term.name: term.shape for term in system.inputs[0].terms}
+    assert of["a"](2.5) == pytest.approx((math.cos(math.pi / 2) + 1) / 2)
+    assert of["b"](7.0) == pytest.approx(0.5)
+    assert of["c"](3.5) == pytest.approx(1 / (1 + math.exp(-1)))
+    assert isinstance(of["d"], Curve)
+    assert isinstance(of["e"], Formula)  # whose difference is below 0 somewhere, where jFuzzyLogic has 0
+    for x in (2.0, 3.0, 4.5):
+        assert of["e"](x) == max(0.0, 1 / (1 + math.exp(5 - x)) - 1 / (1 + math.exp(6 - 2 * x)))
+    assert (of["f"](1.0), of["f"](3.0)) == (pytest.approx(math.exp(-0.5)), 1.0)
+    assert [of["g"](3.0), of["g"](3.1), of["h"](6.0)] == [1.0, 0.0, 1.0]
+    low, mid, high = (term.shape for term in system.outputs[0].terms)
+    assert (low, mid) == (Constant(5), Linear((2.0, 0.5), 1.0))
+    assert high.number(("x", "z"), ())([10.0, 0.0]) == pytest.approx(1.0 + 100 % 4)
+    # singletons and functions by COGS; of two rules for one the greater counts, for ACCU is MAX
+    assert (system.outputs[0].defuzzifier, system.outputs[0].aggregation) == ("average", "max")
+    assert Arbiter(system=system)([3.0, 0.25]) == pytest.approx((0.25 * 5 + 0.75 * 7.125,))
+
+
+FUZZYLITE = """//Code automatically generated with fuzzylite 6.0.
+FUNCTION_BLOCK my - fan
+VAR_INPUT
+  x: REAL;
+END_VAR
+VAR_OUTPUT
+  y: REAL;
+  u: REAL;
+END_VAR
+FUZZIFY x
+  ENABLED : TRUE;
+  RANGE := (0.000 .. 10.000);
+  TERM low := ZShape 2.000 8.000;
+  TERM high := SShape 2.000 8.000;
+  TERM any := Ramp 0.000 10.000;
+END_FUZZIFY
+DEFUZZIFY y
+  ENABLED : TRUE;
+  RANGE := (0.000 .. 1.000);
+  TERM t := Constant 3.000;
+  TERM w := Linear 1.000 2.000;
+  METHOD : COGS;
+  DEFAULT := nan | NC;
+  LOCK : PREVIOUS | RANGE;
+END_DEFUZZIFY
+DEFUZZIFY u
+  RANGE := (0.000 .. 1.000);
+  TERM s := Spike 0.500 1.000;
+  METHOD : COA;
+  ACCU : ESUM;
+  DEFAULT := 0.250;
+END_DEFUZZIFY
+RULEBLOCK
+  ENABLED : TRUE;
+  AND : EPROD;
+  OR : NMAX;
+  ACT : HPROD;
+  RULE 1 : if x is low then y is t
+  RULE 2 : if x is very high then y is very w and u is s
+  RULE : if x is high then y is w
+END_RULEBLOCK
+END_FUNCTION_BLOCK
+"""
+
+
+def test_fuzzylites_dialect_of_fcl():
+    system = reads(FUZZYLITE, "fcl")
+    y, u = system.outputs
+    assert system.name == "my - fan"
+    assert (system.conjunction, system.disjunction, system.implication) == (
+        *("einstein_product", "nilpotent_maximum"), "hamacher_product",
+    )  # fmt: skip
+    assert (y.default, y.lock_previous, y.lock_range, y.aggregation, y.defuzzifier) == (
+        None,
+        True,
+        True,
+        "sum",
+        "average",
+    )
+    assert (u.default, u.aggregation, u.defuzzifier) == (0.25, "einstein_sum", "bisector")
+    # a hedge in a conclusion bends that one and those after it
+    assert [str(rule) for rule in system.rules] == [
+        "if x is low then y is t", "if x is very very high then y is w and u is s", "if x is high then y is w",
+    ]  # fmt: skip
+
+
+FIS = """[System]
+Name='a'
+Type='{type}'
+NumInputs=2
+NumOutputs=1
+NumRules=1
+AndMethod='prod'
+OrMethod='probor'
+DefuzzMethod='{method}'
+[Input1]
+Name='x'
+Range=[-pi pi/2]
+NumMFs=6
+MF1='a':'gaussmf',[2 0 0 0]
+MF2='b':'smf',[3 1]
+MF3='c':'trapmf',[-2 1 -1 2]
+MF4='d':'trimf',[1 1 1]
+MF5='e':'linzmf',[0 1]
+MF6='f':'psigmf',[2 0 -5 1]
+[Input2]
+Name='z'
+Range=[0 1]
+NumMFs=1
+MF1='on':'rampmf',[0 1]
+[Output1]
+Name='y'
+Range=[0 1]
+NumMFs=2
+MF1='mf1':'{function}
+MF2='mf2':'{function}
+[Rules]
+{rule}
+"""
+
+
+def fis(rule="1 1, 1 (1) : 1", head="", type="sugeno", method="wtaver", function="linear',[1 2 3]"):
+    return reads(head + FIS.format(rule=rule, type=type, method=method, function=function), "fis")
+
+
+def test_matlabs_functions():
+    system = fis()
+    a, b, c, d, e, f = (term.shape for term in system.inputs[0].terms)
+    assert system.inputs[0].universe == (-math.pi, math.pi / 2)
+    assert a(1.0) == pytest.approx(math.exp(-1 / 8))
+    assert (b(1.9), b(2.1)) == (0.0, 1.0)  # whose foot is beyond its top: a step half-way
+    assert c(0.0) == pytest.approx(2 / 3)  # of which rise and fall cross
+    assert (d(1.0), d(0.9), e(0.25)) == (1.0, 0.0, 0.75)
+    assert f(0.5) == pytest.approx(1 / (1 + math.exp(-1)) / (1 + math.exp(-2.5)))
+    assert Arbiter(system=system)([1.0, 0.5]) == pytest.approx((1.0 + 2 * 0.5 + 3,))
+
+
+@pytest.mark.parametrize(
+    ("rule", "head", "said"),
+    [
+        ("1.20 -1.05, 1 (1) : 2", "", ["if x is very a or z is not somewhat on then y is mf1"]),
+        ("1.4 0, 1 (0.5) : 1", "", ["if x is very very a then y is mf1 with 0.5"]),
+        ("1.3 0.99, 2 (1) : 1", "# generated with fuzzylite\n", ["if x is extremely a and z is any then y is mf2"]),
+        ("1.01 1, 1.2 (1) : 1", "# generated with fuzzylite\n", ["if very (x is seldom a and z is on) then y is mf1"]),
+    ],
+)
+def test_hedges_are_fractions(rule, head, said):
+    assert [str(rule) for rule in fis(rule, head).rules] == said
+
+
+@pytest.mark.parametrize(
+    ("options", "fault"),
+    [
+        (
+            {"rule": "1.3 1, 1 (1) : 1"},
+            "line 32: .*1.3 for 'x', expected a whole number from -6 to 6, or .05, .2 or .4",
+        ),
+        ({"rule": "1 1, 1.2 (1) : 1"}, "line 32: .*a hedge in the conclusion on 'y', which only fuzzylite's files may"),
+        (
+            {"rule": "1 1, 1.2 (0.5) : 1", "head": "# generated with fuzzylite\n"},
+            "a hedge in a conclusion and a weight",
+        ),
+        ({"rule": "1 0.2, 1 (1) : 1"}, "line 32: .*0.2 for 'z', expected a whole number"),
+        ({"function": "linear',[1 2 3 4]"}, "line 29: linear has 4 numbers, expected 2 or 3 for 2 inputs"),
+        ({"function": "constant',[1 2]"}, "line 29: constant has 2 numbers, expected 1"),
+        ({"function": "function',[sin(q)]"}, "asks for q, expected inputs"),
+        ({"function": "trimf',[0 1 2]"}, "'mf1' is no value, nor does it only rise or only fall"),
+    ],
+)
+def test_what_fis_cannot_mean_is_refused(options, fault):
+    with pytest.raises((FormatError, DefinitionError), match=fault):
+        fis(**options)
+
+
+def test_hybrid_files_have_sets_and_values():
+    assert fis(type="hybrid", method="centroid", function="constant',[0.5]").outputs[0].defuzzifier == "average"
+    assert fis(type="hybrid", method="bisector", function="trimf',[0 0.5 1]").outputs[0].defuzzifier == "bisector"
+    assert fis(type="tsukamoto", function="rampmf',[0 1]").outputs[0].weighted
+
+
+def test_fuzzylite_5_has_other_words():
+    text = """Engine: old
+InputVariable: x
+  range: 0.000 1.000
+  term: on Ramp 0.000 1.000
+OutputVariable: y
+  range: 0.000 1.000
+  accumulation: BoundedSum
+  defuzzifier: LargestOfMaximum 50
+  term: low Ramp 1.000 0.000
+RuleBlock: only
+  activation: EinsteinProduct
+  rule: if x is on then y is low
+"""
+    system = reads(text, "fll")
+    assert (system.implication, system.outputs[0].aggregation, system.outputs[0].defuzzifier, system.points) == (
+        *("einstein_product", "bounded_sum"), "lom", 50,
+    )  # fmt: skip
