@@ -127,10 +127,10 @@ def _style(look: Look, criterion: str | None) -> str:
 def _weights(look: Look, width: int, bars: Bars) -> list[Text]:
     lines = [_title("Weights of the arbiter")]
     names = [plain(criterion["name"]) for criterion in look.header["criteria"]]
-    wide = min(max(9, *map(len, names)), _LONGEST_NAME)
+    wide = min(max(8, *map(len, names)), _LONGEST_NAME) + 1
     for name in names:
         weight, asks = look[f"weight.{name}"], look[f"membership.{name}"]
-        line = Text(f"{name[:wide]:<{wide}}")
+        line = Text(f"{name[: wide - 1]:<{wide}}")
         line.append_text(bars.part(weight, width - 17 - wide, _style(look, name)))
         lines.append(line.append(f" {weight:4.2f} asks {asks:4.2f}"))
     return lines
