@@ -113,6 +113,53 @@ def test_one_that_is_certain_or_was_reported_is_not_tried_again():
     assert thrusters.stuck[6] == -3.0 and np.isnan(thrusters.stuck[[0, 1, 2, 3, 4, 5, 7]]).all()
 
 
+def test_of_several_isolated_each_is_tried_again_after_a_while_and_ever_more_rarely():
+    estimate, thrusters, state = started()
+    reported, tried, period = np.ones(8), [], 0.1
+    reported[7] = 0.0
+    thrusters.health[[1, 4, 7]], thrusters.stuck[4] = 0.0, -3.0
+
+    def wait(seconds, quiet=True):
+        for _ in range(round(seconds / period)):
+            found = fault_detection.try_again(state, estimate, thrusters, reported, quiet, period)
+            if found >= 0:
+                tried.append(found)
+                assert thrusters.health[found] == 1.0 and np.isnan(thrusters.stuck[found])
+                assert estimate.state[EFFECTIVENESS + found] == 1.0
+                fault_detection._isolate(state, estimate, thrusters, found, np.nan)  # it is found out
+                state.tentative[found] = 2
+
+    wait(4.8)
+    assert tried == []
+    wait(0.4, quiet=False)
+    assert tried == []
+    wait(0.1)
+    assert tried == [1]
+    wait(5.2)
+    assert tried == [1, 4]
+    wait(39.0)
+    assert tried == [1, 4]
+    wait(1.5)
+    assert tried == [1, 4, 1]
+    thrusters.health[1] = 1.0  # one alone is not tried, nor what is reported
+    wait(1000.0)
+    assert tried == [1, 4, 1]
+
+
+def test_two_that_were_isolated_wrongly_work_again():
+    """While another one has failed; of the two, one is thought to be stuck."""
+    law, sea = law_for(REGIONS), Sea(noise=NOISE)
+    fly(law, sea, steps=100)
+    thrusters, sea.left[0] = law.memory.thrusters, 0.0
+    thrusters.health[[0, 1, 2]], law.memory.fault_state.tentative[:3], thrusters.stuck[2] = 0.0, 2, -4.0
+    reallocate(thrusters)
+    forces = fly(law, sea, steps=100, first=100)
+    assert not forces[:, [0, 1, 2]].any()  # nothing is commanded of what is stuck
+    fly(law, sea, steps=2300, first=200)
+    assert isolated(law) in ([0], [0, 1], [0, 2])
+    assert np.linalg.norm(sea.position - (8.0, 0.5, 2.5)) < 0.6
+
+
 def started():
     estimate, thrusters = make_estimate(ODIN), make_thrusters(ODIN)
     initialize(estimate, np.zeros(3), np.zeros(3), GAINS)
