@@ -119,7 +119,7 @@ def test_the_fused_loop_sweeps_centroids_as_the_master_does(swept):
 
 
 def test_the_fused_loop_through_sensors_is_the_same(own):
-    changes = ["initial.position=[6.5, 0.0, 4.2]", "time.duration=6.0", "sensing.through=sensors"]
+    changes = ["initial.position=[6.5, 0.0, 4.2]", "time.duration=20.0", "sensing.through=sensors"]
     assert_same_to_the_last_bit(
         load_scenario(own, [*changes, *(f"sensing.{key}=0.0" for key in ("position_noise", "velocity_noise"))])
     )
