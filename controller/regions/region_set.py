@@ -62,16 +62,32 @@ class Region:
     velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
     gain: float = 1.0  # alpha_i of section VII, in N per unit of g
     hard: bool = True
-    deviation: float = 0.0  # m, standard deviation of its place, in each direction
+    deviation: float | Vector3 = 0.0  # m, standard deviation of its place: in any direction, or north, east and down
+
+    @property
+    def deviations(self) -> Vector3:
+        """Standard deviations of its place north, east and down [m]."""
+        return deviations_of(self.deviation)
 
     def __post_init__(self) -> None:
         if self.keep not in ("in", "out"):
             raise RegionError(f"region {self.name!r}: keep is {self.keep!r}, expected 'in' or 'out'")
         require_finite(f"region {self.name!r}", velocity=self.velocity)
         require(0.0 <= self.gain < math.inf, f"region {self.name!r}", "gain", self.gain, "a finite number, 0 or above")
-        require(0.0 <= self.deviation < math.inf, f"region {self.name!r}", "deviation", self.deviation, "0 m or above")
+        require(
+            all(0.0 <= deviation < math.inf for deviation in self.deviations), f"region {self.name!r}", "deviation",
+            self.deviation, "0 m or above, one number or three",
+        )  # fmt: skip
         at_rest = not isinstance(self.shape, Orientation) or not any(self.velocity)
         require(at_rest, f"region {self.name!r}", "velocity", self.velocity, "none: an orientation is at no place")
+
+
+def deviations_of(deviation: float | Vector3) -> Vector3:
+    """Return the standard deviations north, east and down that one number, or three, say."""
+    if isinstance(deviation, float | int):
+        return (float(deviation),) * 3
+    north, east, down = deviation
+    return float(north), float(east), float(down)
 
 
 def name_of(shape: Shape) -> str:
@@ -143,7 +159,7 @@ class PackedRegions(NamedTuple):
     velocities: Array  # (n, 3) m/s, NED
     gains: Array  # (n,) alpha_i
     hard: NDArray[np.bool_]  # (n,)
-    deviations: Array  # (n,) m, standard deviation of each place
+    deviations: Array  # (n, 3) m, standard deviations of each place, NED
 
     def evaluate(
         self,
@@ -221,7 +237,7 @@ def pack(regions: Sequence[Region]) -> PackedRegions:
         velocities=np.array([region.velocity for region in regions], dtype=float).reshape(-1, 3),
         gains=np.array([region.gain for region in regions], dtype=float),
         hard=np.array([region.hard for region in regions], dtype=np.bool_),
-        deviations=np.array([region.deviation for region in regions], dtype=float),
+        deviations=np.array([region.deviations for region in regions], dtype=float).reshape(-1, 3),
     )
 
 

@@ -132,7 +132,9 @@ KEYS = {
     "regions[].shape": Key("", "a shape", ", below"),
     "regions[].velocity": Key("m/s", "north east down; the law is told"),
     "regions[].streamed": Key("", "moved from outside while the run goes on", ", below"),
-    "regions[].deviation": Key("m", "standard deviation of its place", ": margins of the deployable law heed it"),
+    "regions[].deviation": Key(
+        "m", "standard deviation of its place, or three: north, east, down", ": margins of the deployable law grow"
+    ),
     "regions[].hard": Key(
         "", "must not be violated", "; the paper's law, and a law of plain potentials, do not ask"
     ),

@@ -192,7 +192,7 @@ class RegionEntry:
     velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
     streamed: bool = False  # moved from outside while the run goes on
     hard: bool = True  # must not be violated, for laws that tell hard regions from soft ones
-    deviation: float = 0.0  # m, standard deviation of its place, for laws whose margins heed it
+    deviation: float | tuple[float, float, float] = 0.0  # m, of its place, standard: in any direction, or each of NED
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from controller import LAWS
 from controller.errors import RegionError
 from controller.law import validate_quaternion
 from controller.regions import Region, Sphere
-from controller.regions.region_set import SHAPES, of_attitude
+from controller.regions.region_set import SHAPES, deviations_of, of_attitude
 from controller.regions.shape import Shape
 from cosim.errors import ScenarioError
 from cosim.scenario.tables import (
@@ -197,8 +197,8 @@ def check_regions(entries: tuple[RegionEntry, ...]) -> tuple[SecondaryRegion, ..
         _require(good, f"{key}.name", repr(entry.name), "at most 40 letters, digits, blanks, - and _, and not goal")
         _require(names.count(entry.name) == 1, f"{key}.name", "used twice", "a name of its own")
         _require(0.0 <= entry.gain < math.inf, f"{key}.gain", entry.gain, "a finite number, 0 or above")
-        good = 0.0 <= entry.deviation < math.inf
-        _require(good, f"{key}.deviation", entry.deviation, "a finite number, 0 m or above")
+        good = all(0.0 <= deviation < math.inf for deviation in deviations_of(entry.deviation))
+        _require(good, f"{key}.deviation", entry.deviation, "finite, 0 m or above, one number or three")
         _require(all(map(math.isfinite, entry.velocity)), f"{key}.velocity", entry.velocity, "finite numbers")
         shape = _shape(entry.shape, f"{key}.shape")
         region = Region(entry.name, shape, entry.keep, entry.velocity, entry.gain, entry.hard, entry.deviation)

@@ -142,14 +142,14 @@ def gradient_rate(kind: int, sign: float, n: Array, later: Array, velocity: Arra
     return turning
 
 
-def _margin(n: Array, motion: Motion, deviation: float, of_attitude: bool, gains: DeployableGains) -> float:
+def _margin(n: Array, motion: Motion, deviations: Array, of_attitude: bool, gains: DeployableGains) -> float:
     """Return the margin [m, or rad] of a clearance with slope n, by how uncertain vehicle and region are.
 
-    `deviation` [m] is that of the region.
+    `deviations`, shape (3,) [m], are those of the region.
     """
     variance, along, turned = 0.0, 0.0, 0.0
     for axis in range(3):
-        variance += square(n[axis]) * (motion.position_variance[axis] + square(deviation))
+        variance += square(n[axis]) * (motion.position_variance[axis] + square(deviations[axis]))
         along += square(n[axis])
         turned += square(n[3 + axis])
     spread: float = SPREADS * np.sqrt(variance) + np.sqrt(along) * motion.position_spread

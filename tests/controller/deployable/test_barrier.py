@@ -60,7 +60,7 @@ def moving(rng, velocity, position_spread=0.1):
 
 def spread(n, motion, deviation=0.0):
     """Three deviations of a clearance, by the covariances of vehicle and region."""
-    return 3.0 * np.sqrt(n[:3] @ np.diag(motion.position_variance + deviation**2) @ n[:3])
+    return 3.0 * np.sqrt(n[:3] @ np.diag(motion.position_variance + np.square(deviation)) @ n[:3])
 
 
 def written(regions, motion, quaternion, weights, limits=(-30.0, 25.0), time=1.5):
@@ -84,7 +84,7 @@ def test_rows_are_those_of_the_equations():
                     Sphere(tuple(rng.normal(size=3) * 2.0), 0.6),
                     "out",
                     tuple(rng.normal(size=3) * 0.3),
-                    deviation=0.05 * i,
+                    deviation=(0.05 * i, 0.02, 0.0) if i < 2 else 0.1,
                 )
                 for i in range(3)
             ),

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import length3, square
-from controller.laws.deployable.gains import SPREADS
 from controller.laws.deployable.linear_algebra import copy
-from controller.laws.deployable.path_planning.search import PathLimits
+from controller.laws.deployable.path_planning.search import PathLimits, uncertainty
 from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_of_place, clearance_of_sphere
@@ -145,7 +144,7 @@ def _evaluate_place(
             clearance = clearance_of_place(regions, i, point, room)
         beyond = clearance - _STRIDE[1]
         if regions.hard[i]:
-            clearance -= SPREADS * regions.deviations[i]
+            clearance -= uncertainty(regions, i)
             beyond = clearance - far
             free = min(free, clearance)
         else:

@@ -84,6 +84,12 @@ def _empty_tree() -> Tree:
     return Tree(np.zeros((_NODES, 3)), np.zeros(_NODES, dtype=np.int64), size, root)
 
 
+def uncertainty(regions: PackedRegions, i: int) -> float:
+    """Return how far [m] the place of region `i` may be off, in the direction in which that is farthest."""
+    deviations = regions.deviations
+    return float(SPREADS * max(deviations[i, 0], deviations[i, 1], deviations[i, 2]))
+
+
 def clearance_of_all(point: Array, regions: PackedRegions, room: Array) -> float:
     """Return the least clearance [m] of the hard regions of position at a point; `room` has shape (3,)."""
     least = np.inf
@@ -93,7 +99,7 @@ def clearance_of_all(point: Array, regions: PackedRegions, room: Array) -> float
                 clearance = clearance_of_sphere(regions, i, point)
             else:
                 clearance = clearance_of_place(regions, i, point, room)
-            least = min(least, clearance - SPREADS * regions.deviations[i])
+            least = min(least, clearance - uncertainty(regions, i))
     return least
 
 
