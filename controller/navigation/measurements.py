@@ -55,7 +55,7 @@ class SensorModel(NamedTuple):
     heading: float = 0.0035  # rad
     position: float = 0.15  # m
     depth_bias: float = 0.02  # m
-    velocity_scale: float = 0.005  # part of the velocity
+    velocity_scale: float = 0.005  # dimensionless, of the velocity
     acceleration_bias: float = 0.02  # m/s2
     angular_velocity_bias: float = 0.0017  # rad/s
     heading_bias: float = 0.0175  # rad

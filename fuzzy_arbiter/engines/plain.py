@@ -16,7 +16,7 @@ def beyond_plain(system: System, curved_inputs: bool = False) -> str:
     Parameters
     ----------
     system : System
-        Any.
+        What an engine or a check is asked to take.
     curved_inputs : bool
         Whether terms of inputs may be any membership functions.
 

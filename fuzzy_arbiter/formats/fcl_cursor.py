@@ -89,7 +89,7 @@ class Cursor:
         return found
 
     def range(self) -> tuple[float, float]:
-        """Take a range, after its word."""
+        """Take the two limits behind the word of a range, in the units of the variable."""
         self.accept(":=")  # which some texts of the standard leave out
         self.take("(")
         low = self.number("the least value")

@@ -55,6 +55,8 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
         If there is no such output.
     InputError
         If an input is missing, unknown, not a number, or outside its universe.
+    UnsupportedError
+        If the output's terms are values instead of areas.
 
     Examples
     --------

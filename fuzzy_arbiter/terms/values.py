@@ -26,6 +26,13 @@ class Value(ABC):
     def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
         """Return it as arithmetic on the names of the inputs, and of the outputs that come before its own.
 
+        Parameters
+        ----------
+        inputs : sequence of str
+            Names of the system's inputs.
+        outputs : sequence of str
+            Names of the outputs before its own.
+
         Raises
         ------
         DefinitionError
@@ -73,7 +80,15 @@ class Constant(Value):
         object.__setattr__(self, "value", value)
 
     def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
-        """Return the number."""
+        """Return the number.
+
+        Parameters
+        ----------
+        inputs : sequence of str
+            Names of the system's inputs.
+        outputs : sequence of str
+            Names of the outputs before its own.
+        """
         return Expression("", self.value)
 
 
@@ -112,7 +127,20 @@ class Linear(Value):
         object.__setattr__(self, "constant", numbers[-1])
 
     def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
-        """Return the sum, if there are as many inputs as coefficients."""
+        """Return the sum.
+
+        Parameters
+        ----------
+        inputs : sequence of str
+            Names of the system's inputs.
+        outputs : sequence of str
+            Names of the outputs before its own.
+
+        Raises
+        ------
+        DefinitionError
+            If there are not as many inputs as coefficients.
+        """
         if len(inputs) != len(self.coefficients):
             raise DefinitionError(
                 f"linear of {len(self.coefficients)} coefficients, expected one for each input: {', '.join(inputs)}"
@@ -192,7 +220,20 @@ class Formula(Value, Membership):
         return self._whole.names
 
     def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
-        """Return it, if it speaks of these names alone."""
+        """Return it.
+
+        Parameters
+        ----------
+        inputs : sequence of str
+            Names of the system's inputs.
+        outputs : sequence of str
+            Names of the outputs before its own.
+
+        Raises
+        ------
+        DefinitionError
+            If it speaks of other names than these.
+        """
         whole, known = self._whole, (*inputs, *outputs)
         unknown = sorted(whole.names - set(known))
         if unknown:
@@ -212,7 +253,13 @@ class Formula(Value, Membership):
         return np.clip(np.broadcast_to(np.asarray(values, dtype=np.float64), np.shape(places)), 0.0, 1.0)
 
     def breaks(self, universe: tuple[float, float]) -> tuple[float, ...]:
-        """Return none: where it bends is not known."""
+        """Return none: where it bends is not known.
+
+        Parameters
+        ----------
+        universe : tuple of float
+            Lower and upper limit.
+        """
         return ()
 
     def within(self, universe: tuple[float, float]) -> Formula:

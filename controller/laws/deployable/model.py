@@ -199,10 +199,18 @@ def to_acceleration(
 
     Parameters
     ----------
-    dynamics, R, velocity, omega_body, loads
-        As for `free_wrench`.
+    dynamics : Dynamics
+        Of the vehicle.
+    R : ndarray, shape (3, 3)
+        From body to world.
+    velocity : ndarray, shape (3,)
+        Over ground [m/s], world frame.
+    omega_body : ndarray, shape (3,)
+        [rad/s].
+    loads : Loads
+        What acts on it.
     wrench : ndarray, shape (6,)
-        Of all that acts, that of `free_wrench` included, body axes.
+        Of all that acts, that of `free_wrench` included, body axes [N, N m].
     out : ndarray, shape (6,)
         Receives the linear acceleration over ground, NED [m/s2], and the angular one in body axes [rad/s2].
     """
