@@ -3,7 +3,8 @@
 What is measured late is compared with the estimate of its time, and corrects through how the errors have grown since:
 an error of the position then is that of now less what the velocity's error has added, and so on. Samples farther off
 than `_GATE` standard deviations are rejected. After `_REJECTED_IN_A_ROW` of them the estimate is taken to be wrong,
-perhaps by an outlier that came when it was uncertain: its covariance is then that of the start.
+perhaps by an outlier that came when it was uncertain: its covariance is then that of the start. Where that does not
+help either, the filter starts anew.
 """
 
 from __future__ import annotations
@@ -46,6 +47,7 @@ _GATE = 4.0  # standard deviations
 _UNKNOWN = 10.0  # standard deviations of a sample, beyond which it is nearer to the velocity than the estimate
 _REJECTED_IN_A_ROW = 3  # samples: of outliers one in fifty, as many in a row are rare
 CONFIRMED = 3.0  # samples accepted, from which on one that contradicts them is an outlier
+_RESETS = 4.0  # of the covariance without a confirmed sample in between, after which the filter starts anew
 _STEEP = 0.1  # cosine of the pitch, squared, below which a compass is not used
 _HALF_TURN, _TURN = 3.141592653589793, 6.283185307179586  # rad
 _LEAST_SCALE = 1e-3  # of a sensor without noise, in its unit, so that the covariance stays positive
@@ -84,9 +86,15 @@ def correct_by_sensor(memory: NavigationMemory, measurements: Measurements, sens
         believed = memory.accepted[sensor] >= CONFIRMED  # else one of the few before may be the outlier as well
         if believed and memory.rejected[sensor] < _REJECTED_IN_A_ROW:
             return
+        memory.resets[sensor] += 1.0
+        if memory.resets[sensor] > _RESETS:  # no covariance of a start holds such errors
+            restart(memory)
+            return
         _reset_covariance(memory, sensor, innovation, sensors)
     memory.rejected[sensor] = 0.0
     memory.accepted[sensor] += 1.0
+    if memory.accepted[sensor] >= CONFIRMED:
+        memory.resets[sensor] = 0.0
     error = zeros(18)
     for i in range(count):
         for k in range(N_ERRORS):
@@ -183,6 +191,12 @@ def _is_outlier(P: Array, rows: Array, innovation: Array, noise: float, count: i
         if not abs(innovation[n]) <= _GATE * np.sqrt(variance):
             return True
     return False
+
+
+def restart(memory: NavigationMemory) -> None:
+    """Give up the estimate, so that the filter starts anew with the next fixes."""
+    memory.started[0] = 0.0
+    memory.previous_fix[:] = np.nan
 
 
 def _reset_covariance(memory: NavigationMemory, sensor: int, innovation: Array, sensors: SensorModel) -> None:

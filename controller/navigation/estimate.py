@@ -40,6 +40,7 @@ class NavigationMemory(NamedTuple):
     sample_times: Array  # (5,) s, of the last samples used
     previous_fix: Array  # (3,) m, NED, the last fix before the start; NaN: none yet
     rejected: Array  # (5,) samples rejected in a row
+    resets: Array  # (5,) of the covariance, by a sensor that has not been confirmed since
     accepted: Array  # (5,) samples accepted since the start, or since the sensor was believed against the estimate
     innovations: Array  # (5, 3) of each sensor: sum of normalized squared innovations, their degrees, samples rejected
     started: Array  # (1,) 1 once there is an estimate
@@ -66,6 +67,7 @@ def empty_memory() -> NavigationMemory:
         sample_times=np.full(N_SENSORS, -1e11),
         previous_fix=np.full(3, np.nan),
         rejected=np.zeros(N_SENSORS),
+        resets=np.zeros(N_SENSORS),
         accepted=np.zeros(N_SENSORS),
         innovations=np.zeros((N_SENSORS, 3)),
         started=np.zeros(1),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from controller.arithmetic import arctangent, cosine, hypotenuse, square
 from controller.compiling.function import CompiledFunction
 from controller.law import VehicleState
-from controller.navigation.corrections import CONFIRMED, correct_by_sensor
+from controller.navigation.corrections import CONFIRMED, correct_by_sensor, restart
 from controller.navigation.estimate import (
     ATTITUDE,
     GYRO_BIAS,
@@ -62,7 +62,8 @@ def navigate(
         _start(measurements, sensors, memory)
     else:
         for sensor in range(N_SENSORS):
-            if sensor != IMU and measurements.times[sensor] > memory.sample_times[sensor]:
+            new = measurements.times[sensor] > memory.sample_times[sensor] and memory.started[0] > 0.0
+            if sensor != IMU and new:
                 memory.sample_times[sensor] = measurements.times[sensor]
                 correct_by_sensor(memory, measurements, sensor, sensors)
     _write_state(memory, sensors, now[0], state)
@@ -79,8 +80,7 @@ def _take_imu_sample(measurements: Measurements, sensors: SensorModel, memory: N
         propagate(memory, force, omega, sensors, period)
     else:
         if memory.started[0] > 0.0:  # too long without a sample
-            memory.started[0] = 0.0
-            memory.previous_fix[:] = np.nan
+            restart(memory)
         for i in range(3):
             memory.omega[i] = omega[i]
     memory.time[0] = memory.sample_times[IMU] = time
@@ -120,7 +120,7 @@ def _start(measurements: Measurements, sensors: SensorModel, memory: NavigationM
         if abs(apart[i]) > _UNEXPLAINED * sensors.position:
             memory.covariance[POSITION + i, POSITION + i] += 0.25 * square(apart[i])
     for sensor in range(N_SENSORS):
-        memory.rejected[sensor] = memory.accepted[sensor] = 0.0
+        memory.rejected[sensor] = memory.accepted[sensor] = memory.resets[sensor] = 0.0
         memory.sample_times[sensor] = times[sensor]
     memory.accepted[USBL] = CONFIRMED
 

@@ -101,6 +101,35 @@ def test_a_first_fix_that_the_next_contradicts_is_not_believed():
     assert navigator.state.position[1] == pytest.approx(2.0, abs=1e-3)
 
 
+def test_a_start_is_between_two_fixes_and_as_uncertain_as_they_are_apart():
+    for apart, deviation in ((0.3, np.hypot(0.1, 0.15 / np.sqrt(2.0))), (1.2, np.hypot(0.6, 0.146))):
+        navigator = Navigator(MODEL, told())
+        for time, north in ((0.0, 1.0), (1.0, 1.0 + apart)):
+            level(navigator, time, position=(north, 2.0, 5.0))
+            navigator.step(time)
+        assert navigator.state.position == pytest.approx([1.0 + 0.5 * apart, 2.0, 5.0], abs=1e-9)
+        assert navigator.state.deviation[0] == pytest.approx(deviation, rel=0.01)
+
+
+def test_an_estimate_that_no_sample_agrees_with_is_given_up_and_found_anew():
+    """Its attitude is wrong by 40 degrees, more than the covariance of a start holds: the DVL contradicts for ever."""
+    navigator = Navigator(MODEL, told())
+    rest(navigator, 0.01)
+    rest(navigator, 1.2, first=0.01)
+    memory, lost = navigator.memory, []
+    memory.accepted[DVL] = memory.resets[DVL] = 0.0
+    turned = Rotation.from_quat(memory.quaternion[[1, 2, 3, 0]]) * Rotation.from_euler("y", 40.0, degrees=True)
+    memory.quaternion[:] = turned.as_quat()[[3, 0, 1, 2]]
+    for k in range(500):
+        level(navigator, 1.3 + 0.01 * k, sensors=[s for s in range(5) if s != USBL or k % 100 == 0])
+        navigator.step(1.3 + 0.01 * k)
+        lost.append(not navigator.started)
+    assert any(lost) and navigator.started
+    assert navigator.state.position == pytest.approx([1.0, 2.0, 5.0], abs=0.01)
+    _, pitch, roll = Rotation.from_quat(navigator.state.quaternion[[1, 2, 3, 0]]).as_euler("ZYX")
+    assert (pitch, roll) == pytest.approx((0.0, 0.0), abs=1e-3)
+
+
 def test_a_filter_is_consistent_on_a_motion_of_its_own():
     """Circles with a swell, by 30 sets of noise and constant errors; NEES and NIS within 99.9 % of a consistent one."""
     rng, h, runs = np.random.default_rng(11), 0.01, 30
