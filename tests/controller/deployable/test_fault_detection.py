@@ -223,6 +223,19 @@ def test_the_evidence_is_the_log_likelihood_ratio():
         assert ratio == pytest.approx(densities, rel=1e-9, abs=1e-12)
 
 
+def test_evidence_is_summed_since_the_supposed_failure():
+    estimate, thrusters, state = started()
+    estimate.evidence[:, 2], estimate.evidence[:, 10] = (3.0, 2.0), (1.5, 1.0)
+    for _ in range(2):
+        fault_detection._add_evidence(state, estimate, thrusters, 2, 2)
+        fault_detection._add_evidence(state, estimate, thrusters, 2, 10)
+    assert state.sums[:, [2, 10]].tolist() == [[6.0, 3.0], [4.0, 2.0]]
+    assert state.ratio[[2, 10]] == pytest.approx([2.0 * (0.6 * 3.0 - 0.5 * 0.36 * 2.0), 2.0 * (1.5 - 0.5)])
+    estimate.evidence[:, 2] = -30.0, 2.0
+    fault_detection._add_evidence(state, estimate, thrusters, 2, 2)
+    assert state.ratio[2] == 0.0 and not state.sums[:, 2].any()
+
+
 def test_an_innovation_beyond_three_standard_deviations_counts_as_three():
     for sigmas, counted in ((2.9, 2.9), (30.0, 3.0)):
         estimate, _, _ = started()

@@ -109,6 +109,8 @@ def test_a_start_is_between_two_fixes_and_as_uncertain_as_they_are_apart():
             navigator.step(time)
         assert navigator.state.position == pytest.approx([1.0 + 0.5 * apart, 2.0, 5.0], abs=1e-9)
         assert navigator.state.deviation[0] == pytest.approx(deviation, rel=0.01)
+        rates = np.hypot(MODEL.angular_velocity_bias, MODEL.angular_velocity)
+        assert navigator.state.deviation[9:] == pytest.approx(np.full(3, rates), rel=0.01)
 
 
 def test_an_estimate_that_no_sample_agrees_with_is_given_up_and_found_anew():

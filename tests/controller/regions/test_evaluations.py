@@ -6,6 +6,7 @@ import pytest
 from controller.quaternion import rotation_matrix
 from controller.regions import Region, Visibility, pack
 from controller.regions.kinds import SPHERE, evaluate_shape
+from controller.regions.numbers import ANGLE, LENGTH, PART, SIZE
 from controller.regions.region_set import (
     attitude_clearance,
     clearance_at,
@@ -70,3 +71,9 @@ def test_a_sphere_told_by_its_kind_is_the_sphere():
         assert g == pytest.approx((p - centre) @ (p - centre) - radius**2, rel=1e-12)
         assert gradient == pytest.approx(2.0 * (p - centre), rel=1e-12)
         assert distance == pytest.approx(np.linalg.norm(p - centre) - radius, rel=1e-12)
+
+
+def test_ranges_hold_something_and_places_lie_on_either_side():
+    for _, least, greatest in (LENGTH, SIZE, PART, ANGLE):
+        assert least < greatest
+    assert LENGTH[1:] == (-1e6, 1e6) and PART[1:] == (-1.0, 1.0) and SIZE[1] > 0.0
