@@ -1,4 +1,4 @@
-"""What the arbiter decides by, made of clearances and the state that is told: for the master and the fused loop."""
+"""What the arbiter decides by, made of clearances and the measured state: for the master and the fused loop."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def compute_inputs(
     goal, regions : PackedRegions
         The goal alone, and the n regions, where they are now.
     state : VehicleState
-        As it is told.
+        As measured.
     now : ndarray, shape (1,)
         Time [s].
     clearances : ndarray, shape (n,)

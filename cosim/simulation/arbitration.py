@@ -23,7 +23,7 @@ class Arbitration:
     arbiter : Arbiter
         Of these rules.
     state : VehicleState
-        As the arbiter is told it.
+        As measured, for the arbiter.
     now : ndarray, shape (1,)
         Time [s].
     clearances : ndarray, shape (n,)
