@@ -48,7 +48,7 @@ _C_NORMS = {
     "bounded_sum": "a + b < 1.0 ? a + b : 1.0",
     "drastic_sum": "a == 0.0 ? b : b == 0.0 ? a : 1.0",
     "einstein_sum": "(a + b) / (1.0 + a * b)",
-    "hamacher_sum": "a * b < 1.0 ? (a + b - 2.0 * a * b) / (1.0 - a * b) : 1.0",
+    "hamacher_sum": "a + b - 2.0 * a * b < 1.0 - a * b ? (a + b - 2.0 * a * b) / (1.0 - a * b) : 1.0",
     "nilpotent_maximum": "a + b >= 1.0 ? 1.0 : a > b ? a : b",
     "normalized_sum": "(a + b) / (a + b > 1.0 ? a + b : 1.0)",
 }

@@ -78,7 +78,7 @@ def einstein_sum(a: float, b: float) -> float:
 
 def hamacher_sum(a: float, b: float) -> float:
     """Return (a + b - 2 a b) / (1 - a b), and 1 for two ones."""
-    return (a + b - 2.0 * a * b) / (1.0 - a * b) if a * b < 1.0 else 1.0
+    return (a + b - 2.0 * a * b) / (1.0 - a * b) if a + b - 2.0 * a * b < 1.0 - a * b else 1.0
 
 
 def nilpotent_maximum(a: float, b: float) -> float:
@@ -156,7 +156,7 @@ S_NORMS: dict[str, Norm] = {
     ),
     "hamacher_sum": Norm(
         hamacher_sum,
-        lambda a, b: _quotient(a + b - 2.0 * a * b, 1.0 - a * b, a * b < 1.0, 1.0),
+        lambda a, b: _quotient(a + b - 2.0 * a * b, 1.0 - a * b, a + b - 2.0 * a * b < 1.0 - a * b, 1.0),
         "hamacher_sum({0}, {1})",
         *("HamacherSum", "HSUM", "hamacher_sum"),
     ),
