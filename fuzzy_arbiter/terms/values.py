@@ -80,15 +80,7 @@ class Constant(Value):
         object.__setattr__(self, "value", value)
 
     def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
-        """Return the number.
-
-        Parameters
-        ----------
-        inputs : sequence of str
-            Names of the system's inputs.
-        outputs : sequence of str
-            Names of the outputs before its own.
-        """
+        """Return the number, with arguments as `Value.expression`."""
         return Expression("", self.value)
 
 
@@ -127,14 +119,7 @@ class Linear(Value):
         object.__setattr__(self, "constant", numbers[-1])
 
     def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
-        """Return the sum.
-
-        Parameters
-        ----------
-        inputs : sequence of str
-            Names of the system's inputs.
-        outputs : sequence of str
-            Names of the outputs before its own.
+        """Return the sum, with arguments as `Value.expression`.
 
         Raises
         ------
@@ -220,14 +205,7 @@ class Formula(Value, Membership):
         return self._whole.names
 
     def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
-        """Return it.
-
-        Parameters
-        ----------
-        inputs : sequence of str
-            Names of the system's inputs.
-        outputs : sequence of str
-            Names of the outputs before its own.
+        """Return it, with arguments as `Value.expression`.
 
         Raises
         ------
