@@ -63,6 +63,7 @@ class Region:
     gain: float = 1.0  # alpha_i of section VII, in N per unit of g
     hard: bool = True
     deviation: float | Vector3 = 0.0  # m, standard deviation of its place: in any direction, or north, east and down
+    crossing_cost: float = 2.0  # m of path, that a metre through it costs beside its length, where it is soft
 
     @property
     def deviations(self) -> Vector3:
@@ -78,6 +79,8 @@ class Region:
             all(0.0 <= deviation < math.inf for deviation in self.deviations), f"region {self.name!r}", "deviation",
             self.deviation, "0 m or above, one number or three",
         )  # fmt: skip
+        cost = self.crossing_cost
+        require(0.0 <= cost < math.inf, f"region {self.name!r}", "crossing_cost", cost, "a finite number, 0 or above")
         at_rest = not isinstance(self.shape, Orientation) or not any(self.velocity)
         require(at_rest, f"region {self.name!r}", "velocity", self.velocity, "none: an orientation is at no place")
 
@@ -160,6 +163,7 @@ class PackedRegions(NamedTuple):
     gains: Array  # (n,) alpha_i
     hard: NDArray[np.bool_]  # (n,)
     deviations: Array  # (n, 3) m, standard deviations of each place, NED
+    crossing_costs: Array  # (n,) m of path, that a metre through each costs beside its length, where it is soft
 
     def evaluate(
         self,
@@ -238,6 +242,7 @@ def pack(regions: Sequence[Region]) -> PackedRegions:
         gains=np.array([region.gain for region in regions], dtype=float),
         hard=np.array([region.hard for region in regions], dtype=np.bool_),
         deviations=np.array([region.deviations for region in regions], dtype=float).reshape(-1, 3),
+        crossing_costs=np.array([region.crossing_cost for region in regions], dtype=float),
     )
 
 

@@ -24,6 +24,7 @@ class FlightConfig(NamedTuple):
     goal: PackedRegions
     regions: PackedRegions
     criteria: NDArray[np.int64]  # (n,) of each region
+    priorities: Array  # (n,) of each region, for the score alone
     inputs: PackedInputs  # what the arbiter decides by
     step: float  # s, of the plant
     steps: int  # of the plant
@@ -147,12 +148,13 @@ class FlightMetrics(NamedTuple):
     worst_step: float  # s of the wall clock, the longest that law and allocation took
     failed_step: float  # that the FMU refused
     bound_excess: float  # m, by which a clearance was below the law's bound, greatest; -inf: no bound
+    weighted_violation: float  # m s, rad s: integral of how deep each region is violated, times its priority, summed
 
 
 class FlightOutputs(NamedTuple):
     """What a flight fills."""
 
-    metrics: Array  # (14,) in the order of `FlightMetrics`
+    metrics: Array  # (15,) in the order of `FlightMetrics`
     estimate: Array  # (4,) that the last decision rests on
     trace: Array  # (control steps, 17 + c + i + r), or (0, 0) if none is kept; a row: time, true position, quaternion
     # and velocity, position as measured, the weights of the c criteria, the i inputs, the law's r reports

@@ -82,7 +82,7 @@ def fly(  # noqa: C901 - one loop, as a whole
     position, quaternion = native.outputs[:3], native.outputs[3:7]
     first_inside, last_entered, inside = -1, -1, False
     least, least_angle, most = np.inf, np.inf, -np.inf
-    effort, thrust_effort, variation = 0.0, 0.0, 0.0
+    effort, thrust_effort, variation, violation = 0.0, 0.0, 0.0, 0.0
     max_force, max_speed, worst, refused = 0.0, 0.0, 0.0, -1
     failures, known_failures, outages = 0, 0, 0
     bound, excess = np.nan, -np.inf
@@ -125,6 +125,8 @@ def fly(  # noqa: C901 - one loop, as a whole
                         excess = max(excess, bound - clearances[i])
                 else:
                     least_angle = _least(clearances[i], least_angle)
+            if k < setup.steps and not clearances[i] >= 0.0:
+                violation -= setup.priorities[i] * clearances[i] * setup.step
         most = max(most, goal_clearance[0])
         if goal_clearance[0] >= 0.0 and not inside:
             last_entered = k
@@ -197,7 +199,7 @@ def fly(  # noqa: C901 - one loop, as a whole
     metrics[3], metrics[4], metrics[5] = least, least_angle, most
     metrics[6], metrics[7], metrics[8] = effort, thrust_effort, variation
     metrics[9], metrics[10], metrics[11], metrics[12] = max_force, max_speed, worst, refused
-    metrics[13] = excess
+    metrics[13], metrics[14] = excess, violation
 
 
 def _measure(setup: FlightConfig, k: int, now: float, true_state: Array, state: VehicleState) -> None:

@@ -210,6 +210,7 @@ def require_lanes(scenario: Scenario) -> None:
         ("law.name", s.law.name, "ismail_dunnigan"),
         ("arbiter.engine", s.arbiter.engine, "closed"),
         ("arbiter.file", s.arbiter.file, ""),
+        ("arbiter.rules", s.arbiter.rules, "ordered"),
         ("criteria", _said(s), _PAPER),
         ("master.order", s.master.order, "gauss-seidel"),
         ("commands.enabled", s.commands.enabled, False),

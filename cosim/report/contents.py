@@ -284,6 +284,8 @@ def _weighed(scenario: Scenario) -> str:
     if scenario.arbiter.file:
         inputs = ", ".join(f"{signal.name} ({signal.what})" for signal in scenario.rules.inputs)
         return f"the rules of {scenario.arbiter.file}, of {inputs}"
+    if scenario.arbiter.rules != "ordered":
+        return f"{', '.join(scenario.criterion_names)}: {scenario.arbiter.rules}"
     ramp = f"memberships fall to 0 over {scenario.arbiter.ramp:g} m (rad for attitude)"
     return ramp if scenario.has_paper_criteria else f"{', '.join(scenario.criterion_names)}, in this order"
 

@@ -79,6 +79,7 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
         "settle_time": visits[-1].start if visits else None,
         "final_position": [last[name] for name in _PLACE],
         "closest_to_goal": -course.greatest["goal.clearance"],
+        "weighted_violation": course.violation.total() * period,
         "intersection": [names[i] for i in scenario.intersection],
         "intersection_windows": [(span.start, span.end) for span in course.windows],
         "min_clearance": least,
@@ -122,7 +123,8 @@ class _Course:
         # extremes are of the numbers that there are: fmin and fmax pass over what is none
         self.least: dict[str, float] = {}
         self.greatest: dict[str, float] = {}
-        self.force, self.saturated = _Sum(), 0
+        self.force, self.violation, self.saturated = _Sum(), _Sum(), 0
+        self._priorities = np.array([secondary.priority for secondary in scenario.regions])
         self.inside, self._overlap = Spans(), Spans()
         self._visits: list[Span] = []  # the first and the last that ended
         self._windows: list[Span] = []
@@ -150,6 +152,8 @@ class _Course:
         self._acting -= len(time)
         force = np.linalg.norm(block.stack(_FORCE), axis=1)[acted]
         self.force.add(force)
+        if self._clearances:
+            self.violation.add((np.maximum(-block.stack(self._clearances), 0.0) * self._priorities).sum(axis=1)[acted])
         self.saturated += int(np.count_nonzero(np.logical_or.reduce([block[n][acted] > 0.0 for n in self._flags])))
         weights = block.stack(self._weights)
         self._stretch(self.greatest, np.fmax, {

@@ -11,7 +11,8 @@ from typing import Any, Literal
 
 from controller.regions.region_set import of_attitude
 from cosim.errors import ScenarioError
-from cosim.scenario.criteria import PAPER, CriterionSetup, ordered_rules
+from cosim.scenario.criteria import PAPER, CriterionSetup
+from cosim.scenario.rule_variants import rules_by_order
 from cosim.scenario.tables import ArbiterSetup, SecondaryRegion
 from fuzzy_arbiter import Arbiter, ArbiterError, System
 from fuzzy_arbiter.formats import FORMATS, reads
@@ -107,8 +108,15 @@ def check_rules(
         if setup.inputs:
             first = next(iter(setup.inputs))
             raise ScenarioError(f"arbiter.inputs.{first} is given, expected none without arbiter.file")
-        inputs = (InputSignal(c.name, "membership", i) for i, c in enumerate(criteria))
-        return ArbiterRules(ordered_rules(criteria, setup.points), tuple(inputs))
+        system = rules_by_order(setup.rules, criteria, setup.points)
+        places = {criterion.name: i for i, criterion in enumerate(criteria)}
+        if setup.rules == "none":
+            inputs = (InputSignal(v.name, "given", course=((0.0, 1.0),), what="given") for v in system.inputs)
+        else:
+            inputs = (InputSignal(v.name, "membership", places[v.name]) for v in system.inputs)
+        return ArbiterRules(system, tuple(inputs))
+    if setup.rules != "ordered":
+        raise ScenarioError(f"arbiter.rules is {setup.rules!r}, expected none beside arbiter.file, which has its own")
     system = _system(setup.file, setup.text, tuple(criterion.name for criterion in criteria), setup.points)
     try:
         engine = Arbiter(system=system, engine=setup.engine).engine

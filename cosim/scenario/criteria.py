@@ -13,7 +13,7 @@ from typing import Any, Literal
 from controller.regions.region_set import of_attitude
 from cosim.errors import ScenarioError
 from cosim.scenario.tables import PAPER_CRITERIA, CriterionEntry, SecondaryRegion
-from fuzzy_arbiter import SECTION_VI, ArbiterError, Criterion, Shape, System, prioritised
+from fuzzy_arbiter import SECTION_VI, ArbiterError, Criterion, Shape
 from fuzzy_arbiter.formats import reads
 from fuzzy_arbiter.propositions import is_identifier
 from plant_fmu.toml_tables import hint
@@ -158,12 +158,6 @@ def check_criteria_of_regions(regions: Sequence[SecondaryRegion], criteria: Sequ
                 f"criteria.{name}.membership has no {wanted}, expected one, or ramp or approach_time, "
                 f"for region {region.region.name!r}, whose clearance is in {unit}"
             )
-
-
-@functools.lru_cache(maxsize=16)
-def ordered_rules(criteria: tuple[CriterionSetup, ...], points: int) -> System:
-    """Return the system that weighs criteria by their order, as section VI weighs its three, with `points` samples."""
-    return prioritised([criterion.fuzzy for criterion in criteria], points=points)
 
 
 PAPER = check_criteria(PAPER_CRITERIA)[1]

@@ -64,6 +64,10 @@ KEYS = {
     "arbiter.engine": Key("", "`closed`, `exact`, `grid` or `skfuzzy`", "; see [arbiter.md](arbiter.md#engines)"),
     "arbiter.ramp": Key("m", "width over which a membership falls outside its region; rad for regions of attitude"),
     "arbiter.points": Key("", "of the output universe, for `grid` and `skfuzzy`"),
+    "arbiter.rules": Key(
+        "", "`ordered`: by the criteria's order; `reversed`, `crisp`, `none`: to compare with",
+        ", see [criteria.md](criteria.md#to-compare-with); not beside a file",
+    ),
     "arbiter.file": Key(
         "", "rules of one's own, beside the file that names it",
         ": any format of [fuzzy_arbiter](arbiter.md#formats), see [criteria.md](criteria.md#rules-of-ones-own)",
@@ -134,6 +138,9 @@ KEYS = {
     "regions[].streamed": Key("", "moved from outside while the run goes on", ", below"),
     "regions[].deviation": Key(
         "m", "standard deviation of its place, or three: north, east, down", ": margins of the deployable law grow"
+    ),
+    "regions[].priority": Key(
+        "", "by which its violation counts in the score", ": `weighted_violation`; neither arbiter nor law is given it"
     ),
     "regions[].hard": Key(
         "", "must not be violated", "; the paper's law, and a law of plain potentials, do not ask"

@@ -21,6 +21,7 @@ from cosim.errors import ScenarioError
 from cosim.scenario.arbiter_rules import ArbiterRules, check_rules, read_rules
 from cosim.scenario.changes import changed_keys, differing_keys, joined, shown_title
 from cosim.scenario.criteria import PAPER, CriterionSetup, check_criteria, check_criteria_of_regions
+from cosim.scenario.crossing_costs import with_crossing_costs
 from cosim.scenario.keys import comments
 from cosim.scenario.tables import (
     PAPER_CRITERIA,
@@ -186,7 +187,7 @@ class Scenario:
     @property
     def has_paper_criteria(self) -> bool:
         """Whether the criteria are the paper's three, weighed by its rules, with one ramp for all."""
-        return not self.arbiter.file and self.criteria == PAPER
+        return not self.arbiter.file and self.arbiter.rules == "ordered" and self.criteria == PAPER
 
     @property
     def goal_region(self) -> Region:
@@ -309,6 +310,7 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
     vehicle_file = Path(file.vehicle) if file.vehicle.endswith(".toml") else None
     vehicle = vehicle or load_vehicle(vehicle_file or file.vehicle)
     check_parameters(file.plant.parameters, vehicle)
+    regions = with_crossing_costs(regions, tuple(c.name for c in criteria), rules, file.initial.position[2])
     law = check_law(file.law, file.actuation.through, vehicle, time.control, len(regions) + len(seen))
     check_failures(file.failures, file.actuation.through, vehicle)
     check_outages(file.outages, file.sensing.through)

@@ -44,6 +44,7 @@ class ArbiterSetup:
     engine: Literal["closed", "exact", "grid", "skfuzzy"] = "closed"
     ramp: float = 0.2  # m (rad for regions of attitude), width over which a membership falls from 1 to 0 outside
     points: int = 101  # of the output universe, for grid and skfuzzy
+    rules: Literal["ordered", "reversed", "crisp", "none"] = "ordered"  # by which criteria are weighed, without a file
     file: str = ""  # of a system that fuzzy_arbiter reads; else the criteria are weighed by their order
     text: str = ""  # what stands in it
     inputs: dict[str, Any] = field(default_factory=dict)  # of that system: the signal, number or course that each gets
@@ -193,6 +194,7 @@ class RegionEntry:
     streamed: bool = False  # moved from outside while the run goes on
     hard: bool = True  # must not be violated, for laws that tell hard regions from soft ones
     deviation: float | tuple[float, float, float] = 0.0  # m, of its place, standard: in any direction, or each of NED
+    priority: float = 1.0  # by which its violation counts in the score; no law is given it
 
 
 @dataclass(frozen=True)
@@ -267,6 +269,7 @@ class SecondaryRegion:
     criterion: str  # the name of one of the scenario's
     streamed: bool = False  # moved from outside while the run goes on
     is_dynamic: bool = False  # stands for an obstacle that may come in while the run goes on
+    priority: float = 1.0  # by which its violation counts in the score
 
     @property
     def moves(self) -> bool:

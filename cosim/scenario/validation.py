@@ -202,7 +202,8 @@ def check_regions(entries: tuple[RegionEntry, ...]) -> tuple[SecondaryRegion, ..
         _require(all(map(math.isfinite, entry.velocity)), f"{key}.velocity", entry.velocity, "finite numbers")
         shape = _shape(entry.shape, f"{key}.shape")
         region = Region(entry.name, shape, entry.keep, entry.velocity, entry.gain, entry.hard, entry.deviation)
-        regions.append(SecondaryRegion(region, entry.criterion, entry.streamed))
+        _require(0.0 <= entry.priority < math.inf, f"{key}.priority", entry.priority, "a finite number, 0 or above")
+        regions.append(SecondaryRegion(region, entry.criterion, entry.streamed, priority=entry.priority))
     return tuple(regions)
 
 

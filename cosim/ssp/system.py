@@ -143,6 +143,7 @@ def _require(scenario: Scenario) -> None:
             repr(scenario.arbiter.engine),
             "'closed' or 'exact', such as by --set arbiter.engine=closed",
         ),
+        (scenario.arbiter.rules == "ordered", "arbiter.rules", repr(scenario.arbiter.rules), "'ordered'"),
         (not scenario.arbiter.file, "arbiter.file", repr(scenario.arbiter.file), "none: rules get memberships alone"),
         (own is None, f"criteria.{own}.membership", "given", "none: there is one ramp for all"),
         (scenario.sensing.exact, "sensing", "not exact", "neither noise nor gaps"),

@@ -101,8 +101,9 @@ def observe_regions(
             s.later_shifts[i, axis] = r.shifts[i, axis] + _AHEAD * r.velocities[i, axis]
     integrate_attitude(quaternion, velocity[3:], _AHEAD, attitude)
     moved = PackedRegions(
-        r.kinds, r.signs, r.offsets, r.numbers, s.later_shifts, r.velocities, r.gains, r.hard, r.deviations
-    )
+        r.kinds, r.signs, r.offsets, r.numbers, s.later_shifts, r.velocities, r.gains, r.hard, r.deviations,
+        r.crossing_costs,
+    )  # fmt: skip
     evaluate_packed(
         moved, place, attitude, s.later_values, s.later_gradients, s.later_rotation_gradients, s.later_clearances
     )

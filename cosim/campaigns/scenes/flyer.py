@@ -202,6 +202,7 @@ class SceneFlyer:
             goal=known.goal,
             regions=known.regions,
             criteria=known.criteria,
+            priorities=np.ones(known.criteria.size),
             inputs=known.inputs,
             step=c.plant_step,
             steps=c.controls * c.plant_steps,

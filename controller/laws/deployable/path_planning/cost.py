@@ -31,8 +31,7 @@ _TRUST = 0.7  # of the clearance beyond the desired one, travelled before the ne
 _INSIDE = 200.0  # m of path, cost of a metre within a hard region, by
 _EDGE = 0.1  # m, or more; in proportion where by less, so that the cost does not depend on where the strides end
 _NEAR = 3.0  # m of path, cost of a metre on the surface
-_SOFT = 2.0  # m of path, cost of a metre through a soft region that is violated by
-_SHALLOW = 0.2  # m, or more; in proportion where by less
+_SHALLOW = 0.2  # m of violation, from which on a soft region costs in full; in proportion where by less
 _COARSE = 0.25  # m, least distance between two evaluations near the surface of a soft region
 _SPHERE = Sphere.kind
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on do not depend on position alone
@@ -112,7 +111,7 @@ def add_cost(cost: PathCost, path: Array, count: int, regions: PackedRegions, li
             if free < limits.margin:
                 deep = limits.margin - free
                 penalty += _INSIDE * (min(deep / _EDGE, 1.0) + deep)
-        _add_stride(cost, min(stride, length - s + 1e-9), _SOFT * soft, penalty)
+        _add_stride(cost, min(stride, length - s + 1e-9), soft, penalty)
     return False
 
 
@@ -126,7 +125,7 @@ def _add_stride(cost: PathCost, stride: float, soft: float, penalty: float) -> N
 def _evaluate_place(
     cost: PathCost, place: Array, regions: PackedRegions, limits: PathLimits
 ) -> tuple[float, float, float]:
-    """Return the least clearance of hard regions [m], how many soft ones are violated, and the longest stride [m]."""
+    """Return the least clearance of hard regions [m], what soft ones cost a metre, and the longest stride [m]."""
     travelled = cost.travelled[0] + cost.travelled[1]
     later = travelled / limits.speed  # s
     far = limits.clearance + _STRIDE[1] / _TRUST  # m, of clearance, beyond which it does not matter
@@ -148,7 +147,7 @@ def _evaluate_place(
             beyond = clearance - far
             free = min(free, clearance)
         else:
-            soft += min(max(-clearance / _SHALLOW, 0.0), 1.0)
+            soft += regions.crossing_costs[i] * min(max(-clearance / _SHALLOW, 0.0), 1.0)
             reach = min(reach, max(abs(clearance), _COARSE))
         if beyond >= 0.0:
             cost.clear_until[i] = travelled + beyond / (1.0 + own / limits.speed)

@@ -1,0 +1,216 @@
+"""Scenes in which regions conflict, so that some must be violated: which ones, the arbiter decides.
+
+Each scene is a scenario: four criteria in an order of its own, soft and hard regions that exclude each other, a net
+weight of up to 50 N (of a heavy vehicle more), a current of up to 0.4 m/s, noise, and one of three vehicles. The score
+is the priority-weighted violation: a region counts by the place of its criterion in that order, four times as much as
+one of the next criterion. The generator does not know how any law fares in its scenes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from plant_fmu.vehicle import Vehicle, load_vehicle
+
+Generator = np.random.Generator
+Table = dict[str, Any]
+
+_LAGS = {"odin": 0.0, "bluerov2_heavy": 0.15, "rexrov": None}  # s, of the thrusters; None: as the vehicle's file has it
+_PRIORITY = 4.0  # of a criterion beside the next one
+_NET_WEIGHT = 50.0  # N, greatest, of a vehicle of up to 50 kg or that much of
+_MOST_OF_WEIGHT = 0.025  # its weight
+_CURRENT = 0.4  # m/s, greatest
+_CRITERIA = ("obstacle", "shape", "depth", "visibility")
+
+
+def make_conflict(seed: int) -> Table:
+    """Make the conflict of a seed.
+
+    Parameters
+    ----------
+    seed : int
+        0 or above.
+
+    Returns
+    -------
+    dict
+        Its seed, its kind, which names the vehicle as well, and the table of the scenario, without a law.
+    """
+    rng = np.random.default_rng([20261124, seed])
+    vehicle = load_vehicle(list(_LAGS)[int(rng.integers(len(_LAGS)))])
+    kind = list(_KINDS)[int(rng.integers(len(_KINDS)))]
+    order = rng.permutation(len(_CRITERIA)).tolist()  # place of each criterion
+    goal, regions = _KINDS[kind](rng)
+    heading, speed = rng.uniform(-np.pi, np.pi), rng.uniform(0.0, _CURRENT)
+    criteria: list[Table] = [{"name": name, "order": 1 + place} for name, place in zip(_CRITERIA, order, strict=True)]
+    criteria[-1]["membership"] = {"clearance": {"falling": [-0.2, 0.1]}}
+    for region in regions:
+        place = order[_CRITERIA.index(region["criterion"])]
+        region |= {"gain": 100.0 * _scale(vehicle), "priority": _PRIORITY ** (len(_CRITERIA) - 1 - place)}
+    table = {
+        "title": f"Conflict {seed}: {kind}, {vehicle.name}",
+        "vehicle": vehicle.name,
+        "time": {"duration": 60.0, "step": 0.01, "control": 0.02, "arbiter": 0.02},
+        "plant": {
+            "current": [float(speed * np.cos(heading)), float(speed * np.sin(heading)), 0.0],
+            "substep": 0.01,
+            "parameters": _parameters(rng, vehicle),
+        },
+        "initial": {"position": [0.0, 0.0, float(rng.uniform(3.6, 4.4))]},
+        "goal": goal,
+        "criteria": criteria,
+        "actuation": {"through": "thrusters"},
+        "sensing": {"position_noise": 0.02, "velocity_noise": 0.01, "seed": seed},
+        "regions": regions,
+    }
+    return {"seed": seed, "kind": f"{kind}, {vehicle.name}", "scenario": table}
+
+
+def _scale(vehicle: Vehicle) -> float:
+    """Return by how much forces are greater than those of a vehicle of up to 50 kg."""
+    return max(1.0, vehicle.mass / 50.0)
+
+
+def _parameters(rng: Generator, vehicle: Vehicle) -> dict[str, float]:
+    most = max(_NET_WEIGHT, _MOST_OF_WEIGHT * vehicle.weight)
+    parameters = {"buoyancy": float(vehicle.weight - rng.uniform(-most, most))}
+    lag = _LAGS[vehicle.name]
+    if lag is not None:
+        parameters |= {f"thrust_time_constant[{i + 1}]": lag for i in range(vehicle.n_thrusters)}
+    return parameters
+
+
+def _region(name: str, criterion: str, keep: str, hard: bool, shape: Table, velocity: Any = (0.0, 0.0, 0.0)) -> Table:
+    return {
+        "name": name,
+        "criterion": criterion,
+        "keep": keep,
+        "hard": hard,
+        "velocity": [float(v) for v in velocity],
+        "shape": shape,
+    }
+
+
+def _sphere(x: float, y: float, z: float, radius: float) -> Table:
+    return {"type": "sphere", "centre": [float(x), float(y), float(z)], "radius": float(radius)}
+
+
+def _box(x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]) -> Table:
+    spans = np.array([x, y, z], dtype=float)
+    return {"type": "box", "centre": spans.mean(axis=1).tolist(), "size": np.ptp(spans, axis=1).tolist()}
+
+
+def _beyond(axis: int, at: float, sign: float = 1.0) -> Table:
+    """Return the half-space of all that is less than `at` [m] along an axis, or more, where the sign is negative."""
+    point, normal = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+    point[axis], normal[axis] = float(at), float(sign)
+    return {"type": "half_space", "point": point, "normal": normal}
+
+
+def _two(rng: Generator) -> tuple[str, str]:
+    """Return two criteria, at random."""
+    first, second = rng.choice(3, 2, replace=False).tolist()
+    return _CRITERIA[first], _CRITERIA[second]
+
+
+def _closing(rng: Generator, axis: int, middle: float) -> tuple[Table, list[Table]]:
+    """Two hard faces approach each other along an axis, until they are past each other."""
+    one, other = _two(rng)
+    apart, overlap, duration = rng.uniform(3.0, 4.0), rng.uniform(0.2, 0.8), rng.uniform(35.0, 50.0)
+    fast = (apart + overlap) / duration  # m/s, of both together
+    share = rng.uniform()  # of it, that the first one has
+    velocities = np.zeros((2, 3))
+    velocities[0, axis], velocities[1, axis] = share * fast, (share - 1.0) * fast
+    regions = [
+        _region("lower face", one, "out", True, _beyond(axis, middle - apart / 2.0), velocities[0]),
+        _region("upper face", other, "out", True, _beyond(axis, middle + apart / 2.0, -1.0), velocities[1]),
+    ]
+    meet = middle - apart / 2.0 + share * apart
+    place = [rng.uniform(6.0, 9.0), 0.0, 4.0]
+    place[axis] = meet
+    return _sphere(*place, 1.0), regions
+
+
+def _ceiling(rng: Generator) -> tuple[Table, list[Table]]:
+    """A ceiling and the greatest depth close in on each other."""
+    return _closing(rng, 2, 4.0)
+
+
+def _dock(rng: Generator) -> tuple[Table, list[Table]]:
+    """The walls of a dock close."""
+    return _closing(rng, 1, 0.0)
+
+
+def _door(rng: Generator) -> tuple[Table, list[Table]]:
+    """A wall has a door, behind which lies a soft region; it ends below another one."""
+    one, other = _two(rng)
+    gap, edge = rng.uniform(1.4, 2.0), rng.uniform(5.5, 6.5)
+    at, deep = rng.uniform(4.0, 6.0), rng.uniform(0.6, 2.0)
+    door = rng.uniform(-1.5, 1.5)
+    walls = [
+        _region("left wall", "obstacle", "out", True, _box((at, at + 0.6), (door - 20.0, door - gap / 2.0), (-5.0, edge))),
+        _region("right wall", "obstacle", "out", True, _box((at, at + 0.6), (door + gap / 2.0, door + 20.0), (-5.0, edge))),
+    ]
+    width = rng.uniform(2.0, 4.0)
+    behind = _box((at, at + deep), (door - width / 2.0, door + width / 2.0), (-5.0, edge))
+    below = _beyond(2, edge - rng.uniform(0.0, 0.6))
+    return _sphere(10.0, rng.uniform(-1.0, 1.0), rng.uniform(3.5, 4.5), 0.5), [
+        *walls,
+        _region("behind the door", one, "out", False, behind),
+        _region("greatest depth", other, "in", False, below),
+    ]
+
+
+def _sides(rng: Generator) -> tuple[Table, list[Table]]:
+    """An obstacle ahead is passed through one soft region on the left, or through another on the right."""
+    one, other = _two(rng)
+    at, half = rng.uniform(4.0, 5.5), rng.uniform(1.0, 1.8)
+    thick = rng.uniform(0.8, 2.0, 2)
+    wide = rng.uniform(6.0, 9.0)
+    return _sphere(10.0, rng.uniform(-0.8, 0.8), rng.uniform(3.5, 4.5), 0.5), [
+        _region("obstacle ahead", "obstacle", "out", True, _box((at, at + 0.8), (-half, half), (-5.0, 15.0))),
+        _region("left", one, "out", False, _box((at, at + thick[0]), (-half - wide, -half), (-5.0, 15.0))),
+        _region("right", other, "out", False, _box((at, at + thick[1]), (half, half + wide), (-5.0, 15.0))),
+    ]
+
+
+def _squeeze(rng: Generator) -> tuple[Table, list[Table]]:
+    """A least and a greatest depth, both soft, exclude each other."""
+    one, other = _two(rng)
+    middle, overlap = rng.uniform(3.7, 4.3), rng.uniform(0.2, 1.0)
+    return _sphere(rng.uniform(8.0, 11.0), rng.uniform(-2.0, 2.0), middle, rng.uniform(0.8, 1.4)), [
+        _region("least depth", one, "out", False, _beyond(2, middle + overlap / 2.0)),
+        _region("greatest depth", other, "in", False, _beyond(2, middle - overlap / 2.0)),
+    ]
+
+
+def _view(rng: Generator) -> tuple[Table, list[Table]]:
+    """A feature is to be kept in view along a way with an obstacle, clutter, and a greatest depth."""
+    speed, drop = rng.uniform(0.1, 0.2), rng.uniform(0.0, 0.25)
+    velocity = (speed, 0.0, drop * speed)
+    end = 2.0 + 60.0 * speed
+    radius, place = rng.uniform(0.4, 0.7), rng.uniform(3.5, 0.5 * end + 2.0)
+    clutter = rng.uniform(0.5 * end + 1.0, end - 1.0)
+    goal = _sphere(2.0, 1.4, 3.8, 1.5) | {"velocity": list(velocity)}
+    pillar = {"type": "cylinder", "start": [place, 2.6, 0.0], "end": [place, 2.6, 12.0], "radius": radius}
+    risers = {"type": "cylinder", "start": [clutter, 2.2, 0.0], "end": [clutter, 2.2, 12.0], "radius": 1.0}
+    cone = {"type": "cone", "feature": [2.0, 4.0, 4.2], "axis": [0.0, -1.0, -0.15], "half_angle": 0.35, "range": 2.6}
+    return goal, [
+        _region("pillar", "obstacle", "out", True, pillar),
+        _region("risers", "shape", "out", False, risers),
+        _region("greatest depth", "depth", "in", False, _beyond(2, 3.9 + drop * rng.uniform(0.2, 0.8) * end)),
+        _region("view", "visibility", "in", False, cone, velocity),
+    ]
+
+
+_KINDS: dict[str, Callable[[Generator], tuple[Table, list[Table]]]] = {
+    "ceiling": _ceiling,
+    "dock": _dock,
+    "door": _door,
+    "sides": _sides,
+    "squeeze": _squeeze,
+    "view": _view,
+}

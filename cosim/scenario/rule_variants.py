@@ -1,0 +1,51 @@
+"""Rules that weigh criteria by their order, and what they are compared with: reversed, crisp, and no arbiter at all."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+from typing import Literal
+
+from cosim.scenario.criteria import CriterionSetup
+from fuzzy_arbiter import Shape, System, Variable, prioritised
+
+RuleVariant = Literal["ordered", "reversed", "crisp", "none"]
+_ON = Shape(((0.5 - 1e-9, 0.0), (0.5 + 1e-9, 1.0)))  # either or, but without a jump
+_OFF = Shape(((0.5 - 1e-9, 1.0), (0.5 + 1e-9, 0.0)))
+
+
+@functools.lru_cache(maxsize=16)
+def rules_by_order(variant: RuleVariant, criteria: tuple[CriterionSetup, ...], points: int) -> System:
+    """Return the system that weighs criteria by their order.
+
+    Parameters
+    ----------
+    variant : {"ordered", "reversed", "crisp", "none"}
+        As section VI of the paper weighs its three; with the last first; with memberships of 0 or 1, the nearer one;
+        or each by its input alone, which is for inputs of 1: all weights are 1 then.
+    criteria : tuple of CriterionSetup
+        The first in priority first.
+    points : int
+        Samples of the outputs, for engines that sample.
+
+    Returns
+    -------
+    System
+        Its inputs are named like the criteria; its outputs are their weights, in their order.
+    """
+    fuzzy = [criterion.fuzzy for criterion in criteria]
+    if variant == "reversed":
+        system = prioritised(fuzzy[::-1], points=points)
+        return replace(system, outputs=system.outputs[::-1], weights_of=system.weights_of[::-1])
+    system = prioritised(fuzzy, points=points)
+    if variant == "crisp":
+        inputs = [Variable(c.name, (0.0, 1.0), {c.off: _OFF, c.on: _ON}) for c in fuzzy]
+        return replace(system, inputs=tuple(inputs))
+    if variant == "none":
+        rules = [
+            f"if {criterion.name} is {term} then {output.name} is {level}"
+            for criterion, output in zip(fuzzy, system.outputs, strict=True)
+            for term, level in zip((criterion.off, criterion.on), output.term_names, strict=True)
+        ]
+        return replace(system, rules=tuple(rules))
+    return system
