@@ -57,6 +57,7 @@ from controller.stack_array import zeros
 _STALE = 0.15  # s without a measurement, after which the vehicle goes slower
 _TRUSTED_SPREAD = 0.3  # m, of those deviations, beyond which it does too; at twice as much it stops
 _SEED = 1
+_ON_THE_WAY = 0.3  # m/s, from which on soft regions do not push back at all
 _LEAST_EFFECTIVENESS = 0.5  # by which more force is commanded
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 
@@ -129,7 +130,7 @@ def step(
             acceleration[axis] - free[axis] - memory.filtered_acceleration[axis]
         )
     _force_of(dynamics, R, memory.filtered_acceleration, wrench)
-    _soft_forces(memory.observation, regions, memory.weights, R, dynamics, wrench)
+    _soft_forces(memory.observation, regions, memory.weights, desired, R, dynamics, wrench)
     attitude_loop.update_desired(memory.attitude, regions, ahead.position, gains, period)
     attitude_loop.compute_moment(
         memory.attitude, dynamics, ahead.quaternion, ahead.velocity[3:], against, gains, wrench[3:]
@@ -220,12 +221,20 @@ def _force_of(dynamics: Dynamics, R: Array, acceleration: Array, out: Array) -> 
 
 
 def _soft_forces(
-    observation: RegionObservation, regions: PackedRegions, weights: Array, R: Array, dynamics: Dynamics, wrench: Array
+    observation: RegionObservation,
+    regions: PackedRegions,
+    weights: Array,
+    desired: Array,
+    R: Array,
+    dynamics: Dynamics,
+    wrench: Array,
 ) -> None:
     """Add the repulsive force of violated soft regions of position (22), -alpha_i g_i grad g_i / |grad g_i|.
 
-    Each is at most the force that the thrusters give in every direction.
+    Each is at most the force that the thrusters give in every direction. The path decides what is crossed: on the way,
+    which is as fast as `desired` [m/s, NED], a region pushes aside, but not back.
     """
+    speed, force = length3(desired[0], desired[1], desired[2]), zeros(3)
     most = dynamics.translational_mass[0] * model.smallest(dynamics.braking)
     for i in range(regions.kinds.size):
         if regions.hard[i] or not observation.values[i] > 0.0 or regions.kinds[i] >= _ATTITUDE:
@@ -233,10 +242,16 @@ def _soft_forces(
         size = length3(observation.gradients[i, 0], observation.gradients[i, 1], observation.gradients[i, 2])
         if not size > 0.0:
             continue
-        thruster_acceleration = min(regions.gains[i] * weights[i] * observation.values[i], most)
+        push, along = min(regions.gains[i] * weights[i] * observation.values[i], most), 0.0
+        for axis in range(3):
+            force[axis] = -push * observation.gradients[i, axis] / size
+            along += force[axis] * desired[axis]
+        if along < 0.0:
+            for axis in range(3):
+                force[axis] -= along * desired[axis] / (speed * max(speed, _ON_THE_WAY))
         for k in range(3):
             for axis in range(3):
-                wrench[k] -= thruster_acceleration * R[axis, k] * observation.gradients[i, axis] / size
+                wrench[k] += R[axis, k] * force[axis]
 
 
 class DeployableLaw(CompiledLaw):

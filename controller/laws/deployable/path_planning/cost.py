@@ -31,7 +31,8 @@ _TRUST = 0.7  # of the clearance beyond the desired one, travelled before the ne
 _INSIDE = 200.0  # m of path, cost of a metre within a hard region, by
 _EDGE = 0.1  # m, or more; in proportion where by less, so that the cost does not depend on where the strides end
 _NEAR = 3.0  # m of path, cost of a metre on the surface
-_SHALLOW = 0.2  # m of violation, from which on a soft region costs in full; in proportion where by less
+_SHALLOW, _ENTERED = 0.2, 0.5  # m of violation, over which a soft region comes to cost a part for being entered
+_STAY = 3.0  # m of path, as which the stay at its end counts
 _COARSE = 0.25  # m, least distance between two evaluations near the surface of a soft region
 _SPHERE = Sphere.kind
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on do not depend on position alone
@@ -43,13 +44,13 @@ class PathCost(NamedTuple):
     start: Array  # (3,) m, NED: of the path, when the evaluation began
     counts: NDArray[np.int64]  # (2,) leg that is evaluated next, evaluations so far
     travelled: Array  # (2,) m: of the legs before, and of this leg
-    cost: Array  # (2,) m: so far, and what of it hard regions add
+    cost: Array  # (3,) m: so far, what of it hard regions add, and soft ones on the way
     clear_until: Array  # (n,) m of path until which each region is far
 
 
 def empty_cost(n_regions: int) -> PathCost:
     """Return the cost of no path, among `n_regions`."""
-    return PathCost(np.zeros(3), np.zeros(2, dtype=np.int64), np.zeros(2), np.zeros(2), np.zeros(n_regions))
+    return PathCost(np.zeros(3), np.zeros(2, dtype=np.int64), np.zeros(2), np.zeros(3), np.zeros(n_regions))
 
 
 def begin_cost(cost: PathCost, start: Array) -> None:
@@ -87,7 +88,10 @@ def add_cost(cost: PathCost, path: Array, count: int, regions: PackedRegions, li
     place = zeros(3)
     for _ in range(_SAMPLES[0]):
         leg, s = cost.counts[0], cost.travelled[1]
-        if leg == count or cost.cost[0] > most:
+        if cost.cost[0] > most:
+            return True
+        if leg == count:
+            cost.cost[0] += _STAY * _stay_cost(path[count - 1], regions)
             return True
         begin = cost.start if leg == 0 else path[leg - 1]
         length = length3(path[leg, 0] - begin[0], path[leg, 1] - begin[1], path[leg, 2] - begin[2])
@@ -120,6 +124,7 @@ def _add_stride(cost: PathCost, stride: float, soft: float, penalty: float) -> N
     cost.travelled[1] += stride
     cost.cost[0] += stride * (1.0 + soft + penalty)
     cost.cost[1] += stride * penalty
+    cost.cost[2] += stride * soft
 
 
 def _evaluate_place(
@@ -147,8 +152,22 @@ def _evaluate_place(
             beyond = clearance - far
             free = min(free, clearance)
         else:
-            soft += regions.crossing_costs[i] * min(max(-clearance / _SHALLOW, 0.0), 1.0)
+            soft += regions.crossing_costs[i] * _depth_cost(-clearance)
             reach = min(reach, max(abs(clearance), _COARSE))
         if beyond >= 0.0:
             cost.clear_until[i] = travelled + beyond / (1.0 + own / limits.speed)
     return free, soft, reach
+
+
+def _depth_cost(depth: float) -> float:
+    """Return by how much a soft region costs that is violated by a depth [m], which is what counts, and by entering."""
+    return _ENTERED * min(depth / _SHALLOW, 1.0) + depth if depth > 0.0 else 0.0
+
+
+def _stay_cost(end: Array, regions: PackedRegions) -> float:
+    """Return what soft regions cost a metre at the end of a path [m, NED], where they are now."""
+    total, room = 0.0, zeros(3)
+    for i in range(regions.kinds.size):
+        if not regions.hard[i] and regions.kinds[i] < _ATTITUDE:
+            total += regions.crossing_costs[i] * _depth_cost(-clearance_of_place(regions, i, end, room))
+    return total

@@ -2,7 +2,7 @@
 
 A potential alone leads into pockets between obstacles. So the law keeps a path of a few corners, and tries one change
 after the other: a corner moved, added or dropped, or another end in the goal region; what `search.py` finds while the
-path is blocked is a change, too. The path that costs less stays, by `cost.py`. Each period does a bounded part of
+path is blocked, or soft regions make it dear, is a change, too. The path that costs less stays, by `cost.py`. Each period does a bounded part of
 the work. The random numbers are the law's own, so that a run repeats bit for bit. The path only sets the direction: the
 barriers keep the vehicle out of regions, whatever the path.
 """
@@ -25,7 +25,8 @@ from controller.laws.deployable.path_planning.search import (
     limits_along,
     look_for_path,
 )
-from controller.regions.region_set import PackedRegions, clearance_at, evaluate_packed
+from controller.regions.kinds import FIRST_OF_ATTITUDE
+from controller.regions.region_set import PackedRegions, clearance_at, clearance_of_place, evaluate_packed
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
@@ -34,7 +35,9 @@ _LN_30 = 3.4011973816621555
 CORNERS = 8  # at most
 _BETTER = 0.03  # m, and
 _BETTER_PART = 0.01  # of its cost, that a candidate must save to be taken
-_BLOCKED = 0.3  # of its length, cost of passing hard regions above which the trees search for another path
+_BLOCKED = 0.3  # of its length, cost of passing regions above which the trees search for another path
+_HARD, _ALL, _DEAR = 0, 1, 2  # regions that they keep out of: hard ones; soft ones, too; of these the dearer ones
+_LOOKS = 100  # for a path, before the trees keep out of others
 _PASSED = 0.25  # m from a corner, within which it counts as passed
 _CLIMBS = 12  # towards the inside of the goal region
 _PAYS = 0.05  # m deeper for each metre that a climb must bring; straight up it brings 1
@@ -51,9 +54,11 @@ class PathPlan(NamedTuple):
     candidate: Array  # (CORNERS + 1, 3)
     found: Array  # (CORNERS + 1, 3), by the search
     counts: NDArray[np.int64]  # (3,) points of path, candidate and found, the end included; 0: none yet
-    cost: Array  # (2,) m, of the path, and what of it hard regions add
+    cost: Array  # (3,) m, of the path, what of it hard regions add, and soft ones on the way
     new_cost: PathCost  # of path or candidate, whichever is evaluated
     search: Search
+    closed: NDArray[np.bool_]  # (n,) which regions the search keeps out of
+    turn: NDArray[np.int64]  # (2,) what is closed: `_HARD`, `_ALL` or `_DEAR`; looks for a path so far
     random_numbers: Array  # (5,) in [0, 1)
     phase: NDArray[np.int64]  # (1,) `_BEGIN`, `_PATH` or `_CANDIDATE`
     random: NDArray[np.uint64]  # (1,) state of the generator
@@ -68,9 +73,11 @@ def empty_plan(n_regions: int, seed: int) -> PathPlan:
         candidate=np.zeros((n, 3)),
         found=np.zeros((n, 3)),
         counts=np.zeros(3, dtype=np.int64),
-        cost=np.zeros(2),
+        cost=np.zeros(3),
         new_cost=empty_cost(n_regions),
         search=empty_search(),
+        closed=np.zeros(n_regions, dtype=np.bool_),
+        turn=np.zeros(2, dtype=np.int64),
         random_numbers=np.zeros(5),
         phase=np.zeros(1, dtype=np.int64),
         random=state,
@@ -127,13 +134,52 @@ def improve_path(
     """Update the path to vehicle and regions, and try a candidate; to be called once a period [s]."""
     _follow(plan, start, goal, limits, period)
     _evaluate(plan, start, goal, regions, limits)
-    if not is_blocked(plan, start):
+    blocked = is_blocked(plan, start)
+    if not blocked and plan.cost[2] <= _BLOCKED * _length(plan.path, plan.counts[0], start):
         plan.search.room[0] = ROOM[0]
     elif plan.counts[2] == 0:
         end, random_numbers = plan.path[plan.counts[0] - 1], plan.random_numbers
+        _choose_closed(plan, blocked, start, end, regions, limits.margin)
+        closed = PackedRegions(
+            regions.kinds, regions.signs, regions.offsets, regions.numbers, regions.shifts, regions.velocities,
+            regions.gains, plan.closed, regions.deviations, regions.crossing_costs,
+        )  # fmt: skip
         for i in range(random_numbers.size):
             random_numbers[i] = uniform(plan.random)
-        plan.counts[2] = look_for_path(plan.search, start, end, random_numbers, regions, limits, plan.found)
+        plan.counts[2] = look_for_path(plan.search, start, end, random_numbers, closed, limits, plan.found)
+
+
+def _choose_closed(
+    plan: PathPlan, blocked: bool, start: Array, end: Array, regions: PackedRegions, margin: float
+) -> None:
+    """Choose the regions that the trees keep out of; with others than before, they begin anew.
+
+    While hard ones block the path, these alone. Else all, and the dearer ones, in turn; but none that start or end of
+    the path is within.
+    """
+    turn, room = _HARD, zeros(3)
+    if not blocked:
+        plan.turn[1] += 1
+        turn = _DEAR if plan.turn[1] // _LOOKS % 2 == 0 else _ALL
+    if turn != plan.turn[0]:
+        plan.turn[0] = turn
+        plan.search.of_goal.size[0] = plan.search.of_vehicle.size[0] = 0
+    soft, mean = 0, 0.0
+    for i in range(regions.kinds.size):
+        plan.closed[i] = regions.hard[i]
+        if not regions.hard[i]:
+            mean = (soft * mean + regions.crossing_costs[i]) / (soft + 1)
+            soft += 1
+    if turn == _HARD:
+        return
+    for i in range(regions.kinds.size):
+        if regions.hard[i] or regions.kinds[i] >= FIRST_OF_ATTITUDE:
+            continue
+        plan.closed[i] = turn == _ALL or regions.crossing_costs[i] > mean
+        for place in range(2):
+            clearance = clearance_of_place(regions, i, start if place == 0 else end, room)
+            if clearance < margin:
+                plan.closed[i] = False
 
 
 def _follow(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits, period: float) -> None:
