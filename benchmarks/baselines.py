@@ -20,7 +20,8 @@ import numpy as np
 
 from controller import LAWS
 from controller.laws.pd import PdGains
-from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer, Score
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.flyer import SceneFlyer, Score
 from cosim.campaigns.scenes.generator import make_scene
 from cosim.campaigns.scenes.scene import Scene
 

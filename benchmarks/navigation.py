@@ -21,9 +21,9 @@ from controller import LAWS
 from controller.navigation.measurements import SENSORS
 from controller.quaternion import rotation_matrix
 from cosim.campaigns.scenes.as_scenario import scene_scenario
-from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.generator import generate_scenes
-from cosim.campaigns.scenes.scene import decode_scene
+from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.scenario.sensor_suite import scenario_sensors
 from cosim.simulation.master import Master
 

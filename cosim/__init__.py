@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from cosim.campaigns import Campaign, Comparison, Design, Sweep, compare, run_campaign, run_sweep, vary_from
     from cosim.campaigns.scenes.flyer import SceneFlyer
     from cosim.campaigns.scenes.generator import generate_scenes
-    from cosim.campaigns.scenes.scene import Scene, read_scenes
+    from cosim.campaigns.scenes.scene import Scene
+    from cosim.campaigns.scenes.scene_file import read_scenes
     from cosim.errors import CosimError, RunError
     from cosim.export import export_run
     from cosim.mavlink.setup import Mavlink
@@ -67,7 +68,8 @@ _HOMES = {
     "campaigns": {"Campaign", "Comparison", "Design", "Sweep", "compare", "run_campaign", "run_sweep", "vary_from"},
     "campaigns.scenes.flyer": {"SceneFlyer"},
     "campaigns.scenes.generator": {"generate_scenes"},
-    "campaigns.scenes.scene": {"Scene", "read_scenes"},
+    "campaigns.scenes.scene": {"Scene"},
+    "campaigns.scenes.scene_file": {"read_scenes"},
     "errors": {"CosimError", "RunError"},
     "export": {"export_run"},
     "mavlink.setup": {"Mavlink"},

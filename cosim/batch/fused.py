@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from types import TracebackType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,15 +63,8 @@ class FusedFlyer:
     def __init__(self, variation: Variation) -> None:
         self.variation = variation
         base = variation.base
-        for key, received, expected in (
-            ("arbiter.engine", base.arbiter.engine, Arbiter(system=base.rules.system).engine),
-            ("master.order", base.master.order, "gauss-seidel"),
-            ("plant.fmi", base.plant.fmi, 3),
-            ("commands.enabled", base.commands.enabled, False),
-        ):
-            if received != expected:
-                way = f", such as by --set {key}={expected}" if isinstance(expected, str) else ""
-                raise RunError(f"{key} is {received!r}, expected {expected!r} for flights without a record{way}")
+        require_fused(base)
+        for key, (_, expected) in _fixed(base).items():
             if key in variation.keys:
                 raise RunError(f"{key} varies, expected {expected!r} for flights without a record")
         require_builtin_law(base)
@@ -120,31 +114,7 @@ class FusedFlyer:
         PlantError
             If the plant cannot be as the scenario has it. The flyer can go on with another one.
         """
-        plant, law = self._plant, law_of(scenario)
-        n, through = scenario.vehicle.n_thrusters, scenario.actuation.through == "thrusters"
-        plant.reset()
-        plant.set(start_values(scenario))
-        plant.initialise()
-        if through:
-            inputs = tuple(f"thrust[{i + 1}]" for i in range(n))
-            forces = (*(f"thruster_force[{i + 1}]" for i in range(n)), *(f"actuation.{axis}" for axis in "XYZ"))
-        else:
-            inputs = tuple(f"wrench.{axis}" for axis in "XYZKMN")
-            forces = tuple(f"actuator.wrench.{axis}" for axis in "XYZ")  # states: they cost no evaluation
-        through_sensors = scenario.sensing.through == "sensors"
-        native = plant.native(inputs, (*PLANT_OUTPUTS, *forces, *(SENSOR_OUTPUTS if through_sensors else ())))
-        names = [f"thrust_effectiveness[{i + 1}]" for i in range(n)]
-        effectiveness = plant.native(names, ())
-        effectiveness.inputs[:] = [plant[name] for name in names] if scenario.failures else 1.0
-        losses = plant.native(LOSSES, ())
-        losses.inputs[:] = [plant[name] for name in LOSSES] if scenario.outages else 0.0
-        setup = _setup(scenario, n if through else 0)
-        allocator = _allocator(scenario, setup) if through else _NONE
-        decisions = -(-scenario.steps // scenario.control_every)
-        criteria, rules = len(scenario.criteria), scenario.rules
-        rows = np.zeros((decisions, 17 + criteria + len(inputs) + law.report.size) if trace else (0, 0))
-        workspace = make_workspace(setup, criteria, len(inputs), n)
-        metrics, estimate = fly_law(setup, native, effectiveness, losses, allocator, law, rules.system, workspace, rows)
+        metrics, setup, native, estimate, rows = fly_scenario(self._plant, scenario, trace)
         return _outcome(metrics, setup, native, estimate), rows
 
     def close(self) -> None:
@@ -160,7 +130,80 @@ class FusedFlyer:
         self.close()
 
 
-def _setup(scenario: Scenario, thrusters: int) -> FlightConfig:
+def require_fused(scenario: Scenario) -> None:
+    """Raise `RunError` for the first key of a scenario by which the fused loop cannot fly it."""
+    for key, (received, expected) in _fixed(scenario).items():
+        if received != expected:
+            way = f", such as by --set {key}={expected}" if isinstance(expected, str) else ""
+            raise RunError(f"{key} is {received!r}, expected {expected!r} for flights without a record{way}")
+
+
+def _fixed(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
+    """Return of each key that cannot be otherwise what it is, and what it has to be."""
+    return {
+        "arbiter.engine": (scenario.arbiter.engine, Arbiter(system=scenario.rules.system).engine),
+        "master.order": (scenario.master.order, "gauss-seidel"),
+        "plant.fmi": (scenario.plant.fmi, 3),
+        "commands.enabled": (scenario.commands.enabled, False),
+    }
+
+
+def fly_scenario(
+    plant: Plant, scenario: Scenario, trace: bool = False, clock: NDArray[np.int64] = _NO_CLOCK
+) -> tuple[FlightMetrics, FlightConfig, Native, Array, Array]:
+    """Fly a scenario by the plant of its vehicle, which is reset before.
+
+    Parameters
+    ----------
+    plant : Plant
+        Of the scenario's vehicle.
+    scenario : Scenario
+        With nothing that `FusedFlyer` refuses.
+    trace : bool
+        Whether to keep what happened.
+    clock : ndarray of int
+        Of `Clock`, if the law is to be timed.
+
+    Returns
+    -------
+    FlightMetrics, FlightConfig, Native, ndarray, ndarray
+        What it came to, of what it was made, the plant at its end, the last estimate, shape (4,), and the trace, shape
+        (0, 0) if none is kept.
+
+    Raises
+    ------
+    PlantError
+        If the plant cannot be as the scenario has it.
+    """
+    law = law_of(scenario)
+    n, through = scenario.vehicle.n_thrusters, scenario.actuation.through == "thrusters"
+    plant.reset()
+    plant.set(start_values(scenario))
+    plant.initialise()
+    if through:
+        inputs = tuple(f"thrust[{i + 1}]" for i in range(n))
+        forces = (*(f"thruster_force[{i + 1}]" for i in range(n)), *(f"actuation.{axis}" for axis in "XYZ"))
+    else:
+        inputs = tuple(f"wrench.{axis}" for axis in "XYZKMN")
+        forces = tuple(f"actuator.wrench.{axis}" for axis in "XYZ")  # states: they cost no evaluation
+    through_sensors = scenario.sensing.through == "sensors"
+    native = plant.native(inputs, (*PLANT_OUTPUTS, *forces, *(SENSOR_OUTPUTS if through_sensors else ())))
+    names = [f"thrust_effectiveness[{i + 1}]" for i in range(n)]
+    effectiveness = plant.native(names, ())
+    effectiveness.inputs[:] = [plant[name] for name in names] if scenario.failures else 1.0
+    losses = plant.native(LOSSES, ())
+    losses.inputs[:] = [plant[name] for name in LOSSES] if scenario.outages else 0.0
+    setup = _setup(scenario, n if through else 0, clock)
+    allocator = _allocator(scenario, setup) if through else _NONE
+    decisions = -(-scenario.steps // scenario.control_every)
+    criteria, rules = len(scenario.criteria), scenario.rules
+    rows = np.zeros((decisions, 17 + criteria + len(inputs) + law.report.size) if trace else (0, 0))
+    workspace = make_workspace(setup, criteria, len(inputs), n)
+    metrics, estimate = fly_law(setup, native, effectiveness, losses, allocator, law, rules.system, workspace, rows)
+    return metrics, setup, native, estimate, rows
+
+
+def _setup(scenario: Scenario, thrusters: int, clock: NDArray[np.int64]) -> FlightConfig:
     sensing, step = scenario.sensing, scenario.time.step
     decisions = -(-scenario.steps // scenario.control_every)
     noise = np.zeros((0, 6))
@@ -200,7 +243,7 @@ def _setup(scenario: Scenario, thrusters: int) -> FlightConfig:
         tell=scenario.tell_failures,
         thrusters=thrusters,
         bound=find_bound(LAWS[scenario.law.name].diagnostics),
-        clock=_NO_CLOCK,
+        clock=clock,
     )
 
 

@@ -23,10 +23,10 @@ from cosim.results.summary import SETTLED_FOR
 
 _REFUSAL = 512  # bytes of a message
 _MARKS = (
-    "first_inside", "last_entered", "inside", "least_clearance", "least_angle", "goal_clearance", "effort", "max_force",
-    "max_speed", "final_x", "final_y", "final_z", "phi1", "phi2", "phi3", "phi4", "stopped",
+    "first_inside", "last_entered", "inside", "least_clearance", "least_angle", "goal_clearance", "weighted_violation",
+    "effort", "max_force", "max_speed", "final_x", "final_y", "final_z", "phi1", "phi2", "phi3", "phi4", "stopped",
 )  # fmt: skip
-_SAME = ("effort", "max_force", "max_speed", *(f"final_{axis}" for axis in "xyz"), *(f"phi{i}" for i in range(1, 5)))
+_SAME = _MARKS[_MARKS.index("weighted_violation") : _MARKS.index("stopped")]  # by the names of outcomes
 
 
 class Batch(ctypes.Structure):
@@ -39,8 +39,8 @@ class Batch(ctypes.Structure):
         )),
         *((name, ctypes.c_double) for name in ("step", "period", "substep")),
         *((name, ctypes.c_void_p) for name in (
-            "reals", "integers", "kinds", "signs", "offsets", "criteria", "hard", "inverse", "lower", "upper", "rows",
-            "marks", "refusals",
+            "reals", "integers", "kinds", "signs", "offsets", "criteria", "hard", "priorities", "inverse", "lower",
+            "upper", "rows", "marks", "refusals",
         )),
     )  # fmt: skip
 
@@ -88,6 +88,7 @@ class LanesFlyer:
         self._point("offsets", packed.offsets.astype(np.intc))
         self._point("criteria", np.array([-1, *base.criterion_places], np.intc))
         self._point("hard", packed.hard.astype(np.intc))
+        self._point("priorities", np.array([0.0, *(secondary.priority for secondary in base.regions)]))
         if thrusters:
             v = base.vehicle
             allocation = Allocation(v.thruster_matrix, v.thrust_min, v.thrust_max, base.actuation.limits).arguments

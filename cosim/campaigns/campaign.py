@@ -10,7 +10,7 @@ from typing import Any
 
 from cosim.campaigns.analysis.summary import summarise
 from cosim.campaigns.runner import carry_out
-from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.law_gains import gains_from
 from cosim.campaigns.scenes.scene_store import SceneStore
 from cosim.campaigns.scenes.work import SceneTask, SceneWork

@@ -16,7 +16,7 @@ from cosim.campaigns.analysis.summary import median
 from cosim.campaigns.campaign import Campaign, run_campaign
 from cosim.campaigns.pages.comparison_page import NUMBERS, PAGE
 from cosim.campaigns.pages.replays import WORST
-from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.law_gains import law_named
 from cosim.campaigns.scenes.scene_store import SceneStore
 from cosim.campaigns.store.results import Results

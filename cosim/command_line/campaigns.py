@@ -67,7 +67,7 @@ def campaign(options: argparse.Namespace) -> int:
     """Run ``cosim campaign``."""
     from cosim.campaigns import run_campaign
     from cosim.campaigns.pages.campaign_page import campaign_lines, write_campaign_page
-    from cosim.campaigns.scenes.flyer import Conditions
+    from cosim.campaigns.scenes.conditions import Conditions
     from cosim.campaigns.scenes.law_gains import gains_from
 
     gains = gains_from(options.law, options.settings)
@@ -89,7 +89,7 @@ def compare(options: argparse.Namespace) -> int:
     """Run ``cosim compare``."""
     from cosim.campaigns import compare as compare_laws
     from cosim.campaigns.pages.comparison_page import write_comparison_page
-    from cosim.campaigns.scenes.flyer import Conditions
+    from cosim.campaigns.scenes.conditions import Conditions
     from cosim.campaigns.scenes.law_gains import gains_by_law
 
     laws = [law.strip() for law in options.laws.split(",") if law.strip()]

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Literal
 
 from cosim.scenario.criteria import CriterionSetup
-from fuzzy_arbiter import Shape, System, Variable, prioritised
+from fuzzy_arbiter import Rule, Shape, System, Term, Variable, prioritised
 
 RuleVariant = Literal["ordered", "reversed", "crisp", "none"]
 _ON = Shape(((0.5 - 1e-9, 0.0), (0.5 + 1e-9, 1.0)))  # either or, but without a jump
@@ -39,11 +39,11 @@ def rules_by_order(variant: RuleVariant, criteria: tuple[CriterionSetup, ...], p
         return replace(system, outputs=system.outputs[::-1], weights_of=system.weights_of[::-1])
     system = prioritised(fuzzy, points=points)
     if variant == "crisp":
-        inputs = [Variable(c.name, (0.0, 1.0), {c.off: _OFF, c.on: _ON}) for c in fuzzy]
+        inputs = [Variable(c.name, (0.0, 1.0), (Term(c.off, _OFF), Term(c.on, _ON))) for c in fuzzy]
         return replace(system, inputs=tuple(inputs))
     if variant == "none":
         rules = [
-            f"if {criterion.name} is {term} then {output.name} is {level}"
+            Rule.parse(f"if {criterion.name} is {term} then {output.name} is {level}")
             for criterion, output in zip(fuzzy, system.outputs, strict=True)
             for term, level in zip((criterion.off, criterion.on), output.term_names, strict=True)
         ]

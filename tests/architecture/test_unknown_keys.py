@@ -12,7 +12,7 @@ import tomli_w
 from controller import LAWS
 from controller.regions.region_set import SHAPES
 from cosim.campaigns.scenes.law_gains import gains_from
-from cosim.campaigns.scenes.scene import read_scenes
+from cosim.campaigns.scenes.scene_file import read_scenes
 from cosim.errors import CosimError, RunError, ScenarioError
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands.sources import read_log

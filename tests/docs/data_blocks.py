@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import tomli_w
 
-from cosim.campaigns.scenes.scene import decode_scene
+from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.live.command_desk import CommandDesk
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands import CommandQueue

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controller import ControllerError
-from cosim.campaigns.scenes.scene import decode_scene
+from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.errors import CosimError
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import _folder as scenarios

@@ -14,7 +14,7 @@ int arbiter_evaluate(const double inputs[3], double outputs[3]); /* generated */
 
 typedef struct { /* what OUTCOME is made of */
     Real first_inside, last_entered, least_clearance, least_angle, goal_clearance;
-    Real effort, max_force, max_speed_squared, estimate[4], stopped;
+    Real weighted_violation, effort, max_force, max_speed_squared, estimate[4], stopped;
     Mask inside;
 } Marks;
 
@@ -101,7 +101,7 @@ static void begin(Fleet *f)
     m->first_inside = m->last_entered = m->stopped = never;
     m->least_clearance = m->least_angle = splat(INFINITY);
     m->goal_clearance = splat(-INFINITY);
-    m->effort = m->max_force = m->max_speed_squared = none;
+    m->weighted_violation = m->effort = m->max_force = m->max_speed_squared = none;
     m->inside = none > 0.0;
     for (int j = 0; j < 4; j++)
         m->estimate[j] = f->estimate[j] = none;
@@ -138,6 +138,10 @@ static void mark(Fleet *f, int k)
             const Mask less = (f->clearances[j] < *least) | (f->clearances[j] != f->clearances[j]); /* NaN stays, too */
             *least = choose(f->flying & less, f->clearances[j], *least);
         }
+    for (int j = 1; k < f->batch->steps && j < f->batch->n_regions; j++) {
+        const Real more = m->weighted_violation - f->batch->priorities[j] * f->clearances[j] * f->batch->step;
+        m->weighted_violation = choose(f->flying & mask_not(f->clearances[j] >= 0.0), more, m->weighted_violation);
+    }
     m->goal_clearance = choose(f->flying, real_fmax(f->clearances[0], m->goal_clearance), m->goal_clearance);
     m->first_inside = choose(entered & (m->first_inside < 0.0), splat(k), m->first_inside);
     m->last_entered = choose(entered, splat(k), m->last_entered);
@@ -279,6 +283,7 @@ static void tell(const Fleet *f, int i, double marks[N_MARKS])
     marks[LEAST_CLEARANCE] = lane(m->least_clearance, i);
     marks[LEAST_ANGLE] = lane(m->least_angle, i);
     marks[GOAL_CLEARANCE] = lane(m->goal_clearance, i);
+    marks[WEIGHTED_VIOLATION] = lane(m->weighted_violation, i);
     marks[EFFORT] = lane(m->effort, i);
     marks[MAX_FORCE] = lane(m->max_force, i);
     marks[MAX_SPEED] = sqrt(lane(m->max_speed_squared, i));

@@ -22,6 +22,7 @@ enum { /* what a flight is told by */
     LEAST_CLEARANCE, /* m, of hard regions of place; INFINITY: there are none */
     LEAST_ANGLE,     /* rad, of hard regions of attitude */
     GOAL_CLEARANCE,  /* m, the greatest */
+    WEIGHTED_VIOLATION, /* m s, rad s: of each region its depth times its priority, over time, summed */
     EFFORT,          /* N s */
     MAX_FORCE,       /* N */
     MAX_SPEED,       /* m/s */
@@ -48,6 +49,7 @@ typedef struct { /* a batch of flights; each row of `rows` is one */
     const int *offsets;       /* (n_regions + 1,) */
     const int *criteria;      /* (n_regions,) -1 for the goal */
     const int *hard;          /* (n_regions,) */
+    const double *priorities; /* (n_regions,) for the score, 0 for the goal */
     const double *inverse;    /* (thrusters, 6) of the thruster matrix */
     const double *lower, *upper; /* (thrusters,) N */
 

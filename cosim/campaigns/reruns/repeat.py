@@ -15,10 +15,10 @@ import numpy as np
 from controller import ControllerError
 from controller.regions.region_set import of_attitude
 from cosim.campaigns.scenes.as_scenario import scene_scenario
-from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.law_gains import law_named
 from cosim.campaigns.scenes.rows import SCHEMA
-from cosim.campaigns.scenes.scene import decode_scene
+from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.scenes.work import SceneTask
 from cosim.campaigns.store.folder import PLAN, RESULTS, read_plan
 from cosim.campaigns.store.plan import SCENES, SWEEP, difference

@@ -7,20 +7,22 @@ import math
 from typing import Any
 
 from controller.regions.region_set import SHAPES
-from cosim.campaigns.scenes.flyer import VEHICLE, Conditions
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.scenario_scene import AnyScene, ScenarioScene
 from cosim.campaigns.scenes.scene import Scene, plant_values, scene_regions
 from cosim.scenario.scenario import Scenario, validate_scenario
 from plant_fmu.vehicle import load_vehicle
 
+VEHICLE = "odin"  # of scenes that name none
 _OF_THE_SCENARIO = ("substep", "current", "position")  # values of the plant that have keys of their own
 
 
-def scene_scenario(scene: Scene, law: str, gains: Any, conditions: Conditions) -> Scenario:
+def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions) -> Scenario:
     """Return the scenario that says what a scene says, flown as scenes are.
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene or ScenarioScene
         What becomes a scenario.
     law : str
         One of those in `controller.LAWS`.
@@ -32,7 +34,7 @@ def scene_scenario(scene: Scene, law: str, gains: Any, conditions: Conditions) -
     Returns
     -------
     Scenario
-        Its flight is that of `SceneFlyer`, to rounding.
+        What `SceneFlyer` flies.
 
     Raises
     ------
@@ -41,6 +43,8 @@ def scene_scenario(scene: Scene, law: str, gains: Any, conditions: Conditions) -
     PlantFmuError, ControllerError
         If the law cannot work with the gains, or there is no such vehicle.
     """
+    if isinstance(scene, ScenarioScene):
+        return scene.flown_by(law, gains._asdict(), _changes(scene, conditions))
     vehicle = load_vehicle(VEHICLE)
     values = plant_values(scene, vehicle, conditions.plant_step)
     table = {
@@ -60,7 +64,7 @@ def scene_scenario(scene: Scene, law: str, gains: Any, conditions: Conditions) -
         "initial": {"position": scene.start},
         "goal": {"type": "sphere", **dataclasses.asdict(scene.goal)},
         "law": {"name": law, "gains": gains._asdict()},
-        "arbiter": {"ramp": conditions.ramp},
+        "arbiter": {"ramp": conditions.ramp, "rules": conditions.arbiter},
         "actuation": {"through": "thrusters"},
         "sensing": _sensing(scene, conditions),
         "outages": [dataclasses.asdict(outage) for outage in conditions.outages],
@@ -69,6 +73,19 @@ def scene_scenario(scene: Scene, law: str, gains: Any, conditions: Conditions) -
         "regions": _regions(scene),
     }
     return validate_scenario(table, f"{law}-scene-{scene.seed}", vehicle)
+
+
+def _changes(scene: ScenarioScene, conditions: Conditions) -> dict[str, Any]:
+    """Return the tables of a scenario that conditions change."""
+    table = scene.scenario
+    changes: dict[str, Any] = {"tell_failures": conditions.tell_failures}
+    if conditions.arbiter != "ordered":
+        changes["arbiter"] = {**table.get("arbiter", {}), "rules": conditions.arbiter}
+    if conditions.sensing == "sensors":
+        changes["sensing"] = {"through": "sensors", "seed": scene.seed}
+    if conditions.outages:
+        changes["outages"] = [*table.get("outages", ()), *map(dataclasses.asdict, conditions.outages)]
+    return changes
 
 
 def _sensing(scene: Scene, conditions: Conditions) -> dict[str, Any]:

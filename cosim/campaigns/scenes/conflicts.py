@@ -117,7 +117,7 @@ def _two(rng: Generator) -> tuple[str, str]:
 
 
 def _closing(rng: Generator, axis: int, middle: float) -> tuple[Table, list[Table]]:
-    """Two hard faces approach each other along an axis, until they are past each other."""
+    """Make two hard faces that approach each other along an axis, until they are past each other."""
     one, other = _two(rng)
     apart, overlap, duration = rng.uniform(3.0, 4.0), rng.uniform(0.2, 0.8), rng.uniform(35.0, 50.0)
     fast = (apart + overlap) / duration  # m/s, of both together
@@ -129,30 +129,33 @@ def _closing(rng: Generator, axis: int, middle: float) -> tuple[Table, list[Tabl
         _region("upper face", other, "out", True, _beyond(axis, middle + apart / 2.0, -1.0), velocities[1]),
     ]
     meet = middle - apart / 2.0 + share * apart
-    place = [rng.uniform(6.0, 9.0), 0.0, 4.0]
-    place[axis] = meet
-    return _sphere(*place, 1.0), regions
+    ahead = rng.uniform(6.0, 9.0)
+    return _sphere(ahead, meet if axis == 1 else 0.0, meet if axis == 2 else 4.0, 1.0), regions
 
 
 def _ceiling(rng: Generator) -> tuple[Table, list[Table]]:
-    """A ceiling and the greatest depth close in on each other."""
+    """Make a ceiling and a greatest depth that close in on each other."""
     return _closing(rng, 2, 4.0)
 
 
 def _dock(rng: Generator) -> tuple[Table, list[Table]]:
-    """The walls of a dock close."""
+    """Make walls of a dock that close."""
     return _closing(rng, 1, 0.0)
 
 
 def _door(rng: Generator) -> tuple[Table, list[Table]]:
-    """A wall has a door, behind which lies a soft region; it ends below another one."""
+    """Make a wall with a door, behind which lies a soft region; below the wall lies another one."""
     one, other = _two(rng)
     gap, edge = rng.uniform(1.4, 2.0), rng.uniform(5.5, 6.5)
     at, deep = rng.uniform(4.0, 6.0), rng.uniform(0.6, 2.0)
     door = rng.uniform(-1.5, 1.5)
     walls = [
-        _region("left wall", "obstacle", "out", True, _box((at, at + 0.6), (door - 20.0, door - gap / 2.0), (-5.0, edge))),
-        _region("right wall", "obstacle", "out", True, _box((at, at + 0.6), (door + gap / 2.0, door + 20.0), (-5.0, edge))),
+        _region(
+            "left wall", "obstacle", "out", True, _box((at, at + 0.6), (door - 20.0, door - gap / 2.0), (-5.0, edge))
+        ),
+        _region(
+            "right wall", "obstacle", "out", True, _box((at, at + 0.6), (door + gap / 2.0, door + 20.0), (-5.0, edge))
+        ),
     ]
     width = rng.uniform(2.0, 4.0)
     behind = _box((at, at + deep), (door - width / 2.0, door + width / 2.0), (-5.0, edge))
@@ -165,7 +168,7 @@ def _door(rng: Generator) -> tuple[Table, list[Table]]:
 
 
 def _sides(rng: Generator) -> tuple[Table, list[Table]]:
-    """An obstacle ahead is passed through one soft region on the left, or through another on the right."""
+    """Make an obstacle that is passed through one soft region on the left, or through another on the right."""
     one, other = _two(rng)
     at, half = rng.uniform(4.0, 5.5), rng.uniform(1.0, 1.8)
     thick = rng.uniform(0.8, 2.0, 2)
@@ -178,7 +181,7 @@ def _sides(rng: Generator) -> tuple[Table, list[Table]]:
 
 
 def _squeeze(rng: Generator) -> tuple[Table, list[Table]]:
-    """A least and a greatest depth, both soft, exclude each other."""
+    """Make a least and a greatest depth, both soft, that exclude each other."""
     one, other = _two(rng)
     middle, overlap = rng.uniform(3.7, 4.3), rng.uniform(0.2, 1.0)
     return _sphere(rng.uniform(8.0, 11.0), rng.uniform(-2.0, 2.0), middle, rng.uniform(0.8, 1.4)), [
@@ -188,7 +191,7 @@ def _squeeze(rng: Generator) -> tuple[Table, list[Table]]:
 
 
 def _view(rng: Generator) -> tuple[Table, list[Table]]:
-    """A feature is to be kept in view along a way with an obstacle, clutter, and a greatest depth."""
+    """Make a feature to be kept in view along a way with an obstacle, clutter, and a greatest depth."""
     speed, drop = rng.uniform(0.1, 0.2), rng.uniform(0.0, 0.25)
     velocity = (speed, 0.0, drop * speed)
     end = 2.0 + 60.0 * speed

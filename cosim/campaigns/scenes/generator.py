@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-KINDS = ("plain", "hard")
+from cosim.campaigns.scenes.conflicts import make_conflict
+
+KINDS = ("plain", "hard", "conflict")
 
 _GOAL_RADIUS = 0.5  # m
 _FREE = 0.6  # m, from an obstacle to the start and to the goal region, at least
@@ -29,13 +31,13 @@ def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[
         How many.
     seed : int
         Of the first, 0 or above.
-    kind : {"plain", "hard"}
-        Of all of them.
+    kind : {"plain", "hard", "conflict"}
+        Of all of them; conflicts are those of `cosim.campaigns.scenes.conflicts`.
 
     Yields
     ------
     str
-        A line of JSON, as `cosim.campaigns.scenes.scene.read_scenes` reads it.
+        A line of JSON, as `cosim.campaigns.scenes.scene_file.read_scenes` reads it.
 
     Examples
     --------
@@ -46,7 +48,7 @@ def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[
     2
     """
     for one in range(seed, seed + count):
-        yield json.dumps(make_scene(one, kind))
+        yield json.dumps(make_conflict(one) if kind == "conflict" else make_scene(one, kind))
 
 
 def make_scene(seed: int, kind: str = "plain") -> dict[str, Any]:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.campaigns.scenes.scene import Scene, decode_scene
+from cosim.campaigns.scenes.scenario_scene import AnyScene, ScenarioScene
+from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError, ScenarioError
 from cosim.simulation.signals import Array
@@ -72,8 +73,10 @@ def scene_kinds(results: Results) -> SceneKinds:
     return SceneKinds(np.array(kinds, dtype=str), dict(zip(FEATURES, columns, strict=True)))
 
 
-def kind_of(scene: Scene) -> str:
+def kind_of(scene: AnyScene) -> str:
     """Return in words what makes a scene hard beyond its regions: drift of obstacles, noise, a thruster that fails."""
+    if isinstance(scene, ScenarioScene):
+        return scene.kind
     present = {
         "drift": any(any(obstacle.velocity) for obstacle in scene.obstacles),
         "noise": bool(scene.noise.position or scene.noise.velocity),
@@ -82,7 +85,9 @@ def kind_of(scene: Scene) -> str:
     return ", ".join(name for name, there in present.items() if there) or PLAIN
 
 
-def _numbers(scene: Scene) -> tuple[float, ...]:
+def _numbers(scene: AnyScene) -> tuple[float, ...]:
+    if isinstance(scene, ScenarioScene):  # whose plants are not alike
+        return (math.nan,) * len(FEATURES)
     return (
         len(scene.obstacles),
         math.hypot(*scene.current),

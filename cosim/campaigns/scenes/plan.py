@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.store.plan import SCENES, code_digest, versions
 
 

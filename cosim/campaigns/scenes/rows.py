@@ -21,6 +21,7 @@ class Row(NamedTuple):
     violation: bool
     min_clearance: float | None  # m
     bound_excess: float | None  # m
+    weighted_violation: float | None  # m s
     reach_time: float | None  # s
     effort: float | None  # N s
     thrust_variation: float | None  # N
@@ -34,12 +35,18 @@ _COLUMNS = (  # name, type, unit, description
     ("seed", pa.int64(), "", "Of the scene"),
     ("reached", pa.bool_(), "", "Inside the goal region for the last seconds that count as settled"),
     ("violation", pa.bool_(), "", "Beyond a region's surface at any instant, or the flight was not flown to its end"),
-    ("min_clearance", pa.float64(), "m", "Least distance to any region's surface, negative where violated"),
+    ("min_clearance", pa.float64(), "m", "Least distance to any hard region's surface, negative where violated"),
     (
         "bound_excess",
         pa.float64(),
         "m",
         "Greatest excess of the law's last bound over a clearance; null: it has none",
+    ),
+    (
+        "weighted_violation",
+        pa.float64(),
+        "m.s",
+        "Integral of how deep each region is violated, times its priority, summed",
     ),
     ("reach_time", pa.float64(), "s", "Since when it was in the goal region without a break; null if not reached"),
     ("effort", pa.float64(), "N.s", "Integral of the magnitudes of the thrusters' given forces, summed"),
@@ -85,6 +92,7 @@ def row_of(seed: int, score: Score, plant_step: float, scene: str = "") -> Row:
         violation=bool(stopped or not score.min_clearance >= 0.0),
         min_clearance=_number(score.min_clearance),
         bound_excess=_number(score.bound_excess),
+        weighted_violation=_number(score.weighted_violation),
         reach_time=_number(score.reach_time) if score.reached else None,
         effort=_number(score.effort),
         thrust_variation=_number(score.thrust_variation),
@@ -98,8 +106,9 @@ def row_of(seed: int, score: Score, plant_step: float, scene: str = "") -> Row:
 def refused_row(seed: int, reason: str, scene: str = "") -> Row:
     """Return the row of a scene that was not flown."""
     return Row(
-        seed=seed, reached=False, violation=True, min_clearance=None, bound_excess=None, reach_time=None, effort=None,
-        thrust_variation=None, worst_step_time=None, stopped_at=0.0, refused=reason, scene=scene,
+        seed=seed, reached=False, violation=True, min_clearance=None, bound_excess=None, weighted_violation=None,
+        reach_time=None, effort=None, thrust_variation=None, worst_step_time=None, stopped_at=0.0,
+        refused=reason, scene=scene,
     )  # fmt: skip
 
 

@@ -1,33 +1,18 @@
 """Scored scenes: a start, a goal region, obstacles, a depth band, and what the law is not told of the plant.
 
-One JSON object a line. What the law is told of a scene is `KnownScene`; `plant_values` is for the plant alone.
+`scene_regions` are what the law is told of, beside the goal; `plant_values` is for the plant alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
-from typing import IO, NamedTuple
 
-import msgspec
-import numpy as np
-from numpy.typing import NDArray
-
-from controller.regions import DepthBand, Region, Sphere, pack
-from controller.regions.region_set import PackedRegions
+from controller.regions import DepthBand, Region, Sphere
 from controller.regions.shape import GREATEST
 from cosim.errors import ScenarioError
-from cosim.scenario.arbiter_rules import PAPER_RULES
-from cosim.scenario.criteria import PAPER
-from cosim.scenario.tables import SecondaryRegion
-from cosim.simulation.arbiter_inputs import PackedInputs, pack_inputs
-from plant_fmu import PlantFmuError
-from plant_fmu.toml_tables import decode
 from plant_fmu.vehicle import Vehicle
 
 Vector3 = tuple[float, float, float]
-_LONGEST = 1_000_000  # bytes of a scene: a pipe may never end its line
 
 
 @dataclass(frozen=True)
@@ -87,40 +72,6 @@ class Scene:
     righting_moment: float  # N m, z_G W - z_B B
     noise: Noise = Noise()
     failed_thruster: Failure | None = None
-
-
-class KnownScene(NamedTuple):
-    """What the law is told of a scene: no more than this, and its measurements."""
-
-    goal: PackedRegions
-    regions: PackedRegions  # obstacles, then the depth band
-    criteria: NDArray[np.int64]  # (n,) place of each region's criterion among the paper's
-    inputs: PackedInputs  # what the arbiter decides by
-
-
-def known_scene(scene: Scene, ramp: float = 0.2) -> KnownScene:
-    """Return what the law is told of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-        With all that the plant needs.
-    ramp : float
-        Width of the arbiter's memberships [m].
-
-    Returns
-    -------
-    KnownScene
-        Arrays of its own.
-    """
-    names = [criterion.name for criterion in PAPER]
-    regions, criteria = zip(*scene_regions(scene), strict=True)
-    return KnownScene(
-        goal=pack([Region("goal", Sphere(scene.goal.centre, scene.goal.radius), "in")]),
-        regions=pack(regions),
-        criteria=np.array([names.index(criterion) for criterion in criteria], dtype=np.int64),
-        inputs=pack_inputs(list(map(SecondaryRegion, regions, criteria)), PAPER, PAPER_RULES, ramp),
-    )
 
 
 def scene_regions(scene: Scene) -> list[tuple[Region, str]]:
@@ -186,36 +137,7 @@ def plant_values(scene: Scene, vehicle: Vehicle, substep: float) -> dict[str, fl
     return values | {f"position.{axis}": v for axis, v in zip("xyz", scene.start, strict=True)}
 
 
-def decode_scene(line: bytes) -> Scene:
-    """Return the scene of a line.
-
-    Parameters
-    ----------
-    line : bytes
-        One JSON object.
-
-    Returns
-    -------
-    Scene
-        Whose numbers are finite and can be.
-
-    Raises
-    ------
-    ScenarioError
-        If it is no scene; it names the key.
-    """
-    try:
-        table = msgspec.json.decode(line)
-        if not isinstance(table, dict):
-            raise ScenarioError(f"expected one JSON object, got {type(table).__name__!r}")
-        scene = decode(table, Scene)
-    except (msgspec.MsgspecError, PlantFmuError, RecursionError, UnicodeDecodeError) as error:
-        raise ScenarioError(str(error).removeprefix("file: ")) from error
-    _check(scene)
-    return scene
-
-
-def _check(scene: Scene) -> None:
+def check_scene(scene: Scene) -> None:
     """Raise an error at the first number that cannot be, whatever the vehicle."""
     failure, noise, (shallow, deep) = scene.failed_thruster, scene.noise, scene.depth_band
     _require(0 <= scene.seed < 2**63, "seed", scene.seed, "a whole number from 0 to 2^63 - 1")
@@ -242,66 +164,3 @@ def _require(good: bool, key: str, received: object, expected: str) -> None:
 
 def _require_moderate(key: str, values: tuple[float, ...]) -> None:
     _require(all(abs(x) <= GREATEST for x in values), key, values, f"numbers up to {GREATEST:g}")
-
-
-def read_scenes(path: Path) -> Iterator[Scene]:
-    r"""Read scenes from a file, one JSON object a line; blank lines are passed over.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Yields
-    ------
-    Scene
-        In the file's order.
-
-    Raises
-    ------
-    ScenarioError
-        If the file cannot be read, or a line is no scene; it names the line and the key.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> import cosim
-    >>> _ = Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(2)))
-    >>> [scene.seed for scene in cosim.read_scenes(Path("scenes.jsonl"))]
-    [0, 1]
-    """
-    try:
-        with path.open("rb") as file:
-            yield from scenes_in(file, str(path))
-    except OSError as error:
-        raise ScenarioError(f"{path}: {error.strerror or error}") from error
-
-
-def scenes_in(file: IO[bytes], name: str) -> Iterator[Scene]:
-    """Read scenes from a file.
-
-    Parameters
-    ----------
-    file : file object
-        A line is one JSON object; blank ones are passed over. It may be a pipe that never ends.
-    name : str
-        Of where they come from, for messages.
-
-    Yields
-    ------
-    Scene
-        In their order.
-
-    Raises
-    ------
-    ScenarioError
-        At a line that is no scene; it names the line and the key.
-    """
-    for number, line in enumerate(iter(lambda: file.readline(_LONGEST + 1), b""), 1):
-        if len(line) > _LONGEST:
-            raise ScenarioError(f"{name}, line {number}: has more than {_LONGEST} bytes, expected a scene")
-        if line.strip():
-            try:
-                yield decode_scene(line)
-            except ScenarioError as error:
-                raise ScenarioError(f"{name}, line {number}: {error}") from error

@@ -12,7 +12,7 @@ from typing import IO
 
 import msgspec
 
-from cosim.campaigns.scenes.scene import scenes_in
+from cosim.campaigns.scenes.scene_file import scenes_in
 from cosim.errors import ScenarioError
 
 STANDARD_INPUT = Path("-")

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.flyer import SceneFlyer
 from cosim.campaigns.scenes.plan import Plan, plan_of
 from cosim.campaigns.scenes.rows import SCHEMA, refused_row, row_of, table_of
-from cosim.campaigns.scenes.scene import decode_scene
+from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.scenes.scene_store import SceneStore
 from cosim.campaigns.workers.work import Rows
 from cosim.errors import ScenarioError

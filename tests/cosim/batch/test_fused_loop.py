@@ -11,9 +11,12 @@ import pytest
 
 from controller import LAWS, IsmailDunniganLaw, VehicleState
 from controller.allocation import Allocation
+from controller.regions import Region, Sphere, pack
 from cosim.batch.c_calls import Clock, fmi_do_step, seconds
-from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
-from cosim.campaigns.scenes.scene import Failure, Obstacle, SphereSpec, known_scene, plant_values, read_scenes
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.flyer import SceneFlyer
+from cosim.campaigns.scenes.scene import Failure, Obstacle, SphereSpec, plant_values, scene_regions
+from cosim.campaigns.scenes.scene_file import read_scenes
 from cosim.errors import RunError, ScenarioError
 from cosim.scenario.vehicle_model import vehicle_model
 from fuzzy_arbiter import Arbiter, ramp
@@ -37,8 +40,11 @@ class Readable:
     def __init__(self, scene, conditions, law="ismail_dunnigan"):
         self.scene, self.conditions = scene, conditions
         self.vehicle = load_vehicle("odin")
-        self.known = known_scene(scene)
-        n = self.known.regions.kinds.size
+        regions, criteria = zip(*scene_regions(scene), strict=True)
+        self.goal = pack([Region("goal", Sphere(scene.goal.centre, scene.goal.radius), "in")])
+        self.regions = pack(regions)
+        self.criteria = [["obstacle", "shape", "depth"].index(name) for name in criteria]
+        n = len(regions)
         gains, level = LAWS[law].gains_type(), np.array([1.0, 0.0, 0.0, 0.0])
         self.law = LAWS[law].for_vehicle(vehicle_model(self.vehicle), gains, level, conditions.control, n)
         self.values, self.gradients, self.rotation_gradients = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3))
@@ -68,9 +74,9 @@ class Readable:
                     np.ones(8),
                 )
                 state.velocity_body[:3] += scene.noise.velocity * noise[k, 3:]
-                for regions in (self.known.goal, self.known.regions):
+                for regions in (self.goal, self.regions):
                     regions.move_to(plant.time)
-                self.known.regions.evaluate(
+                self.regions.evaluate(
                     state.position,
                     state.quaternion,
                     self.values,
@@ -79,14 +85,14 @@ class Readable:
                     self.clearances,
                 )
                 memberships = [0.0] * 3
-                for criterion, clearance in zip(self.known.criteria, self.clearances, strict=True):
+                for criterion, clearance in zip(self.criteria, self.clearances, strict=True):
                     memberships[criterion] = max(memberships[criterion], ramp(clearance, c.ramp))
-                weights[:] = np.array(arbiter(memberships))[self.known.criteria]
+                weights[:] = np.array(arbiter(memberships))[self.criteria]
                 if self.law.output == "wrench":
-                    self.law.step(state, self.known.goal, self.known.regions, weights, wrench)
+                    self.law.step(state, self.goal, self.regions, weights, wrench)
                     allocation(wrench, forces)
                 else:
-                    self.law.step(state, self.known.goal, self.known.regions, weights, forces)
+                    self.law.step(state, self.goal, self.regions, weights, forces)
                 rows.append(np.concatenate([self.position(plant), state.position, forces]))
                 variation += np.abs(forces - before).sum()
                 before[:] = forces

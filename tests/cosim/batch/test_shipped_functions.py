@@ -16,9 +16,10 @@ from controller.translator.types import type_of
 from cosim.batch.fused import FusedFlyer
 from cosim.batch.shipped_functions import shipped_functions, shipped_texts, write_libraries, write_sources
 from cosim.batch.variation import Variation
-from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.flyer import SceneFlyer
 from cosim.campaigns.scenes.generator import generate_scenes
-from cosim.campaigns.scenes.scene import read_scenes
+from cosim.campaigns.scenes.scene_file import read_scenes
 from cosim.mavlink.vehicle.proximity import Proximity
 from cosim.precheck.way import find_way
 from cosim.scenario.scenario import load_scenario

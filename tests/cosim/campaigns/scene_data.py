@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.rows import SCHEMA, table_of
 from cosim.campaigns.store.parts import write_tables
 from cosim.campaigns.store.results import Results

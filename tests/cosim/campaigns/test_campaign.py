@@ -15,11 +15,12 @@ from controller.paper_law import Gains
 from cosim.campaigns import campaign as module
 from cosim.campaigns import run_campaign
 from cosim.campaigns.analysis.summary import summarise
-from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer, Score
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.flyer import SceneFlyer, Score
 from cosim.campaigns.scenes.law_gains import gains_by_law, gains_from
 from cosim.campaigns.scenes.plan import plan_of
 from cosim.campaigns.scenes.rows import SCHEMA, row_of
-from cosim.campaigns.scenes.scene import decode_scene
+from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.scenes.scene_store import SceneStore
 from cosim.campaigns.scenes.work import SceneTask, SceneWork
 from cosim.campaigns.store.folder import PARTS, RESULTS, SUMMARY, CampaignFolder
@@ -45,7 +46,8 @@ def test_a_row_a_scene_in_order_of_seed(tmp_path, scenes):
     assert table["seed"].to_pylist() == list(range(1000, 1020))
     units = {f.name: f.metadata[b"unit"].decode() for f in table.schema}
     assert units == {
-        "seed": "", "reached": "", "violation": "", "min_clearance": "m", "bound_excess": "m", "reach_time": "s",
+        "seed": "", "reached": "", "violation": "", "min_clearance": "m", "bound_excess": "m",
+        "weighted_violation": "m.s", "reach_time": "s",
         "effort": "N.s", "thrust_variation": "N", "worst_step_time": "s", "stopped_at": "s", "refused": "", "scene": "",
     }  # fmt: skip
     assert all(f.metadata[b"description"] for f in table.schema)

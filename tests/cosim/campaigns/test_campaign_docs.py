@@ -9,9 +9,10 @@ from cosim.batch.fused import FusedFlyer
 from cosim.batch.outcome import FIELDS
 from cosim.batch.variation import Variation
 from cosim.campaigns import vary_from
-from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.rows import SCHEMA
-from cosim.campaigns.scenes.scene import Scene, decode_scene
+from cosim.campaigns.scenes.scene import Scene
+from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.sweeps.design import KINDS
 from cosim.command_line.cli import main
 from cosim.scenario.scenario import load_scenario

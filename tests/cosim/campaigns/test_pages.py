@@ -16,7 +16,7 @@ from cosim.campaigns.pages.figures import distributions, shares_up_to
 from cosim.campaigns.pages.page import Page, number
 from cosim.campaigns.pages.sections import Group, quantiles_table
 from cosim.campaigns.pages.sweep_page import write_sweep_page
-from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.conditions import Conditions
 from cosim.command_line.cli import main
 from cosim.errors import RunError
 from tests.cosim.campaigns.fake import design, fakes, paper

@@ -6,7 +6,7 @@ import signal
 import pytest
 
 from cosim.campaigns import run_campaign
-from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.store.folder import RESULTS
 from cosim.campaigns.store.results import Results
 from cosim.command_line.cli import main

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from controller import LAWS
 from cosim.campaigns.scenes.as_scenario import scene_scenario
-from cosim.campaigns.scenes.flyer import Conditions
-from cosim.campaigns.scenes.scene import decode_scene
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.scenes.scene_store import SceneStore
 from cosim.mavlink.wire.signing import read_key
 from cosim.scenario.scenario import load_scenario
@@ -81,7 +81,7 @@ def samples(seeds: Seeds) -> Case:
 @reader(
     "scenes",
     "jsonl",
-    "cosim.campaigns.scenes.scene:decode_scene",
+    "cosim.campaigns.scenes.scene_file:decode_scene",
     "cosim.campaigns.scenes.scene_store:SceneStore.__init__",
 )
 def scenes(seeds: Seeds) -> Case:

@@ -18,7 +18,7 @@ from cosim.campaigns.pages.page import Html
 from cosim.campaigns.pages.replays import replay_of
 from cosim.campaigns.pages.sweep_page import write_sweep_page
 from cosim.campaigns.reruns.repeat import repeat_of
-from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.plan import plan_of
 from cosim.campaigns.scenes.rows import SCHEMA
 from cosim.campaigns.store.folder import PLAN, RESULTS, SUMMARY

@@ -12,7 +12,7 @@ import pytest
 
 from controller import ControllerError
 from cosim.campaigns import Design, compare, run_sweep, vary_from
-from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.conditions import Conditions
 from cosim.errors import CosimError
 from cosim.scenario.scenario import load_scenario
 from fuzzy_arbiter import ArbiterError

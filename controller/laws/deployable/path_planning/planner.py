@@ -1,10 +1,10 @@
 """Path planner: a polyline from the vehicle into the goal region that keeps clear of the hard regions.
 
 A potential alone leads into pockets between obstacles. So the law keeps a path of a few corners, and tries one change
-after the other: a corner moved, added or dropped, or another end in the goal region; what `search.py` finds while the
-path is blocked, or soft regions make it dear, is a change, too. The path that costs less stays, by `cost.py`. Each period does a bounded part of
-the work. The random numbers are the law's own, so that a run repeats bit for bit. The path only sets the direction: the
-barriers keep the vehicle out of regions, whatever the path.
+after the other: a corner moved, added or dropped, or another end in the goal region. While the path is blocked, or soft
+regions make it dear, what `search.py` finds is a change, too. The path that costs less stays, by `cost.py`. Each period
+does a bounded part of the work. The random numbers are the law's own, so that a run repeats bit for bit. The path only
+sets the direction: the barriers keep the vehicle out of hard regions, whatever the path.
 """
 
 from __future__ import annotations

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cosim.campaigns.scenes.as_scenario import scene_scenario
-from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.flyer import SceneFlyer
 from cosim.campaigns.scenes.scene import Failure, Noise, Obstacle, Scene, SphereSpec
 from cosim.scenario.tables import Outage
 from cosim.simulation.master import Master

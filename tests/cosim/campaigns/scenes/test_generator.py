@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.campaigns.scenes.scene import read_scenes
+from cosim.campaigns.scenes.scene_file import read_scenes
 from cosim.command_line.cli import main
 
 SCENES = Path(__file__).parents[3] / "data" / "scenes"

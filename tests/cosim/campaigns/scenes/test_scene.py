@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from controller import LAWS, IsmailDunniganLaw
-from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
-from cosim.campaigns.scenes.scene import Failure, known_scene, plant_values, read_scenes
+from controller.regions.region_set import PackedRegions
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.flyer import SceneFlyer
+from cosim.campaigns.scenes.scene import Failure, plant_values
+from cosim.campaigns.scenes.scene_file import read_scenes
 from cosim.errors import ScenarioError
 from plant_fmu import load_vehicle
 
@@ -184,4 +187,4 @@ def test_regions_come_with_their_present_place_and_velocity(spied):
     shifts, velocities = (np.frombuffer(steps[20][2][i]).reshape(-1, 3) for i in (4, 5))
     np.testing.assert_allclose(shifts, 0.4 * velocities, rtol=1e-12)
     assert velocities[0].tolist() == LINE["obstacles"][0]["velocity"] and not velocities[1:].any()
-    assert known_scene(SCENE).regions._fields[4:6] == ("shifts", "velocities")
+    assert PackedRegions._fields[4:6] == ("shifts", "velocities")

@@ -4,7 +4,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.flyer import SceneFlyer
 from cosim.campaigns.scenes.generator import generate_scenes
 from cosim.campaigns.scenes.scene import Scene
 

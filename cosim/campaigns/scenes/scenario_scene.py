@@ -1,0 +1,71 @@
+"""A scene that is a whole scenario, but for the law: with its own vehicle, criteria and priorities."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+from typing import Any
+
+from controller import ControllerError
+from cosim.batch.fused import require_fused
+from cosim.campaigns.scenes.scene import Scene
+from cosim.errors import RunError, ScenarioError
+from cosim.scenario.scenario import Scenario, validate_scenario
+from plant_fmu import PlantFmuError
+
+_MOST = 60  # characters of a kind
+
+
+@dataclass(frozen=True)
+class ScenarioScene:
+    r"""One scene, as its line has it.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import cosim
+    >>> _ = Path("conflicts.jsonl").write_text("\n".join(cosim.generate_scenes(1, kind="conflict")))
+    >>> next(cosim.read_scenes(Path("conflicts.jsonl"))).scenario["time"]["duration"]
+    60.0
+    """
+
+    seed: int
+    kind: str  # scenes of a kind are summarised together
+    scenario: dict[str, Any]  # as its file has it, without a law
+
+    def flown_by(self, law: str, gains: dict[str, float], changes: dict[str, Any]) -> Scenario:
+        """Return the scenario with a law, its gains, and other changes of whole tables.
+
+        Raises
+        ------
+        ScenarioError
+            If it cannot be.
+        """
+        table = copy.deepcopy(self.scenario) | {"law": {"name": law, "gains": gains}} | changes
+        try:
+            return validate_scenario(table, f"{law}-scene-{self.seed}")
+        except (PlantFmuError, ControllerError) as error:
+            raise ScenarioError(str(error)) from error
+
+
+AnyScene = Scene | ScenarioScene
+
+
+def check_scenario_scene(scene: ScenarioScene) -> None:
+    """Raise `ScenarioError` at the first thing that cannot be, whatever the law."""
+    if not 0 <= scene.seed < 2**63:
+        raise ScenarioError(f"seed is {scene.seed}, expected a whole number from 0 to 2^63 - 1")
+    if not (0 < len(scene.kind) <= _MOST and scene.kind.isprintable()):
+        raise ScenarioError(f"kind is {scene.kind!r}, expected up to {_MOST} printable characters")
+    table = scene.scenario
+    if "law" in table:
+        raise ScenarioError("scenario.law is given, expected none: the campaign says by which law it is flown")
+    if str(table.get("vehicle", "")).endswith(".toml"):
+        raise ScenarioError(f"scenario.vehicle is {table['vehicle']!r}, expected one that is shipped")
+    arbiter = table.get("arbiter")
+    if isinstance(arbiter, dict) and arbiter.get("file") and not arbiter.get("text"):
+        raise ScenarioError("scenario.arbiter.text is missing, expected that of arbiter.file")
+    try:
+        require_fused(scene.flown_by("ismail_dunnigan", {}, {}))
+    except RunError as error:
+        raise ScenarioError(f"scenario.{error}") from error

@@ -1,0 +1,112 @@
+"""Files of scenes: one JSON object a line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO
+
+import msgspec
+
+from cosim.campaigns.scenes.scenario_scene import AnyScene, ScenarioScene, check_scenario_scene
+from cosim.campaigns.scenes.scene import Scene, check_scene
+from cosim.errors import ScenarioError
+from plant_fmu import PlantFmuError
+from plant_fmu.toml_tables import decode
+
+_LONGEST = 1_000_000  # bytes of a scene: a pipe may never end its line
+
+
+def decode_scene(line: bytes) -> AnyScene:
+    """Return the scene of a line.
+
+    Parameters
+    ----------
+    line : bytes
+        One JSON object.
+
+    Returns
+    -------
+    Scene or ScenarioScene
+        Whose numbers are finite and can be; the latter if the line has a ``scenario``.
+
+    Raises
+    ------
+    ScenarioError
+        If it is no scene; it names the key.
+    """
+    try:
+        table = msgspec.json.decode(line)
+        if not isinstance(table, dict):
+            raise ScenarioError(f"expected one JSON object, got {type(table).__name__!r}")
+        scene = decode(table, ScenarioScene) if "scenario" in table else decode(table, Scene)
+    except (msgspec.MsgspecError, PlantFmuError, RecursionError, UnicodeDecodeError) as error:
+        raise ScenarioError(str(error).removeprefix("file: ")) from error
+    if isinstance(scene, Scene):
+        check_scene(scene)
+    else:
+        check_scenario_scene(scene)
+    return scene
+
+
+def read_scenes(path: Path) -> Iterator[AnyScene]:
+    r"""Read scenes from a file, one JSON object a line; blank lines are passed over.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Yields
+    ------
+    Scene or ScenarioScene
+        In the file's order.
+
+    Raises
+    ------
+    ScenarioError
+        If the file cannot be read, or a line is no scene; it names the line and the key.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import cosim
+    >>> _ = Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(2)))
+    >>> [scene.seed for scene in cosim.read_scenes(Path("scenes.jsonl"))]
+    [0, 1]
+    """
+    try:
+        with path.open("rb") as file:
+            yield from scenes_in(file, str(path))
+    except OSError as error:
+        raise ScenarioError(f"{path}: {error.strerror or error}") from error
+
+
+def scenes_in(file: IO[bytes], name: str) -> Iterator[AnyScene]:
+    """Read scenes from a file.
+
+    Parameters
+    ----------
+    file : file object
+        A line is one JSON object; blank ones are passed over. It may be a pipe that never ends.
+    name : str
+        Of where they come from, for messages.
+
+    Yields
+    ------
+    Scene or ScenarioScene
+        In their order.
+
+    Raises
+    ------
+    ScenarioError
+        At a line that is no scene; it names the line and the key.
+    """
+    for number, line in enumerate(iter(lambda: file.readline(_LONGEST + 1), b""), 1):
+        if len(line) > _LONGEST:
+            raise ScenarioError(f"{name}, line {number}: has more than {_LONGEST} bytes, expected a scene")
+        if line.strip():
+            try:
+                yield decode_scene(line)
+            except ScenarioError as error:
+                raise ScenarioError(f"{name}, line {number}: {error}") from error
