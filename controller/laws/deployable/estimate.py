@@ -25,7 +25,7 @@ _GRAVITY = 9.81  # m/s2
 _FIRST_HEIGHT, _FIRST_ARM = 0.05, 0.15  # m, standard deviations at the start; the second of the weight's moments
 _FIRST_EFFECTIVENESS, _FIRST_COMMON = 0.12, 0.12  # of each thruster, and of all together
 _FIRST_LAG = 0.2  # s, of a vehicle whose file names none; else as much as it names
-_GREATEST_LAG = 1.0  # s
+_KNOWN_LAG = 1e-6  # s, standard deviation of a lag that is not estimated
 _GREATEST_EFFECTIVENESS = 1.1
 
 
@@ -175,6 +175,16 @@ def inflate_effectiveness(estimate: Estimate, j: int) -> None:
     estimate.covariance[EFFECTIVENESS + j, EFFECTIVENESS + j] += square(_FIRST_EFFECTIVENESS)
 
 
+def freeze(estimate: Estimate, gains: DeployableGains) -> None:
+    """Freeze lag and effectiveness where the gains say that they are not estimated."""
+    P = estimate.covariance
+    for i in range(LAG, estimate.state.size):
+        if (gains.lag_bound if i == LAG else gains.effectiveness_estimation) == 0.0:
+            for k in range(estimate.state.size):
+                P[i, k] = P[k, i] = 0.0
+            P[i, i] = square(_KNOWN_LAG) if i == LAG else 0.0
+
+
 def project(estimate: Estimate, gains: DeployableGains) -> None:
     """Project the unknowns onto their bounds."""
     bound = gains.restoring_bound * estimate.mass_scale[0]
@@ -186,7 +196,7 @@ def project(estimate: Estimate, gains: DeployableGains) -> None:
         _bound(estimate, i, -gains.current_bound, gains.current_bound)
     for i in range(EFFECTIVENESS, estimate.state.size):
         _bound(estimate, i, 0.0, _GREATEST_EFFECTIVENESS)
-    _bound(estimate, LAG, 0.0, _GREATEST_LAG)
+    _bound(estimate, LAG, 0.0, gains.lag_bound)
     publish(estimate)
 
 

@@ -43,10 +43,15 @@ class DeployableGains(NamedTuple):
     moment_bound: float = 150.0  # N m, of each of the other three of phi
     current_bound: float = 1.0  # m/s
     adaptation: float = 0.5  # 1/s, of the moments
+    lag_bound: float = 1.0  # s, of the thrusters; 0: no lag is estimated, nor predicted for
     # lost measurements and thrusters
     coast: float = 2.0  # s that the law goes on without valid measurements before it only holds W - B
     rise: float = 0.0  # N, lift once all but attitude is lost for that long, beside the force against W - B
     failure_threshold: float = 12.0  # log-likelihood ratio at which a thruster is isolated; 0: never
+    # parts that 0 takes out, to see what they are worth
+    effectiveness_estimation: float = 1.0  # without it, of each thruster the same
+    path_planning: float = 1.0  # without it, straight at the goal
+    barriers: float = 1.0  # without them, no region is kept but by the path
 
 
 _MAY_BE_ZERO = {
@@ -61,6 +66,10 @@ _MAY_BE_ZERO = {
     "restoring_drift",
     "current_drift",
     "adaptation",
+    "effectiveness_estimation",
+    "lag_bound",
+    "path_planning",
+    "barriers",
 }
 
 

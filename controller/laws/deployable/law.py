@@ -46,7 +46,7 @@ from controller.laws.deployable.gains import SPREADS, DeployableGains, check_gai
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.memory import DeployableMemory
 from controller.laws.deployable.model import Dynamics, Loads, make_dynamics, make_thrusters
-from controller.laws.deployable.path_planning.planner import empty_plan, improve_path
+from controller.laws.deployable.path_planning.planner import empty_plan, go_straight, improve_path
 from controller.laws.deployable.path_planning.search import PathLimits
 from controller.laws.deployable.quadratic_program import empty_workspace
 from controller.quaternion import write_rotation
@@ -117,7 +117,10 @@ def step(
         memory.position_variance[axis] = min(memory.position_variance[axis], square(2.0 * _TRUSTED_SPREAD / SPREADS))
     wider = min(spread, _TRUSTED_SPREAD)
     limits = PathLimits(gains.clearance + wider, gains.margin + wider, gains.speed, gains.depth)
-    improve_path(memory.plan, ahead.position, goal, regions, limits, period)
+    if gains.path_planning > 0.0:
+        improve_path(memory.plan, ahead.position, goal, regions, limits, period)
+    else:
+        go_straight(memory.plan, ahead.position, goal, limits)
     desired_velocity(memory.plan, ahead.position, goal.velocities[0], gains, desired)
     _limit_speed(estimate, spread, gains, desired)
     desired_acceleration(desired, ahead.velocity[:3], gains, acceleration[:3])
@@ -159,9 +162,12 @@ def step(
         memory.position_variance,
         max(memory.deviation[6], memory.deviation[7], memory.deviation[8]),
     )
-    rows = write_rows(
-        work, memory.observation, regions, memory.weights, motion, thrusters.lower, thrusters.upper, gains
-    )
+    rows = 0
+    memory.observation.bound[0] = NO_BOUND
+    if gains.barriers > 0.0:
+        rows = write_rows(
+            work, memory.observation, regions, memory.weights, motion, thrusters.lower, thrusters.upper, gains
+        )
 
     # quadratic program
     steps = quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)

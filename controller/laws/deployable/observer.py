@@ -23,6 +23,7 @@ from controller.laws.deployable.estimate import (
     NET_WEIGHT,
     VELOCITY,
     Estimate,
+    freeze,
     project,
     publish,
 )
@@ -99,6 +100,7 @@ def predict(
         thrusters.effectiveness[j] = x[EFFECTIVENESS + j]
         if P[EFFECTIVENESS + j, EFFECTIVENESS + j] > 0.0:
             P[EFFECTIVENESS + j, EFFECTIVENESS + j] += square(_WEAR) * T
+    freeze(estimate, gains)
     _propagate_deviations(estimate, thrusters, thruster_acceleration, T)
     estimate.evidence[:, :] = 0.0
     estimate.time_since_measurement[0] += period

@@ -7,16 +7,17 @@ current, noise, and a thruster that fails. `cosim.campaigns.scenes.scene` says w
 
 from __future__ import annotations
 
+import functools
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cosim.campaigns.scenes.conflicts import make_conflict
+from cosim.campaigns.scenes.trials import make_trial
 
-KINDS = ("plain", "hard", "conflict")
 
 _GOAL_RADIUS = 0.5  # m
 _FREE = 0.6  # m, from an obstacle to the start and to the goal region, at least
@@ -31,8 +32,8 @@ def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[
         How many.
     seed : int
         Of the first, 0 or above.
-    kind : {"plain", "hard", "conflict"}
-        Of all of them; conflicts are those of `cosim.campaigns.scenes.conflicts`.
+    kind : {"plain", "hard", "conflict", "trial"}
+        Of all of them; the last two as in `conflicts` and `trials` beside this module.
 
     Yields
     ------
@@ -48,7 +49,7 @@ def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[
     2
     """
     for one in range(seed, seed + count):
-        yield json.dumps(make_conflict(one) if kind == "conflict" else make_scene(one, kind))
+        yield json.dumps(MAKERS[kind](one))
 
 
 def make_scene(seed: int, kind: str = "plain") -> dict[str, Any]:
@@ -97,3 +98,11 @@ def _make_obstacle(rng: np.random.Generator, start: NDArray[np.float64], goal: N
         clear_goal = np.linalg.norm(centre - goal) - radius - _GOAL_RADIUS
         if min(clear_start, clear_goal) > _FREE:
             return {"centre": centre.tolist(), "radius": radius, "velocity": [0.0, 0.0, 0.0]}
+
+
+MAKERS: dict[str, Callable[[int], dict[str, Any]]] = {
+    "plain": make_scene,
+    "hard": functools.partial(make_scene, kind="hard"),
+    "conflict": make_conflict,
+    "trial": make_trial,
+}

@@ -149,6 +149,12 @@ def improve_path(
         plan.counts[2] = look_for_path(plan.search, start, end, random_numbers, closed, limits, plan.found)
 
 
+def go_straight(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits) -> None:
+    """Make the path a straight line to the nearest end in the goal region, whatever is in between."""
+    plan.counts[0] = 1
+    nearest_goal_point(goal, start, limits.depth, plan.path[0])
+
+
 def _choose_closed(
     plan: PathPlan, blocked: bool, start: Array, end: Array, regions: PackedRegions, margin: float
 ) -> None:

@@ -1,0 +1,153 @@
+"""Scenes that try one part of a law each: what it has to estimate, to find out, or to get round.
+
+Each scene is a scenario with hard regions alone: spheres across the way, between which it is narrow, and one thing that
+a law is not told and that is far from nominal. The generator does not know how any law fares in its scenes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from plant_fmu.vehicle import Vehicle, load_vehicle
+
+Generator = np.random.Generator
+Table = dict[str, Any]
+
+VEHICLES = ("odin", "bluerov2_heavy", "rexrov")
+_START, _GOAL = np.array([0.0, 0.0, 4.0]), np.array([10.0, 0.0, 4.0])
+_GOAL_RADIUS = 0.5  # m
+_FREE = 0.8  # m, from obstacles to start and goal
+
+
+def make_trial(seed: int) -> Table:
+    """Make the trial of a seed.
+
+    Parameters
+    ----------
+    seed : int
+        0 or above.
+
+    Returns
+    -------
+    dict
+        Its seed, its kind, which says what is tried, and the table of the scenario, without a law.
+    """
+    rng = np.random.default_rng([20261125, seed])
+    vehicle = load_vehicle(VEHICLES[int(rng.integers(len(VEHICLES)))])
+    kind = list(_KINDS)[int(rng.integers(len(_KINDS)))]
+    table = {
+        "title": f"Trial {seed}: {kind}, {vehicle.name}",
+        "vehicle": vehicle.name,
+        "time": {"duration": 60.0, "step": 0.01, "control": 0.02, "arbiter": 0.02},
+        "plant": {
+            "current": [0.0, 0.0, 0.0],
+            "substep": 0.01,
+            "parameters": {f"thrust_time_constant[{i + 1}]": 0.0 for i in range(vehicle.n_thrusters)},
+        },
+        "initial": {"position": _START.tolist()},
+        "goal": {"type": "sphere", "centre": _GOAL.tolist(), "radius": _GOAL_RADIUS},
+        "actuation": {"through": "thrusters"},
+        "sensing": {"position_noise": 0.02, "velocity_noise": 0.01, "seed": seed},
+        "regions": [
+            *(_region(f"obstacle {i + 1}", _sphere(rng)) for i in range(int(rng.integers(6, 12)))),
+            _region("depth band", {"type": "depth_band", "depth": 4.0, "tolerance": 2.5}, "depth", "in"),
+        ],
+    }
+    _KINDS[kind](rng, vehicle, table)
+    return {"seed": seed, "kind": kind, "scenario": table}
+
+
+def _region(name: str, shape: Table, criterion: str = "obstacle", keep: str = "out") -> Table:
+    return {"name": name, "criterion": criterion, "keep": keep, "gain": 100.0, "shape": shape}
+
+
+def _sphere(rng: Generator) -> Table:
+    """Return a sphere across the way, which leaves start and goal free."""
+    while True:
+        radius = rng.uniform(0.3, 0.9)
+        centre = _START + rng.uniform(0.2, 0.8) * (_GOAL - _START) + rng.normal(0.0, [0.3, 0.8, 0.8])
+        free = np.linalg.norm(centre - _START), np.linalg.norm(centre - _GOAL) - _GOAL_RADIUS
+        if min(free) - radius > _FREE:
+            return {"type": "sphere", "centre": centre.tolist(), "radius": float(radius)}
+
+
+def _net_weight(rng: Generator, vehicle: Vehicle, table: Table) -> None:
+    """Make the vehicle heavy or light by 25 to 50 N, or by 1 to 2.5 % of its weight."""
+    most = max(50.0, 0.025 * vehicle.weight)
+    net = rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.0) * most
+    table["plant"]["parameters"]["buoyancy"] = float(vehicle.weight - net)
+
+
+def _current(rng: Generator, vehicle: Vehicle, table: Table) -> None:
+    """Let a current of 0.25 to 0.5 m/s set in."""
+    heading, speed = rng.uniform(-np.pi, np.pi), rng.uniform(0.25, 0.5)
+    table["plant"]["current"] = [float(speed * np.cos(heading)), float(speed * np.sin(heading)), 0.0]
+
+
+def _moments(rng: Generator, vehicle: Vehicle, table: Table) -> None:
+    """Displace the centre of buoyancy by 2 to 5 cm from the vertical, so that the vehicle would rest tilted."""
+    heading, arm = rng.uniform(-np.pi, np.pi), rng.uniform(0.02, 0.05)
+    parameters = table["plant"]["parameters"]
+    parameters["r_B.x"] = float(vehicle.r_B[0] + arm * np.cos(heading))
+    parameters["r_B.y"] = float(vehicle.r_B[1] + arm * np.sin(heading))
+
+
+def _effectiveness(rng: Generator, vehicle: Vehicle, table: Table) -> None:
+    """Wear each thruster to 0.6 to 1 of its force."""
+    wear = rng.uniform(0.6, 1.0, vehicle.n_thrusters).tolist()
+    table["plant"]["parameters"] |= {f"thrust_effectiveness[{i + 1}]": x for i, x in enumerate(wear)}
+
+
+def _lag(rng: Generator, vehicle: Vehicle, table: Table) -> None:
+    """Let the thrusters lag by 0.2 to 0.5 s, which the vehicle's file does not say."""
+    lag = float(rng.uniform(0.2, 0.5))
+    table["plant"]["parameters"] = {f"thrust_time_constant[{i + 1}]": lag for i in range(vehicle.n_thrusters)}
+
+
+def _failure(rng: Generator, vehicle: Vehicle, table: Table) -> None:
+    """Let a thruster fail on the way, or stick."""
+    table["failures"] = [
+        {
+            "thruster": int(rng.integers(1, vehicle.n_thrusters + 1)),
+            "time": float(rng.uniform(2.0, 8.0)),
+            "stuck": bool(rng.integers(2)),
+        }
+    ]
+
+
+def _pocket(rng: Generator, vehicle: Vehicle, table: Table) -> None:
+    """Put a pocket across the way, open towards the start, in the place of the spheres."""
+    at, deep, half = rng.uniform(5.0, 7.0), rng.uniform(1.5, 3.5), rng.uniform(1.0, 2.0)
+    walls = {
+        "back": ((at, at + 0.4), (-half - 0.4, half + 0.4)),
+        "left": ((at - deep, at), (-half - 0.4, -half)),
+        "right": ((at - deep, at), (half, half + 0.4)),
+    }
+    table["regions"] = [
+        table["regions"][-1],
+        *(
+            _region(
+                name,
+                {
+                    "type": "box",
+                    "centre": [sum(x) / 2.0, sum(y) / 2.0, 4.0],
+                    "size": [x[1] - x[0], y[1] - y[0], 8.0],
+                },
+            )
+            for name, (x, y) in walls.items()
+        ),
+    ]
+
+
+_KINDS: dict[str, Callable[[Generator, Vehicle, Table], None]] = {
+    "net weight": _net_weight,
+    "current": _current,
+    "moments": _moments,
+    "effectiveness": _effectiveness,
+    "lag": _lag,
+    "failure": _failure,
+    "pocket": _pocket,
+}
