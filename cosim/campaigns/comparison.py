@@ -99,7 +99,7 @@ def compare(
         law_named(law)
     if len(laws) < 2 or len(set(laws)) < len(laws):
         raise RunError(f"laws are {', '.join(laws) or 'none'}, expected two or more, each once")
-    _refuse_strangers(out)
+    refuse_strangers(out, {NUMBERS, PAGE, *LAWS}, "a comparison")
     campaigns = {}
     with SceneStore(scenes) as store:
         for law in laws:
@@ -190,9 +190,10 @@ def completed(results: Results) -> Any:
     return results["reached"] & ~results["violation"]
 
 
-def _refuse_strangers(out: Path) -> None:
+def refuse_strangers(out: Path, own: set[str], what: str) -> None:
+    """Raise `RunError` if a folder holds anything but its own names and what pages leave; `what` it should hold."""
     if out.is_dir():
-        known = {NUMBERS, PAGE, FIGURES, WORST, f".{NUMBERS}", f".{PAGE}", *LAWS}
+        known = {*own, *(f".{name}" for name in own), FIGURES, WORST}
         strange = sorted(p.name for p in out.iterdir() if p.name not in known and not p.name.startswith(f".{FIGURES}"))
         if strange:
-            raise RunError(f"{out}: holds {strange[0]!r}, expected a new folder or that of a comparison")
+            raise RunError(f"{out}: holds {strange[0]!r}, expected a new folder or that of {what}")

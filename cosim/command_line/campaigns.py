@@ -1,4 +1,4 @@
-"""``cosim campaign`` and ``cosim compare``."""
+"""``cosim campaign``, ``cosim compare`` and ``cosim ablate``."""
 
 from __future__ import annotations
 
@@ -38,8 +38,16 @@ def add_verbs(verbs: Any) -> None:
         help="set a gain of a law, such as ismail_dunnigan.k_p1=10; may be repeated",
     )  # fmt: skip
 
+    ablate = verbs.add_parser("ablate", help="fly the same scenes by the deployable law, and without one part each")
+    _add_scenes(ablate, arbiter=False)
+    ablate.add_argument("--variants", metavar="A[,B]", help="such as net-weight,arbiter-reversed (default: all)")
+    ablate.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
+        help="set a gain of all variants, such as speed=0.8; may be repeated",
+    )  # fmt: skip
 
-def _add_scenes(verb: argparse.ArgumentParser) -> None:
+
+def _add_scenes(verb: argparse.ArgumentParser, arbiter: bool = True) -> None:
     verb.add_argument("scenes", type=Path, metavar="SCENES.jsonl", help="a scene a line; - for standard input")
     verb.add_argument(
         "--out", type=Path, required=True, metavar="DIR",
@@ -54,6 +62,12 @@ def _add_scenes(verb: argparse.ArgumentParser) -> None:
         "compass, pressure sensor and USBL (default: state)",
     )  # fmt: skip
 
+    if arbiter:
+        verb.add_argument(
+            "--arbiter", choices=("ordered", "reversed", "crisp", "none"), default="ordered",
+            help="weigh criteria by their order (default), in reversed order, by memberships of 0 or 1, or all with 1",
+        )  # fmt: skip
+
 
 def add_replays(verb: argparse.ArgumentParser) -> None:
     """Add the flag that says how many of the worst are shown."""
@@ -63,15 +77,21 @@ def add_replays(verb: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
+def _conditions(options: argparse.Namespace) -> Any:
+    from cosim.campaigns.scenes.conditions import Conditions
+
+    arbiter: Any = getattr(options, "arbiter", "ordered")
+    return Conditions(tell_failures=options.tell_failures, sensing=options.sensing, arbiter=arbiter)
+
+
 def campaign(options: argparse.Namespace) -> int:
     """Run ``cosim campaign``."""
     from cosim.campaigns import run_campaign
     from cosim.campaigns.pages.campaign_page import campaign_lines, write_campaign_page
-    from cosim.campaigns.scenes.conditions import Conditions
     from cosim.campaigns.scenes.law_gains import gains_from
 
     gains = gains_from(options.law, options.settings)
-    conditions = Conditions(tell_failures=options.tell_failures, sensing=options.sensing)
+    conditions = _conditions(options)
 
     def run() -> None:
         done = run_campaign(
@@ -89,12 +109,11 @@ def compare(options: argparse.Namespace) -> int:
     """Run ``cosim compare``."""
     from cosim.campaigns import compare as compare_laws
     from cosim.campaigns.pages.comparison_page import write_comparison_page
-    from cosim.campaigns.scenes.conditions import Conditions
     from cosim.campaigns.scenes.law_gains import gains_by_law
 
     laws = [law.strip() for law in options.laws.split(",") if law.strip()]
     gains = gains_by_law(laws, options.settings)
-    conditions = Conditions(tell_failures=options.tell_failures, sensing=options.sensing)
+    conditions = _conditions(options)
 
     def run() -> None:
         done = compare_laws(
@@ -103,6 +122,31 @@ def compare(options: argparse.Namespace) -> int:
         for law, s in done.numbers["laws"].items():
             say(options, f"{law}: {s['reached']} of {s['scenes']} scenes reached, {s['violations']} with a violation")
         print(write_comparison_page(options.out, options.replays))
+
+    return resumable(run, options.out)
+
+
+def ablate(options: argparse.Namespace) -> int:
+    """Run ``cosim ablate``."""
+    from cosim.campaigns.ablation import VARIANTS
+    from cosim.campaigns.ablation import ablate as fly_variants
+    from cosim.campaigns.pages.ablation_page import write_ablation_page
+
+    names = list(VARIANTS) if options.variants is None else [name.strip() for name in options.variants.split(",")]
+    conditions = _conditions(options)
+
+    def run() -> None:
+        done = fly_variants(
+            options.scenes, options.out, names, conditions, options.settings, options.workers, not options.quiet
+        )
+        for name, of in done.numbers["variants"].items():
+            violated = of["weighted_violation"]["other"]
+            weighted = "" if violated is None else f", weighted violation {violated:.4g} m s on average"
+            say(
+                options,
+                f"{name} ({of['what']}): {of['completed']['rows']} of {of['scenes']} scenes completed{weighted}",
+            )
+        print(write_ablation_page(options.out, options.replays))
 
     return resumable(run, options.out)
 

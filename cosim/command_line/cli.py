@@ -263,6 +263,7 @@ _VERBS = {
     "export": export.export,
     "package": package.package,
     "scenes": scenes.scenes,
+    "ablate": campaigns.ablate,
     "campaign": campaigns.campaign,
     "compare": campaigns.compare,
     "sweep": sweep.sweep,

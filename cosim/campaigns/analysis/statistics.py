@@ -21,6 +21,7 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 CHANCE = 0.01  # how often chance alone makes an effect or a rank correlation that is told
 _BINS = 6  # at the most; fewer distinct values have one each
 _LEAST_ROWS = 16  # of which an effect is told: two bins of eight
+_RESAMPLES = 2000  # of a bootstrap
 _ROUNDING = 1e-14  # of a number, within which an outcome is constant
 
 
@@ -192,3 +193,37 @@ def median_difference(differences: Array) -> dict[str, Any]:
     interval = quantile_test(differences, q=0.0, p=0.5).confidence_interval(CONFIDENCE)
     low, high = (float(x) if np.isfinite(x) else None for x in (interval.low, interval.high))
     return {"pairs": n, "median": float(np.median(differences)), "low": low, "high": high}
+
+
+def mean_ratio(one: Array, other: Array) -> dict[str, Any]:
+    """Return the means of two laws over the same rows, and their ratio with its 95 % interval.
+
+    Parameters
+    ----------
+    one, other : ndarray, shape (n,)
+        Numbers of the same rows, at least 0; rows in which either is none are left out.
+
+    Returns
+    -------
+    dict
+        ``pairs``, the means ``one`` and ``other``, their ``ratio``, and ``low`` and ``high`` of its interval by the
+        bootstrap over rows, by percentiles; None where there are no rows, or the other mean is 0.
+    """
+    there = np.isfinite(one) & np.isfinite(other)
+    one, other = one[there], other[there]
+    n = len(one)
+    if not n:
+        return {"pairs": 0, "one": None, "other": None, "ratio": None, "low": None, "high": None}
+    found: dict[str, Any] = {"pairs": n, "one": float(one.mean()), "other": float(other.mean())}
+    if not found["other"] > 0.0:
+        return found | {"ratio": None, "low": None, "high": None}
+    rng, ratios = np.random.default_rng(0), np.empty(_RESAMPLES)
+    for i in range(_RESAMPLES):
+        rows = rng.integers(n, size=n)
+        below = other[rows].sum()
+        ratios[i] = one[rows].sum() / below if below > 0.0 else np.inf
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    low, high = (
+        float(x) if np.isfinite(x) else None for x in np.quantile(ratios, [tail, 1.0 - tail], method="nearest")
+    )
+    return found | {"ratio": found["one"] / found["other"], "low": low, "high": high}

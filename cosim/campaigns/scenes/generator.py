@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from cosim.campaigns.scenes.conflicts import make_conflict
 from cosim.campaigns.scenes.trials import make_trial
 
-
 _GOAL_RADIUS = 0.5  # m
 _FREE = 0.6  # m, from an obstacle to the start and to the goal region, at least
 

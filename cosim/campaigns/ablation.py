@@ -1,0 +1,174 @@
+"""What the parts of the deployable law are worth: the same scenes flown with all of it, and without one part each."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cosim.campaigns.analysis.statistics import Facts, mean_ratio, median_difference, paired, rate
+from cosim.campaigns.campaign import Campaign, run_campaign
+from cosim.campaigns.comparison import completed, refuse_strangers
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.kinds import scene_kinds
+from cosim.campaigns.scenes.law_gains import gains_from
+from cosim.campaigns.scenes.scene_store import SceneStore
+from cosim.campaigns.store.results import Results
+from cosim.errors import RunError
+from cosim.io.atomic_file import write_atomic
+from cosim.io.strict_json import json_text
+from cosim.scenario.rule_variants import RuleVariant
+from plant_fmu.toml_tables import hint
+
+LAW, WHOLE = "deployable", "whole"
+NUMBERS = "ablation.json"
+PAGE = "ablation.html"
+_ZERO = 1e-9  # of a bound that must be above 0
+
+
+class Variant(NamedTuple):
+    """The law without a part."""
+
+    what: str  # in words
+    gains: Mapping[str, float] = {}
+    arbiter: RuleVariant = "ordered"
+
+
+VARIANTS: dict[str, Variant] = {
+    "arbiter-reversed": Variant("criteria weighed in reversed order", arbiter="reversed"),
+    "arbiter-none": Variant("all weights 1", arbiter="none"),
+    "arbiter-crisp": Variant("memberships of 0 or 1", arbiter="crisp"),
+    "net-weight": Variant("W - B taken for 0", {"restoring_bound": _ZERO}),
+    "current": Variant("current taken for 0", {"current_bound": _ZERO}),
+    "moments": Variant("moments of the weight taken for 0", {"moment_bound": _ZERO}),
+    "effectiveness": Variant("the same effectiveness of all thrusters", {"effectiveness_estimation": 0.0}),
+    "lag": Variant("no lag of the thrusters, and no prediction", {"lag_bound": 0.0}),
+    "fault-detection": Variant("no thruster is isolated", {"failure_threshold": 0.0}),
+    "path-planning": Variant("straight at the goal", {"path_planning": 0.0}),
+    "barriers": Variant("no barriers", {"barriers": 0.0}),
+}
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """Where it was written, and what it came to."""
+
+    folder: Path
+    campaigns: dict[str, Campaign]  # by variant, the whole law first
+    numbers: dict[str, Any]
+
+
+def ablate(
+    scenes: Path,
+    out: Path,
+    variants: Sequence[str] = tuple(VARIANTS),
+    conditions: Conditions | None = None,
+    settings: Sequence[str] = (),
+    workers: int = 1,
+    progress: bool = False,
+) -> Ablation:
+    r"""Fly the same scenes by the deployable law, and by it without one part each.
+
+    Parameters
+    ----------
+    scenes : Path
+        A file of one JSON object a line, ``-`` for standard input.
+    out : Path
+        A folder that does not exist, is empty, or holds an ablation of the same scenes: it goes on.
+    variants : sequence of str
+        Of `VARIANTS`.
+    conditions : Conditions, optional
+        How scenes are flown; the arbiter is the variant's.
+    settings : sequence of str
+        ``key=value``, gains of all variants.
+    workers : int
+        Processes.
+    progress : bool
+        Show a bar for each variant, if there is a terminal.
+
+    Returns
+    -------
+    Ablation
+        With a campaign for each variant.
+
+    Raises
+    ------
+    RunError
+        If there is no such variant, or the folder holds something else or cannot be written.
+    Exception
+        Whatever `run_campaign` raises.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import cosim
+    >>> from cosim.campaigns.ablation import ablate
+    >>> _ = Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(1)))
+    >>> done = ablate(Path("scenes.jsonl"), Path("parts"), ["net-weight"])
+    >>> sorted(done.campaigns)
+    ['net-weight', 'whole']
+    """
+    for name in variants:
+        if name not in VARIANTS:
+            raise RunError(f"variant {name!r} is unknown; {hint(name, VARIANTS)}")
+    if not variants or len(set(variants)) < len(variants):
+        raise RunError(f"variants are {', '.join(variants) or 'none'}, expected one or more, each once")
+    refuse_strangers(out, {NUMBERS, PAGE, WHOLE, *VARIANTS}, "an ablation")
+    gains, conditions, campaigns = gains_from(LAW, settings), conditions or Conditions(), {}
+    with SceneStore(scenes) as store:
+        for name in (WHOLE, *variants):
+            variant = VARIANTS.get(name, Variant("all of it"))
+            campaigns[name] = run_campaign(
+                store, LAW, out / name, dataclasses.replace(conditions, arbiter=variant.arbiter),
+                gains._replace(**variant.gains), workers, progress=progress,
+            )  # fmt: skip
+        whole = campaigns[WHOLE].results
+        numbers = {
+            "law": LAW,
+            "scenes": len(store),
+            "scenes_sha256": store.digest,
+            "variants": {
+                name: {
+                    "what": VARIANTS[name].what if name in VARIANTS else "all of it",
+                    **_beside(whole, campaign.results),
+                }
+                for name, campaign in campaigns.items()
+            },
+            "versions": campaigns[WHOLE].summary["versions"],
+            "code_sha256": campaigns[WHOLE].summary["code_sha256"],
+        }
+    try:
+        write_atomic(out / NUMBERS, json_text(numbers))
+    except OSError as error:
+        raise RunError(f"{out}: {error.strerror or error}") from error
+    return Ablation(out, campaigns, numbers)
+
+
+def _beside(whole: Results, results: Results) -> dict[str, Any]:
+    """Return what a variant comes to beside the whole law, over all scenes and by their kinds."""
+    every = np.ones(len(results), dtype=bool)
+    return _numbers(whole, results, every) | {
+        "kinds": {name: _numbers(whole, results, of) for name, of in scene_kinds(results).groups()}
+    }
+
+
+def _numbers(whole: Results, results: Results, of: Facts) -> dict[str, Any]:
+    """Return the numbers of some scenes; ratios and differences are of the whole law to this variant."""
+    theirs, mine = completed(results)[of], completed(whole)[of]
+    violation = {name: rows.number("weighted_violation", absent=np.nan)[of] for name, rows in
+                 ((WHOLE, whole), ("variant", results))}  # fmt: skip
+    both = theirs & mine
+    return {
+        "scenes": int(of.sum()),
+        "completed": rate(theirs),
+        "reached": rate(results["reached"][of]),
+        "violation": rate(results["violation"][of]),
+        "paired": paired(mine, theirs),
+        "weighted_violation": mean_ratio(violation[WHOLE], violation["variant"]),
+        "reach_time": median_difference((whole.number("reach_time")[of] - results.number("reach_time")[of])[both]),
+        "thrust_variation": mean_ratio(whole.number("thrust_variation")[of], results.number("thrust_variation")[of]),
+    }
