@@ -204,7 +204,7 @@ def correct_by_moment(
             row[LAG] += thrusters.matrix[3 + i, j] * estimate.by_lag[j] * x[EFFECTIVENESS + j]
             variance += square(_RIPPLE * given)
             variance += square(thrusters.matrix[3 + i, j] * estimate.by_lag[j]) * lag_variance
-        _correct(estimate, moment[i] - expected, variance, 1.0)
+        _correct(estimate, moment[i] - expected, variance, 1.0, 0, row.size)
     estimate.direct[:] = 0.0
     project(estimate, gains)
 
@@ -244,21 +244,25 @@ def correct(estimate: Estimate, first: int, measured: Array, noise: float, gains
         if not np.isnan(measured[axis]):
             estimate.row[:] = 0.0
             estimate.row[first + axis] = 1.0
-            _correct(estimate, measured[axis] - x[first + axis], square(noise), estimate.weight[0])
+            at = first + axis
+            _correct(estimate, measured[axis] - x[at], square(noise), estimate.weight[0], at, at + 1)
     project(estimate, gains)
     return True
 
 
-def _correct(estimate: Estimate, innovation: float, noise: float, weight: float) -> None:
-    """Correct by one number, whose `row` is set; add weighted evidence of each hypothesis, propagate its deviation."""
+def _correct(estimate: Estimate, innovation: float, noise: float, weight: float, begin: int, end: int) -> None:
+    """Correct by one number; add weighted evidence of each hypothesis, and propagate its deviation.
+
+    The `row` of the number is set, and 0 but from `begin` to before `end`.
+    """
     P, row, gain = estimate.covariance, estimate.row, estimate.gain
     n, variance = row.size, noise
     gain[:] = 0.0
-    for k in range(n):
+    for k in range(begin, end):
         if row[k] != 0.0:
             for i in range(n):
                 gain[i] += P[k, i] * row[k]
-    for i in range(n):
+    for i in range(begin, end):
         variance += gain[i] * row[i]
     variance = max(variance, square(innovation / _OUTLIER))
     for i in range(n):
@@ -266,11 +270,13 @@ def _correct(estimate: Estimate, innovation: float, noise: float, weight: float)
         estimate.state[i] += share * innovation
         for k in range(n):
             P[i, k] -= share * gain[k]
+    for k in range(n):
+        gain[k] /= variance
     for j in range(estimate.direct.size):
         expected = estimate.direct[j]
-        for k in range(n):
+        for k in range(begin, end):
             expected += row[k] * estimate.deviation[j, k]
         estimate.evidence[0, j] += weight * expected * innovation / variance
         estimate.evidence[1, j] += weight * square(expected) / variance
         for k in range(n):
-            estimate.deviation[j, k] -= gain[k] / variance * expected
+            estimate.deviation[j, k] -= gain[k] * expected
