@@ -3,7 +3,7 @@
 Scenes flown by one law or by several, or one scenario with numbers of it varied. Public: `run_campaign`, `compare`,
 `run_sweep`, `vary_from`.
 
-Imports: controller, io, report, run, scenario.
+Imports: controller, io, plant_fmu, report, run, scenario.
 """
 
 import importlib

@@ -18,6 +18,7 @@ LABELS = {  # of columns: what they are called, with unit
     "reach_time": "reach time [s]",
     "settle_time": "settle time [s]",
     "min_clearance": "least clearance [m]",
+    "weighted_violation": "weighted violation [m s]",
     "closest_to_goal": "least distance to the goal [m]",
     "effort": "effort [N s]",
     "thrust_variation": "thrust variation [N]",

@@ -44,7 +44,7 @@ def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions
         If the law cannot work with the gains, or there is no such vehicle.
     """
     if isinstance(scene, ScenarioScene):
-        return scene.flown_by(law, gains._asdict(), _changes(scene, conditions))
+        return scene.with_law(law, gains._asdict(), _changes(scene, conditions))
     vehicle = load_vehicle(VEHICLE)
     values = plant_values(scene, vehicle, conditions.plant_step)
     table = {

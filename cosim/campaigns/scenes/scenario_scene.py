@@ -33,7 +33,7 @@ class ScenarioScene:
     kind: str  # scenes of a kind are summarised together
     scenario: dict[str, Any]  # as its file has it, without a law
 
-    def flown_by(self, law: str, gains: dict[str, float], changes: dict[str, Any]) -> Scenario:
+    def with_law(self, law: str, gains: dict[str, float], changes: dict[str, Any]) -> Scenario:
         """Return the scenario with a law, its gains, and other changes of whole tables.
 
         Raises
@@ -66,6 +66,6 @@ def check_scenario_scene(scene: ScenarioScene) -> None:
     if isinstance(arbiter, dict) and arbiter.get("file") and not arbiter.get("text"):
         raise ScenarioError("scenario.arbiter.text is missing, expected that of arbiter.file")
     try:
-        require_fused(scene.flown_by("ismail_dunnigan", {}, {}))
+        require_fused(scene.with_law("ismail_dunnigan", {}, {}))
     except RunError as error:
         raise ScenarioError(f"scenario.{error}") from error

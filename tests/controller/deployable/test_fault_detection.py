@@ -215,7 +215,7 @@ def test_the_evidence_is_the_log_likelihood_ratio():
         variance = 1.0 + estimate.row @ estimate.covariance @ estimate.row
         innovation = rng.normal() * np.sqrt(variance)
         expected = estimate.deviation @ estimate.row
-        observer._correct(estimate, innovation, 1.0, 1.0)
+        observer._correct(estimate, innovation, 1.0, 1.0, 0, estimate.row.size)
         ratio = estimate.evidence[0] - 0.5 * estimate.evidence[1]
         densities = norm.logpdf(innovation, expected, np.sqrt(variance)) - norm.logpdf(
             innovation, 0.0, np.sqrt(variance)
@@ -243,7 +243,7 @@ def test_an_innovation_beyond_three_standard_deviations_counts_as_three():
         spread = np.sqrt(1.0 + estimate.covariance[3, 3])
         estimate.deviation[0, 3] = 1.0
         before, gain = estimate.state[3], estimate.covariance[3, 3]
-        observer._correct(estimate, sigmas * spread, 1.0, 1.0)
+        observer._correct(estimate, sigmas * spread, 1.0, 1.0, 0, estimate.row.size)
         effective = spread * sigmas / counted
         assert estimate.state[3] - before == pytest.approx(gain / effective**2 * sigmas * spread, rel=1e-9)
         assert estimate.evidence[0, 0] == pytest.approx(counted / effective, rel=1e-9)

@@ -42,17 +42,23 @@ def soft_clearance(packed, point, later=0.0):
     return clearance_at(packed, 3, point - packed.velocities[3] * later)
 
 
+def price(depth):
+    """Return what a soft region costs beside its own price: by its depth, and half a metre for being entered."""
+    return max(depth, 0.0) + 0.5 * np.clip(depth / 0.2, 0.0, 1.0)
+
+
 def expected_cost(points, packed, gains=GAINS):
-    """Look at all regions at each stride: what is far cannot matter. Return the cost, and what hard regions add."""
+    """Look at all regions at each stride. Return the cost, what hard regions add, and soft ones on the way."""
     points = np.asarray(points)
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    enough, total, penalty, samples = gains.clearance + 3.0 / 0.7, lengths.sum(), 0.0, 0
+    enough, total, penalty, through, samples = gains.clearance + 3.0 / 0.7, lengths.sum(), 0.0, 0.0, 0
+    stay = 3.0 * packed.crossing_costs[3] * price(-soft_clearance(packed, points[-1]))
     for leg, length in enumerate(lengths):
         s = 0.0
         while s < length:
             if samples == 512:
                 penalty += 200.0 * (length - s + lengths[leg + 1 :].sum())
-                return total + penalty, penalty
+                return total + penalty + through + stay, penalty, through
             samples += 1
             gone = lengths[:leg].sum() + s
             at = points[leg] + (points[leg + 1] - points[leg]) * s / length
@@ -61,13 +67,13 @@ def expected_cost(points, packed, gains=GAINS):
             room = min(3.0, max(0.25, abs(soft)))
             stride = max(0.7 * (free - gains.clearance), 0.5 * (free - gains.margin), 0.08)
             stride = min(stride, room, length - s + 1e-9)
-            total += stride * 2.0 * np.clip(-soft / 0.2, 0.0, 1.0)
+            through += stride * packed.crossing_costs[3] * price(-soft)
             penalty += stride * 3.0 * (max(gains.clearance - free, 0.0) / gains.clearance) ** 2
             if free < gains.margin:
                 deep = gains.margin - free
                 penalty += stride * 200.0 * (min(deep / 0.1, 1.0) + deep)
             s += stride
-    return total + penalty, penalty
+    return total + penalty + through + stay, penalty, through
 
 
 def cost_of(way, count, packed, start=START, most=np.inf):
@@ -91,13 +97,14 @@ def test_the_cost_is_that_of_looking_everywhere():
         way, count = random_way(rng, 20.0 if k % 6 == 0 else 1.0)
         packed.move_to(0.1 * k)
         packed.velocities[:3] = rng.normal(size=(3, 3)) * rng.choice([0.05, 0.4])
-        expected, penalty = expected_cost([START, *way[:count]], packed)
+        packed.crossing_costs[3] = rng.uniform(0.2, 10.0)
+        expected, penalty, through = expected_cost([START, *way[:count]], packed)
         found, took = cost_of(way, count, packed)
-        assert found == pytest.approx([expected, penalty], rel=1e-9)
+        assert found == pytest.approx([expected, penalty, through], rel=1e-9)
         calls.append(took)
         length = np.linalg.norm(np.diff([START, *way[:count]], axis=0), axis=1).sum()
         dear, long = dear + (penalty > 0.2 * length), long + (penalty > 50.0 * length)
-        soft += expected - penalty > length + 0.1
+        soft += through > 0.1
     assert dear > 20 and long > 1 and soft > 3 and min(calls) == 1 and max(calls) > 1
 
 
@@ -110,13 +117,45 @@ def test_a_way_that_costs_too_much_is_not_evaluated_to_its_end():
 
 
 def test_soft_regions_are_avoided_where_that_is_no_long_way_round():
-    """A disc across the way: at 2.0 m more for each metre within it, all that is violated by 0.2 m or more."""
+    """A ball across the way: 2 m more for each metre within it, times its depth and half a metre for being entered."""
     disc = pack([Region("disc", Sphere((4.0, 0.2, 2.5), 1.5), "out", hard=False)])
     through, round_it = np.zeros((2, CORNERS + 1, 3))
     through[0] = round_it[1] = 8.0, 0.2, 2.5
     round_it[0] = 4.0, 1.9, 2.5
-    assert 8.0 + 2.0 * 2.6 < cost_of(through, 1, disc)[0][0] < 8.0 + 2.0 * 3.3
-    assert cost_of(round_it, 2, disc)[0] == pytest.approx([2.0 * np.hypot(4.0, 1.7), 0.0], abs=0.3)
+    deep = np.maximum(1.5 - np.abs(np.linspace(-4.0, 4.0, 8001)), 0.0)
+    exact = 8.0 + 2.0 * np.mean(deep + 0.5 * np.minimum(deep / 0.2, 1.0)) * 8.0
+    assert cost_of(through, 1, disc)[0] == pytest.approx([exact, 0.0, exact - 8.0], rel=0.15)
+    assert cost_of(round_it, 2, disc)[0] == pytest.approx([2.0 * np.hypot(4.0, 1.7), 0.0, 0.0], abs=0.3)
+
+
+def test_a_stay_within_a_soft_region_costs_as_three_metres_through_it():
+    ball = pack([Region("ball", Sphere((4.0, 0.2, 2.5), 1.5), "out", hard=False, crossing_cost=7.0)])
+    way = np.zeros((CORNERS + 1, 3))
+    way[0] = 3.0, 0.2, 2.5
+    cost, penalty, through = cost_of(way, 1, ball)[0]
+    assert cost - through - 3.0 == pytest.approx(3.0 * 7.0 * (0.5 + 0.5), rel=1e-12) and penalty == 0.0
+
+
+def test_the_trees_leave_dear_regions_for_cheap_ones():
+    """A wall has a door, and ends; a region lies in the door, another one beside the wall: the cheap one is passed."""
+    start, goal = np.array([0.0, 0.0, 2.5]), pack([GOAL])
+    scene = [
+        Region("door", Box((4.0, 0.0, 2.5), (2.0, 2.0, 40.0)), "out", hard=False),
+        Region("left", Box((4.0, -10.5, 2.5), (1.0, 19.0, 40.0)), "out"),
+        Region("right", Box((4.0, 3.0, 2.5), (1.0, 4.0, 40.0)), "out"),
+        Region("beside", Box((4.0, 15.0, 2.5), (2.0, 20.0, 40.0)), "out", hard=False),
+    ]
+    ends = {}
+    for costs in ((20.0, 0.2), (0.2, 20.0)):
+        packed, plan = pack(scene), empty_plan(len(scene), 1)
+        packed.crossing_costs[[0, 3]] = costs
+        for _ in range(1500):
+            improve_path(plan, start, goal, packed, GAINS, 0.02)
+        points = np.array([start, *plan.path[: plan.counts[0]]])
+        (leg,) = (i for i in range(len(points) - 1) if points[i, 0] <= 4.0 < points[i + 1, 0])
+        share = (4.0 - points[leg, 0]) / (points[leg + 1, 0] - points[leg, 0])
+        ends[costs] = points[leg, 1] + share * (points[leg + 1, 1] - points[leg, 1])
+    assert 5.0 < ends[20.0, 0.2] < 8.0 and -1.0 < ends[0.2, 20.0] < 1.0
 
 
 def test_the_nearest_end_is_along_the_slope_where_the_goal_is_deep_enough():
@@ -400,7 +439,8 @@ def test_a_way_is_kept_up_and_replaced_by_one_that_saves_enough():
         while len(before) > 1 and np.linalg.norm(before[0] - start) < 0.25:
             before = before[1:]
         blocked = plan.cost[1] > 0.3 * np.linalg.norm(np.diff([start, *way], axis=0), axis=1).sum()
-        assert blocked or plan.search.room[0] == 3.0
+        dear = plan.cost[2] > 0.3 * np.linalg.norm(np.diff([start, *way], axis=0), axis=1).sum()
+        assert blocked or dear or plan.search.room[0] == 3.0
         grown += plan.search.of_goal.size[0] != nodes
         if phase == way_round._BEGIN and plan.phase[0] == way_round._CANDIDATE:  # the path, in one call
             np.testing.assert_allclose(way, before, rtol=1e-12)
@@ -461,5 +501,5 @@ def test_what_is_found_far_away_is_not_looked_at_again(monkeypatch):
     ):  # fmt: skip
         evaluated.clear()
         regions = pack([Region("ball", Sphere((3.0, 0.2 + aside, 2.5), 0.3), "out", hard=hard)])
-        assert cost_of(way, 1, regions)[0] == pytest.approx([6.0, 0.0])
+        assert cost_of(way, 1, regions)[0] == pytest.approx([6.0, 0.0, 0.0])
         assert least <= len(evaluated) <= most

@@ -116,7 +116,9 @@ def test_only_pure_numbers_among_gains_have_no_unit():
     without = {
         (name, gain) for name, law in LAWS.items() for gain in law.gains_type._fields if not unit_of_gain(name, gain)
     }
-    assert without == {("ismail_dunnigan", "k_q"), ("deployable", "braking_share"), ("deployable", "failure_threshold")}
+    assert without == {("ismail_dunnigan", "k_q"), ("deployable", "braking_share"), ("deployable", "failure_threshold"),
+        *(("deployable", part) for part in ("effectiveness_estimation", "path_planning", "barriers")),
+    }  # fmt: skip
 
 
 def test_every_key_of_a_shape_has_a_unit_or_none():

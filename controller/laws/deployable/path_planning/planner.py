@@ -37,7 +37,7 @@ _BETTER = 0.03  # m, and
 _BETTER_PART = 0.01  # of its cost, that a candidate must save to be taken
 _BLOCKED = 0.3  # of its length, cost of passing regions above which the trees search for another path
 _HARD, _ALL, _DEAR = 0, 1, 2  # regions that they keep out of: hard ones; soft ones, too; of these the dearer ones
-_LOOKS = 100  # for a path, before the trees keep out of others
+_LOOKS = (100, 800)  # for a path, before the trees keep out of others: at first, and at most
 _PASSED = 0.25  # m from a corner, within which it counts as passed
 _CLIMBS = 12  # towards the inside of the goal region
 _PAYS = 0.05  # m deeper for each metre that a climb must bring; straight up it brings 1
@@ -58,7 +58,7 @@ class PathPlan(NamedTuple):
     new_cost: PathCost  # of path or candidate, whichever is evaluated
     search: Search
     closed: NDArray[np.bool_]  # (n,) which regions the search keeps out of
-    turn: NDArray[np.int64]  # (2,) what is closed: `_HARD`, `_ALL` or `_DEAR`; looks for a path so far
+    turn: NDArray[np.int64]  # (3,) what is closed: `_HARD`, `_ALL` or `_DEAR`; looks for a path, left and in all
     random_numbers: Array  # (5,) in [0, 1)
     phase: NDArray[np.int64]  # (1,) `_BEGIN`, `_PATH` or `_CANDIDATE`
     random: NDArray[np.uint64]  # (1,) state of the generator
@@ -77,7 +77,7 @@ def empty_plan(n_regions: int, seed: int) -> PathPlan:
         new_cost=empty_cost(n_regions),
         search=empty_search(),
         closed=np.zeros(n_regions, dtype=np.bool_),
-        turn=np.zeros(2, dtype=np.int64),
+        turn=np.zeros(3, dtype=np.int64),
         random_numbers=np.zeros(5),
         phase=np.zeros(1, dtype=np.int64),
         random=state,
@@ -136,7 +136,7 @@ def improve_path(
     _evaluate(plan, start, goal, regions, limits)
     blocked = is_blocked(plan, start)
     if not blocked and plan.cost[2] <= _BLOCKED * _length(plan.path, plan.counts[0], start):
-        plan.search.room[0] = ROOM[0]
+        plan.search.room[0], plan.turn[0] = ROOM[0], _HARD
     elif plan.counts[2] == 0:
         end, random_numbers = plan.path[plan.counts[0] - 1], plan.random_numbers
         _choose_closed(plan, blocked, start, end, regions, limits.margin)
@@ -160,16 +160,23 @@ def _choose_closed(
 ) -> None:
     """Choose the regions that the trees keep out of; with others than before, they begin anew.
 
-    While hard ones block the path, these alone. Else all, and the dearer ones, in turn; but none that start or end of
-    the path is within.
+    While hard ones block the path, these alone. Else the dearer ones, and all, in turns that grow longer; but none that
+    start or end of the path is within.
     """
-    turn, room = _HARD, zeros(3)
-    if not blocked:
-        plan.turn[1] += 1
-        turn = _DEAR if plan.turn[1] // _LOOKS % 2 == 0 else _ALL
+    turn, room = plan.turn[0], zeros(3)
+    if blocked:
+        turn = _HARD
+    elif turn == _HARD:
+        turn, plan.turn[2] = _DEAR, _LOOKS[0]
+    elif plan.turn[1] == 0:
+        turn = _ALL if turn == _DEAR else _DEAR
+        if turn == _DEAR:
+            plan.turn[2] = min(2 * plan.turn[2], _LOOKS[1])
     if turn != plan.turn[0]:
-        plan.turn[0] = turn
+        plan.turn[0], plan.turn[1] = turn, plan.turn[2]
         plan.search.of_goal.size[0] = plan.search.of_vehicle.size[0] = 0
+        plan.search.room[0] = ROOM[0]
+    plan.turn[1] -= 1
     soft, mean = 0, 0.0
     for i in range(regions.kinds.size):
         plan.closed[i] = regions.hard[i]

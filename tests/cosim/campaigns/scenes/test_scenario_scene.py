@@ -1,0 +1,162 @@
+"""Scenes that are scenarios: conflicts and trials as their pages say, flown by their own rules, refused by name."""
+
+import collections
+import json
+
+import numpy as np
+import pytest
+
+from controller import LAWS
+from controller.regions.region_set import clearance_at, pack
+from cosim.campaigns.scenes.as_scenario import scene_scenario
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.conflicts import make_conflict
+from cosim.campaigns.scenes.flyer import SceneFlyer
+from cosim.campaigns.scenes.generator import generate_scenes
+from cosim.campaigns.scenes.kinds import kind_of
+from cosim.campaigns.scenes.scene_file import decode_scene
+from cosim.campaigns.scenes.trials import make_trial
+from cosim.errors import ScenarioError
+from plant_fmu import load_vehicle
+
+GAINS = LAWS["deployable"].gains_type()
+
+
+def scene_of(table):
+    return decode_scene(json.dumps(table).encode())
+
+
+def scenario_of(table, **conditions):
+    return scene_scenario(scene_of(table), "deployable", GAINS, Conditions(**conditions))
+
+
+def made(make, wanted, count=1):
+    """Return the first scenes of a kind."""
+    scenes = (make(seed) for seed in range(500))
+    return [scene for scene in scenes if scene["kind"].startswith(wanted)][:count]
+
+
+@pytest.mark.parametrize("kind", ["conflict", "trial"])
+def test_scenes_are_those_of_their_seed(kind):
+    one, other = (list(generate_scenes(4, 7, kind)) for _ in range(2))
+    assert one == other and list(generate_scenes(1, 9, kind)) == one[2:3]
+    assert [decode_scene(line.encode()).seed for line in one] == [7, 8, 9, 10]
+
+
+def test_priorities_follow_the_order_of_the_criteria():
+    orders = set()
+    for seed in range(40):
+        scenario = scenario_of(make_conflict(seed))
+        places = scenario.criterion_names
+        orders.add(places)
+        assert all(r.priority == 4.0 ** (3 - places.index(r.criterion)) for r in scenario.regions)
+    assert len(orders) > 10  # of 24
+
+
+def test_kinds_and_vehicles_are_about_as_frequent():
+    kinds = collections.Counter(make_conflict(seed)["kind"] for seed in range(900))
+    assert len(kinds) == 18 and min(kinds.values()) > 25 and max(kinds.values()) < 80  # 50 expected
+    trials = collections.Counter(make_trial(seed)["kind"] for seed in range(700))
+    assert len(trials) == 7 and min(trials.values()) > 65 and max(trials.values()) < 140  # 100 expected
+
+
+@pytest.mark.parametrize("kind", ["ceiling", "dock"])
+def test_faces_that_close_leave_no_place_at_the_end(kind):
+    for table in made(make_conflict, kind, 5):
+        scenario = scenario_of(table)
+        packed = pack([secondary.region for secondary in scenario.regions])
+        axis = 2 if kind == "ceiling" else 1
+        for time, free in ((0.0, True), (scenario.time.duration, False)):
+            packed.move_to(time)
+            places = np.array([[0.0, 0.0, 4.0]] * 401)
+            places[:, axis] += np.linspace(-4.0, 4.0, 401)
+            best = max(min(clearance_at(packed, i, place) for i in range(2)) for place in places)
+            assert (best > 1.4) if free else (best < -0.05)
+
+
+def test_a_squeeze_has_no_place_where_both_depths_are_kept():
+    for table in made(make_conflict, "squeeze", 5):
+        least, greatest = scenario_of(table).regions
+        assert not least.region.hard and not greatest.region.hard
+        assert least.region.shape.point[2] > greatest.region.shape.point[2]
+
+
+def test_the_ways_of_sides_and_door_are_barred_by_soft_regions():
+    for table in made(make_conflict, "sides", 5) + made(make_conflict, "door", 5):
+        hard = [r for r in scenario_of(table).regions if r.region.hard]
+        soft = [r for r in scenario_of(table).regions if not r.region.hard]
+        assert hard and len({r.criterion for r in soft}) == 2
+
+
+def test_a_trial_is_far_from_nominal_in_what_it_tries():
+    (heavy,) = made(make_trial, "net weight")
+    vehicle = load_vehicle(heavy["scenario"]["vehicle"])
+    net = abs(vehicle.weight - heavy["scenario"]["plant"]["parameters"]["buoyancy"])
+    assert net >= 25.0
+    (stream,) = made(make_trial, "current")
+    assert 0.25 <= np.hypot(*stream["scenario"]["plant"]["current"][:2]) <= 0.5
+    (worn,) = made(make_trial, "effectiveness")
+    wear = [x for key, x in worn["scenario"]["plant"]["parameters"].items() if key.startswith("thrust_effectiveness")]
+    assert len(wear) == load_vehicle(worn["scenario"]["vehicle"]).n_thrusters and 0.6 <= min(wear) < max(wear) <= 1.0
+    assert made(make_trial, "failure")[0]["scenario"]["failures"]
+    assert len(made(make_trial, "pocket")[0]["scenario"]["regions"]) == 4
+
+
+def test_conditions_change_what_they_say_and_no_more():
+    (table,) = made(make_conflict, "view")
+    plain = scenario_of(table).table
+    changed = scenario_of(table, arbiter="reversed", sensing="sensors", tell_failures=True).table
+    assert changed["arbiter"]["rules"] == "reversed" and changed["sensing"]["through"] == "sensors"
+    assert changed["tell_failures"] and not plain["tell_failures"]
+    for key in plain.keys() - {"arbiter", "sensing", "tell_failures"}:
+        assert changed[key] == plain[key], key
+
+
+def test_the_weighted_violation_is_the_integral_of_depth_times_priority():
+    (table,) = made(make_conflict, "squeeze")
+    table["scenario"]["time"]["duration"] = 4.0
+    table["scenario"]["time"]["step"] = 0.02  # a row of the trace at each step
+    scene = scene_of(table)
+    with SceneFlyer("pd") as flyer:
+        score, rows = flyer.fly(scene, trace=True)
+    down, expected = rows[:, 3], 0.0
+    for region in table["scenario"]["regions"]:
+        at, sign = region["shape"]["point"][2], region["shape"]["normal"][2]
+        inside = sign * (at - down)  # m, within the half-space
+        depth = np.maximum(inside if region["keep"] == "out" else -inside, 0.0)
+        expected += region["priority"] * depth.sum() * 0.02
+    assert score.weighted_violation == pytest.approx(expected, rel=1e-9) and expected > 0.0
+
+
+def test_a_scene_of_its_own_vehicle_is_flown_by_it():
+    tables = [made(make_conflict, f"squeeze, {vehicle}")[0] for vehicle in ("bluerov2_heavy", "odin")]
+    with SceneFlyer("pd", Conditions(settled=1.0)) as flyer:
+        for table in tables:
+            table["scenario"]["time"]["duration"] = 2.0
+            score, _ = flyer.fly(scene_of(table))
+            assert score.failed_step < 0
+            assert kind_of(scene_of(table)) == table["kind"]
+
+
+SCENARIO = make_conflict(0)["scenario"]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"seed": -1}, r"seed is -1, expected"),
+        ({"kind": ""}, r"kind is '', expected up to 60 printable"),
+        ({"kind": "a\nb"}, r"kind is 'a\\nb', expected"),
+        ({"scenario": {}}, r"vehicle|time"),
+        ({"scenario": SCENARIO | {"law": {"name": "pd"}}}, r"scenario\.law is given, expected none"),
+        ({"scenario": SCENARIO | {"vehicle": "mine.toml"}}, r"vehicle is 'mine\.toml', expected one that is shipped"),
+        ({"scenario": SCENARIO | {"arbiter": {"file": "a.fcl"}}}, r"arbiter\.text is missing"),
+        ({"scenario": SCENARIO | {"master": {"order": "jacobi"}}}, r"scenario\.master\.order is 'jacobi', expected"),
+        ({"scenario": SCENARIO | {"regions": [{"name": "x"}]}}, r"regions\.(0|x)"),
+        ({"more": 1}, r"more: unknown key"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name(change, said):
+    table = {"seed": 0, "kind": "mine", "scenario": SCENARIO} | change
+    with pytest.raises(ScenarioError, match=said):
+        scene_of(table)

@@ -1,0 +1,115 @@
+"""Ablations: the deployable law beside itself without parts of it."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from cosim.campaigns.ablation import VARIANTS, ablate
+from cosim.campaigns.analysis.statistics import mean_ratio
+from cosim.campaigns.pages.ablation_page import write_ablation_page
+from cosim.campaigns.scenes.conflicts import make_conflict
+from cosim.campaigns.scenes.trials import make_trial
+from cosim.command_line.cli import main
+from cosim.errors import RunError
+from tests.cosim.campaigns.scene_data import write
+
+
+@pytest.fixture
+def scenes(tmp_path):
+    """Two short conflicts: a squeeze, in which the arbiter decides from the start, and a door."""
+    tables = [next(t for t in map(make_conflict, range(99)) if t["kind"] == kind) for kind in
+              ("squeeze, odin", "door, odin")]  # fmt: skip
+    for table in tables:
+        table["scenario"]["time"]["duration"] = 3.0
+    return write(tmp_path / "scenes.jsonl", tables)
+
+
+def test_variants_stand_beside_the_whole_law(tmp_path, scenes):
+    out = tmp_path / "out"
+    done = ablate(scenes, out, ["arbiter-none", "barriers"])
+    assert sorted(p.name for p in out.iterdir()) == ["ablation.json", "arbiter-none", "barriers", "whole"]
+    assert json.loads((out / "ablation.json").read_text()) == done.numbers
+    whole, without = (done.campaigns[name].results for name in ("whole", "arbiter-none"))
+    of = done.numbers["variants"]["arbiter-none"]
+    mine, theirs = (rows.number("weighted_violation") for rows in (whole, without))
+    assert of["weighted_violation"]["one"] == mine.mean() and of["weighted_violation"]["other"] == theirs.mean()
+    assert of["weighted_violation"]["ratio"] == pytest.approx(mine.mean() / theirs.mean())
+    assert set(of["kinds"]) == {"squeeze, odin", "door, odin"}
+    assert done.campaigns["barriers"].summary["gains"]["barriers"] == 0.0
+    assert done.campaigns["arbiter-none"].summary["conditions"]["arbiter"] == "none"
+    page = write_ablation_page(out, 0).read_text()
+    assert "arbiter-none" in page and "squeeze, odin" in page and "Where it changed most" in page
+
+
+def test_an_ablation_goes_on_with_what_is_left(tmp_path, scenes):
+    ablate(scenes, tmp_path / "out", ["arbiter-crisp"])
+    more = ablate(scenes, tmp_path / "out", ["arbiter-crisp", "net-weight"])
+    assert {name: campaign.flown for name, campaign in more.campaigns.items()} == {
+        "whole": 0, "arbiter-crisp": 0, "net-weight": 2,
+    }  # fmt: skip
+
+
+def test_every_variant_takes_out_what_it_says():
+    gains = {key for variant in VARIANTS.values() for key in variant.gains}
+    assert gains == {
+        "restoring_bound", "current_bound", "moment_bound", "effectiveness_estimation", "lag_bound",
+        "failure_threshold", "path_planning", "barriers",
+    }  # fmt: skip
+    assert {v.arbiter for v in VARIANTS.values() if not v.gains} == {"reversed", "none", "crisp"}
+
+
+@pytest.mark.parametrize(
+    ("variants", "said"),
+    [(["motor"], "variant 'motor' is unknown"), ([], "variants are none"), (["lag"] * 2, "each once")],
+)
+def test_what_is_no_choice_of_variants_is_refused(tmp_path, scenes, variants, said):
+    with pytest.raises(RunError, match=said):
+        ablate(scenes, tmp_path / "out", variants)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path, scenes):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "thesis.txt").touch()
+    with pytest.raises(RunError, match=r"holds 'thesis\.txt', expected a new folder or that of an ablation"):
+        ablate(scenes, tmp_path / "out", ["lag"])
+
+
+def test_the_command_says_what_came_of_it(tmp_path, scenes, capsys):
+    arguments = ["ablate", str(scenes), "--out", str(tmp_path / "out"), "--variants", "lag", "--replays", "0"]
+    assert main(arguments) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert re.fullmatch(
+        r"whole \(all of it\): \d of 2 scenes completed, weighted violation [\d.]+ m s on average", said[0]
+    )
+    assert said[1].startswith("lag (no lag of the thrusters, and no prediction): ") and said[2].endswith(
+        "ablation.html"
+    )
+
+
+def test_a_ratio_of_means_has_the_interval_of_its_delta_method():
+    """Of many pairs the bootstrap's interval is the normal one of the ratio, by the delta method."""
+    rng = np.random.default_rng(3)
+    one, other = rng.gamma(4.0, 1.0, 4000), rng.gamma(9.0, 1.0, 4000)
+    found = mean_ratio(one, other)
+    ratio = one.mean() / other.mean()
+    spread = np.std(one - ratio * other) / other.mean() / np.sqrt(4000)
+    assert found["ratio"] == pytest.approx(ratio, rel=1e-12)
+    assert [found["low"], found["high"]] == pytest.approx([ratio - 1.96 * spread, ratio + 1.96 * spread], rel=5e-3)
+    assert mean_ratio(one, 0.0 * other)["ratio"] is None and mean_ratio(one[:0], other[:0])["pairs"] == 0
+    assert mean_ratio(np.array([1.0, np.nan]), np.array([2.0, 5.0])) == {
+        "pairs": 1, "one": 1.0, "other": 2.0, "ratio": 0.5, "low": 0.5, "high": 0.5,
+    }  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["net weight", "moments", "effectiveness", "pocket"])
+def test_without_a_part_its_trials_are_failed(tmp_path, kind):
+    """Without the part that a trial tries, fewer of six are completed, and all are with it."""
+    tables = [t for t in map(make_trial, range(900_000, 900_200)) if t["kind"] == kind][:6]
+    variant = "path-planning" if kind == "pocket" else kind.replace(" ", "-")
+    done = ablate(write(tmp_path / "scenes.jsonl", tables), tmp_path / "out", [variant])
+    numbers = done.numbers["variants"]
+    assert numbers["whole"]["completed"]["rows"] == 6 > numbers[variant]["completed"]["rows"]

@@ -1,0 +1,115 @@
+"""Rules to compare an arbiter with, and what a path through a region costs by the arbiter."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from cosim.errors import ScenarioError
+from cosim.scenario.criteria import PAPER, CriterionSetup, Reason
+from cosim.scenario.rule_variants import rules_by_order
+from cosim.scenario.scenario import load_scenario
+from fuzzy_arbiter import SECTION_VI, Arbiter, prioritised
+
+FOUR = (*PAPER, CriterionSetup("visibility", "#CC79A7", (Reason("ramp", None),)))
+PLACES = (0.0, 0.2, 0.4, 0.6, 1.0)
+
+
+def weights(variant, criteria, memberships):
+    """Return the weights by the criteria's names, of memberships by their places."""
+    system = rules_by_order(variant, criteria, 101)
+    by_name = dict(zip((criterion.name for criterion in criteria), memberships, strict=True))
+    return Arbiter(system=system)([by_name[variable.name] for variable in system.inputs])
+
+
+def test_reversed_rules_are_those_of_the_reversed_order():
+    last_first = Arbiter(system=prioritised(SECTION_VI[::-1]))
+    for memberships in itertools.product(PLACES, repeat=3):
+        found = weights("reversed", PAPER, memberships)
+        assert found._fields == ("obstacle", "shape", "depth")
+        assert list(found) == pytest.approx(list(last_first(memberships[::-1]))[::-1], abs=1e-12)
+
+
+def test_crisp_rules_are_the_fuzzy_ones_of_rounded_memberships():
+    for memberships in itertools.product(PLACES, repeat=4):
+        rounded = [float(membership > 0.5) for membership in memberships]
+        assert list(weights("crisp", FOUR, memberships)) == pytest.approx(
+            list(weights("ordered", FOUR, rounded)), abs=1e-12
+        )
+
+
+def test_without_an_arbiter_all_weights_are_1():
+    scenario = load_scenario("inspection-visibility", ['arbiter.rules="none"'])
+    inputs = [signal.course[0][1] for signal in scenario.rules.inputs]
+    assert list(Arbiter(system=scenario.rules.system)(inputs)) == pytest.approx([1.0] * 4, abs=1e-12)
+
+
+@pytest.mark.parametrize("variant", ["ordered", "reversed", "crisp", "none"])
+def test_variants_have_the_closed_form(variant):
+    assert Arbiter(system=rules_by_order(variant, FOUR, 101)).engine == "closed"
+
+
+def test_a_file_has_its_own_rules(tmp_path):
+    Arbiter(system=prioritised()).save(tmp_path / "mine.json")
+    table = "".join(f'arbiter.inputs.{name}="membership.{name}"\n' for name in ("obstacle", "shape", "depth"))
+    changes = [f'arbiter.file="{tmp_path / "mine.json"}"', *table.splitlines()]
+    assert load_scenario("docking", changes).arbiter.rules == "ordered"
+    with pytest.raises(ScenarioError, match=r"arbiter\.rules is 'crisp', expected none beside arbiter\.file"):
+        load_scenario("docking", [*changes, 'arbiter.rules="crisp"'])
+
+
+def costs(variant):
+    scenario = load_scenario("inspection-visibility", [f'arbiter.rules="{variant}"'])
+    return {r.criterion: r.region.crossing_cost for r in scenario.regions if not r.region.hard}
+
+
+def test_a_path_costs_most_through_what_the_arbiter_gives_up_last():
+    """Three criteria have soft regions. In its two pairs the first always wins, the second once, the third never."""
+    assert costs("ordered") == pytest.approx({"shape": 10.0, "depth": 2.0, "visibility": 0.4}, rel=1e-9)
+    assert costs("reversed") == pytest.approx({"shape": 0.4, "depth": 2.0, "visibility": 10.0}, rel=1e-9)
+    assert costs("none") == pytest.approx(dict.fromkeys(("shape", "depth", "visibility"), 2.0), rel=1e-9)
+
+
+def test_rules_of_a_file_are_asked_by_their_own_signals(tmp_path):
+    """Of a file by clearances: on the surface presses in full, as far as the universe goes not at all."""
+    text = """FUNCTION_BLOCK mine
+VAR_INPUT risers : REAL; below : REAL; END_VAR
+VAR_OUTPUT obstacle : REAL; shape : REAL; depth : REAL; visibility : REAL; END_VAR
+FUZZIFY risers TERM near := (0, 1) (1, 0); TERM far := (0, 0) (1, 1); RANGE := (0 .. 1); END_FUZZIFY
+FUZZIFY below TERM near := (0, 1) (1, 0); TERM far := (0, 0) (1, 1); RANGE := (0 .. 1); END_FUZZIFY
+"""
+    for name in ("obstacle", "shape", "depth", "visibility"):
+        text += f"DEFUZZIFY {name} TERM low := (0, 1) (1, 0); TERM high := (0, 0) (1, 1); METHOD : COG; DEFAULT := 0; "
+        text += "RANGE := (0 .. 1); END_DEFUZZIFY\n"
+    text += """RULEBLOCK all AND : MIN; ACT : MIN; ACCU : MAX;
+RULE 1 : IF risers IS near THEN shape IS high;
+RULE 2 : IF risers IS far THEN shape IS low;
+RULE 3 : IF below IS near THEN depth IS low;
+RULE 4 : IF below IS far THEN depth IS low;
+RULE 5 : IF below IS far THEN visibility IS low;
+RULE 6 : IF below IS near THEN visibility IS low;
+RULE 7 : IF below IS far THEN obstacle IS low;
+RULE 8 : IF below IS near THEN obstacle IS low;
+END_RULEBLOCK
+END_FUNCTION_BLOCK
+"""
+    (tmp_path / "mine.fcl").write_text(text)
+    scenario = load_scenario(
+        "inspection-visibility",
+        [
+            f'arbiter.file="{tmp_path / "mine.fcl"}"',
+            'arbiter.engine="exact"',
+            'arbiter.inputs.risers="clearance.risers"',
+            'arbiter.inputs.below="clearance.greatest depth"',
+        ],
+    )
+    found = {r.criterion: r.region.crossing_cost for r in scenario.regions if not r.region.hard}
+    high, low = 2.0 / 3.0, 1.0 / 3.0  # centroids of the two terms
+    pressing, other = high / (high + low), 0.5
+    assert found["shape"] == pytest.approx(2.0 * 5.0 ** (2.0 * pressing - 1.0), rel=1e-9)
+    assert found["depth"] == pytest.approx(2.0 * 5.0 ** (2.0 * np.mean([low, other]) - 1.0), rel=1e-9)
+    assert found["depth"] == found["visibility"]
+
+
+def test_hard_regions_alone_cost_what_they_did():
+    assert {r.region.crossing_cost for r in load_scenario("dense-field").regions} == {2.0}
