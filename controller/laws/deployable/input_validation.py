@@ -29,10 +29,15 @@ _FASTEST = 100.0  # m/s, rad/s
 _RESTING, _PUSHED = 0.02, 0.05  # m/s, m/s2, sums over the axes: below and above, the vehicle rests and is about to move
 
 
-def sanitize_weights(weights: Array, sanitized: Array) -> None:
-    """Write the arbiter's weights, each clipped to [0, 1]; NaN becomes 1, the cautious value."""
+def smooth_weights(weights: Array, smoothed: Array, hard: NDArray[np.bool_], shares: tuple[float, float]) -> None:
+    """Move smoothed weights towards the arbiter's, by a share for soft regions and one for hard ones.
+
+    The first are taken as they are. Each of the arbiter's is clipped to [0, 1]; NaN becomes 1, the cautious value.
+    """
     for i in range(weights.size):
-        sanitized[i] = 1.0 if np.isnan(weights[i]) else min(max(weights[i], 0.0), 1.0)
+        weight = 1.0 if np.isnan(weights[i]) else min(max(weights[i], 0.0), 1.0)
+        share = shares[1] if hard[i] else shares[0]
+        smoothed[i] = weight if np.isnan(smoothed[i]) else smoothed[i] + share * (weight - smoothed[i])
 
 
 def reports_change(reported: Array, before: Array, health: Array) -> bool:

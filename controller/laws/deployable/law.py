@@ -73,7 +73,8 @@ def step(
 ) -> None:
     """Do what `CompiledLaw.step` says, by the deployable law."""
     estimate, thrusters, dynamics, period = memory.state_estimate, memory.thrusters, memory.dynamics, memory.period[0]
-    input_validation.sanitize_weights(weights, memory.weights)
+    shares = (period / (period + gains.weight_smoothing), period / (period + gains.price_smoothing))
+    input_validation.smooth_weights(weights, memory.weights, regions.hard, shares)
     R, desired, acceleration, free, against, wrench = zeros(3, 3), zeros(3), zeros(6), zeros(6), zeros(6), zeros(6)
 
     # estimate
@@ -316,7 +317,7 @@ class DeployableLaw(CompiledLaw):
             deviation=np.zeros(12),
             position_variance=np.zeros(3),
             promised=np.full(2, np.nan),
-            weights=np.ones(n_regions),
+            weights=np.full(n_regions, np.nan),
             reported=np.ones(m),
             filtered_acceleration=np.zeros(3),
             thruster_acceleration=np.zeros((6, m)),
