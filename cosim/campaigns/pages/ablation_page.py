@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cosim.campaigns.ablation import NUMBERS, PAGE, VARIANTS, WHOLE
+from cosim.campaigns.analysis.worst_rows import LISTED
 from cosim.campaigns.pages.page import Html, Page, code, interval, number, write_figures
 from cosim.campaigns.pages.replays import Replay, replay_of
 from cosim.campaigns.pages.sections import basis
@@ -51,7 +52,7 @@ def write_ablation_page(folder: Path, replays: int) -> Path:
     if not (isinstance(variants, dict) and WHOLE in variants and variants.keys() <= {WHOLE, *VARIANTS}):
         raise RunError(f"{folder / NUMBERS}: holds no ablation")
     results = {name: complete_results(folder / name, SCHEMA) for name in variants}
-    changed = _changed(results)[:replays]
+    changed = _changed(results)[: max(LISTED, replays)]
     try:
         with understood(folder / NUMBERS):
             figures = write_figures(folder, _drawings(numbers))
@@ -63,7 +64,7 @@ def write_ablation_page(folder: Path, replays: int) -> Path:
         write({})
         folders = [folder / name for name in results]
         title = f"by {', '.join(results)}"
-        if shown := {key: replay_of(folder, key, folders, f"Scene {key} {title}") for key, *_ in changed}:
+        if shown := {key: replay_of(folder, key, folders, f"Scene {key} {title}") for key, *_ in changed[:replays]}:
             write(shown)
     except OSError as error:
         raise RunError(f"{folder}: {error.strerror or error}") from error
