@@ -64,8 +64,9 @@ def _add_scenes(verb: argparse.ArgumentParser, arbiter: bool = True) -> None:
 
     if arbiter:
         verb.add_argument(
-            "--arbiter", choices=("ordered", "reversed", "crisp", "none"), default="ordered",
-            help="weigh criteria by their order (default), in reversed order, by memberships of 0 or 1, or all with 1",
+            "--arbiter", default="ordered", metavar="ordered|reversed|crisp|none|FILE",
+            help="weigh criteria by their order (default), in reversed order, by memberships of 0 or 1, all with 1, or "
+            "by the rules of a file, whose inputs are named as the criteria",
         )  # fmt: skip
 
 
@@ -80,8 +81,8 @@ def add_replays(verb: argparse.ArgumentParser) -> None:
 def _conditions(options: argparse.Namespace) -> Any:
     from cosim.campaigns.scenes.conditions import Conditions
 
-    arbiter: Any = getattr(options, "arbiter", "ordered")
-    return Conditions(tell_failures=options.tell_failures, sensing=options.sensing, arbiter=arbiter)
+    arbiter = getattr(options, "arbiter", "ordered")
+    return Conditions.by_arbiter(arbiter, tell_failures=options.tell_failures, sensing=options.sensing)
 
 
 def campaign(options: argparse.Namespace) -> int:

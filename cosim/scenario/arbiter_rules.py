@@ -196,7 +196,8 @@ def _signals(
     }
     of_criteria = {criterion.name: i for i, criterion in enumerate(criteria)}
     for name in names:
-        key, value = f"arbiter.inputs.{name}", setup.inputs.get(name, name if name in VEHICLE else None)
+        default = name if name in VEHICLE else f"membership.{name}" if name in of_criteria else None
+        key, value = f"arbiter.inputs.{name}", setup.inputs.get(name, default)
         if value is None:
             raise ScenarioError(
                 f"{key} is missing, expected a signal, a number, or points [time, value]: {setup.file} has this input"

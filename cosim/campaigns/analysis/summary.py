@@ -55,6 +55,7 @@ def summarise(plan: Plan, results: Results, folder: Path) -> dict[str, Any]:
         },
         "medians": {name: median(results.number(name)[reached]) for name in MEDIANS},
         "least_clearance": _or_none(np.min, results.number("min_clearance")),
+        "mean_weighted_violation": _or_none(np.mean, results.number("weighted_violation")),
         "bound_exceeded": int((results.number("bound_excess") > 0.0).sum()),
         "worst_step_time": _or_none(np.max, results.number("worst_step_time")),
         "failed": {

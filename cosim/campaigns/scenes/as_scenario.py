@@ -64,7 +64,7 @@ def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions
         "initial": {"position": scene.start},
         "goal": {"type": "sphere", **dataclasses.asdict(scene.goal)},
         "law": {"name": law, "gains": gains._asdict()},
-        "arbiter": {"ramp": conditions.ramp, "rules": conditions.arbiter},
+        "arbiter": conditions.arbiter_table({"ramp": conditions.ramp}),
         "actuation": {"through": "thrusters"},
         "sensing": _sensing(scene, conditions),
         "outages": [dataclasses.asdict(outage) for outage in conditions.outages],
@@ -79,8 +79,7 @@ def _changes(scene: ScenarioScene, conditions: Conditions) -> dict[str, Any]:
     """Return the tables of a scenario that conditions change."""
     table = scene.scenario
     changes: dict[str, Any] = {"tell_failures": conditions.tell_failures}
-    if conditions.arbiter != "ordered":
-        changes["arbiter"] = {**table.get("arbiter", {}), "rules": conditions.arbiter}
+    changes["arbiter"] = conditions.arbiter_table(table.get("arbiter", {}))
     if conditions.sensing == "sensors":
         changes["sensing"] = {"through": "sensors", "seed": scene.seed}
     if conditions.outages:

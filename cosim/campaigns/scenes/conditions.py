@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal, get_args
 
-from cosim.errors import RunError
+from cosim.errors import RunError, ScenarioError
+from cosim.scenario.arbiter_rules import read_rules
 from cosim.scenario.rule_variants import RuleVariant
-from cosim.scenario.tables import Outage
+from cosim.scenario.tables import ArbiterSetup, Outage
+from fuzzy_arbiter import Arbiter, ArbiterError
+from fuzzy_arbiter.formats import FORMATS, reads
 
 
 @dataclass(frozen=True)
@@ -27,6 +31,11 @@ class Conditions:
     sensing: Literal["state", "sensors"] = "state"  # what the law is told, as `Sensing.through`
     outages: tuple[Outage, ...] = ()  # of sensors
     arbiter: RuleVariant = "ordered"  # by which criteria are weighed, as `ArbiterSetup.rules`
+    arbiter_file: str = (
+        ""  # name of a file of rules instead, whose inputs are named as criteria or as signals of the vehicle
+    )
+    arbiter_text: str = ""  # what stands in it
+    arbiter_engine: Literal["closed", "exact"] = "closed"  # that weighs by these rules
 
     def __post_init__(self) -> None:
         for key in ("duration", "control"):
@@ -34,6 +43,34 @@ class Conditions:
                 raise RunError(f"{key} is {getattr(self, key)} s, expected a finite number above 0")
         if self.plant_steps < 1 or self.controls < 1:
             raise RunError(f"{self.controls} control steps of {self.plant_steps} plant steps, expected 1 or more")
+
+    @classmethod
+    def by_arbiter(cls, arbiter: str, **others: Any) -> Conditions:
+        """Return conditions under which criteria are weighed by a variant, or by the rules of a file.
+
+        Raises
+        ------
+        ScenarioError
+            If there is neither such a variant nor such a file, or it holds no rules.
+        """
+        if arbiter in get_args(RuleVariant):
+            return cls(arbiter=arbiter, **others)  # type: ignore[arg-type]
+        if Path(arbiter).suffix.lower().removeprefix(".") not in FORMATS:
+            known = ", ".join(get_args(RuleVariant))
+            raise ScenarioError(f"--arbiter is {arbiter!r}, expected {known}, or a file of rules")
+        setup = read_rules(ArbiterSetup(file=arbiter))
+        try:
+            engine = Arbiter(system=reads(setup.text, Path(setup.file).suffix.lower().removeprefix("."))).engine
+        except ArbiterError as error:
+            raise ScenarioError(f"--arbiter: {arbiter}: {error}") from error
+        return cls(arbiter_file=setup.file, arbiter_text=setup.text, arbiter_engine=engine, **others)  # type: ignore[arg-type]
+
+    def arbiter_table(self, table: dict[str, Any]) -> dict[str, Any]:
+        """Return the table ``arbiter`` of a scenario under these conditions."""
+        if self.arbiter_file:
+            rules = {"file": self.arbiter_file, "text": self.arbiter_text, "engine": self.arbiter_engine}
+            return {key: value for key, value in table.items() if key != "rules"} | rules
+        return table | ({"rules": self.arbiter} if self.arbiter != "ordered" else {})
 
     @property
     def controls(self) -> int:

@@ -17,6 +17,7 @@ from cosim.campaigns.scenes.kinds import kind_of
 from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.scenes.trials import make_trial
 from cosim.errors import ScenarioError
+from fuzzy_arbiter import Arbiter, prioritised
 from plant_fmu import load_vehicle
 
 GAINS = LAWS["deployable"].gains_type()
@@ -136,6 +137,35 @@ def test_a_scene_of_its_own_vehicle_is_flown_by_it():
             score, _ = flyer.fly(scene_of(table))
             assert score.failed_step < 0
             assert kind_of(scene_of(table)) == table["kind"]
+
+
+def test_rules_of_a_file_weigh_the_criteria_of_any_scene(tmp_path):
+    """The paper's rules, from a file, fly a scene as the scenario's own do; others refuse what they do not know."""
+    file = tmp_path / "mine.json"
+    Arbiter(system=prioritised()).save(file)
+    (scene,) = (decode_scene(line.encode()) for line in generate_scenes(1, 3, "hard"))
+    ends = []
+    for arbiter in ("ordered", str(file)):
+        with SceneFlyer("pd", Conditions.by_arbiter(arbiter, duration=3.0)) as flyer:
+            ends.append(flyer.fly(scene)[0]._replace(worst_step=0.0))
+    assert ends[0] == ends[1]
+    with pytest.raises(ScenarioError, match=r"arbiter\.file: mine\.json has no output 'visibility'"):
+        scene_scenario(scene_of(make_conflict(0)), "pd", LAWS["pd"].gains_type(), Conditions.by_arbiter(str(file)))
+
+
+@pytest.mark.parametrize(
+    ("arbiter", "said"),
+    [
+        ("fuzzy", r"--arbiter is 'fuzzy', expected ordered, reversed, crisp, none, or a file of rules"),
+        ("none.fcl", r"arbiter\.file: none\.fcl: No such file"),
+        ("empty.fcl", r"--arbiter: .*empty\.fcl: "),
+    ],
+)
+def test_what_is_no_arbiter_is_refused(tmp_path, monkeypatch, arbiter, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty.fcl").touch()
+    with pytest.raises(ScenarioError, match=said):
+        Conditions.by_arbiter(arbiter)
 
 
 SCENARIO = make_conflict(0)["scenario"]
