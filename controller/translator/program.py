@@ -37,7 +37,7 @@ class Program:
     Examples
     --------
     >>> import numpy as np
-    >>> from controller.laws.deployable.linear_algebra import norm
+    >>> from controller.linear_algebra import norm
     >>> from controller.translator.program import Program
     >>> from controller.translator.types import type_of
     >>> program = Program()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from controller.allocation import Allocation
-from controller.laws.deployable.linear_algebra import product
+from controller.linear_algebra import product
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import Failure
 from cosim.simulation.signals import Array, Signals

@@ -38,7 +38,7 @@ PARTS = (
         "controller, its mathematics",
         97,
         (
-            "tests/controller/deployable/test_quadratic_program.py",
+            "tests/controller/test_quadratic_program.py",
             "tests/controller/test_allocation.py",
             "tests/controller/test_paper_law.py",
             "tests/controller/test_quaternion.py",
@@ -47,7 +47,7 @@ PARTS = (
         ),
         (
             "controller/allocation.py",
-            "controller/laws/deployable/quadratic_program.py",
+            "controller/quadratic_program.py",
             "controller/paper_law.py",
             "controller/quaternion.py",
             "controller/restoring.py",

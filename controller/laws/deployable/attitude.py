@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from controller.arithmetic import cosine, length3, square
 from controller.laws.deployable.estimate import Estimate
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.model import Dynamics, Loads, free_wrench
+from controller.linear_algebra import copy
 from controller.quaternion import down_parts, error_parts, rate_parts
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, attitude_clearance

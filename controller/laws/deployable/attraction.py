@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from controller.arithmetic import length3, square
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.path_planning.planner import PathPlan
+from controller.linear_algebra import copy
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]

@@ -29,8 +29,8 @@ from controller.laws.deployable.attitude import integrate_attitude
 from controller.laws.deployable.attraction import approach_speed
 from controller.laws.deployable.faces import FACES, face_ahead, has_faces
 from controller.laws.deployable.gains import SPREADS, DeployableGains
-from controller.laws.deployable.linear_algebra import copy
-from controller.laws.deployable.quadratic_program import Workspace
+from controller.linear_algebra import copy
+from controller.quadratic_program import Workspace
 from controller.regions import Box, DepthBand, HalfSpace, Prism
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, evaluate_packed

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from controller.arithmetic import length3
 from controller.law import Diagnostic
 from controller.laws.deployable.estimate import Estimate
-from controller.laws.deployable.linear_algebra import copy
+from controller.linear_algebra import copy
 
 Array = NDArray[np.float64]
 

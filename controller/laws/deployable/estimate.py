@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from controller.arithmetic import square
 from controller.law import VehicleModel
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.linear_algebra import copy
+from controller.linear_algebra import copy
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]

@@ -15,8 +15,8 @@ from controller.laws.deployable import attitude as attitude_loop
 from controller.laws.deployable import estimate as estimate_state
 from controller.laws.deployable.estimate import Estimate
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.memory import DeployableMemory
+from controller.linear_algebra import copy
 from controller.quaternion import write_rotation
 from controller.stack_array import zeros
 

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from controller import quadratic_program
 from controller.arithmetic import length3, square
 from controller.law import (
     Array,
@@ -24,7 +25,6 @@ from controller.laws.deployable import (
     fault_detection,
     input_validation,
     model,
-    quadratic_program,
 )
 from controller.laws.deployable.actuator_lag import empty_prediction, predict_state
 from controller.laws.deployable.attitude import empty_attitude
@@ -43,12 +43,12 @@ from controller.laws.deployable.estimate import LAG, Estimate, make_estimate
 from controller.laws.deployable.faces import FACES
 from controller.laws.deployable.fault_detection import empty_fault_state
 from controller.laws.deployable.gains import SPREADS, DeployableGains, check_gains
-from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.memory import DeployableMemory
 from controller.laws.deployable.model import Dynamics, Loads, make_dynamics, make_thrusters
 from controller.laws.deployable.path_planning.planner import empty_plan, go_straight, improve_path
 from controller.laws.deployable.path_planning.search import PathLimits
-from controller.laws.deployable.quadratic_program import empty_workspace
+from controller.linear_algebra import copy
+from controller.quadratic_program import empty_workspace
 from controller.quaternion import write_rotation
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions

@@ -14,7 +14,7 @@ from controller.laws.deployable.estimate import Estimate
 from controller.laws.deployable.fault_detection import FaultState
 from controller.laws.deployable.model import Dynamics, Thrusters
 from controller.laws.deployable.path_planning.planner import PathPlan
-from controller.laws.deployable.quadratic_program import Workspace
+from controller.quadratic_program import Workspace
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.law import VehicleModel
-from controller.laws.deployable.linear_algebra import invert_symmetric, product
+from controller.linear_algebra import invert_symmetric, product
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]

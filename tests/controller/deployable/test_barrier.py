@@ -5,7 +5,7 @@ import pytest
 
 from controller.laws.deployable import barrier, faces
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.quadratic_program import empty_workspace
+from controller.quadratic_program import empty_workspace
 from controller.regions import Box, Ellipsoid, HalfSpace, Orientation, Region, Sphere, Visibility, pack
 from tests.controller.deployable.scenery import LEVEL
 

@@ -11,7 +11,7 @@ from controller.laws.deployable.estimate import CURRENT, LAG, MOMENTS, VELOCITY,
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.path_planning.planner import improve_path
 from controller.laws.deployable.path_planning.search import PathLimits
-from controller.laws.deployable.quadratic_program import solve
+from controller.quadratic_program import solve
 from controller.quaternion import rotation_matrix
 from controller.regions import Orientation, Region, pack
 from tests.controller.deployable.scenery import GOAL, REGIONS, Sea, fly, law_for

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import length3, square
-from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.path_planning.search import PathLimits, uncertainty
+from controller.linear_algebra import copy
 from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_of_place, clearance_of_sphere

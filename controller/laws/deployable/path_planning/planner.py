@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import exponential, length3
-from controller.laws.deployable.linear_algebra import copy, norm
 from controller.laws.deployable.path_planning.cost import PathCost, add_cost, begin_cost, empty_cost
 from controller.laws.deployable.path_planning.search import (
     ROOM,
@@ -25,6 +24,7 @@ from controller.laws.deployable.path_planning.search import (
     limits_along,
     look_for_path,
 )
+from controller.linear_algebra import copy, norm
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_at, clearance_of_place, evaluate_packed
 from controller.stack_array import zeros

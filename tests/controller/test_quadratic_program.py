@@ -8,10 +8,10 @@ import pytest
 
 from controller.compiling.function import BoundCall
 from controller.laws.deployable.model import make_thrusters, reallocate
-from controller.laws.deployable.quadratic_program import _add_product, _row_residual, empty_workspace, solve
+from controller.quadratic_program import _add_product, _row_residual, empty_workspace, solve
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.vehicle import load_vehicle
-from tests.controller.deployable.exact_program import ROUNDING, error, exact_solution, in_fractions, rounding
+from tests.controller.exact_program import ROUNDING, error, exact_solution, in_fractions, rounding
 
 quadprog = pytest.importorskip("quadprog")
 MODELS = {name: vehicle_model(load_vehicle(name)) for name in ("odin", "bluerov2_heavy")}

@@ -1,4 +1,4 @@
-"""The quadratic program of the barriers: the thruster forces nearest to the nominal ones that keep every barrier.
+"""The quadratic program of barriers: the thruster forces nearest to the nominal ones that keep every barrier.
 
     minimise    1/2 (u - u0)^T H (u - u0) + 1/2 sum rho_i s_i^2
     subject to  a_i^T u + s_i >= b_i,   lower <= u <= upper
@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
-from controller.laws.deployable.linear_algebra import copy
+from controller.linear_algebra import copy
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,298 @@
+"""PD control with a disturbance observer for integral action, behind a second-order control-barrier-function filter.
+
+The nominal force is that of `pd`, less the disturbance that an observer finds:
+
+    f = -k_p1 sat(p - p_d) - k_v1 v + push - M d-hat
+
+The observer compares measured velocities with those that the nominal model (11) predicts in still water; for each of
+the six axes, with the acceleration a by model and thrusters over a period T,
+
+    v-hat <- v-hat + T (a + d-hat) + (1 - z^2) e,   d-hat <- d-hat + (1 - z)^2 / T e,   z = 1 / (1 + omega T)
+
+where e is measured less predicted: two poles at z, omega being `observer`. d-hat is the integral of e, so that net
+weight, current and a lost thruster leave no steady error (extended state observer: J. Han, IEEE Trans. Ind. Electron.
+56(3), 2009). A position is filtered with the same pole.
+
+The filter changes the thruster forces u as little as possible. With h the clearance of a hard region less `margin`, n
+its gradient and v its rate against the region's,
+
+    h'' + (k_1 + k_2) h' + k_1 k_2 h >= 0,   h' = n^T v,   h'' = n^T (A u + a_free + d-hat) + (dn/dt)^T v
+
+keeps h >= 0 if it holds at all times and k_1 h + h' >= 0 at the start: an exponential barrier (Nguyen and Sreenath,
+American Control Conference, 2016), the linear case of high-order barriers (Xiao and Belta, IEEE CDC, 2019). `pull_in`
+and `brake` are k_1 and k_2. Thruster limits are in the quadratic program, and a slack with a price, since limits and
+barriers may contradict each other. Unlike the barriers of the deployable law, these ask for a deceleration that grows
+with speed, whether the thrusters have it or not.
+
+None of these sources was at hand. Model, gradients and program are those of the deployable law.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from controller import quadratic_program
+from controller.arithmetic import square
+from controller.law import (
+    Array,
+    CompiledLaw,
+    Output,
+    VehicleModel,
+    VehicleState,
+    validate_gains,
+    validate_period,
+    validate_quaternion,
+)
+from controller.laws.deployable import model
+from controller.laws.deployable.barrier import (
+    RegionObservation,
+    empty_observation,
+    gradient_rate,
+    observe_regions,
+    pose_gradient,
+)
+from controller.laws.deployable.model import Dynamics, Thrusters
+from controller.linear_algebra import copy
+from controller.potential_field import Field, add_turned, damp, evaluate_field, field_of, set_point_error
+from controller.quadratic_program import Workspace
+from controller.quaternion import error_parts, write_rotation
+from controller.regions.kinds import FIRST_OF_ATTITUDE
+from controller.regions.region_set import PackedRegions
+from controller.stack_array import zeros
+
+_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
+_PRICE = 1e-6  # of slack: the squared force per squared slack times mass that costs as much
+_ABOVE_ZERO = ("k_p1", "observer", "pull_in", "brake")
+
+
+class PidCbfGains(NamedTuple):
+    """Defaults: by ``python -m benchmarks baselines --draws 120 --seed 0``, where no other source stands beside."""
+
+    k_p1: float = 157.1  # N/m
+    k_p2: float = 36.0  # N m, section VII
+    k_v1: float = 162.2  # N s/m
+    k_v2: float = 40.0  # N m s/rad, section VII
+    limit: float = 177.0  # N, greatest pull to the set point
+    inset: float = 0.5  # m, clearance of the set point within the goal region: the centre of the scenes' goals
+    repulsion: float = 302.9  # N/m, of a region of gain 1
+    reach: float = 1.166  # m, clearance at which regions begin to push
+    observer: float = 2.0  # rad/s, bandwidth of the observer
+    pull_in: float = 0.8  # 1/s, k_1 of a barrier
+    brake: float = 2.0  # 1/s, k_2 of a barrier
+    margin: float = 0.05  # m, or rad, kept of hard regions
+
+
+class PidCbfMemory(NamedTuple):
+    """What it keeps, and where it computes; of six numbers three are linear in NED, three angular in body axes."""
+
+    desired_quaternion: Array  # (4,)
+    period: Array  # (1,) s
+    started: Array  # (1,) 1 after the first measurement
+    position: Array  # (3,) m, NED, estimated
+    velocity: Array  # (6,) m/s, rad/s, over ground, estimated
+    disturbance: Array  # (6,) m/s2, rad/s2: d-hat
+    still: model.Loads  # no load, and water that rests
+    acceleration: Array  # (6, m) of one newton of each thruster
+    estimate: Array  # (4,) the vertical disturbance [N], which it takes for weight; zeros
+    report: Array  # (0,)
+    field: Field
+    observation: RegionObservation
+    dynamics: Dynamics
+    thrusters: Thrusters
+    program: Workspace
+
+
+def step(
+    state: VehicleState,
+    goal: PackedRegions,
+    regions: PackedRegions,
+    weights: Array,
+    gains: PidCbfGains,
+    memory: PidCbfMemory,
+    forces: Array,
+) -> None:
+    """Do what `CompiledLaw.step` says; all regions push in full, and hard ones are barriers, whatever their weights."""
+    R, free, wrench, force = zeros(3, 3), zeros(6), zeros(6), zeros(3)
+    dynamics, thrusters, field, work = memory.dynamics, memory.thrusters, memory.field, memory.program
+    mass, velocity = dynamics.translational_mass[0], memory.velocity
+    write_rotation(state.quaternion, R)
+    _update_thrusters(thrusters, state.thruster_health)
+    # observer
+    _observe(memory, state, R, gains)
+    # nominal forces
+    model.free_acceleration(dynamics, R, velocity[:3], velocity[3:], memory.still, free)
+    for i in range(6):
+        free[i] += memory.disturbance[i]
+    pose = VehicleState(memory.position, state.quaternion, state.velocity_body, state.thruster_health, state.deviation)
+    evaluate_field(pose, goal, regions, gains.repulsion, gains.reach, field)
+    set_point_error(field, gains.inset, gains.limit / gains.k_p1)
+    e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
+    damp(zeros(6), e_att, gains.k_p2, gains.k_v1, gains.k_v2, wrench)
+    for i in range(3):
+        force[i] = -gains.k_p1 * field.error[i] - gains.k_v1 * velocity[i] + field.push[i]
+        force[i] -= mass * memory.disturbance[i]
+        wrench[3 + i] -= gains.k_v2 * velocity[3 + i] + dynamics.mass[3 + i, 3 + i] * memory.disturbance[3 + i]
+    add_turned(R, force, 1.0, wrench)
+    for j in range(forces.size):
+        work.nominal[j] = 0.0
+        for k in range(6):
+            work.nominal[j] += thrusters.allocator[j, k] * wrench[k]
+    # filter
+    observe_regions(memory.observation, regions, memory.position, state.quaternion, velocity)
+    model.write_thruster_acceleration(dynamics, thrusters, R, memory.acceleration, memory.acceleration)
+    rows = _write_rows(memory, regions, free, gains)
+    quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
+    copy(forces, thrusters.forces)
+    memory.estimate[0] = mass * memory.disturbance[2]
+
+
+def _update_thrusters(thrusters: Thrusters, health: Array) -> None:
+    """Take note of thrusters that are reported to work or to have failed."""
+    changed = False
+    for j in range(health.size):
+        works = 1.0 if health[j] > 0.0 else 0.0
+        changed = changed or works != thrusters.health[j]
+        thrusters.health[j] = works
+    if changed:
+        model.reallocate(thrusters)
+
+
+def _observe(memory: PidCbfMemory, state: VehicleState, R: Array, gains: PidCbfGains) -> None:
+    """Carry the observer over the last period, and correct it by what is measured, as far as that is a number."""
+    measured, acceleration, thrust, period = zeros(6), zeros(6), zeros(6), memory.period[0]
+    position, velocity, disturbance = memory.position, memory.velocity, memory.disturbance
+    total = 0.0
+    for i in range(3):
+        for k in range(3):
+            measured[i] += R[i, k] * state.velocity_body[k]
+        measured[3 + i] = state.velocity_body[3 + i]
+        total += state.position[i] + measured[i] + measured[3 + i]
+    known = math.isfinite(total)
+    if memory.started[0] == 0.0:
+        if known:
+            copy(state.position, position)
+            copy(measured, velocity)
+            memory.started[0] = 1.0
+        return
+    model.free_acceleration(memory.dynamics, R, velocity[:3], velocity[3:], memory.still, acceleration)
+    model.thrust_acceleration(memory.dynamics, memory.thrusters, R, memory.thrusters.forces, thrust)
+    z = 1.0 / (1.0 + gains.observer * period)
+    for i in range(3):
+        position[i] += period * velocity[i]
+        if known:
+            position[i] += (1.0 - z) * (state.position[i] - position[i])
+    for i in range(6):
+        velocity[i] += period * (acceleration[i] + thrust[i] + disturbance[i])
+        if known:
+            error = measured[i] - velocity[i]
+            velocity[i] += (1.0 - square(z)) * error
+            disturbance[i] += square(1.0 - z) / period * error
+
+
+def _write_rows(memory: PidCbfMemory, regions: PackedRegions, free: Array, gains: PidCbfGains) -> int:
+    """Write the barrier of each hard region that the thrusters could violate; return how many there are.
+
+    `free`, shape (6,), is the acceleration without thrust.
+    """
+    work, observation, rows = memory.program, memory.observation, 0
+    n, later, relative = zeros(6), zeros(6), zeros(6)
+    lower, upper, price = (
+        memory.thrusters.lower,
+        memory.thrusters.upper,
+        _PRICE / square(memory.dynamics.translational_mass[0]),
+    )
+    for i in range(regions.kinds.size):
+        of_attitude = regions.kinds[i] >= _ATTITUDE
+        if not regions.hard[i] or not pose_gradient(
+            observation.gradients, observation.rotation_gradients, i, of_attitude, n
+        ):
+            continue
+        for axis in range(6):
+            relative[axis] = memory.velocity[axis] - (regions.velocities[i, axis] if axis < 3 else 0.0)
+        turning = 0.0
+        if pose_gradient(observation.later_gradients, observation.later_rotation_gradients, i, of_attitude, later):
+            turning = gradient_rate(regions.kinds[i], regions.signs[i], n, later, relative)
+        h, rate, falling = observation.clearances[i] - gains.margin, 0.0, 0.0
+        for axis in range(6):
+            rate += n[axis] * relative[axis]
+            falling += n[axis] * free[axis]
+        right = -(gains.pull_in + gains.brake) * rate - gains.pull_in * gains.brake * h - falling - turning
+        least = 0.0
+        for j in range(lower.size):
+            along = 0.0
+            for axis in range(6):
+                along += n[axis] * memory.acceleration[axis, j]
+            work.rows[rows, j] = along
+            least += along * (lower[j] if along > 0.0 else upper[j])
+        if right > least:
+            work.right[rows], work.price[rows] = right, price
+            rows += 1
+    return rows
+
+
+class PidCbfLaw(CompiledLaw):
+    """PD control with a disturbance observer, filtered by second-order barriers.
+
+    Parameters
+    ----------
+    vehicle : VehicleModel
+        Nominal numbers.
+    gains : PidCbfGains
+        Of the law.
+    desired_quaternion : array_like, shape (4,)
+        Attitude to be kept, from body to world.
+    period : float
+        Control period [s].
+    n_regions : int
+        Number of secondary regions.
+
+    Raises
+    ------
+    LawError
+        If gains, attitude or period are invalid.
+    """
+
+    output: ClassVar[Output] = "thrusters"
+    function = staticmethod(step)
+    gains_type = PidCbfGains
+
+    def __init__(
+        self, vehicle: VehicleModel, gains: PidCbfGains, desired_quaternion: Array, period: float, n_regions: int
+    ) -> None:
+        self.gains, self.n_regions = self.validate(gains), n_regions
+        self.n_forces = m = vehicle.thruster_matrix.shape[1]
+        self.memory = PidCbfMemory(
+            desired_quaternion=validate_quaternion(desired_quaternion),
+            period=np.array([validate_period(period)]),
+            started=np.zeros(1),
+            position=np.zeros(3),
+            velocity=np.zeros(6),
+            disturbance=np.zeros(6),
+            still=model.Loads(np.zeros(3), np.zeros(1), np.zeros(3)),
+            acceleration=np.zeros((6, m)),
+            estimate=np.zeros(4),
+            report=np.zeros(0),
+            field=field_of(n_regions),
+            observation=empty_observation(n_regions),
+            dynamics=model.make_dynamics(vehicle, np.zeros(m + 1)),
+            thrusters=model.make_thrusters(vehicle),
+            program=quadratic_program.empty_workspace(n_regions, m),
+        )
+
+    @classmethod
+    def for_vehicle(
+        cls, vehicle: VehicleModel, gains: Any, desired_quaternion: Array, period: float, n_regions: int
+    ) -> PidCbfLaw:
+        """Return the law for a vehicle, as `CompiledLaw.for_vehicle`."""
+        return cls(vehicle, gains, desired_quaternion, period, n_regions)
+
+    @classmethod
+    def validate(cls, gains: Any) -> Any:
+        """Return gains if the law can work with them."""
+        return validate_gains(gains, _ABOVE_ZERO)
+
+
+LAW = PidCbfLaw
