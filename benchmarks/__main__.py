@@ -15,6 +15,7 @@ from benchmarks import (
     law,
     long_record,
     mavlink,
+    nmpc,
     page,
     peer_environment,
     scaling,
@@ -25,6 +26,7 @@ from benchmarks import (
 from benchmarks.machine import description
 from benchmarks.peer_environment import Environment
 from benchmarks.table import Table, as_json, print_tables, write_json
+from cosim.campaigns.scenes.generator import KINDS
 
 BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy, "mavlink": mavlink, "sitl": sitl, "view": view}
 TABLES = {"all": everything, "scaling": scaling}
@@ -69,6 +71,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     verb.add_argument("--seed", type=int, default=0, help="of the draws (default: %(default)s)")
     verb.add_argument("--workers", type=int, default=2, help="processes (default: %(default)s)")
+    verb = verbs.add_parser("nmpc", help=(nmpc.__doc__ or "").splitlines()[0])
+    verb.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(KINDS)} (default: all)")
+    verb.add_argument("--seed", type=int, default=0, help="of the first scene (default: %(default)s)")
+    verb.add_argument("--count", type=int, default=nmpc.COUNT, help="scenes of a kind (default: %(default)s)")
+    verb.add_argument("--search", action="store_true", help="for horizon and margin first")
+    verb.add_argument("--peers-python", metavar="PYTHON", help="that has CasADi (default: one of their own)")
+    verb.add_argument("--json", type=Path, metavar="FILE", help="append a line for each flight")
     verb = verbs.add_parser("long-record", help=(long_record.__doc__ or "").splitlines()[0])
     verb.add_argument("--rows", type=int, nargs="+", default=long_record.ROWS, help="of the runs (default: 1 and 10 M)")
     verb.add_argument(
@@ -99,6 +108,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
             long_record.print_table(options.rows, options.work, options.scenario, options.folder)
         case "baselines":
             _baselines(parser, options)
+        case "nmpc":
+            if unknown := set(options.kinds) - set(KINDS):
+                parser.error(f"kind is {sorted(unknown)[0]!r}, expected one of {', '.join(KINDS)}")
+            if options.count < 1:
+                parser.error("expected 1 or more scenes")
+            kinds = options.kinds or KINDS
+            nmpc.main(kinds, options.seed, options.count, options.search, options.peers_python, options.json)
         case "peers":
             for peer, version in peer_environment.install(again=True).items():
                 print(f"{peer:24} {version}")

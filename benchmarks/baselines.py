@@ -1,7 +1,7 @@
 """The search for the gains of the laws for comparison, the same for all of them: random draws that race the best.
 
 Gains are drawn log-uniformly, half of them from `RANGES`, the others around the best so far; those without a range
-keep the values of their source. Each draw flies plain and hard scenes by turns, 500 of each from seed 10000 on. Safety
+keep the values of their source. Each draw flies plain and hard scenes by turns, 300 of each from seed 10000 on. Safety
 counts first: better is fewer violations over both, then more reached, then the lower median reach time. A draw flies
 the scenes first in which the best fails, and is given up as soon as it falls behind the best over the scenes flown: who
 repairs none of these cannot be safer. The other laws begin with what was found for `pd`.
@@ -28,7 +28,7 @@ from cosim.campaigns.scenes.scene import Scene
 
 KINDS = ("plain", "hard")  # of scenes
 FIRST_SEED = 10_000
-SCENES = 1000  # plain and hard by turns
+SCENES = 600  # plain and hard by turns
 DURATION = 60.0  # s of a scene in the search; good gains have long reached the goal by then
 # scenes flown by the end of each heat, and by which factor the median reach time may be above that of the best there
 HEATS = ((4, 1.3), (10, 1.15), (40, 1.08), (120, 1.03), (SCENES // 2, 1.0), (SCENES, 1.0))
@@ -39,7 +39,7 @@ PHASES = (
     (0.25, 1.5),
     (0.25, 1.15),
 )  # share of the draws, and within which factor of the best they are
-DRAWS = 60
+DRAWS = 120
 
 _FIELD = {
     "k_p1": (20.0, 600.0),

@@ -53,6 +53,7 @@ PEERS = {
         Peer("pyfuzzylite", ("numpy<2",), "old-numpy"),
         Peer("pymavlink"),
         Peer("python-vehicle-simulator"),
+        Peer("casadi", ("numpy",)),
     )
 }
 

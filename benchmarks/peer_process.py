@@ -38,6 +38,10 @@ class PeerProcess:
 
     def ask(self, line: str) -> float:
         """Send a line, and return the seconds of the answer; NotMeasuredError has what the peer says else."""
+        return float(self.exchange(line)["seconds"])
+
+    def exchange(self, line: str) -> dict[str, Any]:
+        """Send a line, and return the answer; NotMeasuredError has what the peer says else."""
         process = self._process
         assert process.stdin is not None and process.stdout is not None
         with contextlib.suppress(BrokenPipeError):
@@ -49,7 +53,7 @@ class PeerProcess:
         answer: dict[str, Any] = json.loads(told)
         if "error" in answer:
             raise NotMeasuredError(" ".join(answer["error"].split())[:_TAIL])
-        return float(answer["seconds"])
+        return answer
 
 
 @contextlib.contextmanager

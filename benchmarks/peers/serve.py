@@ -1,6 +1,7 @@
 """A peer as a process: ``python serve.py MODULE FUNCTION``, with its setup in JSON as the first line of the input.
 
-Each further line is a number of items to do; each answer a line of JSON: what they took [s], or why they were not done.
+Each further line is a number of items to do, or what else the function takes, in JSON; each answer a line of JSON: what
+it took [s] and what the function returned if that is a dict, or why it was not done.
 """
 
 from __future__ import annotations
@@ -24,11 +25,13 @@ def main(module: str, function: str) -> None:
         work = getattr(importlib.import_module(module), function)(json.loads(sys.stdin.readline()))
         answer(seconds=0.0)
         for line in sys.stdin:
-            count = int(line)
+            given = json.loads(line)
             before = time.perf_counter()
-            told = work(count)
+            told = work(given)
             taken = time.perf_counter() - before
-            answer(seconds=told if isinstance(told, float) else taken)
+            answer(
+                **({"seconds": told if isinstance(told, float) else taken} | (told if isinstance(told, dict) else {}))
+            )
     except Exception as error:  # noqa: BLE001 -- whatever a peer cannot do is an answer
         answer(error=f"{type(error).__name__}: {error}")
 

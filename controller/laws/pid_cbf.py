@@ -121,7 +121,7 @@ def step(
     write_rotation(state.quaternion, R)
     _update_thrusters(thrusters, state.thruster_health)
     # observer
-    _observe(memory, state, R, gains)
+    observe(memory, state, R, gains)
     # nominal forces
     model.free_acceleration(dynamics, R, velocity[:3], velocity[3:], memory.still, free)
     for i in range(6):
@@ -160,7 +160,7 @@ def _update_thrusters(thrusters: Thrusters, health: Array) -> None:
         model.reallocate(thrusters)
 
 
-def _observe(memory: PidCbfMemory, state: VehicleState, R: Array, gains: PidCbfGains) -> None:
+def observe(memory: PidCbfMemory, state: VehicleState, R: Array, gains: PidCbfGains) -> None:
     """Carry the observer over the last period, and correct it by what is measured, as far as that is a number."""
     measured, acceleration, thrust, period = zeros(6), zeros(6), zeros(6), memory.period[0]
     position, velocity, disturbance = memory.position, memory.velocity, memory.disturbance

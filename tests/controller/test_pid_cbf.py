@@ -1,0 +1,144 @@
+"""The PD law with observer and barriers: its observer's poles, its barriers along a motion, and what it is good for."""
+
+import math
+
+import numpy as np
+import pytest
+
+from controller import LAWS, LawError, VehicleState
+from controller.regions import DepthBand, Region, Sphere, pack
+from tests.controller.deployable.scenery import GOAL, LEVEL, ODIN, Sea
+
+PERIOD = 0.02
+BAND = Region("band", DepthBand(3.65, 3.35), "in")
+BALL = Region("ball", Sphere((4.0, 0.6, 2.3), 0.7), "out")
+
+
+def law_of(regions=(), period=PERIOD, **gains):
+    kind = LAWS["pid_cbf"]
+    return kind.for_vehicle(ODIN, kind.gains_type(**gains), LEVEL, period, len(regions))
+
+
+def fly(law, sea, seconds, regions=(), goal=GOAL):
+    """Fly in a sea; return positions, velocities and forces at each period, before its motion."""
+    primary, packed, forces = pack([goal]), pack(regions), np.zeros(8)
+    rows = []
+    for k in range(round(seconds / PERIOD)):
+        packed.move_to(k * PERIOD)
+        law.step(sea.measured(), primary, packed, np.ones(len(regions)), forces)
+        rows.append((sea.position.copy(), sea.velocity.copy(), forces.copy()))
+        sea.step(forces, PERIOD)
+    return (np.array(column) for column in zip(*rows, strict=True))
+
+
+def test_both_poles_of_the_observer_are_where_its_bandwidth_says():
+    """At rest in still water, held by no force, with a push that the model lacks: two equal real poles."""
+    omega, net_weight, kept = 3.0, 6.0, []
+    law, goal = law_of(k_p1=1e-9, k_v1=0.0, repulsion=0.0, limit=0.0, observer=omega), pack([GOAL])
+    acceleration, z, forces = net_weight / 187.5, 1.0 / (1.0 + omega * PERIOD), np.zeros(8)
+    speed = 0.0
+    for _ in range(60):
+        law.memory.thrusters.forces[:] = 0.0  # as if nothing had been commanded
+        velocity = np.array([0.0, 0.0, speed, 0.0, 0.0, 0.0])
+        law.memory.dynamics.quadratic_damping[:] = law.memory.dynamics.linear_damping[:] = 0.0
+        law.step(VehicleState(np.zeros(3), LEVEL, velocity, np.ones(8)), goal, pack([]), np.zeros(0), forces)
+        kept.append(acceleration - law.memory.disturbance[2])
+        speed += PERIOD * acceleration
+    missing = np.array(kept)
+    assert missing[2:] - 2.0 * z * missing[1:-1] + z * z * missing[:-2] == pytest.approx(0.0, abs=1e-13)
+    assert missing[0] == pytest.approx(acceleration) and abs(missing[-1]) < 0.2 * acceleration
+
+
+@pytest.mark.parametrize("net_weight", [-14.0, 9.0])
+def test_net_weight_and_current_leave_no_steady_error(net_weight):
+    law, sea = law_of(), Sea(current=(0.1, -0.2, 0.0), restoring=net_weight)
+    positions, _, _ = fly(law, sea, 60.0)
+    assert positions[-1] == pytest.approx(GOAL.shape.centre, abs=5e-3)
+    assert law.estimate[0] == pytest.approx(net_weight, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "center"), [((0.0, 0.0, 0.0), (2.5, 0.05, 2.5)), ((-0.1, 0.05, 0.0), (3.0, -0.2, 2.4))]
+)
+def test_along_the_motion_each_clearance_keeps_the_barriers_inequality(velocity, center):
+    """h'' by differences of true clearances, of a plant integrated apart: never below, and equal while it acts."""
+    gains = {"pull_in": 0.6, "brake": 1.5, "margin": 0.1, "repulsion": 0.0, "limit": 60.0}
+    region = Region("ball", Sphere(center, 0.7), "out", velocity)
+    law, sea = law_of((region,), **gains), Sea(current=(0.0, 0.0, 0.0), restoring=0.0)
+    positions, _, forces = fly(law, sea, 14.0, (region,))
+    times = PERIOD * np.arange(len(positions))
+    h = np.linalg.norm(positions - center - np.outer(times, velocity), axis=1) - 0.7 - 0.1
+    rate = (h[2:] - h[:-2]) / (2.0 * PERIOD)
+    second = (h[2:] - 2.0 * h[1:-1] + h[:-2]) / PERIOD**2
+    psi = second + (0.6 + 1.5) * rate + 0.6 * 1.5 * h[1:-1]
+    ample = (np.abs(forces) < 26.9).all(axis=1)[1:-1]
+    assert h.min() > -1e-3
+    assert psi[ample].min() > -0.02
+    assert np.sum(np.abs(psi[ample]) < 0.02) > 50  # it acts for a second and more
+
+
+def test_without_the_barrier_it_would_run_into_the_same_obstacle():
+    region = Region("ball", Sphere((2.5, 0.05, 2.5), 0.7), "out", hard=False)
+    positions, _, _ = fly(law_of((region,), repulsion=0.0, limit=60.0), Sea((0.0, 0.0, 0.0), 0.0), 14.0, (region,))
+    assert np.linalg.norm(positions - [2.5, 0.05, 2.5], axis=1).min() < 0.6
+
+
+def test_it_passes_obstacles_in_noise_and_reaches_the_goal():
+    regions = (BALL, Region("drifting", Sphere((5.8, -0.9, 2.2), 0.5), "out", (-0.03, 0.05, 0.0)), BAND)
+    positions, _, forces = fly(law_of(regions), Sea(noise=(0.02, 0.01), seed=3), 60.0, regions)
+    assert np.linalg.norm(positions - BALL.shape.centre, axis=1).min() > 0.7
+    assert np.linalg.norm(positions[-200:] - GOAL.shape.centre, axis=1).max() < 0.5
+    assert np.abs(forces).max() <= 27.0
+
+
+def test_attitude_is_kept_against_a_righting_moment():
+    law, sea = law_of(), Sea(current=(0.0, 0.0, 0.0), restoring=0.0)
+    sea.quaternion = np.array([math.cos(0.2), math.sin(0.2), 0.0, 0.0])
+    list(fly(law, sea, 45.0))
+    assert sea.quaternion == pytest.approx(LEVEL, abs=1e-3)
+
+
+def test_weights_of_the_arbiter_change_nothing():
+    taken = []
+    for weight in (0.0, 1.0):
+        law, forces = law_of((BALL,)), np.zeros(8)
+        state = VehicleState(np.array([3.0, 0.4, 2.2]), LEVEL, np.array([0.5, 0, 0, 0, 0, 0]), np.ones(8))
+        law.step(state, pack([GOAL]), pack([BALL]), np.array([weight]), forces)
+        taken.append(forces)
+    assert (taken[0] == taken[1]).all() and np.abs(taken[0]).max() > 1.0
+
+
+def test_a_thruster_that_is_reported_lost_is_not_asked():
+    law, forces, health = law_of(), np.zeros(8), np.ones(8)
+    health[2] = 0.0
+    law.step(VehicleState(np.zeros(3), LEVEL, np.zeros(6), health), pack([GOAL]), pack([]), np.zeros(0), forces)
+    assert forces[2] == 0.0 and np.abs(forces).max() > 1.0
+
+
+def test_a_lost_position_is_carried_on_by_the_model():
+    law, sea, goal, forces = law_of(), Sea(current=(0.0, 0.0, 0.0), restoring=5.0), pack([GOAL]), np.zeros(8)
+    list(fly(law, sea, 5.0))
+    for _ in range(50):
+        measured = sea.measured()
+        measured.position[1] = math.nan
+        law.step(measured, goal, pack([]), np.zeros(0), forces)
+        assert np.isfinite(forces).all()
+        sea.step(forces, PERIOD)
+    assert law.memory.position == pytest.approx(sea.position, abs=0.05)
+
+
+def test_gains_that_cannot_be_are_named():
+    for gain in LAWS["pid_cbf"].gains_type._fields:
+        for value in (-1.0, math.nan, math.inf):
+            with pytest.raises(LawError, match=rf"law\.gains\.{gain} is"):
+                law_of(**{gain: value})
+    for gain in ("k_p1", "observer", "pull_in", "brake"):
+        with pytest.raises(LawError, match=rf"{gain} is 0.0, expected a finite number above 0"):
+            law_of(**{gain: 0.0})
+
+
+def test_set_up_that_cannot_be_is_refused():
+    law = LAWS["pid_cbf"]
+    for attitude, period in ((np.ones(4), PERIOD), (LEVEL, 0.0)):
+        with pytest.raises(LawError):
+            law.for_vehicle(ODIN, law.gains_type(), attitude, period, 0)
