@@ -26,7 +26,6 @@ from benchmarks import (
 from benchmarks.machine import description
 from benchmarks.peer_environment import Environment
 from benchmarks.table import Table, as_json, print_tables, write_json
-from cosim.campaigns.scenes.generator import KINDS
 
 BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy, "mavlink": mavlink, "sitl": sitl, "view": view}
 TABLES = {"all": everything, "scaling": scaling}
@@ -72,7 +71,7 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("--seed", type=int, default=0, help="of the draws (default: %(default)s)")
     verb.add_argument("--workers", type=int, default=2, help="processes (default: %(default)s)")
     verb = verbs.add_parser("nmpc", help=(nmpc.__doc__ or "").splitlines()[0])
-    verb.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(KINDS)} (default: all)")
+    verb.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(baselines.KINDS)} (default: all)")
     verb.add_argument("--seed", type=int, default=0, help="of the first scene (default: %(default)s)")
     verb.add_argument("--count", type=int, default=nmpc.COUNT, help="scenes of a kind (default: %(default)s)")
     verb.add_argument("--search", action="store_true", help="for horizon and margin first")
@@ -109,11 +108,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         case "baselines":
             _baselines(parser, options)
         case "nmpc":
-            if unknown := set(options.kinds) - set(KINDS):
-                parser.error(f"kind is {sorted(unknown)[0]!r}, expected one of {', '.join(KINDS)}")
+            if unknown := set(options.kinds) - set(baselines.KINDS):
+                parser.error(f"kind is {sorted(unknown)[0]!r}, expected one of {', '.join(baselines.KINDS)}")
             if options.count < 1:
                 parser.error("expected 1 or more scenes")
-            kinds = options.kinds or KINDS
+            kinds = options.kinds or baselines.KINDS
             nmpc.main(kinds, options.seed, options.count, options.search, options.peers_python, options.json)
         case "peers":
             for peer, version in peer_environment.install(again=True).items():

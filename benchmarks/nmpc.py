@@ -1,7 +1,7 @@
 """A nonlinear model predictive controller (CasADi) on scored scenes, with the knowledge that the laws have.
 
-It plans every `PERIOD` by `benchmarks.peers.casadi_nmpc`, in the peers' environment, with the observer of `pid_cbf`; the
-forces hold until the next plan. The time that a plan takes is measured, and not part of the simulation.
+It plans every `PERIOD` by `benchmarks.peers.casadi_nmpc`, in the peers' environment, with the observer of `pid_cbf`;
+the forces hold until the next plan. The time that a plan takes is measured, and not part of the simulation.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple
 import msgspec
 import numpy as np
 
-from benchmarks.baselines import FIRST_SEED, Outcome, outcome
+from benchmarks.baselines import FIRST_SEED, KINDS, Outcome, outcome
 from benchmarks.peer_environment import Environment
 from benchmarks.peer_process import PeerProcess, peer
 from controller import LAWS, VehicleModel, VehicleState
@@ -26,8 +26,10 @@ from controller.laws.pid_cbf import PidCbfGains, PidCbfLaw, observe
 from controller.quaternion import error_parts, write_rotation
 from controller.regions import Sphere
 from controller.regions.region_set import PackedRegions
-from cosim.campaigns.scenes.flyer import VEHICLE, Conditions, SceneFlyer, Score
-from cosim.campaigns.scenes.generator import KINDS, make_scene
+from cosim.campaigns.scenes.as_scenario import VEHICLE
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.flyer import SceneFlyer, Score
+from cosim.campaigns.scenes.generator import make_scene
 from cosim.campaigns.scenes.scene import Scene
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu import load_vehicle
@@ -252,11 +254,11 @@ def main(
     with planner(gains, environment):
         for kind in kinds:
             scores = fly(gains, kind, seed, count)
-            times, failures = sorted(NmpcLaw.function.times), NmpcLaw.function.failures
+            times, failures = sorted(1e3 * t for t in NmpcLaw.function.times), NmpcLaw.function.failures
             print(f"{kind}: {_sentence(outcome(scores))}; least clearance {min(s.min_clearance for s in scores):.3f} m")
             print(
-                f"  a plan: median {1e3 * statistics.median(times):.1f} ms, 99 % {1e3 * times[int(0.99 * len(times))]:.1f}"
-                f" ms, longest {1e3 * times[-1]:.1f} ms; {failures} of {len(times)} not converged",
+                f"  a plan: median {statistics.median(times):.1f} ms, 99 % {times[int(0.99 * len(times))]:.1f} ms, "
+                f"longest {times[-1]:.1f} ms; {failures} of {len(times)} not converged",
                 flush=True,
             )
             if out is not None:

@@ -53,6 +53,7 @@ def controller(setup: dict[str, Any]) -> Callable[[dict[str, Any]], dict[str, An
     variables, low, high = [], [], []
     rows, g_low, g_high = [], [], []
     cost, following = ca.SX(0), None
+    constraints, least, most = [], [], []  # of the stage before
     for k in range(N + 1):
         x, s = ca.SX.sym(f"x{k}", 6), ca.SX.sym(f"s{k}")
         # fatrop finds the stages by this order: variables of a stage, its dynamics, its constraints

@@ -1,7 +1,7 @@
 """A peer as a process: ``python serve.py MODULE FUNCTION``, with its setup in JSON as the first line of the input.
 
 Each further line is a number of items to do, or what else the function takes, in JSON; each answer a line of JSON: what
-it took [s] and what the function returned if that is a dict, or why it was not done.
+it took [s], or the dict that the function returned, or why it was not done.
 """
 
 from __future__ import annotations
