@@ -71,18 +71,18 @@ _ABOVE_ZERO = ("k_p1", "observer", "pull_in", "brake")
 class PidCbfGains(NamedTuple):
     """Defaults: by ``python -m benchmarks baselines --draws 120 --seed 0``, where no other source stands beside."""
 
-    k_p1: float = 157.1  # N/m
+    k_p1: float = 149.4  # N/m
     k_p2: float = 36.0  # N m, section VII
-    k_v1: float = 162.2  # N s/m
+    k_v1: float = 138.2  # N s/m
     k_v2: float = 40.0  # N m s/rad, section VII
-    limit: float = 177.0  # N, greatest pull to the set point
+    limit: float = 180.6  # N, greatest pull to the set point
     inset: float = 0.5  # m, clearance of the set point within the goal region: the centre of the scenes' goals
-    repulsion: float = 302.9  # N/m, of a region of gain 1
-    reach: float = 1.166  # m, clearance at which regions begin to push
-    observer: float = 2.0  # rad/s, bandwidth of the observer
-    pull_in: float = 0.8  # 1/s, k_1 of a barrier
-    brake: float = 2.0  # 1/s, k_2 of a barrier
-    margin: float = 0.05  # m, or rad, kept of hard regions
+    repulsion: float = 44.62  # N/m, of a region of gain 1
+    reach: float = 1.277  # m, clearance at which regions begin to push
+    observer: float = 1.243  # rad/s, bandwidth of the observer
+    pull_in: float = 1.057  # 1/s, k_1 of a barrier
+    brake: float = 1.142  # 1/s, k_2 of a barrier
+    margin: float = 0.05938  # m, or rad, kept of hard regions
 
 
 class PidCbfMemory(NamedTuple):
