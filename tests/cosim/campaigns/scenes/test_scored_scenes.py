@@ -9,7 +9,8 @@ from cosim.campaigns.scenes.flyer import SceneFlyer
 from cosim.campaigns.scenes.generator import generate_scenes
 from cosim.campaigns.scenes.scene import Scene
 
-BASELINES = ["pd", "sun_cheah", "unarbitrated", "antonelli"]
+BASELINES = ["pd", "sun_cheah", "unarbitrated", "antonelli", "pid_cbf"]
+QUICKER = ["pid_cbf"]  # on plain scenes, and less thrifty
 
 
 def scores(law, first, count, hard=False, tell=False):
@@ -27,7 +28,7 @@ def test_no_scene_is_violated_and_every_goal_reached(hard, tell):
 
 
 @pytest.mark.slow
-def test_where_a_baseline_succeeds_it_is_neither_faster_nor_thriftier():
+def test_where_a_baseline_succeeds_it_is_not_thriftier_nor_but_for_one_faster():
     """Medians over the plain scenes that the baseline reaches without violation."""
     ours = scores("deployable", 71_000, 30)
     for law in BASELINES:
@@ -37,4 +38,4 @@ def test_where_a_baseline_succeeds_it_is_neither_faster_nor_thriftier():
         assert len(pairs) > 15, law
         for what in ("reach_time", "effort"):
             theirs, own = (np.median([getattr(score, what) for score in side]) for side in zip(*pairs, strict=True))
-            assert own <= theirs, (law, what)
+            assert own <= theirs or (law in QUICKER and what == "reach_time"), (law, what)
