@@ -37,22 +37,22 @@ from controller.stack_array import zeros
 
 
 class AntonelliGains(NamedTuple):
-    """Defaults: by ``python -m benchmarks baselines --draws 300 --seed 0``, where no other source stands beside."""
+    """Defaults: by ``python -m benchmarks baselines --draws 40 --seed 0``, where no other source stands beside."""
 
-    k_p1: float = 145.2  # N/m, K_P of position
+    k_p1: float = 156.1  # N/m, K_P of position
     k_p2: float = 36.0  # N m, K_P of attitude, section VII
-    k_v1: float = 174.2  # N s/m, K_D of translation
+    k_v1: float = 153.2  # N s/m, K_D of translation
     k_v2: float = 40.0  # N m s/rad, K_D of rotation, section VII
-    lambda_p: float = 0.9439  # 1/s, Lambda of position
+    lambda_p: float = 0.0247  # 1/s, Lambda of position
     lambda_a: float = 0.9  # rad/s, Lambda of attitude: sigma_a of section VII
-    k_theta: float = 1.218  # s2/kg, of the force
+    k_theta: float = 2.348  # s2/kg, of the force
     k_theta_moment: float = 2.0  # s2/(kg m2), of moments: gamma of section VII
-    bound: float = 32.25  # N, of each component of the force
+    bound: float = 19.2  # N, of each component of the force
     bound_moment: float = 65.0  # N m, of each component of the moments: above ODIN-like righting moments
-    limit: float = 193.9  # N, greatest pull to the set point
+    limit: float = 184.2  # N, greatest pull to the set point
     inset: float = 0.5  # m, clearance of the set point within the goal region: the centre of the scenes' goals
-    repulsion: float = 379.1  # N/m, of a region of gain 1
-    reach: float = 1.199  # m, clearance at which regions begin to push
+    repulsion: float = 222.3  # N/m, of a region of gain 1
+    reach: float = 1.499  # m, clearance at which regions begin to push
 
 
 class AntonelliMemory(NamedTuple):

@@ -34,21 +34,21 @@ from controller.stack_array import zeros
 
 
 class SunCheahGains(NamedTuple):
-    """Defaults: by ``python -m benchmarks baselines --draws 300 --seed 0``, where no other source stands beside."""
+    """Defaults: by ``python -m benchmarks baselines --draws 40 --seed 0``, where no other source stands beside."""
 
-    k_p1: float = 152.2  # N/m
+    k_p1: float = 156.1  # N/m
     k_p2: float = 36.0  # N m, section VII
-    k_v1: float = 158.1  # N s/m
+    k_v1: float = 153.2  # N s/m
     k_v2: float = 40.0  # N m s/rad, section VII
-    sigma_p: float = 1.217  # 1/s, of position in the adaptation
+    sigma_p: float = 0.0375  # 1/s, of position in the adaptation
     sigma_a: float = 0.9  # rad/s, of attitude in the adaptation, section VII
-    gamma: float = 0.02121  # s2/kg, s2/(kg m2): L = I / gamma
-    bound: float = 26.96  # N, of the estimate of W - B
+    gamma: float = 1.363  # s2/kg, s2/(kg m2): L = I / gamma
+    bound: float = 30.5  # N, of the estimate of W - B
     bound_moment: float = 65.0  # N m, of the other estimates: above the righting moments of ODIN-like vehicles
-    limit: float = 172.1  # N, greatest pull to the set point
+    limit: float = 184.2  # N, greatest pull to the set point
     inset: float = 0.5  # m, clearance of the set point within the goal region: the centre of the scenes' goals
-    repulsion: float = 288.6  # N/m, of a region of gain 1
-    reach: float = 1.152  # m, clearance at which regions begin to push
+    repulsion: float = 222.3  # N/m, of a region of gain 1
+    reach: float = 1.499  # m, clearance at which regions begin to push
 
 
 class SunCheahMemory(NamedTuple):
