@@ -181,22 +181,27 @@ def _summarise(
 ) -> dict[str, Any]:
     costs = costs_of(results, work.settings.objective, work.horizon)
     summary = {
-        "name": work.name,
-        **_counts(results),
+        "title": work.title,
+        "horizon": work.horizon,
+        **_counts(results, costs),
         "worst": _worst(out, results, costs, points),
         "dice": None,
         **work.plan,
     }
     if dice is not None:
         others = costs_of(dice, work.settings.objective, work.horizon)
-        summary["dice"] = _counts(dice) | {"worst": _worst(out / DICE, dice, others, None)}
+        summary["dice"] = _counts(dice, others) | {"worst": _worst(out / DICE, dice, others, None)}
     return summary
 
 
-def _counts(results: Results) -> dict[str, int]:
+def _counts(results: Results, costs: NDArray[np.float64]) -> dict[str, Any]:
+    """Return how many rows there are of each kind, and the least cost so far wherever it falls."""
     violation = "violation" if "violation" in results.schema.names else "violated"
+    least = np.minimum.accumulate(costs)
+    falls = np.flatnonzero(np.diff(least, prepend=np.inf) < 0.0)
     return {
         "flown": len(results),
+        "best": [[int(i) + 1, float(least[i])] for i in falls if least[i] < _REFUSED],
         "violations": int((results.fact(violation) & results.absent("refused")).sum()),
         "not_reached": int((~results.fact("reached") & results.absent("refused")).sum()),
         "refused": int((~results.absent("refused")).sum()),

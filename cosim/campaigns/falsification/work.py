@@ -101,6 +101,7 @@ class SceneSearch:
         self._space = SceneSpace(family, np.inf if settings.rare_event else _LIMIT)
         self.dimension, self.horizon = self._space.dimension, task.conditions.duration
         self.family, self.name, self.task, self.settings = family, task.law, task, settings
+        self.title = f"The {task.law} law on {family} scenes"
         plan = plan_of(task.law, task.gains, task.conditions, settings.budget, "").table()
         del plan["scenes_sha256"]  # they follow from the search
         self.plan: Mapping[str, Any] = plan | {"search": {"family": family, **asdict(settings)}}
@@ -133,9 +134,7 @@ class SceneSearch:
             scenes = Path(folder) / "scenes.jsonl"
             scenes.write_text("\n".join(generate_scenes(len(self), self.settings.seed, self.family)))
             task = self.task
-            return run_campaign(
-                scenes, task.law, out, task.conditions, task.gains, workers, progress=progress
-            ).results
+            return run_campaign(scenes, task.law, out, task.conditions, task.gains, workers, progress=progress).results
 
 
 class ScenarioSearch(SweepWork):
@@ -161,7 +160,7 @@ class ScenarioSearch(SweepWork):
     def __init__(self, scenario: Scenario, vary: Sequence[Vary], settings: SearchSettings) -> None:
         super().__init__(scenario, Design(tuple(vary), "random", settings.budget, settings.seed))
         self.plan = {**self.plan, "search": asdict(settings)}
-        self.settings, self._scenario = settings, scenario
+        self.settings, self._scenario, self.title = settings, scenario, scenario.title
         self.dimension, self.horizon = len(vary), scenario.time.duration
         self._values = np.empty((0, self.dimension))
 
