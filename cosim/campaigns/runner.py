@@ -129,7 +129,8 @@ def _flown(
         log.warning("%d %ss were refused; why is in their column 'refused'", refused, work.unit)
 
 
-def open_pool(task: Task, workers: int, executor: Executor | None) -> WorkerPool:
+def open_pool(task: Task, workers: int, executor: Executor | None = None) -> WorkerPool:
+    """Return who flies: this process, processes of our own, or an executor."""
     if executor is not None:
         from cosim.campaigns.workers.cluster import Cluster, is_cluster
 
@@ -138,7 +139,7 @@ def open_pool(task: Task, workers: int, executor: Executor | None) -> WorkerPool
 
 
 def warn_refused(table: Any, before: int) -> int:
-    """Tell of the first rows that were refused, and return how many there are now."""
+    """Log why the first rows were refused, and return how many there are now."""
     rows = table.filter(pc.is_valid(table["refused"]))
     for row in rows.slice(0, max(0, _TOLD - before)).to_pylist():
         key = table.schema.names[0]
@@ -147,6 +148,7 @@ def warn_refused(table: Any, before: int) -> int:
 
 
 def progress_bar(work: Work, done: int, progress: bool) -> ProgressBar:
+    """Return a bar over the rows of a work, some of which are done."""
     return ProgressBar(
         progress, total=len(work), initial=done, desc=work.name, unit=work.unit,
         bar_format="{desc} {percentage:3.0f}%|{bar}| {n}/{total} [{elapsed}<{remaining}, {rate_fmt}]",

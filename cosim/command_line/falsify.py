@@ -13,7 +13,8 @@ from cosim.errors import RunError
 _EPILOG = """examples:
   cosim falsify hard --law pd --budget 2000 --out falsified/pd
   cosim falsify hard --law deployable --rare-event --out falsified/rate
-  cosim falsify docking --vary initial.position.1=-4:-2 plant.current.2=-0.2:0.2 --objective arrival --out falsified/dock
+  cosim falsify docking --vary initial.position.1=-4:-2 plant.current.2=-0.2:0.2 --objective arrival \\
+      --out falsified/dock
 """
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cosim.campaigns.analysis.worst_rows import rerun_command
 from cosim.campaigns.falsification.search import import_cma, minimize
 from cosim.campaigns.falsification.splitting import estimate_probability
-from cosim.campaigns.falsification.work import Objective, SceneSearch, ScenarioSearch
+from cosim.campaigns.falsification.work import Objective, ScenarioSearch, SceneSearch
 from cosim.campaigns.runner import open_pool, progress_bar, warn_refused
 from cosim.campaigns.store.columns import to_array
 from cosim.campaigns.store.folder import SUMMARY, CampaignFolder
@@ -115,7 +115,7 @@ def run_falsification(work: Search, out: Path, workers: int = 1, progress: bool 
     estimate = None
     with flyer_held(work.task), CampaignFolder(out, work) as folder:
         with (
-            contextlib.closing(open_pool(work.task, workers, None)) as pool,
+            contextlib.closing(open_pool(work.task, workers)) as pool,
             progress_bar(work, len(folder.rows()), progress) as bar,
         ):
             flights = _Flights(work, folder, pool, bar)
@@ -225,4 +225,5 @@ def _worst(
 
 
 def _distance(differences: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.sqrt(np.mean(differences**2, axis=1))
+    found: NDArray[np.float64] = np.sqrt(np.mean(differences**2, axis=1))
+    return found

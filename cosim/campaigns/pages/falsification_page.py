@@ -122,8 +122,8 @@ def _page(s: dict[str, Any], figures: Mapping[str, Html], shown: Mapping[int, Re
         page.add(figure)
     if rare:
         page.paragraph(
-            "Adaptive multilevel splitting: the half of the flights with more clearance is replaced by variations of the "
-            "others, again and again. The interval counts flights that vary the same first one as dependent.",
+            "Adaptive multilevel splitting replaces the half of the flights with more clearance by variations of the "
+            "other half, again and again. The interval takes variations of the same first flight for dependent.",
             faint=True,
         )
         page.table(
@@ -132,8 +132,9 @@ def _page(s: dict[str, Any], figures: Mapping[str, Html], shown: Mapping[int, Re
         )
     else:
         page.paragraph(
-            "The search is a CMA-ES that begins again where it stalls, within what the generator or the ranges allow, and "
-            "within three standard deviations. Its flights are no sample: their shares are no rates.",
+            "The search is a CMA-ES that begins again where it stalls, within the generator's ranges or those given. "
+            "It takes normal numbers from within three standard deviations. Its flights are no sample, so shares of "
+            "them are no rates.",
             faint=True,
         )
     page.heading(f"The worst {unit}s")
@@ -155,8 +156,8 @@ def _page(s: dict[str, Any], figures: Mapping[str, Html], shown: Mapping[int, Re
     page.heading("What it rests on")
     page.paragraph(
         Html(
-            f"Every {unit} that was flown is a row of {code(RESULTS)}; every number of this page is in {code(SUMMARY)}. "
-            f"The rows follow from what {code(PLAN)} names, the seed of the search included."
+            f"Every flight is a row of {code(RESULTS)}; every number of this page is in {code(SUMMARY)}. The rows follow "
+            f"from what {code(PLAN)} names, the seed of the search included."
         )
     )
     page.table(["", ""], [[key.replace("_", " "), str(value)] for key, value in search.items()])
