@@ -140,7 +140,7 @@ def costs_of(rows: Any, objective: Objective, horizon: float) -> NDArray[np.floa
 
     Parameters
     ----------
-    rows : pyarrow.Table or Results
+    rows : pyarrow.Table
         Of a campaign or a sweep.
     objective : str
         Which of the outcomes counts.
@@ -153,33 +153,19 @@ def costs_of(rows: Any, objective: Objective, horizon: float) -> NDArray[np.floa
         Least clearance [m], of a flight that stopped below 0; less the weighted violation [m s]; or less the time of
         arrival [s], that of who never arrives being the horizon. What was not flown has a great cost.
     """
-    results = rows if isinstance(rows, Results) else _Columns(rows)
-    values = results.number(_COLUMNS[objective])
+    values = to_array(rows[_COLUMNS[objective]]).astype(float)
     if objective == "clearance":
-        values = np.where(np.isnan(results.number("stopped_at")), values, np.fmin(values, _STOPPED))
+        values = np.where(to_array(pc.is_null(rows["stopped_at"])), values, np.fmin(values, _STOPPED))
         costs = np.nan_to_num(values, nan=_REFUSED, posinf=_REFUSED)
     else:
         costs = -np.nan_to_num(values, nan=horizon if objective == "arrival" else 0.0)
-    return np.where(results.absent("refused"), costs, _REFUSED)
-
-
-class _Columns:
-    """The columns of a table as `Results` gives them."""
-
-    def __init__(self, table: Any) -> None:
-        self._table = table
-
-    def number(self, name: str) -> NDArray[np.float64]:
-        return to_array(self._table[name]).astype(float)
-
-    def absent(self, name: str) -> NDArray[np.bool_]:
-        return to_array(pc.is_null(self._table[name]))
+    return np.where(to_array(pc.is_null(rows["refused"])), costs, _REFUSED)
 
 
 def _summarise(
     work: Search, out: Path, results: Results, dice: Results | None, points: NDArray[np.float64]
 ) -> dict[str, Any]:
-    costs = costs_of(results, work.settings.objective, work.horizon)
+    costs = costs_of(results.table, work.settings.objective, work.horizon)
     summary = {
         "title": work.title,
         "horizon": work.horizon,
@@ -189,7 +175,7 @@ def _summarise(
         **work.plan,
     }
     if dice is not None:
-        others = costs_of(dice, work.settings.objective, work.horizon)
+        others = costs_of(dice.table, work.settings.objective, work.horizon)
         summary["dice"] = _counts(dice, others) | {"worst": _worst(out / DICE, dice, others, None)}
     return summary
 

@@ -35,8 +35,8 @@ class Shares:
 
     def uniform(self, low: Any, high: Any) -> Any:
         """Draw evenly between two bounds, or two lists of them."""
-        lows = np.asarray(low, dtype=float)
-        return lows + (np.asarray(high, dtype=float) - lows) * self._next(lows.shape)
+        lows, highs = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+        return np.minimum(lows + (highs - lows) * self._next(lows.shape), highs)[()]
 
     def normal(self, mean: Any, deviation: Any) -> Any:
         """Draw from normal distributions."""

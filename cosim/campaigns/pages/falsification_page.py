@@ -156,8 +156,8 @@ def _page(s: dict[str, Any], figures: Mapping[str, Html], shown: Mapping[int, Re
     page.heading("What it rests on")
     page.paragraph(
         Html(
-            f"Every flight is a row of {code(RESULTS)}; every number of this page is in {code(SUMMARY)}. The rows follow "
-            f"from what {code(PLAN)} names, the seed of the search included."
+            f"Every flight is a row of {code(RESULTS)}; every number of this page is in {code(SUMMARY)}. "
+            f"The rows follow from what {code(PLAN)} names, the seed of the search included."
         )
     )
     page.table(["", ""], [[key.replace("_", " "), str(value)] for key, value in search.items()])

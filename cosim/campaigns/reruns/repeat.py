@@ -24,7 +24,7 @@ from cosim.campaigns.store.folder import PLAN, RESULTS, read_plan
 from cosim.campaigns.store.plan import SCENES, SWEEP, difference
 from cosim.campaigns.store.results import Results
 from cosim.campaigns.sweeps.design import design_of
-from cosim.campaigns.sweeps.rows import SweepBatch, SweepWork, schema_of
+from cosim.campaigns.sweeps.rows import SweepWork, schema_of
 from cosim.campaigns.workers.dispatch import KILLED
 from cosim.campaigns.workers.work import Task
 from cosim.errors import CosimError, RunError
@@ -142,8 +142,10 @@ def _of_sweep(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Rep
         raise RunError(f"{folder / SCENARIO}: is not that of the campaign ({differing})")
     if plan["vehicle_sha256"] != work.plan["vehicle_sha256"]:
         raise RunError(f"{folder / VEHICLE_COPY}: is not that of the campaign")
-    row, values = stored["row"], [stored[key] for key in work.variation.keys]
-    batch = SweepBatch(np.array([row]), np.array([values]), work.design.seeds(np.array([row])))
+    row = stored["row"]
+    batch = work.batch(np.array([row]))
+    if "search" in plan:  # the values of its rows follow from those before, and stand in the rows alone
+        batch = batch._replace(values=np.array([[stored[key] for key in work.variation.keys]]))
     scenario = None
     if stored["refused"] is None:
         scenario = work.variation.scenario(batch.values[0].tolist(), int(batch.seeds[0]))
