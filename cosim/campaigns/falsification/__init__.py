@@ -2,6 +2,6 @@
 
 Rows are flown as those of campaigns and sweeps are, but each follows from what came of those before.
 
-Imports: campaigns.analysis, campaigns.campaign, campaigns.runner, campaigns.scenes, campaigns.store, campaigns.sweep,
-campaigns.sweeps, campaigns.workers, io, plant_fmu, run, scenario.
+Imports: campaigns.analysis, campaigns.scenes, campaigns.store, campaigns.sweeps, campaigns.workers, io, plant_fmu,
+scenario.
 """

@@ -42,8 +42,8 @@ def features(scene):
 @pytest.mark.parametrize("kind", KINDS)
 def test_points_drawn_evenly_are_scenes_of_the_generator(kind):
     space, rng = SceneSpace(kind), np.random.default_rng(1)
-    drawn = [features(scene_at(space, rng.random(space.dimension), i)) for i in range(1500)]
-    made = [features(decode_scene(json.dumps(make_scene(i, kind)).encode())) for i in range(1500)]
+    drawn = [features(scene_at(space, rng.random(space.dimension), i)) for i in range(700)]
+    made = [features(decode_scene(json.dumps(make_scene(i, kind)).encode())) for i in range(700)]
     for name in drawn[0]:
         values = [[scene[name] for scene in scenes] for scenes in (drawn, made)]
         assert ks_2samp(*values).pvalue > 1e-3, name
@@ -52,8 +52,8 @@ def test_points_drawn_evenly_are_scenes_of_the_generator(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_point_leaves_the_family(kind):
     space, rng = SceneSpace(kind, 3.0), np.random.default_rng(2)
-    corners = rng.integers(0, 2, (150, space.dimension)).astype(float)
-    for i, point in enumerate([*corners, *rng.random((150, space.dimension))]):
+    corners = rng.integers(0, 2, (60, space.dimension)).astype(float)
+    for i, point in enumerate([*corners, *rng.random((60, space.dimension))]):
         scene = scene_at(space, point, i)
         hard = kind == "hard"
         start, goal = np.array(scene.start), np.array(scene.goal.centre)
@@ -66,7 +66,7 @@ def test_no_point_leaves_the_family(kind):
             share = (ball.centre - start) @ (goal - start) / ((goal - start) @ (goal - start))
             aside = np.linalg.norm(ball.centre - start - np.clip(share, 0.2, 0.8) * (goal - start))
             assert aside <= 3.0 * np.linalg.norm([0.3, 0.6, 0.5]) + 1e-9
-        assert np.hypot(*scene.current) <= (0.4 if hard else 0.25) * (1.0 + 1e-12)
+        assert np.linalg.norm(scene.current) <= (0.4 if hard else 0.25) * (1.0 + 1e-12)
         assert abs(scene.weight_minus_buoyancy) <= 15.0 and 10.0 <= scene.righting_moment <= 62.0
         assert not hard or (1 <= scene.failed_thruster.index <= 8 and 5.0 <= scene.failed_thruster.time <= 30.0)
 
