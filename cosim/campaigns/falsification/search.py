@@ -14,17 +14,18 @@ from plant_fmu.installing import install_hint
 
 Evaluate = Callable[[NDArray[np.float64]], NDArray[np.float64]]  # points (n, dimension) → costs (n,)
 
-_FIRST = 0.1  # share of the budget that is drawn evenly: where searches begin
-_SPREAD = 0.1  # of a search when it begins, of each coordinate
-_PATIENCE = 20  # generations without a lesser cost, after which a search begins elsewhere
+_FIRST = 0.1  # share of the budget that is drawn evenly: where wide searches begin
+_WIDE, _NARROW = 0.1, 0.02  # spread of a search when it begins, of each coordinate
+_PATIENCE = 10  # generations without a lesser cost, after which a search ends
 
 
 def minimize(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> None:
     """Evaluate a function at as many points as the budget has, ever more of them where it is least.
 
     A tenth of them is drawn evenly. From the best of those begins a CMA-ES with a diagonal covariance (Ros and Hansen
-    2008), which follows some eighty coordinates within a hundred generations. Where 20 generations bring nothing, the
-    next best begins another one with twice the population (Auger and Hansen 2005).
+    2008), which follows some eighty coordinates within a hundred generations. Where ten generations bring nothing, a
+    narrow search begins from the least cost of all, and after it a wide one from the next best that was drawn, by turns.
+    Each wide one has twice the population of that before (Auger and Hansen 2005).
 
     Parameters
     ----------
@@ -44,26 +45,33 @@ def minimize(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> None
     """
     cma, rng = import_cma(), np.random.default_rng(seed)
     drawn = rng.random((math.ceil(_FIRST * budget), dimension))
-    starts = iter(drawn[np.argsort(evaluate(drawn), kind="stable")])
-    left, population = budget - len(drawn), 4 + int(3.0 * math.log(dimension))
+    costs = evaluate(drawn)
+    starts = iter(drawn[np.argsort(costs, kind="stable")])
+    worst, least = drawn[np.argmin(costs)], float(costs.min())
+    left, wide, small = budget - len(drawn), True, 4 + int(3.0 * math.log(dimension))
+    population = small
     while left > 0:
-        start = next(starts, None)
+        start = next(starts, rng.random(dimension)) if wide else worst
+        size = population if wide else small
         options = {
-            "bounds": [0.0, 1.0], "CMA_diagonal": True, "popsize": population, "seed": np.nan,
+            "bounds": [0.0, 1.0], "CMA_diagonal": True, "popsize": size, "seed": np.nan,
             "randn": lambda *shape: rng.standard_normal(shape),
             "signals_filename": "", "verbose": -9, "verb_log": 0, "verb_disp": 0,
         }  # fmt: skip
-        strategy = cma.CMAEvolutionStrategy(rng.random(dimension) if start is None else start, _SPREAD, options)
-        least, stale = math.inf, 0
+        strategy = cma.CMAEvolutionStrategy(start, _WIDE if wide else _NARROW, options)
+        own, stale = math.inf, 0
         while left > 0 and stale < _PATIENCE and not strategy.stop():
             points = np.array(strategy.ask())[:left]
             costs = evaluate(points)
             left -= len(points)
-            if len(points) == population:
+            if len(points) == size:
                 strategy.tell(list(points), costs.tolist())
-            stale = 0 if costs.min() < least else stale + 1
-            least = min(least, float(costs.min()))
-        population *= 2
+            best = int(np.argmin(costs))
+            stale = 0 if costs[best] < own else stale + 1
+            own = min(own, float(costs[best]))
+            if own < least:
+                worst, least = points[best], own
+        population, wide = (2 * population, False) if wide else (population, True)
 
 
 def import_cma() -> Any:
