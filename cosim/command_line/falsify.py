@@ -12,6 +12,7 @@ from cosim.errors import RunError
 
 _EPILOG = """examples:
   cosim falsify hard --law pd --budget 2000 --out falsified/pd
+  cosim falsify conflict --law deployable --objective violation --out falsified/conflict
   cosim falsify hard --law deployable --rare-event --out falsified/rate
   cosim falsify docking --vary initial.position.1=-4:-2 plant.current.2=-0.2:0.2 --objective arrival \\
       --out falsified/dock
@@ -32,7 +33,7 @@ def add_verb(verbs: Any) -> None:
     )  # fmt: skip
     falsify.add_argument(
         "what", metavar="FAMILY|SCENARIO",
-        help="plain or hard, the families of cosim scenes; or a shipped name or TOML file, which stands before --vary",
+        help="plain, hard or conflict, as cosim scenes makes them; or a shipped name or TOML file, before --vary",
     )  # fmt: skip
     falsify.add_argument("--law", help="such as pd; of a scenario, in the place of its own")
     falsify.add_argument(
@@ -79,16 +80,16 @@ def falsify(options: argparse.Namespace) -> int:
 
 
 def _search(options: argparse.Namespace) -> Any:
+    from cosim.campaigns.falsification.spaces import FAMILIES
     from cosim.campaigns.falsification.work import ScenarioSearch, SceneSearch, SearchSettings
-    from cosim.campaigns.scenes.flyer import Conditions
-    from cosim.campaigns.scenes.generator import KINDS
+    from cosim.campaigns.scenes.conditions import Conditions
     from cosim.campaigns.scenes.law_gains import gains_from
     from cosim.campaigns.scenes.work import SceneTask
     from cosim.campaigns.sweeps.design import vary_from
     from cosim.scenario.scenario import load_scenario
 
     what, settings = options.what, SearchSettings(options.objective, options.budget, options.seed, options.rare_event)
-    if what in KINDS:
+    if what in FAMILIES:
         if options.vary:
             raise RunError(f"--vary: expected none with the family {what}: its generator says what varies")
         if not options.law:
@@ -97,7 +98,7 @@ def _search(options: argparse.Namespace) -> Any:
             what, SceneTask(options.law, gains_from(options.law, options.settings), Conditions()), settings
         )
     if what.endswith(".jsonl"):
-        raise RunError(f"{what}: is a file of scenes, expected a family ({', '.join(KINDS)}) or a scenario")
+        raise RunError(f"{what}: is a file of scenes, expected a family ({', '.join(FAMILIES)}) or a scenario")
     vary = vary_from(options.vary)
     both = {key.key for key in vary} & {text.partition("=")[0].strip() for text in options.settings}
     if both:

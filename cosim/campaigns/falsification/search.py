@@ -24,8 +24,8 @@ def minimize(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> None
 
     A tenth of them is drawn evenly. From the best of those begins a CMA-ES with a diagonal covariance (Ros and Hansen
     2008), which follows some eighty coordinates within a hundred generations. Where ten generations bring nothing, a
-    narrow search begins from the least cost of all, and after it a wide one from the next best that was drawn, by turns.
-    Each wide one has twice the population of that before (Auger and Hansen 2005).
+    narrow search begins from the least cost of all, and after it a wide one from the next best that was drawn. Each
+    wide one has twice the population of that before (Auger and Hansen 2005).
 
     Parameters
     ----------
@@ -47,11 +47,11 @@ def minimize(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> None
     drawn = rng.random((math.ceil(_FIRST * budget), dimension))
     costs = evaluate(drawn)
     starts = iter(drawn[np.argsort(costs, kind="stable")])
-    worst, least = drawn[np.argmin(costs)], float(costs.min())
+    place, least = drawn[np.argmin(costs)], float(costs.min())
     left, wide, small = budget - len(drawn), True, 4 + int(3.0 * math.log(dimension))
     population = small
     while left > 0:
-        start = next(starts, rng.random(dimension)) if wide else worst
+        start = next(starts, rng.random(dimension)) if wide else place
         size = population if wide else small
         options = {
             "bounds": [0.0, 1.0], "CMA_diagonal": True, "popsize": size, "seed": np.nan,
@@ -70,7 +70,7 @@ def minimize(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> None
             stale = 0 if costs[best] < own else stale + 1
             own = min(own, float(costs[best]))
             if own < least:
-                worst, least = points[best], own
+                place, least = points[best], own
         population, wide = (2 * population, False) if wide else (population, True)
 
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.campaigns.campaign import run_campaign
-from cosim.campaigns.falsification.spaces import SceneSpace
+from cosim.campaigns.falsification.spaces import FAMILIES, SceneSpace
 from cosim.campaigns.falsification.splitting import LEAST_BUDGET
-from cosim.campaigns.scenes.generator import KINDS, generate_scenes
+from cosim.campaigns.scenes.generator import generate_scenes
 from cosim.campaigns.scenes.plan import plan_of
 from cosim.campaigns.scenes.rows import SCHEMA, refused_row, table_of
 from cosim.campaigns.scenes.work import SceneTask
@@ -78,7 +78,7 @@ class SceneSearch:
     Parameters
     ----------
     family : str
-        One of `cosim.campaigns.scenes.generator.KINDS`.
+        One of `cosim.campaigns.falsification.spaces.FAMILIES`.
     task : SceneTask
         How they are flown.
     settings : SearchSettings
@@ -87,17 +87,15 @@ class SceneSearch:
     Raises
     ------
     RunError
-        If there is no such family, or its scenes do not have what is searched for.
+        If there is no such family.
     """
 
     unit, schema = "scene", SCHEMA
     files: Mapping[str, bytes] = {}
 
     def __init__(self, family: str, task: SceneTask, settings: SearchSettings) -> None:
-        if family not in KINDS:
-            raise RunError(f"family {family!r} is unknown; {hint(family, KINDS)}")
-        if settings.objective == "violation":
-            raise RunError("objective is violation, but scenes have no priorities; expected clearance or arrival")
+        if family not in FAMILIES:
+            raise RunError(f"family {family!r} is unknown; {hint(family, FAMILIES)}")
         self._space = SceneSpace(family, np.inf if settings.rare_event else _LIMIT)
         self.dimension, self.horizon = self._space.dimension, task.conditions.duration
         self.family, self.name, self.task, self.settings = family, task.law, task, settings

@@ -39,7 +39,24 @@ def make_conflict(seed: int) -> Table:
     dict
         Its seed, its kind, which names the vehicle as well, and the table of the scenario, without a law.
     """
-    rng = np.random.default_rng([20261124, seed])
+    return draw_conflict(np.random.default_rng([20261124, seed]), seed)
+
+
+def draw_conflict(rng: Any, seed: int) -> Table:
+    """Make a conflict of random numbers.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        What it is drawn from, or what stands for one.
+    seed : int
+        The scene's own, 0 or above.
+
+    Returns
+    -------
+    dict
+        As `make_conflict` does.
+    """
     vehicle = load_vehicle(list(_LAGS)[int(rng.integers(len(_LAGS)))])
     kind = list(_KINDS)[int(rng.integers(len(_KINDS)))]
     order = rng.permutation(len(_CRITERIA)).tolist()  # place of each criterion

@@ -12,7 +12,7 @@ from cosim.campaigns.falsification.falsification import costs_of, run_falsificat
 from cosim.campaigns.falsification.work import ScenarioSearch, SceneSearch, SearchSettings
 from cosim.campaigns.pages.falsification_page import write_falsification_page
 from cosim.campaigns.reruns.rerun import rerun
-from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.generator import generate_scenes
 from cosim.campaigns.scenes.law_gains import gains_from
 from cosim.campaigns.scenes.rows import refused_row, row_of, table_of
@@ -86,6 +86,13 @@ def test_rows_of_a_scenario_come_again_with_the_values_that_were_found(tmp_path)
     assert first["initial.position.1"] != last["initial.position.1"]
     again = rerun(tmp_path / "out", 29, tmp_path / "run")
     assert again.differing == {} and again.apart == {}
+    assert check(write_falsification_page(tmp_path / "out", 0)).asked == []
+
+
+def test_conflicts_are_searched_for_the_greatest_violation_weighted_by_priority(tmp_path):
+    found = run_falsification(search(20, family="conflict", objective="violation"), tmp_path / "out")
+    weighted = found.results["weighted_violation"]
+    assert weighted.max() > 0.0 and [-one["cost"] for one in found.summary["worst"]][0] == weighted.max()
     assert check(write_falsification_page(tmp_path / "out", 0)).asked == []
 
 
@@ -182,14 +189,14 @@ def test_of_rows_that_are_near_to_each_other_one_is_listed(found):
         ("plain --law pd --budget 99 --rare-event", "budget is 99, expected 100 to 1000000 flights"),
         ("plain --law pd --seed -1", "seed is -1, expected a whole number from 0"),
         ("plain --law pd --objective near", "objective 'near' is unknown; "),
-        ("plain --law pd --objective violation", "scenes have no priorities; expected clearance or arrival"),
+        ("trial --law pd", "trial"),
         ("plain --law pd --objective arrival --rare-event", "objective is arrival, expected clearance"),
         ("plain", "--law is missing"),
         ("plain --law pdd", "law 'pdd' is unknown; did you mean 'pd'"),
         ("plain --law pd --set k=1", "--set k: the law pd has no such gain"),
         ("plain --law pd --vary limit.force=1:2", "--vary: expected none with the family plain"),
         ("plian --law pd", "plian"),
-        ("scenes.jsonl --law pd", "is a file of scenes, expected a family (plain, hard) or a scenario"),
+        ("scenes.jsonl --law pd", "is a file of scenes, expected a family (plain, hard, conflict) or a scenario"),
         ("docking", "nothing varies, expected at least one key"),
         ("docking --vary initial.positon.1=1:2", "initial.positon"),
         ("docking --vary initial.position.1=2:1", "expected the lower end first"),
@@ -214,7 +221,7 @@ def test_without_cma_nothing_is_flown(tmp_path, capsys, monkeypatch):
 
 
 def test_the_command_says_what_was_found(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("cosim.campaigns.scenes.flyer.Conditions.duration", 0.4)
+    monkeypatch.setattr("cosim.campaigns.scenes.conditions.Conditions.duration", 0.4)
     words = ["falsify", "hard", "--law", "pd", "--budget", "20", "--replays", "0", "--out", str(tmp_path / "out")]
     for lines in (4, 5):
         assert main(words) == 0

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import ks_2samp
 
-from cosim.campaigns.falsification.spaces import SceneSpace
-from cosim.campaigns.scenes.generator import KINDS, make_scene
-from cosim.campaigns.scenes.scene import decode_scene
+from cosim.campaigns.falsification.spaces import SceneSpace, Shares
+from cosim.campaigns.scenes.conflicts import make_conflict
+from cosim.campaigns.scenes.generator import MOST_OBSTACLES, make_scene
+from cosim.campaigns.scenes.scene_file import decode_scene
 
 
 def scene_at(space, point, seed=0):
@@ -39,7 +40,7 @@ def features(scene):
     }
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", MOST_OBSTACLES)
 def test_points_drawn_evenly_are_scenes_of_the_generator(kind):
     space, rng = SceneSpace(kind), np.random.default_rng(1)
     drawn = [features(scene_at(space, rng.random(space.dimension), i)) for i in range(700)]
@@ -49,7 +50,7 @@ def test_points_drawn_evenly_are_scenes_of_the_generator(kind):
         assert ks_2samp(*values).pvalue > 1e-3, name
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", MOST_OBSTACLES)
 def test_no_point_leaves_the_family(kind):
     space, rng = SceneSpace(kind, 3.0), np.random.default_rng(2)
     corners = rng.integers(0, 2, (60, space.dimension)).astype(float)
@@ -86,3 +87,42 @@ def test_the_middle_is_the_middle_of_each_range():
     assert scene.current == (0.125, 0.0, 0.0) and scene.weight_minus_buoyancy == 0.0 and scene.righting_moment == 36.0
     assert [ball.centre for ball in scene.obstacles] == [(5.0, 0.0, 2.875)] * 4
     assert [ball.radius for ball in scene.obstacles] == pytest.approx([0.6] * 4)
+
+
+def numbers(conflict):
+    """Return numbers of a conflict that its parameters decide."""
+    table = conflict["scenario"]
+    return {
+        "kind": sum(map(ord, conflict["kind"])),
+        "order": table["criteria"][0]["order"],
+        "goal": table["goal"]["centre"][0],
+        "regions": len(table["regions"]),
+        "priority": max(region["priority"] for region in table["regions"]),
+        "drift": table["regions"][0]["velocity"][2],
+        "current": np.hypot(*table["plant"]["current"][:2]),
+        "buoyancy": table["plant"]["parameters"]["buoyancy"],
+        "start": table["initial"]["position"][2],
+    }
+
+
+def test_conflicts_drawn_evenly_are_those_of_the_generator():
+    space, rng = SceneSpace("conflict"), np.random.default_rng(1)
+    drawn = [numbers(json.loads(space.line(rng.random(space.dimension), i))) for i in range(700)]
+    made = [numbers(make_conflict(i)) for i in range(700)]
+    for name in drawn[0]:
+        assert ks_2samp([one[name] for one in drawn], [one[name] for one in made]).pvalue > 1e-3, name
+
+
+def test_a_conflict_follows_from_its_point_alone_and_can_be_flown():
+    space, rng = SceneSpace("conflict"), np.random.default_rng(3)
+    for i, point in enumerate([*rng.integers(0, 2, (20, space.dimension)), *rng.random((40, space.dimension))]):
+        one, other = (json.loads(space.line(point.astype(float), seed)) for seed in (i, i + 100))
+        del one["scenario"]["title"], other["scenario"]["title"]
+        one["scenario"]["sensing"]["seed"] = other["scenario"]["sensing"]["seed"]
+        assert one["seed"] == i and one["scenario"] == other["scenario"] and one["kind"] == other["kind"]
+        assert scene_at(space, point.astype(float), i).seed == i
+
+
+def test_numbers_that_may_come_twice_are_refused():
+    with pytest.raises(NotImplementedError):
+        Shares(np.empty(0), np.random.default_rng(0)).choice(3, 2, True)
