@@ -92,7 +92,7 @@ def test_rows_of_a_scenario_come_again_with_the_values_that_were_found(tmp_path)
 def test_conflicts_are_searched_for_the_greatest_violation_weighted_by_priority(tmp_path):
     found = run_falsification(search(20, family="conflict", objective="violation"), tmp_path / "out")
     weighted = found.results["weighted_violation"]
-    assert weighted.max() > 0.0 and [-one["cost"] for one in found.summary["worst"]][0] == weighted.max()
+    assert weighted.max() > 0.0 and -found.summary["worst"][0]["cost"] == weighted.max()
     assert check(write_falsification_page(tmp_path / "out", 0)).asked == []
 
 
