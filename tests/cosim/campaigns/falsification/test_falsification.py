@@ -25,7 +25,7 @@ from tests.cosim.campaigns.scene_data import BRIEF, rows
 from tests.cosim.campaigns.test_pages import check, runs_of
 
 pytest.importorskip("cma")
-ARRIVING = Conditions(duration=30.0)
+NEARING = Conditions(duration=12.0)  # long enough to come near to obstacles
 
 
 def search(budget=40, conditions=BRIEF, family="plain", **settings):
@@ -42,7 +42,7 @@ def varied(objective="clearance", budget=30):
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
     """Return a search whose scenes take long enough to come near to something."""
-    return run_falsification(search(60, ARRIVING), tmp_path_factory.mktemp("found") / "out")
+    return run_falsification(search(60, NEARING), tmp_path_factory.mktemp("found") / "out")
 
 
 def test_a_search_finds_worse_scenes_than_as_many_of_the_generator(found):
@@ -89,6 +89,7 @@ def test_rows_of_a_scenario_come_again_with_the_values_that_were_found(tmp_path)
     assert check(write_falsification_page(tmp_path / "out", 0)).asked == []
 
 
+@pytest.mark.slow
 def test_conflicts_are_searched_for_the_greatest_violation_weighted_by_priority(tmp_path):
     found = run_falsification(search(20, family="conflict", objective="violation"), tmp_path / "out")
     weighted = found.results["weighted_violation"]
@@ -109,7 +110,7 @@ def interrupt_after(monkeypatch, tables):
     monkeypatch.setattr(CampaignFolder, "add", counting)
 
 
-@pytest.mark.parametrize("make", [search, varied])
+@pytest.mark.parametrize("make", [search, pytest.param(varied, marks=pytest.mark.slow)])
 def test_what_was_interrupted_goes_on_to_the_same_rows(make, tmp_path, monkeypatch):
     whole = run_falsification(make(), tmp_path / "whole")
     with monkeypatch.context() as patch:
@@ -124,6 +125,7 @@ def test_what_was_interrupted_goes_on_to_the_same_rows(make, tmp_path, monkeypat
     assert not (tmp_path / "out" / PARTS).exists()
 
 
+@pytest.mark.slow
 def test_rows_are_the_same_for_any_number_of_workers(tmp_path):
     one, two = (run_falsification(search(), tmp_path / str(n), workers=n) for n in (1, 2))
     assert rows(one.results) == rows(two.results)
