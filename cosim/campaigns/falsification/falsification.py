@@ -14,7 +14,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from cosim.campaigns.analysis.worst_rows import rerun_command
-from cosim.campaigns.falsification.search import import_cma, minimize
+from cosim.campaigns.falsification.search import minimize
 from cosim.campaigns.falsification.splitting import estimate_probability
 from cosim.campaigns.falsification.work import Objective, ScenarioSearch, SceneSearch
 from cosim.campaigns.runner import open_pool, progress_bar, warn_refused
@@ -102,16 +102,13 @@ def run_falsification(work: Search, out: Path, workers: int = 1, progress: bool 
     Raises
     ------
     RunError
-        If the package cma is not installed, the folder holds something else or cannot be written, or processes die
-        whatever they fly.
+        If the folder holds something else or cannot be written, or processes die whatever they fly.
     BuildError, PlantError
         If there is no FMU of the vehicle.
     KeyboardInterrupt
         After Ctrl-C; what is done is kept.
     """
     settings = work.settings
-    if not settings.rare_event:
-        import_cma()
     estimate = None
     with flyer_held(work.task), CampaignFolder(out, work) as folder:
         with (

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.campaigns.campaign import run_campaign
+from cosim.campaigns.falsification.search import import_cma
 from cosim.campaigns.falsification.spaces import FAMILIES, SceneSpace
 from cosim.campaigns.falsification.splitting import LEAST_BUDGET
 from cosim.campaigns.scenes.generator import generate_scenes
@@ -71,6 +72,10 @@ class SearchSettings:
         if self.rare_event and self.objective != "clearance":
             raise RunError(f"objective is {self.objective}, expected clearance: the rare event is a violation")
 
+    def table(self) -> dict[str, Any]:
+        """Return what the rows follow from, for JSON; a RunError if what searches is not installed."""
+        return asdict(self) | ({} if self.rare_event else {"cma": import_cma().__version__})
+
 
 class SceneSearch:
     """Scenes of a family of the generator, searched for those in which a law does worst.
@@ -87,7 +92,7 @@ class SceneSearch:
     Raises
     ------
     RunError
-        If there is no such family.
+        If there is no such family, or the package cma is not installed.
     """
 
     unit, schema = "scene", SCHEMA
@@ -102,7 +107,7 @@ class SceneSearch:
         self.title = f"The {task.law} law on {family} scenes"
         plan = plan_of(task.law, task.gains, task.conditions, settings.budget, "").table()
         del plan["scenes_sha256"]  # they follow from the search
-        self.plan: Mapping[str, Any] = plan | {"search": {"family": family, **asdict(settings)}}
+        self.plan: Mapping[str, Any] = plan | {"search": {"family": family, **settings.table()}}
         self._lines: list[bytes] = []
 
     def __len__(self) -> int:
@@ -152,12 +157,12 @@ class ScenarioSearch(SweepWork):
     ScenarioError
         If a key is unknown, or what it names is no number.
     RunError
-        If nothing varies, or a key that is a whole number has values that are none.
+        If nothing varies, a key that is a whole number has values that are none, or the package cma is not installed.
     """
 
     def __init__(self, scenario: Scenario, vary: Sequence[Vary], settings: SearchSettings) -> None:
         super().__init__(scenario, Design(tuple(vary), "random", settings.budget, settings.seed))
-        self.plan = {**self.plan, "search": asdict(settings)}
+        self.plan = {**self.plan, "search": settings.table()}
         self.settings, self._scenario, self.title = settings, scenario, scenario.title
         self.dimension, self.horizon = len(vary), scenario.time.duration
         self._values = np.empty((0, self.dimension))

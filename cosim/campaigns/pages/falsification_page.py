@@ -83,7 +83,7 @@ def falsification_lines(summary: dict[str, Any]) -> Iterator[str]:
         yield f"{s['title']}: {_estimated(s['estimate'])}, from {s['flown']} flights"
     else:
         for name, found in (("search", s), ("dice", s["dice"])):
-            worst = f", worst {_value(s, found['worst'][0])} {_unit(s)}" if found["worst"] else ""
+            worst = f", worst {_value(s, found['worst'][0], True)}" if found["worst"] else ""
             yield f"{name + ':':7} {found['flown']} flights, {found['violations']} with a violation{worst}"
     for worst in s["worst"][:1]:
         yield f"worst: {worst['command']}"
@@ -132,9 +132,9 @@ def _page(s: dict[str, Any], figures: Mapping[str, Html], shown: Mapping[int, Re
         )
     else:
         page.paragraph(
-            "The search is a CMA-ES that begins again where it stalls, within the generator's ranges or those given. "
-            "It takes normal numbers from within three standard deviations. Its flights are no sample, so shares of "
-            "them are no rates.",
+            "A tenth of the flights is random. Then CMA-ES searches by turns widely and narrowly, in the generator's "
+            "ranges or those given, and normal numbers within three standard deviations. The flights of a search are "
+            "no sample: shares of them are no rates.",
             faint=True,
         )
     page.heading(f"The worst {unit}s")
@@ -170,7 +170,7 @@ def _verdict(s: dict[str, Any], unit: str) -> str:
         return f"The probability of a violation: {_estimated(s['estimate'])}, from {s['flown']} flights."
 
     def of(found: dict[str, Any]) -> str:
-        worst = f"; the worst is {_value(s, found['worst'][0])} {_unit(s)}" if found["worst"] else ""
+        worst = f"; the worst is {_value(s, found['worst'][0], True)}" if found["worst"] else ""
         return f"{found['violations']} {unit}s with a violation and {found['not_reached']} that did not arrive{worst}"
 
     return f"In {s['flown']} flights the search found {of(s)}. As many random ones: {of(s['dice'])}."
@@ -186,14 +186,12 @@ def _cells(s: dict[str, Any], row: dict[str, Any] | None) -> list[str]:
     return [str(row["row"]), _value(s, row)] if row else ["–", "–"]
 
 
-def _value(s: dict[str, Any], row: dict[str, Any]) -> str:
-    never = s["search"]["objective"] == "arrival" and -row["cost"] >= s["horizon"]
-    return "never" if never else number(_of_cost(s, row["cost"]), 3)
+def _value(s: dict[str, Any], row: dict[str, Any], unit: bool = False) -> str:
+    objective = s["search"]["objective"]
+    if objective == "arrival" and -row["cost"] >= s["horizon"]:
+        return "never"
+    return number(_of_cost(s, row["cost"]), 3) + (f" {_UNITS[objective]}" if unit else "")
 
 
 def _of_cost(s: dict[str, Any], cost: float) -> float:
     return cost if s["search"]["objective"] == "clearance" else -cost
-
-
-def _unit(s: dict[str, Any]) -> str:
-    return _UNITS[s["search"]["objective"]]
