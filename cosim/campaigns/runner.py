@@ -117,19 +117,20 @@ def _flown(
     left[rows] = False
     batches, n, refused = Batches(np.flatnonzero(left)), int(left.sum()), 0
     with (
-        contextlib.closing(_pool(work.task, workers, executor) if n else InProcess()) as pool,
-        _bar(work, len(work) - n, progress) as bar,
+        contextlib.closing(open_pool(work.task, workers, executor) if n else InProcess()) as pool,
+        progress_bar(work, len(work) - n, progress) as bar,
         contextlib.closing(fly_all(work, batches, pool)) as tables,
     ):
         for table in tables:
             yield table
             bar.update(len(table))
-            refused = _tell(table, refused)
+            refused = warn_refused(table, refused)
     if refused > _TOLD:
         log.warning("%d %ss were refused; why is in their column 'refused'", refused, work.unit)
 
 
-def _pool(task: Task, workers: int, executor: Executor | None) -> WorkerPool:
+def open_pool(task: Task, workers: int, executor: Executor | None = None) -> WorkerPool:
+    """Return who flies: this process, processes of our own, or an executor."""
     if executor is not None:
         from cosim.campaigns.workers.cluster import Cluster, is_cluster
 
@@ -137,8 +138,8 @@ def _pool(task: Task, workers: int, executor: Executor | None) -> WorkerPool:
     return Processes(workers, task) if workers > 1 else InProcess()
 
 
-def _tell(table: Any, before: int) -> int:
-    """Tell of the first rows that were refused, and return how many there are now."""
+def warn_refused(table: Any, before: int) -> int:
+    """Log why the first rows were refused, and return how many there are now."""
     rows = table.filter(pc.is_valid(table["refused"]))
     for row in rows.slice(0, max(0, _TOLD - before)).to_pylist():
         key = table.schema.names[0]
@@ -146,7 +147,8 @@ def _tell(table: Any, before: int) -> int:
     return before + len(rows)
 
 
-def _bar(work: Work, done: int, progress: bool) -> ProgressBar:
+def progress_bar(work: Work, done: int, progress: bool) -> ProgressBar:
+    """Return a bar over the rows of a work, some of which are done."""
     return ProgressBar(
         progress, total=len(work), initial=done, desc=work.name, unit=work.unit,
         bar_format="{desc} {percentage:3.0f}%|{bar}| {n}/{total} [{elapsed}<{remaining}, {rate_fmt}]",

@@ -18,6 +18,7 @@ from cosim.command_line import (
     campaigns,
     completion,
     export,
+    falsify,
     mavlink,
     package,
     replay,
@@ -123,6 +124,7 @@ def _parser() -> argparse.ArgumentParser:
     scenes.add_verb(verbs)
     campaigns.add_verbs(verbs)
     sweep.add_verbs(verbs)
+    falsify.add_verb(verbs)
     mavlink.add_verbs(verbs)
     sitl.add_verbs(verbs)
     completion.add_verb(verbs, parser)
@@ -268,6 +270,7 @@ _VERBS = {
     "compare": campaigns.compare,
     "sweep": sweep.sweep,
     "rerun": sweep.rerun,
+    "falsify": falsify.falsify,
     "listen": mavlink.listen,
     "stream": mavlink.stream,
     "mavlink-check": mavlink.mavlink_check,

@@ -144,6 +144,8 @@ def _of_sweep(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Rep
         raise RunError(f"{folder / VEHICLE_COPY}: is not that of the campaign")
     row = stored["row"]
     batch = work.batch(np.array([row]))
+    if "search" in plan:  # the values of its rows follow from those before, and stand in the rows alone
+        batch = batch._replace(values=np.array([[stored[key] for key in work.variation.keys]]))
     scenario = None
     if stored["refused"] is None:
         scenario = work.variation.scenario(batch.values[0].tolist(), int(batch.seeds[0]))

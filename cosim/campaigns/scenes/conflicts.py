@@ -39,7 +39,24 @@ def make_conflict(seed: int) -> Table:
     dict
         Its seed, its kind, which names the vehicle as well, and the table of the scenario, without a law.
     """
-    rng = np.random.default_rng([20261124, seed])
+    return draw_conflict(np.random.default_rng([20261124, seed]), seed)
+
+
+def draw_conflict(rng: Any, seed: int) -> Table:
+    """Make a conflict of random numbers.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        What it is drawn from, or what stands for one.
+    seed : int
+        The scene's own, 0 or above.
+
+    Returns
+    -------
+    dict
+        As `make_conflict` does.
+    """
     vehicle = load_vehicle(list(_LAGS)[int(rng.integers(len(_LAGS)))])
     kind = list(_KINDS)[int(rng.integers(len(_KINDS)))]
     order = rng.permutation(len(_CRITERIA)).tolist()  # place of each criterion
@@ -150,12 +167,8 @@ def _door(rng: Generator) -> tuple[Table, list[Table]]:
     at, deep = rng.uniform(4.0, 6.0), rng.uniform(0.6, 2.0)
     door = rng.uniform(-1.5, 1.5)
     walls = [
-        _region(
-            "left wall", "obstacle", "out", True, _box((at, at + 0.6), (door - 20.0, door - gap / 2.0), (-5.0, edge))
-        ),
-        _region(
-            "right wall", "obstacle", "out", True, _box((at, at + 0.6), (door + gap / 2.0, door + 20.0), (-5.0, edge))
-        ),
+        _region("left wall", "obstacle", "out", True, _box((at, at + 0.6), (door - 20.0, door - gap / 2.0), (-5.0, edge))),
+        _region("right wall", "obstacle", "out", True, _box((at, at + 0.6), (door + gap / 2.0, door + 20.0), (-5.0, edge))),
     ]
     width = rng.uniform(2.0, 4.0)
     behind = _box((at, at + deep), (door - width / 2.0, door + width / 2.0), (-5.0, edge))

@@ -8,9 +8,10 @@ current, noise, and a thruster that fails. `cosim.campaigns.scenes.scene` says w
 from __future__ import annotations
 
 import functools
+import itertools
 import json
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +19,22 @@ from numpy.typing import NDArray
 from cosim.campaigns.scenes.conflicts import make_conflict
 from cosim.campaigns.scenes.trials import make_trial
 
+MOST_OBSTACLES = {"plain": 6, "hard": 14}
 _GOAL_RADIUS = 0.5  # m
 _FREE = 0.6  # m, from an obstacle to the start and to the goal region, at least
+
+
+class Draws(Protocol):
+    """The random numbers of a scene: a generator of NumPy, or what stands for one."""
+
+    def uniform(self, low: Any, high: Any) -> Any:
+        """Draw evenly between two bounds, or two lists of them."""
+
+    def normal(self, mean: Any, deviation: Any) -> Any:
+        """Draw from normal distributions."""
+
+    def integers(self, low: int, high: int) -> Any:
+        """Draw a whole number from `low` on, below `high`."""
 
 
 def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[str]:
@@ -66,12 +81,34 @@ def make_scene(seed: int, kind: str = "plain") -> dict[str, Any]:
     dict
         As JSON has it; SI units, NED.
     """
+    rng = np.random.default_rng([20261121, seed, int(kind == "hard")])
+    return draw_scene(rng, itertools.repeat(rng), seed, kind)
+
+
+def draw_scene(rng: Draws, of_obstacles: Iterable[Draws], seed: int, kind: str) -> dict[str, Any]:
+    """Make a plain or hard scene of random numbers.
+
+    Parameters
+    ----------
+    rng : Draws
+        What all but the obstacles is drawn from.
+    of_obstacles : iterable of Draws
+        What each obstacle is drawn from, as many as `MOST_OBSTACLES` says.
+    seed : int
+        The scene's own, 0 or above.
+    kind : {"plain", "hard"}
+        A hard one has drift, noise and a failing thruster.
+
+    Returns
+    -------
+    dict
+        As JSON has it; SI units, NED.
+    """
     hard = kind == "hard"
-    rng = np.random.default_rng([20261121, seed, int(hard)])
     start = np.array([0.0, 0.0, rng.uniform(1.5, 4.0)])
     goal = np.array([rng.uniform(8.0, 12.0), rng.uniform(-3.0, 3.0), rng.uniform(1.5, 4.5)])
-    n_obstacles = int(rng.integers(6, 15) if hard else rng.integers(1, 7))
-    obstacles = [_make_obstacle(rng, start, goal) for _ in range(n_obstacles)]
+    n_obstacles = int(rng.integers(6 if hard else 1, MOST_OBSTACLES[kind] + 1))
+    obstacles = [_make_obstacle(of, start, goal) for of in itertools.islice(of_obstacles, n_obstacles)]
     heading, speed = rng.uniform(-np.pi, np.pi), rng.uniform(0.0, 0.4 if hard else 0.25)
     if hard:
         obstacles[0]["velocity"] = rng.uniform([-0.08, -0.1, 0.0], [0.0, 0.1, 0.0]).tolist()
@@ -89,7 +126,7 @@ def make_scene(seed: int, kind: str = "plain") -> dict[str, Any]:
     }
 
 
-def _make_obstacle(rng: np.random.Generator, start: NDArray[np.float64], goal: NDArray[np.float64]) -> dict[str, Any]:
+def _make_obstacle(rng: Draws, start: NDArray[np.float64], goal: NDArray[np.float64]) -> dict[str, Any]:
     while True:
         radius = rng.uniform(0.3, 0.9)
         centre = start + rng.uniform(0.2, 0.8) * (goal - start) + rng.normal(0.0, [0.3, 0.6, 0.5])

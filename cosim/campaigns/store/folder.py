@@ -102,6 +102,10 @@ class CampaignFolder:
         """Return the keys of the rows that parts hold, shape (n,)."""
         return self._parts.keys()
 
+    def rows(self) -> Any:
+        """Return all rows that there are, in order of key: a pyarrow.Table."""
+        return self.results().table if self.complete else self._parts.table()
+
     def add(self, table: Any) -> None:
         """Write the rows of a batch, in order of key."""
         self._parts.add(table)

@@ -115,6 +115,11 @@ class Parts:
         for file in files:
             file.unlink()
 
+    def table(self) -> Any:
+        """Return all rows in order of key, a pyarrow.Table; parts that cannot be read are removed."""
+        self.keys()
+        return pa.concat_tables([self._schema.empty_table(), *in_order(self._files, self._schema)])
+
     def join(self, path: Path) -> None:
         """Write all rows to one file in order of key.
 

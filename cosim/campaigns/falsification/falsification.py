@@ -1,0 +1,212 @@
+"""A search from its settings to its folder: rows flown as the search asks for them, the dice beside, a summary."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from cosim.campaigns.analysis.worst_rows import rerun_command
+from cosim.campaigns.falsification.search import minimize
+from cosim.campaigns.falsification.splitting import estimate_probability
+from cosim.campaigns.falsification.work import Objective, ScenarioSearch, SceneSearch
+from cosim.campaigns.runner import open_pool, progress_bar, warn_refused
+from cosim.campaigns.store.columns import to_array
+from cosim.campaigns.store.folder import SUMMARY, CampaignFolder
+from cosim.campaigns.store.results import Results
+from cosim.campaigns.workers.batch_sizing import Batches
+from cosim.campaigns.workers.dispatch import fly_all
+from cosim.campaigns.workers.worker import flyer_held
+from cosim.campaigns.workers.worker_pools import WorkerPool
+from cosim.errors import RunError
+from cosim.io.atomic_file import write_atomic
+from cosim.io.strict_json import json_text
+
+DICE = "dice"  # folder of as many rows that are drawn at random
+LISTED = 10  # of the worst rows
+_COLUMNS = {"clearance": "min_clearance", "violation": "weighted_violation", "arrival": "reach_time"}
+_REFUSED = 1e9  # cost of a row that was not flown: no search goes there
+_STOPPED = -1e-6  # m, clearance of a flight that the plant stopped, at the most: it was not seen to be safe
+_APART = 0.1  # of rows that are listed, at least: root of the mean square over the coordinates
+
+Search = SceneSearch | ScenarioSearch
+
+
+@dataclass(frozen=True)
+class Falsification:
+    """Where a search was written, and what it came to."""
+
+    folder: Path
+    results: Results
+    summary: dict[str, Any]
+    flown: int  # rows of the search, by this call; the rest had been flown before
+
+
+class _Flights:
+    """Flies the rows that a search asks for, and keeps them in the folder."""
+
+    def __init__(self, work: Search, folder: CampaignFolder, pool: WorkerPool, bar: Any) -> None:
+        self._work, self._folder, self._pool, self._bar = work, folder, pool, bar
+        self._known = folder.rows()
+        self._keys = to_array(self._known.column(0))
+        self._time, self.flown, self._refused = 0.0, 0, 0
+        self.points = np.empty((0, work.dimension))
+
+    def __call__(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the costs of points."""
+        rows = self._work.add(points)
+        self.points = np.concatenate([self.points, points])
+        known = np.isin(rows, self._keys)
+        tables = [self._known.filter(pa.array(np.isin(self._keys, rows)))]
+        if not known.all():
+            batches, started = Batches(rows[~known]), time.perf_counter()
+            if self.flown:
+                batches.measured(self.flown, self._time)
+            for table in fly_all(self._work, batches, self._pool):
+                self._folder.add(table)
+                self._bar.update(len(table))
+                self._refused = warn_refused(table, self._refused)
+                tables.append(table)
+            self.flown, self._time = self.flown + int((~known).sum()), self._time + time.perf_counter() - started
+        flown = pa.concat_tables(tables)
+        return costs_of(flown.sort_by(flown.schema.names[0]), self._work.settings.objective, self._work.horizon)
+
+
+def run_falsification(work: Search, out: Path, workers: int = 1, progress: bool = False) -> Falsification:
+    """Search for the rows that go worst, or estimate how likely a violation is, and write results and summary.
+
+    Parameters
+    ----------
+    work : SceneSearch or ScenarioSearch
+        What is searched.
+    out : Path
+        A folder that does not exist, is empty, or holds the same search: as a whole, which writes its summary again,
+        or as a part, which goes on.
+    workers : int
+        Processes; rows are the same for any number.
+    progress : bool
+        Show a bar, if there is a terminal.
+
+    Returns
+    -------
+    Falsification
+        With every row that was flown; beside a search for the worst, its folder ``dice`` has as many random ones.
+
+    Raises
+    ------
+    RunError
+        If the folder holds something else or cannot be written, or processes die whatever they fly.
+    BuildError, PlantError
+        If there is no FMU of the vehicle.
+    KeyboardInterrupt
+        After Ctrl-C; what is done is kept.
+    """
+    settings = work.settings
+    estimate = None
+    with flyer_held(work.task), CampaignFolder(out, work) as folder:
+        with (
+            contextlib.closing(open_pool(work.task, workers)) as pool,
+            progress_bar(work, len(folder.rows()), progress) as bar,
+        ):
+            flights = _Flights(work, folder, pool, bar)
+            if settings.rare_event:
+                estimate = estimate_probability(flights, work.dimension, settings.budget, settings.seed)
+            else:
+                minimize(flights, work.dimension, settings.budget, settings.seed)
+        results = folder.results() if folder.complete else folder.join()
+        folder.remove_parts()
+        dice = None if settings.rare_event else work.fly_dice(out / DICE, workers, progress)
+        try:
+            summary = _summarise(work, out, results, dice, flights.points)
+            summary["estimate"] = estimate and asdict(estimate)
+            write_atomic(out / SUMMARY, json_text(summary))
+        except OSError as error:
+            raise RunError(f"{out}: {error.strerror or error}; what is flown is kept") from error
+    return Falsification(out, results, summary, flights.flown)
+
+
+def costs_of(rows: Any, objective: Objective, horizon: float) -> NDArray[np.float64]:
+    """Return what a search makes least.
+
+    Parameters
+    ----------
+    rows : pyarrow.Table
+        Of a campaign or a sweep.
+    objective : str
+        Which of the outcomes counts.
+    horizon : float
+        Length of a flight [s].
+
+    Returns
+    -------
+    ndarray, shape (rows,)
+        Least clearance [m], of a flight that stopped below 0; less the weighted violation [m s]; or less the time of
+        arrival [s], that of who never arrives being the horizon. What was not flown has a great cost.
+    """
+    values = to_array(rows[_COLUMNS[objective]]).astype(float)
+    if objective == "clearance":
+        values = np.where(to_array(pc.is_null(rows["stopped_at"])), values, np.fmin(values, _STOPPED))
+        costs = np.nan_to_num(values, nan=_REFUSED, posinf=_REFUSED)
+    else:
+        costs = -np.nan_to_num(values, nan=horizon if objective == "arrival" else 0.0)
+    return np.where(to_array(pc.is_null(rows["refused"])), costs, _REFUSED)
+
+
+def _summarise(
+    work: Search, out: Path, results: Results, dice: Results | None, points: NDArray[np.float64]
+) -> dict[str, Any]:
+    costs = costs_of(results.table, work.settings.objective, work.horizon)
+    summary = {
+        "title": work.title,
+        "horizon": work.horizon,
+        **_counts(results, costs),
+        "worst": _worst(out, results, costs, points),
+        "dice": None,
+        **work.plan,
+    }
+    if dice is not None:
+        others = costs_of(dice.table, work.settings.objective, work.horizon)
+        summary["dice"] = _counts(dice, others) | {"worst": _worst(out / DICE, dice, others, None)}
+    return summary
+
+
+def _counts(results: Results, costs: NDArray[np.float64]) -> dict[str, Any]:
+    """Return how many rows there are of each kind, and the least cost so far wherever it falls."""
+    violation = "violation" if "violation" in results.schema.names else "violated"
+    least = np.minimum.accumulate(costs)
+    falls = np.flatnonzero(np.diff(least, prepend=np.inf) < 0.0)
+    return {
+        "flown": len(results),
+        "best": [[int(i) + 1, float(least[i])] for i in falls if least[i] < _REFUSED],
+        "violations": int((results.fact(violation) & results.absent("refused")).sum()),
+        "not_reached": int((~results.fact("reached") & results.absent("refused")).sum()),
+        "refused": int((~results.absent("refused")).sum()),
+    }
+
+
+def _worst(
+    folder: Path, results: Results, costs: NDArray[np.float64], points: NDArray[np.float64] | None
+) -> list[dict[str, Any]]:
+    """Return the worst rows, of those near to each other the worst one."""
+    found: list[int] = []
+    for i in np.argsort(costs, kind="stable").tolist():
+        if len(found) == LISTED or costs[i] == _REFUSED:
+            break
+        if points is None or not found or _distance(points[found] - points[i]).min() > _APART:
+            found.append(i)
+    keys = results[results.schema.names[0]]
+    return [
+        {"row": int(keys[i]), "cost": float(costs[i]), "command": rerun_command(folder, int(keys[i]))} for i in found
+    ]
+
+
+def _distance(differences: NDArray[np.float64]) -> NDArray[np.float64]:
+    found: NDArray[np.float64] = np.sqrt(np.mean(differences**2, axis=1))
+    return found

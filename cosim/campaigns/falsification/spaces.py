@@ -1,0 +1,122 @@
+"""Scenes as points of a unit cube, so that a search can move among them, and a sampler draw them as they come."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from cosim.campaigns.scenes.conflicts import draw_conflict
+from cosim.campaigns.scenes.generator import MOST_OBSTACLES, draw_scene
+
+FAMILIES = (*MOST_OBSTACLES, "conflict")
+_CONFLICTS = 64  # that are drawn to see how many numbers one has
+_OF_AN_OBSTACLE = 5  # coordinates: radius, place along the way, three of the distance from it
+
+Point = NDArray[np.float64]  # (dimension,) each from 0 to 1
+
+
+class Shares:
+    """Stands for a random number generator: a number drawn is at a given share of its distribution.
+
+    Parameters
+    ----------
+    shares : ndarray, shape (n,)
+        Of the first n numbers, from 0 to 1.
+    rest : numpy.random.Generator
+        What the numbers after those are drawn from.
+    limit : float
+        Greatest distance of a normal number from its mean [standard deviations].
+    """
+
+    def __init__(self, shares: Point, rest: np.random.Generator, limit: float = np.inf) -> None:
+        self._shares, self._rest, self._limit = shares, rest, limit
+        self.drawn = 0  # numbers
+
+    def uniform(self, low: Any = 0.0, high: Any = 1.0, size: int | None = None) -> Any:
+        """Draw evenly between two bounds, or two lists of them; or so many numbers."""
+        lows, highs = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+        return np.minimum(lows + (highs - lows) * self._next(lows.shape if size is None else (size,)), highs)[()]
+
+    def normal(self, mean: Any, deviation: Any) -> Any:
+        """Draw from normal distributions."""
+        deviations = np.asarray(deviation, dtype=float)
+        return mean + deviations * np.clip(ndtri(self._next(deviations.shape)), -self._limit, self._limit)
+
+    def integers(self, low: int, high: int | None = None) -> int:
+        """Draw a whole number from `low` on, below `high`; or from 0 on, below the only bound."""
+        low, high = (0, low) if high is None else (low, high)
+        return min(low + int((high - low) * self._next(())), high - 1)
+
+    def permutation(self, n: int) -> NDArray[np.int64]:
+        """Draw an order of the numbers from 0 on, below `n`."""
+        return np.argsort(self._next((n,)), kind="stable")
+
+    def choice(self, n: int, size: int, replace: bool) -> NDArray[np.int64]:
+        """Draw so many different numbers from 0 on, below `n`."""
+        if replace:
+            raise NotImplementedError("numbers that may come twice")
+        return self.permutation(n)[:size]
+
+    def _next(self, shape: tuple[int, ...]) -> Any:
+        n = int(np.prod(shape))
+        given = self._shares[self.drawn : self.drawn + n]
+        self.drawn += n
+        return np.concatenate([given, self._rest.random(n - len(given))]).reshape(shape)[()]
+
+
+class SceneSpace:
+    """The scenes of a family of the generator, each a point of a unit cube.
+
+    Points that are drawn evenly give scenes with the generator's own distribution: a coordinate is the share of the
+    distribution of one number. An obstacle that leaves too little room around start or goal is drawn again, as by the
+    generator, from the scene's seed.
+
+    Parameters
+    ----------
+    family : str
+        One of `FAMILIES`.
+    limit : float
+        Greatest distance of a normal number from its mean [standard deviations].
+    """
+
+    def __init__(self, family: str, limit: float = np.inf) -> None:
+        self.family, self._limit = family, limit
+        rng = np.random.default_rng(0)
+        if family in MOST_OBSTACLES:
+            several = [Shares(np.empty(0), rng)]
+            draw_scene(several[0], [Shares(np.empty(0), rng)] * MOST_OBSTACLES[family], 0, family)
+        else:
+            several = [Shares(np.empty(0), rng) for _ in range(_CONFLICTS)]
+            for shares in several:
+                draw_conflict(shares, 0)
+        self._others = max(shares.drawn for shares in several)
+        self.dimension = self._others + _OF_AN_OBSTACLE * MOST_OBSTACLES.get(family, 0)
+
+    def line(self, point: Point, seed: int) -> bytes:
+        """Return the scene at a point as a line of JSON.
+
+        Parameters
+        ----------
+        point : ndarray, shape (dimension,)
+            From 0 to 1.
+        seed : int
+            The scene's own: of its noise, and of obstacles that are drawn again.
+
+        Returns
+        -------
+        bytes
+            As `cosim.campaigns.scenes.scene_file.decode_scene` reads it.
+        """
+        rest = np.random.default_rng([seed, 2])
+        others = Shares(point[: self._others], rest, self._limit)
+        obstacles = point[self._others :].reshape(-1, _OF_AN_OBSTACLE)
+        if self.family in MOST_OBSTACLES:
+            drawn = [Shares(shares, rest, self._limit) for shares in obstacles]
+            scene = draw_scene(others, drawn, seed, self.family)
+        else:
+            scene = draw_conflict(others, seed)
+        return json.dumps(scene).encode() + b"\n"

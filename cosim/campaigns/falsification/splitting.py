@@ -1,0 +1,111 @@
+"""The probability of a rare event, by adaptive multilevel splitting."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from cosim.campaigns.falsification.search import Evaluate
+
+_PARTICLES = 16  # part of the budget that is flown at once: it lasts for about 15 levels, each half as likely
+_KEPT = 0.5  # share of the particles that are beyond the next level
+_MOVES = 2  # that every copied particle is tried to make
+_CHANGED = 0.5  # share of the coordinates that a move changes
+_ACCEPTED = 0.3  # share of the moves that the step is adapted to
+_SHORTEST = 0.02  # step
+_QUANTILE = 1.96  # of the interval, 95 %
+LEAST_BUDGET = 100  # points
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A probability with its interval."""
+
+    probability: float  # 0 where no point was in the event
+    low: float  # of the 95 % interval; 0 where no point was in the event
+    high: float
+    levels: tuple[tuple[float, float], ...]  # cost, and how likely it is not to be greater
+
+
+def estimate_probability(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> Estimate:
+    """Estimate how likely the cost of a point that is drawn evenly is below 0.
+
+    Particles are drawn evenly. Again and again the half with the greater costs is replaced by copies of the others,
+    which a Markov chain then moves where the cost is no greater than the level that parts the halves: the estimate is
+    the product of the shares (Au and Beck 2001, Cerou and others 2012). A move changes half of the coordinates, by
+    preconditioned Crank-Nicolson steps in normal numbers, so points stay distributed as they were drawn. A cost may be
+    random: it is then drawn anew with each move.
+
+    The interval is that of a normal distribution of the logarithm. Its variance sums those of the shares, each between
+    the families of first particles: copies of one are not independent.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Points, shape (n, dimension), each coordinate from 0 to 1; returns their costs, shape (n,).
+    dimension : int
+        How many coordinates.
+    budget : int
+        How many points at the most, `LEAST_BUDGET` or more.
+    seed : int
+        Of particles and moves.
+
+    Returns
+    -------
+    Estimate
+        Where the budget ends before a cost is below 0, its upper bound alone says something.
+    """
+    rng = np.random.default_rng(seed)
+    n = max(LEAST_BUDGET // 5, budget // _PARTICLES)
+    z = rng.standard_normal((n, dimension))
+    costs, families = evaluate(ndtr(z)), np.arange(n)
+    left, step, reached, variance = budget - n, 0.5, 1.0, 0.0
+    levels: list[tuple[float, float]] = []
+    while True:
+        level = float(np.sort(costs)[int(_KEPT * n) - 1])
+        inside = costs <= level
+        copied = np.flatnonzero(~inside)
+        if level < 0.0 or not len(copied) or left < _MOVES * len(copied):
+            return _conclude(costs < 0.0, families, reached, variance, levels)
+        variance += _relative_variance(inside, families)
+        reached *= float(inside.mean())
+        levels.append((level, reached))
+        parents = np.arange(n)
+        parents[copied] = rng.choice(np.flatnonzero(inside), len(copied))
+        z, costs, families = z[parents], costs[parents], families[parents]
+        for _ in range(_MOVES):
+            moved = math.sqrt(1.0 - step**2) * z[copied] + step * rng.standard_normal((len(copied), dimension))
+            moved = np.where(rng.random(moved.shape) < _CHANGED, moved, z[copied])
+            new = evaluate(ndtr(moved))
+            left -= len(copied)
+            accepted = new <= level
+            z[copied[accepted]], costs[copied[accepted]] = moved[accepted], new[accepted]
+            step = float(np.clip(step * math.exp(accepted.mean() - _ACCEPTED), _SHORTEST, 1.0))
+
+
+def _conclude(
+    event: NDArray[np.bool_],
+    families: NDArray[np.int64],
+    reached: float,
+    variance: float,
+    levels: list[tuple[float, float]],
+) -> Estimate:
+    if not event.any():
+        most = 1.0 - 0.025 ** (1.0 / len(event))  # Clopper and Pearson, none of n
+        high = min(1.0, reached * math.exp(_QUANTILE * math.sqrt(variance)) * most)
+        return Estimate(0.0, 0.0, high, tuple(levels))
+    probability = reached * float(event.mean())
+    half = _QUANTILE * math.sqrt(variance + _relative_variance(event, families))
+    levels.append((0.0, probability))
+    return Estimate(probability, probability * math.exp(-half), min(1.0, probability * math.exp(half)), tuple(levels))
+
+
+def _relative_variance(inside: NDArray[np.bool_], families: NDArray[np.int64]) -> float:
+    """Return the squared relative error of a share, between families that are independent of each other."""
+    share, several = inside.mean(), len(np.unique(families))
+    sums = np.bincount(families, inside - share)
+    return float((sums**2).sum() / inside.sum() ** 2 * several / max(1, several - 1))

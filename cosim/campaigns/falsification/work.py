@@ -1,0 +1,183 @@
+"""What a search flies: rows whose numbers are known only when the search asks for them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.campaigns.campaign import run_campaign
+from cosim.campaigns.falsification.search import import_cma
+from cosim.campaigns.falsification.spaces import FAMILIES, SceneSpace
+from cosim.campaigns.falsification.splitting import LEAST_BUDGET
+from cosim.campaigns.scenes.generator import generate_scenes
+from cosim.campaigns.scenes.plan import plan_of
+from cosim.campaigns.scenes.rows import SCHEMA, refused_row, table_of
+from cosim.campaigns.scenes.work import SceneTask
+from cosim.campaigns.store.results import Results
+from cosim.campaigns.sweep import run_sweep
+from cosim.campaigns.sweeps.design import Design, Vary
+from cosim.campaigns.sweeps.rows import SweepBatch, SweepWork
+from cosim.campaigns.workers.work import Rows
+from cosim.errors import RunError
+from cosim.scenario.scenario import Scenario
+from plant_fmu.toml_tables import hint
+
+Objective = Literal["clearance", "violation", "arrival"]
+OBJECTIVES: tuple[Objective, ...] = get_args(Objective)
+_LIMIT = 3.0  # standard deviations of a normal number within which a search stays
+_MOST = 1_000_000  # rows
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """What is searched for, and for how long.
+
+    Parameters
+    ----------
+    objective : str
+        ``"clearance"``, the least one; ``"violation"``, the greatest one weighted by priority; ``"arrival"``, the
+        latest one, never being the worst.
+    budget : int
+        Rows that are flown.
+    seed : int
+        Of the search.
+    rare_event : bool
+        Estimate how likely a violation is, in the place of a search for the worst.
+
+    Raises
+    ------
+    RunError
+        If there can be no such search.
+    """
+
+    objective: Objective = "clearance"
+    budget: int = 2000
+    seed: int = 0
+    rare_event: bool = False
+
+    def __post_init__(self) -> None:
+        if self.objective not in OBJECTIVES:
+            raise RunError(f"objective {self.objective!r} is unknown; {hint(self.objective, OBJECTIVES)}")
+        least = LEAST_BUDGET if self.rare_event else 1
+        if not least <= self.budget <= _MOST:
+            raise RunError(f"budget is {self.budget}, expected {least} to {_MOST} flights")
+        if not 0 <= self.seed < 2**31:
+            raise RunError(f"seed is {self.seed}, expected a whole number from 0 to 2^31 - 1")
+        if self.rare_event and self.objective != "clearance":
+            raise RunError(f"objective is {self.objective}, expected clearance: the rare event is a violation")
+
+    def table(self) -> dict[str, Any]:
+        """Return what the rows follow from, for JSON; a RunError if what searches is not installed."""
+        return asdict(self) | ({} if self.rare_event else {"cma": import_cma().__version__})
+
+
+class SceneSearch:
+    """Scenes of a family of the generator, searched for those in which a law does worst.
+
+    Parameters
+    ----------
+    family : str
+        One of `cosim.campaigns.falsification.spaces.FAMILIES`.
+    task : SceneTask
+        How they are flown.
+    settings : SearchSettings
+        What is searched for.
+
+    Raises
+    ------
+    RunError
+        If there is no such family, or the package cma is not installed.
+    """
+
+    unit, schema = "scene", SCHEMA
+    files: Mapping[str, bytes] = {}
+
+    def __init__(self, family: str, task: SceneTask, settings: SearchSettings) -> None:
+        if family not in FAMILIES:
+            raise RunError(f"family {family!r} is unknown; {hint(family, FAMILIES)}")
+        self._space = SceneSpace(family, np.inf if settings.rare_event else _LIMIT)
+        self.dimension, self.horizon = self._space.dimension, task.conditions.duration
+        self.family, self.name, self.task, self.settings = family, task.law, task, settings
+        self.title = f"The {task.law} law on {family} scenes"
+        plan = plan_of(task.law, task.gains, task.conditions, settings.budget, "").table()
+        del plan["scenes_sha256"]  # they follow from the search
+        self.plan: Mapping[str, Any] = plan | {"search": {"family": family, **settings.table()}}
+        self._lines: list[bytes] = []
+
+    def __len__(self) -> int:
+        return self.settings.budget
+
+    def add(self, points: NDArray[np.float64]) -> Rows:
+        """Make rows of points, shape (n, dimension), and return their numbers."""
+        first = len(self._lines)
+        self._lines += [self._space.line(point, first + i) for i, point in enumerate(points)]
+        return np.arange(first, len(self._lines))
+
+    def batch(self, rows: Rows) -> list[bytes]:
+        """Return the lines of some rows."""
+        return [self._lines[row] for row in rows]
+
+    def rows_of(self, keys: Rows) -> Rows:
+        """Return the rows of some seeds, which are their numbers; -1 for one that has none."""
+        return np.where((keys >= 0) & (keys < len(self)), keys, -1)
+
+    def refused(self, row: int, reason: str) -> Any:
+        """Return the table of one scene that could not be flown."""
+        return table_of([refused_row(row, reason, self._lines[row].decode().strip())])
+
+    def fly_dice(self, out: Path, workers: int, progress: bool) -> Results:
+        """Fly as many scenes as the generator makes them."""
+        with TemporaryDirectory() as folder:
+            scenes = Path(folder) / "scenes.jsonl"
+            scenes.write_text("\n".join(generate_scenes(len(self), self.settings.seed, self.family)))
+            task = self.task
+            return run_campaign(scenes, task.law, out, task.conditions, task.gains, workers, progress=progress).results
+
+
+class ScenarioSearch(SweepWork):
+    """A scenario, searched for the values of some keys with which it goes worst.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What stays.
+    vary : sequence of Vary
+        What varies, and in which range.
+    settings : SearchSettings
+        What is searched for.
+
+    Raises
+    ------
+    ScenarioError
+        If a key is unknown, or what it names is no number.
+    RunError
+        If nothing varies, a key that is a whole number has values that are none, or the package cma is not installed.
+    """
+
+    def __init__(self, scenario: Scenario, vary: Sequence[Vary], settings: SearchSettings) -> None:
+        super().__init__(scenario, Design(tuple(vary), "random", settings.budget, settings.seed))
+        self.plan = {**self.plan, "search": settings.table()}
+        self.settings, self._scenario, self.title = settings, scenario, scenario.title
+        self.dimension, self.horizon = len(vary), scenario.time.duration
+        self._values = np.empty((0, self.dimension))
+
+    def add(self, points: NDArray[np.float64]) -> Rows:
+        """Make rows of points, shape (n, dimension), and return their numbers."""
+        first = len(self._values)
+        values = [vary.at(points[:, i]) for i, vary in enumerate(self.design.vary)]
+        self._values = np.concatenate([self._values, np.column_stack(values)])
+        return np.arange(first, len(self._values))
+
+    def batch(self, rows: Rows) -> SweepBatch:
+        """Return values and seeds of some rows."""
+        return SweepBatch(rows, self._values[rows], self.design.seeds(rows))
+
+    def fly_dice(self, out: Path, workers: int, progress: bool) -> Results:
+        """Fly as many rows with values that are drawn evenly."""
+        return run_sweep(self._scenario, self.design, out, workers=workers, progress=progress).results

@@ -1,0 +1,233 @@
+"""``cosim falsify``: from its flags to a folder whose rows can be flown again, whoever flies them."""
+
+import json
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from cosim.campaigns import vary_from
+from cosim.campaigns.falsification import falsification as module
+from cosim.campaigns.falsification.falsification import costs_of, run_falsification
+from cosim.campaigns.falsification.work import ScenarioSearch, SceneSearch, SearchSettings
+from cosim.campaigns.pages.falsification_page import write_falsification_page
+from cosim.campaigns.reruns.rerun import rerun
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.generator import generate_scenes
+from cosim.campaigns.scenes.law_gains import gains_from
+from cosim.campaigns.scenes.rows import refused_row, row_of, table_of
+from cosim.campaigns.scenes.work import SceneTask
+from cosim.campaigns.store.folder import PARTS, CampaignFolder
+from cosim.command_line.cli import main
+from cosim.errors import RunError
+from cosim.scenario.scenario import load_scenario
+from tests.cosim.campaigns.scene_data import BRIEF, rows
+from tests.cosim.campaigns.test_pages import check, runs_of
+
+pytest.importorskip("cma")
+NEARING = Conditions(duration=12.0)  # long enough to come near to obstacles
+
+
+def search(budget=40, conditions=BRIEF, family="plain", **settings):
+    task = SceneTask("pd", gains_from("pd"), conditions)
+    return SceneSearch(family, task, SearchSettings(budget=budget, **settings))
+
+
+def varied(objective="clearance", budget=30):
+    scenario = load_scenario("paper", ["arbiter.engine=closed", "time.duration=0.3", "sensing.position_noise=0.02"])
+    vary = vary_from(["initial.position.1=-2:2", "regions.SR1.gain=500:5000:log", "limit.force=400,800"])
+    return ScenarioSearch(scenario, vary, SearchSettings(objective, budget))
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """Return a search whose scenes take long enough to come near to something."""
+    return run_falsification(search(60, NEARING), tmp_path_factory.mktemp("found") / "out")
+
+
+def test_a_search_finds_worse_scenes_than_as_many_of_the_generator(found):
+    s = found.summary
+    assert found.flown == s["flown"] == s["dice"]["flown"] == 60
+    assert s["worst"][0]["cost"] == found.results["min_clearance"].min() < s["dice"]["worst"][0]["cost"]
+    dice = pq.read_table(found.folder / "dice" / "results.parquet")
+    made = [json.loads(line)["goal"]["centre"] for line in generate_scenes(60)]
+    assert [json.loads(line)["goal"]["centre"] for line in dice["scene"].to_pylist()] == made
+    for part, results in ((s, found.results), (s["dice"], None)):
+        clearance = results["min_clearance"] if results else dice["min_clearance"].to_numpy()
+        least = [clearance[:flights].min() for flights, _ in part["best"]]
+        assert least == [cost for _, cost in part["best"]] and least == sorted(least, reverse=True)
+
+
+def test_its_page_shows_search_and_dice_and_the_worst_moving(found):
+    page = check(write_falsification_page(found.folder, 1))
+    worst, dice = found.summary["worst"], found.summary["dice"]["worst"]
+    assert page.asked == [f"worst/{worst[0]['row']}/replay.html"]
+    listed = [row for row in page.rows if row[-1].startswith("cosim rerun")]
+    assert [(int(row[0]), int(row[2])) for row in listed] == [
+        (one["row"], other["row"]) for one, other in zip(worst, dice, strict=False)
+    ]
+    assert [path.name for path in (found.folder / "figures").iterdir()] == ["convergence.svg"]
+    (run,) = runs_of(found.folder / page.asked[0])
+    assert run["status"] == "completed"
+
+
+def test_its_rows_are_those_of_a_campaign_and_come_again(found, tmp_path):
+    key = found.summary["worst"][0]["row"]
+    again = rerun(found.folder, key, tmp_path / "run")
+    assert again.differing == {} and again.apart == {} and again.run is not None
+    key = found.summary["dice"]["worst"][0]["row"]
+    assert rerun(found.folder / "dice", key, tmp_path / "dice").differing == {}
+
+
+def test_rows_of_a_scenario_come_again_with_the_values_that_were_found(tmp_path):
+    found = run_falsification(varied(), tmp_path / "out")
+    first, last = found.results.table.to_pylist()[0], found.results.table.to_pylist()[-1]
+    assert -2.0 <= last["initial.position.1"] <= 2.0 and last["limit.force"] in (400.0, 800.0)
+    assert first["initial.position.1"] != last["initial.position.1"]
+    again = rerun(tmp_path / "out", 29, tmp_path / "run")
+    assert again.differing == {} and again.apart == {}
+    assert check(write_falsification_page(tmp_path / "out", 0)).asked == []
+
+
+@pytest.mark.slow
+def test_conflicts_are_searched_for_the_greatest_violation_weighted_by_priority(tmp_path):
+    found = run_falsification(search(20, family="conflict", objective="violation"), tmp_path / "out")
+    weighted = found.results["weighted_violation"]
+    assert weighted.max() > 0.0 and -found.summary["worst"][0]["cost"] == weighted.max()
+    assert check(write_falsification_page(tmp_path / "out", 0)).asked == []
+
+
+def interrupt_after(monkeypatch, tables):
+    """Have Ctrl-C come once so many tables are written."""
+    add, left = CampaignFolder.add, [tables]
+
+    def counting(folder, table):
+        add(folder, table)
+        left[0] -= 1
+        if not left[0]:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(CampaignFolder, "add", counting)
+
+
+@pytest.mark.parametrize("make", [search, pytest.param(varied, marks=pytest.mark.slow)])
+def test_what_was_interrupted_goes_on_to_the_same_rows(make, tmp_path, monkeypatch):
+    whole = run_falsification(make(), tmp_path / "whole")
+    with monkeypatch.context() as patch:
+        interrupt_after(patch, 6)
+        with pytest.raises(KeyboardInterrupt):
+            run_falsification(make(), tmp_path / "out")
+    assert (tmp_path / "out" / PARTS).exists()
+    rest = run_falsification(make(), tmp_path / "out")
+    assert 0 < rest.flown < len(whole.results) and rows(rest.results) == rows(whole.results)
+    again = run_falsification(make(), tmp_path / "out")
+    assert again.flown == 0 and again.summary == rest.summary
+    assert not (tmp_path / "out" / PARTS).exists()
+
+
+@pytest.mark.slow
+def test_rows_are_the_same_for_any_number_of_workers(tmp_path):
+    one, two = (run_falsification(search(), tmp_path / str(n), workers=n) for n in (1, 2))
+    assert rows(one.results) == rows(two.results)
+
+
+def test_another_search_has_a_folder_of_its_own(tmp_path):
+    run_falsification(search(), tmp_path / "out")
+    with pytest.raises(RunError, match=r"holds another campaign \(search.seed is 0, now 1\)"):
+        run_falsification(search(seed=1), tmp_path / "out")
+
+
+def test_a_rate_is_estimated_from_the_flights_and_shown_level_by_level(tmp_path):
+    found = run_falsification(search(200, Conditions(duration=8.0), rare_event=True), tmp_path / "out")
+    estimate = found.summary["estimate"]
+    assert 100 < found.flown == len(found.results) <= 200
+    assert 0.0 <= estimate["low"] <= estimate["probability"] < estimate["high"] < 1.0
+    assert found.summary["dice"] is None and not (tmp_path / "out" / "dice").exists()
+    page = check(write_falsification_page(tmp_path / "out", 0))
+    assert sum(row[1].count("e-") == 1 for row in page.rows if len(row) == 2) >= len(estimate["levels"]) - 1
+    assert run_falsification(search(200, Conditions(duration=8.0), rare_event=True), tmp_path / "out").flown == 0
+
+
+@pytest.mark.slow
+def test_a_rate_that_is_not_small_is_that_of_the_dice(tmp_path):
+    """A barrier that is off has a violation in some per cent of plain scenes."""
+    from cosim.campaigns import run_campaign
+
+    task = SceneTask("unarbitrated", gains_from("unarbitrated"), Conditions(duration=40.0))
+    estimate = run_falsification(
+        SceneSearch("plain", task, SearchSettings(budget=1000, rare_event=True)), tmp_path / "rate"
+    ).summary["estimate"]
+    (tmp_path / "s.jsonl").write_text("\n".join(generate_scenes(1000, 5000)))
+    dice = run_campaign(tmp_path / "s.jsonl", "unarbitrated", tmp_path / "dice", task.conditions).summary
+    counted = dice["rates"]["violation"]
+    assert max(estimate["low"], counted["low"]) < min(estimate["high"], counted["high"])
+
+
+def test_costs_say_what_is_worse():
+    def row(seed, clearance, time, stopped=-1):
+        from cosim.campaigns.scenes.flyer import Score
+
+        return row_of(seed, Score(np.isfinite(time), time, clearance, 1.0, 1.0, 1e-3, stopped), 0.01)
+
+    table = table_of(
+        [row(0, 0.3, 20.0), row(1, -0.1, 30.0), row(2, 0.2, np.inf), row(3, 0.5, np.inf, 7), refused_row(4, "no")]
+    )
+    assert costs_of(table, "clearance", 120.0).tolist() == [0.3, -0.1, 0.2, module._STOPPED, module._REFUSED]
+    assert costs_of(table, "arrival", 120.0).tolist() == [-20.0, -30.0, -120.0, -120.0, module._REFUSED]
+
+
+def test_of_rows_that_are_near_to_each_other_one_is_listed(found):
+    points = np.tile(np.linspace(0.0, 1.0, 60)[:, None], 3)
+    costs = np.linspace(1.0, 0.0, 60)
+    listed = module._worst(found.folder, found.results, costs, points)
+    assert [one["row"] for one in listed] == [59, 53, 47, 41, 35, 29, 23, 17, 11, 5]
+    assert len(module._worst(found.folder, found.results, np.full(60, module._REFUSED), points)) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("plain --law pd --budget 0", "budget is 0, expected 1 to 1000000 flights"),
+        ("plain --law pd --budget 99 --rare-event", "budget is 99, expected 100 to 1000000 flights"),
+        ("plain --law pd --seed -1", "seed is -1, expected a whole number from 0"),
+        ("plain --law pd --objective near", "objective 'near' is unknown; "),
+        ("trial --law pd", "trial"),
+        ("plain --law pd --objective arrival --rare-event", "objective is arrival, expected clearance"),
+        ("plain", "--law is missing"),
+        ("plain --law pdd", "law 'pdd' is unknown; did you mean 'pd'"),
+        ("plain --law pd --set k=1", "--set k: the law pd has no such gain"),
+        ("plain --law pd --vary limit.force=1:2", "--vary: expected none with the family plain"),
+        ("plian --law pd", "plian"),
+        ("scenes.jsonl --law pd", "is a file of scenes, expected a family (plain, hard, conflict) or a scenario"),
+        ("docking", "nothing varies, expected at least one key"),
+        ("docking --vary initial.positon.1=1:2", "initial.positon"),
+        ("docking --vary initial.position.1=2:1", "expected the lower end first"),
+        ("docking --vary initial.position.1=1:2 --set initial.position.1=1", "is set and varies, expected either"),
+        ("docking --vary sensing.seed=1:5", "sensing.seed is a whole number"),
+    ],
+)
+def test_what_cannot_be_searched_is_said_in_one_line(words, message, tmp_path, capsys):
+    assert main(["falsify", *words.split(), "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr()
+    assert message in said.err and said.err.count("\n") == 1 and said.out == ""
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_cma_nothing_is_flown(tmp_path, capsys, monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "cma", None)
+    assert main(["falsify", "plain", "--law", "pd", "--out", str(tmp_path / "out")]) == 2
+    assert "a search needs cma (the extra falsify)" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_command_says_what_was_found(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("cosim.campaigns.scenes.conditions.Conditions.duration", 0.4)
+    words = ["falsify", "hard", "--law", "pd", "--budget", "20", "--replays", "0", "--out", str(tmp_path / "out")]
+    for lines in (4, 5):
+        assert main(words) == 0
+        said = capsys.readouterr().out.splitlines()
+        assert len(said) == lines and said[-1] == str(tmp_path / "out" / "falsification.html")
+        assert said[-4].startswith("search: 20 flights, ") and said[-3].startswith("dice:   20 flights, ")
+    assert said[0] == f"{tmp_path / 'out'}: was complete already"

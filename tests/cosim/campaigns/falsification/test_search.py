@@ -1,0 +1,86 @@
+"""The search for the least cost, beside dice and beside the package's own bookkeeping."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from cosim.campaigns.falsification.search import minimize
+from cosim.errors import RunError
+
+pytest.importorskip("cma")
+DIMENSION = 60
+
+
+class Valley:
+    """Least, 0, in a place of ten coordinates; the others do not count. With some noise."""
+
+    def __init__(self, noise=0.0):
+        self.place, self.points = np.linspace(0.05, 0.95, 10), []
+        self.noise, self.rng = noise, np.random.default_rng(2)
+        self.costs = []
+
+    def __call__(self, points):
+        self.points += list(points)
+        costs = ((points[:, :10] - self.place) ** 2).sum(axis=1) + self.noise * self.rng.standard_normal(len(points))
+        self.costs += costs.tolist()
+        return costs
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_a_search_comes_far_below_the_dice(noise):
+    found, dice = Valley(noise), Valley(noise)
+    minimize(found, DIMENSION, 1500, 0)
+    dice(np.random.default_rng(0).random((1500, DIMENSION)))
+    assert min(found.costs) < 0.3 * min(dice.costs)
+    assert np.median(found.costs) < min(dice.costs)
+
+
+@pytest.mark.parametrize("budget", [1, 2, 30, 400])
+def test_exactly_the_budget_is_evaluated_inside_the_cube(budget):
+    found = Valley()
+    minimize(found, DIMENSION, budget, 0)
+    points = np.array(found.points)
+    assert points.shape == (budget, DIMENSION) and ((points >= 0.0) & (points <= 1.0)).all()
+
+
+def test_the_least_at_a_corner_is_met():
+    found = []
+
+    def cost(points):
+        found.extend(points)
+        return points.sum(axis=1)
+
+    minimize(cost, 3, 600, 1)
+    assert min(point.sum() for point in found) < 0.02
+
+
+def test_a_search_that_stalls_begins_elsewhere():
+    """The cost is flat, so no generation is better than the first of its search."""
+    points = []
+
+    def flat(some):
+        points.append(some.copy())
+        return np.zeros(len(some))
+
+    minimize(flat, 5, 2000, 0)
+    sizes = [len(some) for some in points[1:]]
+    assert sizes[0] == 8 and max(sizes) >= 32
+
+
+def test_the_same_seed_gives_the_same_points_and_no_state_is_shared():
+    np.random.seed(3)
+    before = np.random.get_state()[1].tolist()
+    one, same, other = Valley(), Valley(), Valley()
+    minimize(one, DIMENSION, 300, 4)
+    minimize(same, DIMENSION, 300, 4)
+    minimize(other, DIMENSION, 300, 5)
+    assert np.array_equal(one.points, same.points) and not np.array_equal(one.points, other.points)
+    assert np.random.get_state()[1].tolist() == before
+
+
+def test_without_the_package_one_line_says_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "cma", None)
+    with pytest.raises(RunError, match=r"^a search needs cma \(the extra falsify\); .* install .*cma>=") as error:
+        minimize(Valley(), DIMENSION, 10, 0)
+    assert "\n" not in str(error.value)

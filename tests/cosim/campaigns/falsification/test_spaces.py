@@ -1,0 +1,128 @@
+"""Scenes as points of a cube: drawn evenly they are those of the generator, and never outside of its family."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.stats import ks_2samp
+
+from cosim.campaigns.falsification.spaces import SceneSpace, Shares
+from cosim.campaigns.scenes.conflicts import make_conflict
+from cosim.campaigns.scenes.generator import MOST_OBSTACLES, make_scene
+from cosim.campaigns.scenes.scene_file import decode_scene
+
+
+def scene_at(space, point, seed=0):
+    return decode_scene(space.line(point, seed))
+
+
+def features(scene):
+    """Return numbers of a scene that its parameters decide."""
+    start, goal = np.array(scene.start), np.array(scene.goal.centre)
+    balls = scene.obstacles
+    failed = scene.failed_thruster
+    return {
+        "start": start[2],
+        **{f"goal {axis}": x for axis, x in zip("xyz", goal, strict=True)},
+        "obstacles": len(balls),
+        **{f"first {axis}": x for axis, x in zip("xyz", np.array(balls[0].centre), strict=True)},
+        "last x": balls[-1].centre[0],
+        "last y": balls[-1].centre[1],
+        "radius": balls[0].radius,
+        "drift": balls[0].velocity[0],
+        "aside": balls[0].velocity[1],
+        "current": np.hypot(*scene.current[:2]),
+        "heading": np.arctan2(scene.current[1], scene.current[0]),
+        "weight": scene.weight_minus_buoyancy,
+        "righting": scene.righting_moment,
+        "thruster": failed.index if failed else 0,
+        "time": failed.time if failed else 0.0,
+    }
+
+
+@pytest.mark.parametrize("kind", MOST_OBSTACLES)
+def test_points_drawn_evenly_are_scenes_of_the_generator(kind):
+    space, rng = SceneSpace(kind), np.random.default_rng(1)
+    drawn = [features(scene_at(space, rng.random(space.dimension), i)) for i in range(700)]
+    made = [features(decode_scene(json.dumps(make_scene(i, kind)).encode())) for i in range(700)]
+    for name in drawn[0]:
+        values = [[scene[name] for scene in scenes] for scenes in (drawn, made)]
+        assert ks_2samp(*values).pvalue > 1e-3, name
+
+
+@pytest.mark.parametrize("kind", MOST_OBSTACLES)
+def test_no_point_leaves_the_family(kind):
+    space, rng = SceneSpace(kind, 3.0), np.random.default_rng(2)
+    corners = rng.integers(0, 2, (60, space.dimension)).astype(float)
+    for i, point in enumerate([*corners, *rng.random((60, space.dimension))]):
+        scene = scene_at(space, point, i)
+        hard = kind == "hard"
+        start, goal = np.array(scene.start), np.array(scene.goal.centre)
+        assert 1.5 <= start[2] <= 4.0 and 8.0 <= goal[0] <= 12.0 and abs(goal[1]) <= 3.0 and 1.5 <= goal[2] <= 4.5
+        assert (6 if hard else 1) <= len(scene.obstacles) <= (14 if hard else 6)
+        for ball in scene.obstacles:
+            assert 0.3 <= ball.radius <= 0.9
+            assert np.linalg.norm(ball.centre - start) - ball.radius > 0.6
+            assert np.linalg.norm(ball.centre - goal) - ball.radius - 0.5 > 0.6
+            share = (ball.centre - start) @ (goal - start) / ((goal - start) @ (goal - start))
+            aside = np.linalg.norm(ball.centre - start - np.clip(share, 0.2, 0.8) * (goal - start))
+            assert aside <= 3.0 * np.linalg.norm([0.3, 0.6, 0.5]) + 1e-9
+        assert np.linalg.norm(scene.current) <= (0.4 if hard else 0.25) * (1.0 + 1e-12)
+        assert abs(scene.weight_minus_buoyancy) <= 15.0 and 10.0 <= scene.righting_moment <= 62.0
+        assert not hard or (1 <= scene.failed_thruster.index <= 8 and 5.0 <= scene.failed_thruster.time <= 30.0)
+
+
+def test_near_points_are_near_scenes():
+    space = SceneSpace("hard", 3.0)
+    point = np.full(space.dimension, 0.45)
+    here, there = features(scene_at(space, point)), features(scene_at(space, point + 1e-6))
+    assert all(there[name] == pytest.approx(here[name], abs=1e-4) for name in here)
+    assert here != there
+
+
+def test_the_middle_is_the_middle_of_each_range():
+    space = SceneSpace("plain")
+    scene = scene_at(space, np.full(space.dimension, 0.5))
+    assert scene.start == (0.0, 0.0, 2.75) and scene.goal.centre == (10.0, 0.0, 3.0)
+    assert scene.current == (0.125, 0.0, 0.0) and scene.weight_minus_buoyancy == 0.0 and scene.righting_moment == 36.0
+    assert [ball.centre for ball in scene.obstacles] == [(5.0, 0.0, 2.875)] * 4
+    assert [ball.radius for ball in scene.obstacles] == pytest.approx([0.6] * 4)
+
+
+def numbers(conflict):
+    """Return numbers of a conflict that its parameters decide."""
+    table = conflict["scenario"]
+    return {
+        "kind": sum(map(ord, conflict["kind"])),
+        "order": table["criteria"][0]["order"],
+        "goal": table["goal"]["centre"][0],
+        "regions": len(table["regions"]),
+        "priority": max(region["priority"] for region in table["regions"]),
+        "drift": table["regions"][0]["velocity"][2],
+        "current": np.hypot(*table["plant"]["current"][:2]),
+        "buoyancy": table["plant"]["parameters"]["buoyancy"],
+        "start": table["initial"]["position"][2],
+    }
+
+
+def test_conflicts_drawn_evenly_are_those_of_the_generator():
+    space, rng = SceneSpace("conflict"), np.random.default_rng(1)
+    drawn = [numbers(json.loads(space.line(rng.random(space.dimension), i))) for i in range(700)]
+    made = [numbers(make_conflict(i)) for i in range(700)]
+    for name in drawn[0]:
+        assert ks_2samp([one[name] for one in drawn], [one[name] for one in made]).pvalue > 1e-3, name
+
+
+def test_a_conflict_follows_from_its_point_alone_and_can_be_flown():
+    space, rng = SceneSpace("conflict"), np.random.default_rng(3)
+    for i, point in enumerate([*rng.integers(0, 2, (20, space.dimension)), *rng.random((40, space.dimension))]):
+        one, other = (json.loads(space.line(point.astype(float), seed)) for seed in (i, i + 100))
+        del one["scenario"]["title"], other["scenario"]["title"]
+        one["scenario"]["sensing"]["seed"] = other["scenario"]["sensing"]["seed"]
+        assert one["seed"] == i and one["scenario"] == other["scenario"] and one["kind"] == other["kind"]
+        assert scene_at(space, point.astype(float), i).seed == i
+
+
+def test_numbers_that_may_come_twice_are_refused():
+    with pytest.raises(NotImplementedError):
+        Shares(np.empty(0), np.random.default_rng(0)).choice(3, 2, True)
