@@ -188,10 +188,13 @@ class HedgeKind:
     ----------
     number, array : callable
         Bends a float, or each of an array.
+    fll : bool
+        Whether fuzzylite has it, too.
     """
 
     number: Callable[[float], float]
     array: Callable[[Array], Array]
+    fll: bool = True
 
 
 def very(a: float) -> float:
@@ -214,10 +217,22 @@ def seldom(a: float) -> float:
     return math.sqrt(0.5 * a) if a <= 0.5 else 1.0 - math.sqrt(0.5 * (1.0 - a))
 
 
+def cubed(a: float) -> float:
+    """Return a^3."""
+    return a * a * a
+
+
+def cube_root(a: float) -> float:
+    """Return the cube root."""
+    return math.cbrt(a)
+
+
 HEDGES: dict[str, HedgeKind] = {
     "very": HedgeKind(very, lambda a: a * a),
     "somewhat": HedgeKind(somewhat, np.sqrt),
     "extremely": HedgeKind(extremely, lambda a: np.where(a <= 0.5, 2.0 * a * a, 1.0 - 2.0 * (1.0 - a) * (1.0 - a))),
     "seldom": HedgeKind(seldom, lambda a: np.where(a <= 0.5, np.sqrt(0.5 * a), 1.0 - np.sqrt(0.5 * (1.0 - a)))),
+    "cubed": HedgeKind(cubed, lambda a: a * a * a, fll=False),  # Octave's *extremely*
+    "cube_root": HedgeKind(cube_root, np.cbrt, fll=False),
 }
 """Hedges by their word; *not* and *any* are propositions of their own."""

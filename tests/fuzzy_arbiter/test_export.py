@@ -277,6 +277,7 @@ CURVED = System(
         "if a is very v or somewhat (a is e and a is t) or a is o then y is h and z is w",
         "if a is extremely f and not (a is seldom t) then y is l",
         "if a is any then z is u with 0.25",
+        "if a is cubed g and not (a is cube_root s) then y is m",
     ),
     conjunction="einstein_product",
     disjunction="bounded_sum",

@@ -60,6 +60,8 @@ def test_it_keeps_the_laws_of_norms(name, a, b, c):
         ("very", lambda a: a**2),
         ("somewhat", sqrt),
         ("extremely", lambda a: 2 * a**2 if a <= 0.5 else 1 - 2 * (1 - a) ** 2),
+        ("cubed", lambda a: a**3),
+        ("cube_root", lambda a: a ** (1 / 3)),
         ("seldom", lambda a: sqrt(a / 2) if a <= 0.5 else 1 - sqrt((1 - a) / 2)),
     ],
 )
@@ -72,3 +74,4 @@ def test_a_hedge_is_as_defined(hedge, formula):
 
 def test_all_are_tried():
     assert set(NORMS) == set(DEFINED)
+    assert set(HEDGES) == {"very", "somewhat", "extremely", "seldom", "cubed", "cube_root"}
