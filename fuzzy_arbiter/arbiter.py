@@ -306,7 +306,8 @@ class Arbiter:
         -------
         numba dispatcher
             ``evaluate(inputs, outputs) -> int`` on arrays of float64: fills the outputs with what a call gives, and
-            returns 0, or -i if the i-th input is bad, or k if the k-th output is undefined.
+            returns 0, or -i if the i-th input is not in its universe, or k if no rule fires for the k-th output and
+            that has no default; the outputs are then as they were.
 
         Raises
         ------
