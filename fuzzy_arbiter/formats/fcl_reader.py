@@ -19,7 +19,7 @@ from fuzzy_arbiter.formats.fcl_words import (
     Token,
     block_name,
 )
-from fuzzy_arbiter.formats.notation import assembled, located, refuse, told_apart
+from fuzzy_arbiter.formats.notation import assembled, located, refuse
 from fuzzy_arbiter.propositions import Is, quoted
 from fuzzy_arbiter.rule import Operators, Rule
 from fuzzy_arbiter.rule_text import parse_rules
@@ -172,7 +172,7 @@ class _Reader(Cursor):
             refuse(
                 draft.line, f"{name!r} has no range, and its points make none; expected RANGE := (least .. greatest);"
             )
-        return name, universe, told_apart(draft.terms) if self.fuzzylite else tuple(draft.terms)
+        return name, universe, tuple(draft.terms)
 
     def variables(self, into: dict[str, _Draft]) -> None:
         while not self.accept("END_VAR"):

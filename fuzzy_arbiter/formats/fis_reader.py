@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable
 from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.formats.fis_rules import read_rules, with_complements
-from fuzzy_arbiter.formats.fis_terms import numbers_of, read_function
+from fuzzy_arbiter.formats.fis_terms import numbers_of, read_function, told_apart
 from fuzzy_arbiter.formats.fis_words import (
     DEFUZZIFIERS,
     FUZZYLITE_KEYS,
@@ -16,7 +16,7 @@ from fuzzy_arbiter.formats.fis_words import (
     SETTINGS,
     TYPES,
 )
-from fuzzy_arbiter.formats.notation import assembled, located, read_number, refuse, told_apart
+from fuzzy_arbiter.formats.notation import assembled, located, read_number, refuse
 from fuzzy_arbiter.formats.settings import read_settings
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.shapes import Membership

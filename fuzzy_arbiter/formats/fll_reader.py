@@ -21,7 +21,7 @@ from fuzzy_arbiter.formats.fll_words import (
     RESOLUTION,
     settings_of,
 )
-from fuzzy_arbiter.formats.notation import assembled, located, read_number, refuse, told_apart
+from fuzzy_arbiter.formats.notation import assembled, located, read_number, refuse
 from fuzzy_arbiter.formats.settings import read_settings
 from fuzzy_arbiter.propositions import And, Not, Or, Proposition
 from fuzzy_arbiter.rule import Operators, Rule
@@ -55,8 +55,8 @@ def read(text: str) -> System:
     """Return the system that a text in the FuzzyLite Language defines.
 
     The points are the most of any output's defuzzifier; an output's default of ``nan`` is none; ranges that are locked
-    clip inputs. An aggregation of ``none`` adds the strengths of values, as fuzzylite does. Of terms of one name rules
-    mean the first, as there; the others get a number.
+    clip inputs. An aggregation of ``none`` adds the strengths of values, as fuzzylite does. Terms of one name are
+    refused, for rules mean the first in fuzzylite and the last in pyfuzzylite.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def _variable(block: _Block, inputs: int | None = None) -> tuple[str, tuple[floa
         name, kind, numbers = (*content.split(maxsplit=2), "", "", "")[:3]
         with located(f"line {line}: term {name!r}"):
             terms.append(Term(name, read_shape(kind, numbers, line, inputs)))
-    parts = block.name, (bounds[0], bounds[1]), told_apart(terms)
+    parts = block.name, (bounds[0], bounds[1]), tuple(terms)
     if inputs is None:
         with located(f"line {block.line}"):
             Variable(*parts)

@@ -12,7 +12,6 @@ from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.propositions import is_identifier
 from fuzzy_arbiter.rule import Operators, Rule
-from fuzzy_arbiter.terms.term import Term
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
@@ -132,30 +131,6 @@ def located(where: str) -> Iterator[None]:
         yield
     except DefinitionError as error:
         raise type(error)(f"{shortened(where)}: {shortened(str(error))}") from None
-
-
-def told_apart(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """Return terms with a number after a name that came before.
-
-    Parameters
-    ----------
-    terms : sequence of Term
-        Of one variable, of a format to which terms of one name are several, or of which rules mean the first.
-
-    Returns
-    -------
-    tuple of Term
-        Each name once.
-    """
-    found: list[Term] = []
-    for term in terms:
-        name, names = term.name, {other.name for other in found}
-        for k in range(2, len(terms) + 2):
-            if name not in names:
-                break
-            name = f"{term.name}_{k}"
-        found.append(Term(name, term.shape))
-    return tuple(found)
 
 
 def assembled(
