@@ -10,6 +10,7 @@ import subprocess
 import sys
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from benchmarks.peers import skfuzzy_rules
 from benchmarks.peers.fuzzy_libraries import LIBRARIES
 from benchmarks.table import Row, compared
 from benchmarks.timing import Own, Timing, time_batches, time_calls, timed
-from fuzzy_arbiter import SECTION_VI, Arbiter, Criterion
+from fuzzy_arbiter import SECTION_VI, Arbiter, Criterion, Output, System, Variable, auto_terms, triangle
 
 STEPS = 20_000
 RATIO = "how many times as long as scikit-fuzzy as its examples use it"
@@ -67,6 +68,14 @@ def measure(steps: int, repeats: int) -> list[Row]:
     for engine in ("closed", "exact", "grid"):
         work = _batch(Arbiter(engine=engine), batch)
         add(f"batch of {len(batch)}: {engine}", time_batches(work, len(batch), repeats))
+    for name, general in (("one rule at 0.9", _general()), ("tipping", _tipping())):
+        rows = np.column_stack(
+            [np.random.default_rng(0).uniform(*v.universe, len(batch)) for v in general.system.inputs]
+        )
+        add(f"batch of {len(rows)}: exact, {name}", time_batches(_batch(general, rows), len(rows), repeats))
+        add(f"compiled, in a loop of its own: exact, {name}", _looped(general, rows, repeats))
+    for system in ("section_vi", "tipping"):
+        add(f"batch of {len(batch)}: pyfuzzylite, resolution 100, {system}", _other_batch(system, len(batch), repeats))
     add("building: 40 criteria", time_calls(lambda: Arbiter(criteria), max(1, few // 10), repeats))
     return compared(timings)
 
@@ -99,6 +108,48 @@ def _other(library: str, evaluations: int, repeats: int) -> Timing | str:
     setup = {"library": library, "system": "section_vi", "resolution": 100}
     with peer(Environment(python), library, "fuzzy_libraries", "evaluations", setup) as contestant:
         return timed(contestant, evaluations, repeats)
+
+
+def _other_batch(system: str, rows: int, repeats: int) -> Timing | str:
+    python = interpreter("pyfuzzylite")
+    if python is None:
+        return "pyfuzzylite is not installed"
+    setup = {"system": system, "resolution": 100}
+    with peer(Environment(python), "pyfuzzylite", "fuzzy_libraries", "batches", setup) as contestant:
+        return timed(contestant, rows, repeats)
+
+
+def _general() -> Arbiter:
+    """Return the paper's rules with one that counts less, of which there is no closed form."""
+    system = Arbiter().system
+    return Arbiter(system=replace(system, rules=(*system.rules[:-1], replace(system.rules[-1], weight=0.9))))
+
+
+def _tipping() -> Arbiter:
+    service, food = (Variable(name, (0, 10), auto_terms(3)) for name in ("service", "food"))
+    terms = {"low": triangle(0, 0, 13), "medium": triangle(0, 13, 25), "high": triangle(13, 25, 25)}
+    rules = (
+        "if service is poor or food is poor then tip is low",
+        "if service is average then tip is medium",
+        "if service is good or food is good then tip is high",
+    )
+    return Arbiter(system=System((service, food), (Output("tip", (0, 25), terms),), rules))
+
+
+def _looped(arbiter: Arbiter, rows: np.ndarray[Any, np.dtype[np.float64]], repeats: int) -> Timing | str:
+    """Time the compiled function where compiled code calls it, as a campaign does."""
+    if importlib.util.find_spec("numba") is None:
+        return "Numba is not installed"
+    import numba
+
+    evaluate, outputs = arbiter.compiled(), np.empty((len(rows), len(arbiter.system.outputs)))
+
+    @numba.njit
+    def loop(inputs: Any, outputs: Any) -> None:
+        for i in range(len(inputs)):
+            evaluate(inputs[i], outputs[i])
+
+    return time_batches(lambda: loop(rows, outputs), len(rows), repeats)
 
 
 def _stock(function: Callable[[dict[str, Any]], Callable[[int], object]], count: int, repeats: int) -> Timing:

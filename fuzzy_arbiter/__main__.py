@@ -79,6 +79,7 @@ def _parser() -> argparse.ArgumentParser:
     def verb(name: str, what: str, engine: bool = True) -> argparse.ArgumentParser:
         added = verbs.add_parser(name, help=what, description=f"{what[0].upper()}{what[1:]}.")
         added.add_argument("file", metavar="FILE", help=f"a definition, or {BUILT_IN}")
+        added.add_argument("--block", metavar="NAME", help="which FUNCTION_BLOCK of a FCL file that has several")
         if engine:
             added.add_argument(
                 "--engine",
@@ -219,12 +220,12 @@ def _fault(what: str) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     if options.verb == "convert":
-        convert(options.file, options.out, options.native)
+        convert(options.file, options.out, options.native, options.block)
         print(options.out)
         return 0
     if options.verb == "plot":
         require_suffix(options.out, IMAGES)
-    system = load_system(options.file)
+    system = load_system(options.file, options.block)
     if options.verb == "bench":
         from fuzzy_arbiter.command_line.bench import bench, table
 

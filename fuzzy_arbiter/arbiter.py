@@ -241,6 +241,7 @@ class Arbiter:
         *,
         outside: Outside | None = None,
         default: float | Mapping[str, float] | None = None,
+        block: str | None = None,
     ) -> Arbiter:
         """Return the arbiter that a file defines.
 
@@ -254,6 +255,8 @@ class Arbiter:
             What happens to an input outside its universe, in the place of what the file says.
         default : float or mapping from output's name to float, optional
             Value of all outputs, or of those that are named, where no rule fires, in the place of what the file says.
+        block : str, optional
+            Which FUNCTION_BLOCK of a FCL file is meant, by its name; needed where there are several.
 
         Returns
         -------
@@ -269,7 +272,7 @@ class Arbiter:
         """
         from fuzzy_arbiter.formats import load
 
-        system = load(path)
+        system = load(path, block)
         try:
             system = replace(system, outside=system.outside if outside is None else outside)
             system = _with_defaults(system, default)
@@ -303,7 +306,8 @@ class Arbiter:
         -------
         numba dispatcher
             ``evaluate(inputs, outputs) -> int`` on arrays of float64: fills the outputs with what a call gives, and
-            returns 0, or -i if the i-th input is bad, or k if the k-th output is undefined.
+            returns 0, or -i if the i-th input is not in its universe, or k if no rule fires for the k-th output and
+            that has no default; the outputs are then as they were.
 
         Raises
         ------

@@ -197,7 +197,7 @@ class Hedged(Proposition):
 
     Attributes
     ----------
-    hedge : {"very", "somewhat", "extremely", "seldom"}
+    hedge : {"very", "somewhat", "extremely", "seldom", "cubed", "cube_root"}
         How it bends the degree, see `fuzzy_arbiter.terms.norms.HEDGES`.
     part : Proposition
         What is bent.

@@ -48,7 +48,8 @@ def parse_rules(text: str) -> list[Rule]:
 def parse_rule(text: str) -> Rule:
     """Return the rule that a text says.
 
-    Words of rules may be in any case. The hedges very, somewhat, extremely and seldom stand before a term. ``&``,
+    Words of rules may be in any case. The hedges very, somewhat, extremely, seldom, cubed and cube_root stand
+    before a term. ``&``,
     ``|``, ``~`` stand for *and*, *or*, *not*; *not* binds before *and*, *and* before *or*. Names that are no
     identifiers stand in double quotes.
 
@@ -223,17 +224,21 @@ class _Parser:
         return statement
 
 
-def bent_rules(condition: Proposition, conclusions: Sequence[tuple[tuple[str, ...], Is]], weight: float) -> list[Rule]:
-    """Return a rule whose conclusions have hedges as rules whose conclusions have none, as fuzzylite takes it.
+def bent_rules(
+    condition: Proposition, conclusions: Sequence[tuple[tuple[str, ...], Is]], weight: float, carry: bool = True
+) -> list[Rule]:
+    """Return a rule whose conclusions have hedges as rules whose conclusions have none.
 
     Parameters
     ----------
     condition : Proposition
         Of the rule.
     conclusions : sequence of (tuple of str, Is)
-        The hedges of each conclusion, *not* among them, and the conclusion; they go on to those after it.
+        The hedges of each conclusion, *not* among them, and the conclusion.
     weight : float
         Of the rule.
+    carry : bool
+        Whether hedges also bend the conclusions after theirs, as fuzzylite takes them.
 
     Returns
     -------
@@ -243,7 +248,7 @@ def bent_rules(condition: Proposition, conclusions: Sequence[tuple[tuple[str, ..
     rows: dict[tuple[tuple[str, ...], int], list[Is]] = {}
     carried: tuple[str, ...] = ()
     for k, (hedges, conclusion) in enumerate(conclusions):
-        carried = hedges + carried
+        carried = hedges + carried if carry else hedges
         # a second conclusion on one output is another rule, too
         before = sum(c.variable == conclusion.variable for _, c in conclusions[:k])
         rows.setdefault((carried, before), []).append(conclusion)

@@ -24,9 +24,9 @@ OBSTACLES = 6
 def contests(environment: Environment) -> Iterator[Contest]:
     """Yield the contests of arbiter and laws."""
     ours: dict[str, Entry] = {
+        "arbiter, exact engine": _calls("exact"),
         "arbiter, closed form": _calls("closed"),
         "arbiter, closed form, compiled": _compiled,
-        "arbiter, exact engine": _calls("exact"),
         "arbiter, on scikit-fuzzy": _calls("skfuzzy"),
     }
     stock = f"scikit-fuzzy, compute(), {POINTS} points"

@@ -64,10 +64,8 @@ SYSTEMS: dict[str, Any] = {
 Evaluate = Callable[[list[float]], list[float]]
 
 
-def pyfuzzylite(system: str, resolution: int) -> tuple[Evaluate, str]:
-    """Return a function of the inputs, and the system's text in the FuzzyLite language."""
-    import fuzzylite
-
+def _fuzzylite_text(system: str, resolution: int) -> str:
+    """Return a system's text in the FuzzyLite language."""
     inputs, outputs, rules = SYSTEMS[system]
     text = [f"Engine: {system}"]
     for kind, variables in (("InputVariable", inputs), ("OutputVariable", outputs)):
@@ -85,7 +83,15 @@ def pyfuzzylite(system: str, resolution: int) -> tuple[Evaluate, str]:
     text += ["RuleBlock:", "  enabled: true", "  conjunction: Minimum", "  disjunction: Maximum"]
     text += ["  implication: Minimum", "  activation: General"]
     text += [f"  rule: if {f' {join} '.join(asked)} then {concluded}" for asked, join, concluded in rules]
-    engine = fuzzylite.FllImporter().from_string("\n".join(text))
+    return "\n".join(text)
+
+
+def pyfuzzylite(system: str, resolution: int) -> tuple[Evaluate, str]:
+    """Return a function of the inputs, and the system's text in the FuzzyLite language."""
+    import fuzzylite
+
+    text = _fuzzylite_text(system, resolution)
+    engine = fuzzylite.FllImporter().from_string(text)
 
     def evaluate(values: list[float]) -> list[float]:
         for variable, value in zip(engine.input_variables, values, strict=True):
@@ -93,7 +99,7 @@ def pyfuzzylite(system: str, resolution: int) -> tuple[Evaluate, str]:
         engine.process()
         return [float(variable.value) for variable in engine.output_variables]
 
-    return evaluate, "\n".join(text)
+    return evaluate, text
 
 
 def simpful(system: str, resolution: int) -> tuple[Evaluate, str]:
@@ -142,6 +148,22 @@ def evaluations(setup: dict[str, Any]) -> Callable[[int], object]:
     def work(count: int) -> None:
         for _ in range(count):
             evaluate(next(inputs))
+
+    return work
+
+
+def batches(setup: dict[str, Any]) -> Callable[[int], object]:
+    """Return a function that evaluates so many rows at once, which pyfuzzylite alone of these can."""
+    import fuzzylite
+    import numpy as np
+
+    engine = fuzzylite.FllImporter().from_string(_fuzzylite_text(setup["system"], setup["resolution"]))
+    rng, ranges = np.random.default_rng(0), [span for span, _ in SYSTEMS[setup["system"]][0].values()]
+
+    def work(count: int) -> None:
+        for variable, (low, high) in zip(engine.input_variables, ranges, strict=True):
+            variable.value = rng.uniform(low, high, count)
+        engine.process()
 
     return work
 

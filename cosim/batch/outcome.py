@@ -16,7 +16,11 @@ FIELDS: dict[str, tuple[type, str, str]] = {
     "settle_time": (np.float64, "s", "When it came in for the last time; none: never"),
     "violated": (np.bool_, "", "Violated a hard region at some step"),
     "min_clearance": (np.float64, "m", "Least clearance of any hard region of place; inf: there is none"),
-    "weighted_violation": (np.float64, "m.s", "Integral of how deep each region is violated, times its priority, summed"),
+    "weighted_violation": (
+        np.float64,
+        "m.s",
+        "Integral of how deep each region is violated, times its priority, summed",
+    ),
     "closest_to_goal": (np.float64, "m", "Least distance to the goal region, below 0 inside"),
     "effort": (np.float64, "N.s", "Integral of the magnitude of the force on the body"),
     "max_force": (np.float64, "N", "Greatest force on the body"),

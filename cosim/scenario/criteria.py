@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import json
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -12,10 +10,11 @@ from typing import Any, Literal
 
 from controller.regions.region_set import of_attitude
 from cosim.errors import ScenarioError
+from cosim.scenario.membership_terms import read_term, term_in_words
 from cosim.scenario.tables import PAPER_CRITERIA, CriterionEntry, SecondaryRegion
-from fuzzy_arbiter import SECTION_VI, ArbiterError, Criterion, Shape
-from fuzzy_arbiter.formats import reads
+from fuzzy_arbiter import SECTION_VI, Criterion
 from fuzzy_arbiter.propositions import is_identifier
+from fuzzy_arbiter.shapes import Membership
 from plant_fmu.toml_tables import hint
 
 Quantity = Literal["ramp", "clearance", "angle", "approach_time"]
@@ -38,7 +37,7 @@ class Reason:
     """Why a criterion may ask for attention: how far a region is, or how soon it will be met."""
 
     quantity: Quantity
-    term: Shape | None  # degree by the quantity; None for a ramp
+    term: Membership | None  # degree by the quantity; None for a ramp
     ramp: float | None = None  # m or rad, width of a ramp; None for the arbiter's
 
     def is_of(self, region: SecondaryRegion) -> bool:
@@ -51,8 +50,7 @@ class Reason:
         if self.term is None:
             return f"within {width if self.ramp is None else self.ramp:g} m or rad"
         unit = QUANTITIES[self.quantity]
-        points = ", ".join(f"{degree:g} at {place:g} {unit}" for place, degree in self.term.points)
-        return f"{self.quantity.replace('_', ' ')}: {points}"
+        return f"{self.quantity.replace('_', ' ')}: {term_in_words(self.term, unit)}"
 
 
 @dataclass(frozen=True)
@@ -122,22 +120,7 @@ def _reasons(membership: dict[str, Any], key: str) -> Iterator[Reason]:
                 raise ScenarioError(f"{where} is {value!r}, expected a width of 0 m or above")
             yield Reason("ramp", None, float(value))
         else:
-            yield Reason(quantity, _term(json.dumps(value, default=str), where))  # type: ignore[arg-type]
-
-
-@functools.lru_cache(maxsize=64)
-def _term(value: str, where: str) -> Shape:
-    """Return a term as `fuzzy_arbiter` reads it of JSON."""
-    text = f'{{"criteria": [{{"name": "x", "on": "pressing", "off": "satisfied", "membership": {value}}}]}}'
-    try:
-        (variable,) = reads(text, "json").inputs
-    except ArbiterError as error:
-        said = re.sub(r"^criteria\[0\](?:\.membership)?(?:: criterion 'x')?", where, str(error))
-        raise ScenarioError(said if said.startswith(where) else f"{where}: {said}") from error
-    term = variable.terms[-1].shape
-    if not isinstance(term, Shape):
-        raise ScenarioError(f"{where}: expected a term that is straight between points; arbiter.file takes any")
-    return term
+            yield Reason(quantity, read_term(value, quantity == "approach_time", where))  # type: ignore[arg-type]
 
 
 def check_criteria_of_regions(regions: Sequence[SecondaryRegion], criteria: Sequence[CriterionSetup]) -> None:

@@ -44,7 +44,9 @@ def with_crossing_costs(
         return regions
     of_regions = tuple(region.criterion for region in regions)
     asked = tuple(name in soft for name in criteria)
-    costs = dict(zip(criteria, _costs(rules.system, rules.inputs, tuple(criteria), asked, of_regions, depth), strict=True))
+    costs = dict(
+        zip(criteria, _costs(rules.system, rules.inputs, tuple(criteria), asked, of_regions, depth), strict=True)
+    )
     return tuple(replace(r, region=replace(r.region, crossing_cost=costs[r.criterion])) for r in regions)
 
 
@@ -78,7 +80,12 @@ def _costs(
 
 
 def _input(
-    signal: InputSignal, far: float, pressing: set[str], criteria: Sequence[str], of_regions: Sequence[str], depth: float
+    signal: InputSignal,
+    far: float,
+    pressing: set[str],
+    criteria: Sequence[str],
+    of_regions: Sequence[str],
+    depth: float,
 ) -> float:
     """Return what an input gets while two criteria press in full, and the vehicle is at rest; `far` is its greatest."""
     if signal.kind == "membership":

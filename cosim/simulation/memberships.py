@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from cosim.scenario.criteria import CriterionSetup
 from cosim.scenario.tables import SecondaryRegion
+from cosim.simulation.curves import PackedCurves, curve_degree, pack_curves
 from cosim.simulation.signals import Array
-from fuzzy_arbiter import ramp
+from fuzzy_arbiter import Shape, ramp
 
 _APPROACH_TIME = 1
 
@@ -23,11 +24,12 @@ class PackedMemberships(NamedTuple):
     regions: NDArray[np.int64]  # (r,) whose reason it is
     criteria: NDArray[np.int64]  # (r,) of that region
     quantities: NDArray[np.int64]  # (r,) 0 its clearance, 1 the time to contact
-    ramps: Array  # (r,) m or rad, where the membership reaches 0; NaN: it goes by points
+    ramps: Array  # (r,) m or rad, where the membership reaches 0; NaN: it goes by points or a curve
     follows: NDArray[np.bool_]  # (r,) whether the ramp is the arbiter's
     offsets: NDArray[np.int64]  # (r + 1,) into the points
     places: Array  # m, rad or s: of the points, one row's behind the other's
     degrees: Array  # of the points
+    curves: PackedCurves  # of terms that are not straight, which have no points
     by_time: bool  # whether any row asks for the time to contact
 
 
@@ -57,7 +59,8 @@ def pack_memberships(
         for reason in criteria[names.index(region.criterion)].reasons
         if reason.is_of(region)
     ]
-    points = [reason.term.points if reason.term else () for _, _, reason in rows]
+    terms = [reason.term for _, _, reason in rows]
+    points = [term.points if isinstance(term, Shape) else () for term in terms]
     widths = [width if r.ramp is None else r.ramp for _, _, r in rows]
     return PackedMemberships(
         regions=np.array([i for i, _, _ in rows], np.int64),
@@ -68,6 +71,7 @@ def pack_memberships(
         offsets=np.cumsum([0, *map(len, points)], dtype=np.int64),
         places=np.array([place for of in points for place, _ in of], float),
         degrees=np.array([degree for of in points for _, degree in of], float),
+        curves=pack_curves(terms),
         by_time=any(r.quantity == "approach_time" for _, _, r in rows),
     )
 
@@ -93,7 +97,10 @@ def compute_memberships(
     for k in range(packed.regions.size):
         i, criterion, width = packed.regions[k], packed.criteria[k], packed.ramps[k]
         x = clearances[i] if packed.quantities[k] == 0 else approach_times[i]
-        degree = ramp(x, width) if width >= 0.0 else _degree(packed, k, x)
+        degree: float = ramp(x, width)
+        if not width >= 0.0:
+            curved = packed.curves.offsets[k] < packed.curves.offsets[k + 1]
+            degree = curve_degree(packed.curves, k, x) if curved else _degree(packed, k, x)
         memberships[criterion] = max(memberships[criterion], degree)
 
 

@@ -18,13 +18,15 @@ BUILT_IN = "section-vi"
 EXPORTS = ("c", "py")
 
 
-def load_system(file: str) -> System:
+def load_system(file: str, block: str | None = None) -> System:
     """Return the system of a file, or the built-in one.
 
     Parameters
     ----------
     file : str
         Path, or ``section-vi``.
+    block : str, optional
+        Which FUNCTION_BLOCK of a FCL file is meant.
 
     Returns
     -------
@@ -40,7 +42,7 @@ def load_system(file: str) -> System:
         return prioritised()
     from fuzzy_arbiter.formats import load
 
-    return load(file)
+    return load(file, block)
 
 
 def described(arbiter: Arbiter) -> str:
@@ -94,7 +96,7 @@ def _numbers(term: Term) -> str:
     )
 
 
-def convert(file: str, out: str, native: bool) -> None:
+def convert(file: str, out: str, native: bool, block: str | None = None) -> None:
     """Write a system in another format, or as source code.
 
     Parameters
@@ -105,6 +107,8 @@ def convert(file: str, out: str, native: bool) -> None:
         File to write, whose suffix says how.
     native : bool
         Whether its centroids shall be the weights, so that other tools give them without a normalization.
+    block : str, optional
+        As of `load_system`.
 
     Raises
     ------
@@ -117,7 +121,7 @@ def convert(file: str, out: str, native: bool) -> None:
 
     suffix = Path(out).suffix[1:].lower()
     require_suffix(out, (*FORMATS, *EXPORTS))
-    system = load_system(file)
+    system = load_system(file, block)
     if native:
         system = fold_normalization(system)
     if suffix in EXPORTS:

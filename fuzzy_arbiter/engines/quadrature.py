@@ -30,7 +30,7 @@ _MOST = 20_000  # parts
 # a slot meets its cut; it and its cut sum to 1; it and those before it sum to 1; it passes those before it
 _CUT, _REST, _FULL, _PASSED = -1, -2, -3, -4
 _NEAR = 1e-11  # of the universe: how near to a bend is near enough, as what is missed is the square of that
-_EQUAL = 1e-12  # heights that differ by less are equal
+_EQUAL = 1.0 - 1e-12  # heights are equal whose quotient is above this
 
 
 class Parts(NamedTuple):
@@ -173,7 +173,7 @@ class _Joined:
         above = bends >= 0.0
         changes = above[..., 1:] != above[..., :-1]
         if of._output.aggregation == "max":  # of slots below the greatest nothing is seen
-            top = implied >= implied.max(axis=0) - _EQUAL
+            top = implied >= implied.max(axis=0) * _EQUAL
             seen = top[..., 1:] | top[..., :-1]
             changes &= np.array([seen[a] | seen[b if b >= 0 else a] for a, b in signs]).reshape(changes.shape)
         which, part, at = np.nonzero(changes)
@@ -278,14 +278,14 @@ class _Joined:
         greatest = max(heights.max(), at_breaks.max())
         if not greatest > 0.0:
             return float("nan")
-        flat = heights.min(axis=0) >= heights.max(axis=0) - _EQUAL
+        flat = heights.min(axis=0) >= heights.max(axis=0) * _EQUAL
         points, tops = [self.breaks], [at_breaks]
         a, b = starts[~flat], ends[~flat]
         if len(a):
             for _ in range(14):  # each closes in on the greatest of 17 places
                 near = a + np.linspace(0.0, 1.0, 17)[:, None] * (b - a)
                 found = self.heights(near.ravel()).reshape(near.shape)
-                top = found >= found.max(axis=0) - 1e-15
+                top = found >= found.max(axis=0) * (1.0 - 1e-15)
                 order = np.arange(17)[:, None]
                 first = np.where(top, order, 17).min(axis=0)
                 last = np.where(top, order, -1).max(axis=0)
@@ -295,8 +295,8 @@ class _Joined:
             tops.append(self.heights(points[-1]))
             greatest = max(greatest, tops[-1].max())
         places, heights_found = np.concatenate(points), np.concatenate(tops)
-        singles = np.unique(places[heights_found >= greatest - _EQUAL])
-        level = flat & (heights.max(axis=0) >= greatest - _EQUAL)
+        singles = np.unique(places[heights_found >= greatest * _EQUAL])
+        level = flat & (heights.max(axis=0) >= greatest * _EQUAL)
         left, right = starts[level], ends[level]
         if kind == "som":
             return float(min([*singles, *left]))

@@ -23,11 +23,11 @@ def to_c(system: System) -> str:
     -------
     str
         A file with ``int NAME_evaluate(const double inputs[], double outputs[])``, which fills the outputs and returns
-        0, or -i if the i-th input is not in its universe, or k if no rule fires for the k-th output; NAME is the
-        system's, with an underscore for each sign that C has not in names. Files of different names go into one
-        program. It gives what the arbiter's own engine does, to the last bit if the compiler does not contract
-        operations (``-ffp-contract=off``) and keeps to the rules of NaN (no ``-ffast-math``); functions of ``math.h``
-        to their rounding.
+        0, or -i if the i-th input is not in its universe, or k if no rule fires for the k-th output and that has no
+        default, where a call gives NaN; a comment has their names. NAME is the system's, with an underscore for each
+        sign that C has not in names. Files of different names go into one program. It gives what the arbiter's own
+        engine does, to the last bit if the compiler does not contract operations (``-ffp-contract=off``) and keeps to
+        the rules of NaN (no ``-ffast-math``); functions of ``math.h`` to their rounding.
 
     Examples
     --------
@@ -70,7 +70,16 @@ def _file(code: Program) -> Iterator[str]:
         for name in ("clip", "scale"):
             if f"centroid_of_{name}" in text:
                 yield (files("fuzzy_arbiter.export") / f"{name}.c").read_text().rstrip()
-    yield "\n/* Fills the outputs; returns 0, or -i if the i-th input is bad, or k if the k-th output is undefined. */"
+    yield "\n/* Fills the outputs and returns 0. Else it leaves them as they are, and returns"
+    yield from (
+        f" * {-i:3}  {_safe(v.name)} is not in its universe, or no number" for i, v in enumerate(system.inputs, 1)
+    )
+    yield from (
+        f" * {k:3}  no rule fires for {_safe(v.name)}, which has no default"
+        for k, v in enumerate(system.outputs, 1)
+        if v.default is None
+    )
+    yield " */"
     yield signature
     yield "{"
     yield from (f"    double x{i} = inputs[{i - 1}]; /* {_safe(v.name)} */" for i, v in enumerate(system.inputs, 1))

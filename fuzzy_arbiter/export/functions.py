@@ -42,13 +42,14 @@ _C_NORMS = {
     "power": "pow(a, b)",
     "bounded_difference": "a + b > 1.0 ? a + b - 1.0 : 0.0",
     "drastic_product": "a == 1.0 ? b : b == 1.0 ? a : 0.0",
-    "einstein_product": "a * b / (2.0 - (a + b - a * b))",
-    "hamacher_product": "a * b > 0.0 ? a * b / (a + b - a * b) : 0.0",
+    "einstein_product": "a * b / (1.0 + (1.0 - a) * (1.0 - b))",
+    "hamacher_product": "a > 1e-308 && b > 1e-308 ? 1.0 / (1.0 / a + 1.0 / b - 1.0) : 0.0",
     "nilpotent_minimum": "a + b <= 1.0 ? 0.0 : a < b ? a : b",
     "bounded_sum": "a + b < 1.0 ? a + b : 1.0",
     "drastic_sum": "a == 0.0 ? b : b == 0.0 ? a : 1.0",
     "einstein_sum": "(a + b) / (1.0 + a * b)",
-    "hamacher_sum": "a + b - 2.0 * a * b < 1.0 - a * b ? (a + b - 2.0 * a * b) / (1.0 - a * b) : 1.0",
+    "hamacher_sum": "a + b <= 1.0 ? (a * (1.0 - b) + b * (1.0 - a)) / (1.0 - a * b)"
+    " : 1.0 - hamacher_product(1.0 - a, 1.0 - b)",
     "nilpotent_maximum": "a + b >= 1.0 ? 1.0 : a > b ? a : b",
     "normalized_sum": "(a + b) / (a + b > 1.0 ? a + b : 1.0)",
 }
@@ -57,6 +58,8 @@ _C_HEDGES = {
     "somewhat": "sqrt(a)",
     "extremely": "a <= 0.5 ? 2.0 * a * a : 1.0 - 2.0 * (1.0 - a) * (1.0 - a)",
     "seldom": "a <= 0.5 ? sqrt(0.5 * a) : 1.0 - sqrt(0.5 * (1.0 - a))",
+    "cubed": "a * a * a",
+    "cube_root": "cbrt(a)",
 }
 # of C's math.h
 _C_MATH = frozenset((*_PYTHON_OF_ONE, "fmod"))
@@ -81,7 +84,9 @@ def called(texts: Iterable[str]) -> list[str]:
     UnsupportedError
         If one is not exported.
     """
-    names = sorted({name for text in texts for name in _CALL.findall(text) if name not in ("or", "and", "not")})
+    found = {name for text in texts for name in _CALL.findall(text) if name not in ("or", "and", "not")}
+    found |= {name for norm in found & _C_NORMS.keys() for name in _CALL.findall(_C_NORMS[norm]) if name in _C_NORMS}
+    names = sorted(found)  # a norm calls those before it
     for name in names:
         if name not in (*_C_NORMS, *_C_HEDGES, *_COMPARED, *_C_MATH):
             raise UnsupportedError(f"export: the function {name!r} of a formula is not exported")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Iterator, Sequence
 
-from fuzzy_arbiter.definition import System
+from fuzzy_arbiter.definition import System, variable_names
 from fuzzy_arbiter.engines import sweep
 from fuzzy_arbiter.export.functions import in_python
 from fuzzy_arbiter.export.program import Assign, Choose, Program, Return, Statement, Sweep, program
@@ -18,14 +18,18 @@ from math import nan as NAN
 """
 _TAIL = '''
 
+INPUTS = {inputs!r}
+OUTPUTS = {outputs!r}
+
+
 def weights(inputs):
-    """Return the outputs as a tuple; ValueError if an input is bad or an output undefined."""
-    outputs = [0.0] * {outputs}
+    """Return the outputs as a tuple; ValueError names an input that is bad, or an output that is undefined."""
+    outputs = [0.0] * len(OUTPUTS)
     fault = evaluate(inputs, outputs)
     if fault < 0:
-        raise ValueError(f"input {{-fault}} is {{inputs[-fault - 1]!r}}, which is not in its universe")
+        raise ValueError(f"input {{INPUTS[-fault - 1]}} is {{inputs[-fault - 1]!r}}, which is not in its universe")
     if fault > 0:
-        raise ValueError(f"output {{fault}} is undefined: no rule fires at {{inputs!r}}")
+        raise ValueError(f"output {{OUTPUTS[fault - 1]}} is undefined: no rule fires, and it has no default")
     return tuple(outputs)
 '''
 
@@ -42,8 +46,9 @@ def to_python(system: System) -> str:
     -------
     str
         A module with ``evaluate(inputs, outputs)``, which fills the outputs and returns 0, or -i if the i-th input is
-        not in its universe, or k if no rule fires for the k-th output; and ``weights(inputs)``, which returns a tuple
-        or raises ``ValueError``. Both give what the arbiter's own engine does, to the last bit.
+        not in its universe, or k if no rule fires for the k-th output and that has no default, where a call gives NaN;
+        and ``weights(inputs)``, which returns a tuple or raises ``ValueError`` with the name. Both give what the
+        arbiter's own engine does, to the last bit.
 
     Examples
     --------
@@ -82,7 +87,7 @@ def _module(code: Program) -> Iterator[str]:
     yield from _block(code.statements, system, "    ")
     yield from (f"    outputs[{k - 1}] = y{k}" for k in range(1, len(system.outputs) + 1))
     yield "    return 0"
-    yield _TAIL.rstrip().format(outputs=len(system.outputs))
+    yield _TAIL.rstrip().format(inputs=variable_names(system.inputs), outputs=variable_names(system.outputs))
 
 
 def _block(statements: Sequence[Statement], system: System, indent: str) -> Iterator[str]:

@@ -25,7 +25,6 @@ MAX_FILE = 4_000_000  # bytes
 _READ: dict[str, Callable[[str], System]] = {
     "json": json_toml.read_json,
     "toml": json_toml.read_toml,
-    "fcl": fcl.read,
     "fis": fis.read,
     "fll": fll.read,
 }
@@ -38,7 +37,7 @@ _WRITE: dict[str, Callable[[System], str]] = {
 }
 
 
-def reads(text: str, format: str) -> System:
+def reads(text: str, format: str, block: str | None = None) -> System:
     """Return the system that a text defines.
 
     Parameters
@@ -47,6 +46,8 @@ def reads(text: str, format: str) -> System:
         All of a file; a byte order mark and the ends of lines do not matter.
     format : {"json", "toml", "fcl", "fis", "fll"}
         What it is written in.
+    block : str, optional
+        Which FUNCTION_BLOCK of a FCL text is meant, by its name; needed where there are several.
 
     Returns
     -------
@@ -56,7 +57,7 @@ def reads(text: str, format: str) -> System:
     Raises
     ------
     FormatError
-        If there is no such format, the text is not of it, or it says what this package does not know.
+        If there is no such format or block, the text is not of it, or it says what this package does not know.
     DefinitionError
         If what it defines cannot be.
 
@@ -71,7 +72,12 @@ def reads(text: str, format: str) -> System:
     _require_format(format, f"format is {format!r}")
     if not isinstance(text, str):
         raise FormatError(f"{shown(text)} came, expected text")
-    return _READ[format](text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n"))
+    lines = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    if format == "fcl":
+        return fcl.read(lines, block)
+    if block is not None:
+        raise FormatError(f"block is {shown(block)}, expected none for {format}: only FCL has function blocks")
+    return _READ[format](lines)
 
 
 def writes(system: System, format: str) -> str:
@@ -110,13 +116,15 @@ def writes(system: System, format: str) -> str:
     return _WRITE[format](system)
 
 
-def load(path: str | Path) -> System:
+def load(path: str | Path, block: str | None = None) -> System:
     """Return the system that a file defines.
 
     Parameters
     ----------
     path : str or Path
         Of a JSON, TOML, FCL, FIS or FLL file, told by its suffix in any case.
+    block : str, optional
+        As of `reads`.
 
     Returns
     -------
@@ -153,7 +161,7 @@ def load(path: str | Path) -> System:
     except (OSError, ValueError) as error:  # the latter for a name with a null in it
         raise FormatError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     try:
-        return reads(text, format)
+        return reads(text, format, block)
     except ArbiterError as error:
         raise type(error)(f"{path}: {error}") from None
 

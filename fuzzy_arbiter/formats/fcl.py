@@ -9,7 +9,7 @@ from fuzzy_arbiter.engines.plain import bent
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fcl_reader import system_of
 from fuzzy_arbiter.formats.fcl_terms import say_shape, universe_of
-from fuzzy_arbiter.formats.fcl_words import METHODS, RESERVED, cut
+from fuzzy_arbiter.formats.fcl_words import METHODS, RESERVED, chosen_block, cut
 from fuzzy_arbiter.formats.notation import blocks, cannot_say, require_word, require_words, say_number
 from fuzzy_arbiter.formats.settings import read_settings, say_settings
 from fuzzy_arbiter.rule import Rule
@@ -113,7 +113,7 @@ def _require_one_case(system: System) -> None:
                 raise UnsupportedError(f"fcl cannot say the names {other!r} and {name!r}: they differ in case alone")
 
 
-def read(text: str) -> System:
+def read(text: str, block: str | None = None) -> System:
     """Return the system that a function block defines.
 
     A variable without RANGE has the universe of its points. NC becomes a missing default. What is not said is as
@@ -122,7 +122,9 @@ def read(text: str) -> System:
     Parameters
     ----------
     text : str
-        One function block.
+        One function block, or several.
+    block : str, optional
+        Name of the one that is meant; needed where there are several.
 
     Returns
     -------
@@ -132,10 +134,10 @@ def read(text: str) -> System:
     Raises
     ------
     FormatError
-        If the text is no FCL, or says what this package does not know; the line is named.
+        If the text is no FCL, has no such block, or says what this package does not know; the line is named.
     DefinitionError
         If what it defines cannot be.
     """
     tokens, comments = cut(text)
     fuzzylite = any("generated with fuzzylite" in text for _, text in comments)
-    return system_of(tokens, fuzzylite, read_settings(comments, _SETTINGS))
+    return system_of(chosen_block(tokens, block), fuzzylite, read_settings(comments, _SETTINGS))

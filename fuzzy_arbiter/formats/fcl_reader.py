@@ -9,15 +9,23 @@ from typing import Any
 from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable
 from fuzzy_arbiter.formats.fcl_cursor import Cursor
 from fuzzy_arbiter.formats.fcl_terms import universe_of
-from fuzzy_arbiter.formats.fcl_words import CONJUNCTIONS, DISJUNCTIONS, JOINS, METHODS, PAIRS, Token
+from fuzzy_arbiter.formats.fcl_words import (
+    CONJUNCTIONS,
+    DISJUNCTIONS,
+    JOINS,
+    METHODS,
+    PAIRS,
+    SECTIONS,
+    Token,
+    block_name,
+)
 from fuzzy_arbiter.formats.notation import assembled, located, refuse
-from fuzzy_arbiter.propositions import quoted
+from fuzzy_arbiter.propositions import Is, quoted
 from fuzzy_arbiter.rule import Operators, Rule
 from fuzzy_arbiter.rule_text import parse_rules
 from fuzzy_arbiter.terms.term import Term
 from fuzzy_arbiter.terms.values import Constant, Linear, Value
 
-_SECTIONS = ("VAR_INPUT", "VAR_OUTPUT", "FUZZIFY", "DEFUZZIFY", "RULEBLOCK", "END_FUNCTION_BLOCK")
 _RULE_WORDS = frozenset(("if", "then", "and", "or", "not", "is", "with"))
 
 
@@ -74,6 +82,23 @@ class _Block:
         return Operators(conjunction, self.said.get("OR", PAIRS[conjunction]), self.said.get("ACT", "min"))
 
 
+def _on_first_of_value(rule: Rule, outputs: list[Output]) -> Rule:
+    """Return a rule that concludes the first of terms of one value: jFuzzyLogic joins strengths by value."""
+    known = {output.name: output for output in outputs if output.weighted and output.aggregation != "sum"}
+    shapes = {(name, term.name): term.shape for name, output in known.items() for term in output.terms}
+    conclusions = tuple(
+        next(
+            Is(c.variable, term)
+            for (name, term), shape in shapes.items()
+            if name == c.variable and shape == shapes[c.variable, c.term]
+        )
+        if (c.variable, c.term) in shapes
+        else c
+        for c in rule.conclusions
+    )
+    return rule if conclusions == rule.conclusions else replace(rule, conclusions=conclusions)
+
+
 @dataclass
 class _Reader(Cursor):
     """Reads one text by recursive descent."""
@@ -87,7 +112,9 @@ class _Reader(Cursor):
 
     def system(self, settings: dict[str, Any]) -> System:
         begin = self.take("FUNCTION_BLOCK")
-        name = self.title(begin.line) or "arbiter"
+        name = block_name(self.tokens[self.at :])
+        while name and self.here.line == begin.line and self.here.text.upper() not in SECTIONS:
+            self.at += 1
         sections: dict[str, Callable[[], None]] = {
             "VAR_INPUT": lambda: self.variables(self.inputs),
             "VAR_OUTPUT": lambda: self.variables(self.outputs),
@@ -98,7 +125,7 @@ class _Reader(Cursor):
         while not self.accept("END_FUNCTION_BLOCK"):
             sections[self.take(*sections, "END_FUNCTION_BLOCK").text.upper()]()
         if self.here.kind != "end":
-            self.unexpected("the end of the file; one function block makes a system")
+            self.unexpected("the end of the file")
         accumulations = {block.said["ACCU"]: block.line for block in self.blocks if "ACCU" in block.said}
         if len(accumulations) > 1:
             refuse(max(accumulations.values()), "RULEBLOCK has another ACCU than that before it, expected the same")
@@ -116,16 +143,10 @@ class _Reader(Cursor):
             for block, own in zip(self.blocks, operators, strict=True)
             for line, rule in block.rules
         ]
+        if not self.fuzzylite:
+            rules = [(line, _on_first_of_value(rule, outputs)) for line, rule in rules]
         norms = {key: getattr(first, key) for key in ("conjunction", "disjunction", "implication")}
-        return assembled(begin.line, inputs, outputs, rules, name=name, **norms, **settings)
-
-    def title(self, line: int) -> str:
-        """Take the block's name: all that stands in its line, up to a word of the language."""
-        words: list[str] = []
-        while self.here.line == line and self.here.text.upper() not in _SECTIONS and self.here.kind != "end":
-            words += [" "] * (self.here.spaced and bool(words)) + [self.here.text]
-            self.at += 1
-        return "".join(words)
+        return assembled(begin.line, inputs, outputs, rules, name=name or "arbiter", **norms, **settings)
 
     def output(self, name: str, draft: _Draft, accumulation: str | None) -> Output:
         shapes = [term.shape for term in draft.terms or ()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from fuzzy_arbiter.formats.notation import refuse
@@ -17,6 +18,7 @@ _WORDS = (
     "trian var var_input var_output with"
 )
 RESERVED = frozenset(_WORDS.split())
+SECTIONS = ("VAR_INPUT", "VAR_OUTPUT", "FUZZIFY", "DEFUZZIFY", "RULEBLOCK", "END_FUNCTION_BLOCK")
 
 # jFuzzyLogic's words; fuzzylite has others for some
 CONJUNCTIONS = {
@@ -108,3 +110,58 @@ def cut(text: str) -> tuple[list[Token], list[tuple[int, str]]]:
         line += found.count("\n")
     tokens.append(Token("end", "the end of the file", line))
     return tokens, comments
+
+
+def block_name(tokens: Sequence[Token]) -> str:
+    """Return the name that begins a function block: all that stands in its line, up to a word of the language.
+
+    Parameters
+    ----------
+    tokens : sequence of Token
+        What follows ``FUNCTION_BLOCK``.
+
+    Returns
+    -------
+    str
+        Empty if there is none.
+    """
+    words: list[str] = []
+    for token in tokens:
+        if token.line != tokens[0].line or token.text.upper() in SECTIONS or token.kind == "end":
+            break
+        words += [" "] * (token.spaced and bool(words)) + [token.text]
+    return "".join(words)
+
+
+def chosen_block(tokens: list[Token], name: str | None) -> list[Token]:
+    """Return the tokens of one function block.
+
+    Parameters
+    ----------
+    tokens : list of Token
+        Of all of a text.
+    name : str or None
+        Of the block; None where there is but one.
+
+    Returns
+    -------
+    list of Token
+        All of them, if the text does not consist of function blocks and no name was asked for.
+
+    Raises
+    ------
+    FormatError
+        If there is no such block, or several and no name; all names are told.
+    """
+    starts = [i for i, token in enumerate(tokens) if token.text.upper() == "FUNCTION_BLOCK"]
+    if name is None and len(starts) < 2:
+        return tokens
+    ends = [*starts[1:], len(tokens) - 1]
+    names = [block_name(tokens[start + 1 :]) for start in starts]
+    chosen = [i for i, own in enumerate(names) if own == name]
+    if len(chosen) == 1:
+        return [*tokens[starts[chosen[0]] : ends[chosen[0]]], tokens[-1]]
+    listed = ", ".join(names) or "none: there is no FUNCTION_BLOCK"
+    if name is not None:
+        refuse(tokens[0].line, f"block is {name!r}, expected {'one of ' * bool(names)}{listed}, each once")
+    return refuse(tokens[starts[1]].line, f"another FUNCTION_BLOCK came, expected block=, one of {listed}")

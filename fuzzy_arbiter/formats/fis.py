@@ -16,7 +16,7 @@ from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.kinds import KINDS
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from fuzzy_arbiter.terms.term import Term
-from fuzzy_arbiter.terms.values import Constant, Linear
+from fuzzy_arbiter.terms.values import Constant, Linear, Value
 
 __all__ = ["read", "write"]
 
@@ -76,7 +76,8 @@ def _method(system: System) -> tuple[str, str, str]:
         return "mamdani", method, AGGREGATIONS[aggregation].fis
     if aggregation != "sum":
         raise UnsupportedError(f"fis cannot say the aggregation {aggregation!r} of values: expected 'sum'")
-    return "sugeno", method, "sum"
+    values = all(isinstance(term.shape, Value) for output in system.outputs for term in output.terms)
+    return ("sugeno" if values else "tsukamoto"), method, "sum"
 
 
 def _require_names(system: System) -> None:
@@ -111,6 +112,11 @@ def _function(term: Term, v: Variable) -> str:
         return x + width if x + width > x else math.nextafter(x, math.inf)
 
     places = [x for x, _ in term.shape.points]
+    if isinstance(v, Output) and v.weighted:  # a ramp of Tsukamoto's method, for which fuzzylite alone has a word
+        if max(degree for _, degree in term.shape.points) != 1.0:
+            raise UnsupportedError(_no_function(term, v))
+        foot, top = places if term.shape.points[0][1] == 0.0 else reversed(places)
+        return f"'rampmf',[{say_number(foot)} {say_number(top)}]"
     match [degree for _, degree in term.shape.points]:
         case [0.0, 1.0, 0.0] | [0.0, 1.0, 1.0, 0.0]:
             pass

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable
 from fuzzy_arbiter.errors import FormatError
-from fuzzy_arbiter.formats.fis_terms import numbers_of, read_function
-from fuzzy_arbiter.formats.fis_words import DEFUZZIFIERS, HEDGES, METHODS, OCTAVE_HEDGES, SETTINGS, TYPES
+from fuzzy_arbiter.formats.fis_rules import read_rules, with_complements
+from fuzzy_arbiter.formats.fis_terms import numbers_of, read_function, told_apart
+from fuzzy_arbiter.formats.fis_words import (
+    DEFUZZIFIERS,
+    FUZZYLITE_KEYS,
+    METHODS,
+    SETTINGS,
+    TYPES,
+)
 from fuzzy_arbiter.formats.notation import assembled, located, read_number, refuse
 from fuzzy_arbiter.formats.settings import read_settings
-from fuzzy_arbiter.propositions import And, Anything, Hedged, Is, Not, Or, Proposition
 from fuzzy_arbiter.rule import Rule
-from fuzzy_arbiter.rule_text import bent_rules
 from fuzzy_arbiter.shapes import Membership
 from fuzzy_arbiter.terms.term import Term
 from fuzzy_arbiter.terms.values import Formula
@@ -24,7 +28,6 @@ _ENTRY = re.compile(r"(\w+)\s*=\s*(.*)", re.ASCII)
 _QUOTED = re.compile(r"'([^']*)'")
 _LIST = re.compile(r"\[([^][]*)\]")
 _FUNCTION = re.compile(r"'([^']*)'\s*:\s*'([^']*)'\s*,\s*\[([^][]*)\]")
-_RULE = re.compile(r"([^,()]*),([^,()]*)\(([^()]*)\)\s*:\s*(\S+)")
 _COUNTS = ("NumInputs", "NumOutputs", "NumRules")
 _SYSTEM_KEYS = ("Name", "Type", "Version", *_COUNTS, *METHODS, "DefuzzMethod")
 
@@ -45,6 +48,14 @@ class _Section:
         match = _QUOTED.fullmatch(value)
         return match[1] if match else refuse(line, f"{key} is {value}, expected text in single quotes")
 
+    def flag(self, key: str) -> bool:
+        line, value = self.entries.get(key, (self.line, "0"))
+        return value == "1" if value in ("0", "1") else refuse(line, f"{key} is {value}, expected 0 or 1")
+
+    def default(self) -> float | None:
+        line, value = self.entries.get("Default", (self.line, "nan"))
+        return None if value == "nan" else read_number(value, line, "Default")
+
     def require_count(self, key: str, count: int) -> None:
         line, value = self.entries.get(key, (self.line, ""))
         if value != str(count):
@@ -54,8 +65,10 @@ class _Section:
 def read(text: str) -> System:
     """Return the system that MATLAB's text defines.
 
-    Terms of one name are numbered, as rules speak of them by their place. The strengths of rules that conclude one
-    value are added, whatever AggMethod says, as MATLAB does it.
+    Terms of one name are numbered, as rules speak of them by their place. Where a rule concludes that an output is not
+    in a term, its complement becomes a term of its own. The strengths of rules that conclude one value are added,
+    whatever AggMethod says, as MATLAB does it; where a comment names the fuzzy-logic-toolkit, they are joined as
+    AggMethod says, as Octave does it.
 
     Parameters
     ----------
@@ -65,7 +78,7 @@ def read(text: str) -> System:
     Returns
     -------
     System
-        Without defaults, which the format does not know.
+        With defaults and locks only of fuzzylite's versions 3 to 5, whose keys these are.
 
     Raises
     ------
@@ -81,16 +94,20 @@ def read(text: str) -> System:
     system = sections["System"]
     norms, defuzzifier, name = _norms(system), _defuzzifier(system), system.string("Name")
     aggregation = norms.pop("aggregation")
-    fuzzylite = any("generated with fuzzylite" in text for _, text in comments)
+    fuzzylite = any("generated with fuzzylite" in text for _, text in comments) or any(
+        key in FUZZYLITE_KEYS for section in sections.values() for key in section.entries
+    )
     inputs = [Variable(*parts) for parts in _variables(sections, "Input", None)]
-    outputs = _outputs(sections, len(inputs), defuzzifier, aggregation)
+    values = aggregation if any("fuzzy-logic-toolkit" in text for _, text in comments) else "sum"
+    outputs = _outputs(sections, len(inputs), defuzzifier, aggregation, values)
     counted = {"NumInputs": len(inputs), "NumOutputs": len(outputs), "NumRules": len(sections["Rules"].rows)}
     for key, count in counted.items():
         system.require_count(key, count)
     rules: list[tuple[int, Rule]] = []
     for line, row in sections["Rules"].rows:
         with located(f"line {line}: {row!r}"):
-            rules += [(line, rule) for rule in _rules(line, row, inputs, outputs, fuzzylite)]
+            rules += [(line, rule) for rule in read_rules(line, row, inputs, outputs, fuzzylite)]
+    outputs = [with_complements(output, rules) for output in outputs]
     return assembled(system.line, inputs, outputs, rules, name=name or "arbiter", **norms, **settings)
 
 
@@ -179,14 +196,18 @@ def _variables(sections: dict[str, _Section], kind: str, inputs: int | None) -> 
     return variables
 
 
-def _outputs(sections: dict[str, _Section], inputs: int, defuzzifier: str, aggregation: str) -> list[Output]:
+def _outputs(
+    sections: dict[str, _Section], inputs: int, defuzzifier: str, aggregation: str, of_values: str
+) -> list[Output]:
     outputs: list[Output] = []
     for k, parts in enumerate(_variables(sections, "Output", inputs), 1):
         values = any(not isinstance(term.shape, Membership) or isinstance(term.shape, Formula) for term in parts[2])
         own = "average" if values and defuzzifier not in WEIGHTED and _hybrid(sections) else defuzzifier
-        join = "sum" if own in WEIGHTED else aggregation
-        with located(f"line {sections[f'Output{k}'].line}"):
-            outputs.append(Output(*parts, None, own, join))  # type: ignore[arg-type]  # of its words
+        join = of_values if own in WEIGHTED else aggregation
+        section = sections[f"Output{k}"]
+        locks = section.flag("LockRange"), section.flag("LockPrevious")
+        with located(f"line {section.line}"):
+            outputs.append(Output(*parts, section.default(), own, join, *locks))  # type: ignore[arg-type]  # of its words
     return outputs
 
 
@@ -203,7 +224,10 @@ def _variable(section: _Section, inputs: int | None) -> _Parts:
     bounds = numbers_of(match[1], line, "Range") if match else []
     if len(bounds) != 2:
         refuse(line, f"Range is {value}, expected two numbers in brackets")
-    functions = {key: entry for key, entry in section.entries.items() if key not in ("Name", "Range", "NumMFs")}
+    if "Enabled" in section.entries and not section.flag("Enabled"):
+        refuse(section.entries["Enabled"][0], f"Enabled is 0 for {name!r}, expected 1")
+    known = ("Name", "Range", "NumMFs", *(FUZZYLITE_KEYS if inputs is not None else FUZZYLITE_KEYS[:1]))
+    functions = {key: entry for key, entry in section.entries.items() if key not in known}
     section.require_count("NumMFs", len(functions))
     terms: list[Term] = []
     for j, (key, (line, value)) in enumerate(functions.items(), 1):
@@ -215,80 +239,8 @@ def _variable(section: _Section, inputs: int | None) -> _Parts:
         term, function, places = match.groups()
         with located(f"line {line}: term {term!r}"):
             terms.append(Term(term, read_function(function, places, line, term, inputs)))
-    parts = name, (bounds[0], bounds[1]), _told_apart(terms)
+    parts = name, (bounds[0], bounds[1]), told_apart(terms)
     with located(f"line {section.line}"):
         if inputs is None:
             Variable(*parts)
     return parts
-
-
-def _told_apart(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """Return terms with a number after a name that came before, for rules speak of their places."""
-    found: list[Term] = []
-    for term in terms:
-        name, names = term.name, {other.name for other in found}
-        for k in range(2, len(terms) + 2):
-            if name not in names:
-                break
-            name = f"{term.name}_{k}"
-        found.append(Term(name, term.shape))
-    return tuple(found)
-
-
-def _rules(line: int, row: str, inputs: Sequence[Variable], outputs: Sequence[Variable], fuzzylite: bool) -> list[Rule]:
-    match = _RULE.fullmatch(row)
-    if not match:
-        refuse(line, f"{row!r}, expected a rule such as 1 -2, 1 (1) : 1")
-    asked, concluded, weight, connective = match.groups()
-    if connective not in ("1", "2"):
-        refuse(line, f"{row!r} ends in {connective!r}, expected 1 for and, 2 for or")
-    condition: list[Proposition] = []
-    for (index, negated, hedges), v in zip(_indices(asked, line, row, inputs, fuzzylite), inputs, strict=True):
-        statement = _statement(index, hedges, v)
-        if statement is not None:
-            condition.append(Not(statement) if negated else statement)
-    conclusions: list[tuple[tuple[str, ...], Is]] = []
-    for (index, negated, hedges), v in zip(_indices(concluded, line, row, outputs, fuzzylite), outputs, strict=True):
-        if negated:
-            refuse(line, f"{row!r} concludes that {v.name!r} is not in a term, which is not known here")
-        if hedges and not fuzzylite:
-            refuse(line, f"{row!r} has a hedge in the conclusion on {v.name!r}, which only fuzzylite's files may have")
-        if index:
-            conclusions.append((hedges, Is(v.name, v.terms[index - 1].name)))
-    if not condition or not conclusions:
-        refuse(line, f"{row!r} has no {'conclusion' if condition else 'condition'}, expected one number that is not 0")
-    joined = condition[0] if len(condition) == 1 else (And if connective == "1" else Or)(tuple(condition))
-    share = read_number(weight.strip(), line, "weight")
-    if share != 1.0 and any(hedges for hedges, _ in conclusions):
-        refuse(line, f"{row!r} has a hedge in a conclusion and a weight, expected the weight 1")
-    return bent_rules(joined, conclusions, share)
-
-
-def _statement(index: int, hedges: tuple[str, ...], v: Variable) -> Proposition | None:
-    if hedges == ("any",):
-        return Anything(v.name)
-    if not index:
-        return None
-    statement: Proposition = Is(v.name, v.terms[index - 1].name)
-    for hedge in reversed(hedges):
-        statement = Hedged(hedge, statement)
-    return statement
-
-
-def _indices(
-    text: str, line: int, row: str, variables: Sequence[Variable], fuzzylite: bool
-) -> list[tuple[int, bool, tuple[str, ...]]]:
-    """Return of each variable the number of its term from 1, whether it is negated, and its hedges."""
-    parts = text.split()
-    if len(parts) != len(variables):
-        refuse(line, f"{row!r} has {len(parts)} numbers in {text.strip()!r}, expected {len(variables)}")
-    indices = []
-    for part, v in zip(parts, variables, strict=True):
-        whole = re.fullmatch(r"(-?)([0-9]{1,9})(?:\.([0-9]*?)0*)?", part, re.ASCII)  # fuzzylite writes 1.000
-        index = int(whole[2]) if whole else -1
-        hedges = (HEDGES if fuzzylite else OCTAVE_HEDGES).get(whole[3] or "") if whole else None
-        if whole is None or index > len(v.terms) or hedges is None or (hedges and not index and hedges != ("any",)):
-            expected = f"a whole number from {-len(v.terms)} to {len(v.terms)}, or .05, .2 or .4 more for a hedge"
-            refuse(line, f"{row!r}: {part} for {v.name!r}, expected {expected}")
-        indices.append((index, whole[1] == "-", hedges))
-    return indices

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
+from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.formats.fis_words import CURVES, FUNCTIONS, SHOULDERS, STRAIGHT, VALUES
 from fuzzy_arbiter.formats.fll_terms import curve_of, read_shape, read_value
 from fuzzy_arbiter.formats.notation import read_number, refuse, say_numbers
 from fuzzy_arbiter.shapes import Membership, Shape
+from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.expressions import Expression
+from fuzzy_arbiter.terms.term import Term
 from fuzzy_arbiter.terms.values import Formula, Value
 
 
@@ -62,6 +66,55 @@ def read_function(function: str, text: str, line: int, term: str, inputs: int | 
     if function == "trapmf" and numbers[1] > numbers[2]:
         return _crossed(*numbers)
     return read_shape(kind, say_numbers(numbers), line)
+
+
+def complement(shape: Membership) -> Membership:
+    """Return the function that is 1 less another.
+
+    Parameters
+    ----------
+    shape : Membership
+        Of straight pieces, or a curve in one piece.
+
+    Returns
+    -------
+    Membership
+        Exact for straight pieces, a formula for a curve.
+
+    Raises
+    ------
+    DefinitionError
+        If the curve has several pieces.
+    """
+    if isinstance(shape, Shape):
+        return Shape(tuple((x, 1.0 - degree) for x, degree in shape.points))
+    if isinstance(shape, Curve) and len(shape.trees) == 1:
+        return Formula(f"1 - ({Expression('', shape.trees[0]).text})")
+    raise DefinitionError("the complement of this function is not known, expected straight pieces or a curve in one")
+
+
+def told_apart(terms: Sequence[Term]) -> tuple[Term, ...]:
+    """Return terms with a number after a name that came before.
+
+    Parameters
+    ----------
+    terms : sequence of Term
+        Of one variable; rules speak of their places, so that their names may be the same.
+
+    Returns
+    -------
+    tuple of Term
+        Each name once.
+    """
+    found: list[Term] = []
+    for term in terms:
+        name, names = term.name, {other.name for other in found}
+        for k in range(2, len(terms) + 2):
+            if name not in names:
+                break
+            name = f"{term.name}_{k}"
+        found.append(Term(name, term.shape))
+    return tuple(found)
 
 
 def numbers_of(text: str, line: int, what: str) -> list[float]:

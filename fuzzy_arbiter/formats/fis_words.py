@@ -15,6 +15,7 @@ S_WORDS = {**{norm.fis: name for name, norm in S_NORMS.items()}, "algebraic_sum"
 JOINS = {**{norm.fis: name for name, norm in AGGREGATIONS.items()}, "algebraic_sum": "probor", "": "max"}
 DEFUZZIFIERS = {
     "centroid": "centroid",
+    "centroid_integral": "centroid",  # Octave's, whose centroid sums at places
     "bisector": "bisector",
     "mom": "mom",
     "som": "som",
@@ -38,8 +39,24 @@ CURVES = {kind.fis[0]: (name, kind.fis[1]) for name, kind in KINDS.items() if ki
 VALUES = ("constant", "linear", "function")
 SHOULDERS = {"linsmf": rising, "linzmf": falling}
 FUNCTIONS = (*STRAIGHT, *SHOULDERS, *CURVES, *VALUES)
+# keys of a variable that fuzzylite's versions 3 to 5 add
+FUZZYLITE_KEYS = ("Enabled", "Default", "LockRange", "LockPrevious")
 # what stands after the point of a term's number, as Octave writes hedges: ten times that is the power
-OCTAVE_HEDGES: dict[str, tuple[str, ...]] = {"": (), "05": ("somewhat",), "2": ("very",), "4": ("very", "very")}
+OCTAVE_HEDGES: dict[str, tuple[str, ...]] = {
+    "": (),
+    "05": ("somewhat",),
+    "2": ("very",),
+    "3": ("cubed",),
+    "4": ("very", "very"),
+}
+# and where a rule concludes a value, whose strength it takes to the inverse of that power
+OCTAVE_ROOTS: dict[str, tuple[str, ...]] = {
+    "": (),
+    "05": ("very",),
+    "2": ("somewhat",),
+    "3": ("cube_root",),
+    "4": ("somewhat", "somewhat"),
+}
 HEDGES: dict[str, tuple[str, ...]] = {
     "": (),
     "01": ("seldom",),

@@ -11,7 +11,7 @@ from fuzzy_arbiter.formats.notation import blocks, cannot_say, require_words, sa
 from fuzzy_arbiter.formats.settings import say_settings
 from fuzzy_arbiter.propositions import And, Anything, Hedged, Is, Not, Or, Proposition
 from fuzzy_arbiter.rule import Rule
-from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, HEDGES, S_NORMS, T_NORMS
 
 __all__ = ["read", "write"]
 
@@ -90,6 +90,8 @@ def _condition(p: Proposition, i: int, rule: Rule) -> str:
         return word.join(f"({text})" if isinstance(part, And | Or) else text for part, text in texts)
     bends: list[str] = []
     while isinstance(p, Not | Hedged):
+        if isinstance(p, Hedged) and not HEDGES[p.hedge].fll:
+            raise cannot_say("fll", i, rule, "a hedge of fuzzylite's, such as very, somewhat or extremely")
         bends.append(p.hedge if isinstance(p, Hedged) else "not")
         p = p.part
     if not isinstance(p, Is | Anything):

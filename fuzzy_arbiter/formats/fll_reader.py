@@ -55,7 +55,8 @@ def read(text: str) -> System:
     """Return the system that a text in the FuzzyLite Language defines.
 
     The points are the most of any output's defuzzifier; an output's default of ``nan`` is none; ranges that are locked
-    clip inputs. An aggregation of ``none`` adds the strengths of values, as fuzzylite does.
+    clip inputs. An aggregation of ``none`` adds the strengths of values, as fuzzylite does. Terms of one name are
+    refused, for rules mean the first in fuzzylite and the last in pyfuzzylite.
 
     Parameters
     ----------

@@ -15,7 +15,9 @@ from fuzzy_arbiter.terms.norms import HEDGES
 from fuzzy_arbiter.terms.values import Constant, Formula, Linear, Value
 
 _FUNCTIONS = "acosh asinh atanh gt lt le ge eq neq abs fabs"
-RESERVED = frozenset((*HEDGES, "any", "not", *WORDS, *_FUNCTIONS.split()))
+RESERVED = frozenset(
+    (*(word for word, hedge in HEDGES.items() if hedge.fll), "any", "not", *WORDS, *_FUNCTIONS.split())
+)
 # each with the number of its places; a height may follow
 _PLACES = {"Triangle": 3, "Trapezoid": 4, "Ramp": 2, "Rectangle": 2, "Binary": 2}
 CURVES = {kind.fll[0]: (name, kind.fll[1]) for name, kind in KINDS.items() if kind.fll[0]}

@@ -47,13 +47,13 @@ def drastic_product(a: float, b: float) -> float:
 
 
 def einstein_product(a: float, b: float) -> float:
-    """Return a b / (2 - (a + b - a b))."""
-    return a * b / (2.0 - (a + b - a * b))
+    """Return a b / (1 + (1 - a) (1 - b))."""
+    return a * b / (1.0 + (1.0 - a) * (1.0 - b))
 
 
 def hamacher_product(a: float, b: float) -> float:
-    """Return a b / (a + b - a b), and 0 for two zeros."""
-    return a * b / (a + b - a * b) if a * b > 0.0 else 0.0
+    """Return 1 / (1/a + 1/b - 1), and 0 where one is 0."""
+    return 1.0 / (1.0 / a + 1.0 / b - 1.0) if a > 1e-308 and b > 1e-308 else 0.0
 
 
 def nilpotent_minimum(a: float, b: float) -> float:
@@ -77,8 +77,10 @@ def einstein_sum(a: float, b: float) -> float:
 
 
 def hamacher_sum(a: float, b: float) -> float:
-    """Return (a + b - 2 a b) / (1 - a b), and 1 for two ones."""
-    return (a + b - 2.0 * a * b) / (1.0 - a * b) if a + b - 2.0 * a * b < 1.0 - a * b else 1.0
+    """Return (a (1 - b) + b (1 - a)) / (1 - a b); near two ones that is 1 less the product of what lacks."""
+    if a + b <= 1.0:
+        return (a * (1.0 - b) + b * (1.0 - a)) / (1.0 - a * b)
+    return 1.0 - hamacher_product(1.0 - a, 1.0 - b)
 
 
 def nilpotent_maximum(a: float, b: float) -> float:
@@ -91,8 +93,11 @@ def normalized_sum(a: float, b: float) -> float:
     return (a + b) / max(1.0, a + b)
 
 
-def _quotient(above: Array, below: Array, good: NDArray[np.bool_], otherwise: float) -> Array:
-    return np.asarray(np.divide(above, below, out=np.full(np.shape(above), otherwise), where=good))
+def _hamacher_product(a: Array, b: Array) -> Array:
+    good = (a > 1e-308) & (b > 1e-308)
+    above = np.ones(np.shape(good))
+    first, second = (np.divide(above, x, out=np.ones_like(above), where=good) for x in (a, b))
+    return np.asarray(np.where(good, 1.0 / (first + second - 1.0), 0.0))
 
 
 T_NORMS: dict[str, Norm] = {
@@ -112,13 +117,13 @@ T_NORMS: dict[str, Norm] = {
     ),
     "einstein_product": Norm(
         einstein_product,
-        lambda a, b: a * b / (2.0 - (a + b - a * b)),
+        lambda a, b: a * b / (1.0 + (1.0 - a) * (1.0 - b)),
         "einstein_product({0}, {1})",
         *("EinsteinProduct", "EPROD", "einstein_product"),
     ),
     "hamacher_product": Norm(
         hamacher_product,
-        lambda a, b: _quotient(a * b, a + b - a * b, a * b > 0.0, 0.0),
+        _hamacher_product,
         "hamacher_product({0}, {1})",
         *("HamacherProduct", "HAMACHER", "hamacher_product"),
     ),
@@ -156,7 +161,11 @@ S_NORMS: dict[str, Norm] = {
     ),
     "hamacher_sum": Norm(
         hamacher_sum,
-        lambda a, b: _quotient(a + b - 2.0 * a * b, 1.0 - a * b, a + b - 2.0 * a * b < 1.0 - a * b, 1.0),
+        lambda a, b: np.where(
+            a + b <= 1.0,
+            (a * (1.0 - b) + b * (1.0 - a)) / np.maximum(1.0 - a * b, 0.5),
+            1.0 - _hamacher_product(1.0 - a, 1.0 - b),
+        ),
         "hamacher_sum({0}, {1})",
         *("HamacherSum", "HSUM", "hamacher_sum"),
     ),
@@ -188,10 +197,13 @@ class HedgeKind:
     ----------
     number, array : callable
         Bends a float, or each of an array.
+    fll : bool
+        Whether fuzzylite has it, too.
     """
 
     number: Callable[[float], float]
     array: Callable[[Array], Array]
+    fll: bool = True
 
 
 def very(a: float) -> float:
@@ -214,10 +226,22 @@ def seldom(a: float) -> float:
     return math.sqrt(0.5 * a) if a <= 0.5 else 1.0 - math.sqrt(0.5 * (1.0 - a))
 
 
+def cubed(a: float) -> float:
+    """Return a^3."""
+    return a * a * a
+
+
+def cube_root(a: float) -> float:
+    """Return the cube root."""
+    return math.cbrt(a)
+
+
 HEDGES: dict[str, HedgeKind] = {
     "very": HedgeKind(very, lambda a: a * a),
     "somewhat": HedgeKind(somewhat, np.sqrt),
     "extremely": HedgeKind(extremely, lambda a: np.where(a <= 0.5, 2.0 * a * a, 1.0 - 2.0 * (1.0 - a) * (1.0 - a))),
     "seldom": HedgeKind(seldom, lambda a: np.where(a <= 0.5, np.sqrt(0.5 * a), 1.0 - np.sqrt(0.5 * (1.0 - a)))),
+    "cubed": HedgeKind(cubed, lambda a: a * a * a, fll=False),  # Octave's *extremely*
+    "cube_root": HedgeKind(cube_root, np.cbrt, fll=False),
 }
 """Hedges by their word; *not* and *any* are propositions of their own."""

@@ -27,6 +27,7 @@ from fuzzy_arbiter import (
     trapezoid,
     triangle,
 )
+from fuzzy_arbiter.definition import variable_names
 from fuzzy_arbiter.errors import EngineError, UnsupportedError
 from fuzzy_arbiter.export import to_c, to_python
 from fuzzy_arbiter.propositions import Is
@@ -180,14 +181,15 @@ def test_systems_of_several_files_go_into_one_program(tmp_path):
 def test_python(system):
     module = {}
     exec(compile(to_python(system).encode(), "<arbiter>", "exec"), module)  # from bytes, as of a file
+    inputs, outputs = variable_names(system.inputs), variable_names(system.outputs)
     for x, weights in expected(system):
         if isinstance(weights, int):
-            with pytest.raises(ValueError, match=f"output {weights} is undefined"):
+            with pytest.raises(ValueError, match=re.escape(f"output {outputs[weights - 1]} is undefined")):
                 module["weights"](x)
         else:
             assert module["weights"](x) == weights
     for x, status in bad(system):
-        with pytest.raises(ValueError, match=f"input {-status} is"):
+        with pytest.raises(ValueError, match=re.escape(f"input {inputs[-status - 1]} is")):
             module["weights"](x)
 
 
@@ -277,6 +279,7 @@ CURVED = System(
         "if a is very v or somewhat (a is e and a is t) or a is o then y is h and z is w",
         "if a is extremely f and not (a is seldom t) then y is l",
         "if a is any then z is u with 0.25",
+        "if a is cubed g and not (a is cube_root s) then y is m",
     ),
     conjunction="einstein_product",
     disjunction="bounded_sum",
@@ -338,3 +341,16 @@ def test_what_is_not_exported_is_named(change, fault):
     for export in (to_c, to_python):
         with pytest.raises(UnsupportedError, match=f"export: .*{fault}"):
             export(changed)
+
+
+def test_the_c_says_what_it_returns_by_name():
+    system = Arbiter().system
+    (y,) = (Output("y */", (0, 1), {"a": rising(0, 1)}),)
+    text = to_c(
+        System((system.inputs[0],), (y, replace(y, name="z", default=0.5)), ("if obstacle is exist then z is a",))
+    )
+    assert (
+        " *  -1  obstacle is not in its universe, or no number\n *   1  no rule fires for y * /, which has no default\n"
+        in text
+    )
+    assert "no rule fires for z" not in text

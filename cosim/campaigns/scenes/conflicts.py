@@ -167,8 +167,12 @@ def _door(rng: Generator) -> tuple[Table, list[Table]]:
     at, deep = rng.uniform(4.0, 6.0), rng.uniform(0.6, 2.0)
     door = rng.uniform(-1.5, 1.5)
     walls = [
-        _region("left wall", "obstacle", "out", True, _box((at, at + 0.6), (door - 20.0, door - gap / 2.0), (-5.0, edge))),
-        _region("right wall", "obstacle", "out", True, _box((at, at + 0.6), (door + gap / 2.0, door + 20.0), (-5.0, edge))),
+        _region(
+            "left wall", "obstacle", "out", True, _box((at, at + 0.6), (door - 20.0, door - gap / 2.0), (-5.0, edge))
+        ),
+        _region(
+            "right wall", "obstacle", "out", True, _box((at, at + 0.6), (door + gap / 2.0, door + 20.0), (-5.0, edge))
+        ),
     ]
     width = rng.uniform(2.0, 4.0)
     behind = _box((at, at + deep), (door - width / 2.0, door + width / 2.0), (-5.0, edge))

@@ -6,11 +6,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from controller.compiling.function import CompiledFunction
 from controller.regions import Orientation, Region, Sphere
+from cosim.errors import ScenarioError
 from cosim.scenario.criteria import PAPER, check_criteria
 from cosim.scenario.tables import CriterionEntry, SecondaryRegion
+from cosim.simulation.curves import _power, _quotient
 from cosim.simulation.memberships import compute_memberships, pack_memberships
 from fuzzy_arbiter import Shape
+from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.kinds import KINDS
+from fuzzy_arbiter.terms.values import Formula
 
 lengths = st.floats(-2.0, 2.0) | st.sampled_from([np.nan, np.inf, -np.inf, 0.0, 0.2])
 NAMES = ("obstacle", "shape", "depth")
@@ -85,3 +91,108 @@ def test_criteria_without_a_reason_follow_the_ramp_of_the_arbiter_and_others_do_
     _, setups = check_criteria((CriterionEntry("a"), CriterionEntry("b", membership={"ramp": 0.4})))
     assert memberships_of([0.1, 0.1], ["a", "b"], 0.2, setups).tolist() == [0.5, 0.75]
     assert pack_memberships(regions(["a", "b"]), setups, 0.2).follows.tolist() == [True, False]
+
+
+CURVES = {
+    "gaussian": [0.2, 0.5],
+    "gaussian2": [-0.4, 0.3, 0.5, 0.8],
+    "bell": [0.5, 0.7, 2.3],
+    "sigmoid": [0.5, -7.0],
+    "sigmoid_difference": [-0.5, 9.0, 4.0, 1.0],
+    "sigmoid_product": [-0.5, 9.0, -4.0, 1.0],
+    "z_shape": [-0.2, 1.0],
+    "s_shape": [-0.2, 1.0],
+    "pi_shape": [-1.0, -0.2, 0.3, 1.5],
+    "cosine": [0.3, 1.4],
+    "spike": [0.4, 2.0],
+    "concave": [0.5, 1.5],
+    "arc": [1.5, 0.5],
+    "semi_ellipse": [-1.0, 1.2],
+}
+FORMULAS = [
+    "exp(-abs(x)) * le(x, 1) + gt(x, 1) * 0.1",
+    "min(1, abs(sin(x)) / max(x ^ 2, 0.5))",
+    "0.5 + 0.5 * cos(3 * x) * tan(0.5)",
+    "1 / (1 + sqrt(abs(x)) * log(2 + x ^ 2)) * lt(x, 2.5) * ge(x, -2.5) * neq(x, 1) + 0 * eq(x, 7)",
+    "min(1, pow(0.5, x - 1) * 0.25) * gt(x, -3)",
+]
+
+
+def curved(term):
+    _, setups = check_criteria((CriterionEntry("near", membership={"clearance": term}),))
+    return setups
+
+
+def test_every_curve_is_tried():
+    assert set(CURVES) == set(KINDS) - {"singleton"}  # which jumps
+
+
+@pytest.mark.parametrize(
+    "term", [*({kind: numbers} for kind, numbers in CURVES.items()), {"gaussian": [0.2, 0.5], "height": 0.7}], ids=str
+)
+@pytest.mark.parametrize("compiled", [False, True])
+def test_a_curve_over_clearance_is_the_curve_itself(term, compiled):
+    """By the translated C, too; powers by NumPy's or C's own routine are off by a unit of the last place or two."""
+    kind, numbers = next(iter(term.items()))
+    curve = Curve(kind, tuple(map(float, numbers)), term.get("height", 1.0))
+    packed = pack_memberships(regions(["near"]), curved(term), 0.2)
+    compute = CompiledFunction(compute_memberships) if compiled else compute_memberships
+    found, x = np.zeros(1), np.zeros(1)
+    for place in [*np.linspace(-2.0, 2.0, 401), *numbers, np.inf, -np.inf, 1e300]:
+        x[0] = place
+        compute(packed, x, np.zeros(0), found)
+        expected = curve(float(place))
+        assert found[0] == pytest.approx(0.0 if np.isnan(expected) else expected, abs=4e-16)
+
+
+@pytest.mark.parametrize("text", FORMULAS)
+@pytest.mark.parametrize("compiled", [False, True])
+def test_a_formula_over_clearance_is_the_formula_itself(text, compiled):
+    packed = pack_memberships(regions(["near"]), curved({"formula": text}), 0.2)
+    compute = CompiledFunction(compute_memberships) if compiled else compute_memberships
+    found, x = np.zeros(1), np.zeros(1)
+    for place in np.linspace(-3.0, 3.0, 61):
+        x[0] = place
+        compute(packed, x, np.zeros(0), found)
+        assert found[0] == pytest.approx(Formula(text)(float(place)), abs=4e-16)
+
+
+@pytest.mark.parametrize(
+    ("a", "b"), [(0.0, -1.0), (-2.0, 0.5), (-2.0, 3.0), (1e200, 2.0), (-1e200, 3.0), (1e-200, -2.0), (np.inf, -1.0)]
+)
+def test_where_python_raises_powers_and_quotients_are_those_of_numpy(a, b):
+    with np.errstate(all="ignore"):
+        np.testing.assert_equal(_power(a, b), float(np.power(np.float64(a), b)))
+        np.testing.assert_equal(_quotient(a, 0.0), float(np.divide(a, 0.0)))
+        np.testing.assert_equal(_quotient(a, -0.0), float(np.divide(a, -0.0)))
+
+
+@pytest.mark.parametrize(
+    ("term", "fault"),
+    [
+        ({"singleton": [0.5]}, r"clearance: singleton \[0.5\] jumps, expected a change without jumps"),
+        ({"s_shape": [0.5, 0.5]}, r"clearance: s_shape \[0.5, 0.5\] jumps"),
+        ({"gaussian": [0.5, 0.0]}, "clearance: gaussian of mean, deviation: .* expected a deviation other than 0"),
+        ({"gaussian": [0.5]}, "clearance.gaussian: a list came, expected a list of 2 numbers"),
+        ({"formula": "x"}, "clearance: expression 'x' gives 2 at x = 2, expected at most 1"),
+        ({"formula": "q"}, "clearance is a value, expected a membership function"),
+        ({"formula": "0.5 * tanh(x)"}, "clearance: the function 'tanh', expected of pow, abs, .*; arbiter.file takes"),
+        (
+            {"formula": "0*(x" + "+(x" * 40 + ")" * 41},
+            "clearance: a formula nested so deep, expected at most 32 numbers",
+        ),
+    ],
+)
+def test_what_is_no_curve_is_refused(term, fault):
+    with pytest.raises(ScenarioError, match=f"^criteria.near.membership.{fault}"):
+        curved(term)
+
+
+def test_reasons_are_said_in_words():
+    says = {
+        "gaussian of mean 0.2, deviation 0.5, height 0.7, in m": {"gaussian": [0.2, 0.5], "height": 0.7},
+        "exp(-abs(x)), with x in m": {"formula": "exp(-abs(x))"},
+        "1 at 0.2 m, 0 at 0.5 m": {"falling": [0.2, 0.5]},
+    }
+    for words, term in says.items():
+        assert curved(term)[0].reasons[0].words(0.2) == f"clearance: {words}"

@@ -108,6 +108,23 @@ def test_the_fused_loop_flies_four_criteria_as_the_master_does():
     assert_same_to_the_last_bit(load_scenario(FOUR, ["time.duration=14.0", *NOISY]))
 
 
+def test_the_fused_loop_flies_curves_as_the_master_does():
+    changes = [
+        "criteria.obstacle.membership={ramp=0.3,approach_time={sigmoid=[2.0,-3.0]}}",
+        "criteria.shape.membership={clearance={gaussian=[0.0,0.3]}}",
+        "criteria.depth.membership={clearance={z_shape=[0.0,0.5]}}",
+        "criteria.visibility.membership={clearance={formula='1 / (1 + exp(20 * (x + 0.15)))'}}",
+    ]
+    run = assert_same_to_the_last_bit(load_scenario(FOUR, ["time.duration=14.0", *NOISY, *changes]))
+    clean = Rows(load_scenario(FOUR, ["time.duration=4.0", *changes]))
+    every = slice(0, None, 38)  # rows at which the arbiter decides
+    riser = np.hypot(clean["position.x"] - 7.4, clean["position.y"] - 2.2) - 1.0
+    np.testing.assert_allclose(clean["membership.shape"][every], np.exp(-(riser**2) / 0.18)[every], atol=1e-4)
+    seen = 1.0 / (1.0 + np.exp(20.0 * (clean["view.clearance"] + 0.15)))
+    np.testing.assert_allclose(clean["membership.visibility"][every], seen[every], atol=1e-3)
+    assert np.ptp(run["membership.obstacle"]) > 0.5
+
+
 def test_the_fused_loop_flies_rules_of_a_file_as_the_master_does(own):
     changes = ["initial.position=[6.5, 0.0, 4.2]", "time.duration=6.0", "arbiter.inputs.charge=[[1, 1], [4, 0.1]]"]
     assert_same_to_the_last_bit(load_scenario(own, changes))

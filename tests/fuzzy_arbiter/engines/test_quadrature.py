@@ -228,3 +228,10 @@ def test_the_arbiter_says_how_each_output_is_evaluated():
     straight = system(Output("y", (0, 10), TERMS[3:]))
     assert Arbiter(system=straight).engine_reason.startswith("there is no closed form: ")
     assert "quadrature" not in Arbiter(system=straight).engine_reason
+
+
+@pytest.mark.parametrize("cut", [1.0, 1e-3, 1e-20])
+def test_where_rules_hardly_fire_the_greatest_places_are_still_the_peaks(cut):
+    terms = (Term("a", triangle(0, 1, 2)), Term("b", triangle(1, 2, 3)))
+    made = system(Output("y", (0, 10), terms, None, "mom"), "prod")
+    assert ExactEngine(made).centroids([cut, cut])[0] == pytest.approx(1.5, abs=1e-9)

@@ -171,6 +171,9 @@ def test_matlabs_functions():
     ("rule", "head", "said"),
     [
         ("1.20 -1.05, 1 (1) : 2", "", ["if x is very a or z is not somewhat on then y is mf1"]),
+        ("1.3 0, 1 (1) : 1", "", ["if x is cubed a then y is mf1"]),
+        ("1 0, 1.2 (1) : 1", "", ["if x is somewhat a then y is mf1"]),  # values: Octave takes the inverse power
+        ("1 1, 2.3 (1) : 1", "", ["if cube_root (x is a and z is on) then y is mf2"]),
         ("1.4 0, 1 (0.5) : 1", "", ["if x is very very a then y is mf1 with 0.5"]),
         ("1.3 0.99, 2 (1) : 1", "# generated with fuzzylite\n", ["if x is extremely a and z is any then y is mf2"]),
         ("1.01 1, 1.2 (1) : 1", "# generated with fuzzylite\n", ["if very (x is seldom a and z is on) then y is mf1"]),
@@ -184,10 +187,14 @@ def test_hedges_are_fractions(rule, head, said):
     ("options", "fault"),
     [
         (
-            {"rule": "1.3 1, 1 (1) : 1"},
-            "line 32: .*1.3 for 'x', expected a whole number from -6 to 6, or .05, .2 or .4",
+            {"rule": "1.25 1, 1 (1) : 1"},
+            "line 32: .*1.25 for 'x', expected a whole number from -6 to 6, or .05, .2, .3 or .4",
         ),
-        ({"rule": "1 1, 1.2 (1) : 1"}, "line 32: .*a hedge in the conclusion on 'y', which only fuzzylite's files may"),
+        (
+            {"rule": "1 1, 1.2 (1) : 1", "type": "mamdani", "method": "mom", "function": "trimf',[0 1 2]"},
+            "line 32: .*a hedge in the conclusion on 'y', expected none on a set",
+        ),
+        ({"rule": "1 1, -1 (1) : 1"}, "concludes that 'y' is not in a term, expected a set"),
         (
             {"rule": "1 1, 1.2 (0.5) : 1", "head": "# generated with fuzzylite\n"},
             "a hedge in a conclusion and a weight",
@@ -202,6 +209,57 @@ def test_hedges_are_fractions(rule, head, said):
 def test_what_fis_cannot_mean_is_refused(options, fault):
     with pytest.raises((FormatError, DefinitionError), match=fault):
         fis(**options)
+
+
+@pytest.mark.parametrize(
+    ("function", "at", "degree"),
+    [
+        ("trimf',[0 0.5 1]", 0.25, 0.5),
+        ("trapmf',[0 0 0.5 1]", 0.0, 0.0),
+        ("gaussmf',[0.2 1]", 0.8, 1.0 - math.exp(-0.5)),
+    ],
+)
+def test_what_is_concluded_not_to_be_is_a_complement(function, at, degree):
+    system = fis("1 1, -2 (1) : 1", type="mamdani", method="centroid", function=function)
+    output = system.outputs[0]
+    assert (str(system.rules[0]), output.term_names) == (
+        *("if x is a and z is on then y is not_mf2",), ("mf1", "mf2", "not_mf2"),
+    )  # fmt: skip
+    assert output.terms[2].shape(at) == pytest.approx(degree)
+
+
+def test_a_complement_of_a_curve_in_pieces_is_refused():
+    with pytest.raises(DefinitionError, match=r"line 32: .*the complement of this function is not known"):
+        fis("1 1, -1 (1) : 1", type="mamdani", method="centroid", function="smf',[0 1]")
+
+
+def test_octave_joins_strengths_by_its_aggregation_and_matlab_adds_them():
+    text = FIS.replace("[System]", "[System]\nAggMethod='max'")
+    both = text.format(rule="1 1, 1 (1) : 1", type="sugeno", method="wtaver", function="constant',[1]")
+    assert reads(both, "fis").outputs[0].aggregation == "sum"
+    assert reads("## This file is part of the fuzzy-logic-toolkit.\n" + both, "fis").outputs[0].aggregation == "max"
+    assert fis(type="mamdani", method="centroid_integral", function="trimf',[0 0.5 1]").outputs[0].defuzzifier == (
+        "centroid"
+    )
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        ("Enabled=1\nDefault=nan\nLockPrevious=1\nLockRange=0", (None, False, True)),
+        ("Default=0.500\nLockRange=1", (0.5, True, False)),
+    ],
+)
+def test_fuzzylite_5_adds_keys_to_outputs(keys, expected):
+    text = FIS.replace("[Output1]", f"[Output1]\n{keys}").format(
+        rule="1.300 0.990, 1 (1) : 1", type="sugeno", method="wtaver", function="linear',[1 2 3]"
+    )
+    system = reads(text, "fis")
+    output = system.outputs[0]
+    assert (output.default, output.lock_range, output.lock_previous) == expected
+    assert str(system.rules[0]) == "if x is extremely a and z is any then y is mf1"  # as fuzzylite has hedges
+    with pytest.raises(FormatError, match=r"line \d+: Enabled is 0 for 'z', expected 1"):
+        reads(text.replace("[Input2]", "[Input2]\nEnabled=0"), "fis")
 
 
 def test_hybrid_files_have_sets_and_values():

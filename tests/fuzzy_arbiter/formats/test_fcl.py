@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import Output, Shape, Term, Variable, falling, prioritised, rising, triangle
+from fuzzy_arbiter import Arbiter, Output, Shape, Term, Variable, falling, prioritised, rising, triangle
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.rule import Operators
@@ -165,7 +165,7 @@ def test_numbers_are_those_of_the_standard():
         ("Gravity *)", "Gravity", r"line 23: the comment that begins here with '\(\*' has no end"),
         ("ACT : MIN;", "ACT = MIN;", r"line 28: '=' is no sign of FCL"),
         ("END_FUNCTION_BLOCK\n", "", r"line 34: the end of the file came after 'END_RULEBLOCK', expected VAR_INPUT"),
-        ("END_FUNCTION_BLOCK\n", "END_FUNCTION_BLOCK FUNCTION_BLOCK", r"one function block makes a system"),
+        ("END_FUNCTION_BLOCK\n", "END_FUNCTION_BLOCK FUNCTION_BLOCK", r"line 34: another FUNCTION_BLOCK came"),
         ("TRIAN 0 5 10;", "TRIAN 40 45 50; RANGE := (0 .. 30);", r"line 19: .*term 'cheap' has no area"),
     ],
 )  # fmt: skip
@@ -215,3 +215,50 @@ def test_jumps_are_points_of_one_place():
     )
     system = replace(TIPPING, inputs=(box, TIPPING.inputs[1]), rules=TIPPING.rules[:2])
     assert reads(writes(system, "fcl"), "fcl") == system
+
+
+BLOCKS = """FUNCTION_BLOCK first
+VAR_INPUT x : REAL; RANGE := (0 .. 1); END_VAR
+VAR_OUTPUT y : REAL; END_VAR
+FUZZIFY x TERM on := (0, 0) (1, 1); END_FUZZIFY
+DEFUZZIFY y TERM low := 1; TERM small := 1; TERM high := 3; METHOD : COGS; END_DEFUZZIFY
+RULEBLOCK one
+  RULE 1 : IF x IS on THEN y IS low;
+  RULE 2 : IF x IS on THEN y IS small;
+  RULE 3 : IF x IS on THEN y IS high;
+END_RULEBLOCK
+END_FUNCTION_BLOCK
+"""
+
+
+def test_one_of_several_blocks_is_chosen_by_name(tmp_path):
+    text = BLOCKS + BLOCKS.replace("first", "second of two").replace("high := 3", "high := 5")
+    assert reads(text, "fcl", "first") == reads(BLOCKS, "fcl")
+    assert reads(text, "fcl", "second of two").name == "second of two"
+    with pytest.raises(
+        FormatError, match="line 12: another FUNCTION_BLOCK came, expected block=, one of first, second of"
+    ):
+        reads(text, "fcl")
+    with pytest.raises(FormatError, match="line 1: block is 'third', expected one of first, second of two, each once"):
+        reads(text, "fcl", "third")
+    with pytest.raises(FormatError, match="block is 'first', expected one of first, first, each once"):
+        reads(BLOCKS + BLOCKS, "fcl", "first")
+    with pytest.raises(FormatError, match="expected none: there is no FUNCTION_BLOCK"):
+        reads("VAR_INPUT", "fcl", "first")
+    with pytest.raises(FormatError, match="block is 'first', expected none for json: only FCL has function blocks"):
+        reads("{}", "json", "first")
+    path = tmp_path / "two.fcl"
+    path.write_text(text)
+    assert Arbiter.load(path, block="second of two")([1.0]) == pytest.approx((3.0,))
+
+
+def test_strengths_are_joined_by_value_as_jfuzzylogic_joins_them():
+    assert Arbiter(system=reads(BLOCKS, "fcl"))([1.0]) == pytest.approx(((1.0 + 3.0) / 2.0,))  # not (1 + 1 + 3) / 3
+    ours = BLOCKS.replace("TERM on := (0, 0) (1, 1)", "TERM on := Ramp 0.0 1.0")  # a word of fuzzylite, which adds them
+    assert Arbiter(system=reads(ours, "fcl"))([1.0]) == pytest.approx(((1.0 + 1.0 + 3.0) / 3.0,))
+
+
+def test_terms_of_one_name_are_refused_for_libraries_differ_in_which_they_mean():
+    for head in ("", "(* generated with fuzzylite *)"):
+        with pytest.raises(DefinitionError, match="two terms are named 'low', expected each name once"):
+            reads(head + BLOCKS.replace("small", "low"), "fcl")

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import Output, Rule, Shape, Term, Variable, falling, prioritised, rising, trapezoid, triangle
+from fuzzy_arbiter import Output, Rule, Shape, System, Term, Variable, falling, prioritised, rising, trapezoid, triangle
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
+from fuzzy_arbiter.terms.curves import curve
 from tests.fuzzy_arbiter.formats.systems import TIPPING
 
 OTHERS = """% a tip for the waiter
@@ -146,7 +147,6 @@ def test_all_shapes_of_0_and_1_come_back(shape):
         ("[Input2]", "[Input]", r"line 25: section '\[Input\]', expected"),
         ("[Input2]", "[Inputs]", r"line 25: '\[Inputs\]', expected a section"),
         ("[Rules]\n", "", r"line 39: '1 1, 1 \(1\) : 2', expected a key, = and its value"),
-        ("1 1, 1 (1) : 2", "1 1, -1 (1) : 2", "line 40: '1 1, -1 .* concludes that 'tip' is not in a term"),
         ("1 1, 1 (1) : 2", "1 1, 0 (1) : 2", "line 40: '1 1, 0 .* has no conclusion"),
         ("1 1, 1 (1) : 2", "0 0, 1 (1) : 2", "line 40: '0 0, 1 .* has no condition"),
         ("1 1, 1 (1) : 2", "4 1, 1 (1) : 2", "line 40: .*: 4 for 'service', expected a whole number from -3 to 3"),
@@ -208,3 +208,15 @@ def test_conclusions_stand_in_the_order_of_the_outputs():
         UnsupportedError, match=r"fis cannot say the conclusions of R1 .*: expected each output in the order"
     ):
         writes(replace(system, rules=(rule,)), "fis")
+
+
+def test_ramps_of_tsukamotos_method_are_fuzzylites():
+    terms = {"up": rising(0.0, 0.25), "down": falling(0.4, 0.6), "s": curve("s_shape", 0.0, 1.0)}
+    x, y = Variable("x", (0, 1), {"on": rising(0, 1)}), Output("y", (0, 1), terms, None, "average", "sum")
+    system = System((x,), (y,), tuple(f"if x is on then y is {name}" for name in terms))
+    text = writes(system, "fis")
+    assert reads(text, "fis") == system
+    assert "Type='tsukamoto'" in text and "'rampmf',[0 0.25]" in text and "'rampmf',[0.6 0.4]" in text
+    low = replace(y, terms=(Term("up", Shape(((0.0, 0.0), (1.0, 0.7)))),))
+    with pytest.raises(UnsupportedError, match="fis cannot say the term 'up' of 'y'"):
+        writes(System((x,), (low,), ("if x is on then y is up",)), "fis")

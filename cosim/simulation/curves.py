@@ -1,0 +1,181 @@
+"""Membership functions that are not straight, as programs of a stack machine: for master and fused loop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.stack_array import zeros
+from cosim.scenario.membership_terms import FUNCTIONS, pieces_of
+from cosim.simulation.signals import Array
+from fuzzy_arbiter.shapes import Membership
+from fuzzy_arbiter.terms.parser import Node
+
+_WORDS = ("number", "x", *FUNCTIONS)
+_NUMBER, _X, _ADD, _SUBTRACT, _MULTIPLY, _DIVIDE, _POWER, _POW, _NEGATE, _ABS, _SQRT, _EXP, _LOG = range(13)
+_COS, _SIN, _TAN, _MIN, _MAX, _LT, _LE, _GT, _GE, _EQ, _NEQ = range(13, len(_WORDS))
+_LARGEST = 709.78  # what exp has a finite value of
+
+
+class PackedCurves(NamedTuple):
+    """The curves of r terms, in pieces; a term that is none has no pieces."""
+
+    offsets: NDArray[np.int64]  # (r + 1,) into the pieces
+    ends: Array  # m, rad or s: where each piece ends, the last of a term at infinity
+    starts: NDArray[np.int64]  # (pieces + 1,) into the programs
+    words: NDArray[np.int64]  # in the order of `_WORDS`
+    numbers: Array  # of each word that is a number
+
+
+def pack_curves(terms: Sequence[Membership | None]) -> PackedCurves:
+    """Turn curves and formulas into programs.
+
+    Parameters
+    ----------
+    terms : sequence of Membership or None
+        Of which only these have pieces; None is a ramp.
+
+    Returns
+    -------
+    PackedCurves
+        In their order.
+    """
+    pieces = [pieces_of(term) if term else [] for term in terms]
+    programs = [_program(tree) for of in pieces for _, tree in of]
+    return PackedCurves(
+        offsets=np.cumsum([0, *map(len, pieces)], dtype=np.int64),
+        ends=np.array([end for of in pieces for end, _ in of], float),
+        starts=np.cumsum([0, *map(len, programs)], dtype=np.int64),
+        words=np.array([word for program in programs for word, _ in program], np.int64),
+        numbers=np.array([number for program in programs for _, number in program], float),
+    )
+
+
+def _program(tree: Node) -> list[tuple[int, float]]:
+    """Return a tree's words, arguments before their function."""
+    if isinstance(tree, float):
+        return [(_NUMBER, tree)]
+    if isinstance(tree, str):
+        return [(_X, 0.0)]
+    return [*(word for part in tree[1:] for word in _program(part)), (_WORDS.index(tree[0]), 0.0)]
+
+
+def curve_degree(packed: PackedCurves, k: int, x: float) -> float:
+    """Return the degree of a term at a place, as `fuzzy_arbiter` does: of a jump the greater one, within [0, 1].
+
+    Parameters
+    ----------
+    packed : PackedCurves
+        Of the terms.
+    k : int
+        Which, one that has pieces.
+    x : float
+        Place [m, rad or s].
+
+    Returns
+    -------
+    float
+        NaN where there is none.
+    """
+    piece, last = packed.offsets[k], packed.offsets[k + 1] - 1
+    while piece < last and x > packed.ends[piece]:
+        piece += 1
+    degree: float = _value(packed, piece, x)
+    if piece < last and x == packed.ends[piece]:
+        degree = max(degree, _value(packed, piece + 1, x))
+    if x != x:
+        degree = x
+    elif degree < 0.0:
+        degree = 0.0
+    elif degree > 1.0:
+        degree = 1.0
+    return degree
+
+
+def _value(packed: PackedCurves, piece: int, x: float) -> float:
+    stack, n = zeros(32), 0  # `MAX_WAITING`
+    for at in range(packed.starts[piece], packed.starts[piece + 1]):
+        word = packed.words[at]
+        if word in (_NUMBER, _X):
+            stack[n] = packed.numbers[at] if word == _NUMBER else x
+            n += 1
+        elif _NEGATE <= word <= _TAN:
+            stack[n - 1] = _of_one(word, stack[n - 1])
+        else:
+            n -= 1
+            stack[n - 1] = _of_two(word, stack[n - 1], stack[n])
+    value: float = stack[0]
+    return value
+
+
+def _of_one(word: int, a: float) -> float:
+    """Return a function of one number, as IEEE 754 has it, where Python raises."""
+    value: float = math.nan
+    if word == _NEGATE:
+        value = -a
+    elif word == _ABS:
+        value = abs(a)
+    elif word == _SQRT:
+        value = math.sqrt(a) if a >= 0.0 else math.nan
+    elif word == _EXP:
+        value = math.exp(a) if not a >= _LARGEST else math.inf
+    elif word == _LOG:
+        value = math.log(a) if a > 0.0 else -math.inf if a == 0.0 else math.nan
+    elif abs(a) < math.inf:
+        value = math.cos(a) if word == _COS else math.sin(a) if word == _SIN else math.tan(a)
+    return value
+
+
+def _of_two(word: int, a: float, b: float) -> float:
+    """Return a function of two numbers, likewise."""
+    value: float = 0.0
+    if word == _ADD:
+        value = a + b
+    elif word == _SUBTRACT:
+        value = a - b
+    elif word == _MULTIPLY:
+        value = a * b
+    elif word == _DIVIDE:
+        value = _quotient(a, b)
+    elif word in (_POWER, _POW):
+        value = _power(a, b)
+    elif word == _MIN:
+        value = min(a, b)
+    elif word == _MAX:
+        value = max(a, b)
+    elif (
+        (word == _LT and a < b)
+        or (word == _LE and a <= b)
+        or (word == _GT and a > b)
+        or (word == _GE and a >= b)
+        or (word == _EQ and a == b)
+        or (word == _NEQ and a != b)
+    ):
+        value = 1.0
+    return value
+
+
+def _quotient(a: float, b: float) -> float:
+    value: float = math.nan
+    if b != 0.0:
+        value = a / b
+    elif a != 0.0 and a == a:
+        value = math.copysign(math.inf, a) * math.copysign(1.0, b)
+    return value
+
+
+def _power(a: float, b: float) -> float:
+    size, value = abs(a), math.nan
+    whole = abs(b) >= 9e15 or int(b) == b if abs(b) < math.inf else True
+    if a == 0.0 and b < 0.0:
+        value = math.inf
+    elif 0.0 < size < math.inf and b * math.log(size) > _LARGEST and (a > 0.0 or whole):
+        odd = a < 0.0 and abs(b) < 9e15 and int(b) % 2 != 0
+        value = -math.inf if odd else math.inf
+    elif a >= 0.0 or whole or a != a:
+        value = a**b
+    return value
