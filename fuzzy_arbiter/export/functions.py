@@ -59,7 +59,7 @@ _C_HEDGES = {
     "extremely": "a <= 0.5 ? 2.0 * a * a : 1.0 - 2.0 * (1.0 - a) * (1.0 - a)",
     "seldom": "a <= 0.5 ? sqrt(0.5 * a) : 1.0 - sqrt(0.5 * (1.0 - a))",
     "cubed": "a * a * a",
-    "cube_root": "cbrt(a)",
+    "cube_root": "pow(a, 1.0 / 3.0)",
 }
 # of C's math.h
 _C_MATH = frozenset((*_PYTHON_OF_ONE, "fmod"))

@@ -233,7 +233,7 @@ def cubed(a: float) -> float:
 
 def cube_root(a: float) -> float:
     """Return the cube root."""
-    return math.cbrt(a)
+    return math.pow(a, 1.0 / 3.0)
 
 
 HEDGES: dict[str, HedgeKind] = {
@@ -242,6 +242,6 @@ HEDGES: dict[str, HedgeKind] = {
     "extremely": HedgeKind(extremely, lambda a: np.where(a <= 0.5, 2.0 * a * a, 1.0 - 2.0 * (1.0 - a) * (1.0 - a))),
     "seldom": HedgeKind(seldom, lambda a: np.where(a <= 0.5, np.sqrt(0.5 * a), 1.0 - np.sqrt(0.5 * (1.0 - a)))),
     "cubed": HedgeKind(cubed, lambda a: a * a * a, fll=False),  # Octave's *extremely*
-    "cube_root": HedgeKind(cube_root, np.cbrt, fll=False),
+    "cube_root": HedgeKind(cube_root, lambda a: a ** (1.0 / 3.0), fll=False),
 }
 """Hedges by their word; *not* and *any* are propositions of their own."""
