@@ -30,14 +30,18 @@ _RESTING, _PUSHED = 0.02, 0.05  # m/s, m/s2, sums over the axes: below and above
 
 
 def smooth_weights(weights: Array, smoothed: Array, hard: NDArray[np.bool_], shares: tuple[float, float]) -> None:
-    """Move smoothed weights towards the arbiter's, by a share for soft regions and one for hard ones.
+    """Move smoothed weights, shape (2, n), towards the arbiter's, by a share for soft regions and one for hard ones.
 
-    The first are taken as they are. Each of the arbiter's is clipped to [0, 1]; NaN becomes 1, the cautious value.
+    The first stage follows the arbiter, the second one the first: so noise makes small steps of small steps. The first
+    weights are taken as they are. Each of the arbiter's is clipped to [0, 1]; NaN becomes 1, the cautious value.
     """
     for i in range(weights.size):
         weight = 1.0 if np.isnan(weights[i]) else min(max(weights[i], 0.0), 1.0)
         share = shares[1] if hard[i] else shares[0]
-        smoothed[i] = weight if np.isnan(smoothed[i]) else smoothed[i] + share * (weight - smoothed[i])
+        if np.isnan(smoothed[0, i]):
+            smoothed[0, i] = smoothed[1, i] = weight
+        smoothed[0, i] += share * (weight - smoothed[0, i])
+        smoothed[1, i] += share * (smoothed[0, i] - smoothed[1, i])
 
 
 def reports_change(reported: Array, before: Array, health: Array) -> bool:

@@ -134,7 +134,7 @@ def step(
             acceleration[axis] - free[axis] - memory.filtered_acceleration[axis]
         )
     _force_of(dynamics, R, memory.filtered_acceleration, wrench)
-    _soft_forces(memory.observation, regions, memory.weights, desired, R, dynamics, wrench)
+    _soft_forces(memory.observation, regions, memory.weights[1], desired, R, dynamics, wrench)
     attitude_loop.update_desired(memory.attitude, regions, ahead.position, gains, period)
     attitude_loop.compute_moment(
         memory.attitude, dynamics, ahead.quaternion, ahead.velocity[3:], against, gains, wrench[3:]
@@ -167,7 +167,7 @@ def step(
     memory.observation.bound[0] = NO_BOUND
     if gains.barriers > 0.0:
         rows = write_rows(
-            work, memory.observation, regions, memory.weights, motion, thrusters.lower, thrusters.upper, gains
+            work, memory.observation, regions, memory.weights[1], motion, thrusters.lower, thrusters.upper, gains
         )
 
     # quadratic program
@@ -317,7 +317,7 @@ class DeployableLaw(CompiledLaw):
             deviation=np.zeros(12),
             position_variance=np.zeros(3),
             promised=np.full(2, np.nan),
-            weights=np.full(n_regions, np.nan),
+            weights=np.full((2, n_regions), np.nan),
             reported=np.ones(m),
             filtered_acceleration=np.zeros(3),
             thruster_acceleration=np.zeros((6, m)),
