@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
+from scipy.stats import t
 
 from cosim.campaigns.falsification.search import Evaluate
 
@@ -16,8 +17,9 @@ _KEPT = 0.5  # share of the particles that are beyond the next level
 _MOVES = 2  # that every copied particle is tried to make
 _CHANGED = 0.5  # share of the coordinates that a move changes
 _ACCEPTED = 0.3  # share of the moves that the step is adapted to
+_GAIN = 2.0  # of that adaptation
 _SHORTEST = 0.02  # step
-_QUANTILE = 1.96  # of the interval, 95 %
+_TAIL = 0.025  # of the interval, on each side
 LEAST_BUDGET = 100  # points
 
 
@@ -29,6 +31,7 @@ class Estimate:
     low: float  # of the 95 % interval; 0 where no point was in the event
     high: float
     levels: tuple[tuple[float, float], ...]  # cost, and how likely it is not to be greater
+    families: int  # first particles that the last ones descend from: of few, little can be said
 
 
 def estimate_probability(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> Estimate:
@@ -40,8 +43,8 @@ def estimate_probability(evaluate: Evaluate, dimension: int, budget: int, seed: 
     preconditioned Crank-Nicolson steps in normal numbers, so points stay distributed as they were drawn. A cost may be
     random: it is then drawn anew with each move.
 
-    The interval is that of a normal distribution of the logarithm. Its variance sums those of the shares, each between
-    the families of first particles: copies of one are not independent.
+    The interval is that of the logarithm, by Student's distribution. Its variance sums those of the shares, each
+    between the families of first particles: copies of one are not independent.
 
     Parameters
     ----------
@@ -57,23 +60,25 @@ def estimate_probability(evaluate: Evaluate, dimension: int, budget: int, seed: 
     Returns
     -------
     Estimate
-        Where the budget ends before a cost is below 0, its upper bound alone says something.
+        Where no cost comes below 0, its upper bound alone says something: the least one of all levels.
     """
     rng = np.random.default_rng(seed)
     n = max(LEAST_BUDGET // 5, budget // _PARTICLES)
     z = rng.standard_normal((n, dimension))
     costs, families = evaluate(ndtr(z)), np.arange(n)
-    left, step, reached, variance = budget - n, 0.5, 1.0, 0.0
+    left, step, reached, variance, bound = budget - n, 0.5, 1.0, 0.0, 1.0
     levels: list[tuple[float, float]] = []
     while True:
         level = float(np.sort(costs)[int(_KEPT * n) - 1])
         inside = costs <= level
         copied = np.flatnonzero(~inside)
+        several = len(np.unique(families))
         if level < 0.0 or not len(copied) or left < _MOVES * len(copied):
-            return _conclude(costs < 0.0, families, reached, variance, levels)
+            break
         variance += _relative_variance(inside, families)
         reached *= float(inside.mean())
         levels.append((level, reached))
+        bound = min(bound, reached * _factor(variance, several))
         parents = np.arange(n)
         parents[copied] = rng.choice(np.flatnonzero(inside), len(copied))
         z, costs, families = z[parents], costs[parents], families[parents]
@@ -84,24 +89,21 @@ def estimate_probability(evaluate: Evaluate, dimension: int, budget: int, seed: 
             left -= len(copied)
             accepted = new <= level
             z[copied[accepted]], costs[copied[accepted]] = moved[accepted], new[accepted]
-            step = float(np.clip(step * math.exp(accepted.mean() - _ACCEPTED), _SHORTEST, 1.0))
-
-
-def _conclude(
-    event: NDArray[np.bool_],
-    families: NDArray[np.int64],
-    reached: float,
-    variance: float,
-    levels: list[tuple[float, float]],
-) -> Estimate:
+            step = float(np.clip(step * math.exp(_GAIN * (accepted.mean() - _ACCEPTED)), _SHORTEST, 1.0))
+    event = costs < 0.0
     if not event.any():
-        most = 1.0 - 0.025 ** (1.0 / len(event))  # Clopper and Pearson, none of n
-        high = min(1.0, reached * math.exp(_QUANTILE * math.sqrt(variance)) * most)
-        return Estimate(0.0, 0.0, high, tuple(levels))
+        none = 1.0 - _TAIL ** (1.0 / several)  # Clopper and Pearson, none of so many families
+        bound = min(bound, reached * _factor(variance, several) * none)
+        return Estimate(0.0, 0.0, bound, tuple(levels), several)
     probability = reached * float(event.mean())
-    half = _QUANTILE * math.sqrt(variance + _relative_variance(event, families))
+    factor = _factor(variance + _relative_variance(event, families), several)
     levels.append((0.0, probability))
-    return Estimate(probability, probability * math.exp(-half), min(1.0, probability * math.exp(half)), tuple(levels))
+    return Estimate(probability, probability / factor, min(1.0, probability * factor), tuple(levels), several)
+
+
+def _factor(variance: float, several: int) -> float:
+    """Return by which factor a probability may be off, from so many families."""
+    return math.exp(float(t.ppf(1.0 - _TAIL, several - 1)) * math.sqrt(variance)) if several > 1 else math.inf
 
 
 def _relative_variance(inside: NDArray[np.bool_], families: NDArray[np.int64]) -> float:

@@ -123,7 +123,8 @@ def _page(s: dict[str, Any], figures: Mapping[str, Html], shown: Mapping[int, Re
     if rare:
         page.paragraph(
             "Adaptive multilevel splitting replaces the half of the flights with more clearance by variations of the "
-            "other half, again and again. The interval takes variations of the same first flight for dependent.",
+            "other half, again and again. The interval takes variations of the same first flight for dependent: the "
+            f"last ones come from {rare['families']} of the first.",
             faint=True,
         )
         page.table(
