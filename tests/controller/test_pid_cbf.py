@@ -92,7 +92,7 @@ def test_it_passes_obstacles_in_noise_and_reaches_the_goal():
 
 
 def test_attitude_is_kept_against_a_righting_moment():
-    law, sea = law_of(), Sea(current=(0.0, 0.0, 0.0), restoring=0.0)
+    law, sea = law_of(observer=3.0), Sea(current=(0.0, 0.0, 0.0), restoring=0.0)
     sea.quaternion = np.array([math.cos(0.2), math.sin(0.2), 0.0, 0.0])
     list(fly(law, sea, 45.0))
     assert sea.quaternion == pytest.approx(LEVEL, abs=1e-3)
