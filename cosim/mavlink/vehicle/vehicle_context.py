@@ -26,6 +26,7 @@ from cosim.simulation.commands.commands import Arm, Command, MissionItem, Mode, 
 from cosim.simulation.commands.settings import LiveSettings
 from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.signals import Array, Column
+from plant_fmu.autopilot import Autopilot, pulse_of_effort
 
 COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1: ground stations listen to no other
 
@@ -120,6 +121,10 @@ class VehicleContext:
         self.unix_start_us = time.time_ns() // 1000  # when simulated time was 0
         vehicle = scenario.vehicle
         self._limits = tuple(zip((-vehicle.thrust_min).tolist(), vehicle.thrust_max.tolist(), strict=True))
+        table = vehicle.autopilot if options.profile != "px4" else None
+        table = table or Autopilot("", tuple(range(1, vehicle.n_thrusters + 1)), curve="linear")
+        signs = table.signs if isinstance(table.signs, tuple) else (table.signs,) * vehicle.n_thrusters
+        self._outputs, self._curves = table.channels, [pulse_of_effort(table, sign) for sign in signs]
         self._commands = commands if options.commands and live and scenario.commands.enabled else None
         self._said: dict[str, float] = {}
         self._said_lately: deque[float] = deque(maxlen=_TEXTS)
@@ -182,8 +187,24 @@ class VehicleContext:
 
     def thrust_parts(self) -> list[float]:
         """Return what each thruster gives, as a part of the vehicle's limit on that side, from -1 to 1."""
+        return self._parts(self.view.thruster_forces)
+
+    def servo_pulses(self) -> list[float]:
+        """Return what each servo output says [us], by the vehicle's table ``autopilot``; 0 for an output of none.
+
+        Without that table, and as PX4, a thruster's output has its number, and pulses go straight with the force.
+        """
+        pulses = [0.0] * max(self._outputs, default=0)
+        for part, output, pulse in zip(
+            self._parts(self.view.thruster_commands), self._outputs, self._curves, strict=True
+        ):
+            if output:
+                pulses[output - 1] = pulse(part)
+        return pulses
+
+    def _parts(self, forces: Sequence[float]) -> list[float]:
         parts = []
-        for force, (backwards, forwards) in zip(self.view.thruster_forces, self._limits, strict=True):
+        for force, (backwards, forwards) in zip(forces, self._limits, strict=True):
             limit = forwards if force > 0.0 else backwards
             parts.append(max(-1.0, min(1.0, force / limit)) if limit > 0.0 else 0.0)
         return parts
