@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +15,7 @@ from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.vehicle.proximity import Proximity
 from cosim.mavlink.vehicle.view import View
+from cosim.mavlink.vehicle.voice import Voice
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.encode import Encoder
 from cosim.mavlink.wire.message_sink import MessageSink
@@ -30,10 +30,6 @@ from plant_fmu.autopilot import Autopilot, pulse_of_effort
 
 COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1: ground stations listen to no other
 
-_CHUNK = 50  # characters of a STATUSTEXT
-_LONGEST_TEXT = 200  # characters
-_TEXTS = 12  # in each _TEXTS_PERIOD at the most
-_TEXTS_PERIOD = 1.0  # s
 _WISH_LASTS = 0.5  # s, that a command may take until a snapshot shows it
 
 
@@ -84,6 +80,8 @@ class VehicleContext:
         Where on the globe position 0 is.
     home : tuple of float
         North and east of home [m], which is at the surface.
+    voice : Voice
+        Says texts; `say`, `reject` and `text` are its own.
     now : float
         The wall clock, as it was told last [s].
     failsafe : bool
@@ -126,9 +124,8 @@ class VehicleContext:
         signs = table.signs if isinstance(table.signs, tuple) else (table.signs,) * vehicle.n_thrusters
         self._outputs, self._curves = table.channels, [pulse_of_effort(table, sign) for sign in signs]
         self._commands = commands if options.commands and live and scenario.commands.enabled else None
-        self._said: dict[str, float] = {}
-        self._said_lately: deque[float] = deque(maxlen=_TEXTS)
-        self._text_id = 0
+        self.voice = Voice(self.mavlink, self.make, self.links, lambda: self.now)
+        self.say, self.reject, self.text = self.voice.say, self.voice.reject, self.voice.text
         self.restart()
 
     def restart(self) -> None:
@@ -253,49 +250,7 @@ class VehicleContext:
         self._wished = None if mode == self.mode else (self.now, mode)
         self._mode_before = mode
 
-    # ---- the voice ----
-
     def send(self, message: Any) -> None:
         """Send a message on every link."""
         for link in self.links:
             link.send(message)
-
-    def say(self, text: str, severity: int | None = None, key: str = "", every: float = 0.0) -> None:
-        """Send a text on every link, as STATUSTEXT, in parts if it is long.
-
-        Parameters
-        ----------
-        text : str
-            One line.
-        severity : int, optional
-            MAV_SEVERITY; default: information.
-        key : str
-            Texts of the same key are throttled together.
-        every : float
-            Seconds of the wall clock between two of a key.
-        """
-        if every and self.now - self._said.get(key, -every) < every:
-            return
-        if len(self._said_lately) == _TEXTS and self.now - self._said_lately[0] < _TEXTS_PERIOD:
-            return
-        self._said_lately.append(self.now)
-        if every:
-            self._said[key] = self.now
-        for message in self.text(text, severity):
-            self.send(message)
-
-    def reject(self, reason: str, key: str) -> None:
-        """Say why something is refused; not more often than every two seconds for a kind of reason."""
-        self.say(f"Refused: {reason}", self.mavlink.MAV_SEVERITY_WARNING, f"deny {key}", 2.0)
-
-    def text(self, text: str, severity: int | None = None) -> list[Any]:
-        """Return the STATUSTEXT messages of a text."""
-        level = self.mavlink.MAV_SEVERITY_INFO if severity is None else severity
-        text = text[:_LONGEST_TEXT]
-        if len(text) <= _CHUNK:
-            return [self.make("STATUSTEXT", level, text, 0, 0)]
-        self._text_id = self._text_id % 0xFFFF + 1
-        parts = [text[i : i + _CHUNK] for i in range(0, len(text), _CHUNK)]
-        if len(parts[-1]) == _CHUNK:
-            parts.append("")  # a part that is not full is the last one
-        return [self.make("STATUSTEXT", level, part, self._text_id, i) for i, part in enumerate(parts)]

@@ -59,6 +59,7 @@ class Counts:
     forged: int = field(default=0, metadata={"words": "forged"})
     replayed: int = field(default=0, metadata={"words": "replayed"})
     old: int = field(default=0, metadata={"words": "too old"})
+    ahead: int = field(default=0, metadata={"words": "with a timestamp more than a minute ahead"})
     crowded: int = field(default=0, metadata={"words": "of too many signing streams"})
     setup_signing: int = field(default=0, metadata={"words": "that would change the key"})
 
