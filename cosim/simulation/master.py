@@ -334,7 +334,7 @@ class Master:
         """Ask the law, or the sticks, for forces of the coming period, and bring them to the plant's inputs."""
         actuators = self.actuators
         if self.command_handler is not None and not self.command_handler.automatic_control:
-            actuators.command[:] = self.command_handler.wrench
+            actuators.command[:] = self.command_handler.wrench()
             actuators.allocate()
             return
         if self.navigator is not None and not self.navigator.started:  # nothing is known to steer by

@@ -27,7 +27,7 @@ BUDGET = 200_000.0  # bytes/s, of the wall clock, into a network
 _BURST = 0.5  # s of the budget, that can go at once
 _RESERVED = 0.25  # of it, which streams and lists leave to answers
 _ANSWERS = frozenset(  # that go to the link on which they were asked for alone
-    ("AUTOPILOT_VERSION", "AVAILABLE_MODES", "COMMAND_ACK", "FILE_TRANSFER_PROTOCOL", "MESSAGE_INTERVAL",
+    ("AUTOPILOT_VERSION", "AVAILABLE_MODES", "COMMAND_ACK", "FILE_TRANSFER_PROTOCOL", "LOG_DATA", "LOG_ENTRY", "MESSAGE_INTERVAL",
      "MISSION_ACK", "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_REQUEST_INT", "PARAM_ERROR", "PARAM_VALUE", "PING",
      "TIMESYNC")
 )  # fmt: skip
