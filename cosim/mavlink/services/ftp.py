@@ -137,8 +137,7 @@ class FileServer(Service):
             parts.append((offset, _part(content, offset, request.size)))
         last = len(parts)
         return [
-            _packet(request, i, _ACK, data, offset, complete=i == last)
-            for i, (offset, data) in enumerate(parts, 1)
+            _packet(request, i, _ACK, data, offset, complete=i == last) for i, (offset, data) in enumerate(parts, 1)
         ]
 
     # ---- what there is ----

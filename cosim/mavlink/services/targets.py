@@ -32,8 +32,8 @@ _WARNING_PERIOD = 2.0  # s
 class Targets(Service):
     """SET_POSITION_TARGET_*, and the commands that move, turn and pace the vehicle.
 
-    Set-points are followed while the region is to be reached, as ArduSub follows them in GUIDED alone. What comes before
-    that mode, as PX4's stations send it, waits for it. One that says what the last one said makes no command, unless it
+    Set-points are followed while the region is to be reached, as ArduSub follows them in GUIDED alone. One that comes
+    before that mode, as PX4's stations send it, waits for it. One that says what the last one said makes no command, unless it
     is a way from here and none came for a second: QGroundControl's change of depth, made twice. A velocity without a
     position is a sphere about the vehicle that travels; it ends when no set-point comes for three seconds.
 
@@ -81,7 +81,9 @@ class Targets(Service):
             moving, self._drifting, self._last = any(self._drifting), None, ()
             if moving and context.mode_ahead == "reach":
                 context.submit(SetTarget(context.view.position_ned, context.settings["commands.hold_radius"]))
-                context.say(f"No velocity for {_VELOCITY_LASTS:g} s: the vehicle stays", context.mavlink.MAV_SEVERITY_WARNING)
+                context.say(
+                    f"No velocity for {_VELOCITY_LASTS:g} s: the vehicle stays", context.mavlink.MAV_SEVERITY_WARNING
+                )
         if early is not None and context.now - early[0] >= _PATIENCE:
             self._early = None
             now, then = (MODE_NAMES[mode].lower() for mode in (context.mode_ahead, "reach"))
@@ -175,7 +177,9 @@ class Targets(Service):
                 self.warn_of(place)
 
     def _attitude(self, sender: Sender, message: Any) -> None:
-        self.context.reject("attitude set-points: the law keeps the attitude; CONDITION_YAW turns the vehicle", "attitude")
+        self.context.reject(
+            "attitude set-points: the law keeps the attitude; CONDITION_YAW turns the vehicle", "attitude"
+        )
 
     def warn_of(self, place: Vector3, of: str = "target") -> None:
         """Say what stands against a target, which is followed all the same.
@@ -189,7 +193,9 @@ class Targets(Service):
         """
         context = self.context
         for words in self._keep_in.objections(place, context.view, context.settings):
-            context.say(f"Warning: {of} {words}", context.mavlink.MAV_SEVERITY_WARNING, f"{of} {words}", _WARNING_PERIOD)
+            context.say(
+                f"Warning: {of} {words}", context.mavlink.MAV_SEVERITY_WARNING, f"{of} {words}", _WARNING_PERIOD
+            )
 
     def _may(self, sender: Sender) -> bool:
         context = self.context

@@ -21,7 +21,7 @@ _LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 class KeepIn:
     """The regions in space that a vehicle is to stay in.
 
-    Making one loads the library that evaluates them, which may take seconds: not to be done beside a running simulation.
+    Making one loads the library that evaluates them, which may take seconds: not to be done beside a simulation.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class KeepIn:
         packed = pack([dataclasses.replace(r, shape=shapes.get(r.name, r.shape)) for r in self._regions])
         if shifts:
             packed.shifts[:] = shifts
-        values, gradients, turnings, clearances = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
-        packed.evaluate(np.array(position), _LEVEL, values, gradients, turnings, clearances)
+        values, gradients, rotation_gradients, clearances = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
+        packed.evaluate(np.array(position), _LEVEL, values, gradients, rotation_gradients, clearances)
         found: list[float] = clearances.tolist()
         return found

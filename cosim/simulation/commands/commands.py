@@ -41,8 +41,8 @@ class Arm(_Command, frozen=True):
 class SetMode(_Command, frozen=True):
     """Change the mode: who steers, and whither.
 
-    By hand, hold the place, reach the target region, follow the mission, surface, by hand with the attitude kept, or with
-    attitude and depth kept.
+    By hand, hold the place, reach the target region, follow the mission, surface, by hand with the attitude kept, or by
+    hand with attitude and depth kept.
     """
 
     mode: Mode

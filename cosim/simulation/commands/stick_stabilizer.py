@@ -13,7 +13,7 @@ from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
 _CENTERED = 0.02  # part of a stick's way that counts as released
-_GREATEST_LEAN = math.radians(30.0)  # of full roll and pitch sticks
+_GREATEST_TILT = math.radians(30.0)  # of full roll and pitch sticks
 _YAW_RATE, _CLIMB_RATE = math.radians(45.0), 0.3  # rad/s, m/s of full sticks
 _FARTHEST = math.radians(20.0), 0.3  # rad, m: by which heading and depth that are asked for lead the vehicle
 _ATTITUDE, _DEPTH, _INTEGRAL = 2.5, 1.5, 0.3  # rad/s of both loops, 1/s of the depth's integral
@@ -80,11 +80,11 @@ class StickStabilizer:
             rate[2] = turn * _YAW_RATE
             ahead = math.remainder(self._heading + rate[2] * self._period - self._yaw(), math.tau)
             self._heading = self._yaw() + min(max(ahead, -_FARTHEST[0]), _FARTHEST[0])
-        lean = multiply(
-            from_axis_angle(_EAST, float(sticks[4]) * _GREATEST_LEAN),
-            from_axis_angle(_NORTH, float(sticks[3]) * _GREATEST_LEAN),
+        tilt = multiply(
+            from_axis_angle(_EAST, float(sticks[4]) * _GREATEST_TILT),
+            from_axis_angle(_NORTH, float(sticks[3]) * _GREATEST_TILT),
         )
-        angle = 2.0 * error(multiply(from_axis_angle(_DOWN, self._heading), lean), self._state.quaternion)[1:]
+        angle = 2.0 * error(multiply(from_axis_angle(_DOWN, self._heading), tilt), self._state.quaternion)[1:]
         moment: Array = -self._inertia * _ATTITUDE * (_ATTITUDE * angle + 2.0 * (self._state.velocity_body[3:] - rate))
         return moment
 

@@ -43,7 +43,7 @@ class Captured:
     def __init__(self):
         self.frames = []
 
-    def send(self, frame):
+    def send(self, frame, old=None):
         self.frames.append(frame)
         return True
 

@@ -7,6 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from controller.quaternion import from_axis_angle
+from cosim.mavlink.services.speed import terminal_speed
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.simulation.commands.commands import (
     AddObstacle,
@@ -16,7 +17,6 @@ from cosim.simulation.commands.commands import (
     SetMode,
     SetTarget,
 )
-from cosim.mavlink.services.speed import terminal_speed
 from cosim.simulation.environment import shape_center
 from plant_fmu import load_vehicle
 from tests.cosim.mavlink.station import NAN, Station, scenario
