@@ -33,9 +33,9 @@ class Targets(Service):
     """SET_POSITION_TARGET_*, and the commands that move, turn and pace the vehicle.
 
     Set-points are followed while the region is to be reached, as ArduSub follows them in GUIDED alone. One that comes
-    before that mode, as PX4's stations send it, waits for it. One that says what the last one said makes no command, unless it
-    is a way from here and none came for a second: QGroundControl's change of depth, made twice. A velocity without a
-    position is a sphere about the vehicle that travels; it ends when no set-point comes for three seconds.
+    before that mode, as PX4's stations send it, waits for it. One that says what the last one said makes no command,
+    unless it is a way from here and none came for a second: QGroundControl's change of depth, made twice. A velocity
+    without a position is a sphere about the vehicle that travels; it ends when no set-point comes for three seconds.
 
     Parameters
     ----------
