@@ -91,8 +91,8 @@ def decode_mission_item(
 
 def _another_speed(context: VehicleContext, item: ReceivedMissionItem) -> MissionItem:
     m = context.mavlink
-    before = getattr(context.settings.gains, "speed", None)
-    if before is None and item.param2 != -1.0:
+    before = getattr(context.settings.gains, "speed", math.nan)
+    if math.isnan(before) and item.param2 != -1.0:
         raise ItemError(m.MAV_MISSION_UNSUPPORTED, f"law {context.scenario.law.name} has no speed")
     try:
         speed = resolve_speed(context, shortest(item.param2))

@@ -97,7 +97,7 @@ def _target(message: Any) -> int | None:
 
 def _old_size(message: Any) -> int:
     """Return how long a payload is without extension fields, which stand last and are no part of CRC_EXTRA."""
-    crc, size, found = dialect().x25crc(f"{message.msgname} ".encode()), 0, message.unpacker.size
+    crc, size, found = dialect().x25crc(f"{message.msgname} ".encode()), 0, int(message.unpacker.size)
     for name, array in zip(message.ordered_fieldnames, message.array_lengths, strict=True):
         kind = message.fieldtypes[message.fieldnames.index(name)]
         crc.accumulate(f"{kind} {name} ".encode() + bytes((array,) if array else ()))
