@@ -77,8 +77,23 @@ class Manual(Service):
 
     def _order(self, sticks: Vector6) -> None:
         context = self.context
-        if sticks != context.sticks and context.submit(ManualControl(sticks)) == context.mavlink.MAV_RESULT_ACCEPTED:
+        if sticks == context.sticks:
+            return
+        if context.submit(ManualControl(self._parts(sticks))) == context.mavlink.MAV_RESULT_ACCEPTED:
             context.sticks = sticks
+
+    def _parts(self, sticks: Vector6) -> Vector6:
+        """Return which parts of the greatest wrench the sticks ask for, before the pilot's gain.
+
+        An ArduSub asks its thrusters for gain times stick, and their force goes with the square of that.
+        """
+        context, table = self.context, self.context.scenario.vehicle.autopilot
+        if context.profile.name != "ardusub" or table is None or table.curve != "quadratic":
+            return sticks
+        gain = context.settings["commands.pilot_gain"]
+        squared = 6 if context.mode_ahead == "manual" else 3  # in other modes the last three ask for angles and rates
+        x, y, z, k, m, n = (gain * s * abs(s) if i < squared else s for i, s in enumerate(sticks))
+        return x, y, z, k, m, n
 
     def _wrench(self, message: Any) -> Vector6:
         """Return X Y Z K M N from -1 to 1; the vertical stick is up where positive, Z is down."""

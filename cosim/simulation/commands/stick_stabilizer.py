@@ -14,7 +14,10 @@ from plant_fmu import Vehicle
 
 _CENTERED = 0.02  # part of a stick's way that counts as released
 _GREATEST_TILT = math.radians(30.0)  # of full roll and pitch sticks
-_YAW_RATE, _CLIMB_RATE = math.radians(45.0), 0.3  # rad/s, m/s of full sticks
+YAW_RATE = math.radians(
+    202.5
+)  # rad/s of a full stick at a pilot gain of 1, as ArduSub has it: 45 deg/s by ACRO_YAW_P of 4.5
+_CLIMB_RATE = 0.3  # m/s of a full stick
 _FARTHEST = math.radians(20.0), 0.3  # rad, m: by which heading and depth that are asked for lead the vehicle
 _ATTITUDE, _DEPTH, _INTEGRAL = 2.5, 1.5, 0.3  # rad/s of both loops, 1/s of the depth's integral
 _NORTH, _EAST, _DOWN = np.eye(3)
@@ -66,7 +69,7 @@ class StickStabilizer:
             [N, N m], body frame; nothing where the state that it needs is not known.
         """
         wrench: Array = gain * sticks * self._reach
-        wrench[3:] = self._moment(sticks)
+        wrench[3:] = self._moment(sticks, gain)
         if keep_depth:
             wrench[2] = 0.0
             R = rotation_matrix(self._state.quaternion)
@@ -74,10 +77,10 @@ class StickStabilizer:
         result: Array = np.clip(np.where(np.isfinite(wrench), wrench, 0.0), -self._reach, self._reach)
         return result
 
-    def _moment(self, sticks: Array) -> Array:
+    def _moment(self, sticks: Array, gain: float) -> Array:
         rate, turn = np.zeros(3), float(sticks[5])
         if abs(turn) > _CENTERED:
-            rate[2] = turn * _YAW_RATE
+            rate[2] = gain * turn * YAW_RATE
             ahead = math.remainder(self._heading + rate[2] * self._period - self._yaw(), math.tau)
             self._heading = self._yaw() + min(max(ahead, -_FARTHEST[0]), _FARTHEST[0])
         tilt = multiply(

@@ -133,9 +133,9 @@ def test_depth_is_kept_until_the_vertical_stick_asks_for_a_rate(fly):
 
 
 def test_the_yaw_stick_asks_for_a_rate_and_the_heading_is_kept_then(fly):
-    commands = {0: [SetMode("stabilize"), sticks(0, 0, 0, 0, 0, 0.5)], 400: [sticks(0, 0, 0, 0, 0, 0)]}
+    commands = {0: [SetMode("stabilize"), sticks(0, 0, 0, 0, 0, 0.25)], 400: [sticks(0, 0, 0, 0, 0, 0)]}
     yaw = np.unwrap(fly(commands, "time.duration=10", *OPEN)["attitude.yaw"])
-    assert np.diff(yaw[200:400]).mean() * STEPS == pytest.approx(np.radians(22.5), rel=0.1)
+    assert np.diff(yaw[200:400]).mean() * STEPS == pytest.approx(np.radians(0.5 * 0.25 * 202.5), rel=0.1)
     assert np.ptp(yaw[700:]) < 0.02
 
 
