@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 
 from cosim.command_line import (
     campaigns,
+    companion,
     completion,
     export,
     mavlink,
@@ -125,6 +126,7 @@ def _parser() -> argparse.ArgumentParser:
     sweep.add_verbs(verbs)
     mavlink.add_verbs(verbs)
     sitl.add_verbs(verbs)
+    companion.add_verb(verbs)
     completion.add_verb(verbs, parser)
 
     about = verbs.add_parser("help", help="print this help, or that of a verb")
@@ -271,4 +273,5 @@ _VERBS = {
     "stream": mavlink.stream,
     "mavlink-check": mavlink.mavlink_check,
     "sitl": sitl.sitl,
+    "companion": companion.companion,
 }
