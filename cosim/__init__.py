@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from cosim.campaigns.scenes.generator import generate_scenes
     from cosim.campaigns.scenes.scene import Scene
     from cosim.campaigns.scenes.scene_file import read_scenes
+    from cosim.companion.companion import Companion
+    from cosim.companion.frame_alignment import SceneOrigin
+    from cosim.companion.link import NetworkLink
+    from cosim.companion.options import CompanionOptions
     from cosim.errors import CosimError, RunError
     from cosim.export import export_run
     from cosim.mavlink.setup import Mavlink
@@ -36,18 +40,22 @@ if TYPE_CHECKING:
 __all__ = [
     "Campaign",
     "Check",
+    "Companion",
+    "CompanionOptions",
     "Comparison",
     "CosimError",
     "Design",
     "Master",
     "Mavlink",
     "MavlinkOptions",
+    "NetworkLink",
     "Record",
     "Run",
     "RunError",
     "Scenario",
     "Scene",
     "SceneFlyer",
+    "SceneOrigin",
     "Sweep",
     "check_scenario",
     "compare",
@@ -70,6 +78,10 @@ _HOMES = {
     "campaigns.scenes.generator": {"generate_scenes"},
     "campaigns.scenes.scene": {"Scene"},
     "campaigns.scenes.scene_file": {"read_scenes"},
+    "companion.companion": {"Companion"},
+    "companion.frame_alignment": {"SceneOrigin"},
+    "companion.link": {"NetworkLink"},
+    "companion.options": {"CompanionOptions"},
     "errors": {"CosimError", "RunError"},
     "export": {"export_run"},
     "mavlink.setup": {"Mavlink"},

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 MOST_CHANNELS = 32  # of the longer servo packet
 SHORTEST, LONGEST = 800, 2200  # us, of a pulse that a speed controller takes for one
+
+Curve = Callable[[float], float]  # from what an output says to a part of the greatest force, -1 to 1; or back
 
 
 @dataclass(frozen=True)
@@ -64,3 +67,61 @@ def validate_autopilot(
     good = 0 <= given.pwm_dead_band < given.pwm_span
     require(good, "autopilot.pwm_dead_band", f"{given.pwm_dead_band} us", "0 or above, and less than pwm_span")
     return Autopilot(given.frame, channels, signs, given.pwm_neutral, given.pwm_span, given.pwm_dead_band, given.curve)
+
+
+def effort_of_pulse(table: Autopilot, sign: int) -> Curve:
+    """Return the function from a pulse [us] to a part of the greatest force.
+
+    Parameters
+    ----------
+    table : Autopilot
+        Neutral, span, dead band and curve.
+    sign : int
+        -1 where a pulse above neutral makes the force negative.
+
+    Returns
+    -------
+    callable
+        u or u|u|, -1 to 1, with u the distance from neutral in spans; 0 within the dead band, and for what is no pulse.
+    """
+    neutral, span, dead_band, quadratic = (
+        table.pwm_neutral, table.pwm_span, table.pwm_dead_band, table.curve == "quadratic",
+    )  # fmt: skip
+
+    def effort(pulse: float) -> float:
+        if not SHORTEST <= pulse <= LONGEST or abs(pulse - neutral) <= dead_band:
+            return 0.0
+        u = min(max((pulse - neutral) / span, -1.0), 1.0)
+        return sign * u * abs(u) if quadratic else sign * u
+
+    return effort
+
+
+def pulse_of_effort(table: Autopilot, sign: int) -> Curve:
+    """Return the function from a part of the greatest force to the pulse [us] that asks for it.
+
+    Parameters
+    ----------
+    table : Autopilot
+        Neutral, span and curve.
+    sign : int
+        As for `effort_of_pulse`, whose inverse it is outside the dead band.
+
+    Returns
+    -------
+    callable
+        Takes -1 to 1, and clips what is beyond; neutral for NaN.
+
+    Examples
+    --------
+    >>> from plant_fmu.autopilot import Autopilot, pulse_of_effort
+    >>> pulse_of_effort(Autopilot("vectored_6dof"), -1)(0.25)
+    1300.0
+    """
+    neutral, span, quadratic = table.pwm_neutral, table.pwm_span, table.curve == "quadratic"
+
+    def pulse(effort: float) -> float:
+        part = min(max(effort, -1.0), 1.0) if effort == effort else 0.0
+        return neutral + sign * span * (math.copysign(math.sqrt(abs(part)), part) if quadratic else part)
+
+    return pulse

@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 
 from cosim.command_line import (
     campaigns,
+    companion,
     completion,
     export,
     falsify,
@@ -127,6 +128,7 @@ def _parser() -> argparse.ArgumentParser:
     falsify.add_verb(verbs)
     mavlink.add_verbs(verbs)
     sitl.add_verbs(verbs)
+    companion.add_verb(verbs)
     completion.add_verb(verbs, parser)
 
     about = verbs.add_parser("help", help="print this help, or that of a verb")
@@ -275,4 +277,5 @@ _VERBS = {
     "stream": mavlink.stream,
     "mavlink-check": mavlink.mavlink_check,
     "sitl": sitl.sitl,
+    "companion": companion.companion,
 }

@@ -53,7 +53,7 @@ def add_link_flags(parser: argparse.ArgumentParser, commands: bool = False, requ
         help=f"of the vehicle (default: {usual.system_id})",
     )  # fmt: skip
     parser.add_argument(
-        "--origin", type=_origin, default=usual.origin, metavar="LAT,LON",
+        "--origin", type=origin, default=usual.origin, metavar="LAT,LON",
         help=f"where position 0 is on the globe, in degrees (default: {usual.origin[0]:g},{usual.origin[1]:g}; "
         "a negative latitude as --origin=-33.9,18.4)",
     )  # fmt: skip
@@ -119,7 +119,8 @@ def _systems(text: str) -> frozenset[int]:
     return frozenset(_SYSTEM(part.strip()) for part in text.split(","))
 
 
-def _origin(text: str) -> tuple[float, float]:
+def origin(text: str) -> tuple[float, float]:
+    """Return latitude and longitude [deg] that a flag names; argparse.ArgumentTypeError if it names none."""
     try:
         latitude, longitude = (float(part) for part in text.split(","))
     except ValueError:

@@ -13,6 +13,7 @@ from cosim.mavlink.messages.table import HEARTBEAT
 from cosim.mavlink.services.commands import Commands
 from cosim.mavlink.services.ftp import FileServer
 from cosim.mavlink.services.gcs_failsafe import GcsFailsafe
+from cosim.mavlink.services.logs import Logs
 from cosim.mavlink.services.manual import Manual
 from cosim.mavlink.services.mission import Missions
 from cosim.mavlink.services.modes import Modes
@@ -78,6 +79,7 @@ class Autopilot:
             parameters,
             Missions(context, targets, parameters),
             FileServer(context, parameters),
+            Logs(context),
             Timing(context),
             Origin(context),
             GcsFailsafe(context),
@@ -185,6 +187,7 @@ class Autopilot:
             self._advance()
         for service in self._services:
             service.tick()
+        context.voice.tick()
         for link, streams in list(self._streams.items()):
             if streams.beaten or link not in self._beaten_at:
                 streams.beaten = False

@@ -31,6 +31,8 @@ _MODES = {
     "reach": "Heads for the target",
     "mission": "Follows the mission",
     "surface": "Surfaces",
+    "stabilize": "Steered by hand, attitude kept",
+    "depth_hold": "Steered by hand, attitude and depth kept",
 }
 
 

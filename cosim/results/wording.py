@@ -118,6 +118,8 @@ def verdict(summary: dict[str, Any]) -> str:
         kept = f"; it {but}violated {', '.join(broken)}."
     wanted, acted = newtons(summary["max_force_asked"]), newtons(summary["max_force"])
     force = f" The law asked for up to {wanted}" + ("." if wanted == acted else f"; up to {acted} acted.")
+    if not math.isfinite(summary["max_force"]):
+        force = f" The law asked for up to {wanted}; what acted was not measured."
     ended = {
         "completed": "",
         "interrupted": f" The run was interrupted at {summary['simulated_time']:.3f} s.",

@@ -9,7 +9,7 @@ from controller.linear_algebra import product
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import Failure
 from cosim.simulation.signals import Array, Signals
-from plant_fmu import Plant
+from cosim.simulation.stepped_plant import SteppedPlant
 
 MAX_WRENCH = (
     1e5  # N, N m: more is not asked of the plant in a run that can be sent anywhere, where a law might ask for any
@@ -23,7 +23,7 @@ class Actuators:
     ----------
     scenario : Scenario
         What is run.
-    plant : Plant
+    plant : SteppedPlant
         Whose thrusters fail, and are limited.
     signals : Signals
         Whose row holds what is asked for, and the inputs.
@@ -38,7 +38,7 @@ class Actuators:
         Of the thrusters as far as the law is told: 1 working, 0 failed.
     """
 
-    def __init__(self, scenario: Scenario, plant: Plant, signals: Signals) -> None:
+    def __init__(self, scenario: Scenario, plant: SteppedPlant, signals: Signals) -> None:
         self._scenario, self._plant = scenario, plant
         vehicle = scenario.vehicle
         self._bounded = scenario.commands.enabled

@@ -11,21 +11,21 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.commands import MODES
 from cosim.simulation.lyapunov_signals import lyapunov_columns
 from cosim.simulation.signals import Column
-from plant_fmu import Plant
+from cosim.simulation.stepped_plant import SteppedPlant
 from plant_fmu.running import Channel
 from plant_fmu.variables import variables
 
 _FORCE_UNITS = ("N",) * 3 + ("N.m",) * 3
 
 
-def columns_of(scenario: Scenario, plant: Plant, law: Law) -> list[Column]:
+def columns_of(scenario: Scenario, plant: SteppedPlant, law: Law) -> list[Column]:
     """Return the columns of a run.
 
     Parameters
     ----------
     scenario : Scenario
         What is run.
-    plant : Plant
+    plant : SteppedPlant
         Its outputs, flags and inputs are columns.
     law : Law
         Its diagnostics are columns.

@@ -29,6 +29,7 @@ from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.lyapunov_signals import LyapunovSignals
 from cosim.simulation.sensor_navigation import SensorNavigation, make_sensing
 from cosim.simulation.signals import Array, Signals
+from cosim.simulation.stepped_plant import SteppedPlant
 from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant
 
@@ -57,6 +58,8 @@ class Master:
         What to run.
     law : Law, optional
         What steers; default: the scenario's law.
+    plant : SteppedPlant, optional
+        What is steered, closed with the master; default: the FMU of the scenario's vehicle.
 
     Attributes
     ----------
@@ -73,10 +76,8 @@ class Master:
         If the FMU refuses the scenario's numbers.
     BuildError
         If there is no FMU and none can be built.
-    LawError, DefinitionError
-        If law or arbiter cannot be set up.
-    ScenarioError
-        If the scenario asks for what a law that is a function has not.
+    LawError, DefinitionError, ScenarioError
+        If law or arbiter cannot be set up, or the scenario asks for what a law that is a function has not.
 
     Examples
     --------
@@ -88,7 +89,7 @@ class Master:
     0.002
     """
 
-    def __init__(self, scenario: Scenario, law: Law | None = None) -> None:
+    def __init__(self, scenario: Scenario, law: Law | None = None, plant: SteppedPlant | None = None) -> None:
         if isinstance(law, FunctionLaw):
             scenario = with_custom_law(law, scenario)  # refuses what such a law cannot have
         self.scenario = scenario
@@ -99,7 +100,7 @@ class Master:
         self.environment = RegionEnvironment(scenario)
         self._boundary = 0.0  # s, when the next step begins
 
-        self.plant = Plant(scenario.vehicle, scenario.plant.fmi)
+        self.plant: SteppedPlant = Plant(scenario.vehicle, scenario.plant.fmi) if plant is None else plant
         try:
             self.plant.set(start_values(scenario))
             self.plant.initialise()
@@ -334,7 +335,7 @@ class Master:
         """Ask the law, or the sticks, for forces of the coming period, and bring them to the plant's inputs."""
         actuators = self.actuators
         if self.command_handler is not None and not self.command_handler.automatic_control:
-            actuators.command[:] = self.command_handler.wrench
+            actuators.command[:] = self.command_handler.wrench()
             actuators.allocate()
             return
         if self.navigator is not None and not self.navigator.started:  # nothing is known to steer by

@@ -11,7 +11,7 @@ from cosim.scenario.scenario import Scenario
 from cosim.scenario.sensor_suite import outage_schedule, scenario_sensors, sensor_model
 from cosim.simulation.sensor import Sensor
 from cosim.simulation.signals import Signals
-from plant_fmu import Plant
+from cosim.simulation.stepped_plant import SteppedPlant
 
 _ROUNDING = 1e-6  # of a step
 FIRST, FIRST_TIME = "measured.depth", f"measured.time.{SENSORS[0]}"  # outputs of the plant, the others follow
@@ -24,7 +24,7 @@ class SensorNavigation:
     ----------
     scenario : Scenario
         Of the sensors and their outages.
-    plant : Plant
+    plant : SteppedPlant
         Its sensors.
     signals : Signals
         Where its outputs stand.
@@ -35,7 +35,7 @@ class SensorNavigation:
     """
 
     def __init__(
-        self, scenario: Scenario, plant: Plant, signals: Signals, true_state: VehicleState, given: VehicleState
+        self, scenario: Scenario, plant: SteppedPlant, signals: Signals, true_state: VehicleState, given: VehicleState
     ) -> None:
         self._true_state, self._given, self._plant = true_state, given, plant
         parameters = scenario_sensors(scenario)
@@ -65,7 +65,7 @@ class SensorNavigation:
 
 
 def make_sensing(
-    scenario: Scenario, plant: Plant, signals: Signals, true_state: VehicleState
+    scenario: Scenario, plant: SteppedPlant, signals: Signals, true_state: VehicleState
 ) -> tuple[VehicleState, Sensor | SensorNavigation | None]:
     """Return the state that law and arbiter are given, and what writes it.
 
@@ -73,7 +73,7 @@ def make_sensing(
     ----------
     scenario : Scenario
         How the vehicle is sensed.
-    plant : Plant
+    plant : SteppedPlant
         Its sensors.
     signals : Signals
         Where it stands.

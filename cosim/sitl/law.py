@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -13,9 +13,7 @@ from controller.regions.region_set import PackedRegions
 from cosim.errors import RunError
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
-from plant_fmu.autopilot import LONGEST, SHORTEST, Autopilot
-
-Curve = Callable[[float], float]  # from what an output says to a part of the greatest force, -1 to 1
+from plant_fmu.autopilot import Curve, effort_of_pulse
 
 
 class AutopilotLaw:
@@ -115,34 +113,6 @@ def law_of_pwm(vehicle: Vehicle) -> AutopilotLaw:
     signs = table.signs if isinstance(table.signs, tuple) else (table.signs,) * vehicle.n_thrusters
     efforts = [effort_of_pulse(table, sign) for sign in signs]
     return AutopilotLaw(table.channels, efforts, vehicle, "pwm", "us")
-
-
-def effort_of_pulse(table: Autopilot, sign: int) -> Curve:
-    """Return the function from a pulse [us] to a part of the greatest force.
-
-    Parameters
-    ----------
-    table : Autopilot
-        Neutral, span, dead band and curve.
-    sign : int
-        -1 where a pulse above neutral makes the force negative.
-
-    Returns
-    -------
-    callable
-        u or u|u|, -1 to 1, with u the distance from neutral in spans; 0 within the dead band, and for what is no pulse.
-    """
-    neutral, span, dead_band, quadratic = (
-        table.pwm_neutral, table.pwm_span, table.pwm_dead_band, table.curve == "quadratic",
-    )  # fmt: skip
-
-    def effort(pulse: float) -> float:
-        if not SHORTEST <= pulse <= LONGEST or abs(pulse - neutral) <= dead_band:
-            return 0.0
-        u = min(max((pulse - neutral) / span, -1.0), 1.0)
-        return sign * u * abs(u) if quadratic else sign * u
-
-    return effort
 
 
 def law_of_controls(vehicle: Vehicle) -> AutopilotLaw:

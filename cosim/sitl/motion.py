@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from controller.quaternion import rotation_matrix
-from plant_fmu import Plant
+from cosim.simulation.stepped_plant import SteppedPlant
 
 Three = tuple[float, float, float]
 
@@ -39,13 +39,13 @@ class MotionReader:
 
     Parameters
     ----------
-    plant : Plant
+    plant : SteppedPlant
         Initialised.
     bottom : bool
         Whether there is one.
     """
 
-    def __init__(self, plant: Plant, bottom: bool) -> None:
+    def __init__(self, plant: SteppedPlant, bottom: bool) -> None:
         names = plant.outputs.names
         self._values, self._bottom = plant.outputs.values, bottom
         self._at = np.array([names.index(name) for name in _NAMES])

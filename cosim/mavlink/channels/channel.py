@@ -33,12 +33,18 @@ class Channel(Protocol):
         """
         ...
 
-    def heard(self, peer: Hashable) -> None:
-        """Hear that what came from `peer` is a frame that is heeded."""
+    def heard(self, peer: Hashable, version: int) -> None:
+        """Hear that what came from `peer` is a frame that is accepted, of MAVLink 1 or 2.
+
+        A peer that has spoken MAVLink 1 alone is answered in it.
+        """
         ...
 
-    def send(self, frame: bytes) -> bool:
-        """Take a frame to be sent to all peers when it is tended; return whether there was room for all of them."""
+    def send(self, frame: bytes, old: bytes | None = None) -> bool:
+        """Take a frame to be sent to all peers when it is tended; return whether there was room for all of them.
+
+        Peers that are answered in MAVLink 1 get `old` instead, which is the same in that version, or nothing for None.
+        """
         ...
 
     def tend(self, now: float) -> None:

@@ -92,6 +92,8 @@ class Stream:
         The frames that wait.
     open : bool
         Whether the other side was there when it was last spoken to.
+    version : int
+        Greatest version of MAVLink that came from there; 0 before any did.
     """
 
     def __init__(
@@ -104,6 +106,7 @@ class Stream:
         self._read, self._close = read, close
         self.outgoing = Outgoing(write, limit)
         self.open = True
+        self.version = 0  # the greatest that the other side has spoken; 0 for none yet
 
     def read(self) -> bytes | None:
         """Return what has come, None if nothing has; `open` tells whether more can come."""
@@ -116,8 +119,12 @@ class Stream:
         self.open = bool(data)
         return data or None
 
-    def put(self, frame: bytes) -> bool:
-        """Take a frame for the other side; return whether there was room."""
+    def put(self, frame: bytes, old: bytes | None = None) -> bool:
+        """Take a frame for the other side, `old` if it speaks MAVLink 1; return whether there was room."""
+        if self.version == 1:
+            if old is None:
+                return True
+            frame = old
         try:
             return self.outgoing.put(frame)
         except OSError:
@@ -143,17 +150,17 @@ class OneStream:
 
     Parameters
     ----------
-    stream : Stream
-        The first one.
+    stream : Stream or None
+        The first one, if there is one already.
     gone, slow : str
         Who was not there, or took too little, when frames were dropped.
     """
 
     datagrams = False
 
-    def __init__(self, stream: Stream, gone: str, slow: str) -> None:
+    def __init__(self, stream: Stream | None, gone: str, slow: str) -> None:
         self.trouble: dict[str, int] = Counter()
-        self._stream: Stream | None = stream
+        self._stream = stream
         self._gone, self._slow = gone, slow
 
     def receive(self) -> tuple[Hashable, bytes] | None:
@@ -162,15 +169,17 @@ class OneStream:
         data = None if stream is None else stream.read()
         return None if data is None else (stream, data)
 
-    def heard(self, peer: Hashable) -> None:
-        """Know the peer already."""
+    def heard(self, peer: Hashable, version: int) -> None:
+        """Note which version the peer speaks."""
+        assert isinstance(peer, Stream)
+        peer.version = max(peer.version, version)
 
-    def send(self, frame: bytes) -> bool:
+    def send(self, frame: bytes, old: bytes | None = None) -> bool:
         """Send to the other side, if it is there."""
         if self._stream is None:
             self.trouble[f"frames dropped while there was no {self._gone}"] += 1
             return False
-        return self._stream.put(frame)
+        return self._stream.put(frame, old)
 
     def close(self) -> None:
         """Close the stream, having written what can be written at once."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import logging
 import socket
 import time
 from collections import Counter
@@ -11,6 +12,8 @@ from collections.abc import Hashable
 
 from cosim.errors import TelemetryError
 from cosim.mavlink.channels.stream import WAITING, OneStream, Stream
+
+log = logging.getLogger(__name__)
 
 CLIENTS = 8
 _CONNECTING = 3.0  # s, that opening waits for the other side
@@ -64,12 +67,14 @@ class TcpIn:
                 return client, data
         return None
 
-    def heard(self, peer: Hashable) -> None:
-        """Send to each client, whatever it says."""
+    def heard(self, peer: Hashable, version: int) -> None:
+        """Note which version a client speaks; all are sent to, whatever they say."""
+        assert isinstance(peer, Stream)
+        peer.version = max(peer.version, version)
 
-    def send(self, frame: bytes) -> bool:
+    def send(self, frame: bytes, old: bytes | None = None) -> bool:
         """Send to each client."""
-        taken = [client.put(frame) for client in self.clients]
+        taken = [client.put(frame, old) for client in self.clients]
         return all(taken)
 
     def tend(self, now: float) -> None:
@@ -106,23 +111,18 @@ class TcpIn:
 
 
 class TcpOut(OneStream):
-    """A client; when the connection is lost, it tries again every 2 s.
-
-    Raises
-    ------
-    TelemetryError
-        If nobody answers at first.
-    """
+    """A client; while there is no server, at first or later, it tries again every 2 s."""
 
     def __init__(self, host: str, port: int) -> None:
         self._address = (host, port)
         self._attempt: socket.socket | None = None
         self._last = time.monotonic()
-        try:
-            made = socket.create_connection((host, port), _CONNECTING)
-        except OSError as error:
-            raise TelemetryError(f"tcp:{host}:{port}: {error.strerror or error}") from error
-        super().__init__(stream_of(made), gone="server", slow="for a slow server")
+        stream = None
+        with contextlib.suppress(OSError):
+            stream = stream_of(socket.create_connection((host, port), _CONNECTING))
+        if stream is None:
+            log.warning("MAVLink: tcp:%s:%s: nobody listens yet; waiting", host, port)
+        super().__init__(stream, gone="server", slow="for a slow server")
 
     def tend(self, now: float) -> None:
         """Write what waits, or connect anew."""

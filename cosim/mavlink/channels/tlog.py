@@ -63,10 +63,10 @@ class Tlog:
         """Return nothing: a log is written only."""
         return None
 
-    def heard(self, peer: Hashable) -> None:
+    def heard(self, peer: Hashable, version: int) -> None:
         """Hear nothing."""
 
-    def send(self, frame: bytes) -> bool:
+    def send(self, frame: bytes, old: bytes | None = None) -> bool:
         """Append a frame; return whether there was room for it."""
         if len(self._waiting) > _WAITING:
             self.trouble["frames not logged"] += 1

@@ -36,6 +36,7 @@ class UdpOut:
     def __init__(self, host: str, port: int) -> None:
         self.trouble: dict[str, int] = Counter()
         self._packet = b""  # frames that go together
+        self._version = 0  # the greatest that the peer has spoken; 0 for none yet
         self._socket = _socket(f"udpout:{host}:{port}", lambda s: s.connect((host, port)))
 
     def receive(self) -> tuple[Hashable, bytes] | None:
@@ -45,11 +46,13 @@ class UdpOut:
         except OSError:  # nothing is there, or word that nobody listened to what was sent
             return None
 
-    def heard(self, peer: Hashable) -> None:
-        """Know the peer already."""
+    def heard(self, peer: Hashable, version: int) -> None:
+        """Note which version the peer speaks."""
+        self._version = max(self._version, version)
 
-    def send(self, frame: bytes) -> bool:
+    def send(self, frame: bytes, old: bytes | None = None) -> bool:
         """Take a frame for the next datagram; that nobody listens is no trouble."""
+        frame = (old or b"") if self._version == 1 else frame
         if len(self._packet) + len(frame) > _PACKET:
             self._flush()
         self._packet += frame
@@ -97,8 +100,9 @@ class UdpIn:
         self.trouble: dict[str, int] = Counter()
         self._socket = _socket(f"udpin:{host}:{port}", lambda s: s.bind((host, port)))
         self.port: int = self._socket.getsockname()[1]
-        self._packet = b""
+        self._packets = {1: b"", 2: b""}  # by version
         self._heard: dict[tuple[str, int], float] = {}  # when, by address
+        self._version: dict[tuple[str, int], int] = {}  # the greatest that each has spoken
 
     @property
     def peers(self) -> list[tuple[str, int]]:
@@ -113,26 +117,28 @@ class UdpIn:
             return None
         return address, data
 
-    def heard(self, peer: Hashable) -> None:
+    def heard(self, peer: Hashable, version: int) -> None:
         """Send to this address from now on, where there is room."""
         assert isinstance(peer, tuple)
         if peer in self._heard or len(self._heard) < PEERS:
             self._heard[peer] = time.monotonic()
+            self._version[peer] = max(self._version.get(peer, 1), version)
         else:
             self.trouble["frames of peers beyond 8"] += 1
 
-    def send(self, frame: bytes) -> bool:
+    def send(self, frame: bytes, old: bytes | None = None) -> bool:
         """Take a frame for the next datagram to each peer; to none of them is well too."""
-        if len(self._packet) + len(frame) > _PACKET:
+        if len(self._packets[2]) + len(frame) > _PACKET:
             self._flush()
-        self._packet += frame
+        self._packets[2] += frame
+        self._packets[1] += old or b""  # never the longer one by much: it has fewer messages, and zeros at their ends
         return True
 
     def tend(self, now: float) -> None:
         """Send what was taken, and forget who is silent."""
         self._flush()
         for peer in [peer for peer, last in self._heard.items() if now - last > SILENCE]:
-            del self._heard[peer]
+            del self._heard[peer], self._version[peer]
 
     def close(self) -> None:
         """Send what was taken, and close the socket."""
@@ -140,10 +146,11 @@ class UdpIn:
         self._socket.close()
 
     def _flush(self) -> None:
-        packet, self._packet = self._packet, b""
-        for peer in self._heard if packet else ():
+        packets, self._packets = self._packets, {1: b"", 2: b""}
+        for peer in self._heard:
             try:
-                self._socket.sendto(packet, peer)
+                if packet := packets[self._version[peer]]:
+                    self._socket.sendto(packet, peer)
             except OSError:
                 self.trouble[_NOT_TAKEN] += 1
 

@@ -40,14 +40,13 @@ def nav_controller_output(context: VehicleContext) -> list[Any]:
 
 
 def servo_output_raw(context: VehicleContext) -> list[Any]:
-    """SERVO_OUTPUT_RAW: the thrusters' forces as PWM [µs], linear, 0 where there is none; its time wraps."""
-    pulses = [_CENTRE + _SWING * part for part in context.thrust_parts()]
-    pulses = (pulses + [0] * _SERVOS)[:_SERVOS]
+    """SERVO_OUTPUT_RAW: what is asked of the thrusters as pulses [µs], 0 where there is none; its time wraps."""
+    pulses = (context.servo_pulses() + [0] * _SERVOS)[:_SERVOS]
     return [context.make("SERVO_OUTPUT_RAW", wrapped(context.view.boot_us, 1), 0, *pulses)]
 
 
 def actuator_output_status(context: VehicleContext) -> list[Any]:
-    """ACTUATOR_OUTPUT_STATUS: the same as parts from -1 to 1."""
+    """ACTUATOR_OUTPUT_STATUS: what each thruster gives, as a part of its limit, from -1 to 1."""
     parts = context.thrust_parts()[:_OUTPUTS]
     return [context.make("ACTUATOR_OUTPUT_STATUS", context.view.boot_us, (1 << len(parts)) - 1, parts)]
 

@@ -2,5 +2,5 @@
 
 Parameters, missions, commands, manual control, FTP and the rest, one service a file.
 
-Imports: mavlink.messages, mavlink.vehicle, mavlink.wire, scenario, simulation.commands.
+Imports: mavlink.messages, mavlink.vehicle, mavlink.wire, plant_fmu, scenario, simulation.commands.
 """

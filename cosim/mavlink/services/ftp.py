@@ -17,7 +17,7 @@ _HEADER = struct.Struct("<HBBBBBBI")  # seq, session, opcode, size, req_opcode, 
 _ROOM = 239  # bytes of data in a payload
 _PAYLOAD = 251
 _FOLDER, _FILE = "@PARAM", "param.pck"
-_CLIENTS = 8  # each with one session; who came first goes when there are more
+_CLIENTS = 8  # each with one file open; who came first goes when there are more
 _BURST = 16  # packets
 _LONGEST_PATH = 100
 
@@ -41,9 +41,9 @@ class _Request:
 
 @dataclass
 class _Client:
-    """What a station has open."""
+    """What a station has open, in the session that it chose."""
 
-    session: int
+    session: int = 0
     content: bytes | None = None
     last_request: bytes = b""
     last_replies: list[bytes] = field(default_factory=list)
@@ -95,8 +95,7 @@ class FileServer(Service):
         if key not in self._clients:
             if len(self._clients) >= _CLIENTS:
                 self._clients.popitem(last=False)
-            taken = {client.session for client in self._clients.values()}
-            self._clients[key] = _Client(next(i for i in range(_CLIENTS) if i not in taken))
+            self._clients[key] = _Client()
         self._clients.move_to_end(key)
         return self._clients[key]
 
@@ -106,8 +105,8 @@ class FileServer(Service):
                 return self._burst(client, request)
             data = self._answer(client, request)
         except RefusedError as refused:
-            return [_packet(client, request, 1, _NAK, bytes([refused.error]), request.offset)]
-        return [_packet(client, request, 1, _ACK, data, request.offset)]
+            return [_packet(request, 1, _NAK, bytes([refused.error]), request.offset)]
+        return [_packet(request, 1, _ACK, data, request.offset)]
 
     def _answer(self, client: _Client, request: _Request) -> bytes:
         match request.opcode:
@@ -119,7 +118,7 @@ class FileServer(Service):
             case opcode if opcode == _LIST:
                 return self._listing(_path(request), request.offset)
             case opcode if opcode == _OPEN:
-                client.content = self._content(_path(request))
+                client.session, client.content = request.session, self._content(_path(request))
                 return struct.pack("<I", len(client.content))
             case opcode if opcode == _READ:
                 return _part(_opened(client, request), request.offset, request.size)
@@ -132,14 +131,13 @@ class FileServer(Service):
             content = _opened(client, request)
             parts = [(request.offset, _part(content, request.offset, request.size))]
         except RefusedError as refused:
-            return [_packet(client, request, 1, _NAK, bytes([refused.error]), request.offset)]
+            return [_packet(request, 1, _NAK, bytes([refused.error]), request.offset)]
         while len(parts) < _BURST and parts[-1][0] + len(parts[-1][1]) < len(content):
             offset = parts[-1][0] + len(parts[-1][1])
             parts.append((offset, _part(content, offset, request.size)))
         last = len(parts)
         return [
-            _packet(client, request, i, _ACK, data, offset, complete=i == last)
-            for i, (offset, data) in enumerate(parts, 1)
+            _packet(request, i, _ACK, data, offset, complete=i == last) for i, (offset, data) in enumerate(parts, 1)
         ]
 
     # ---- what there is ----
@@ -191,9 +189,8 @@ def _part(content: bytes, offset: int, size: int) -> bytes:
     return content[offset : offset + (size or _ROOM)]
 
 
-def _packet(
-    client: _Client, request: _Request, after: int, opcode: int, data: bytes, offset: int, complete: bool = False
-) -> bytes:
+def _packet(request: _Request, after: int, opcode: int, data: bytes, offset: int, complete: bool = False) -> bytes:
+    """Return a reply; it echoes the session of the request, by which a station knows that it is its own."""
     seq = (request.seq + after) & 0xFFFF
-    header = _HEADER.pack(seq, client.session, opcode, len(data), request.opcode, complete, 0, offset)
+    header = _HEADER.pack(seq, request.session, opcode, len(data), request.opcode, complete, 0, offset)
     return (header + data).ljust(_PAYLOAD, b"\0")

@@ -1,4 +1,4 @@
-"""Sticks: MANUAL_CONTROL."""
+"""Sticks: MANUAL_CONTROL and RC_CHANNELS_OVERRIDE."""
 
 from __future__ import annotations
 
@@ -7,21 +7,24 @@ from typing import Any
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector6
-from cosim.simulation.commands.commands import ManualControl
+from cosim.simulation.commands.commands import STICK_MODES, ManualControl
 
 _FULL = 1000.0
 _INVALID = 0x7FFF
 _TIMEOUT = 3.0  # s of the wall clock
 _PITCH, _ROLL = 1, 2  # enabled_extensions
+_CENTRE, _SWING = 1500, 400  # us of a channel
+_CHANNELS = 6  # pitch, roll, up, yaw, forward, right, as ArduSub has them
+_RELEASED, _IGNORED = 0, 0xFFFF  # a channel that is given back, and one that stays as it is
 _NEUTRAL: Vector6 = (0.0,) * 6
 
 
 class Manual(Service):
-    """Sticks become parts of the greatest wrench, while the mode is manual."""
+    """Sticks become parts of the greatest wrench, while the mode is one that they steer in."""
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
-        self.messages = {"MANUAL_CONTROL": self._manual_control}
+        self.messages = {"MANUAL_CONTROL": self._manual_control, "RC_CHANNELS_OVERRIDE": self._override}
         self._heard: float | None = None
         self._state = (context.armed, context.mode)
 
@@ -41,29 +44,56 @@ class Manual(Service):
         if self._heard is None or context.now - self._heard < _TIMEOUT:
             return
         self._heard = None
-        if context.mode_ahead == "manual":
+        if context.mode_ahead in STICK_MODES:
             self._order(_NEUTRAL)
             context.say("Lost manual control", context.mavlink.MAV_SEVERITY_CRITICAL, "sticks", _TIMEOUT)
 
     def _manual_control(self, sender: Sender, message: Any) -> None:
+        if message.target == self.context.options.system_id:
+            self._take(sender, self._wrench(message))
+
+    def _override(self, sender: Sender, message: Any) -> None:
+        pulses = [getattr(message, f"chan{i}_raw") for i in range(1, _CHANNELS + 1)]
+        surge, sway, heave, roll, pitch, yaw = self.context.sticks
+        before = pitch, roll, -heave, yaw, surge, sway
+        pitch, roll, up, yaw, surge, sway = (
+            old if pulse == _IGNORED else 0.0 if pulse == _RELEASED else _part((pulse - _CENTRE) / _SWING)
+            for pulse, old in zip(pulses, before, strict=True)
+        )
+        self._take(sender, (surge, sway, -up + 0.0, roll, pitch, yaw))
+
+    def _take(self, sender: Sender, sticks: Vector6) -> None:
         context = self.context
-        if message.target != context.options.system_id:
-            return
         if not context.accepts_commands:
             context.submit()
             return
-        if context.mode_ahead != "manual":
+        if context.mode_ahead not in STICK_MODES:
             return
         if not context.operator.may_steer(sender.system, context.now):
             context.reject("another station has the vehicle in hand", "active gcs")
             return
         self._heard = context.now
-        self._order(self._wrench(message))
+        self._order(sticks)
 
     def _order(self, sticks: Vector6) -> None:
         context = self.context
-        if sticks != context.sticks and context.submit(ManualControl(sticks)) == context.mavlink.MAV_RESULT_ACCEPTED:
+        if sticks == context.sticks:
+            return
+        if context.submit(ManualControl(self._parts(sticks))) == context.mavlink.MAV_RESULT_ACCEPTED:
             context.sticks = sticks
+
+    def _parts(self, sticks: Vector6) -> Vector6:
+        """Return which parts of the greatest wrench the sticks ask for, before the pilot's gain.
+
+        An ArduSub asks its thrusters for gain times stick, and their force goes with the square of that.
+        """
+        context, table = self.context, self.context.scenario.vehicle.autopilot
+        if context.profile.name != "ardusub" or table is None or table.curve != "quadratic":
+            return sticks
+        gain = context.settings["commands.pilot_gain"]
+        squared = 6 if context.mode_ahead == "manual" else 3  # in other modes the last three ask for angles and rates
+        x, y, z, k, m, n = (gain * s * abs(s) if i < squared else s for i, s in enumerate(sticks))
+        return x, y, z, k, m, n
 
     def _wrench(self, message: Any) -> Vector6:
         """Return X Y Z K M N from -1 to 1; the vertical stick is up where positive, Z is down."""

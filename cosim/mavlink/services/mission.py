@@ -203,6 +203,9 @@ class Missions(Service):
         result = context.submit(SetMission(tuple(course)))
         if result == m.MAV_RESULT_ACCEPTED:
             context.plan, context.course = tuple(items), tuple(course)
+            for number, item in enumerate(course, self._first):
+                if item.position is not None:
+                    self._targets.warn_of(item.position, f"mission item {number}")
             context.operator.commanded(sender.system)
             return int(m.MAV_MISSION_ACCEPTED)
         return int(m.MAV_MISSION_DENIED if result == m.MAV_RESULT_DENIED else m.MAV_MISSION_ERROR)

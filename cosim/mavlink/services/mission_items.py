@@ -8,13 +8,12 @@ from collections.abc import Sequence
 from cosim.errors import CommandError
 from cosim.mavlink.services.parameters import shortest
 from cosim.mavlink.services.service import place_of, unscaled
+from cosim.mavlink.services.speed import SPEED, resolve_speed
 from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.encode import whole
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import ChangeSetting, MissionItem, SetHeading
-
-SPEED = "law.gains.speed"  # key of the setting
 
 _LONGEST_STAY = 1e9  # s
 _LARGEST = 1e5  # m
@@ -91,13 +90,14 @@ def decode_mission_item(
 
 
 def _another_speed(context: VehicleContext, item: ReceivedMissionItem) -> MissionItem:
-    m, speed = context.mavlink, shortest(item.param2)
-    if speed < 0.0:  # as it is
-        return MissionItem(None)
-    before = getattr(context.settings.gains, "speed", None)
-    if before is None:
+    m = context.mavlink
+    before = getattr(context.settings.gains, "speed", math.nan)
+    if math.isnan(before) and item.param2 != -1.0:
         raise ItemError(m.MAV_MISSION_UNSUPPORTED, f"law {context.scenario.law.name} has no speed")
     try:
+        speed = resolve_speed(context, shortest(item.param2))
+        if speed is None:
+            return MissionItem(None)
         context.settings.change(SPEED, speed)
     except CommandError as error:
         raise ItemError(m.MAV_MISSION_INVALID_PARAM2, str(error)) from error

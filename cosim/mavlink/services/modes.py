@@ -71,7 +71,7 @@ class Modes(Service):
         context = self.context
         if mode is None:
             numbers = context.profile.numbers
-            known = ", ".join(f"{MODE_NAMES[mode].split()[0].lower()} {number}" for mode, number in numbers.items())
+            known = ", ".join(f"{MODE_NAMES[mode].lower()} {number}" for mode, number in numbers.items())
             context.reject(f"no such mode: {named}; profile {context.profile.name} has {known}", "mode")
             return int(context.mavlink.MAV_RESULT_FAILED)
         return self._steer(sender, mode)

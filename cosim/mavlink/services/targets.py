@@ -3,29 +3,39 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
-from cosim.mavlink.services.mission_items import SPEED
+from cosim.errors import CommandError
 from cosim.mavlink.services.parameters import Parameters, shortest
 from cosim.mavlink.services.service import Call, Service, place_of, unscaled
+from cosim.mavlink.services.speed import SPEED, resolve_speed
+from cosim.mavlink.vehicle.keep_in import KeepIn
 from cosim.mavlink.vehicle.profile import MODE_NAMES
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import Command, SetHeading, SetMode, SetTarget
 
 _X_Y, _Z = 0b011, 0b100  # type_mask: what is ignored
-_VELOCITY, _ACCELERATION, _FORCE, _YAW = 0b111000, 0b111 << 6, 1 << 9, 1 << 10
+_VELOCITY, _ACCELERATION, _FORCE, _YAW, _YAW_RATE = 0b111000, 0b111 << 6, 1 << 9, 1 << 10, 1 << 11
 _LOCAL, _OFFSET, _BODY, _BODY_OFFSET, _BODY_FRD = 1, 7, 8, 9, 12
 _FROM_HERE = (_OFFSET, _BODY, _BODY_OFFSET, _BODY_FRD)
+_TURNED = (_BODY, _BODY_OFFSET, _BODY_FRD)
 _ANEW = 1.0  # s of silence, after which the same way from here is another one
+_EARLY = 1.0  # s, for which a set-point that came before its mode may be followed once that mode is on
+_PATIENCE = 3.0  # s of set-points in another mode, after which that is worth a word
+_VELOCITY_LASTS = 3.0  # s without another set-point, after which a velocity ends, as ArduSub has it
+_SAME_SPEED = 0.01  # m/s
+_WARNING_PERIOD = 2.0  # s
 
 
 class Targets(Service):
     """SET_POSITION_TARGET_*, and the commands that move, turn and pace the vehicle.
 
-    Set-points are heeded while the region is to be reached, as ArduSub heeds them in GUIDED alone. One that says what
-    the last one said makes no command, unless it is a way from here and none came for a second: QGroundControl's change
-    of depth, made twice.
+    Set-points are followed while the region is to be reached, as ArduSub follows them in GUIDED alone. One that comes
+    before that mode, as PX4's stations send it, waits for it. One that says what the last one said makes no command,
+    unless it is a way from here and none came for a second: QGroundControl's change of depth, made twice. A velocity
+    without a position is a sphere about the vehicle that travels; it ends when no set-point comes for three seconds.
 
     Parameters
     ----------
@@ -37,13 +47,16 @@ class Targets(Service):
 
     def __init__(self, context: VehicleContext, parameters: Parameters) -> None:
         super().__init__(context)
-        self._parameters = parameters
+        self._parameters, self._keep_in = parameters, KeepIn(context.scenario)
         m = context.mavlink
         self._last: tuple[object, ...] = ()
         self._last_at = -math.inf
+        self._drifting: Vector3 | None = None  # the velocity [m/s, NED] that a set-point without a position asked for
+        self._early: tuple[float, float, Callable[[], None]] | None = None  # the first, the last, and what it asks for
         self.messages = {
             "SET_POSITION_TARGET_LOCAL_NED": self._local,
             "SET_POSITION_TARGET_GLOBAL_INT": self._global,
+            "SET_ATTITUDE_TARGET": self._attitude,
         }
         self.commands = {
             m.MAV_CMD_DO_REPOSITION: self._reposition,
@@ -52,13 +65,34 @@ class Targets(Service):
         }
 
     def on_snapshot(self) -> None:
-        """Forget the last set-point once another mode is on."""
-        if self.context.mode_ahead != "reach":
-            self._last = ()
+        """Forget the last set-point once another mode is on, and follow one that came before its mode."""
+        context, early = self.context, self._early
+        if context.mode_ahead != "reach":
+            self._last, self._drifting = (), None
+        elif early is not None:
+            self._early = None
+            if context.now - early[1] < _EARLY:
+                early[2]()
+
+    def tick(self) -> None:
+        """End a velocity that is not sent any more, and say of set-points that wait for their mode."""
+        context, early = self.context, self._early
+        if self._drifting is not None and context.now - self._last_at >= _VELOCITY_LASTS:
+            moving, self._drifting, self._last = any(self._drifting), None, ()
+            if moving and context.mode_ahead == "reach":
+                context.submit(SetTarget(context.view.position_ned, context.settings["commands.hold_radius"]))
+                context.say(
+                    f"No velocity for {_VELOCITY_LASTS:g} s: the vehicle stays", context.mavlink.MAV_SEVERITY_WARNING
+                )
+        if early is not None and context.now - early[0] >= _PATIENCE:
+            self._early = None
+            now, then = (MODE_NAMES[mode].lower() for mode in (context.mode_ahead, "reach"))
+            text = f"Set-points wait: the mode is {now}, they count in {then}"
+            context.say(text, context.mavlink.MAV_SEVERITY_NOTICE, "early", 10.0)
 
     def restart(self) -> None:
         """Forget the last set-point."""
-        self._last = ()
+        self._last, self._drifting, self._early = (), None, None
 
     # ---- set-points ----
 
@@ -103,27 +137,65 @@ class Targets(Service):
         context, mask = self.context, message.type_mask
         if not self._may(sender):
             return
-        forced = mask & _FORCE and mask & _ACCELERATION != _ACCELERATION  # QGroundControl sets all bits but those
-        if mask & _Z or mask & _X_Y not in (0, _X_Y) or forced:
-            context.reject(f"set-point with mask {mask}: a position is needed", "mask")
+        fault = _fault(message)
+        if fault:
+            context.reject(f"set-point with mask {mask}: {fault}", "mask")
             return
         if context.mode_ahead != "reach":
-            name = MODE_NAMES[context.mode_ahead].lower()
-            context.reject(f"set-point while the mode is {name}", "mode of set-point")
+            first, last, _ = self._early or (context.now, context.now, None)
+            first = first if context.now - last < _EARLY else context.now
+            self._early = first, context.now, lambda: self._follow(message, frame, place, raw)
             return
+        self._follow(message, frame, place, raw)
+
+    def _follow(self, message: Any, frame: int, place: Vector3, raw: Vector3) -> None:
+        """Follow a set-point, unless the last one said the same."""
+        context, mask = self.context, message.type_mask
         going = (0.0, 0.0, 0.0) if mask & _VELOCITY else (message.vx, message.vy, message.vz)
         yaw = None if mask & _YAW or not math.isfinite(message.yaw) else message.yaw
-        said = (frame, mask, raw, going, yaw)
         since, self._last_at = context.now - self._last_at, context.now
-        if said == self._last and (frame not in _FROM_HERE or since < _ANEW):
+        velocity = self._levelled(frame, going)
+        commands: list[Command] = []
+        if mask & _X_Y and mask & _Z:
+            said: tuple[object, ...] = ("velocity", yaw)
+            if self._drifting is None or not math.dist(self._drifting, velocity) < _SAME_SPEED or said != self._last:
+                radius = context.settings["commands.hold_radius"]
+                commands.append(SetTarget(context.view.position_ned, radius, velocity))
+        else:
+            said = (frame, mask, raw, going, yaw)
+            if said != self._last or (frame in _FROM_HERE and since >= _ANEW):
+                place = (*context.view.target[:2], place[2]) if mask & _X_Y else place
+                commands.append(SetTarget(place, None, velocity))
+        if not commands:
             return
-        position = (*context.view.target[:2], place[2]) if mask & _X_Y else place
-        commands: list[Command] = [SetTarget(position, None, self._levelled(frame, going))]
         if yaw is not None and self._last[-1:] != (yaw,):
-            turned = frame in (_BODY, _BODY_OFFSET, _BODY_FRD)
-            commands.append(SetHeading(yaw + (context.view.euler[2] if turned else 0.0)))
+            commands.append(SetHeading(yaw + (context.view.euler[2] if frame in _TURNED else 0.0)))
         if context.submit(*commands) == context.mavlink.MAV_RESULT_ACCEPTED:
             self._last = said
+            self._drifting = velocity if said[0] == "velocity" else None
+            if self._drifting is None:
+                self.warn_of(place)
+
+    def _attitude(self, sender: Sender, message: Any) -> None:
+        self.context.reject(
+            "attitude set-points: the law keeps the attitude; CONDITION_YAW turns the vehicle", "attitude"
+        )
+
+    def warn_of(self, place: Vector3, of: str = "target") -> None:
+        """Say what stands against a target, which is followed all the same.
+
+        Parameters
+        ----------
+        place : tuple of float
+            Its middle [m, NED].
+        of : str
+            What is placed there.
+        """
+        context = self.context
+        for words in self._keep_in.objections(place, context.view, context.settings):
+            context.say(
+                f"Warning: {of} {words}", context.mavlink.MAV_SEVERITY_WARNING, f"{of} {words}", _WARNING_PERIOD
+            )
 
     def _may(self, sender: Sender) -> bool:
         context = self.context
@@ -169,8 +241,11 @@ class Targets(Service):
         commands: list[Command] = [SetTarget((x, y, z)) if any(map(math.isfinite, place)) else SetMode("hold")]
         if math.isfinite(yaw):
             commands.append(SetHeading(yaw))
-        self._last = ()
-        return context.submit(*commands)
+        self._last, self._drifting = (), None
+        result = context.submit(*commands)
+        if result == context.mavlink.MAV_RESULT_ACCEPTED and isinstance(commands[0], SetTarget):
+            self.warn_of((x, y, z))
+        return result
 
     def _turn(self, call: Call) -> int:
         context = self.context
@@ -184,13 +259,36 @@ class Targets(Service):
         return context.submit(SetHeading(angle))
 
     def _speed(self, call: Call) -> int:
-        m, speed = self.context.mavlink, call[2]
+        m, context = self.context.mavlink, self.context
         if not self._parameters.has(SPEED):
             return int(m.MAV_RESULT_UNSUPPORTED)
-        if speed < 0.0:  # as it is
-            return int(m.MAV_RESULT_ACCEPTED)
-        if not math.isfinite(speed):
+        try:
+            speed = resolve_speed(context, shortest(call[2]) if math.isfinite(call[2]) else call[2])
+        except CommandError as error:
+            context.reject(str(error), "speed")
             return int(m.MAV_RESULT_DENIED)
+        if speed is None:
+            return int(m.MAV_RESULT_ACCEPTED)
         if not self._may(call.sender):
             return int(m.MAV_RESULT_DENIED)
-        return self._parameters.change(SPEED, shortest(speed))
+        return self._parameters.change(SPEED, speed)
+
+
+def _fault(message: Any) -> str:
+    """Return what of a set-point cannot be followed, in words; empty where all can."""
+    mask = message.type_mask
+    position, velocity, acceleration = mask & (_X_Y | _Z), mask & _VELOCITY, mask & _ACCELERATION
+    if mask & _FORCE and acceleration != _ACCELERATION:  # QGroundControl sets all bits but those
+        return "forces are not followed"
+    asked = (a for i, a in enumerate((message.afx, message.afy, message.afz), 6) if not mask & 1 << i)
+    if any(asked):
+        return "accelerations are not followed"
+    if not mask & _YAW_RATE and message.yaw_rate:
+        return "yaw rates are not followed; a yaw is"
+    if position == _X_Y | _Z and velocity == 0:
+        return ""
+    if position == _X_Y | _Z:
+        return "a position or a velocity is needed"
+    if position not in (0, _X_Y) or velocity not in (0, _VELOCITY):
+        return "position and velocity are needed whole, or depth alone"
+    return ""

@@ -3,5 +3,5 @@
 The latest snapshot of the run by named quantities, the profile that it is shown with, the active ground station, and
 geodesy.
 
-Imports: controller, mavlink.wire, scenario, simulation, simulation.commands.
+Imports: controller, mavlink.wire, plant_fmu, scenario, simulation, simulation.commands.
 """

@@ -15,13 +15,41 @@ MODE_NAMES: dict[Mode, str] = {
     "reach": "Region reaching",
     "mission": "Mission of regions",
     "surface": "Surface",
+    "stabilize": "Stabilize",
+    "depth_hold": "Depth hold",
 }
 
 # MAV_STANDARD_MODE, for the modes that are like one
-STANDARD_MODES: dict[Mode, int] = {"manual": 0, "hold": 1, "reach": 0, "mission": 6, "surface": 5}
+STANDARD_MODES: dict[Mode, int] = {
+    "manual": 0,
+    "hold": 1,
+    "reach": 0,
+    "mission": 6,
+    "surface": 5,
+    "stabilize": 0,
+    "depth_hold": 4,
+}
 
 # MAV_MODE_FLAG: custom mode 1, auto 4, guided 8, stabilised 16, manual input 64
-_BASE_MODES: dict[Mode, int] = {"manual": 65, "hold": 25, "reach": 25, "mission": 29, "surface": 29}
+_BASE_MODES: dict[Mode, int] = {
+    "manual": 65,
+    "hold": 25,
+    "reach": 25,
+    "mission": 29,
+    "surface": 29,
+    "stabilize": 81,
+    "depth_hold": 81,
+}
+# ArduSub's, of which each mode is stabilised and has manual input
+_BASE_MODES_OF_ARDUSUB: dict[Mode, int] = {
+    "manual": 81,
+    "hold": 89,
+    "reach": 89,
+    "mission": 89,
+    "surface": 81,
+    "stabilize": 81,
+    "depth_hold": 81,
+}
 _ARMED = 128
 _CUSTOM = 1
 
@@ -66,7 +94,7 @@ class Profile:
         first, second : int
             Its parameters 2 and 3. PX4's encoding has main mode and sub-mode there; ArduPilot's the number alone. A
             number of ArduSub is none of PX4's main modes with a sub-mode 0 that means another of the modes here, but
-            for 1, ACRO there and MANUAL here, which are both by hand.
+            for 1 and 7, ACRO and CIRCLE there, MANUAL and STABILIZED here, which sticks steer.
         """
         if not self.packed:
             return self.mode_of(first)
@@ -78,10 +106,10 @@ class Profile:
         """Return whether a ``custom_mode`` is PX4's return: no mode here, but a command to surface at home."""
         return self.packed and number == _RETURN
 
-    @staticmethod
-    def base_mode(mode: Mode, armed: bool) -> int:
+    def base_mode(self, mode: Mode, armed: bool) -> int:
         """Return MAV_MODE_FLAG bits: custom mode always, then who steers, and whether the thrusters may work."""
-        return _BASE_MODES[mode] | (_ARMED if armed else 0)
+        modes = _BASE_MODES_OF_ARDUSUB if self.name == "ardusub" else _BASE_MODES
+        return modes[mode] | (_ARMED if armed else 0)
 
 
 def is_custom(base_mode: int) -> bool:
@@ -94,13 +122,23 @@ def _px4(main: int, sub: int = 0) -> int:
 
 
 _RETURN = _px4(4, 5)
-_ARDUSUB: dict[Mode, int] = {"manual": 19, "hold": 16, "reach": 4, "mission": 3, "surface": 9}
+_ARDUSUB: dict[Mode, int] = {
+    "manual": 19,
+    "hold": 16,
+    "reach": 4,
+    "mission": 3,
+    "surface": 9,
+    "stabilize": 0,
+    "depth_hold": 2,
+}
 _PX4: dict[Mode, int] = {
     "manual": _px4(1),
     "hold": _px4(4, 3),
     "reach": _px4(6),
     "mission": _px4(4, 4),
     "surface": _px4(4, 6),
+    "stabilize": _px4(7),
+    "depth_hold": _px4(2),
 }
 
 PROFILES: dict[ProfileName, Profile] = {

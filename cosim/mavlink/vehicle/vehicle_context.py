@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +15,7 @@ from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.vehicle.proximity import Proximity
 from cosim.mavlink.vehicle.view import View
+from cosim.mavlink.vehicle.voice import Voice
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.encode import Encoder
 from cosim.mavlink.wire.message_sink import MessageSink
@@ -26,13 +26,10 @@ from cosim.simulation.commands.commands import Arm, Command, MissionItem, Mode, 
 from cosim.simulation.commands.settings import LiveSettings
 from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.signals import Array, Column
+from plant_fmu.autopilot import Autopilot, pulse_of_effort
 
 COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1: ground stations listen to no other
 
-_CHUNK = 50  # characters of a STATUSTEXT
-_LONGEST_TEXT = 200  # characters
-_TEXTS = 12  # in each _TEXTS_PERIOD at the most
-_TEXTS_PERIOD = 1.0  # s
 _WISH_LASTS = 0.5  # s, that a command may take until a snapshot shows it
 
 
@@ -83,6 +80,8 @@ class VehicleContext:
         Where on the globe position 0 is.
     home : tuple of float
         North and east of home [m], which is at the surface.
+    voice : Voice
+        Says texts; `say`, `reject` and `text` are its own.
     now : float
         The wall clock, as it was told last [s].
     failsafe : bool
@@ -120,10 +119,13 @@ class VehicleContext:
         self.unix_start_us = time.time_ns() // 1000  # when simulated time was 0
         vehicle = scenario.vehicle
         self._limits = tuple(zip((-vehicle.thrust_min).tolist(), vehicle.thrust_max.tolist(), strict=True))
+        table = vehicle.autopilot if options.profile != "px4" else None
+        table = table or Autopilot("", tuple(range(1, vehicle.n_thrusters + 1)), curve="linear")
+        signs = table.signs if isinstance(table.signs, tuple) else (table.signs,) * vehicle.n_thrusters
+        self._outputs, self._curves = table.channels, [pulse_of_effort(table, sign) for sign in signs]
         self._commands = commands if options.commands and live and scenario.commands.enabled else None
-        self._said: dict[str, float] = {}
-        self._said_lately: deque[float] = deque(maxlen=_TEXTS)
-        self._text_id = 0
+        self.voice = Voice(self.mavlink, self.make, self.links, lambda: self.now)
+        self.say, self.reject, self.text = self.voice.say, self.voice.reject, self.voice.text
         self.restart()
 
     def restart(self) -> None:
@@ -182,8 +184,24 @@ class VehicleContext:
 
     def thrust_parts(self) -> list[float]:
         """Return what each thruster gives, as a part of the vehicle's limit on that side, from -1 to 1."""
+        return self._parts(self.view.thruster_forces)
+
+    def servo_pulses(self) -> list[float]:
+        """Return what each servo output says [us], by the vehicle's table ``autopilot``; 0 for an output of none.
+
+        Without that table, and as PX4, a thruster's output has its number, and pulses go straight with the force.
+        """
+        pulses = [0.0] * max(self._outputs, default=0)
+        for part, output, pulse in zip(
+            self._parts(self.view.thruster_commands), self._outputs, self._curves, strict=True
+        ):
+            if output:
+                pulses[output - 1] = pulse(part)
+        return pulses
+
+    def _parts(self, forces: Sequence[float]) -> list[float]:
         parts = []
-        for force, (backwards, forwards) in zip(self.view.thruster_forces, self._limits, strict=True):
+        for force, (backwards, forwards) in zip(forces, self._limits, strict=True):
             limit = forwards if force > 0.0 else backwards
             parts.append(max(-1.0, min(1.0, force / limit)) if limit > 0.0 else 0.0)
         return parts
@@ -232,49 +250,7 @@ class VehicleContext:
         self._wished = None if mode == self.mode else (self.now, mode)
         self._mode_before = mode
 
-    # ---- the voice ----
-
     def send(self, message: Any) -> None:
         """Send a message on every link."""
         for link in self.links:
             link.send(message)
-
-    def say(self, text: str, severity: int | None = None, key: str = "", every: float = 0.0) -> None:
-        """Send a text on every link, as STATUSTEXT, in parts if it is long.
-
-        Parameters
-        ----------
-        text : str
-            One line.
-        severity : int, optional
-            MAV_SEVERITY; default: information.
-        key : str
-            Texts of the same key are throttled together.
-        every : float
-            Seconds of the wall clock between two of a key.
-        """
-        if every and self.now - self._said.get(key, -every) < every:
-            return
-        if len(self._said_lately) == _TEXTS and self.now - self._said_lately[0] < _TEXTS_PERIOD:
-            return
-        self._said_lately.append(self.now)
-        if every:
-            self._said[key] = self.now
-        for message in self.text(text, severity):
-            self.send(message)
-
-    def reject(self, reason: str, key: str) -> None:
-        """Say why something is refused; not more often than every two seconds for a kind of reason."""
-        self.say(f"Refused: {reason}", self.mavlink.MAV_SEVERITY_WARNING, f"deny {key}", 2.0)
-
-    def text(self, text: str, severity: int | None = None) -> list[Any]:
-        """Return the STATUSTEXT messages of a text."""
-        level = self.mavlink.MAV_SEVERITY_INFO if severity is None else severity
-        text = text[:_LONGEST_TEXT]
-        if len(text) <= _CHUNK:
-            return [self.make("STATUSTEXT", level, text, 0, 0)]
-        self._text_id = self._text_id % 0xFFFF + 1
-        parts = [text[i : i + _CHUNK] for i in range(0, len(text), _CHUNK)]
-        if len(parts[-1]) == _CHUNK:
-            parts.append("")  # a part that is not full is the last one
-        return [self.make("STATUSTEXT", level, part, self._text_id, i) for i, part in enumerate(parts)]

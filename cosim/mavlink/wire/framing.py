@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields
 from functools import cache
 from typing import Any, NamedTuple
@@ -17,6 +17,7 @@ _SIGNED = 0x01  # of the flags that one must understand
 _SIGNATURE = 13  # bytes
 _CRC = 2  # bytes
 _SETUP_SIGNING = 256
+_LAST_OF_V1 = 255  # id of a message
 _V2_HEADER = struct.Struct("<BBBxxBBHB")  # marker, length, flags, system, component, id in two parts
 _V2_WHOLE = struct.Struct("<BBBBBBBHB")  # the same with what is skipped there: further flags and sequence number
 _V1_HEADER = struct.Struct("<BBxBBB")  # marker, length, system, component, id
@@ -30,6 +31,7 @@ class Kind(NamedTuple):
     crc_extra: int
     size: int  # bytes of the payload at the most
     target: int | None  # where in it the system is named that it is meant for
+    old_size: int  # bytes of the payload in MAVLink 1, which has no extension fields
 
 
 class Header(NamedTuple):
@@ -59,6 +61,7 @@ class Counts:
     forged: int = field(default=0, metadata={"words": "forged"})
     replayed: int = field(default=0, metadata={"words": "replayed"})
     old: int = field(default=0, metadata={"words": "too old"})
+    ahead: int = field(default=0, metadata={"words": "with a timestamp more than a minute ahead"})
     crowded: int = field(default=0, metadata={"words": "of too many signing streams"})
     setup_signing: int = field(default=0, metadata={"words": "that would change the key"})
 
@@ -73,7 +76,7 @@ class Counts:
 def kinds() -> dict[int, Kind]:
     """Return what is known of each message of the dialect, by its id."""
     return {
-        number: Kind(message.crc_extra, message.unpacker.size, _target(message))
+        number: Kind(message.crc_extra, message.unpacker.size, _target(message), _old_size(message))
         for number, message in dialect().mavlink_map.items()
     }
 
@@ -90,6 +93,18 @@ def _target(message: Any) -> int | None:
         kind = message.fieldtypes[message.fieldnames.index(other)]
         offset += _SIZES[kind] * (array or 1)
     return None
+
+
+def _old_size(message: Any) -> int:
+    """Return how long a payload is without extension fields, which stand last and are no part of CRC_EXTRA."""
+    crc, size, found = dialect().x25crc(f"{message.msgname} ".encode()), 0, int(message.unpacker.size)
+    for name, array in zip(message.ordered_fieldnames, message.array_lengths, strict=True):
+        kind = message.fieldtypes[message.fieldnames.index(name)]
+        crc.accumulate(f"{kind} {name} ".encode() + bytes((array,) if array else ()))
+        size += _SIZES[kind] * (array or 1)
+        if crc.crc & 0xFF ^ crc.crc >> 8 == message.crc_extra:
+            found = size  # the last one: one before it may be the same by chance
+    return found
 
 
 _SIZES = {"char": 1, "uint8_t": 1, "int8_t": 1, "uint16_t": 2, "int16_t": 2, "uint32_t": 4, "int32_t": 4,
@@ -124,15 +139,20 @@ class Framer:
 
     Attributes
     ----------
-    seq : int
-        Of the next frame, 0 to 255.
+    seq, old_seq : int
+        Of the next frame of MAVLink 2 and of MAVLink 1, 0 to 255.
     """
 
     def __init__(self, source: tuple[int, int]) -> None:
         self._source = source
         self._crc = dialect().x25crc
         self._message = 0
-        self.seq = 0
+        self.seq = self.old_seq = 0
+
+    def count(self, old: bytes | None) -> None:
+        """Go on to the next frame, also of MAVLink 1 unless `old` is None."""
+        self.seq = (self.seq + 1) % 256
+        self.old_seq = (self.old_seq + (old is not None)) % 256
 
     def frame(self, message: Any) -> bytes:
         """Return a message as a frame.
@@ -142,8 +162,18 @@ class Framer:
         struct.error, OverflowError, IndexError, TypeError, ValueError
             If a field cannot hold its value.
         """
+        return self._packed(message, self._framed)
+
+    def old_frame(self, message: Any) -> bytes | None:
+        """Return a message as a frame of MAVLink 1, without its extension fields; None for one that it has not.
+
+        It raises as `frame` does.
+        """
+        return None if message.get_msgId() > _LAST_OF_V1 else self._packed(message, self._framed_old)
+
+    def _packed(self, message: Any, pack: Callable[..., bytes]) -> bytes:
         self._message = message.get_msgId()  # its `id` may be a field
-        message._pack = self._framed  # which the message's own `pack` calls with its payload
+        message._pack = pack  # which the message's own `pack` calls with its payload
         try:
             framed: bytes = message.pack(None)
         finally:
@@ -155,6 +185,16 @@ class Framer:
         system, component = self._source
         number = self._message & 0xFFFF, self._message >> 16
         body = _V2_WHOLE.pack(V2, len(payload), 0, 0, self.seq, system, component, *number) + payload
+        return self._checked(body, crc_extra)
+
+    def _framed_old(self, codec: None, crc_extra: int, payload: bytes, force_mavlink1: bool = False) -> bytes:
+        payload = payload[: kinds()[self._message].old_size]
+        system, component = self._source
+        return self._checked(
+            bytes((V1, len(payload), self.old_seq, system, component, self._message)) + payload, crc_extra
+        )
+
+    def _checked(self, body: bytes, crc_extra: int) -> bytes:
         crc: int = self._crc(body[1:] + bytes((crc_extra,))).crc
         return body + crc.to_bytes(_CRC, "little")
 

@@ -16,7 +16,7 @@ from cosim.mavlink.channels.tlog import Tlog
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import Endpoint
-from cosim.mavlink.wire.framing import Counts, Framer, Gate, StreamReader
+from cosim.mavlink.wire.framing import V1, Counts, Framer, Gate, StreamReader
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.mavlink.wire.signing import SigningClock, Verifier
 
@@ -27,9 +27,9 @@ BUDGET = 200_000.0  # bytes/s, of the wall clock, into a network
 _BURST = 0.5  # s of the budget, that can go at once
 _RESERVED = 0.25  # of it, which streams and lists leave to answers
 _ANSWERS = frozenset(  # that go to the link on which they were asked for alone
-    ("AUTOPILOT_VERSION", "AVAILABLE_MODES", "COMMAND_ACK", "FILE_TRANSFER_PROTOCOL", "MESSAGE_INTERVAL",
-     "MISSION_ACK", "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_REQUEST_INT", "PARAM_ERROR", "PARAM_VALUE", "PING",
-     "TIMESYNC")
+    ("AUTOPILOT_VERSION", "AVAILABLE_MODES", "COMMAND_ACK", "FILE_TRANSFER_PROTOCOL", "LOG_DATA", "LOG_ENTRY",
+     "MESSAGE_INTERVAL", "MISSION_ACK", "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_REQUEST_INT", "PARAM_ERROR",
+     "PARAM_VALUE", "PING", "TIMESYNC")
 )  # fmt: skip
 _FIRST = frozenset(
     {
@@ -149,6 +149,7 @@ class Link:
         self._readers: WeakKeyDictionary[Any, StreamReader] = WeakKeyDictionary()
         self._frames: Iterator[tuple[bytes, Any]] = iter(())  # of the bytes that came last
         self._peer: Any = None  # where they came from
+        self._old_peers = False  # whether any has spoken MAVLink 1
         self._told: set[str] = set()  # of messages that could not be encoded
 
     def has_room(self) -> bool:
@@ -158,7 +159,11 @@ class Link:
     def send(self, message: Any) -> bool:
         """Encode, sign where that is asked for, and send a message; return whether it went to all peers."""
         try:
-            frame = self._framer.frame(message) if self._signer is None else self._signed(message, self._signer)
+            if self._signer is not None:  # what speaks MAVLink 1 cannot sign, and is not heard
+                frame, old = self._signed(message, self._signer), None
+            else:
+                frame = self._framer.frame(message)
+                old = self._framer.old_frame(message) if self._old_peers else None
         except _UNENCODABLE as error:
             self.unencodable += 1
             if message.get_type() not in self._told:
@@ -168,9 +173,9 @@ class Link:
         if self._budget is not None and not self._budget.take(len(frame), message.get_type() in _FIRST):
             self.dropped += 1
             return False
-        self._framer.seq = (self._framer.seq + 1) % 256
+        self._framer.count(old)
         self.sent += 1
-        sent = self.channel.send(frame)
+        sent = self.channel.send(frame, old)
         if message.get_type() in _ANSWERS:
             for tlog in self.logs:
                 tlog.send(message)
@@ -190,7 +195,9 @@ class Link:
         while time.perf_counter() < until:
             found = next(self._frames, None)
             if found is not None:
-                self.channel.heard(self._peer)
+                version = 1 if found[0][0] == V1 else 2
+                self._old_peers |= version == 1
+                self.channel.heard(self._peer, version)
                 yield found
                 continue
             received = self.channel.receive()

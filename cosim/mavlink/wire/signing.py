@@ -29,6 +29,7 @@ class Refusal(Enum):
     FORGED = "forged"
     REPLAYED = "replayed"
     OLD = "old"
+    AHEAD = "ahead"
     CROWDED = "crowded"
 
 
@@ -86,11 +87,19 @@ def _is_hexadecimal(text: str) -> bool:
 class SigningClock:
     """Timestamps of all signed frames of this vehicle: each is later than all before, also before a restart.
 
-    They go by the wall clock, and by whoever is ahead of it: to a peer whose clock is ahead ours would look old.
+    They go by the wall clock, and by whoever is at most a minute ahead of it: to a peer whose clock is ahead ours would
+    look old.
     """
 
     def __init__(self) -> None:
         self._last = 0
+        self._offset = time.time() - time.monotonic()  # s: a wall clock that is set back does not make all others early
+
+    @property
+    def latest_accepted(self) -> int:
+        """Timestamp [10 us since 2015] beyond which nobody is believed: a minute after the wall clock."""
+        wall = max(time.time(), self._offset + time.monotonic())
+        return int((wall - _EPOCH) * _PER_SECOND) + _MINUTE
 
     @property
     def now(self) -> int:
@@ -139,6 +148,8 @@ class Verifier:
         latest = self._latest.get(sender)
         if latest is not None and stamp <= latest:
             return Refusal.REPLAYED
+        if stamp > self._clock.latest_accepted:  # it would make all others look old
+            return Refusal.AHEAD
         oldest = self._clock.now - _MINUTE
         if latest is None and stamp < oldest:
             return Refusal.OLD

@@ -1,6 +1,6 @@
 // Commands to a live run: buttons, and the places of target and regions as numbers, for who has no mouse.
 
-const MODE_NAMES = ["manual", "hold", "reach", "mission", "surface"];
+const MODE_NAMES = ["manual", "hold", "reach", "mission", "surface", "stabilize", "depth_hold"];
 const SURE = 4000; // ms, for which a button that was pressed once waits to be pressed again
 const NEW_OBSTACLES = 1001; // their numbers begin here, away from those that sensors give
 

@@ -15,6 +15,7 @@ from cosim.scenario.tables import Vector3
 from cosim.simulation.actuators import Actuators
 from cosim.simulation.commands.commands import (
     MODES,
+    STICK_MODES,
     AddObstacle,
     Arm,
     ChangeSetting,
@@ -34,6 +35,7 @@ from cosim.simulation.commands.commands import (
 from cosim.simulation.commands.mission_executor import MissionExecutor
 from cosim.simulation.commands.obstacle_slots import ObstacleSlots
 from cosim.simulation.commands.settings import LiveSettings
+from cosim.simulation.commands.stick_stabilizer import StickStabilizer
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.signals import Array
 
@@ -92,18 +94,20 @@ class CommandHandler:
         # greatest wrench along and about each axis, which full sticks are parts of
         self._reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
         self._manual: Array = np.zeros(6)
+        self._stabilizer = StickStabilizer(vehicle, state, scenario.time.control, self._reach)
         self._mission = MissionExecutor()
         self._slots = ObstacleSlots(scenario.commands.obstacles)
 
     @property
     def automatic_control(self) -> bool:
         """Whether the law says what the thrusters do; otherwise `wrench` does."""
-        return self.armed and self.mode != "manual"
+        return self.armed and self.mode not in STICK_MODES
 
-    @property
     def wrench(self) -> Array:
-        """What the sticks ask for, shape (6,) [N, N m], body frame; nothing unless armed."""
+        """Return what the sticks ask for in a control period, shape (6,) [N, N m], body frame; nothing unless armed."""
         gain = self.settings["commands.pilot_gain"] if self.armed else 0.0
+        if self.armed and self.mode != "manual":
+            return self._stabilizer.wrench(self._manual, gain, self.mode == "depth_hold")
         wrench: Array = gain * self._manual * self._reach
         return wrench
 
@@ -129,6 +133,7 @@ class CommandHandler:
             case Arm():
                 self.armed = command.armed
                 self._manual[:] = 0.0
+                self._stabilizer.begin()
             case SetMode():
                 self._set_mode(command.mode, time)
             case SetTarget():
@@ -196,6 +201,8 @@ class CommandHandler:
                 self._environment.set_target(up, radius)
             case "reach":
                 self._environment.restore_target()
+            case "stabilize" | "depth_hold":
+                self._stabilizer.begin()
             case "mission":
                 self._mission.enter(max(self._mission.at, 0))
                 self._resume(time)

@@ -11,9 +11,10 @@ import msgspec
 from cosim.errors import CommandError
 from cosim.scenario.tables import Vector3, Vector6
 
-Mode = Literal["manual", "hold", "reach", "mission", "surface"]
+Mode = Literal["manual", "hold", "reach", "mission", "surface", "stabilize", "depth_hold"]
 
 MODES: tuple[Mode, ...] = get_args(Mode)  # a mode's index is its number in the record
+STICK_MODES: tuple[Mode, ...] = ("manual", "stabilize", "depth_hold")  # in which sticks steer, and no law
 
 NOT_A_COMMAND = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)  # what msgspec raises at a text that is none
 
@@ -38,7 +39,11 @@ class Arm(_Command, frozen=True):
 
 
 class SetMode(_Command, frozen=True):
-    """Change the mode: by hand, hold the place, reach the target region, follow the mission, or surface."""
+    """Change the mode: who steers, and whither.
+
+    By hand, hold the place, reach the target region, follow the mission, surface, by hand with the attitude kept, or by
+    hand with attitude and depth kept.
+    """
 
     mode: Mode
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v10 import all as v10
 
 from cosim.mavlink.wire.framing import Framer, StreamReader, kinds
 from tests.cosim.mavlink.stubs import Station, attitude, heartbeat, mavlink, odometry, open_gate, request_list
@@ -223,3 +224,10 @@ def test_offsets_of_targets_are_those_of_the_packed_message():
         setattr(message, name, 99)
         payload = np.frombuffer(message.pack(mavlink.MAVLink(None))[10:-2], np.uint8)
         assert payload[at] == 99, kind.msgname
+
+
+def test_what_mavlink_1_has_of_a_message_is_what_its_own_dialect_says():
+    both = [number for number in v10.mavlink_map if number in kinds()]
+    assert len(both) > 150
+    for number in both:
+        assert kinds()[number].old_size == v10.mavlink_map[number].unpacker.size, v10.mavlink_map[number].msgname

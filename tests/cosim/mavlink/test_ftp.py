@@ -142,9 +142,18 @@ def test_what_was_lost_is_sent_again(client):
     assert [bytes(r.payload) for r in client.send(packet)] == [bytes(r.payload) for r in client.send(packet)]
 
 
+@pytest.mark.parametrize("session", [0, 1, 7, 255])
+def test_replies_echo_the_session_that_the_station_chose(client, session):
+    """MAVProxy counts its sessions, and drops a reply of another one."""
+    for opcode, data in ((LISTING, b"/"), (OPEN, FILE), (READ, b""), (BURST, b""), (TERMINATE, b""), (OPEN, b"no")):
+        assert {reply.session for reply in client.ask(opcode, data, session=session, size=len(data) or 40)} == {session}
+
+
 def test_stations_do_not_share_a_session(client):
-    sessions = {client.ask(OPEN, FILE, system=system)[0].session for system in range(240, 248)}
-    assert len(sessions) == 8
+    for system in range(240, 248):  # all choose the same number
+        assert client.ask(OPEN, FILE + b"?start=%d" % (system - 240), system=system)[0].session == 0
+    heads = [client.ask(READ, size=40, system=system)[0].payload for system in range(240, 248)]
+    assert len(set(heads)) == 8
     for system in range(2, 200):  # many more: the oldest go
         assert client.ask(OPEN, FILE, system=system)[0].opcode == ACK
 

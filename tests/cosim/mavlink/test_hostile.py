@@ -32,9 +32,9 @@ class Script:
         self.looked += data is not None
         return None if data is None else (0, data)
 
-    def heard(self, peer): ...
+    def heard(self, peer, version): ...
 
-    def send(self, frame):
+    def send(self, frame, old=None):
         return True
 
     def tend(self, now): ...

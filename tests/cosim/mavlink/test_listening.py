@@ -248,7 +248,6 @@ def test_hearing_nothing_is_a_failure(capsys):
         (["udpin:10.0.0.1:14550"], "--allow-remote"),
         (["nonsense"], "endpoint 'nonsense'"),
         (["new.tlog"], "not a file"),
-        (["tcp:127.0.0.1:1"], "tcp:127.0.0.1:1"),
     ],
 )
 def test_what_is_no_endpoint_is_said_in_a_line(arguments, text, capsys):

@@ -16,6 +16,8 @@ from cosim.mavlink.vehicle.view import View
 from cosim.mavlink.wire.encode import Encoder, float32, whole, wrapped
 from cosim.simulation.columns import names_of
 from cosim.simulation.signals import Column
+from plant_fmu import load_vehicle
+from plant_fmu.autopilot import effort_of_pulse, pulse_of_effort
 from tests.cosim.mavlink.station import Station, scenario
 
 TURN = from_axis_angle(np.array([0.0, 0.0, 1.0]), 2.0)
@@ -69,11 +71,35 @@ def test_depth_as_pressure(station):
 
 
 def test_thrusters(station):
-    (servo,) = ask(station, 36)
-    assert [servo.servo1_raw, servo.servo2_raw, servo.servo3_raw, servo.servo4_raw] == [1700, 1100, 1500, 1900]
-    assert (servo.servo8_raw, servo.servo9_raw) == (1500, 0)
     (actuators,) = ask(station, 375)
     assert actuators.actuator[:4] == [0.5, -1.0, 0.0, 1.0] and actuators.active == 0xFF
+
+
+def servos(of, profile="ardusub", **row):
+    station = Station(profile, of=of)
+    station.look(1.0, **row)
+    (message,) = ask(station, 36)
+    return [getattr(message, f"servo{i}_raw") for i in range(1, 10)]
+
+
+def test_pulses_are_those_of_the_vehicles_own_table():
+    """A real ArduSub that drives a BlueROV2 Heavy forward gives 1300, 1300, 1700, 1700 (measured)."""
+    forward = {"thrust[1]": (10.0, 10.0, -10.0, -10.0)}
+    heavy = scenario("vehicle='bluerov2_heavy'", "actuation.through='thrusters'")
+    assert servos(heavy, **forward) == [1300, 1300, 1700, 1700, 1500, 1500, 1500, 1500, 0]
+    assert servos(heavy, "px4", **forward) == [1600, 1600, 1400, 1400, 1500, 1500, 1500, 1500, 0]  # linear, unsigned
+
+
+def test_pulses_and_forces_are_each_others_inverse():
+    table = load_vehicle("bluerov2_heavy").autopilot
+    for part in (-1.0, -0.3, 0.02, 0.5, 1.0):
+        assert effort_of_pulse(table, -1)(pulse_of_effort(table, -1)(part)) == pytest.approx(part)
+    assert pulse_of_effort(table, 1)(math.nan) == 1500
+
+
+def test_a_vehicle_without_a_table_has_straight_pulses_in_order():
+    forces = (13.5, -27.0, 0.0, 54.0)
+    assert servos(scenario(), **{"thrust[1]": forces})[:4] == [1700, 1100, 1500, 1900]
 
 
 def test_time_of_servos_wraps():

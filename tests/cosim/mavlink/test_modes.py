@@ -4,7 +4,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.vehicle.profile import PROFILES
-from cosim.simulation.commands.commands import Arm, Reset, SetMode, SetTarget
+from cosim.simulation.commands.commands import MODES, Arm, Reset, SetMode, SetTarget
 from tests.cosim.mavlink.station import NAN, Station, scenario
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
@@ -34,10 +34,12 @@ def test_arming(station):
         ("ardusub", (4,), "reach"),
         ("ardusub", (3,), "mission"),
         ("ardusub", (9,), "surface"),
+        ("ardusub", (0,), "stabilize"),
+        ("ardusub", (2,), "depth_hold"),
         # as MAVSDK and QGC send them to PX4, and MAVSDK to any other autopilot that is not ArduPilot
         *((p, n, m) for p in ("px4", "generic") for n, m in [
             ((1, 0), "manual"), ((1, NAN), "manual"), ((4, 3), "hold"), ((6, 0), "reach"), ((4, 4), "mission"),
-            ((4, 6), "surface"),
+            ((4, 6), "surface"), ((7, 0), "stabilize"), ((2, 0), "depth_hold"),
         ]),
     ],
 )  # fmt: skip
@@ -51,7 +53,7 @@ def test_each_profile_has_its_numbers(profile, numbers, mode):
 
 
 @pytest.mark.parametrize("profile", ["px4", "generic"])
-@pytest.mark.parametrize("number", [0, 2, 3, 4, 7, 9, 16, 19, 20, 21])
+@pytest.mark.parametrize("number", [0, 3, 4, 9, 16, 19, 20, 21])
 def test_a_number_of_ardusub_means_nothing_else(profile, number):
     station = Station(profile)
     station.look()
@@ -60,7 +62,7 @@ def test_a_number_of_ardusub_means_nothing_else(profile, number):
     assert station.commanded() == []
 
 
-@pytest.mark.parametrize("number", [0, 1, 2, 6, 7, 20, 21, 77])
+@pytest.mark.parametrize("number", [1, 6, 7, 20, 21, 77])
 def test_a_mode_that_is_not_there_is_refused(number):
     station = Station("ardusub")
     station.look()
@@ -86,10 +88,10 @@ def test_set_mode_message():
 def test_standard_modes(station):
     upload(station)
     station.commanded()
-    for number, mode in ((1, "hold"), (6, "mission"), (5, "surface")):
+    for number, mode in ((1, "hold"), (6, "mission"), (5, "surface"), (4, "depth_hold")):
         assert station.command(262, number) == ACCEPTED
         assert station.commanded() == [SetMode(mode)]
-    for number in (0, 2, 3, 4, 8, NAN):
+    for number in (0, 2, 3, 8, NAN):
         assert station.command(262, number) == FAILED
     assert station.commanded() == []
 
@@ -97,7 +99,7 @@ def test_standard_modes(station):
 def test_available_modes_say_what_can_be_set(station):
     assert station.command(512, 435, 0) == ACCEPTED
     modes = station.wire.of("AVAILABLE_MODES")
-    assert [(m.number_modes, m.mode_index) for m in modes] == [(5, i) for i in range(1, 6)]
+    assert [(m.number_modes, m.mode_index) for m in modes] == [(7, i) for i in range(1, 8)]
     profile = PROFILES[station.autopilot._context.options.profile]
     upload(station)
     station.commanded()
@@ -106,11 +108,23 @@ def test_available_modes_say_what_can_be_set(station):
             station.send(mavlink.MAVLink_set_mode_message(1, 1, message.custom_mode))
             (command,) = station.commanded()
             assert profile.numbers[command.mode] == message.custom_mode
-    assert station.command(512, 435, 6) == FAILED
+    assert station.command(512, 435, 8) == FAILED
     station.wire.clear()
     station.command(512, 435, 3)
     (one,) = station.wire.of("AVAILABLE_MODES")
     assert (one.mode_index, one.mode_name) == (3, "Region reaching")
+
+
+@pytest.mark.parametrize("armed", [0.0, 1.0])
+def test_base_mode_is_a_real_ardusubs(armed):
+    """ArduSub's base_mode(): stabilised and manual input in all modes, guided where it finds its own way."""
+    station = Station("ardusub")
+    for number, guided in ((0, 0), (2, 0), (3, 8), (4, 8), (9, 0), (16, 8), (19, 0)):
+        mode = PROFILES["ardusub"].mode_of(number)
+        station.look(1.0, **{"commands.mode": float(MODES.index(mode)), "commands.armed": armed})
+        station.command(512, 0)
+        beat = station.wire.of("HEARTBEAT")[-1]
+        assert (beat.custom_mode, beat.base_mode) == (number, 1 + 16 + 64 + guided + 128 * int(armed))
 
 
 def test_the_mode_shown_is_that_of_the_snapshot(station):

@@ -10,7 +10,7 @@ from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands import CommandQueue
 from cosim.simulation.master import Master
 from tests.cosim.mavlink.station import NAN, Station, Wire
-from tests.cosim.mavlink.test_targets import local, obstacle, sticks
+from tests.cosim.mavlink.test_targets import local, obstacle, sticks, velocity
 
 
 class Flight(Station):
@@ -52,6 +52,22 @@ def test_disarm_and_arm(flight):
     flight.fly(0.1)
     assert flight.last("HEARTBEAT").base_mode & 128
     assert flight.wire.texts[-2:] == ["Disarmed", "Armed"]
+
+
+def test_a_velocity_is_flown_and_ends(flight):
+    """MAVSDK's set_velocity_ned, streamed at 10 Hz."""
+    flight.fly(0.1)
+    x = flight.master.signals.view("position.x", 3)
+    for k in range(60):
+        flight.send(velocity((0.0, 0.2, 0.0)))
+        flight.fly(0.1)
+        if k == 29:
+            halfway = x.copy()
+    assert (x - halfway)[1] / 3.0 == pytest.approx(0.2, rel=0.2)
+    flight.fly(6.0)
+    rest = x.copy()
+    flight.fly(1.0)
+    assert np.abs(x - rest).max() < 0.05
 
 
 def test_a_set_point_is_reached(flight):
@@ -116,7 +132,7 @@ def test_who_listens_changes_nothing():
     for listening in (False, True):
         with Master(load_scenario("paper-deployable", ["time.duration=2.0"])) as master:
             flight = Flight(master, commands=False)
-            for _ in range(100):
+            for _ in range(60):
                 if listening:
                     flight.fly(0.01)
                     flight.command(400, 0.0)

@@ -31,7 +31,7 @@ def accepts(gate, frame):
 
 def refused(gate):
     c = gate.counts
-    names = ("unsigned", "forged", "replayed", "old", "crowded", "checksum", "malformed")
+    names = ("unsigned", "forged", "replayed", "old", "ahead", "crowded", "checksum", "malformed")
     return {name: getattr(c, name) for name in names if getattr(c, name)}
 
 
@@ -43,7 +43,7 @@ class Captured:
     def __init__(self):
         self.frames = []
 
-    def send(self, frame):
+    def send(self, frame, old=None):
         self.frames.append(frame)
         return True
 
@@ -128,12 +128,24 @@ def test_a_new_stream_may_be_a_minute_behind_and_an_old_one_goes_its_own_pace():
 def test_a_sender_whose_clock_is_ahead_takes_our_frames():
     clock = SigningClock()
     gate, link = open_gate(Verifier(KEY, clock)), signed_link(clock)
-    station = Station(key=KEY, stamp=now() + 60 * MINUTE)
+    station = Station(key=KEY, stamp=now() + MINUTE - 200_000)
+    station.codec.signing.timestamp += 6_100_000  # so far that ours look old to it
     link.send(heartbeat())
-    assert [m.get_type() for m in station.parse(link.channel.frames[-1])] == ["BAD_DATA"]  # an hour behind
+    assert [m.get_type() for m in station.parse(link.channel.frames[-1])] == ["BAD_DATA"]
+    station.codec.signing.timestamp -= 6_100_000
     assert accepts(gate, station.pack(heartbeat()))
     link.send(heartbeat())
     assert [m.get_type() for m in station.parse(link.channel.frames[-1])] == ["HEARTBEAT"]
+
+
+def test_a_clock_an_hour_ahead_is_refused_and_locks_nobody_out():
+    gate, clock = gate_and_clock()
+    for k in range(5):  # nor does one that creeps ahead, a minute at a time
+        accepts(gate, Station(key=KEY, link=k, stamp=now() + (k + 1) * MINUTE - 100_000).pack(heartbeat()))
+    assert refused(gate) == {"ahead": 4}
+    assert not accepts(gate, Station(key=KEY, link=9, stamp=now() + 60 * MINUTE).pack(heartbeat()))
+    assert refused(gate) == {"ahead": 5} and clock.now < now() + MINUTE
+    assert accepts(gate, Station(key=KEY, link=10, stamp=now()).pack(heartbeat()))
 
 
 def test_a_frame_heard_on_one_link_is_a_repeat_on_another():
@@ -150,10 +162,10 @@ def test_streams_are_bounded_and_forgotten_only_when_a_repeat_would_be_too_old()
     assert accepts(gate, first)
     for link in range(1, STREAMS):
         assert accepts(gate, Station(key=KEY, link=link, stamp=begin + 10 * link).pack(heartbeat()))
-    extra = Station(key=KEY, link=200, stamp=begin + 50 * MINUTE).pack(heartbeat())
+    extra = Station(key=KEY, link=200, stamp=begin + MINUTE - 100_000).pack(heartbeat())
     assert not accepts(gate, extra)
     assert refused(gate) == {"crowded": 1}
-    clock.heard(begin + 2 * MINUTE)  # time goes by
+    clock.heard(begin + MINUTE + 100_000)  # time goes by
     assert accepts(gate, extra)
     assert not accepts(gate, first)
     assert refused(gate) == {"crowded": 1, "old": 1}

@@ -7,6 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from controller.quaternion import from_axis_angle
+from cosim.mavlink.services.speed import terminal_speed
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.simulation.commands.commands import (
     AddObstacle,
@@ -16,7 +17,9 @@ from cosim.simulation.commands.commands import (
     SetMode,
     SetTarget,
 )
-from tests.cosim.mavlink.station import NAN, Station
+from cosim.simulation.environment import shape_center
+from plant_fmu import load_vehicle
+from tests.cosim.mavlink.station import NAN, Station, scenario
 
 POSITION = 0b110111111000
 WITH_VELOCITY = 0b110111000000
@@ -67,7 +70,7 @@ def test_depth_alone(station):
 
 
 @pytest.mark.parametrize("message", [
-    local(mask=0b110111000111), local(mask=0b111111111100), local(mask=POSITION | 1), local(frame=4), local(frame=20),
+    local(mask=0b110111111111), local(mask=0b111111111100), local(mask=POSITION | 1), local(frame=4), local(frame=20),
     local(place=(NAN, 0, 0)), local(place=(math.inf, 0, 0)), local(place=(1e6, 0, 0)), local(mask=0b111000111000),
     local(mask=WITH_VELOCITY, speed=(NAN, 0, 0)), local(mask=WITH_VELOCITY, speed=(1e4, 0, 0)),
 ])  # fmt: skip
@@ -85,6 +88,138 @@ def test_set_points_count_while_the_region_is_to_be_reached(station):
     station.command(176, 1, 4)  # and at once, before a snapshot shows it
     station.send(local())
     assert station.commanded()[1:] == [SetTarget((3.0, 4.0, 5.0))]
+
+
+def velocity(going, frame=1, mask=0b110111000111, **more):
+    return local(frame, mask, (0.0, 0.0, 0.0), going, **more)
+
+
+def test_a_velocity_without_a_position_travels_from_here_until_it_ends(station):
+    """MAVSDK's set_velocity_ned, sent again at 20 Hz, and then no more."""
+    for _ in range(20):
+        station.send(velocity((0.2, 0.0, -0.1)))
+        station.wait(0.05)
+    station.send(velocity((0.0, 0.3, 0.0)))
+    first, second = station.commanded()
+    assert first.velocity == pytest.approx((0.2, 0.0, -0.1)) and second.velocity == pytest.approx((0.0, 0.3, 0.0))
+    assert first.position == second.position == (1.0, 2.0, 5.0) and first.radius == 0.3
+    station.wait(2.9)
+    assert station.commanded() == []
+    station.wait(0.2)
+    assert station.commanded() == [SetTarget((1.0, 2.0, 5.0), 0.3)]
+    assert "No velocity for 3 s: the vehicle stays" in station.wire.texts
+
+
+def test_a_velocity_in_the_bodys_frame_is_turned_by_yaw(station):
+    station.look(2.0, **EAST)
+    station.send(velocity((0.2, 0.0, 0.0), frame=8))
+    (command,) = station.commanded()
+    assert command.velocity == pytest.approx((0.0, 0.2, 0.0), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("message", "words"),
+    [
+        (velocity((0.1, 0, 0), mask=0b010111000111), "yaw rates are not followed"),
+        (local(mask=0b110000111000), "accelerations are not followed"),
+        (local(mask=0b110000111111), "accelerations are not followed"),
+    ],
+)
+def test_rates_and_accelerations_are_refused_aloud(station, message, words):
+    message.afx, message.yaw_rate = 0.1, 0.2
+    station.send(message)
+    assert station.commanded() == []
+    assert words in "".join(station.wire.texts)
+
+
+def test_an_attitude_is_refused_aloud(station):
+    q = [1.0, 0.0, 0.0, 0.0]
+    station.send(mavlink.MAVLink_set_attitude_target_message(0, 1, 1, 0, q, 0.0, 0.0, 0.0, 0.5))
+    assert "Refused: attitude set-points" in "".join(station.wire.texts)
+
+
+def test_a_set_point_before_its_mode_is_no_warning_and_counts_with_it(station):
+    """PX4's pattern: stream set-points, then switch to offboard."""
+    station.look(2.0, **{"commands.mode": 1.0})
+    station.wire.clear()
+    for _ in range(10):
+        station.send(local())
+        station.wait(0.05)
+    assert station.commanded() == [] and station.wire.texts == []
+    station.look(3.0)
+    assert station.commanded() == [SetTarget((3.0, 4.0, 5.0))]
+
+
+def test_set_points_that_wait_too_long_are_spoken_of(station):
+    station.look(2.0, **{"commands.mode": 1.0})
+    station.wire.clear()
+    for _ in range(35):
+        station.send(local())
+        station.wait(0.1)
+    (text,) = texts(station)
+    assert text == "Set-points wait: the mode is position hold, they count in region reaching"
+    assert {m.severity for m in station.wire.of("STATUSTEXT")} == {mavlink.MAV_SEVERITY_NOTICE}
+
+
+def texts(station):
+    """Return the texts, each whole."""
+    whole = []
+    for message in station.wire.of("STATUSTEXT"):
+        if message.chunk_seq:
+            whole[-1] += message.text
+        else:
+            whole.append(message.text)
+    return whole
+
+
+def test_each_reason_of_a_refusal_is_said_in_the_end(station):
+    for k in range(6):
+        station.send(local(frame=20 + k % 3))
+    assert len(station.wire.texts) == 2  # one text in two parts
+    station.wait(2.1)
+    said = texts(station)
+    assert sum("frame 20;" in text for text in said) == 2 and sum("frame 22;" in text for text in said) == 1
+    assert any("(2 times)" in text for text in said if "frame 21;" in text)
+
+
+def test_a_flood_of_texts_waits_and_is_not_lost(station):
+    for k in range(30):
+        station.autopilot._context.say(f"text {k}")
+    assert len(station.wire.texts) == 12
+    station.wait(3.0)
+    assert station.wire.texts == [f"text {k}" for k in range(30)]
+
+
+def test_targets_above_water_or_outside_their_region_are_followed_with_a_warning():
+    kept_in = scenario(name="harbour")
+    station = Station("ardusub", of=kept_in)
+    station.look()
+    (region,) = [r.region for r in kept_in.regions if r.region.keep == "in"][:1]
+    station.send(local(place=(1000.0, 0.0, -1.5)))
+    assert station.commanded() == [SetTarget((1000.0, 0.0, -1.5))]
+    said = texts(station)
+    assert "Warning: target 1.5 m above the surface" in said
+    assert any(text.startswith("Warning: target ") and text.endswith(f"m outside {region.name}") for text in said)
+    station.wire.clear()
+    station.wait(3.0)
+    station.send(local(place=tuple(map(float, shape_center(region.shape)))))
+    assert not any("outside" in text for text in texts(station))
+
+
+@pytest.mark.parametrize("speed", [-0.5, 99.0, 0.0, NAN, math.inf, 1.2])
+def test_speeds_that_cannot_be_are_refused_aloud(speed):
+    station = Station("ardusub", of=scenario("vehicle='bluerov2_heavy'", name="pipe-inspection"))
+    station.look()
+    assert station.command(178, 0.0, speed) == mavlink.MAV_RESULT_DENIED
+    assert "Refused: a speed of" in "".join(station.wire.texts)
+    assert station.commanded() == []
+
+
+def test_speeds_of_the_protocol(station):
+    assert terminal_speed(load_vehicle("bluerov2_heavy")) == pytest.approx(0.85, abs=0.01)  # 13.7 v + 141 v² = 113 N
+    for asked, key in ((-1.0, None), (0.2, 0.2), (-2.0, station.autopilot._context.scenario.law.gains.speed)):
+        assert station.command(178, 0.0, asked) == mavlink.MAV_RESULT_ACCEPTED
+        assert [c.value for c in station.commanded()] == ([] if key is None else [key])
 
 
 def test_the_same_set_point_counts_again_after_another_mode(station):
@@ -291,4 +426,26 @@ def test_only_so_many_and_the_one_not_seen_for_long_goes(station):
 def test_obstacles_in_other_frames_or_nowhere(station):
     station.send(obstacle(frame=8))
     station.send(obstacle(place=(NAN, 0.0, 0.0)))
+    assert station.commanded() == []
+
+
+def override(*pulses):
+    return mavlink.MAVLink_rc_channels_override_message(1, 1, *pulses, *[0xFFFF] * (8 - len(pulses)))
+
+
+@pytest.mark.parametrize("mode", [0.0, 5.0, 6.0])
+def test_overridden_channels_are_sticks_in_ardusubs_order(station, mode):
+    station.look(2.0, **{"commands.mode": mode})
+    station.send(override(1500, 1500, 1700, 1500, 1900, 1300))  # pitch roll up yaw forward right
+    (command,) = station.commanded()
+    assert command.wrench == pytest.approx((1.0, -0.5, -0.5, 0.0, 0.0, 0.0))
+    station.send(override(0xFFFF, 0xFFFF, 0, 0xFFFF, 0xFFFF, 1500))  # up released, forward as it is
+    (command,) = station.commanded()
+    assert command.wrench == pytest.approx((1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    station.wait(3.1)
+    assert station.commanded()[-1] == ManualControl((0.0,) * 6)
+
+
+def test_overridden_channels_count_in_no_other_mode(station):
+    station.send(override(1500, 1500, 1700, 1500, 1900, 1300))
     assert station.commanded() == []

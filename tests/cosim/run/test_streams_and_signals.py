@@ -21,6 +21,9 @@ import plant_fmu.__main__
 from cosim.command_line import cli
 from cosim.command_line.cli import main
 from cosim.command_line.process import kills_interrupt
+from cosim.mavlink.conformance.vehicle import running_vehicle
+from cosim.mavlink.wire.endpoint import Endpoint
+from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.results.record import load_record
 from cosim.run.run_folder import report_again
 from tests.docs.peers import flying
@@ -254,11 +257,23 @@ VERBS = {  # {run}: a run folder
     "stream": ["{run}", "--mavlink", "run.tlog", "--rate", "max"],
     "mavlink-check": [],
     "sitl": ["--port", "9114", "--timeout", "60", "--set", "time.duration=0.02", "--no-report", "--out", "out"],
+    "companion": [
+        "udpin:127.0.0.1:14572", "--scenario", "pipe-inspection", "--profile", "generic", "--dry-run",
+        "--timeout", "60", "--scene-origin", "55.9097,-3.3203", "--set", "time.duration=0.1", "--no-report",
+        "--out", "out",
+    ],
     "completion": ["bash"],
     "help": [],
-}
+}  # fmt: skip
+WAITING = {"sitl", "companion"}  # verbs that say on standard error that they wait, and who came
 SLOW = {"report", "check", "calibrate", "package", "campaign", "compare", "sweep", "rerun", "mavlink-check"}
-NEED = {"watch": "rich", "listen": "pymavlink", "stream": "pymavlink", "mavlink-check": "pymavlink"}
+NEED = {
+    "watch": "rich",
+    "listen": "pymavlink",
+    "stream": "pymavlink",
+    "mavlink-check": "pymavlink",
+    "companion": "pymavlink",
+}
 
 
 def test_D12_every_verb_is_tried():
@@ -266,7 +281,7 @@ def test_D12_every_verb_is_tried():
 
 
 @pytest.mark.parametrize(
-    "verb", [pytest.param(verb, marks=pytest.mark.slow) if verb in SLOW | {"sitl"} else verb for verb in VERBS]
+    "verb", [pytest.param(verb, marks=pytest.mark.slow) if verb in SLOW | WAITING else verb for verb in VERBS]
 )
 def test_D12_a_reader_that_goes_away_ends_every_verb_alike(verb, flown, place, unread, capsys):
     if verb in NEED:
@@ -277,9 +292,12 @@ def test_D12_a_reader_that_goes_away_ends_every_verb_alike(verb, flown, place, u
     with contextlib.ExitStack() as stack:
         if verb == "sitl":
             stack.enter_context(flying(9114))
+        if verb == "companion":
+            seen = Endpoint("udpout", "vehicle", host="127.0.0.1", port=14572)
+            stack.enter_context(running_vehicle([seen], MavlinkOptions(commands=True)))
         stack.enter_context(unread())
         assert main([verb, *(word.format(run=flown) for word in VERBS[verb])]) == 141
-    assert verb == "sitl" or capsys.readouterr().err == ""  # which says there that it waits, and who came
+    assert verb in WAITING or capsys.readouterr().err == ""
 
 
 OTHERS = [

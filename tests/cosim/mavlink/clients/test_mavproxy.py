@@ -13,7 +13,7 @@ from tests.cosim.mavlink.clients.conftest import commands_of, cosim_run
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs
 
-MODULES = "param,wp,fence,mode,arm,cmdlong,link,misc,rc,signing,output,log"
+MODULES = "param,wp,fence,mode,arm,cmdlong,link,misc,rc,signing,output,log,ftp"
 PATIENCE = 60.0  # s, for what is to be seen
 
 
@@ -92,13 +92,15 @@ def test_a_pilot_connects_arms_changes_modes_and_lists_what_there_is(ardupilots_
 
         mavproxy.do("disarm", "DISARMED")
         mavproxy.do("arm throttle", "COMPONENT_ARM_DISARM: ACCEPTED", r"(?<!DIS)ARMED")
-        for mode in ("POSHOLD", "MANUAL", "SURFACE", "GUIDED"):
+        for mode in ("POSHOLD", "MANUAL", "STABILIZE", "ALT_HOLD", "SURFACE", "GUIDED"):
             mavproxy.do(f"mode {mode}", f"Mode {mode}")
         name, before = re.search(r"^(\S+)\s+([\d.]+)", parameters, re.MULTILINE).groups()
         mavproxy.do(f"param show {name}", rf"{name}\s+{float(before):.6f}")
         mavproxy.do("wp list", r"Requesting 0 waypoints|Have 0 waypoints|Saved \d+ waypoints|\d+ waypoints")
+        mavproxy.do("ftp list @PARAM", r"param\.pck\s+\d+")  # it drops replies of a session that is not its own
+        mavproxy.do("log list", "No logs")
         mavproxy.do("status", r"MAV Errors: 0", r"SYS_STATUS", r"HOME_POSITION")
         text = mavproxy.text.lower()
     assert "fence breach" not in text
     assert "traceback" not in text and "error in" not in text
-    assert commands_of(folder)[:2] == ["arm", "arm"] and commands_of(folder).count("set_mode") == 4
+    assert commands_of(folder)[:2] == ["arm", "arm"] and commands_of(folder).count("set_mode") == 6

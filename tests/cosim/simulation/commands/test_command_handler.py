@@ -109,6 +109,36 @@ def test_sticks_push_along_their_axis(fly, axis):
     assert velocity[axis] > 0.1
 
 
+def sticks(*values):
+    return ManualControl(tuple(values))
+
+
+def test_stabilized_sticks_keep_level_and_heading_where_bare_ones_do_not(fly):
+    push = [sticks(0.5, 0.0, 0.0, 0.0, 0.0, 0.0)]
+    bare = fly({0: [SetMode("manual"), *push]}, "time.duration=10", *OPEN)
+    helped = fly({0: [SetMode("stabilize"), *push]}, "time.duration=10", *OPEN)
+    assert np.abs(bare["attitude.pitch"]).max() > 0.15
+    assert np.abs(helped.stack("attitude.roll", "attitude.pitch")).max() < 0.1
+    assert abs(helped["attitude.yaw"][-1]) < 0.01
+    assert helped["velocity.u"][-1] > 0.4 and not helped["command.Z"].any()  # heave is the pilot's
+
+
+def test_depth_is_kept_until_the_vertical_stick_asks_for_a_rate(fly):
+    commands = {0: [SetMode("depth_hold")], 1000: [sticks(0, 0, 1.0, 0, 0, 0)], 1500: [sticks(0, 0, 0, 0, 0, 0)]}
+    run = fly(commands, "time.duration=30", *OPEN)
+    depth = run.position[:, 2]
+    assert np.abs(depth[500:1000] - depth[0]).max() < 0.05
+    assert np.diff(depth[1200:1500]).mean() * STEPS == pytest.approx(0.3, abs=0.05)
+    assert np.ptp(depth[2500:]) < 0.05
+
+
+def test_the_yaw_stick_asks_for_a_rate_and_the_heading_is_kept_then(fly):
+    commands = {0: [SetMode("stabilize"), sticks(0, 0, 0, 0, 0, 0.25)], 400: [sticks(0, 0, 0, 0, 0, 0)]}
+    yaw = np.unwrap(fly(commands, "time.duration=10", *OPEN)["attitude.yaw"])
+    assert np.diff(yaw[200:400]).mean() * STEPS == pytest.approx(np.radians(0.5 * 0.25 * 202.5), rel=0.1)
+    assert np.ptp(yaw[700:]) < 0.02
+
+
 def test_greatest_wrench_is_where_the_first_thruster_is_at_its_limit():
     vehicle = load_vehicle("bluerov2_heavy")
     matrix, limit = vehicle.thruster_matrix, vehicle.thrust_max[0]

@@ -1,0 +1,124 @@
+"""``cosim companion``."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from cosim.command_line.link_flags import origin
+from cosim.command_line.numbers import number, whole
+from cosim.command_line.process import INTERRUPTED, tell
+from cosim.command_line.results import print_run
+from cosim.mavlink.wire.options import PROFILES
+
+_COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
+_STEER_BY = ("sticks", "wrench", "velocity")
+
+
+def add_verb(verbs: Any) -> None:
+    """Add the verb to the parser.
+
+    Parameters
+    ----------
+    verbs : argparse subparsers
+        Of the command.
+    """
+    verb = verbs.add_parser("companion", help="steer a real autopilot by a scenario's regions, arbiter and law")
+    verb.add_argument(
+        "endpoint",
+        metavar="ENDPOINT",
+        help="where the autopilot is, such as udpin:127.0.0.1:14550 or serial:/dev/ttyACM0",
+    )
+    verb.add_argument("--scenario", required=True, help="a shipped name, or a TOML file")
+    verb.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run")
+    verb.add_argument("--profile", choices=PROFILES, default="ardusub", help="which autopilot it is (default: ardusub)")
+    verb.add_argument(
+        "--steer-by", choices=_STEER_BY, default="sticks",
+        help="sticks: surge, sway, heave and yaw while the autopilot keeps level; wrench: all six axes in manual mode; "
+        "velocity: set-points (default: sticks)",
+    )  # fmt: skip
+    where = verb.add_mutually_exclusive_group()
+    where.add_argument(
+        "--scene-origin", type=origin, metavar="LAT,LON", help="where the scene's origin is on the globe, in degrees"
+    )
+    where.add_argument(
+        "--surveyed-origin", type=_position, metavar="N,E,D",
+        help="where the autopilot's local origin is in the scene, in metres (a negative number as "
+        "--surveyed-origin=-1,0,0)",
+    )  # fmt: skip
+    verb.add_argument(
+        "--surface-pressure", type=number(500.0, 1200.0), default=1013.25, metavar="HPA",
+        help="of the air, for the depth (default: 1013.25)",
+    )  # fmt: skip
+    verb.add_argument(
+        "--water-density", type=number(900.0, 1200.0), default=1000.0, metavar="KG/M3", help="default: 1000; sea: 1025"
+    )
+    arming = verb.add_mutually_exclusive_group()
+    arming.add_argument(
+        "--dry-run", action="store_true", help="compute and record, and send neither sticks nor commands"
+    )
+    arming.add_argument("--await-arm", action="store_true", help="wait for somebody to arm the vehicle (the default)")
+    arming.add_argument("--arm", action="store_true", help="arm the vehicle")
+    verb.add_argument(
+        "--pilot-gain", type=number(0.05, 1.0), default=0.5, metavar="N",
+        help="part of the greatest wrench that full sticks give: ArduSub's JS_GAIN_DEFAULT (default: 0.5)",
+    )  # fmt: skip
+    verb.add_argument(
+        "--velocity-lag", type=number(0.01, 10.0), default=0.5, metavar="S",
+        help="of the autopilot's velocity loop (default: 0.5)",
+    )  # fmt: skip
+    verb.add_argument(
+        "--least-battery", type=number(0.0, 100.0), default=0.0, metavar="PERCENT",
+        help="hold the vehicle below it (default: 0, never)",
+    )  # fmt: skip
+    verb.add_argument(
+        "--system-id", type=whole(1, 255), default=255, metavar="N",
+        help="of the companion; an ArduSub takes sticks from its SYSID_MYGCS alone (default: 255)",
+    )  # fmt: skip
+    verb.add_argument(
+        "--timeout", type=number(0.1, 1e6), metavar="S", help="end if steering cannot begin in so many seconds"
+    )
+    verb.add_argument("--allow-remote", action="store_true", help="let the link leave this machine")
+    verb.add_argument("--signing-key", type=Path, metavar="FILE", help="sign with the key in this file")
+    verb.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: runs/SCENARIO-TIME)")
+    verb.add_argument("--no-report", action="store_true", help="leave out the report, its figures and the replay")
+
+
+def companion(options: argparse.Namespace) -> int:
+    """Run ``cosim companion``."""
+    from cosim.companion.companion import Companion
+    from cosim.companion.frame_alignment import SceneOrigin
+    from cosim.companion.link import NetworkLink
+    from cosim.companion.options import CompanionOptions
+    from cosim.errors import TelemetryError
+    from cosim.mavlink.wire.endpoint import parse_endpoint
+    from cosim.mavlink.wire.signing import read_key
+    from cosim.scenario.scenario import load_scenario
+
+    endpoint = parse_endpoint(options.endpoint, options.allow_remote)
+    if endpoint.kind == "tlog":
+        raise TelemetryError(f"endpoint {options.endpoint!r}: expected a network or a serial device, not a file")
+    scene = SceneOrigin(options.scene_origin, options.surveyed_origin, options.surface_pressure, options.water_density)
+    chosen = CompanionOptions(
+        options.profile, options.steer_by, scene, options.dry_run, options.arm, options.pilot_gain,
+        options.velocity_lag, options.least_battery, options.timeout,
+    )  # fmt: skip
+    scenario = load_scenario(options.scenario, options.overrides)
+    key = read_key(options.signing_key) if options.signing_key else None
+    with NetworkLink(endpoint, key, (options.system_id, _COMPONENT)) as link:
+        run = Companion(scenario, link, chosen).run(options.out, not options.no_report, _show)
+    print_run(options, run, not options.no_report)
+    return INTERRUPTED if run.summary["status"] == "interrupted" else 0
+
+
+def _show(state: str, missing: str) -> None:
+    tell(state.replace("_", " ") + ("" if missing == "nothing" else f", waits for {missing}"))
+
+
+def _position(text: str) -> tuple[float, float, float]:
+    try:
+        north, east, down = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected metres north, east and down, such as 1.5,-2,0") from error
+    return north, east, down

@@ -1,0 +1,191 @@
+"""A scenario flown on a real vehicle: from the first heartbeat to the run's folder."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from controller.regions.region_set import of_attitude
+from cosim.companion.link import AutopilotLink
+from cosim.companion.options import CompanionOptions
+from cosim.companion.rehearsal import rehearse
+from cosim.companion.remote_vehicle import RemoteVehicle
+from cosim.companion.safety import State
+from cosim.companion.session import AutopilotSession
+from cosim.errors import RunError
+from cosim.results.recorder import Recorder
+from cosim.results.run_result import Run
+from cosim.run.run_folder import claim, conclude
+from cosim.scenario.scenario import Scenario
+from cosim.scenario.tables import SecondaryRegion
+from cosim.simulation.master import Master
+
+_RELEASE = 2.0  # s at the most, that letting go takes at the end
+
+
+def scenario_to_steer(scenario: Scenario) -> Scenario:
+    """Return a scenario as the companion flies it: a step is a control period, and the state is what is reported.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        As it is simulated.
+
+    Raises
+    ------
+    RunError
+        If it asks for what a real vehicle cannot be made to do.
+    ScenarioError
+        If its periods do not fit.
+    """
+    for key, asked in (("failures", scenario.failures), ("record.lyapunov", scenario.record.lyapunov)):
+        if asked:
+            raise RunError(f"{scenario.name}: {key} is set, expected none: the vehicle is a real one")
+    period = scenario.time.control
+    arbiter = max(1, round(scenario.time.arbiter / period)) * period
+    duration = max(1, round(scenario.time.duration / period)) * period
+    return scenario.replace(
+        {
+            "time.step": period,
+            "time.arbiter": arbiter,
+            "time.duration": duration,
+            "sensing.through": "state",
+            "sensing.position_noise": 0.0,
+            "sensing.velocity_noise": 0.0,
+            "sensing.dead_for": 0.0,
+            "commands.enabled": True,
+            "commands.await_arm": True,
+            "commands.obstacles": 0,
+        }
+    )
+
+
+def _is_fence(secondary: SecondaryRegion) -> bool:
+    return secondary.region.hard and not of_attitude(secondary.region.shape)
+
+
+class Companion:
+    """Steers a vehicle through its autopilot by a scenario's regions, arbiter and law.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is to be flown, as it is simulated.
+    link : AutopilotLink
+        To the autopilot; it stays open.
+    options : CompanionOptions
+        How.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        As it is flown.
+    session : AutopilotSession
+        With the autopilot.
+
+    Raises
+    ------
+    RunError, ScenarioError
+        As `scenario_to_steer`.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> with cosim.NetworkLink(cosim.parse_endpoint("udpout:127.0.0.1:14599")) as link:
+    ...     companion = cosim.Companion(cosim.load_scenario("pipe-inspection"), link, cosim.CompanionOptions())
+    >>> companion.scenario.time.step, companion.session.supervisor.state
+    (0.02, 'waiting')
+    """
+
+    def __init__(self, scenario: Scenario, link: AutopilotLink, options: CompanionOptions) -> None:
+        self.scenario = scenario_to_steer(scenario)
+        self._options = options
+        self.session = AutopilotSession(link, self.scenario.vehicle, options)
+        self._said = ("", "")
+        hard = [i for i, secondary in enumerate(self.scenario.regions, 1) if _is_fence(secondary)]
+        self._hard = np.array(hard, dtype=int)
+
+    def run(
+        self, out: Path | None = None, report: bool = True, tell: Callable[[State, str], None] | None = None
+    ) -> Run:
+        """Wait until the vehicle can be steered, steer it for the scenario's time, and let go.
+
+        Parameters
+        ----------
+        out : Path, optional
+            The run folder, as for `run_scenario`.
+        report : bool
+            Write report and figures too.
+        tell : callable, optional
+            Told of each state, and what it waits for, when that changes.
+
+        Returns
+        -------
+        Run
+            Its status is ``completed``, or says in which state it ended and why.
+
+        Raises
+        ------
+        RunError
+            If steering cannot begin in time, or the folder cannot be written.
+        BuildError, LawError, DefinitionError
+            If law or arbiter cannot be set up.
+        KeyboardInterrupt
+            If Ctrl-C came before steering began.
+        """
+        rehearse(self.scenario, self._options)
+        with Master(self.scenario, plant=RemoteVehicle(self.scenario, self.session)) as master:
+            self.prepare(tell)
+            folder = claim(out, self.scenario)
+            try:
+                recorder = Recorder(folder.path, master.signals.columns)
+            except BaseException:
+                folder.discard()
+                raise
+            started = time.perf_counter()
+            try:
+                status = self._steer(master, recorder, tell)
+            finally:
+                self.session.release(_RELEASE)
+                wall_time = time.perf_counter() - started
+                kept = folder.keep(recorder)
+            if not kept:
+                raise RunError(f"{folder.path}: ended before the first step")
+            return conclude(folder.path, self.scenario, status, wall_time, report)
+
+    def prepare(self, tell: Callable[[State, str], None] | None = None) -> None:
+        """Exchange messages until the vehicle can be steered; RunError if that takes longer than the options allow."""
+        session, period = self.session, self.scenario.time.step
+        begun = session.clock()
+        while not session.supervisor.is_steering:
+            now = session.clock()
+            session.exchange(np.zeros(6), now, now + period)
+            self._report(tell)
+            if self._options.timeout is not None and now - begun > self._options.timeout:
+                raise RunError(f"{self._options.timeout:g} s have gone by, waiting for {session.missing()}")
+
+    def _steer(self, master: Master, recorder: Recorder, tell: Callable[[State, str], None] | None) -> str:
+        session = self.session
+        clearances = master.signals.view("goal.clearance", len(self.scenario.regions) + 1)
+        master.plant.initialise()
+        try:
+            for k in range(self.scenario.steps + 1):
+                master.step(k, session)
+                recorder.observe(k, master.row)
+                violated = clearances[self._hard]
+                session.outside = float(max(0.0, -np.nanmin(violated))) if np.isfinite(violated).any() else 0.0
+                self._report(tell)
+        except KeyboardInterrupt:
+            return "interrupted"
+        state, reason = session.supervisor.state, session.supervisor.reason
+        return "completed" if session.supervisor.is_steering else f"{state}: {reason}"
+
+    def _report(self, tell: Callable[[State, str], None] | None) -> None:
+        """Tell state, and what it waits for, where that has changed."""
+        now = self.session.supervisor.state, self.session.missing()
+        if tell is not None and now != self._said:
+            tell(*now)
+        self._said = now

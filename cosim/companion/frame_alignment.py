@@ -1,0 +1,148 @@
+"""Where the autopilot's local frame lies in the scene. Nothing is steered before that is known.
+
+An EKF has its origin where the vehicle was when it got one, not where the scene has its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim.companion.vehicle_state import ReportedState
+from cosim.mavlink.vehicle.geodesy import LocalFrame
+from cosim.scenario.tables import Vector3
+from cosim.simulation.signals import Array
+
+_SAMPLES = 10  # that agree, before the frame is known
+_SPREAD = 0.15  # m, standard deviation of each coordinate among them
+_GRAVITY = 9.80665  # m/s2
+_JUMP = 0.3  # m, between two positions, beyond what the velocity explains
+_SMOOTHING = 0.1  # of a new sample in the drift
+
+
+@dataclass(frozen=True)
+class SceneOrigin:
+    """Where the scene's origin is, as the user says it.
+
+    Either the scene's latitude and longitude, and the vehicle's own GLOBAL_POSITION_INT and pressure say the rest; or
+    where the autopilot's local origin was surveyed to lie in the scene.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> cosim.SceneOrigin(surveyed=(0.9, -1.6, 1.9)).density
+    1000.0
+    """
+
+    geodetic: tuple[float, float] | None = None  # deg, latitude and longitude of the scene's origin
+    surveyed: Vector3 | None = None  # m, NED, of the autopilot's local origin in the scene
+    surface_pressure: float = 1013.25  # hPa, of the air
+    density: float = 1000.0  # kg/m3, of the water, as ArduSub has it unless BARO_SPEC_GRAV says otherwise
+
+
+class FrameAlignment:
+    """Finds the frame, and watches it.
+
+    Parameters
+    ----------
+    origin : SceneOrigin
+        As the user says it.
+
+    Attributes
+    ----------
+    offset : ndarray, shape (3,) or None
+        Of the autopilot's local origin in the scene [m, NED]; None until it is known.
+    jump : float
+        Greatest leap of the position since the frame is known [m], beyond what the velocity explains.
+    """
+
+    def __init__(self, origin: SceneOrigin) -> None:
+        self._origin = origin
+        self._frame = None if origin.geodetic is None else LocalFrame(*origin.geodetic)
+        self._samples: deque[Array] = deque(maxlen=_SAMPLES)
+        self.offset: Array | None = None if origin.surveyed is None else np.array(origin.surveyed, dtype=float)
+        self.jump = 0.0
+        self._reference: Array | None = None  # of the sample that the offset is compared with later
+        self._drift: Array = np.zeros(3)
+        self._taken = 0, 0  # positions and samples, as the autopilot's messages are counted
+        self._before: tuple[Array, Array, float, int] | None = None
+
+    def update(self, state: ReportedState, now: float) -> None:
+        """Take what the autopilot has reported since the last call; `now` is our time [s]."""
+        if not np.isfinite(state.position).all():
+            return
+        came, before = state.came, self._taken
+        second = "GLOBAL_POSITION_INT" if self._frame is not None else "SCALED_PRESSURE"
+        self._taken = came["LOCAL_POSITION_NED"] + came["ODOMETRY"], came[second]
+        if self.offset is not None and self._taken[0] != before[0]:
+            self._watch(state, now)
+        sample = self._sample(state) if self._taken[1] != before[1] else None
+        if sample is None:
+            return
+        if self.offset is None:
+            self._samples.append(sample)
+            if len(self._samples) == _SAMPLES and np.max(np.std(self._samples, axis=0)) < _SPREAD:
+                self.offset = self._reference = np.mean(self._samples, axis=0)
+        elif self._reference is None:
+            self._samples.append(sample)
+            if len(self._samples) == _SAMPLES:
+                self._reference = np.mean(self._samples, axis=0)
+        else:
+            error = np.where(np.isfinite(sample), sample - self._reference, 0.0)
+            self._drift += _SMOOTHING * (error - self._drift)
+
+    @property
+    def drift(self) -> float:
+        """How far the local position and its second sources, globe and pressure, have come apart since then [m]."""
+        return float(np.linalg.norm(self._drift))
+
+    def to_scene(self, position: Array) -> Array:
+        """Return a position of the autopilot's local frame in the scene's [m, NED]; NaN before that is known."""
+        result: Array = position + self.offset if self.offset is not None else np.full(3, math.nan)
+        return result
+
+    def missing(self, state: ReportedState) -> str:
+        """Return what the frame still waits for, in words; empty once it is known."""
+        if self.offset is not None:
+            return ""
+        if self._frame is None:
+            return "where the scene's origin is: give --scene-origin or --surveyed-origin"
+        if not np.isfinite(state.position).all():
+            return "LOCAL_POSITION_NED"
+        if state.global_position is None:
+            return "GLOBAL_POSITION_INT: the autopilot has no global position; set its origin, or survey it"
+        if math.isnan(state.pressure):
+            return "SCALED_PRESSURE or SCALED_PRESSURE2"
+        return f"{_SAMPLES} global positions that agree within {_SPREAD:g} m with the local ones"
+
+    def restart(self) -> None:
+        """Find the frame anew, where the vehicle itself can say it; a surveyed one stays, and so does a leap in it."""
+        if self._origin.surveyed is not None:
+            return
+        self.offset = self._reference = None
+        self._samples.clear()
+        self.jump, self._drift, self._before = 0.0, np.zeros(3), None
+
+    def _sample(self, state: ReportedState) -> Array | None:
+        """Return the offset as the second sources have it now; NaN where one says nothing, None where none does."""
+        depth = (state.pressure - self._origin.surface_pressure) * 100.0 / (self._origin.density * _GRAVITY)
+        north = east = math.nan
+        if self._frame is not None and state.global_position is not None:
+            north, east, _ = self._frame.to_local(*state.global_position[:2], 0.0)
+        sample: Array = np.array([north, east, depth]) - state.position
+        wanted = sample[2:] if self._origin.surveyed is not None else sample
+        return sample if np.isfinite(wanted).all() else None
+
+    def _watch(self, state: ReportedState, now: float) -> None:
+        before = self._before
+        self._before = state.position.copy(), state.velocity.copy(), now, state.resets
+        if before is None:
+            return
+        position, velocity, at, resets = before
+        explained = 0.5 * (velocity + state.velocity) * (now - at)
+        leap = float(np.linalg.norm(state.position - position - np.nan_to_num(explained)))
+        if leap > _JUMP or resets != state.resets:
+            self.jump = max(self.jump, leap)

@@ -1,0 +1,31 @@
+"""What a user says of a flight that the companion steers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from cosim.companion.frame_alignment import SceneOrigin
+from cosim.companion.outputs import SteerBy
+from cosim.mavlink.wire.options import ProfileName
+
+
+@dataclass(frozen=True)
+class CompanionOptions:
+    """How the vehicle is steered, and what it must do for that.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> cosim.CompanionOptions(dry_run=True).steer_by
+    'sticks'
+    """
+
+    profile: ProfileName = "ardusub"
+    steer_by: SteerBy = "sticks"  # sticks: surge, sway, heave, yaw in STABILIZE; wrench: all six in MANUAL; velocity
+    origin: SceneOrigin = field(default_factory=SceneOrigin)
+    dry_run: bool = False  # compute and record, and send nothing
+    arm: bool = False  # arm the vehicle; otherwise that is the pilot's
+    pilot_gain: float = 0.5  # part of the greatest wrench that full sticks give; ArduSub's JS_GAIN_DEFAULT
+    velocity_lag: float = 0.5  # s, of the autopilot's velocity loop
+    least_battery: float = 0.0  # percent, below which it is held
+    timeout: float | None = None  # s, within which steering must begin

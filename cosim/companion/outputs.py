@@ -1,0 +1,156 @@
+"""How the law's wrench reaches an autopilot: as sticks, or as a velocity."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from controller.quaternion import rotation_matrix
+from cosim.companion.vehicle_state import ReportedState
+from cosim.mavlink.vehicle.profile import Profile
+from cosim.simulation.commands.command_handler import greatest_wrench
+from cosim.simulation.commands.commands import Mode
+from cosim.simulation.commands.stick_stabilizer import YAW_RATE
+from cosim.simulation.signals import Array
+from plant_fmu import Vehicle
+
+SteerBy = Literal["sticks", "wrench", "velocity"]
+STEER_BY: tuple[SteerBy, ...] = get_args(SteerBy)
+STEERED_IN: dict[SteerBy, Mode] = {"sticks": "stabilize", "wrench": "manual", "velocity": "reach"}
+
+_FULL = 1000.0
+_PITCH, _ROLL = 1, 2  # enabled_extensions
+_VELOCITY_ONLY = 0b110111000111  # type_mask
+_LOCAL_NED = 1
+_YAW_LAG = 0.3  # s, of an autopilot's rate loop
+_FASTEST = 0.5  # m/s, of a velocity that is asked for
+_NEUTRAL: Array = np.zeros(6)
+
+
+@dataclass(frozen=True)
+class StickScale:
+    """What full sticks give.
+
+    Attributes
+    ----------
+    reach : ndarray, shape (6,)
+        Greatest wrench along and about each body axis alone [N, N m].
+    gain : float
+        The pilot's: the part of it that full sticks give.
+    quadratic : bool
+        Whether a thruster's force goes with the square of what the autopilot asks of it.
+    yaw_inertia : float
+        With the added one [kg m2].
+    """
+
+    reach: Array
+    gain: float
+    quadratic: bool
+    yaw_inertia: float
+
+    def sticks(self, wrench: Array) -> Array:
+        """Return the sticks that ask for a wrench, shape (6,), X Y Z K M N from -1 to 1, each axis by itself.
+
+        Parameters
+        ----------
+        wrench : ndarray, shape (6,)
+            [N, N m], body frame; what is not finite asks for nothing.
+        """
+        share = np.divide(wrench, self.reach, out=np.zeros(6), where=self.reach > 0.0)
+        share = np.where(np.isfinite(share), share, 0.0)
+        if self.quadratic:
+            share = np.copysign(np.sqrt(np.abs(share)), share)
+        clipped: Array = np.clip(share / self.gain, -1.0, 1.0)
+        return clipped
+
+    def yaw_rate_stick(self, moment: float, rate: float) -> float:
+        """Return the yaw stick by which an autopilot that keeps a rate of turn does what a moment would.
+
+        Parameters
+        ----------
+        moment : float
+            About the body's vertical axis [N m].
+        rate : float
+            Of turn now [rad/s].
+        """
+        asked = rate + _YAW_LAG * moment / self.yaw_inertia
+        return min(max(asked / (self.gain * YAW_RATE), -1.0), 1.0) if math.isfinite(asked) else 0.0
+
+
+def scale_of(vehicle: Vehicle, profile: Profile, gain: float) -> StickScale:
+    """Return what full sticks give of a vehicle.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Its thrusters' limits count, and as ArduSub the curve of its table ``autopilot``.
+    profile : Profile
+        Which autopilot it is.
+    gain : float
+        The pilot's, above 0 to 1.
+    """
+    reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+    table = vehicle.autopilot
+    quadratic = profile.name == "ardusub" and table is not None and table.curve == "quadratic"
+    return StickScale(reach, gain, quadratic, float(vehicle.inertia[2, 2] + vehicle.added_mass[5, 5]))
+
+
+def manual_control(mavlink: Any, system: int, profile: Profile, sticks: Array, all_axes: bool) -> Any:
+    """Return MANUAL_CONTROL; roll and pitch are in it where `all_axes` are steered."""
+    surge, sway, heave, roll, pitch, yaw = sticks.tolist()
+    center = profile.centred_stick
+    x, y, r = (round(_FULL * part) for part in (surge, sway, yaw))
+    z = round(center - (_FULL - center) * heave)
+    message = mavlink.MAVLink_manual_control_message(system, x, y, z, r, 0)
+    if all_axes:
+        message.enabled_extensions = _PITCH | _ROLL
+        message.s, message.t = round(_FULL * pitch), round(_FULL * roll)
+    return message
+
+
+def neutral(mavlink: Any, system: int, profile: Profile) -> Any:
+    """Return MANUAL_CONTROL with all sticks at rest."""
+    return manual_control(mavlink, system, profile, _NEUTRAL, all_axes=False)
+
+
+class VelocityLead:
+    """Turns a wrench into the velocity that an inner loop of a known lag is to be asked for.
+
+    A first-order loop accelerates by (asked - v) / lag. So v + lag a asks for the acceleration a that the wrench would
+    give the vehicle, by its mass, added mass and damping.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Whose model counts.
+    lag : float
+        Of the autopilot's velocity loop [s].
+    """
+
+    def __init__(self, vehicle: Vehicle, lag: float) -> None:
+        self._mass: Array = vehicle.mass + np.diag(vehicle.added_mass)[:3]
+        self._linear, self._quadratic = vehicle.linear_damping[:3], vehicle.quadratic_damping[:3]
+        self._lag = lag
+
+    def velocity(self, wrench: Array, state: ReportedState) -> Array:
+        """Return the velocity [m/s, NED], shape (3,), of at most 0.5 m/s."""
+        speed = state.velocity_body[:3]
+        force = np.where(np.isfinite(wrench[:3]), wrench[:3], 0.0)
+        drag = (self._linear + self._quadratic * np.abs(speed)) * speed
+        asked: Array = rotation_matrix(state.quaternion) @ (speed + self._lag * (force - drag) / self._mass)
+        length = float(np.linalg.norm(asked))
+        if not math.isfinite(length):
+            return np.zeros(3)
+        return asked * min(1.0, _FASTEST / length) if length > 0.0 else asked
+
+
+def velocity_target(mavlink: Any, system: int, velocity: Array) -> Any:
+    """Return SET_POSITION_TARGET_LOCAL_NED with a velocity [m/s, NED] alone."""
+    x, y, z = velocity.tolist()
+    zeros = (0.0,) * 3
+    return mavlink.MAVLink_set_position_target_local_ned_message(
+        0, system, 1, _LOCAL_NED, _VELOCITY_ONLY, *zeros, x, y, z, *zeros, 0.0, 0.0
+    )

@@ -1,0 +1,155 @@
+"""When the law may steer, and what ends that: one table for the code, its tests and its documentation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, get_args
+
+State = Literal["waiting", "aligning", "disarmed", "engaging", "dry_run", "steering", "held", "pilot"]
+
+STATES: tuple[State, ...] = get_args(State)  # a state's index is its number in the record
+
+MEANINGS: dict[State, str] = {
+    "waiting": "no vehicle, or no position and attitude of it yet; nothing is sent but requests",
+    "aligning": "the autopilot's frame is not known in the scene yet; nothing is sent but requests",
+    "disarmed": "all is known; arming is awaited, or asked for where the user said so",
+    "engaging": "armed; the mode that is steered in is asked for",
+    "dry_run": "the law is computed and recorded, and nothing is sent",
+    "steering": "sticks or velocities are sent at each step",
+    "held": "sticks are released and the hold mode is asked for, until somebody resumes",
+    "pilot": "somebody else steers; nothing is sent, until somebody resumes",
+}
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What ends steering.
+
+    Attributes
+    ----------
+    name : str
+        As it stands in status and texts.
+    limit : float
+        Beyond which `Observation`'s value of that name ends it; 0 for what is or is not.
+    unit : str
+        Of the limit.
+    words : str
+        What is compared with it.
+    then : State
+        What follows.
+    """
+
+    name: str
+    limit: float
+    unit: str
+    words: str
+    then: State
+
+
+CONDITIONS: tuple[Condition, ...] = (
+    Condition("pilot's sticks", 0.0, "", "somebody else sends sticks that are deflected", "pilot"),
+    Condition("takeover", 0.0, "", "DO_PAUSE_CONTINUE with 0 came for the companion", "held"),
+    Condition("disarmed", 0.0, "", "the vehicle is disarmed", "pilot"),
+    Condition("mode taken", 0.0, "", "the mode that is steered in was on, and is not any more", "pilot"),
+    Condition("refused mode", 0.8, "s", "since the mode was asked for, without it", "held"),
+    Condition("lost link", 0.4, "s", "since anything came from the autopilot", "held"),
+    Condition("stale estimate", 0.5, "s", "age of the older one of position and attitude", "held"),
+    Condition("late loop", 0.3, "s", "by which a step begins too late", "held"),
+    Condition("autopilot failsafe", 0.0, "", "the heartbeat says CRITICAL or EMERGENCY", "held"),
+    Condition("frame jump", 0.5, "m", "leap of the position that the velocity does not explain", "held"),
+    Condition("frame drift", 0.5, "m", "by which local position and globe or pressure have come apart", "held"),
+    Condition(
+        "geofence", 0.1, "m", "inside a hard region that is to be kept out of, or outside one to stay in", "held"
+    ),
+    Condition("battery", 0.0, "", "the battery has less left than the user's limit", "held"),
+    Condition("leak", 0.0, "", "the autopilot has reported a leak", "held"),
+)
+
+
+class Observation(NamedTuple):
+    """All that the decision rests on, at one step."""
+
+    now: float  # s
+    has_state: bool
+    frame_known: bool
+    is_armed: bool
+    in_mode: bool  # the one that is steered in
+    values: dict[str, float]  # by a condition's name; above its limit, it ends steering
+
+
+class Supervisor:
+    """Decides the state, step by step.
+
+    Parameters
+    ----------
+    dry_run : bool
+        Compute alone.
+
+    Attributes
+    ----------
+    state : State
+        Now.
+    reason : str
+        The condition that ended steering last; empty where none did.
+    """
+
+    def __init__(self, dry_run: bool = False) -> None:
+        self.state: State = "waiting"
+        self.reason = ""
+        self._dry_run = dry_run
+        self._asked_at: float | None = None  # when the mode was asked for
+
+    @property
+    def is_steering(self) -> bool:
+        """Whether the law is at work."""
+        return self.state in ("steering", "dry_run")
+
+    def asked_for_mode(self, now: float) -> None:
+        """Note that the mode is asked for, the first time."""
+        if self._asked_at is None:
+            self._asked_at = now
+
+    def waited_for_mode(self, now: float) -> float:
+        """Return for how long the mode is asked for in vain [s]."""
+        return 0.0 if self._asked_at is None else now - self._asked_at
+
+    def resume(self) -> None:
+        """Begin anew, after a hold or a pilot; what is not in order holds again."""
+        if self.state in ("held", "pilot"):
+            self.state, self.reason, self._asked_at = "waiting", "", None
+
+    def update(self, seen: Observation) -> State:
+        """Return the state of the coming step.
+
+        Parameters
+        ----------
+        seen : Observation
+            At its beginning.
+        """
+        if self.state in ("engaging", "steering", "dry_run"):
+            self._judge(seen)
+        if self.state in ("held", "pilot"):
+            return self.state
+        if self.state not in ("steering", "dry_run"):
+            self.state = self._progress(seen)
+        return self.state
+
+    def _judge(self, seen: Observation) -> None:
+        for condition in CONDITIONS:
+            if seen.values.get(condition.name, 0.0) > condition.limit:
+                self.state, self.reason = condition.then, condition.name
+                return
+
+    def _progress(self, seen: Observation) -> State:
+        if not seen.has_state:
+            return "waiting"
+        if not seen.frame_known:
+            return "aligning"
+        if self._dry_run:
+            return "dry_run"
+        if not seen.is_armed:
+            return "disarmed"
+        if not seen.in_mode:
+            return "engaging"
+        self._asked_at = None
+        return "steering"

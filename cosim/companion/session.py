@@ -1,0 +1,283 @@
+"""The exchange with one autopilot: what is sent in which state, and what is made of what comes."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from cosim.companion.clock_sync import timesync
+from cosim.companion.frame_alignment import FrameAlignment
+from cosim.companion.link import AutopilotLink
+from cosim.companion.options import CompanionOptions
+from cosim.companion.outputs import (
+    STEERED_IN,
+    VelocityLead,
+    manual_control,
+    neutral,
+    scale_of,
+    velocity_target,
+)
+from cosim.companion.safety import Observation, State, Supervisor
+from cosim.companion.vehicle_state import RATES, ReportedState
+from cosim.mavlink.vehicle.profile import PROFILES
+from cosim.mavlink.wire.dialect import dialect
+from cosim.simulation.commands.commands import Arm, Command, Mode
+from cosim.simulation.signals import Array
+from plant_fmu import Vehicle
+
+log = logging.getLogger(__name__)
+
+_HEARTBEAT, _SYNC, _RATES, _REPEAT = 1.0, 0.5, 10.0, 0.25  # s, between two of a kind
+_PILOT_LASTS = 1.0  # s after deflected sticks of somebody else
+_FALLBACK = 1.0  # s of holding without the hold mode, after which the depth alone is to be held
+_ROUNDING = 1e-6  # s
+_OURSELVES = 1  # parameter 1 of DO_SET_MODE: the custom mode counts
+
+
+class AutopilotSession:
+    """Steers one autopilot as its supervisor allows; a source of commands for the master that computes the law.
+
+    Parameters
+    ----------
+    link : AutopilotLink
+        To the autopilot.
+    vehicle : Vehicle
+        That it drives.
+    options : CompanionOptions
+        What the user says.
+
+    Attributes
+    ----------
+    reported : ReportedState
+        What the autopilot says.
+    alignment : FrameAlignment
+        Of its frame with the scene.
+    supervisor : Supervisor
+        Who decides whether the law steers.
+    profile : Profile
+        Which autopilot it is.
+    sticks, velocity : ndarray, shape (6,), (3,)
+        As sent last, -1 to 1 and [m/s, NED], or in a dry run as they would be; else zero.
+    lateness : float
+        By which the last step began too late [s].
+    """
+
+    exhausted = False
+
+    def __init__(self, link: AutopilotLink, vehicle: Vehicle, options: CompanionOptions) -> None:
+        self._link, self._options = link, options
+        self._mavlink: Any = dialect()
+        self.profile = PROFILES[options.profile]
+        self._scale = scale_of(vehicle, self.profile, options.pilot_gain)
+        self._lead = VelocityLead(vehicle, options.velocity_lag)
+        self._mode = self.profile.numbers[STEERED_IN[options.steer_by]]
+        self.reported = ReportedState(link.identity)
+        self.alignment = FrameAlignment(options.origin)
+        self.supervisor = Supervisor(options.dry_run)
+        self.sticks: Array = np.zeros(6)
+        self.velocity: Array = np.zeros(3)
+        self.lateness = self.outside = 0.0  # s; m, by which hard regions are violated
+        self._taken_over = False
+        self._law_works = False  # as the master was commanded last
+        self._sent_at: dict[str, float] = {}
+        self._held_at = 0.0
+        self._said = ""
+
+    def clock(self) -> float:
+        """Return the link's time [s]."""
+        return self._link.clock()
+
+    def take(self, k: int) -> Sequence[Command]:
+        """Return the command that lets the law work, or stops it, where that has changed."""
+        if self._law_works == self.supervisor.is_steering:
+            return ()
+        self._law_works = self.supervisor.is_steering
+        return (Arm(self._law_works),)
+
+    def exchange(self, wrench: Array, due: float, until: float) -> None:
+        """Do one step: decide, send, and listen.
+
+        Parameters
+        ----------
+        wrench : ndarray, shape (6,)
+            That the law asks for [N, N m], body frame.
+        due, until : float
+            When the step was to begin, and when it ends [s].
+        """
+        now = self._link.clock()
+        self.lateness = max(0.0, now - due)
+        self._listen(0.0)
+        before = self.supervisor.state
+        state = self.supervisor.update(self._observation(now))
+        if state != before:
+            self._held_at = now
+            self._tell(state)
+        self._ask(now)
+        self._act(state, now, wrench)
+        while True:
+            self._listen(max(0.0, until - self._link.clock()))
+            if self._link.clock() >= until - _ROUNDING:
+                return
+
+    def _listen(self, timeout: float) -> None:
+        for one in self._link.receive(timeout):
+            self._take(one.system, one.component, one.message, one.time)
+
+    def release(self, seconds: float) -> None:
+        """Let go: hold the place and release the sticks, for so many seconds or until the mode is on."""
+        if self.supervisor.state not in ("engaging", "steering", "held"):
+            return
+        self.supervisor.state, self.supervisor.reason = "held", self.supervisor.reason or "end"
+        begun = self._held_at = self._link.clock()
+        while self._link.clock() - begun < seconds and self.reported.mode != self.profile.numbers["hold"]:
+            now = self._link.clock()
+            self.exchange(np.zeros(6), now, now + 0.05)
+
+    def missing(self) -> str:
+        """Return what steering waits for, in words."""
+        reported, now = self.reported, self._link.clock()
+        if reported.system is None:
+            return "a heartbeat of an autopilot"
+        if not math.isfinite(reported.age(now)):
+            return "LOCAL_POSITION_NED and ATTITUDE_QUATERNION, or ODOMETRY"
+        return self.alignment.missing(reported) or {
+            "disarmed": "arming", "held": f"somebody to resume after: {self.supervisor.reason}",
+            "pilot": f"somebody to resume after: {self.supervisor.reason}", "engaging": f"mode {self._mode}",
+        }.get(self.supervisor.state, "nothing")  # fmt: skip
+
+    # ---- what is decided by ----
+
+    def _observation(self, now: float) -> Observation:
+        reported, alignment = self.reported, self.alignment
+        has_state = math.isfinite(reported.age(now))
+        values = {
+            "lost link": now - reported.heard_at,
+            "stale estimate": reported.age(now),
+            "late loop": self.lateness,
+            "autopilot failsafe": float(reported.in_failsafe),
+            "frame jump": alignment.jump,
+            "frame drift": alignment.drift,
+            "geofence": self.outside,
+            "battery": float(reported.battery < self._options.least_battery),
+            "leak": float(reported.is_leaking),
+            "takeover": float(self._taken_over),
+        }
+        in_mode = reported.mode == self._mode
+        if not self._options.dry_run:
+            values |= {
+                "pilot's sticks": float(now - reported.pilot_at < _PILOT_LASTS),
+                "disarmed": float(not reported.is_armed),
+                "mode taken": float(self.supervisor.state == "steering" and not in_mode),
+                "refused mode": self.supervisor.waited_for_mode(now),
+            }
+        return Observation(now, has_state, alignment.offset is not None, reported.is_armed, in_mode, values)
+
+    # ---- what is sent ----
+
+    def _due(self, what: str, period: float, now: float) -> bool:
+        if now - self._sent_at.get(what, -math.inf) < period:
+            return False
+        self._sent_at[what] = now
+        return True
+
+    def _ask(self, now: float) -> None:
+        """Send what goes on in every state: heartbeat, clock, and message rates."""
+        m = self._mavlink
+        if self._due("heartbeat", _HEARTBEAT, now):
+            self._link.send(
+                m.MAVLink_heartbeat_message(
+                    m.MAV_TYPE_ONBOARD_CONTROLLER, m.MAV_AUTOPILOT_INVALID, 0, 0, m.MAV_STATE_ACTIVE, 3
+                )
+            )
+        if self.reported.system is None:
+            return
+        if self._due("sync", _SYNC, now):
+            self._link.send(timesync(m, self.reported.sync.request(now)))
+        if self._due("rates", _RATES, now):
+            for message_id, rate in RATES.items():
+                self._command(m.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate)
+
+    def _act(self, state: State, now: float, wrench: Array) -> None:
+        self.sticks[:], self.velocity[:] = 0.0, 0.0
+        if state == "disarmed" and self._options.arm and self._due("arm", 1.0, now):
+            self._command(self._mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+        elif state == "engaging":
+            self.supervisor.asked_for_mode(now)
+            self._send_mode(STEERED_IN[self._options.steer_by], now)
+            self._link.send(self._output(np.zeros(6), still=True))
+        elif state == "steering":
+            self._link.send(self._output(wrench))
+        elif state == "dry_run":
+            self._output(wrench)
+        elif state == "held" and self.reported.system is not None:
+            self._hold(now)
+
+    def _output(self, wrench: Array, still: bool = False) -> Any:
+        """Return the message that asks for a wrench, and note what is in it."""
+        m, system = self._mavlink, self.reported.system or 0
+        if self._options.steer_by == "velocity":
+            if not still:
+                self.velocity[:] = self._lead.velocity(wrench, self.reported)
+            return velocity_target(m, system, self.velocity)
+        all_axes = self._options.steer_by == "wrench"
+        self.sticks[:] = self._scale.sticks(wrench)
+        if not all_axes:
+            self.sticks[3:5] = 0.0  # the autopilot keeps the vehicle level
+            rate = 0.0 if still else float(self.reported.rates[2])
+            self.sticks[5] = self._scale.yaw_rate_stick(float(wrench[5]), rate)
+        return manual_control(m, system, self.profile, self.sticks, all_axes)
+
+    def _hold(self, now: float) -> None:
+        """Release the sticks, and ask for the hold mode, or where that is refused for the depth to be held."""
+        if self.reported.mode == self.profile.numbers["hold"]:
+            return
+        self._link.send(neutral(self._mavlink, self.reported.system or 0, self.profile))
+        refused = now - self._held_at > _FALLBACK
+        if not (refused and self.reported.mode == self.profile.numbers["depth_hold"]):
+            self._send_mode("depth_hold" if refused else "hold", now)
+
+    def _send_mode(self, mode: Mode, now: float) -> None:
+        if self._due("mode", _REPEAT, now):
+            number = self.profile.numbers[mode]
+            first, second = (number >> 16 & 0xFF, number >> 24) if self.profile.packed else (number, 0)
+            self._command(self._mavlink.MAV_CMD_DO_SET_MODE, _OURSELVES, first, second)
+
+    def _command(self, number: int, *parameters: float) -> None:
+        filled = [*parameters, *[0.0] * (7 - len(parameters))]
+        self._link.send(self._mavlink.MAVLink_command_long_message(self.reported.system or 0, 1, number, 0, *filled))
+
+    def _tell(self, state: State) -> None:
+        """Say in which state the companion is now, to logs and to whoever listens on the link."""
+        reason = f": {self.supervisor.reason}" if self.supervisor.reason else ""
+        text = f"Companion {state.replace('_', ' ')}{reason}"
+        log.log(logging.WARNING if reason else logging.INFO, "%s", text)
+        m = self._mavlink
+        severity = m.MAV_SEVERITY_WARNING if reason else m.MAV_SEVERITY_NOTICE
+        self._link.send(m.MAVLink_statustext_message(severity, text[:50].encode()))
+
+    # ---- what comes ----
+
+    def _take(self, system: int, component: int, message: Any, at: float) -> None:
+        if message.get_type() == "COMMAND_LONG":
+            self._commanded(system, component, message)
+            return
+        self.reported.take(system, component, message, at)
+        self.alignment.update(self.reported, at)
+
+    def _commanded(self, system: int, component: int, message: Any) -> None:
+        """Follow DO_PAUSE_CONTINUE to ourselves: 0 takes over, 1 resumes."""
+        m = self._mavlink
+        if (message.target_system, message.target_component) != self._link.identity:
+            return
+        result = m.MAV_RESULT_UNSUPPORTED
+        if message.command == m.MAV_CMD_DO_PAUSE_CONTINUE and message.param1 in (0.0, 1.0):
+            result = m.MAV_RESULT_ACCEPTED
+            self._taken_over = message.param1 == 0.0
+            if not self._taken_over:
+                self.alignment.restart()
+                self.supervisor.resume()
+        self._link.send(m.MAVLink_command_ack_message(message.command, result, 0, 0, system, component))

@@ -1,0 +1,201 @@
+"""The vehicle as its autopilot reports it: the newest of each quantity, and how old it is."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from controller.quaternion import rotation_matrix
+from cosim.companion.clock_sync import ClockSync
+from cosim.simulation.signals import Array
+
+RATES = {  # Hz that are asked for, by message id
+    0: 5.0,  # HEARTBEAT, with mode and arming
+    31: 50.0,  # ATTITUDE_QUATERNION
+    32: 50.0,  # LOCAL_POSITION_NED
+    33: 5.0,  # GLOBAL_POSITION_INT
+    36: 10.0,  # SERVO_OUTPUT_RAW
+    1: 2.0,  # SYS_STATUS
+    29: 10.0,  # SCALED_PRESSURE
+    137: 10.0,  # SCALED_PRESSURE2
+    132: 5.0,  # DISTANCE_SENSOR
+}
+_ARMED, _CRITICAL = 128, 5  # of base_mode; MAV_STATE from which on a failsafe acts
+_LOCAL_NED, _BODY_FRD = 1, 12
+_DOWNWARDS = 25  # MAV_SENSOR_ROTATION_PITCH_270
+_DEFLECTED, _INVALID = 50, 0x7FFF  # of a stick's 1000; of no stick
+_RESTS_IN_THE_MIDDLE = (3, 12)  # MAV_AUTOPILOT: ArduPilot and PX4
+_CENTER, _DEFLECTED_PULSE = 1500, 25  # us
+_MILLI, _MICRO = 1e-3, 1e-6
+
+
+class ReportedState:
+    """What one autopilot says, taken message by message. Nothing is estimated here.
+
+    Parameters
+    ----------
+    identity : (int, int)
+        System and component that we are: whoever else sends sticks is a pilot.
+
+    Attributes
+    ----------
+    system : int or None
+        The vehicle's system id: that of the first autopilot that was heard.
+    position, velocity : ndarray, shape (3,)
+        [m, m/s], NED, in the autopilot's own local frame.
+    quaternion, rates : ndarray, shape (4,), (3,)
+        From body to world, scalar first; body rates [rad/s].
+    mode, is_armed, in_failsafe : int, bool, bool
+        Of its heartbeat.
+    global_position : tuple of float or None
+        Latitude and longitude [deg] and altitude above home [m].
+    pressure : float
+        Outside [hPa]; NaN where none is reported.
+    heard_at, beaten_at, pilot_at : float
+        Our time [s] at which anything came, a heartbeat, and sticks of somebody else.
+    sync : ClockSync
+        Of both clocks.
+    """
+
+    def __init__(self, identity: tuple[int, int]) -> None:
+        self._identity = identity
+        self.system: int | None = None
+        self.autopilot = 0
+        self.position: Array = np.full(3, math.nan)
+        self.velocity: Array = np.full(3, math.nan)
+        self.quaternion: Array = np.array([1.0, 0.0, 0.0, 0.0])
+        self.rates: Array = np.zeros(3)
+        self.mode, self.is_armed, self.in_failsafe = -1, False, False
+        self.global_position: tuple[float, float, float] | None = None
+        self.pressure = self.altitude = self.battery = math.nan
+        self.pulses: tuple[int, ...] = ()
+        self.is_leaking = False
+        self.resets = 0  # of the autopilot's estimate, as it counts them
+        self.heard_at = self.beaten_at = self.pilot_at = -math.inf
+        self.came: Counter[str] = Counter()  # messages, by name
+        self.results: dict[int, int] = {}  # of commands, by number
+        self.texts: list[str] = []
+        self.sync = ClockSync()
+        self._position_boot = self._attitude_boot = math.nan  # s since the autopilot's boot
+        self._position_at = self._attitude_at = -math.inf  # our time [s]
+        self._handlers: dict[str, Callable[[Any, float], None]] = {
+            "HEARTBEAT": self._heartbeat,
+            "LOCAL_POSITION_NED": self._local_position,
+            "ATTITUDE_QUATERNION": self._attitude_quaternion,
+            "ODOMETRY": self._odometry,
+            "GLOBAL_POSITION_INT": self._global_position,
+            "SCALED_PRESSURE": self._first_pressure,
+            "SCALED_PRESSURE2": self._second_pressure,
+            "DISTANCE_SENSOR": self._distance,
+            "SERVO_OUTPUT_RAW": self._servos,
+            "SYS_STATUS": self._status,
+            "STATUSTEXT": self._text,
+            "COMMAND_ACK": self._acknowledge,
+            "TIMESYNC": lambda m, now: self.sync.take(m.tc1, m.ts1, now),
+        }
+        self._second = False  # whether there is an outside sensor beside the autopilot's own
+
+    def take(self, system: int, component: int, message: Any, now: float) -> None:
+        """Take a message that came at our time `now` [s]."""
+        kind = message.get_type()
+        if kind in ("MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"):
+            if (system, component) != self._identity and _is_deflected(message, self.autopilot):
+                self.pilot_at = now
+            return
+        if self.system is None and kind == "HEARTBEAT" and component == 1 and message.autopilot != 8:
+            self.system = system
+        if system != self.system or component != 1 or kind not in self._handlers:
+            return
+        self.heard_at = now
+        self.came[kind] += 1
+        self._handlers[kind](message, now)
+
+    def age(self, now: float) -> float:
+        """Return how old the older one of position and attitude is [s]; infinite before both have come.
+
+        By the autopilot's own stamps where clocks are aligned, and never less than the time since it came.
+        """
+        ages = []
+        for boot, heard in ((self._position_boot, self._position_at), (self._attitude_boot, self._attitude_at)):
+            stamped = now - (boot + self.sync.offset)
+            ages.append(max(now - heard, stamped if math.isfinite(stamped) else 0.0))
+        return max(ages)
+
+    @property
+    def velocity_body(self) -> Array:
+        """Linear and angular velocity, shape (6,) [m/s, rad/s], body frame."""
+        linear: Array = rotation_matrix(self.quaternion).T @ self.velocity
+        return np.concatenate([linear, self.rates])
+
+    # ---- message by message ----
+
+    def _heartbeat(self, m: Any, now: float) -> None:
+        self.beaten_at, self.autopilot, self.mode = now, m.autopilot, m.custom_mode
+        self.is_armed, self.in_failsafe = bool(m.base_mode & _ARMED), m.system_status >= _CRITICAL
+
+    def _local_position(self, m: Any, now: float) -> None:
+        self._place((m.x, m.y, m.z), (m.vx, m.vy, m.vz), m.time_boot_ms * _MILLI, now)
+
+    def _place(self, position: Any, velocity: Any, boot: float, now: float) -> None:
+        self.position[:], self.velocity[:] = position, velocity
+        self._position_boot, self._position_at = boot, now
+
+    def _attitude_quaternion(self, m: Any, now: float) -> None:
+        self._turn((m.q1, m.q2, m.q3, m.q4), (m.rollspeed, m.pitchspeed, m.yawspeed), m.time_boot_ms * _MILLI, now)
+
+    def _turn(self, quaternion: Any, rates: Any, boot: float, now: float) -> None:
+        length = math.hypot(*quaternion)
+        if length > 0.0:
+            self.quaternion[:], self.rates[:] = np.divide(quaternion, length), rates
+            self._attitude_boot, self._attitude_at = boot, now
+
+    def _odometry(self, m: Any, now: float) -> None:
+        if (m.frame_id, m.child_frame_id) != (_LOCAL_NED, _BODY_FRD):
+            return
+        boot = m.time_usec * _MICRO
+        self._turn(m.q, (m.rollspeed, m.pitchspeed, m.yawspeed), boot, now)
+        self._place((m.x, m.y, m.z), rotation_matrix(self.quaternion) @ (m.vx, m.vy, m.vz), boot, now)
+        self.resets = m.reset_counter
+
+    def _global_position(self, m: Any, now: float) -> None:
+        if m.lat or m.lon:
+            self.global_position = m.lat * 1e-7, m.lon * 1e-7, m.relative_alt * _MILLI
+
+    def _first_pressure(self, m: Any, now: float) -> None:
+        if not self._second:
+            self.pressure = m.press_abs
+
+    def _second_pressure(self, m: Any, now: float) -> None:
+        self._second, self.pressure = True, m.press_abs
+
+    def _distance(self, m: Any, now: float) -> None:
+        if m.orientation == _DOWNWARDS:
+            self.altitude = m.current_distance * 0.01
+
+    def _servos(self, m: Any, now: float) -> None:
+        if m.port == 0:
+            self.pulses = tuple(getattr(m, f"servo{i}_raw") for i in range(1, 17))
+
+    def _status(self, m: Any, now: float) -> None:
+        self.battery = float(m.battery_remaining) if m.battery_remaining >= 0 else math.nan
+
+    def _text(self, m: Any, now: float) -> None:
+        self.texts.append(m.text)
+        self.is_leaking |= "leak detected" in m.text.lower()
+
+    def _acknowledge(self, m: Any, now: float) -> None:
+        self.results[m.command] = m.result
+
+
+def _is_deflected(message: Any, autopilot: int) -> bool:
+    """Return whether somebody holds a stick away from its rest."""
+    if message.get_type() == "RC_CHANNELS_OVERRIDE":
+        pulses = (getattr(message, f"chan{i}_raw") for i in range(1, 7))
+        return any(abs(pulse - _CENTER) > _DEFLECTED_PULSE for pulse in pulses if 0 < pulse < 0xFFFF)
+    level = any(abs(v) > _DEFLECTED for v in (message.x, message.y, message.r) if v != _INVALID)
+    rest = 500 if autopilot in _RESTS_IN_THE_MIDDLE else 0
+    return level or (message.z != _INVALID and abs(message.z - rest) > _DEFLECTED)

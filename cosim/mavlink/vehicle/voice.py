@@ -1,0 +1,115 @@
+"""What the vehicle says in words: STATUSTEXT, not too much at once, and no refusal is lost."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from cosim.mavlink.wire.encode import Encoder
+from cosim.mavlink.wire.message_sink import MessageSink
+
+_CHUNK = 50  # characters of a STATUSTEXT
+_LONGEST_TEXT = 200  # characters
+_TEXTS = 12  # in each _PERIOD at the most
+_PERIOD = 1.0  # s
+_WAITING = 48  # texts that wait for the next period
+_REFUSALS_PERIOD = 2.0  # s, between two times at which refusals of a kind are said
+_REASONS = 8  # of a kind that wait to be said, by their words; further ones are counted
+
+
+class Voice:
+    """Says texts on every link.
+
+    Parameters
+    ----------
+    mavlink : module
+        The dialect.
+    make : Encoder
+        Makes messages.
+    links : sequence of MessageSink
+        That are attached; may grow.
+    clock : callable
+        Returns the wall clock [s].
+    """
+
+    def __init__(self, mavlink: Any, make: Encoder, links: Sequence[MessageSink], clock: Callable[[], float]) -> None:
+        self._mavlink, self._make, self._links, self._clock = mavlink, make, links, clock
+        self._said: dict[str, float] = {}  # when, by key
+        self._said_lately: deque[float] = deque(maxlen=_TEXTS)
+        self._waiting: deque[list[Any]] = deque(maxlen=_WAITING)
+        self._refusals: dict[str, dict[str, int]] = {}  # how often each reason was not said yet, by kind
+        self._text_id = 0
+
+    def say(self, text: str, severity: int | None = None, key: str = "", every: float = 0.0) -> None:
+        """Send a text on every link, in parts if it is long; at once, or when fewer were sent lately.
+
+        Parameters
+        ----------
+        text : str
+            One line.
+        severity : int, optional
+            MAV_SEVERITY; default: information.
+        key : str
+            Of texts of the same key, one is said in a while, and others are dropped.
+        every : float
+            Seconds of the wall clock between two of a key.
+        """
+        now = self._clock()
+        if every and now - self._said.get(key, -every) < every:
+            return
+        if every:
+            self._said[key] = now
+        self._waiting.append(self.text(text, severity))
+        self._send_waiting()
+
+    def reject(self, reason: str, key: str) -> None:
+        """Say why something is refused: at once, or after two seconds where a refusal of that kind was said lately.
+
+        Parameters
+        ----------
+        reason : str
+            In a few words.
+        key : str
+            The kind of refusal. What repeats is said once, with how often it came.
+        """
+        if self._clock() - self._said.get(f"deny {key}", -_REFUSALS_PERIOD) >= _REFUSALS_PERIOD:
+            self._said[f"deny {key}"] = self._clock()
+            self._refuse(reason)
+            return
+        reasons = self._refusals.setdefault(key, {})
+        if reason not in reasons and len(reasons) >= _REASONS:
+            reason = "others, of the same kind"
+        reasons[reason] = reasons.get(reason, 0) + 1
+
+    def tick(self) -> None:
+        """Say what waits, as far as its time has come."""
+        now = self._clock()
+        for key in [key for key in self._refusals if now - self._said[f"deny {key}"] >= _REFUSALS_PERIOD]:
+            self._said[f"deny {key}"] = now
+            for reason, times in self._refusals.pop(key).items():
+                self._refuse(reason if times == 1 else f"{reason} ({times} times)")
+        self._send_waiting()
+
+    def _refuse(self, reason: str) -> None:
+        self.say(f"Refused: {reason}", self._mavlink.MAV_SEVERITY_WARNING)
+
+    def _send_waiting(self) -> None:
+        now = self._clock()
+        while self._waiting and not (len(self._said_lately) == _TEXTS and now - self._said_lately[0] < _PERIOD):
+            self._said_lately.append(now)
+            for message in self._waiting.popleft():
+                for link in self._links:
+                    link.send(message)
+
+    def text(self, text: str, severity: int | None = None) -> list[Any]:
+        """Return the STATUSTEXT messages of a text."""
+        level = self._mavlink.MAV_SEVERITY_INFO if severity is None else severity
+        text = text[:_LONGEST_TEXT]
+        if len(text) <= _CHUNK:
+            return [self._make("STATUSTEXT", level, text, 0, 0)]
+        self._text_id = self._text_id % 0xFFFF + 1
+        parts = [text[i : i + _CHUNK] for i in range(0, len(text), _CHUNK)]
+        if len(parts[-1]) == _CHUNK:
+            parts.append("")  # a part that is not full is the last one
+        return [self._make("STATUSTEXT", level, part, self._text_id, i) for i, part in enumerate(parts)]

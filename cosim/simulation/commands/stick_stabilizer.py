@@ -1,0 +1,110 @@
+"""Sticks with help, as ArduSub's STABILIZE and ALT_HOLD: the vehicle keeps level and its heading, and its depth too."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from controller import VehicleState
+from controller.quaternion import error, from_axis_angle, multiply, rotation_matrix
+from cosim.simulation.signals import Array
+from plant_fmu import Vehicle
+
+_CENTERED = 0.02  # part of a stick's way that counts as released
+_GREATEST_TILT = math.radians(30.0)  # of full roll and pitch sticks
+YAW_RATE = math.radians(
+    202.5
+)  # rad/s of a full stick at a pilot gain of 1, as ArduSub has it: 45 deg/s by ACRO_YAW_P of 4.5
+_CLIMB_RATE = 0.3  # m/s of a full stick
+_FARTHEST = math.radians(20.0), 0.3  # rad, m: by which heading and depth that are asked for lead the vehicle
+_ATTITUDE, _DEPTH, _INTEGRAL = 2.5, 1.5, 0.3  # rad/s of both loops, 1/s of the depth's integral
+_NORTH, _EAST, _DOWN = np.eye(3)
+
+
+class StickStabilizer:
+    """Turns sticks into a wrench: surge and sway push, the others ask for angles and rates that are kept.
+
+    It knows the vehicle's mass and inertia, as an autopilot that is tuned for it does, and nothing of the water.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        That is steered.
+    state : VehicleState
+        As the law is told; read at each step.
+    period : float
+        Between two steps [s].
+    reach : ndarray, shape (6,)
+        Greatest wrench along and about each axis [N, N m].
+    """
+
+    def __init__(self, vehicle: Vehicle, state: VehicleState, period: float, reach: Array) -> None:
+        self._inertia: Final[Array] = np.diag(vehicle.inertia) + np.diag(vehicle.added_mass)[3:]
+        self._mass: Final = float(vehicle.mass + vehicle.added_mass[2, 2])
+        self._state, self._period, self._reach = state, period, reach
+        self.begin()
+
+    def begin(self) -> None:
+        """Keep heading and depth as they are now."""
+        self._heading, self._depth = self._yaw(), float(self._state.position[2])
+        self._integral = 0.0  # N
+
+    def wrench(self, sticks: Array, gain: float, keep_depth: bool) -> Array:
+        """Return the wrench of a control period.
+
+        Parameters
+        ----------
+        sticks : ndarray, shape (6,)
+            Parts of X Y Z K M N, -1 to 1.
+        gain : float
+            The pilot's, 0 to 1.
+        keep_depth : bool
+            Whether the vertical stick asks for a rate, and the depth is kept once it is released; else it pushes.
+
+        Returns
+        -------
+        ndarray, shape (6,)
+            [N, N m], body frame; nothing where the state that it needs is not known.
+        """
+        wrench: Array = gain * sticks * self._reach
+        wrench[3:] = self._moment(sticks, gain)
+        if keep_depth:
+            wrench[2] = 0.0
+            R = rotation_matrix(self._state.quaternion)
+            wrench[:3] += R.T @ (self._heave(float(sticks[2]), R) * _DOWN)
+        result: Array = np.clip(np.where(np.isfinite(wrench), wrench, 0.0), -self._reach, self._reach)
+        return result
+
+    def _moment(self, sticks: Array, gain: float) -> Array:
+        rate, turn = np.zeros(3), float(sticks[5])
+        if abs(turn) > _CENTERED:
+            rate[2] = gain * turn * YAW_RATE
+            ahead = math.remainder(self._heading + rate[2] * self._period - self._yaw(), math.tau)
+            self._heading = self._yaw() + min(max(ahead, -_FARTHEST[0]), _FARTHEST[0])
+        tilt = multiply(
+            from_axis_angle(_EAST, float(sticks[4]) * _GREATEST_TILT),
+            from_axis_angle(_NORTH, float(sticks[3]) * _GREATEST_TILT),
+        )
+        angle = 2.0 * error(multiply(from_axis_angle(_DOWN, self._heading), tilt), self._state.quaternion)[1:]
+        moment: Array = -self._inertia * _ATTITUDE * (_ATTITUDE * angle + 2.0 * (self._state.velocity_body[3:] - rate))
+        return moment
+
+    def _heave(self, stick: float, R: Array) -> float:
+        """Return the force down [N], world axes."""
+        depth, rate = float(self._state.position[2]), 0.0
+        if abs(stick) > _CENTERED:
+            rate = stick * _CLIMB_RATE
+            ahead = self._depth + rate * self._period - depth
+            self._depth = depth + min(max(ahead, -_FARTHEST[1]), _FARTHEST[1])
+        error_down = self._depth - depth
+        force = self._mass * _DEPTH * _DEPTH * error_down
+        most = float(self._reach[2])
+        self._integral = min(max(self._integral + _INTEGRAL * force * self._period, -most), most)
+        speed = float(R[2] @ self._state.velocity_body[:3])
+        return force + self._mass * _DEPTH * 2.0 * (rate - speed) + self._integral
+
+    def _yaw(self) -> float:
+        e0, e1, e2, e3 = self._state.quaternion
+        return math.atan2(2.0 * (e0 * e3 + e1 * e2), 1.0 - 2.0 * (e2 * e2 + e3 * e3))

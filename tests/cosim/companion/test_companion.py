@@ -1,0 +1,272 @@
+"""The companion flies our own vehicle through its autopilot, whose clock is the run's; nothing here waits."""
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import all as mavlink
+
+from cosim.companion.companion import Companion, scenario_to_steer
+from cosim.companion.frame_alignment import SceneOrigin
+from cosim.companion.options import CompanionOptions
+from cosim.companion.safety import CONDITIONS, MEANINGS, STATES
+from cosim.errors import RunError
+from cosim.mavlink.wire.options import ORIGIN
+from cosim.results.run_result import load_run
+from cosim.run.run_folder import report_again
+from cosim.scenario.scenario import load_scenario
+from tests.architecture.modules import ROOT
+from tests.cosim.companion.stand_in import IDENTITY, StandIn
+
+SHIFT = (0.9, -1.6, 1.9)  # m: what a real ArduSub's origin was off by
+GLOBE = SceneOrigin(geodetic=ORIGIN)
+EVENT = 3.0  # s of the stand-in's time, while it is steered
+STICKS = ("MANUAL_CONTROL", "SET_POSITION_TARGET_LOCAL_NED")
+
+
+class Flight:
+    """A flight, its states with their times, and its record."""
+
+    def __init__(self, tmp_path, seconds=6.0, events=(), link=None, **options):
+        self.link = link or StandIn(profile="generic", shift=SHIFT)
+        self.link.events = [(EVENT, event) for event in events]
+        options = {"profile": "generic", "origin": GLOBE, "timeout": 10.0, **options}
+        scenario = load_scenario("pipe-inspection", [f"time.duration={seconds}"])
+        self.companion = Companion(scenario, self.link, CompanionOptions(**options))
+        self.states = []
+        self.run = self.companion.run(tmp_path / "run", report=False, tell=self._tell)
+        self.status = self.run.summary["status"]
+
+    def _tell(self, state, missing):
+        if not self.states or self.states[-1][1] != state:
+            self.states.append((self.link.clock() - 100.0, state))
+
+    def time_of(self, state):
+        return next(time for time, name in self.states if name == state)
+
+    def sent_after(self, time, *kinds):
+        return [m for at, m in self.link.sent if at - 100.0 > time and m.get_type() in kinds]
+
+    def target(self):
+        """Return the middle of the goal region at the end: it travels [m, NED]."""
+        table = self.run.table()
+        return np.array([table[f"target.{axis}"].to_numpy()[-1] for axis in "xyz"])
+
+    def held(self, reason):
+        """Check that it is held for that reason, within a second, with the sticks released."""
+        since = self.time_of("held")
+        assert self.status == f"held: {reason}"
+        assert EVENT < since <= EVENT + 1.0
+        self._released(since)
+        return since
+
+    def _released(self, since):
+        column = dict(zip(("state", "x", "y", "z"), self.run.table().select(
+            ["companion.state", "stick.X", "stick.Y", "stick.Z"]).to_pandas().to_numpy().T, strict=True))  # fmt: skip
+        assert column["state"][-1] == STATES.index(self.states[-1][1])
+        idle = column["state"] == STATES.index(self.states[-1][1])
+        assert idle.sum() > 50 and not any(column[name][idle][1:].any() for name in "xyz")
+        for message in self.sent_after(since, "MANUAL_CONTROL"):
+            assert (message.x, message.y, message.z, message.r) == (0, 0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    "steer_by", ["sticks", *(pytest.param(by, marks=pytest.mark.slow) for by in ("wrench", "velocity"))]
+)
+def test_a_goal_is_reached_and_regions_are_kept_by_the_truth(tmp_path, steer_by):
+    flight = Flight(tmp_path, 30.0, steer_by=steer_by)
+    link, goal = flight.link, flight.companion.scenario.goal
+    assert flight.status == "completed" and [s for _, s in flight.states][-1] == "steering"
+    true = np.array([link.now(f"position.{axis}") for axis in "xyz"])
+    assert np.linalg.norm(true - flight.target()) < goal.radius
+    for region in ("pipe", "sea bed"):
+        assert link.column(f"{region}.clearance").min() > 0.0
+    session = flight.companion.session
+    assert session.alignment.offset == pytest.approx([-s for s in SHIFT], abs=0.03)
+    told = session.alignment.to_scene(session.reported.position)
+    assert told == pytest.approx(true, abs=0.03)
+
+
+def test_without_the_frame_the_same_flight_ends_elsewhere(tmp_path):
+    """A surveyed origin is believed: a wrong one is what the frame step is there against."""
+    flight = Flight(tmp_path, 20.0, origin=SceneOrigin(surveyed=(0.0, 0.0, 0.0)))
+    true = np.array([flight.link.now(f"position.{axis}") for axis in "xyz"])
+    assert np.linalg.norm(true - flight.target()) > 1.0
+
+
+def test_nothing_is_steered_before_the_frame_is_known(tmp_path):
+    with pytest.raises(RunError, match="where the scene's origin is"):
+        Flight(tmp_path, origin=SceneOrigin())
+    link = StandIn(profile="generic", silent=["GLOBAL_POSITION_INT"])
+    with pytest.raises(RunError, match="the autopilot has no global position"):
+        Flight(tmp_path, link=link)
+    assert not [m for _, m in link.sent if m.get_type() in STICKS]
+    assert not (tmp_path / "run").exists()
+
+
+def test_it_waits_for_arming_and_does_not_arm_by_itself(tmp_path):
+    link = StandIn(profile="generic", armed=False)
+    with pytest.raises(RunError, match="waiting for arming"):
+        Flight(tmp_path, link=link)
+    assert not [m for _, m in link.sent if m.get_type() == "COMMAND_LONG" and m.command == 400]
+    armed = Flight(tmp_path, 2.0, link=StandIn(profile="generic", armed=False), arm=True)
+    assert armed.status == "completed" and armed.link.now("commands.armed") == 1.0
+
+
+def test_a_dry_run_sends_no_sticks_and_no_command_but_for_messages(tmp_path):
+    flight = Flight(tmp_path, 3.0, dry_run=True)
+    assert flight.status == "completed" and flight.states[-1][1] == "dry_run"
+    assert not [m for _, m in flight.link.sent if m.get_type() in STICKS]
+    assert {m.command for _, m in flight.link.sent if m.get_type() == "COMMAND_LONG"} == {511}
+    assert np.abs(flight.run.table()["stick.Y"].to_numpy()).max() > 0.05  # what it would have sent
+
+
+# ---- what ends steering: each condition of the table ----
+
+
+def position_off(link, by):
+    def leap(message):
+        message.x += by
+
+    link.tamper["LOCAL_POSITION_NED"] = leap
+
+
+def changed(link, kind, **fields):
+    link.tamper[kind] = lambda message: message.__dict__.update(fields)
+
+
+def drift(link):
+    begun = link.clock()
+
+    def creep(message):
+        message.x += 0.4 * (link.clock() - begun)
+
+    link.tamper["LOCAL_POSITION_NED"] = creep
+
+
+def command(link, number, *parameters, system=1, component=1):
+    filled = [*parameters, *[0.0] * (7 - len(parameters))]
+    link.hear(mavlink.MAVLink_command_long_message(system, component, number, 0, *filled))
+
+
+FAULTS = {
+    "lost link": lambda link: setattr(link, "cut", True),
+    "stale estimate": lambda link: link.silent.add("LOCAL_POSITION_NED"),
+    "late loop": lambda link: setattr(link, "stall", 0.35),
+    "autopilot failsafe": lambda link: changed(link, "HEARTBEAT", system_status=5),
+    "frame jump": lambda link: position_off(link, 1.0),
+    "battery": lambda link: changed(link, "SYS_STATUS", battery_remaining=12),
+    "leak": lambda link: link.autopilot._context.say("Leak Detected"),
+    "takeover": lambda link: command(link, 193, 0.0, system=IDENTITY[0], component=IDENTITY[1]),
+}
+
+
+@pytest.mark.parametrize("reason", FAULTS)
+def test_a_fault_holds_the_vehicle_within_a_second(tmp_path, reason):
+    link = StandIn(profile="generic", shift=SHIFT)
+    flight = Flight(tmp_path, link=link, events=[lambda: FAULTS[reason](link)], least_battery=20.0)
+    flight.held(reason)
+    if reason != "lost link":
+        assert link.mode() == 1 and link.autopilot._context.sticks == (0.0,) * 6  # position hold
+
+
+def test_a_refused_mode_holds_within_a_second_of_asking(tmp_path):
+    link = StandIn(profile="generic", shift=SHIFT)
+    link.deaf.add(176)
+    with pytest.raises(RunError, match="somebody to resume after: refused mode"):
+        Flight(tmp_path, link=link)
+    first = min(at for at, m in link.sent if m.get_type() == "COMMAND_LONG" and m.command == 176)
+    texts = [(at, m.text) for at, m in link.sent if m.get_type() == "STATUSTEXT"]
+    (held,) = [at for at, text in texts if text == "Companion held: refused mode"]
+    assert held - first <= 1.0
+
+
+def test_drift_between_the_sources_holds(tmp_path):
+    link = StandIn(profile="generic", shift=SHIFT)
+    flight = Flight(tmp_path, 8.0, link=link, events=[lambda: drift(link)])
+    assert flight.status == "held: frame drift" and flight.companion.session.alignment.drift > 0.5
+
+
+def test_a_violated_hard_region_holds(tmp_path):
+    flight = Flight(tmp_path, 8.0, origin=SceneOrigin(surveyed=(0.0, 3.2, -1.9)))  # as if it were beside the pipe
+    assert flight.status in ("held: geofence", "completed")
+    inside = flight.run.table()["pipe.clearance"].to_numpy().min() < -0.1
+    assert inside == (flight.status == "held: geofence")
+
+
+def takes_the_mode(link):
+    command(link, 176, 1.0, 4.0, 3.0)
+
+
+def moves_a_stick(link):
+    link.hear(mavlink.MAVLink_manual_control_message(1, 600, 0, 0, 0, 0))
+
+
+PILOTS = {
+    "mode taken": takes_the_mode,
+    "pilot's sticks": moves_a_stick,
+    "disarmed": lambda link: command(link, 400, 0.0),
+}
+
+
+@pytest.mark.parametrize("reason", PILOTS)
+def test_a_pilot_wins_within_a_second_and_is_left_alone(tmp_path, reason):
+    link = StandIn(profile="generic", shift=SHIFT)
+    flight = Flight(tmp_path, link=link, events=[lambda: PILOTS[reason](link)])
+    since = flight.time_of("pilot")
+    assert flight.status == f"pilot: {reason}" and EVENT < since <= EVENT + 1.0
+    assert not flight.sent_after(since, *STICKS)
+    assert not [m for m in flight.sent_after(since, "COMMAND_LONG") if m.command == 176]
+
+
+def test_who_took_over_can_resume(tmp_path):
+    link = StandIn(profile="generic", shift=SHIFT)
+    ours = {"system": IDENTITY[0], "component": IDENTITY[1]}
+    later = [(EVENT, lambda: command(link, 193, 0.0, **ours)), (EVENT + 2.0, lambda: command(link, 193, 1.0, **ours))]
+    flight = Flight(tmp_path, 10.0, link=link, events=[lambda: link.events.extend(later)])
+    names = [state for _, state in flight.states]
+    assert names[-1] == "steering" and "held" in names and flight.status == "completed"
+
+
+def test_each_condition_has_a_test_here():
+    tested = {*FAULTS, *PILOTS, "refused mode", "frame drift", "geofence"}
+    assert tested == {condition.name for condition in CONDITIONS}
+
+
+def test_the_pages_tables_are_the_codes():
+    page = (ROOT / "docs" / "howto" / "companion.md").read_text()
+    for condition in CONDITIONS:
+        limit = f"{condition.limit:g} {condition.unit}" if condition.unit else "any"
+        assert f"| {condition.name} | {limit} | {condition.words} | {condition.then} |" in page
+    for number, state in enumerate(STATES):
+        assert f"| {number} | {state.replace('_', ' ')} | {MEANINGS[state]} |" in page
+
+
+# ---- the run that is left ----
+
+
+def test_the_record_has_what_passed_between_companion_and_autopilot(tmp_path):
+    flight = Flight(tmp_path, 3.0)
+    run = load_run(tmp_path / "run")
+    table = run.table()
+    assert table.num_rows == round(3.0 / 0.02) + 1
+    age = table["autopilot.age"].to_numpy()
+    assert 0.01 < np.median(age) < 0.05  # 12 ms on the way, and half a period
+    estimate = np.array([table[f"autopilot.position.{a}"].to_numpy() for a in "xyz"])
+    scene = np.array([table[f"position.{a}"].to_numpy() for a in "xyz"])
+    assert scene - estimate == pytest.approx(np.outer(flight.companion.session.alignment.offset, np.ones(151)))
+    assert set(table["companion.state"].to_numpy()[2:]) == {STATES.index("steering")}
+    assert table["companion.round_trip"].to_numpy()[-1] == pytest.approx(0.067, abs=0.03)
+
+
+def test_what_a_real_vehicle_cannot_be_made_to_do_is_refused():
+    with pytest.raises(RunError, match=r"record\.lyapunov is set"):
+        scenario_to_steer(load_scenario("paper", ["record.lyapunov=true"]))
+    steered = scenario_to_steer(load_scenario("pipe-inspection"))
+    assert steered.time.step == steered.time.control == 0.02 and steered.sensing.exact
+
+
+@pytest.mark.slow
+def test_report_and_replay_are_written_as_of_any_run(tmp_path):
+    Flight(tmp_path, 3.0)
+    summary, files = report_again(tmp_path / "run")
+    assert summary["simulated_time"] == 3.0
+    assert {file.name for file in files} >= {"report.html", "replay.html"}

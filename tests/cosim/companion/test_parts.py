@@ -1,0 +1,177 @@
+"""The companion's parts, each against a number that stands elsewhere."""
+
+import math
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import all as mavlink
+
+from cosim.companion.clock_sync import ClockSync
+from cosim.companion.frame_alignment import FrameAlignment, SceneOrigin
+from cosim.companion.outputs import VelocityLead, manual_control, scale_of, velocity_target
+from cosim.companion.safety import CONDITIONS, Observation, Supervisor
+from cosim.companion.vehicle_state import ReportedState
+from cosim.mavlink.vehicle.geodesy import LocalFrame
+from cosim.mavlink.vehicle.profile import PROFILES
+from cosim.simulation.commands.commands import ManualControl
+from plant_fmu import load_vehicle
+from tests.cosim.mavlink.station import Station, scenario
+
+HEAVY = load_vehicle("bluerov2_heavy")
+ARDUSUB = PROFILES["ardusub"]
+SHIFT = 0.9, -1.6, 1.9
+
+
+# ---- clocks ----
+
+
+def test_the_quickest_answer_gives_the_offset():
+    sync = ClockSync()
+    assert math.isnan(sync.offset)
+    for sent, took, skew in ((10.0, 0.100, 0.03), (11.0, 0.004, 0.0), (12.0, 0.060, -0.02)):
+        stamp = sync.request(sent)
+        sync.take(round((sent + took / 2 + skew - 3.0) * 1e9), stamp, sent + took)
+    assert sync.offset == pytest.approx(3.0, abs=1e-6) and sync.round_trip == pytest.approx(0.004)
+    sync.take(5_000_000_000, 123, 13.0)  # nobody asked for it
+    assert sync.offset == pytest.approx(3.0, abs=1e-6)
+
+
+def test_an_autopilot_that_starts_again_has_another_offset_at_once():
+    sync = ClockSync()
+    for sent, boot in ((10.0, 500.0), (11.0, 501.0), (12.0, 0.5)):
+        sync.take(round(boot * 1e9), sync.request(sent - 0.005), sent + 0.005)
+    assert sync.offset == pytest.approx(11.5, abs=1e-6)
+
+
+# ---- the frame ----
+
+
+def reported(position, geodetic=None, depth=None, heard=0.0, state=None):
+    state = state or ReportedState((255, 191))
+    beat = mavlink.MAVLink_heartbeat_message(12, 3, 1, 0, 4, 3)
+    state.take(1, 1, beat, heard)
+    x, y, z = map(float, position)
+    state.take(1, 1, mavlink.MAVLink_local_position_ned_message(round(heard * 1e3), x, y, z, 0, 0, 0), heard)
+    if depth is not None:
+        pressure = 1013.25 + 1000.0 * 9.80665 * depth / 100.0
+        state.take(1, 1, mavlink.MAVLink_scaled_pressure2_message(0, pressure, 0, 0), heard)
+    if geodetic is not None:
+        latitude, longitude, _ = geodetic
+        state.take(1, 1, mavlink.MAVLink_global_position_int_message(
+            0, round(latitude * 1e7), round(longitude * 1e7), 0, 0, 0, 0, 0, 0), heard)  # fmt: skip
+    return state
+
+
+def test_the_frame_follows_from_globe_and_pressure():
+    origin = (55.9097, -3.3203)
+    alignment, frame, state = FrameAlignment(SceneOrigin(geodetic=origin)), LocalFrame(*origin), None
+    true = np.array([3.0, -2.0, 4.0])
+    for k in range(10):
+        assert alignment.offset is None
+        state = reported(true + np.array(SHIFT), frame.to_global(tuple(true)), true[2], k * 0.1, state)
+        alignment.update(state, k * 0.1)
+    assert alignment.offset == pytest.approx([-0.9, 1.6, -1.9], abs=0.02)  # 1e-7 deg is a centimeter
+    assert alignment.to_scene(state.position) == pytest.approx(true, abs=0.02)
+
+
+def test_positions_that_do_not_agree_give_no_frame():
+    origin, rng = (55.9097, -3.3203), np.random.default_rng(1)
+    alignment, frame, state = FrameAlignment(SceneOrigin(geodetic=origin)), LocalFrame(*origin), None
+    for k in range(60):
+        where = rng.normal(0.0, 0.5, 3)
+        state = reported((0.0, 0.0, 0.0), frame.to_global(tuple(where)), 1.0, k * 0.1, state)
+        alignment.update(state, k * 0.1)
+    assert alignment.offset is None and "agree" in alignment.missing(state)
+
+
+# ---- what is sent ----
+
+
+def test_full_surge_of_a_bluerov2_at_half_gain_is_28_newtons():
+    """As a real ArduSub was measured to give; and no stick asks for more."""
+    scale = scale_of(HEAVY, ARDUSUB, 0.5)
+    sticks = scale.sticks(np.array([28.28, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    assert sticks[0] == pytest.approx(1.0, abs=0.01)
+    assert scale.sticks(np.full(6, -1e3)).tolist() == [-1.0] * 6
+    assert scale.sticks(np.array([math.nan, math.inf, 0, 0, 0, 0]))[:2].tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("profile", ["ardusub", "generic"])
+def test_sticks_give_the_wrench_that_they_were_made_for(profile):
+    """Through the vehicle's own service for sticks, whose parts of the greatest wrench the pilot's gain scales."""
+    station = Station(profile, of=scenario("vehicle='bluerov2_heavy'", name="pipe-inspection"))
+    station.look(1.0, **{"commands.mode": 0.0})
+    scale = scale_of(HEAVY, PROFILES[profile], 0.5)
+    wrench = np.array([10.0, -5.0, 8.0, 0.5, -0.8, 1.2])
+    station.send(manual_control(mavlink, 1, PROFILES[profile], scale.sticks(wrench), all_axes=True))
+    (command,) = station.commanded()
+    assert isinstance(command, ManualControl)
+    assert 0.5 * np.array(command.wrench) * scale.reach == pytest.approx(wrench, rel=0.02)
+
+
+def test_a_velocity_leads_by_the_acceleration_that_the_wrench_gives():
+    lead, state = VelocityLead(HEAVY, lag=0.5), reported((0.0, 0.0, 0.0))
+    asked = lead.velocity(np.array([10.0, 0.0, 0.0, 0.0, 0.0, 0.0]), state)
+    assert asked == pytest.approx([0.5 * 10.0 / (13.5 + 6.36), 0.0, 0.0])  # mass and added mass of the source
+    steady = 0.3
+    state.velocity[:] = steady, 0.0, 0.0
+    drag = 13.7 * steady + 141.0 * steady**2
+    assert lead.velocity(np.array([drag, 0, 0, 0, 0, 0]), state) == pytest.approx([steady, 0.0, 0.0])
+    assert np.linalg.norm(lead.velocity(np.full(6, 1e5), state)) == pytest.approx(0.5)
+    message = velocity_target(mavlink, 1, asked)
+    assert message.type_mask == 0b110111000111 and message.coordinate_frame == mavlink.MAV_FRAME_LOCAL_NED
+
+
+# ---- who may steer ----
+
+
+def seen(**values):
+    return Observation(0.0, True, True, True, True, {name.replace("_", " "): v for name, v in values.items()})
+
+
+@pytest.mark.parametrize("condition", CONDITIONS, ids=lambda condition: condition.name)
+def test_each_condition_ends_steering_beyond_its_limit_alone(condition):
+    supervisor = Supervisor()
+    assert supervisor.update(seen()) == "steering"
+    at_limit = Observation(0.0, True, True, True, True, {condition.name: condition.limit})
+    assert supervisor.update(at_limit) == "steering"
+    beyond = at_limit._replace(values={condition.name: condition.limit + 0.01})
+    assert supervisor.update(beyond) == condition.then and supervisor.reason == condition.name
+    assert supervisor.update(seen()) == condition.then  # until somebody resumes
+    supervisor.resume()
+    assert supervisor.update(seen()) == "steering" and supervisor.reason == ""
+
+
+def test_the_way_to_steering_goes_step_by_step():
+    supervisor, nothing = Supervisor(), Observation(0.0, False, False, False, False, {})
+    known = {"has_state": True}
+    expected = [
+        ({}, "waiting"), (known, "aligning"), (known | {"frame_known": True}, "disarmed"),
+        (known | {"frame_known": True, "is_armed": True}, "engaging"),
+        (known | {"frame_known": True, "is_armed": True, "in_mode": True}, "steering"),
+    ]  # fmt: skip
+    for changes, state in expected:
+        assert supervisor.update(nothing._replace(**changes)) == state
+
+
+@pytest.mark.parametrize(
+    ("system", "component", "x", "z", "counts"),
+    [
+        (255, 191, 900, 500, False),  # ours
+        (255, 190, 20, 500, False),  # at rest, as an ArduSub's sticks are
+        (255, 190, 0, 0, True),  # full down
+        (255, 190, 0, 700, True),
+        (254, 1, 300, 500, True),
+    ],
+)
+def test_deflected_sticks_of_somebody_else_are_a_pilots(system, component, x, z, counts):
+    state = reported((0.0, 0.0, 0.0))
+    state.take(system, component, mavlink.MAVLink_manual_control_message(1, x, 0, z, 0, 0), 5.0)
+    assert (state.pilot_at == 5.0) == counts
+
+
+def test_overridden_channels_are_a_pilots_too():
+    state = reported((0.0, 0.0, 0.0))
+    pulses = [0, 0xFFFF, 1500, 1500, 1700, 0, 0, 0]
+    state.take(255, 190, mavlink.MAVLink_rc_channels_override_message(1, 1, *pulses), 6.0)
+    assert state.pilot_at == 6.0
