@@ -58,8 +58,11 @@ def expected(memory, state, goal, regions, weights):
         GAINS.braking_share * dynamics.braking.min(),
         0.5 * GAINS.acceleration * (0.02**2 + seen.state[LAG] ** 2), variance, state.deviation[6:9].max(),
     )  # fmt: skip
+    rates = 0.02 / (0.02 + np.where(regions.hard, GAINS.price_smoothing, GAINS.weight_smoothing))
+    stages = memory.weights[0] + rates * (weights - memory.weights[0])
+    smoothed = memory.weights[1] + rates * (stages - memory.weights[1])
     rows = barrier.write_rows(
-        memory.program, memory.observation, regions, weights, motion, thrusters.lower, thrusters.upper, GAINS
+        memory.program, memory.observation, regions, smoothed, motion, thrusters.lower, thrusters.upper, GAINS
     )
     forces, program = np.empty(8), copy.deepcopy(memory.program)
     solve(memory.program, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)

@@ -251,6 +251,8 @@ VERBS = {  # {run}: a run folder
     "scenes": ["--count", "3"],
     "campaign": ["scenes.jsonl", "--law", "ismail_dunnigan", *CAMPAIGN],
     "compare": ["scenes.jsonl", "--laws", "ismail_dunnigan,pd", *CAMPAIGN],
+    "ablate": ["scenes.jsonl", "--variants", "lag", *CAMPAIGN],
+    "falsify": ["plain", "--law", "pd", "--budget", "2", *CAMPAIGN],
     "sweep": ["paper", *QUICK, "--vary", "initial.position.1=-1:1", "--samples", "2", *CAMPAIGN],
     "rerun": ["out", "0", "--out", "again"],
     "listen": ["udpin:127.0.0.1:14571", "--seconds", "0.1"],
@@ -266,9 +268,22 @@ VERBS = {  # {run}: a run folder
     "help": [],
 }  # fmt: skip
 WAITING = {"sitl", "companion"}  # verbs that say on standard error that they wait, and who came
-SLOW = {"report", "check", "calibrate", "package", "campaign", "compare", "sweep", "rerun", "mavlink-check"}
+SLOW = {
+    "report",
+    "check",
+    "calibrate",
+    "package",
+    "campaign",
+    "compare",
+    "ablate",
+    "falsify",
+    "sweep",
+    "rerun",
+    "mavlink-check",
+}
 NEED = {
     "watch": "rich",
+    "falsify": "cma",
     "listen": "pymavlink",
     "stream": "pymavlink",
     "mavlink-check": "pymavlink",

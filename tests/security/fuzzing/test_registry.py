@@ -33,6 +33,7 @@ ITS_OWN = {  # what parses nothing that comes from outside: why
     "cosim.mavlink.services.parameters:Parameters._send_hash": "its own hash",
     "cosim.mavlink.services.parameters:_as_float32": "its own number",
     "cosim.results.recorder:Recorder._append_parts": "the parts that it has just written",
+    "cosim.scenario.membership_terms:_read": "text made of a scenario's table, which is fuzzed",
     "cosim.scenario.scenario:Scenario.replace": "its own text",
     "cosim.scenario.toml_file:shipped_titles": "what came with the package",
     "cosim.scenario.toml_file:read_table": "calls the reader of plant_fmu.toml_tables",
