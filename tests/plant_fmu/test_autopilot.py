@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from plant_fmu.autopilot import LONGEST, SHORTEST, Autopilot, validate_autopilot
+from plant_fmu.autopilot import LONGEST, SHORTEST, Autopilot, effort_of_pulse, pulse_of_effort, validate_autopilot
 
 
 def require(good, key, came, expected):
@@ -38,3 +38,16 @@ def test_pulses_reach_as_far_as_speed_controllers_take_them_and_no_farther(neutr
         shift = -beyond if low == SHORTEST else beyond
         with pytest.raises(ValueError, match="pulses of 800 to 2200 us"):
             checked(pwm_neutral=neutral + shift, pwm_span=span)
+
+
+@pytest.mark.parametrize("curve", ["linear", "quadratic"])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_a_pulse_asks_for_the_effort_that_it_came_from(curve, sign):
+    """Outside the dead band each is the other's inverse; beyond the ends a pulse stays at them, and NaN is neutral."""
+    table = Autopilot("vectored_6dof", curve=curve)
+    pulse, effort = pulse_of_effort(table, sign), effort_of_pulse(table, sign)
+    for part in (-1.0, -0.64, -0.25, 0.36, 0.81, 1.0):
+        assert effort(pulse(part)) == pytest.approx(part, rel=1e-12)
+    ends = [table.pwm_neutral - sign * table.pwm_span, table.pwm_neutral + sign * table.pwm_span]
+    assert [pulse(-1.0), pulse(1.0)] == ends == [pulse(-7.0), pulse(7.0)]
+    assert pulse(0.0) == pulse(float("nan")) == table.pwm_neutral
