@@ -151,7 +151,7 @@ def chosen_block(tokens: list[Token], name: str | None) -> list[Token]:
     Raises
     ------
     FormatError
-        If there is no such block, or several and no name; all names are told.
+        If there is no such block, or several and no name; it lists all names.
     """
     starts = [i for i, token in enumerate(tokens) if token.text.upper() == "FUNCTION_BLOCK"]
     if name is None and len(starts) < 2:

@@ -88,7 +88,7 @@ def _changes(scene: ScenarioScene, conditions: Conditions) -> dict[str, Any]:
 
 
 def _sensing(scene: Scene, conditions: Conditions) -> dict[str, Any]:
-    """Return what the law is told: through sensors, their noise is that of data sheets, not of the scene."""
+    """Return what the law is given: through sensors, their noise is that of data sheets, not of the scene."""
     sensing: dict[str, Any] = {"through": conditions.sensing, "seed": scene.seed}
     if conditions.sensing == "state":
         sensing |= {"position_noise": scene.noise.position, "velocity_noise": scene.noise.velocity}
@@ -104,7 +104,7 @@ def _failures(scene: Scene, conditions: Conditions) -> list[dict[str, float]]:
 
 
 def _regions(scene: Scene) -> list[dict[str, Any]]:
-    """Return the regions that the law is told of, as a scenario's file has them."""
+    """Return the regions that the law is given, as a scenario's file has them."""
     kinds = {shape: name for name, shape in SHAPES.items()}
     return [
         {

@@ -28,7 +28,7 @@ class Conditions:
     settled: float = 10.0  # s at the end inside the goal region
     ramp: float = 0.2  # m, width of the arbiter's memberships
     tell_failures: bool = False
-    sensing: Literal["state", "sensors"] = "state"  # what the law is told, as `Sensing.through`
+    sensing: Literal["state", "sensors"] = "state"  # what the law is given, as `Sensing.through`
     outages: tuple[Outage, ...] = ()  # of sensors
     arbiter: RuleVariant = "ordered"  # by which criteria are weighed, as `ArbiterSetup.rules`
     arbiter_file: str = (

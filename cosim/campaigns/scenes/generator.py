@@ -1,7 +1,7 @@
 """Random scenes to fly by campaigns, the same for everyone who uses the same seed.
 
 A scene is a start, a spherical goal region, spheres across the straight way to it, a depth band, a steady current,
-and restoring forces that no law is told. A hard one has more obstacles, the first of which drifts, a stronger
+and restoring forces that no law is given. A hard one has more obstacles, the first of which drifts, a stronger
 current, noise, and a thruster that fails. `cosim.campaigns.scenes.scene` says what is done with each number.
 """
 

@@ -1,6 +1,6 @@
-"""Scored scenes: a start, a goal region, obstacles, a depth band, and what the law is not told of the plant.
+"""Scored scenes: a start, a goal region, obstacles, a depth band, and what the law is not given of the plant.
 
-`scene_regions` are what the law is told of, beside the goal; `plant_values` is for the plant alone.
+The law is given `scene_regions` and the goal; `plant_values` are for the plant alone.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Scenes that try one part of a law each: what it has to estimate, to find out, or to get round.
 
 Each scene is a scenario with hard regions alone: spheres across the way, between which it is narrow, and one thing that
-a law is not told and that is far from nominal. The generator does not know how any law fares in its scenes.
+a law is not given and that is far from nominal. The generator does not know how any law fares in its scenes.
 """
 
 from __future__ import annotations

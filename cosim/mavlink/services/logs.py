@@ -1,4 +1,4 @@
-"""Log files: there are none on the vehicle, and who asks is told so at once. The record is the run folder's."""
+"""Log files: the vehicle has none and answers so at once. The record is in the run folder."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class StickStabilizer:
     vehicle : Vehicle
         That is steered.
     state : VehicleState
-        As the law is told; read at each step.
+        As the law is given it; read at each step.
     period : float
         Between two steps [s].
     reach : ndarray, shape (6,)
