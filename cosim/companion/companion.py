@@ -104,12 +104,12 @@ class Companion:
         self.scenario = scenario_to_steer(scenario)
         self._options = options
         self.session = AutopilotSession(link, self.scenario.vehicle, options)
-        self._said = ("", "")
+        self._reported = ("", "")
         hard = [i for i, secondary in enumerate(self.scenario.regions, 1) if _is_fence(secondary)]
         self._hard = np.array(hard, dtype=int)
 
     def run(
-        self, out: Path | None = None, report: bool = True, tell: Callable[[State, str], None] | None = None
+        self, out: Path | None = None, report: bool = True, on_state: Callable[[State, str], None] | None = None
     ) -> Run:
         """Wait until the vehicle can be steered, steer it for the scenario's time, and let go.
 
@@ -119,8 +119,8 @@ class Companion:
             The run folder, as for `run_scenario`.
         report : bool
             Write report and figures too.
-        tell : callable, optional
-            Told of each state, and what it waits for, when that changes.
+        on_state : callable, optional
+            Called with each new state, and with what it waits for.
 
         Returns
         -------
@@ -138,7 +138,7 @@ class Companion:
         """
         rehearse(self.scenario, self._options)
         with Master(self.scenario, plant=RemoteVehicle(self.scenario, self.session)) as master:
-            self.prepare(tell)
+            self.prepare(on_state)
             folder = claim(out, self.scenario)
             try:
                 recorder = Recorder(folder.path, master.signals.columns)
@@ -147,7 +147,7 @@ class Companion:
                 raise
             started = time.perf_counter()
             try:
-                status = self._steer(master, recorder, tell)
+                status = self._steer(master, recorder, on_state)
             finally:
                 self.session.release(_RELEASE)
                 wall_time = time.perf_counter() - started
@@ -156,18 +156,18 @@ class Companion:
                 raise RunError(f"{folder.path}: ended before the first step")
             return conclude(folder.path, self.scenario, status, wall_time, report)
 
-    def prepare(self, tell: Callable[[State, str], None] | None = None) -> None:
+    def prepare(self, on_state: Callable[[State, str], None] | None = None) -> None:
         """Exchange messages until the vehicle can be steered; RunError if that takes longer than the options allow."""
         session, period = self.session, self.scenario.time.step
         begun = session.clock()
         while not session.supervisor.is_steering:
             now = session.clock()
             session.exchange(np.zeros(6), now, now + period)
-            self._report(tell)
+            self._report(on_state)
             if self._options.timeout is not None and now - begun > self._options.timeout:
                 raise RunError(f"{self._options.timeout:g} s have gone by, waiting for {session.missing()}")
 
-    def _steer(self, master: Master, recorder: Recorder, tell: Callable[[State, str], None] | None) -> str:
+    def _steer(self, master: Master, recorder: Recorder, on_state: Callable[[State, str], None] | None) -> str:
         session = self.session
         clearances = master.signals.view("goal.clearance", len(self.scenario.regions) + 1)
         master.plant.initialise()
@@ -177,15 +177,15 @@ class Companion:
                 recorder.observe(k, master.row)
                 violated = clearances[self._hard]
                 session.outside = float(max(0.0, -np.nanmin(violated))) if np.isfinite(violated).any() else 0.0
-                self._report(tell)
+                self._report(on_state)
         except KeyboardInterrupt:
             return "interrupted"
         state, reason = session.supervisor.state, session.supervisor.reason
         return "completed" if session.supervisor.is_steering else f"{state}: {reason}"
 
-    def _report(self, tell: Callable[[State, str], None] | None) -> None:
-        """Tell state, and what it waits for, where that has changed."""
+    def _report(self, on_state: Callable[[State, str], None] | None) -> None:
+        """Call `on_state` where the state, or what it waits for, has changed."""
         now = self.session.supervisor.state, self.session.missing()
-        if tell is not None and now != self._said:
-            tell(*now)
-        self._said = now
+        if on_state is not None and now != self._reported:
+            on_state(*now)
+        self._reported = now

@@ -32,7 +32,7 @@ class Flight:
         scenario = load_scenario("pipe-inspection", [f"time.duration={seconds}"])
         self.companion = Companion(scenario, self.link, CompanionOptions(**options))
         self.states = []
-        self.run = self.companion.run(tmp_path / "run", report=False, tell=self._tell)
+        self.run = self.companion.run(tmp_path / "run", report=False, on_state=self._tell)
         self.status = self.run.summary["status"]
 
     def _tell(self, state, missing):
