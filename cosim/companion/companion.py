@@ -11,10 +11,10 @@ import numpy as np
 from controller.regions.region_set import of_attitude
 from cosim.companion.link import AutopilotLink
 from cosim.companion.options import CompanionOptions
-from cosim.companion.rehearsal import rehearse
 from cosim.companion.remote_vehicle import RemoteVehicle
 from cosim.companion.safety import State
 from cosim.companion.session import AutopilotSession
+from cosim.companion.warm_up import warm_up
 from cosim.errors import RunError
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import Run
@@ -136,7 +136,7 @@ class Companion:
         KeyboardInterrupt
             If Ctrl-C came before steering began.
         """
-        rehearse(self.scenario, self._options)
+        warm_up(self.scenario, self._options)
         with Master(self.scenario, plant=RemoteVehicle(self.scenario, self.session)) as master:
             self.prepare(on_state)
             folder = claim(out, self.scenario)

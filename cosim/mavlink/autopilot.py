@@ -187,7 +187,7 @@ class Autopilot:
             self._advance()
         for service in self._services:
             service.tick()
-        context.voice.tick()
+        context.status_texts.send_due()
         for link, streams in list(self._streams.items()):
             if streams.beaten or link not in self._beaten_at:
                 streams.beaten = False

@@ -20,7 +20,7 @@ class Events:
     Parameters
     ----------
     context : VehicleContext
-        Whose voice is used.
+        That sends them as status texts.
     """
 
     def __init__(self, context: VehicleContext) -> None:

@@ -1,4 +1,4 @@
-"""A search from its settings to its folder: rows flown as the search asks for them, the dice beside, a summary."""
+"""A search from its settings to its folder: rows flown as the search asks for them, random ones beside, a summary."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from cosim.errors import RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
 
-DICE = "dice"  # folder of as many rows that are drawn at random
+RANDOM = "random"  # folder of as many rows that are drawn at random
 LISTED = 10  # of the worst rows
 _COLUMNS = {"clearance": "min_clearance", "violation": "weighted_violation", "arrival": "reach_time"}
 _REFUSED = 1e9  # cost of a row that was not flown: no search goes there
@@ -97,7 +97,7 @@ def run_falsification(work: Search, out: Path, workers: int = 1, progress: bool 
     Returns
     -------
     Falsification
-        With every row that was flown; beside a search for the worst, its folder ``dice`` has as many random ones.
+        With every row that was flown; beside a search for the worst, its folder ``random`` has as many random ones.
 
     Raises
     ------
@@ -122,9 +122,9 @@ def run_falsification(work: Search, out: Path, workers: int = 1, progress: bool 
                 minimize(flights, work.dimension, settings.budget, settings.seed)
         results = folder.results() if folder.complete else folder.join()
         folder.remove_parts()
-        dice = None if settings.rare_event else work.fly_dice(out / DICE, workers, progress)
+        random = None if settings.rare_event else work.fly_random(out / RANDOM, workers, progress)
         try:
-            summary = _summarise(work, out, results, dice, flights.points)
+            summary = _summarise(work, out, results, random, flights.points)
             summary["estimate"] = estimate and asdict(estimate)
             write_atomic(out / SUMMARY, json_text(summary))
         except OSError as error:
@@ -160,7 +160,7 @@ def costs_of(rows: Any, objective: Objective, horizon: float) -> NDArray[np.floa
 
 
 def _summarise(
-    work: Search, out: Path, results: Results, dice: Results | None, points: NDArray[np.float64]
+    work: Search, out: Path, results: Results, random: Results | None, points: NDArray[np.float64]
 ) -> dict[str, Any]:
     costs = costs_of(results.table, work.settings.objective, work.horizon)
     summary = {
@@ -168,12 +168,12 @@ def _summarise(
         "horizon": work.horizon,
         **_counts(results, costs),
         "worst": _worst(out, results, costs, points),
-        "dice": None,
+        "random": None,
         **work.plan,
     }
-    if dice is not None:
-        others = costs_of(dice.table, work.settings.objective, work.horizon)
-        summary["dice"] = _counts(dice, others) | {"worst": _worst(out / DICE, dice, others, None)}
+    if random is not None:
+        others = costs_of(random.table, work.settings.objective, work.horizon)
+        summary["random"] = _counts(random, others) | {"worst": _worst(out / RANDOM, random, others, None)}
     return summary
 
 

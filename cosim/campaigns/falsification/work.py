@@ -131,7 +131,7 @@ class SceneSearch:
         """Return the table of one scene that could not be flown."""
         return table_of([refused_row(row, reason, self._lines[row].decode().strip())])
 
-    def fly_dice(self, out: Path, workers: int, progress: bool) -> Results:
+    def fly_random(self, out: Path, workers: int, progress: bool) -> Results:
         """Fly as many scenes as the generator makes them."""
         with TemporaryDirectory() as folder:
             scenes = Path(folder) / "scenes.jsonl"
@@ -178,6 +178,6 @@ class ScenarioSearch(SweepWork):
         """Return values and seeds of some rows."""
         return SweepBatch(rows, self._values[rows], self.design.seeds(rows))
 
-    def fly_dice(self, out: Path, workers: int, progress: bool) -> Results:
+    def fly_random(self, out: Path, workers: int, progress: bool) -> Results:
         """Fly as many rows with values that are drawn evenly."""
         return run_sweep(self._scenario, self.design, out, workers=workers, progress=progress).results

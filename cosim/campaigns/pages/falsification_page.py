@@ -82,7 +82,7 @@ def falsification_lines(summary: dict[str, Any]) -> Iterator[str]:
     if s["estimate"]:
         yield f"{s['title']}: {_estimated(s['estimate'])}, from {s['flown']} flights"
     else:
-        for name, found in (("search", s), ("dice", s["dice"])):
+        for name, found in (("search", s), ("random", s["random"])):
             worst = f", worst {_value(s, found['worst'][0], True)}" if found["worst"] else ""
             yield f"{name + ':':7} {found['flown']} flights, {found['violations']} with a violation{worst}"
     for worst in s["worst"][:1]:
@@ -104,12 +104,12 @@ def _drawings(s: dict[str, Any]) -> Iterator[NamedFigure]:
         axes.set(xlabel=label, ylabel="probability of less")
         yield NamedFigure("levels", "How likely a flight comes as near or nearer, level by level.", figure)
         return
-    for name, found, color in (("search", s, BLUE), ("dice", s["dice"], ORANGE)):
+    for name, found, color in (("search", s, BLUE), ("random", s["random"], ORANGE)):
         flights, costs = zip(*[*found["best"], [found["flown"], found["best"][-1][1]]], strict=True)
         axes.step(flights, [_of_cost(s, cost) for cost in costs], where="post", color=color, label=name)
     axes.set(xlabel="flights", ylabel=f"worst so far: {label}")
     axes.legend()
-    yield NamedFigure("convergence", "The worst that search and dice had found after so many flights.", figure)
+    yield NamedFigure("convergence", "The worst of the search and of random flights, after so many flights.", figure)
 
 
 def _page(s: dict[str, Any], figures: Mapping[str, Html], shown: Mapping[int, Replay]) -> Page:
@@ -140,17 +140,17 @@ def _page(s: dict[str, Any], figures: Mapping[str, Html], shown: Mapping[int, Re
         )
     page.heading(f"The worst {unit}s")
     page.paragraph(f"Of {unit}s that are near to each other, the worst one. A replay shows the flight in the browser.")
-    label, dice = _LABELS[search["objective"]], s["dice"]["worst"] if s["dice"] else []
+    label, random = _LABELS[search["objective"]], s["random"]["worst"] if s["random"] else []
     page.table(
-        [f"{unit} found", label, *(["of the dice", label] if dice else []), "to be seen", "again, with full record"],
+        [f"{unit} found", label, *(["at random", label] if random else []), "to be seen", "again, with full record"],
         [
             [
                 *_cells(s, found),
-                *(_cells(s, drawn) if dice else []),
+                *(_cells(s, drawn) if random else []),
                 shown[found["row"]].cell() if found and found["row"] in shown else "–",
                 code(found["command"]) if found else "–",
             ]
-            for found, drawn in zip_longest(s["worst"], dice)
+            for found, drawn in zip_longest(s["worst"], random)
         ],
     )
     refused_section(page, unit, s["refused"], {})
@@ -174,7 +174,7 @@ def _verdict(s: dict[str, Any], unit: str) -> str:
         worst = f"; the worst is {_value(s, found['worst'][0], True)}" if found["worst"] else ""
         return f"{found['violations']} {unit}s with a violation and {found['not_reached']} that did not arrive{worst}"
 
-    return f"In {s['flown']} flights the search found {of(s)}. As many random ones: {of(s['dice'])}."
+    return f"In {s['flown']} flights the search found {of(s)}. As many random ones: {of(s['random'])}."
 
 
 def _estimated(estimate: Mapping[str, Any]) -> str:

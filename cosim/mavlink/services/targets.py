@@ -10,7 +10,7 @@ from cosim.errors import CommandError
 from cosim.mavlink.services.parameters import Parameters, shortest
 from cosim.mavlink.services.service import Call, Service, place_of, unscaled
 from cosim.mavlink.services.speed import SPEED, resolve_speed
-from cosim.mavlink.vehicle.keep_in import KeepIn
+from cosim.mavlink.vehicle.keep_in_regions import KeepInRegions
 from cosim.mavlink.vehicle.profile import MODE_NAMES
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector3
@@ -47,7 +47,7 @@ class Targets(Service):
 
     def __init__(self, context: VehicleContext, parameters: Parameters) -> None:
         super().__init__(context)
-        self._parameters, self._keep_in = parameters, KeepIn(context.scenario)
+        self._parameters, self._keep_in = parameters, KeepInRegions(context.scenario)
         m = context.mavlink
         self._last: tuple[object, ...] = ()
         self._last_at = -math.inf

@@ -1,4 +1,4 @@
-"""What all micro-services share: the latest snapshot, the links, the way to give commands, and the voice."""
+"""What all micro-services share: the latest snapshot, the links, the way to give commands, and the status texts."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from cosim.mavlink.vehicle.layout import Layout
 from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.vehicle.proximity import Proximity
+from cosim.mavlink.vehicle.status_texts import StatusTexts
 from cosim.mavlink.vehicle.view import View
-from cosim.mavlink.vehicle.voice import Voice
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.encode import Encoder
 from cosim.mavlink.wire.message_sink import MessageSink
@@ -80,8 +80,8 @@ class VehicleContext:
         Where on the globe position 0 is.
     home : tuple of float
         North and east of home [m], which is at the surface.
-    voice : Voice
-        Says texts; `say`, `reject` and `text` are its own.
+    status_texts : StatusTexts
+        Sends texts; `say`, `reject` and `text` are its own.
     now : float
         The wall clock, as it was told last [s].
     failsafe : bool
@@ -124,8 +124,8 @@ class VehicleContext:
         signs = table.signs if isinstance(table.signs, tuple) else (table.signs,) * vehicle.n_thrusters
         self._outputs, self._curves = table.channels, [pulse_of_effort(table, sign) for sign in signs]
         self._commands = commands if options.commands and live and scenario.commands.enabled else None
-        self.voice = Voice(self.mavlink, self.make, self.links, lambda: self.now)
-        self.say, self.reject, self.text = self.voice.say, self.voice.reject, self.voice.text
+        self.status_texts = StatusTexts(self.mavlink, self.make, self.links, lambda: self.now)
+        self.say, self.reject, self.text = self.status_texts.say, self.status_texts.reject, self.status_texts.text
         self.restart()
 
     def restart(self) -> None:

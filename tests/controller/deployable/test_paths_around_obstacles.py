@@ -136,7 +136,7 @@ def test_a_stay_within_a_soft_region_costs_as_three_metres_through_it():
     assert cost - through - 3.0 == pytest.approx(3.0 * 7.0 * (0.5 + 0.5), rel=1e-12) and penalty == 0.0
 
 
-def test_the_trees_leave_dear_regions_for_cheap_ones():
+def test_the_trees_leave_costly_regions_for_cheap_ones():
     """A wall has a door, and ends; a region lies in the door, another one beside the wall: the cheap one is passed."""
     start, goal = np.array([0.0, 0.0, 2.5]), pack([GOAL])
     scene = [

@@ -2,9 +2,9 @@
 
 A potential alone leads into pockets between obstacles. So the law keeps a path of a few corners, and tries one change
 after the other: a corner moved, added or dropped, or another end in the goal region. While the path is blocked, or soft
-regions make it dear, what `search.py` finds is a change, too. The path that costs less stays, by `cost.py`. Each period
-does a bounded part of the work. The random numbers are the law's own, so that a run repeats bit for bit. The path only
-sets the direction: the barriers keep the vehicle out of hard regions, whatever the path.
+regions make it costly, what `search.py` finds is a change, too. The path that costs less stays, by `cost.py`. Each
+period does a bounded part of the work. The random numbers are the law's own, so that a run repeats bit for bit. The
+path only sets the direction: the barriers keep the vehicle out of hard regions, whatever the path.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ CORNERS = 8  # at most
 _BETTER = 0.03  # m, and
 _BETTER_PART = 0.01  # of its cost, that a candidate must save to be taken
 _BLOCKED = 0.3  # of its length, cost of passing regions above which the trees search for another path
-_HARD, _ALL, _DEAR = 0, 1, 2  # regions that they keep out of: hard ones; soft ones, too; of these the dearer ones
+_HARD, _ALL, _COSTLY = 0, 1, 2  # regions that they keep out of: hard ones; soft ones, too; of these the costlier ones
 _LOOKS = (100, 800)  # for a path, before the trees keep out of others: at first, and at most
 _PASSED = 0.25  # m from a corner, within which it counts as passed
 _CLIMBS = 12  # towards the inside of the goal region
@@ -58,7 +58,7 @@ class PathPlan(NamedTuple):
     new_cost: PathCost  # of path or candidate, whichever is evaluated
     search: Search
     closed: NDArray[np.bool_]  # (n,) which regions the search keeps out of
-    turn: NDArray[np.int64]  # (3,) what is closed: `_HARD`, `_ALL` or `_DEAR`; looks for a path, left and in all
+    turn: NDArray[np.int64]  # (3,) what is closed: `_HARD`, `_ALL` or `_COSTLY`; looks for a path, left and in all
     random_numbers: Array  # (5,) in [0, 1)
     phase: NDArray[np.int64]  # (1,) `_BEGIN`, `_PATH` or `_CANDIDATE`
     random: NDArray[np.uint64]  # (1,) state of the generator
@@ -160,17 +160,17 @@ def _choose_closed(
 ) -> None:
     """Choose the regions that the trees keep out of; with others than before, they begin anew.
 
-    While hard ones block the path, these alone. Else the dearer ones, and all, in turns that grow longer; but none that
-    start or end of the path is within.
+    While hard ones block the path, these alone. Else the costlier ones, and all, in turns that grow longer; but none
+    that start or end of the path is within.
     """
     turn, room = plan.turn[0], zeros(3)
     if blocked:
         turn = _HARD
     elif turn == _HARD:
-        turn, plan.turn[2] = _DEAR, _LOOKS[0]
+        turn, plan.turn[2] = _COSTLY, _LOOKS[0]
     elif plan.turn[1] == 0:
-        turn = _ALL if turn == _DEAR else _DEAR
-        if turn == _DEAR:
+        turn = _ALL if turn == _COSTLY else _COSTLY
+        if turn == _COSTLY:
             plan.turn[2] = min(2 * plan.turn[2], _LOOKS[1])
     if turn != plan.turn[0]:
         plan.turn[0], plan.turn[1] = turn, plan.turn[2]

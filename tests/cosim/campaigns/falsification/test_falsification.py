@@ -47,12 +47,12 @@ def found(tmp_path_factory):
 
 def test_a_search_finds_worse_scenes_than_as_many_of_the_generator(found):
     s = found.summary
-    assert found.flown == s["flown"] == s["dice"]["flown"] == 60
-    assert s["worst"][0]["cost"] == found.results["min_clearance"].min() < s["dice"]["worst"][0]["cost"]
-    dice = pq.read_table(found.folder / "dice" / "results.parquet")
+    assert found.flown == s["flown"] == s["random"]["flown"] == 60
+    assert s["worst"][0]["cost"] == found.results["min_clearance"].min() < s["random"]["worst"][0]["cost"]
+    dice = pq.read_table(found.folder / "random" / "results.parquet")
     made = [json.loads(line)["goal"]["centre"] for line in generate_scenes(60)]
     assert [json.loads(line)["goal"]["centre"] for line in dice["scene"].to_pylist()] == made
-    for part, results in ((s, found.results), (s["dice"], None)):
+    for part, results in ((s, found.results), (s["random"], None)):
         clearance = results["min_clearance"] if results else dice["min_clearance"].to_numpy()
         least = [clearance[:flights].min() for flights, _ in part["best"]]
         assert least == [cost for _, cost in part["best"]] and least == sorted(least, reverse=True)
@@ -60,7 +60,7 @@ def test_a_search_finds_worse_scenes_than_as_many_of_the_generator(found):
 
 def test_its_page_shows_search_and_dice_and_the_worst_moving(found):
     page = check(write_falsification_page(found.folder, 1))
-    worst, dice = found.summary["worst"], found.summary["dice"]["worst"]
+    worst, dice = found.summary["worst"], found.summary["random"]["worst"]
     assert page.asked == [f"worst/{worst[0]['row']}/replay.html"]
     listed = [row for row in page.rows if row[-1].startswith("cosim rerun")]
     assert [(int(row[0]), int(row[2])) for row in listed] == [
@@ -75,8 +75,8 @@ def test_its_rows_are_those_of_a_campaign_and_come_again(found, tmp_path):
     key = found.summary["worst"][0]["row"]
     again = rerun(found.folder, key, tmp_path / "run")
     assert again.differing == {} and again.apart == {} and again.run is not None
-    key = found.summary["dice"]["worst"][0]["row"]
-    assert rerun(found.folder / "dice", key, tmp_path / "dice").differing == {}
+    key = found.summary["random"]["worst"][0]["row"]
+    assert rerun(found.folder / "random", key, tmp_path / "dice").differing == {}
 
 
 def test_rows_of_a_scenario_come_again_with_the_values_that_were_found(tmp_path):
@@ -142,7 +142,7 @@ def test_a_rate_is_estimated_from_the_flights_and_shown_level_by_level(tmp_path)
     estimate = found.summary["estimate"]
     assert 100 < found.flown == len(found.results) <= 200
     assert 0.0 <= estimate["low"] <= estimate["probability"] < estimate["high"] < 1.0
-    assert found.summary["dice"] is None and not (tmp_path / "out" / "dice").exists()
+    assert found.summary["random"] is None and not (tmp_path / "out" / "random").exists()
     page = check(write_falsification_page(tmp_path / "out", 0))
     assert sum(row[1].count("e-") == 1 for row in page.rows if len(row) == 2) >= len(estimate["levels"]) - 1
     assert run_falsification(search(200, Conditions(duration=8.0), rare_event=True), tmp_path / "out").flown == 0
@@ -229,5 +229,5 @@ def test_the_command_says_what_was_found(tmp_path, capsys, monkeypatch):
         assert main(words) == 0
         said = capsys.readouterr().out.splitlines()
         assert len(said) == lines and said[-1] == str(tmp_path / "out" / "falsification.html")
-        assert said[-4].startswith("search: 20 flights, ") and said[-3].startswith("dice:   20 flights, ")
+        assert said[-4].startswith("search: 20 flights, ") and said[-3].startswith("random: 20 flights, ")
     assert said[0] == f"{tmp_path / 'out'}: was complete already"

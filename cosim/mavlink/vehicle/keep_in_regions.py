@@ -18,7 +18,7 @@ from cosim.simulation.commands.settings import LiveSettings
 _LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-class KeepIn:
+class KeepInRegions:
     """The regions in space that a vehicle is to stay in.
 
     Making one loads the library that evaluates them, which may take seconds: not to be done beside a simulation.

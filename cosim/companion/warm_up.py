@@ -21,7 +21,7 @@ _STEPS = 3
 class _NoLink:
     """A link to nobody, whose time goes by as it is waited for."""
 
-    name, identity = "rehearsal", (255, 191)
+    name, identity = "warm-up", (255, 191)
 
     def __init__(self) -> None:
         self._now = 0.0
@@ -46,7 +46,7 @@ class _ArmAtFirst:
         return (Arm(True),) if k == 0 else ()
 
 
-def rehearse(scenario: Scenario, options: CompanionOptions) -> None:
+def warm_up(scenario: Scenario, options: CompanionOptions) -> None:
     """Make a few steps of a scenario with a vehicle that stands where it starts.
 
     Parameters

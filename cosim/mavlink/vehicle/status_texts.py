@@ -1,4 +1,4 @@
-"""What the vehicle says in words: STATUSTEXT, not too much at once, and no refusal is lost."""
+"""STATUSTEXT messages of the vehicle: not too many at once, and no refusal is lost."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _REFUSALS_PERIOD = 2.0  # s, between two times at which refusals of a kind are s
 _REASONS = 8  # of a kind that wait to be said, by their words; further ones are counted
 
 
-class Voice:
-    """Says texts on every link.
+class StatusTexts:
+    """Sends texts on every link.
 
     Parameters
     ----------
@@ -82,8 +82,8 @@ class Voice:
             reason = "others, of the same kind"
         reasons[reason] = reasons.get(reason, 0) + 1
 
-    def tick(self) -> None:
-        """Say what waits, as far as its time has come."""
+    def send_due(self) -> None:
+        """Send the refusals and texts that are due."""
         now = self._clock()
         for key in [key for key in self._refusals if now - self._said[f"deny {key}"] >= _REFUSALS_PERIOD]:
             self._said[f"deny {key}"] = now
