@@ -11,14 +11,13 @@ import numpy as np
 from cosim.campaigns.ablation import NUMBERS, PAGE, VARIANTS, WHOLE
 from cosim.campaigns.analysis.worst_rows import LISTED
 from cosim.campaigns.pages.page import Html, Page, code, interval, number, write_figures
-from cosim.campaigns.pages.replays import Replay, replay_of
+from cosim.campaigns.pages.replays import Replay, write_page_with_replays
 from cosim.campaigns.pages.sections import basis
 from cosim.campaigns.reruns.repeat import complete_results
 from cosim.campaigns.scenes.kinds import scene_kinds
 from cosim.campaigns.scenes.rows import SCHEMA
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
-from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import read_json, understood
 
 if TYPE_CHECKING:
@@ -56,16 +55,11 @@ def write_ablation_page(folder: Path, replays: int) -> Path:
     try:
         with understood(folder / NUMBERS):
             figures = write_figures(folder, _drawings(numbers))
-
-        def write(shown: Mapping[int, Replay]) -> None:
-            with understood(folder / NUMBERS):
-                write_atomic(folder / PAGE, _page(numbers, changed, figures, shown).html())
-
-        write({})
-        folders = [folder / name for name in results]
-        title = f"by {', '.join(results)}"
-        if shown := {key: replay_of(folder, key, folders, f"Scene {key} {title}") for key, *_ in changed[:replays]}:
-            write(shown)
+        write_page_with_replays(
+            folder / PAGE, folder / NUMBERS, lambda shown: _page(numbers, changed, figures, shown),
+            [key for key, *_ in changed[:replays]], [folder / name for name in results],
+            lambda key: f"Scene {key} by {', '.join(results)}",
+        )  # fmt: skip
     except OSError as error:
         raise RunError(f"{folder}: {error.strerror or error}") from error
     return folder / PAGE

@@ -11,7 +11,7 @@ import numpy as np
 from cosim.campaigns.analysis.summary import OF_ALL, SPREADS, rates_of
 from cosim.campaigns.analysis.worst_rows import LISTED, Worst, worst_rows
 from cosim.campaigns.pages.page import Html, Page, code, interval, wall, write_figures
-from cosim.campaigns.pages.replays import Replay, replay_of
+from cosim.campaigns.pages.replays import Replay, write_page_with_replays
 from cosim.campaigns.pages.sections import (
     Group,
     basis,
@@ -27,7 +27,6 @@ from cosim.campaigns.store.folder import PLAN, RESULTS, SUMMARY, held
 from cosim.campaigns.store.plan import SCENES
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
-from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import read_json, understood
 
 if TYPE_CHECKING:
@@ -69,15 +68,11 @@ def write_campaign_page(folder: Path, replays: int) -> Path:
         kinds, worst = scene_kinds(results), worst_rows(results, max(LISTED, replays))
         with understood(folder / SUMMARY):
             figures = write_figures(folder, _drawings(results, kinds, summary) if worst else [])
-
-        def write(shown: Mapping[int, Replay]) -> None:
-            with understood(folder / SUMMARY):
-                write_atomic(folder / PAGE, _page(folder, results, kinds, summary, worst, figures, shown).html())
-
-        write({})
-        by = f"by the {summary['law']} law"
-        if shown := {w.key: replay_of(folder, w.key, [folder], f"Scene {w.key} {by}") for w in worst[:replays]}:
-            write(shown)
+        write_page_with_replays(
+            folder / PAGE, folder / SUMMARY,
+            lambda shown: _page(folder, results, kinds, summary, worst, figures, shown),
+            [w.key for w in worst[:replays]], [folder], lambda key: f"Scene {key} by the {summary['law']} law",
+        )  # fmt: skip
     return folder / PAGE
 
 

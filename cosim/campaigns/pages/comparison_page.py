@@ -13,14 +13,13 @@ from cosim.campaigns.analysis.summary import SPREADS
 from cosim.campaigns.analysis.worst_rows import ORDER, Worst, rerun_command, worst_rows
 from cosim.campaigns.pages.campaign_page import FACTS, group_of, spreads_of
 from cosim.campaigns.pages.page import Html, Page, code, interval, number, wall, write_figures
-from cosim.campaigns.pages.replays import Replay, replay_of
+from cosim.campaigns.pages.replays import Replay, write_page_with_replays
 from cosim.campaigns.pages.sections import LABELS, basis, quantiles_table, rates_table
 from cosim.campaigns.reruns.repeat import complete_results
 from cosim.campaigns.scenes.rows import SCHEMA
 from cosim.campaigns.store.folder import SUMMARY
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
-from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import read_json, understood
 
 if TYPE_CHECKING:
@@ -63,17 +62,11 @@ def write_comparison_page(folder: Path, replays: int) -> Path:
     try:
         with understood(folder / NUMBERS):
             figures = write_figures(folder, _drawings(results, numbers) if any(worst.values()) else [])
-
-        def write(shown: Mapping[int, Replay]) -> None:
-            with understood(folder / NUMBERS):
-                write_atomic(folder / PAGE, _page(folder, numbers, worst, figures, shown).html())
-
-        write({})
-        keys = dict.fromkeys(w.key for of in worst.values() for w in of[:replays])
-        folders = [folder / law for law in results]
-        title = f"by {', '.join(results)}"
-        if shown := {key: replay_of(folder, key, folders, f"Scene {key} {title}") for key in keys}:
-            write(shown)
+        write_page_with_replays(
+            folder / PAGE, folder / NUMBERS, lambda shown: _page(folder, numbers, worst, figures, shown),
+            dict.fromkeys(w.key for of in worst.values() for w in of[:replays]), [folder / law for law in results],
+            lambda key: f"Scene {key} by {', '.join(results)}",
+        )  # fmt: skip
     except OSError as error:
         raise RunError(f"{folder}: {error.strerror or error}") from error
     return folder / PAGE

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim.campaigns.pages.page import Html, Page, code, number, write_figures
-from cosim.campaigns.pages.replays import Replay, replay_of
+from cosim.campaigns.pages.replays import Replay, write_page_with_replays
 from cosim.campaigns.pages.sections import basis, refused_section
 from cosim.campaigns.reruns.repeat import require_complete
 from cosim.campaigns.store.folder import PLAN, RESULTS, SUMMARY, held
 from cosim.errors import RunError
-from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import read_json, understood
 
 if TYPE_CHECKING:
@@ -54,14 +53,10 @@ def write_falsification_page(folder: Path, replays: int) -> Path:
         with understood(folder / SUMMARY):
             figures = write_figures(folder, _drawings(summary))
             worst = [row["row"] for row in summary["worst"]][:replays]
-
-        def write(shown: Mapping[int, Replay]) -> None:
-            with understood(folder / SUMMARY):
-                write_atomic(folder / PAGE, _page(summary, figures, shown).html())
-
-        write({})
-        if shown := {key: replay_of(folder, key, [folder], f"{summary['title']}: {key}") for key in worst}:
-            write(shown)
+        write_page_with_replays(
+            folder / PAGE, folder / SUMMARY, lambda shown: _page(summary, figures, shown), worst, [folder],
+            lambda key: f"{summary['title']}: {key}",
+        )  # fmt: skip
     return folder / PAGE
 
 

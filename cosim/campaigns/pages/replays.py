@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.campaigns.pages.page import Html, link
+from cosim.campaigns.pages.page import Html, Page, link
 from cosim.campaigns.reruns.repeat import Repeat, repeat_of
 from cosim.errors import CosimError, RunError
 from cosim.io.atomic_file import write_atomic
-from cosim.io.strict_json import json_text, read_json
+from cosim.io.strict_json import json_text, read_json, understood
 from cosim.replay.page import write_page
 from cosim.replay.trace import trace_of
 from cosim.results.run_result import REPLAY, load_run
@@ -37,6 +37,50 @@ class Replay:
 
         shown = [link(self.page, "replay")] if self.page else []
         return Html("; ".join([*shown, *map(html.escape, self.remarks)]))
+
+
+def write_page_with_replays(
+    path: Path,
+    numbers: Path,
+    page: Callable[[Mapping[int, Replay]], Page],
+    keys: Iterable[int],
+    folders: Sequence[Path],
+    title: Callable[[int], str],
+) -> None:
+    """Write a page, fly rows again, and write the page with their replays.
+
+    Parameters
+    ----------
+    path : Path
+        Of the page; the replays go into a folder beside it.
+    numbers : Path
+        File that the page is made of, for errors.
+    page : callable
+        Makes the page of the replays that there are, by their keys.
+    keys : iterable of int
+        Rows that are flown again.
+    folders : sequence of Path
+        As of `replay_of`.
+    title : callable
+        Makes the title of a key's replay.
+
+    Raises
+    ------
+    RunError
+        If the numbers are none of such a page, or a folder cannot be read.
+    OSError
+        If the page or a replay cannot be written.
+    KeyboardInterrupt
+        After Ctrl-C; the page is there, without the replays.
+    """
+
+    def write(shown: Mapping[int, Replay]) -> None:
+        with understood(numbers):
+            write_atomic(path, page(shown).html())
+
+    write({})
+    if shown := {key: replay_of(path.parent, key, folders, title(key)) for key in keys}:
+        write(shown)
 
 
 def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Replay:

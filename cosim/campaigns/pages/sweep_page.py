@@ -12,7 +12,7 @@ from cosim.batch.outcome import FIELDS
 from cosim.campaigns.analysis.statistics import CHANCE
 from cosim.campaigns.analysis.worst_rows import LISTED, Worst, worst_rows
 from cosim.campaigns.pages.page import Html, Page, code, interval, number, write_figures
-from cosim.campaigns.pages.replays import Replay, replay_of
+from cosim.campaigns.pages.replays import Replay, write_page_with_replays
 from cosim.campaigns.pages.sections import (
     LABELS,
     Group,
@@ -29,7 +29,6 @@ from cosim.campaigns.store.results import Results
 from cosim.campaigns.sweeps.rows import schema_of
 from cosim.campaigns.sweeps.summary import FACTS
 from cosim.errors import RunError
-from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import read_json, understood
 from cosim.results.run_result import SCENARIO
 
@@ -73,15 +72,10 @@ def write_sweep_page(folder: Path, replays: int) -> Path:
         worst = worst_rows(results, max(LISTED, replays))
         with understood(folder / SUMMARY):
             figures = write_figures(folder, _drawings(results, summary) if worst else [])
-
-        def write(shown: Mapping[int, Replay]) -> None:
-            with understood(folder / SUMMARY):
-                write_atomic(folder / PAGE, _page(folder, summary, worst, figures, shown).html())
-
-        write({})
-        of = f"of the sweep of {summary['name']}"
-        if shown := {w.key: replay_of(folder, w.key, [folder], f"Row {w.key} {of}") for w in worst[:replays]}:
-            write(shown)
+        write_page_with_replays(
+            folder / PAGE, folder / SUMMARY, lambda shown: _page(folder, summary, worst, figures, shown),
+            [w.key for w in worst[:replays]], [folder], lambda key: f"Row {key} of the sweep of {summary['name']}",
+        )  # fmt: skip
     return folder / PAGE
 
 
