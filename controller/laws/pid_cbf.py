@@ -49,6 +49,7 @@ from controller.law import (
 from controller.laws.deployable import model
 from controller.laws.deployable.barrier import (
     RegionObservation,
+    add_row,
     empty_observation,
     gradient_rate,
     observe_regions,
@@ -220,16 +221,7 @@ def _write_rows(memory: PidCbfMemory, regions: PackedRegions, free: Array, gains
             rate += n[axis] * relative[axis]
             falling += n[axis] * free[axis]
         right = -(gains.pull_in + gains.brake) * rate - gains.pull_in * gains.brake * h - falling - turning
-        least = 0.0
-        for j in range(lower.size):
-            along = 0.0
-            for axis in range(6):
-                along += n[axis] * memory.acceleration[axis, j]
-            work.rows[rows, j] = along
-            least += along * (lower[j] if along > 0.0 else upper[j])
-        if right > least:
-            work.right[rows], work.price[rows] = right, price
-            rows += 1
+        rows = add_row(work, rows, n, memory.acceleration, right, price, lower, upper)
     return rows
 
 

@@ -262,19 +262,49 @@ def write_rows(
             slope = gains.barrier_slope if h <= 0.0 else braking / (allowed + braking / gains.barrier_slope)  # phi'
             right = -gains.barrier_rate * (rate + allowed) - slope * rate - falling - turning
 
-            # its row, unless no thrust within the limits violates it
-            least = 0.0
-            for j in range(lower.size):
-                along = 0.0
-                for axis in range(6):
-                    along += n[axis] * motion.thruster_acceleration[axis, j]
-                work.rows[rows, j] = along
-                least += along * (lower[j] if along > 0.0 else upper[j])
-            if right > least:
-                work.right[rows], work.price[rows] = right, price
-                rows += 1
+            rows = add_row(work, rows, n, motion.thruster_acceleration, right, price, lower, upper)
     observation.bound[0] = bound
     return rows
+
+
+def add_row(
+    work: Workspace,
+    rows: int,
+    n: Array,
+    thruster_acceleration: Array,
+    right: float,
+    price: float,
+    lower: Array,
+    upper: Array,
+) -> int:
+    """Add the constraint n^T A u >= right, unless no forces within the limits violate it; return the number of rows.
+
+    Parameters
+    ----------
+    work : Workspace
+        Receives row, right side and price.
+    rows : int
+        Rows that there are.
+    n : ndarray, shape (6,)
+        Slope of a clearance over the pose.
+    thruster_acceleration : ndarray, shape (6, m)
+        A: acceleration of one newton of each thruster [m/s2, rad/s2].
+    right, price : float
+        Right side, and price of slack.
+    lower, upper : ndarray, shape (m,)
+        Limits of u [N].
+    """
+    least = 0.0
+    for j in range(lower.size):
+        along = 0.0
+        for axis in range(6):
+            along += n[axis] * thruster_acceleration[axis, j]
+        work.rows[rows, j] = along
+        least += along * (lower[j] if along > 0.0 else upper[j])
+    if not right > least:
+        return rows
+    work.right[rows], work.price[rows] = right, price
+    return rows + 1
 
 
 def update_promise(promised: Array, bound: float, slack: float) -> None:
