@@ -63,7 +63,7 @@ class Region:
     gain: float = 1.0  # alpha_i of section VII, in N per unit of g
     hard: bool = True
     deviation: float | Vector3 = 0.0  # m, standard deviation of its place: in any direction, or north, east and down
-    crossing_cost: float = 2.0  # m of path, that a metre through it costs beside its length, where it is soft
+    crossing_cost: float = 2.0  # of a metre of path through it, half a metre deep, beside its length; where it is soft
 
     @property
     def deviations(self) -> Vector3:
@@ -163,7 +163,7 @@ class PackedRegions(NamedTuple):
     gains: Array  # (n,) alpha_i
     hard: NDArray[np.bool_]  # (n,)
     deviations: Array  # (n, 3) m, standard deviations of each place, NED
-    crossing_costs: Array  # (n,) m of path, that a metre through each costs beside its length, where it is soft
+    crossing_costs: Array  # (n,) of a metre of path through each, half a metre deep, beside its length
 
     def evaluate(
         self,

@@ -31,8 +31,9 @@ _TRUST = 0.7  # of the clearance beyond the desired one, travelled before the ne
 _INSIDE = 200.0  # m of path, cost of a metre within a hard region, by
 _EDGE = 0.1  # m, or more; in proportion where by less, so that the cost does not depend on where the strides end
 _NEAR = 3.0  # m of path, cost of a metre on the surface
-_SHALLOW, _ENTERED = 0.2, 0.5  # m of violation, over which a soft region comes to cost a part for being entered
-_STAY = 3.0  # m of path, as which the stay at its end counts
+_ENTERED = 0.5  # m of depth that being in a soft region costs as much as, in full from a depth of
+_SHALLOW = 0.2  # m on; in proportion where it is less deep
+_STAY = 3.0  # m of path that the stay at its end costs as much as
 _COARSE = 0.25  # m, least distance between two evaluations near the surface of a soft region
 _SPHERE = Sphere.kind
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on do not depend on position alone
@@ -160,7 +161,7 @@ def _evaluate_place(
 
 
 def _depth_cost(depth: float) -> float:
-    """Return by how much a soft region costs that is violated by a depth [m], which is what counts, and by entering."""
+    """Return what the crossing cost of a soft region is multiplied with at a depth [m] in it, below 0 outside."""
     return _ENTERED * min(depth / _SHALLOW, 1.0) + depth if depth > 0.0 else 0.0
 
 
