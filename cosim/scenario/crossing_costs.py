@@ -3,8 +3,8 @@
 A planner chooses between regions that are far from each other, and from the vehicle: the weights of the moment say
 nothing of that. So the arbiter is asked beforehand: of each pair of criteria that have soft regions, both press in
 full, and nothing else does. The share of a criterion is the mean, over the pairs that it is in, of its part of the two
-weights. A metre of path through a region, half a metre deep, costs `_EQUAL` m at a share of one half, which is what all get
-where the arbiter prefers none, and a factor `_PREFERRED` more, or less, at a share of 1, or 0.
+weights. A metre of path through a region, half a metre deep, costs `_EQUAL` m at a share of one half, which is what
+all get where the arbiter prefers none, and a factor `_PREFERRED` more, or less, at a share of 1, or 0.
 """
 
 from __future__ import annotations
