@@ -73,8 +73,8 @@ class StatusTexts:
         key : str
             The kind of refusal. What repeats is said once, with how often it came.
         """
-        if self._clock() - self._said.get(f"deny {key}", -_REFUSALS_PERIOD) >= _REFUSALS_PERIOD:
-            self._said[f"deny {key}"] = self._clock()
+        if self._clock() - self._said.get(f"reject {key}", -_REFUSALS_PERIOD) >= _REFUSALS_PERIOD:
+            self._said[f"reject {key}"] = self._clock()
             self._refuse(reason)
             return
         reasons = self._refusals.setdefault(key, {})
@@ -85,8 +85,8 @@ class StatusTexts:
     def send_due(self) -> None:
         """Send the refusals and texts that are due."""
         now = self._clock()
-        for key in [key for key in self._refusals if now - self._said[f"deny {key}"] >= _REFUSALS_PERIOD]:
-            self._said[f"deny {key}"] = now
+        for key in [key for key in self._refusals if now - self._said[f"reject {key}"] >= _REFUSALS_PERIOD]:
+            self._said[f"reject {key}"] = now
             for reason, times in self._refusals.pop(key).items():
                 self._refuse(reason if times == 1 else f"{reason} ({times} times)")
         self._send_waiting()
