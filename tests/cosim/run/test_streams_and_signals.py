@@ -152,6 +152,15 @@ def receive(number):
     time.sleep(60.0)
 
 
+@pytest.fixture
+def without_nohup():
+    """Let a closed terminal end this process, also where the tests were started under nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.usefixtures("without_nohup")
 @pytest.mark.parametrize("sent", [signal.SIGHUP, signal.SIGTERM, signal.SIGINT])
 def test_D10_every_verb_ends_by_a_signal_as_by_ctrl_c(sent, capsys, monkeypatch):
     before = [signal.getsignal(number) for number in (signal.SIGHUP, signal.SIGTERM, signal.SIGINT)]
@@ -161,6 +170,7 @@ def test_D10_every_verb_ends_by_a_signal_as_by_ctrl_c(sent, capsys, monkeypatch)
     assert [signal.getsignal(number) for number in (signal.SIGHUP, signal.SIGTERM, signal.SIGINT)] == before
 
 
+@pytest.mark.usefixtures("without_nohup")
 def test_D10_a_terminal_that_closes_twice_does_not_disturb_the_end():
     with kills_interrupt():
         with pytest.raises(KeyboardInterrupt):
