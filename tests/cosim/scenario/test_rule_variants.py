@@ -30,6 +30,7 @@ def test_reversed_rules_are_those_of_the_reversed_order():
         assert list(found) == pytest.approx(list(last_first(memberships[::-1]))[::-1], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_crisp_rules_are_the_fuzzy_ones_of_rounded_memberships():
     for memberships in itertools.product(PLACES, repeat=4):
         rounded = [float(membership > 0.5) for membership in memberships]

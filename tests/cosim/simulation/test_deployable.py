@@ -235,6 +235,7 @@ def test_it_follows_a_goal_that_moves():
     assert flight.clearance(goal)[-500:].min() > 0.0
 
 
+@pytest.mark.slow
 def test_a_box_with_one_opening_is_left_through_it():
     """The way straight ahead is a pocket, open behind: a potential alone would stay in it."""
     walls = [
@@ -265,6 +266,7 @@ def angle_to(flight, feature):
     return np.arccos(np.clip(np.sum(ahead * to, axis=1) / np.linalg.norm(to, axis=1), -1.0, 1.0))
 
 
+@pytest.mark.slow
 def test_the_feature_stays_in_view_on_the_way():
     feature = (4.0, 3.0, 2.0)
     view = Region("view", Visibility(feature, (1.0, 0.0, 0.0), 0.7), "in")

@@ -39,6 +39,7 @@ def packed(tmp_path_factory):
     return package_system(load_scenario(ALL_SHAPES), tmp_path_factory.mktemp("ssp") / "all.ssp")
 
 
+@pytest.mark.slow
 def test_a_master_with_another_step_is_warned(packed, capfd):
     """In FMPy, which prints what FMUs say; the scenario has a step of 10 ms, the law a period of 30 ms."""
     run_in_fmpy(packed, 20, 0.02)
@@ -249,6 +250,7 @@ def test_the_command_says_what_stands_against_it(tmp_path, capsys):
 CRITERIA = 'criteria=[{name="obstacle"},{name="depth",order=0},{name="shape"},{name="visibility"}]'
 
 
+@pytest.mark.slow
 def test_a_system_has_as_many_criteria_as_the_scenario(tmp_path):
     settings = ["time.duration=0.5", CRITERIA]
     scenario = load_scenario(ALL_SHAPES, settings)

@@ -110,7 +110,8 @@ def interrupt_after(monkeypatch, tables):
     monkeypatch.setattr(CampaignFolder, "add", counting)
 
 
-@pytest.mark.parametrize("make", [search, pytest.param(varied, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("make", [search, varied])
+@pytest.mark.slow
 def test_what_was_interrupted_goes_on_to_the_same_rows(make, tmp_path, monkeypatch):
     whole = run_falsification(make(), tmp_path / "whole")
     with monkeypatch.context() as patch:
@@ -137,6 +138,7 @@ def test_another_search_has_a_folder_of_its_own(tmp_path):
         run_falsification(search(seed=1), tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_a_rate_is_estimated_from_the_flights_and_shown_level_by_level(tmp_path):
     found = run_falsification(search(200, Conditions(duration=8.0), rare_event=True), tmp_path / "out")
     estimate = found.summary["estimate"]
