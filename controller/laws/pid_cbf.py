@@ -143,7 +143,7 @@ def step(
             work.nominal[j] += thrusters.allocator[j, k] * wrench[k]
     # filter
     observe_regions(memory.observation, regions, memory.position, state.quaternion, velocity)
-    model.write_thruster_acceleration(dynamics, thrusters, R, memory.acceleration, memory.acceleration)
+    model.write_thruster_acceleration(dynamics, thrusters, R, R, memory.acceleration, memory.acceleration)
     rows = _write_rows(memory, regions, free, gains)
     quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
     copy(forces, thrusters.forces)

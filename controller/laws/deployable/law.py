@@ -98,7 +98,7 @@ def step(
         input_validation.update_thrusters(memory, state.thruster_health)
 
     # prediction
-    lag, ahead = estimate.state[LAG], memory.predicted
+    lag, ahead, R_ahead = estimate.state[LAG], memory.predicted, zeros(3, 3)
     loads = Loads(estimate.water_velocity, estimate.net_weight, estimate.moments)
     model.free_wrench(dynamics, R, estimate.velocity, memory.omega, loads, against)
     model.to_acceleration(dynamics, R, estimate.velocity, memory.omega, loads, against, free)
@@ -107,8 +107,9 @@ def step(
         for i in range(6):
             acceleration[i] += free[i]
     predict_state(ahead, estimate.position, estimate.velocity, memory.quaternion, memory.omega, acceleration, lag)
-    model.free_wrench(dynamics, R, ahead.velocity[:3], ahead.velocity[3:], loads, against)
-    model.to_acceleration(dynamics, R, ahead.velocity[:3], ahead.velocity[3:], loads, against, free)
+    write_rotation(ahead.quaternion, R_ahead)
+    model.free_wrench(dynamics, R_ahead, ahead.velocity[:3], ahead.velocity[3:], loads, against)
+    model.to_acceleration(dynamics, R_ahead, ahead.velocity[:3], ahead.velocity[3:], loads, against, free)
 
     # path planner, bounded attraction
     spread = 0.0
@@ -133,8 +134,8 @@ def step(
         memory.filtered_acceleration[axis] += share * (
             acceleration[axis] - free[axis] - memory.filtered_acceleration[axis]
         )
-    _force_of(dynamics, R, memory.filtered_acceleration, wrench)
-    _soft_forces(memory.observation, regions, memory.weights[1], desired, R, dynamics, wrench)
+    _force_of(dynamics, R_ahead, memory.filtered_acceleration, wrench)
+    _soft_forces(memory.observation, regions, memory.weights[1], desired, R_ahead, dynamics, wrench)
     attitude_loop.update_desired(memory.attitude, regions, ahead.position, gains, period)
     attitude_loop.compute_moment(
         memory.attitude, dynamics, ahead.quaternion, ahead.velocity[3:], against, gains, wrench[3:]
@@ -149,7 +150,7 @@ def step(
 
     # barriers
     model.write_thruster_acceleration(
-        dynamics, thrusters, R, memory.thruster_acceleration, memory.effective_acceleration
+        dynamics, thrusters, R, R_ahead, memory.thruster_acceleration, memory.effective_acceleration
     )
     motion = Motion(
         ahead.position,

@@ -245,27 +245,25 @@ def free_acceleration(
 
 
 def write_thruster_acceleration(
-    dynamics: Dynamics, thrusters: Thrusters, R: Array, of_force: Array, of_command: Array
+    dynamics: Dynamics, thrusters: Thrusters, R: Array, R_ahead: Array, of_force: Array, of_command: Array
 ) -> None:
     """Write the acceleration of one newton of each thruster, and of one commanded newton, shape (6, m) each.
 
-    Linear in NED [m/s2], angular in body axes [rad/s2]. A thruster that is stuck follows no command: its limits are the
-    force that it gives.
+    Linear in NED [m/s2], angular in body axes [rad/s2]; a force acts at the attitude `R`, a command at `R_ahead`. A
+    thruster that is stuck follows no command: its limits are the force that it gives.
     """
-    of_force[:, :] = 0.0
+    body = zeros(6)
     for j in range(thrusters.health.size):
-        for i in range(6):
-            body = 0.0
-            for k in range(6):
-                body += dynamics.inverse_mass[i, k] * thrusters.matrix[k, j]
-            if i >= 3:
-                of_force[i, j] = body
-            else:
-                for axis in range(3):
-                    of_force[axis, j] += R[axis, i] * body
         given = thrusters.effectiveness[j] if np.isnan(thrusters.stuck[j]) else 1.0
         for i in range(6):
-            of_command[i, j] = of_force[i, j] * given
+            body[i] = 0.0
+            for k in range(6):
+                body[i] += dynamics.inverse_mass[i, k] * thrusters.matrix[k, j]
+        for i in range(6):
+            of_force[i, j], of_command[i, j] = body[i], body[i] * given
+        for i in range(3):
+            of_force[i, j] = R[i, 0] * body[0] + R[i, 1] * body[1] + R[i, 2] * body[2]
+            of_command[i, j] = (R_ahead[i, 0] * body[0] + R_ahead[i, 1] * body[1] + R_ahead[i, 2] * body[2]) * given
 
 
 def limit_stuck_thrusters(thrusters: Thrusters) -> None:

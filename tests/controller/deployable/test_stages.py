@@ -79,12 +79,13 @@ def test_a_force_gives_the_acceleration():
 def test_what_a_newton_of_each_thruster_does():
     dynamics, thrusters = askew(np.random.default_rng(3)), make_thrusters(ODIN)
     body = dynamics.inverse_mass @ thrusters.matrix
-    expected = np.vstack([TURNED @ body[:3], body[3:]])
+    expected, ahead = np.vstack([TURNED @ body[:3], body[3:]]), TURNED @ TURNED
     push, asked = np.zeros((6, thrusters.health.size)), np.zeros((6, thrusters.health.size))
     thrusters.effectiveness[:], thrusters.stuck[5] = np.linspace(0.2, 0.9, 8), 4.0
-    write_thruster_acceleration(dynamics, thrusters, TURNED, push, asked)
+    write_thruster_acceleration(dynamics, thrusters, TURNED, ahead, push, asked)
     assert push == pytest.approx(expected, rel=1e-12, abs=1e-15)
     given = np.where(np.arange(8) == 5, 1.0, thrusters.effectiveness)  # the limits of one that is stuck are its force
+    expected[:3] = ahead @ body[:3]
     assert asked == pytest.approx(expected * given, rel=1e-12, abs=1e-15)
 
 

@@ -35,6 +35,7 @@ def expected(memory, state, goal, regions, weights):
     motion = seen.position, seen.velocity, memory.quaternion, omega, free + pushing
     actuator_lag.predict_state(ahead, *motion, seen.state[LAG])
     position, velocity, turn = ahead.position, ahead.velocity[:3], ahead.velocity[3:]
+    R = rotation_matrix(ahead.quaternion)
     model.free_acceleration(dynamics, R, velocity, turn, loads, free)
     variance = np.diag(seen.covariance)[:3] + state.deviation[:3] ** 2
     wider = 3.0 * np.sqrt(variance.max())
