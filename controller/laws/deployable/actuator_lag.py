@@ -1,12 +1,14 @@
 """Forces and state behind the lag of the thrusters, which the observer estimates.
 
 Forces f follow commands u by tau f' = u - f. They are propagated for the estimated lag, and for a standard deviation
-less and more: the secant between these is how the forces depend on the lag. Where the estimate has moved, the forces
-move with it, to what they would be now had the lag always been that.
+less and more: the secant between these is how the forces depend on the lag, and what it misses at the estimated one is
+their curvature. Where the estimate has moved, the forces move with it, to what they would be now had the lag always
+been that.
 
 Let a be the acceleration without thrust, and G f that of the thrusters. Then p + tau v has the rate v + tau (a + G f),
 and this has the rate a + G u + tau a'. So the point ahead answers to commands at once, and the vehicle follows it: its
-position is a mean of where that point was. The law controls the point ahead; without a lag it is the vehicle.
+position is a mean of where that point was. The law controls the point ahead, and its commands act at the attitude
+there: G turns with the body while forces follow. Without a lag the point is the vehicle.
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ _GREATEST_TURN = 0.5  # rad, of the attitude ahead
 def update_forces(estimate: Estimate, thrusters: Thrusters, period: float) -> None:
     """Propagate the acting forces over the last period [s], behind the estimated lag and behind its bracket."""
     lag, spread = estimate.state[LAG], np.sqrt(estimate.covariance[LAG, LAG])
-    lags, bracket = estimate.lags, estimate.bracket
+    lags, bracket, now = estimate.lags, estimate.bracket, thrusters.acting_now
     least, most = max(lag - spread, 0.0), lag + spread
     remains, average = _of_lag(lag, period)
     remains_least, average_least = _of_lag(least, period)
@@ -37,21 +39,26 @@ def update_forces(estimate: Estimate, thrusters: Thrusters, period: float) -> No
     for j in range(thrusters.forces.size):
         commanded = thrusters.forces[j] if np.isnan(thrusters.stuck[j]) else thrusters.stuck[j]
         # what the forces would be now, had the lag been what it is now taken for
-        behind = _between(bracket[0, j], bracket[1, j], lags, lag) - commanded
-        behind_least = _between(bracket[0, j], bracket[1, j], lags, least) - commanded
-        behind_most = _between(bracket[0, j], bracket[1, j], lags, most) - commanded
+        behind = _between(bracket[0, j], now[j], bracket[1, j], lags, lag) - commanded
+        behind_least = _between(bracket[0, j], now[j], bracket[1, j], lags, least) - commanded
+        behind_most = _between(bracket[0, j], now[j], bracket[1, j], lags, most) - commanded
         thrusters.acting[j] = commanded + average * behind
-        thrusters.acting_now[j] = commanded + remains * behind
+        now[j] = commanded + remains * behind
         bracket[0, j] = commanded + remains_least * behind_least
         bracket[1, j] = commanded + remains_most * behind_most
         estimate.by_lag[j] = (average_most * behind_most - average_least * behind_least) / (most - least)
-    lags[0], lags[1] = least, most
+        by_secant = average_least * behind_least + estimate.by_lag[j] * (lag - least)
+        estimate.curvature[j] = average * behind - by_secant
+    lags[0], lags[1], lags[2] = least, lag, most
 
 
-def _between(least: float, most: float, lags: Array, lag: float) -> float:
-    """Return the force behind a lag, of those behind two `lags`; the nearer one beyond them."""
-    share = (lag - lags[0]) / (lags[1] - lags[0])
-    between: float = least + min(max(share, 0.0), 1.0) * (most - least)
+def _between(least: float, middle: float, most: float, lags: Array, lag: float) -> float:
+    """Return the force behind a lag, of those behind three `lags`; the nearest one beyond them."""
+    first, low, high = 1, middle, most
+    if lag < lags[1]:
+        first, low, high = 0, least, middle
+    share = (lag - lags[first]) / (lags[first + 1] - lags[first])
+    between: float = low + min(max(share, 0.0), 1.0) * (high - low)
     return between
 
 

@@ -24,7 +24,7 @@ _FIRST_CURRENT, _FIRST_RESTORING = 0.3, 15.0  # m/s, N: standard deviations at t
 _GRAVITY = 9.81  # m/s2
 _FIRST_HEIGHT, _FIRST_ARM = 0.05, 0.15  # m, standard deviations at the start; the second of the weight's moments
 _FIRST_EFFECTIVENESS, _FIRST_COMMON = 0.12, 0.12  # of each thruster, and of all together
-_FIRST_LAG = 0.2  # s, of a vehicle whose file names none; else as much as it names
+_FIRST_LAG = 0.3  # s, and its standard deviation, of a vehicle whose file names none; else what it names
 _KNOWN_LAG = 1e-6  # s, standard deviation of a lag that is not estimated
 _GREATEST_EFFECTIVENESS = 1.1
 
@@ -50,9 +50,10 @@ class Estimate(NamedTuple):
     weight: Array  # (1,) of positions and velocities as evidence of failures: less than 1 of one whose error lasts
     last_measured: Array  # (6,) position and velocity, as last measured
     mass_scale: Array  # (1,) mass over 50 kg, at least 1: a heavier vehicle's W - B is less well known
-    lags: Array  # (2,) s, a standard deviation below and above the estimated lag
-    bracket: Array  # (2, m) N, forces behind those lags
+    lags: Array  # (3,) s, the estimated lag between a standard deviation less and more
+    bracket: Array  # (2, m) N, forces behind the least and the greatest of them
     by_lag: Array  # (m,) N/s, by how much the acting forces grow with the lag, between those
+    curvature: Array  # (m,) N, by which the acting forces differ from a line between those
     transition: Array  # (3, 14 + m) of the velocity over a period
     product: Array  # (3, 14 + m) transition times covariance
     row: Array  # (14 + m,) of a measurement
@@ -71,11 +72,12 @@ def make_estimate(vehicle: VehicleModel) -> Estimate:
     mass, m = vehicle.rigid_mass[0, 0], vehicle.thruster_matrix.shape[1]
     mass_scale, n = max(mass / _LIGHT, 1.0), EFFECTIVENESS + m
     state, deviations = np.zeros(n), np.zeros(n)
-    state[EFFECTIVENESS:], state[LAG] = 0.95, np.mean(vehicle.thrust_time_constant)
+    lag = float(np.mean(vehicle.thrust_time_constant)) or _FIRST_LAG
+    state[EFFECTIVENESS:], state[LAG] = 0.95, lag
     deviations[CURRENT:NET_WEIGHT] = _FIRST_CURRENT
     deviations[NET_WEIGHT] = _FIRST_RESTORING * mass_scale
     deviations[MOMENTS:HEIGHT] = _FIRST_ARM * _GRAVITY * mass
-    deviations[HEIGHT], deviations[LAG] = _FIRST_HEIGHT, state[LAG] or _FIRST_LAG
+    deviations[HEIGHT], deviations[LAG] = _FIRST_HEIGHT, lag
     deviations[EFFECTIVENESS:] = _FIRST_EFFECTIVENESS
     covariance = np.diag(deviations**2)
     covariance[EFFECTIVENESS:, EFFECTIVENESS:] += _FIRST_COMMON**2
@@ -98,9 +100,10 @@ def make_estimate(vehicle: VehicleModel) -> Estimate:
         weight=np.ones(1),
         last_measured=np.full(6, np.nan),
         mass_scale=np.array([mass_scale]),
-        lags=np.array([0.0, 1.0]),
+        lags=np.array([0.0, 0.5, 1.0]),
         bracket=np.zeros((2, m)),
         by_lag=np.zeros(m),
+        curvature=np.zeros(m),
         transition=np.zeros((3, n)),
         product=np.zeros((3, n)),
         row=np.zeros(n),
@@ -131,6 +134,7 @@ def initialize(estimate: Estimate, position: Array, velocity: Array, gains: Depl
         start_from(estimate, VELOCITY, zeros(3), _FIRST_VELOCITY)
     else:
         start_from(estimate, VELOCITY, velocity, gains.velocity_noise)
+    project(estimate, gains)
     estimate.time_since_measurement[0] = 0.0
 
 

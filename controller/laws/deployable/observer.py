@@ -43,6 +43,7 @@ _GAP_MEMORY = 1.0  # s, over which a gap in the measurements is forgotten
 _RIPPLE = 0.05  # standard deviation of a thruster's force in one period, as part of it
 _WEAR = 0.01  # 1/sqrt(s), drift of an effectiveness
 _LAG_DRIFT = 0.003  # s/sqrt(s)
+_CURVED = 0.9  # s, for which what the secant of the lag misses lasts, so that as noise it counts the more
 _OUTLIER = 3.0  # standard deviations, beyond which an innovation counts as if it had that many
 
 
@@ -62,7 +63,7 @@ def predict(
     """
     x, P, F = estimate.state, estimate.covariance, estimate.transition
     mass, T = dynamics.translational_mass[0], period
-    free = zeros(6)
+    free, curvature = zeros(6), zeros(3)
     loads = Loads(estimate.water_velocity, estimate.net_weight, estimate.moments)
     free_acceleration(dynamics, R, estimate.velocity, omega_body, loads, free)
     linear = (dynamics.linear_damping[0] + dynamics.linear_damping[1] + dynamics.linear_damping[2]) / 3.0
@@ -82,14 +83,13 @@ def predict(
             acceleration += by_force * thrusters.acting[j] * effectiveness
             F[axis, EFFECTIVENESS + j] = T * by_force * thrusters.acting[j]
             F[axis, LAG] += T * by_force * estimate.by_lag[j] * effectiveness
+            curvature[axis] += T * by_force * estimate.curvature[j] * effectiveness
         estimate.acceleration[axis] = acceleration
         x[axis] += T * (estimate.velocity[axis] + 0.5 * T * acceleration)
         x[VELOCITY + axis] += T * acceleration
     _propagate_covariance(estimate, T)
     for axis in range(3):
-        # by its uncertainty the lag acts in a curve, of which the secant is a part
-        curved = square(F[axis, LAG]) * P[LAG, LAG]
-        P[VELOCITY + axis, VELOCITY + axis] += square(_UNMODELLED) * T + curved
+        P[VELOCITY + axis, VELOCITY + axis] += square(_UNMODELLED) * T + _CURVED / T * square(curvature[axis])
         # so that the moments follow at the rate of adaptation
         P[MOMENTS + axis, MOMENTS + axis] += square(gains.adaptation * _ANGULAR * dynamics.mass[3 + axis, 3 + axis]) * T
     for axis in range(2):
@@ -174,7 +174,7 @@ def correct_by_moment(
     `by_current`, shape (3, 2), is how the moment that the model knows grows with the current [N s]; `rate_deviation`,
     shape (3,), the standard deviation [rad/s] of the rates.
     """
-    row, x, lag_variance = estimate.row, estimate.state, estimate.covariance[LAG, LAG]
+    row, x = estimate.row, estimate.state
     k, middle, body = zeros(3), zeros(3), zeros(3)
     k[0], k[1], k[2] = down_parts(quaternion)
     for i in range(3):  # as it was in the middle of the period
@@ -203,7 +203,7 @@ def correct_by_moment(
             expected += given * x[EFFECTIVENESS + j]
             row[LAG] += thrusters.matrix[3 + i, j] * estimate.by_lag[j] * x[EFFECTIVENESS + j]
             variance += square(_RIPPLE * given)
-            variance += square(thrusters.matrix[3 + i, j] * estimate.by_lag[j]) * lag_variance
+            variance += _CURVED / period * square(thrusters.matrix[3 + i, j] * estimate.curvature[j])
         _correct(estimate, moment[i] - expected, variance, 1.0, 0, row.size)
     estimate.direct[:] = 0.0
     project(estimate, gains)

@@ -40,19 +40,23 @@ def test_forces_follow_their_commands_as_the_equation_says(lag):
         actual = end
 
 
-def test_the_secant_is_between_a_standard_deviation_less_and_more():
+def test_secant_and_curvature_are_those_between_a_standard_deviation_less_and_more():
     rng, (estimate, thrusters) = np.random.default_rng(2), lagging(0.2, 0.1)
-    (less, behind_less), (more, behind_more) = lagging(0.1, 1e-7), lagging(0.3, 1e-7)
+    (less, behind_less), (same, behind), (more, behind_more) = (lagging(lag, 1e-7) for lag in (0.1, 0.2, 0.3))
     for _ in range(20):
-        thrusters.forces[:] = behind_less.forces[:] = behind_more.forces[:] = rng.uniform(-20.0, 20.0, 8)
-        for one, forces in ((estimate, thrusters), (less, behind_less), (more, behind_more)):
+        given = (estimate, thrusters), (less, behind_less), (same, behind), (more, behind_more)
+        commanded = rng.uniform(-20.0, 20.0, 8)
+        for one, forces in given:
+            forces.forces[:] = commanded
             actuator_lag.update_forces(one, forces, PERIOD)
     assert estimate.by_lag == pytest.approx((behind_more.acting - behind_less.acting) / 0.2, abs=1e-3)
+    curvature = behind.acting - 0.5 * (behind_less.acting + behind_more.acting)
+    assert estimate.curvature == pytest.approx(curvature, abs=1e-3) and np.abs(curvature).max() > 0.1
 
 
 def test_where_the_estimate_moves_the_forces_move_with_it():
-    """As if the lag had always been what it is now taken for: exactly at the ends of the bracket."""
-    for now in (0.1, 0.3):
+    """As if the lag had always been what it is now taken for: exactly where the forces were propagated for it."""
+    for now in (0.1, 0.2, 0.3):
         rng, (estimate, thrusters) = np.random.default_rng(3), lagging(0.2, 0.1)
         other, expected = lagging(now, 1e-7)
         for _ in range(20):

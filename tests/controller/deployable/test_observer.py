@@ -92,7 +92,7 @@ def random_estimate(rng, thrusters):
     publish(estimate)
     thrusters.forces[:] = rng.uniform(-20.0, 20.0, 8)
     estimate.bracket[:] = rng.uniform(-20.0, 20.0, (2, 8))
-    estimate.lags[:] = 0.1, 0.3
+    estimate.lags[:] = 0.1, 0.15, 0.3
     return estimate, dynamics
 
 
@@ -104,10 +104,11 @@ def test_the_covariance_of_a_prediction_is_that_of_a_kalman_filter():
         before, P = copy.deepcopy(estimate), estimate.covariance.copy()
         predict(estimate, dynamics, thrusters)
         before.by_lag[:] = estimate.by_lag
-        F = transition(before, dynamics, thrusters, pushes(dynamics, thrusters, np.eye(3)))
+        by_force = pushes(dynamics, thrusters, np.eye(3))
+        F, curvature = transition(before, dynamics, thrusters, by_force), estimate.curvature * before.state[-8:]
         expected = F @ P @ F.T
         Q = np.zeros(N)
-        Q[VELOCITY:CURRENT] = 0.03**2 * PERIOD + F[VELOCITY:CURRENT, LAG] ** 2 * P[LAG, LAG]
+        Q[VELOCITY:CURRENT] = 0.03**2 * PERIOD + 0.9 * PERIOD * (by_force[:3] @ curvature) ** 2
         Q[CURRENT:NET_WEIGHT] = GAINS.current_drift**2 * PERIOD
         Q[NET_WEIGHT] = (GAINS.restoring_drift * 125.0 / 50.0) ** 2 * PERIOD
         Q[MOMENTS:HEIGHT] = (GAINS.adaptation * 0.019 * np.diag(dynamics.mass)[3:]) ** 2 * PERIOD
@@ -141,7 +142,8 @@ def test_a_moment_corrects_by_its_row():
     for _ in range(20):
         estimate, dynamics = random_estimate(rng, thrusters)
         thrusters.acting[:] = rng.uniform(-20.0, 20.0, 8)
-        estimate.by_lag[:], estimate.acceleration[:] = rng.normal(size=8), rng.normal(size=3)
+        estimate.by_lag[:], estimate.curvature[:] = rng.normal(size=8), 0.1 * rng.normal(size=8)
+        estimate.acceleration[:] = rng.normal(size=3)
         turned, omega, by_current = Rotation.random(random_state=rng), rng.normal(size=3), rng.normal(size=(3, 2))
         R, x, P = turned.as_matrix(), estimate.state.copy(), estimate.covariance.copy()
         k, e = R[2] + 0.5 * PERIOD * np.cross(omega, R[2]), x[EFFECTIVENESS:]
@@ -151,7 +153,7 @@ def test_a_moment_corrects_by_its_row():
         H[:, HEIGHT] = -dynamics.rigid_mass[0] * np.cross([0.0, 0.0, 1.0], R.T @ estimate.acceleration)
         H[:, LAG], H[:, EFFECTIVENESS:] = thrusters.matrix[3:] @ (estimate.by_lag * e), given
         noise = (0.019 * np.diag(dynamics.mass)[3:]) ** 2 / PERIOD + np.sum((0.05 * given) ** 2, axis=1)
-        noise += np.sum((thrusters.matrix[3:] * estimate.by_lag) ** 2, axis=1) * P[LAG, LAG]
+        noise += 0.9 / PERIOD * np.sum((thrusters.matrix[3:] * estimate.curvature) ** 2, axis=1)
         noise += 2.0 * (np.diag(dynamics.mass)[3:] * RATES / PERIOD) ** 2
         expected = H @ x - H[:, CURRENT:NET_WEIGHT] @ x[CURRENT:NET_WEIGHT] - H[:, LAG] * x[LAG]
         moment = expected + 0.1 * np.sqrt(noise) * rng.uniform(-1.0, 1.0, 3)
@@ -255,7 +257,7 @@ def test_the_prediction_follows_the_vehicles_model():
         estimate, dynamics, thrusters = started(velocity=(0.6, -0.4, 0.1), model=model)
         R, x = Rotation.from_euler("zyx", [0.7, -0.3, 0.2]).as_matrix(), estimate.state
         x[CURRENT:NET_WEIGHT], x[NET_WEIGHT], x[MOMENTS:HEIGHT] = (0.2, -0.1), 7.0, (0.3, -0.2, 4.0)
-        x[EFFECTIVENESS:] = rng.uniform(0.5, 1.0, 8)
+        x[EFFECTIVENESS:], x[LAG] = rng.uniform(0.5, 1.0, 8), 0.0
         publish(estimate)
         thrusters.forces[:] = rng.uniform(-20.0, 20.0, 8)
         free, pushed = np.empty(6), np.empty(6)
