@@ -1,27 +1,30 @@
 // How large the scene is: where vehicles go and bounded regions are.
 
+const ROOM = 0.1; // of the way's diagonal: what is farther off is not brought into the picture
+
 /** Whether a region is where it can be met: an obstacle that is not there yet waits far above the water. */
 const isThere = (place) => Vec.finite(place) && place[2] > -1e4;
 
-/** Some points of a run's way, and where its regions are on the way. */
+/** Points about a run's way and its goal: the corners of a box about the vehicle at each of some rows. */
 function placesOf(run) {
-  const places = [];
+  const { radius } = run.header.vehicle;
   const [xs, ys, zs] = ["x", "y", "z"].map((axis) => run.column(`position.${axis}`));
-  const stride = Math.max(1, Math.floor(run.rows / 400));
-  for (let i = 0; i < run.rows; i += stride) places.push([xs[i], ys[i], zs[i]]);
-  if (run.rows) places.push([xs[run.rows - 1], ys[run.rows - 1], zs[run.rows - 1]]);
-  const kept = places.filter(Vec.finite);
+  const stride = Math.max(1, Math.floor(run.rows / 200));
+  const rows = Array.from({ length: Math.ceil(run.rows / stride) }, (_, i) => i * stride);
+  if (run.rows) rows.push(run.rows - 1);
+  const places = rows.map((i) => [xs[i], ys[i], zs[i]]).filter(Vec.finite);
+  const kept = places.flatMap((p) => cornersOf([p.map((x) => x - radius), p.map((x) => x + radius)]));
   const { shape } = run.header.regions[0]; // the goal
   const solid = surfaceOf(shape);
-  if (solid) {
-    const { centre, radius } = solid;
-    for (const t of [run.start, run.end]) {
-      const at = Vec.add(centre, run.shift(0, t));
-      if (Vec.finite(at)) kept.push(at.map((x) => x - radius), at.map((x) => x + radius));
-    }
+  for (const t of solid ? [run.start, run.end] : []) {
+    const at = Vec.add(solid.centre, run.shift(0, t));
+    if (Vec.finite(at)) kept.push(...cornersOf([at.map((x) => x - solid.radius), at.map((x) => x + solid.radius)]));
   }
   return kept;
 }
+
+/** The corners of an upright box. */
+const cornersOf = (box) => [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [0, 1, 2].map((i) => box[(k >> i) & 1][i]));
 
 /** The upright box about some points. */
 function boxAbout(points) {
@@ -40,24 +43,21 @@ function boxOfSolid({ points }, shift) {
 }
 
 /**
- * What of a region belongs into the picture: points. A bounded one counts where it is near the way, along the axes on
- * which it does not go beyond: a pipeline of a kilometre shall not make a vehicle a dot. Of a plane it is the point
- * that is nearest to the way's middle.
+ * What of a region belongs into the picture: points. A bounded one counts where it is near the way, as far as the
+ * limits go: neither a pipeline of a kilometre nor a pile of a hundred metres shall make a vehicle a dot. Of a plane
+ * it is the point that is nearest to the way's middle.
  */
-function reachOf(shape, shift, way, limits, room) {
-  const inLimits = (x, k) => x >= limits[0][k] && x <= limits[1][k];
+function reachOf(shape, shift, middle, limits) {
   const solid = surfaceOf(shape);
   if (solid) {
     if (!isThere(Vec.add(solid.centre, shift))) return [];
     const box = boxOfSolid(solid, shift);
     if (box[0].some((x, k) => x > limits[1][k]) || box[1].some((x, k) => x < limits[0][k])) return [];
-    const within = (x, k) => (inLimits(x, k) ? x : Math.min(way[1][k], Math.max(way[0][k], x)));
-    return box.map((corner) => corner.map(within));
+    return cornersOf(box.map((corner) => corner.map((x, k) => Math.min(limits[1][k], Math.max(limits[0][k], x)))));
   }
-  const middle = Vec.scale(Vec.add(...way), 0.5);
   return (shape.drawing?.planes ?? [])
     .map(({ point, normal }) => Vec.along(middle, normal, Vec.dot(Vec.sub(Vec.add(point, shift), middle), normal)))
-    .filter((p) => p.every((x, k) => x >= limits[0][k] - room && x <= limits[1][k] + room));
+    .filter((p) => p.every((x, k) => x >= limits[0][k] && x <= limits[1][k]));
 }
 
 /**
@@ -65,18 +65,17 @@ function reachOf(shape, shift, way, limits, room) {
  * @param {Run[]} runs  @returns {{content: number[][], bounds: [number[], number[]]}}
  */
 function extentOf(runs) {
-  const places = runs.flatMap(placesOf);
-  if (!places.length) places.push([-1, -1, 0], [1, 1, 2]);
+  const content = runs.flatMap(placesOf);
+  if (!content.length) content.push([-1, -1, 0], [1, 1, 2]);
   const radius = Math.max(0.1, ...runs.map((run) => run.header.vehicle.radius));
-  const [low, high] = boxAbout(places);
-  const room = Math.max(6 * radius, 0.35 * Vec.norm(Vec.sub(high, low)));
+  const [low, high] = boxAbout(content);
+  const room = Math.max(4 * radius, ROOM * Vec.norm(Vec.sub(high, low)));
   const limits = [low.map((x) => x - room), high.map((x) => x + room)];
-  const way = [low.map((x) => x - 2 * radius), high.map((x) => x + 2 * radius)];
-  const content = [...way];
+  const middle = Vec.scale(Vec.add(low, high), 0.5);
   for (const run of runs) {
     run.header.regions.forEach((_, i) => {
       for (const t of [run.start, 0.5 * (run.start + run.end), run.end]) {
-        content.push(...reachOf(run.shape(i, t), run.rows ? run.shift(i, t) : [0, 0, 0], way, limits, room));
+        content.push(...reachOf(run.shape(i, t), run.rows ? run.shift(i, t) : [0, 0, 0], middle, limits));
       }
     });
   }
@@ -88,8 +87,7 @@ function extentOf(runs) {
   }
   // the water's surface tells most where it is near
   const height = bounds[1][2] - bounds[0][2];
-  if (bounds[0][2] > 0 && bounds[0][2] < 0.6 * height) bounds[0][2] = 0;
+  if (bounds[0][2] > 0 && bounds[0][2] < ROOM * height) bounds[0][2] = 0;
   bounds[1][2] += 0.04 * height;
-  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [0, 1, 2].map((i) => bounds[(k >> i) & 1][i]));
-  return { content: corners, bounds };
+  return { content, bounds };
 }

@@ -60,36 +60,58 @@ class Camera {
    * north, east to the right
    */
   look(name) {
-    // aslant, so that the way goes from left to right
-    const quarter = (Math.PI / 2) * Math.round(this.bearing / (Math.PI / 2));
-    const views = {
-      iso: [quarter + 2.2, 0.46],
-      top: [Math.PI, STEEPEST],
-      side: [Math.PI / 2, 0],
-      front: [Math.PI, 0],
+    const views = { top: [Math.PI, STEEPEST], side: [Math.PI / 2, 0], front: [Math.PI, 0] };
+    const filled = (view) => {
+      [this.azimuth, this.elevation] = view;
+      this._fit();
+      return this.filled();
     };
-    [this.azimuth, this.elevation] = views[name];
+    // aslant, as the content fills the picture best
+    const [best] = views[name] ? [views[name]] : this._aslant().sort((a, b) => filled(b) - filled(a));
+    [this.azimuth, this.elevation] = best;
     this.fit();
+  }
+
+  /** The part of the picture that the box about the content takes. */
+  filled() {
+    const seen = this.content.map((p) => this.project(p));
+    const [width, height] = [0, 1].map((k) => seen.reduce((most, p) => Math.max(most, p[k]), -Infinity) - seen.reduce((least, p) => Math.min(least, p[k]), Infinity));
+    return (width * height) / (this.width * this.height);
+  }
+
+  /** Directions aslant from which content that goes along the bearing goes from left to right: [azimuth, elevation]. */
+  _aslant() {
+    return [0, Math.PI / 2].flatMap((axis) => {
+      const along = axis + (Math.cos(this.bearing - axis) < 0 ? Math.PI : 0);
+      return [0.33, 0.55].map((elevation) => [along + 0.5 * Math.PI + 0.42, elevation]);
+    });
   }
 
   /** Bring the content into the picture, the direction of view kept. */
   fit() {
-    this._update();
-    if (this.content.length) {
-      const room = [this.width, this.height].map((size) => (0.5 * size - Math.min(56, 0.11 * size)) / this.focal);
-      const [d1, right] = this._fitted(this.right, room[0]);
-      const [d2, up] = this._fitted(this.up, room[1]);
-      const ahead = Vec.dot(this.target, this.forward);
-      this.target = Vec.along(Vec.along(Vec.scale(this.forward, ahead), this.right, right), this.up, up);
-      this.distance = Math.max(d1, d2, 0.5);
-      // the target goes to the content's middle, so that the camera turns about that
-      const depths = this.content.map((p) => Vec.dot(Vec.sub(p, this.target), this.forward));
-      const middle = 0.5 * (Math.min(...depths) + Math.max(...depths));
-      this.target = Vec.along(this.target, this.forward, middle);
-      this.distance += middle;
-    }
+    this._fit();
     this._changed();
     this.fitted = true;
+  }
+
+  _fit() {
+    this._update();
+    if (!this.content.length) return;
+    const side = Math.min(36, 0.08 * this.width);
+    const [top, bottom] = [Math.min(50, 0.16 * this.height), Math.min(28, 0.1 * this.height)]; // buttons are at the top
+    const tangent = (size, margin) => (0.5 * size - margin) / this.focal;
+    const across = this._bounded(this.right, tangent(this.width, side), tangent(this.width, side));
+    const upright = this._bounded(this.up, tangent(this.height, bottom), tangent(this.height, top));
+    const ahead = Vec.dot(this.target, this.forward);
+    this.distance = Math.max(across.least, upright.least, 0.5);
+    const [right, up] = [across, upright].map(({ middle }) => middle(this.distance));
+    this.target = Vec.along(Vec.along(Vec.scale(this.forward, ahead), this.right, right), this.up, up);
+    // the target goes to the content's middle, so that the camera turns about that
+    const depths = this.content.map((p) => Vec.dot(Vec.sub(p, this.target), this.forward));
+    const middle = 0.5 * (Math.min(...depths) + Math.max(...depths));
+    this.target = Vec.along(this.target, this.forward, middle);
+    this.distance += middle;
+    this._update();
   }
 
   /** Pixels and depth [m] of a point: [x, y, depth]; meaningless unless depth is above `near`. */
@@ -134,17 +156,23 @@ class Camera {
     return this.focal / Vec.dot(Vec.sub(p, this.eye), this.forward);
   }
 
-  /** How far off, and how far to the side, all content is in the picture: closed, as each side bounds both linearly. */
-  _fitted(side, tangent) {
+  /**
+   * How far off the eye is at least, so that all content is within two tangents of a direction across the view, and
+   * where the view's middle is then at a distance: closed, as each side bounds both linearly.
+   */
+  _bounded(side, below, above) {
     let most = -Infinity;
     let least = Infinity;
     for (const p of this.content) {
       const across = Vec.dot(p, side);
-      const ahead = tangent * Vec.dot(Vec.sub(p, this.target), this.forward);
-      most = Math.max(most, across - ahead);
-      least = Math.min(least, across + ahead);
+      const ahead = Vec.dot(Vec.sub(p, this.target), this.forward);
+      most = Math.max(most, across - above * ahead);
+      least = Math.min(least, across + below * ahead);
     }
-    return [(most - least) / (2 * tangent), 0.5 * (most + least)];
+    return {
+      least: (most - least) / (above + below),
+      middle: (distance) => 0.5 * (most - above * distance + least + below * distance),
+    };
   }
 
   _changed() {

@@ -18,14 +18,8 @@ class CommandPanel {
     summary.append(this.state);
     this.body = element("div", "command-body");
     this.holder.append(summary, this.body);
-    const { stage } = link.page;
     document.getElementById("stage").append(this.holder);
-    // names in the scene stay out from behind it; it hangs at the right
-    new ResizeObserver(() => {
-      const { offsetTop, offsetHeight, offsetWidth } = this.holder;
-      stage.covered = { top: offsetTop, width: offsetWidth + 8, height: offsetHeight };
-      stage.changed();
-    }).observe(this.holder);
+    link.page.stage.coveredBy(this.holder);
     this._rows = [];
   }
 

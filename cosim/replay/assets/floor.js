@@ -43,14 +43,19 @@ function paintFloor(painter, labels, bounds, colours, named) {
   painter.line([[n0, e0, floor], [n1, e0, floor], [n1, e1, floor], [n0, e1, floor], [n0, e0, floor]]);
   painter.stroke(colours.gridMajor, 1.2);
   if (!named) return;
-  // the side on which a label is nearer to the eye
-  const nearer = (a, b) => {
-    const [p, q] = [camera.project(a), camera.project(b)];
-    return Math.abs(p[1] - q[1]) > 1 ? p[1] > q[1] : p[2] < q[2];
+  // the side on which labels are nearer to the eye, unless the picture ends before it
+  const seen = (p) => {
+    const [x, y, depth] = camera.project(p);
+    return depth > camera.near && x > 0 && y > 0 && x < camera.width && y < camera.height;
   };
-  const middle = [0.5 * (n0 + n1), 0.5 * (e0 + e1)];
-  const east = nearer([middle[0], e1, floor], [middle[0], e0, floor]) ? [e1, 1] : [e0, -1];
-  const north = nearer([n1, middle[1], floor], [n0, middle[1], floor]) ? [n1, 1] : [n0, -1];
+  const edge = (ticks, at, low, high) => {
+    const sides = [[low, -1], [high, 1]].map(([side, sign]) => {
+      const [x, y, depth] = camera.project(at(0.5 * (ticks[0] + ticks.at(-1)), side));
+      return { side, sign, x, y, depth, shown: ticks.filter((tick) => seen(at(tick, side))) };
+    });
+    sides.sort((a, b) => (Math.abs(a.y - b.y) > 1 ? b.y - a.y : a.depth - b.depth));
+    return sides.find(({ shown }) => shown.length > 1) ?? sides[0];
+  };
   const name = (key, at, outward, text, rank) => {
     const p = camera.project(at);
     const q = camera.project(Vec.add(at, outward));
@@ -62,10 +67,18 @@ function paintFloor(painter, labels, bounds, colours, named) {
     labels.add({ key, text, x, y, colour: colours.soft, size: 11, rank, gap: 0, pad: 7, sides: ["here"] });
   };
   const out = 0.02 * camera.distance;
-  name("north", [middle[0], east[0], floor], [0, out * east[1], 0], "north [m]", 40);
-  name("east", [north[0], middle[1], floor], [out * north[1], 0, 0], "east [m]", 40);
-  for (const n of norths) name(`n${n}`, [n, east[0], floor], [0, out * east[1], 0], metres(n, step), 60);
-  for (const e of easts) name(`e${e}`, [north[0], e, floor], [out * north[1], 0, 0], metres(e, step), 60);
+  const axes = [
+    ["north", norths, e0, e1, (n, e) => [n, e, floor], [0, out, 0]],
+    ["east", easts, n0, n1, (e, n) => [n, e, floor], [out, 0, 0]],
+  ];
+  for (const [axis, ticks, low, high, at, outward] of axes) {
+    if (!ticks.length) continue;
+    const { side, sign, shown } = edge(ticks, at, low, high);
+    const away = Vec.scale(outward, sign);
+    for (const tick of shown) name(`${axis} ${tick}`, at(tick, side), away, metres(tick, step), 60);
+    const [first, last] = [shown[0] ?? ticks[0], shown.at(-1) ?? ticks.at(-1)];
+    name(axis, at(0.5 * (first + last), side), away, `${axis} [m]`, 40);
+  }
 }
 
 /** A ruler of depth on the upright edge of the bounds that is farthest to the left. */

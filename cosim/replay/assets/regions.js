@@ -125,11 +125,11 @@ function nameRegions(labels, camera, entries, colours, runs, t) {
   }
 }
 
-/** Keep names off a vehicle, unless it fills the picture. */
+/** Keep names off a vehicle with its axes and forces, unless it fills the picture. */
 function blockVehicle(labels, camera, { pose, size }) {
   const [x, y, depth] = camera.project(pose.position);
   if (depth < camera.near) return;
-  const half = Math.min(70, 1.3 * size * camera.scaleAt(pose.position));
+  const half = Math.min(0.2 * camera.width, 0.2 * camera.height, 2 * size * camera.scaleAt(pose.position));
   labels.block(x - half, y - half, 2 * half, 2 * half);
 }
 

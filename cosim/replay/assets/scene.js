@@ -109,7 +109,7 @@ class Scene {
 
   /**
    * Draw the scene at a time.
-   * @param {number} t [s]  @param {{follow: boolean, trail: boolean, labels: boolean, covered: ?object}} options
+   * @param {number} t [s]  @param {{follow: boolean, trail: boolean, labels: boolean, covered: number[][]}} options
    */
   draw(t, options = {}) {
     this._last = [t, options];
@@ -125,8 +125,7 @@ class Scene {
     context.lineJoin = "bevel"; // round ones cost as much as the lines
     this._paintSky(colours);
     this.labels.begin(camera.width, camera.height);
-    const { covered } = options;
-    if (covered) this.labels.block(camera.width - covered.width, covered.top, covered.width, covered.height);
+    for (const box of options.covered ?? []) this.labels.block(...box);
 
     const regions = this._regions.at(t, poses, camera.target, this.theme);
     this._entries = farthestFirst(regions.filter((entry) => entry.solid || entry.sheet), camera.eye);
@@ -193,8 +192,7 @@ class Scene {
     this.camera.content = content;
     const lead = this.runs.find((run) => run.rows);
     if (!lead) return;
-    const [a, b] = [lead.pose(lead.start).position, lead.pose(lead.end).position];
-    const way = Vec.sub(b, a);
+    const way = Vec.sub(lead.pose(lead.end).position, lead.pose(lead.start).position);
     if (Vec.finite(way)) this.camera.bearing = Math.atan2(way[1], way[0]);
   }
 

@@ -8,13 +8,19 @@ class Stage {
     this.changed = changed;
     this.side = false;
     this.labels = true;
-    this.covered = null; // {top, width, height} of what hangs over the scene, at its right [px]
     this.holder = document.getElementById("views");
     const first = this.holder.querySelector(".view");
     this.views = [this._view(first)];
     this.canvas = this.views[0].canvas;
     this._sizes = new ResizeObserver(() => this.resize());
     this._sizes.observe(this.holder);
+    this._covers = new ResizeObserver(() => this._cover());
+    for (const group of document.querySelectorAll("#scene-bar .group")) this._covers.observe(group);
+  }
+
+  /** Keep names out from behind an element that hangs over the scene. */
+  coveredBy(hung) {
+    this._covers.observe(hung);
   }
 
   /** The scene of the first canvas; null while there is nothing to draw. */
@@ -80,13 +86,25 @@ class Stage {
 
   resize() {
     for (const scene of this.scenes) scene.resize();
-    this.changed();
+    this._cover();
   }
 
   draw(t, follow) {
     // one camera can follow one vehicle only
-    const { labels, covered } = this;
-    this.scenes.forEach((scene, i) => scene.draw(t, { follow: follow && i === 0, trail: true, labels, covered }));
+    const { labels } = this;
+    this.views.forEach(({ blank, scene, covered }, i) => {
+      if (!blank) scene.draw(t, { follow: follow && i === 0, trail: true, labels, covered });
+    });
+  }
+
+  /** Where buttons and commands hang over each canvas: [x, y, width, height] in its pixels. */
+  _cover() {
+    const over = [...document.querySelectorAll("#scene-bar .group, #commands")].map((hung) => hung.getBoundingClientRect());
+    for (const view of this.views) {
+      const { left, top } = view.canvas.getBoundingClientRect();
+      view.covered = over.map((box) => [box.left - left - 4, box.top - top - 4, box.width + 8, box.height + 8]);
+    }
+    this.changed();
   }
 
   /** Call a method of the one camera. */
@@ -113,7 +131,7 @@ class Stage {
   }
 
   _view(made) {
-    const view = { element: made, canvas: made.querySelector("canvas"), caption: made.querySelector(".caption"), scene: null, blank: true, indices: [] };
+    const view = { element: made, canvas: made.querySelector("canvas"), caption: made.querySelector(".caption"), scene: null, blank: true, indices: [], covered: [] };
     tellPointed(this, view);
     return view;
   }
