@@ -1,4 +1,21 @@
-// Axes of a chart: ticks at round numbers, the range that the curves need, and a curve as few strokes as pixels need.
+// Axes of a chart: time with a break, ticks at round numbers, the range that the curves need, and a curve as few strokes as pixels need.
+
+const LONG_TAIL = 0.3; // part of the time from which on a tail in which nothing moves is drawn short
+const SHORT_TAIL = 0.14; // part of the axis that it then takes
+
+/** Where times stand along an axis: on a line, broken before a long tail in which nothing moves any more. */
+class TimeAxis {
+  /** @param {number[]} window [s]  @param {?number} rest when the tail begins [s]  @param {number} left, right ends */
+  constructor([from, to], rest, left, right) {
+    this.broken = rest !== null && rest > from && to - rest > LONG_TAIL * (to - from);
+    this.rest = this.broken ? rest : to;
+    const at = this.broken ? right - SHORT_TAIL * (right - left) : right;
+    const across = (at - left) / Math.max(this.rest - from, 1e-9);
+    const behind = (right - at) / Math.max(to - this.rest, 1e-9);
+    this.x = (t) => (this.broken && t > rest ? at + (t - rest) * behind : left + (t - from) * across);
+    this.time = (x) => (this.broken && x > at ? rest + (x - at) / behind : from + (x - left) / across);
+  }
+}
 
 /** Round numbers between two: at most about `most` of them. */
 function ticks(low, high, most) {

@@ -118,7 +118,7 @@ class Board {
 
   _frame() {
     const [from, to] = this.shownWindow();
-    for (const chart of this.charts) chart.setWindow(from, to);
+    for (const chart of this.charts) chart.setWindow(from, to, this.window ? null : this.player.rest);
     document.getElementById("charts-whole").disabled = !this.window;
     document.getElementById("charts-window").textContent = this.window ? `${clock(from)} to ${clock(to)}` : "whole run";
     this._later();

@@ -61,17 +61,18 @@ function reachOf(shape, shift, middle, limits) {
 }
 
 /**
- * The points that a camera shall have in its picture, and the box in which the scene is drawn.
- * @param {Run[]} runs  @returns {{content: number[][], bounds: [number[], number[]]}}
+ * The points that a camera shall have in its picture, those of them on the way, and the box in which all is drawn.
+ * @param {Run[]} runs  @returns {{way: number[][], content: number[][], bounds: [number[], number[]]}}
  */
 function extentOf(runs) {
-  const content = runs.flatMap(placesOf);
-  if (!content.length) content.push([-1, -1, 0], [1, 1, 2]);
+  const way = runs.flatMap(placesOf);
+  if (!way.length) way.push([-1, -1, 0], [1, 1, 2]);
   const radius = Math.max(0.1, ...runs.map((run) => run.header.vehicle.radius));
-  const [low, high] = boxAbout(content);
+  const [low, high] = boxAbout(way);
   const room = Math.max(4 * radius, ROOM * Vec.norm(Vec.sub(high, low)));
   const limits = [low.map((x) => x - room), high.map((x) => x + room)];
   const middle = Vec.scale(Vec.add(low, high), 0.5);
+  const content = [...way];
   for (const run of runs) {
     run.header.regions.forEach((_, i) => {
       for (const t of [run.start, 0.5 * (run.start + run.end), run.end]) {
@@ -89,5 +90,5 @@ function extentOf(runs) {
   const height = bounds[1][2] - bounds[0][2];
   if (bounds[0][2] > 0 && bounds[0][2] < ROOM * height) bounds[0][2] = 0;
   bounds[1][2] += 0.04 * height;
-  return { content, bounds };
+  return { way, content, bounds };
 }

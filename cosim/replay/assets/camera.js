@@ -11,7 +11,9 @@ class Camera {
     this.elevation = 0.5; // rad, of the eye above the target
     this.distance = 10; // m
     this.content = []; // points that fit() brings into the picture
-    this.bearing = 0; // rad, towards which the content goes
+    this.way = []; // those of them that are of the vehicles' ways and their goals
+    this.bearing = 0; // rad, towards which the way goes
+    this.covered = 0; // pixels at the right that something hangs over
     this.listeners = new Set(); // called when the view changes
     this.fitted = true; // nothing has moved it since all content was brought into the picture
     this.width = 1;
@@ -26,6 +28,13 @@ class Camera {
     this.height = Math.max(1, height);
     if (this.fitted) this.fit();
     else this._update();
+  }
+
+  /** Say how much of the picture something hangs over at its right [CSS pixels]. */
+  cover(pixels) {
+    if (this.covered === pixels) return;
+    this.covered = pixels;
+    if (this.fitted) this.fit();
   }
 
   /** Go around the target, as a hand that drags the scene by so many CSS pixels. */
@@ -61,25 +70,25 @@ class Camera {
    */
   look(name) {
     const views = { top: [Math.PI, STEEPEST], side: [Math.PI / 2, 0], front: [Math.PI, 0] };
-    const filled = (view) => {
+    const length = (view) => {
       [this.azimuth, this.elevation] = view;
       this._fit();
-      return this.filled();
+      return this._lengthOfWay();
     };
-    // aslant, as the content fills the picture best
-    const [best] = views[name] ? [views[name]] : this._aslant().sort((a, b) => filled(b) - filled(a));
+    // aslant, where the way is seen longest
+    const [best] = views[name] ? [views[name]] : this._aslant().sort((a, b) => length(b) - length(a));
     [this.azimuth, this.elevation] = best;
     this.fit();
   }
 
-  /** The part of the picture that the box about the content takes. */
-  filled() {
-    const seen = this.content.map((p) => this.project(p));
-    const [width, height] = [0, 1].map((k) => seen.reduce((most, p) => Math.max(most, p[k]), -Infinity) - seen.reduce((least, p) => Math.min(least, p[k]), Infinity));
-    return (width * height) / (this.width * this.height);
+  /** The diagonal of the box about the way in the picture [pixels]. */
+  _lengthOfWay() {
+    const seen = this.way.map((p) => this.project(p));
+    const extent = (k) => seen.reduce((x, p) => Math.max(x, p[k]), -Infinity) - seen.reduce((x, p) => Math.min(x, p[k]), Infinity);
+    return Math.hypot(extent(0), extent(1));
   }
 
-  /** Directions aslant from which content that goes along the bearing goes from left to right: [azimuth, elevation]. */
+  /** Directions aslant from which the way goes from left to right: [azimuth, elevation]. */
   _aslant() {
     return [0, Math.PI / 2].flatMap((axis) => {
       const along = axis + (Math.cos(this.bearing - axis) < 0 ? Math.PI : 0);
@@ -100,7 +109,7 @@ class Camera {
     const side = Math.min(36, 0.08 * this.width);
     const [top, bottom] = [Math.min(50, 0.16 * this.height), Math.min(28, 0.1 * this.height)]; // buttons are at the top
     const tangent = (size, margin) => (0.5 * size - margin) / this.focal;
-    const across = this._bounded(this.right, tangent(this.width, side), tangent(this.width, side));
+    const across = this._bounded(this.right, tangent(this.width, side), tangent(this.width, side + this.covered));
     const upright = this._bounded(this.up, tangent(this.height, bottom), tangent(this.height, top));
     const ahead = Vec.dot(this.target, this.forward);
     this.distance = Math.max(across.least, upright.least, 0.5);

@@ -65,8 +65,10 @@ class Chart {
     if (this._shown) this._legend();
   }
 
-  setWindow(from, to) {
+  /** Show a span of time [s]; of the whole run also when nothing moves any more, or null. */
+  setWindow(from, to, rest = null) {
     this.window = [from, to];
+    this.rest = rest;
     this.stale = true;
   }
 
@@ -85,8 +87,9 @@ class Chart {
     if (this.canvas.height !== Math.round(height * dots)) this.canvas.height = Math.round(height * dots);
     const context = this.canvas.getContext("2d");
     context.setTransform(dots, 0, 0, dots, 0, 0);
-    this.frame = new Frame(width, height, this.window, rangeOf(this.curves, this.window, this.spec.zero), this.spec.down);
-    if (this.spec.fixed) this.frame = new Frame(width, height, this.window, [-0.03, 1.06], false);
+    const { fixed, zero, down } = this.spec;
+    const range = fixed ? [-0.03, 1.06] : rangeOf(this.curves, this.window, zero);
+    this.frame = new Frame(width, height, this.window, this.rest, range, down);
     paintPlot(context, this.frame, this.spec, this.curves, this.theme);
     context.fillStyle = hueColour("ink", this.theme);
     if (cursor !== null) context.fillRect(this.frame.x(cursor) - 0.75, this.frame.top, 1.5, this.frame.bottom - this.frame.top);
@@ -102,7 +105,7 @@ class Chart {
   tell(t, index) {
     for (const { of, value } of this._entries) {
       const curve = this.curves.find((one) => one.signal === of && one.index === index);
-      const text = curve ? quantity(valueAt(curve, t), this.spec.unit) : "";
+      const text = curve ? reading(valueAt(curve, t), this.spec.unit) : "";
       if (value.textContent !== text) value.textContent = text;
     }
   }

@@ -66,8 +66,9 @@ function derived(compute) {
   };
 }
 
-/** Clearances of an obstacle that comes and goes: no number while it is not there. */
-function whileThere(name) {
+/** Clearances of a region; of an obstacle that comes and goes no number while it is not there. */
+function clearanceOf({ name, comes }) {
+  if (!comes) return (run) => run.column(`${name}.clearance`);
   return derived((run) => {
     const values = run.column(`${name}.clearance`);
     const shifts = ["x", "y", "z"].map((axis) => run.column(`${name}.shift.${axis}`));
@@ -79,11 +80,11 @@ function whileThere(name) {
 function clearances(runs, unit) {
   const found = new Map();
   for (const run of runs) {
-    for (const region of run.header.regions) {
-      const column = region.unit === unit && run.column(`${region.name}.clearance`);
-      if (!column) continue;
+    for (const region of run.header.regions.filter((one) => one.unit === unit)) {
+      const values = clearanceOf(region)(run);
+      if (!values || (region.comes && !values.some(Number.isFinite))) continue; // it has not come yet
       const before = found.get(region.name) ?? { region, least: Infinity };
-      found.set(region.name, { region, least: column.reduce((a, b) => (b < a ? b : a), before.least) });
+      found.set(region.name, { region, least: values.reduce((a, b) => (b < a ? b : a), before.least) });
     }
   }
   const near = [...found.values()].filter(({ region }) => region.criterion).sort((a, b) => a.least - b.least);
@@ -97,7 +98,7 @@ function clearances(runs, unit) {
       shade: faint ? 0 : TOWARDS_INK[nth % TOWARDS_INK.length],
       dash: faint ? [] : DASHES[told++ % DASHES.length],
       faint,
-      ...(region.comes ? { values: whileThere(region.name) } : {}),
+      values: clearanceOf(region),
     });
   });
 }

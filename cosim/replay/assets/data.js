@@ -93,6 +93,14 @@ class Run {
     return names.map((signal) => (leaps ? this.held(signal, t) : this.at(signal, t)));
   }
 
+  /** Whether a region is on its way at a time: between the rows about it, or the last two. */
+  moves(region, t) {
+    const row = Math.min(this.row(t), this.rows - 2);
+    if (!(row >= 0) || !this.has(`${this.header.regions[region].name}.shift.x`)) return false;
+    const [a, b] = [row, row + 1].map((i) => this.shift(region, this.time[i]));
+    return this._isThere(region, row) && Vec.norm(Vec.sub(a, b)) > 0;
+  }
+
   /** Whether a region is there at a time: obstacles that were told of while the run went on come and go. */
   there(region, t) {
     return this._isThere(region, this.row(t));
@@ -111,6 +119,25 @@ class Run {
   active(t) {
     const index = this.held("active", t);
     return Number.isFinite(index) ? index : 0;
+  }
+
+  /** From when on the vehicle stays where it is at the end, the arbiter changes nothing, and nothing is told of [s]. */
+  get rest() {
+    if (this._rest?.rows === this.rows) return this._rest.time;
+    const all = (names) => names.map((name) => this.column(name)).filter(Boolean);
+    const last = this.rows - 1;
+    const near = (columns, most) => (i) => columns.every((column) => Math.abs(column[i] - column[last]) <= most);
+    const places = all(["x", "y", "z"].map((axis) => `position.${axis}`));
+    const way = Math.hypot(...places.map((x) => x.reduce((a, b) => Math.max(a, b), -Infinity) - x.reduce((a, b) => Math.min(a, b), Infinity)));
+    const still = [
+      near(places, 0.02 * way), near(all([0, 1, 2, 3].map((e) => `quaternion.e${e}`)), 0.05), near(all(["active"]), 0),
+    ];
+    let row = last;
+    while (row > 0 && still.every((rests) => rests(row - 1))) row -= 1;
+    const told = (this.header.events ?? []).filter(({ kind }) => kind !== "end").flatMap(({ time, until }) => [time, until ?? time]);
+    const time = Math.max(this.rows ? this.time[row] : 0, ...told);
+    this._rest = { rows: this.rows, time: time + 0.05 * (time - this.start) };
+    return this._rest.time;
   }
 
   /** Append one row, as it comes from a live run. */

@@ -49,8 +49,17 @@ function keysOf(page) {
     { group: "Page", keys: "R", text: "The next run into the panel", does: { r: () => page.select((page.selected + 1) % Math.max(1, page.runs.length)) } },
     { group: "Page", keys: "V", text: "Several runs side by side, or in one scene", does: { v: () => page.setSide(!stage.side) } },
     { group: "Page", keys: "T", text: "Light or dark", does: { t: () => page.setTheme(page.theme === "dark" ? "light" : "dark") } },
+    { group: "Page", keys: "Esc", text: "Close the menu that is open", does: { Escape: closeMenu } },
     { group: "Page", keys: "?", text: "This help; Esc closes it", does: { "?": () => page.help() } },
   ];
+}
+
+/** Close the choice of charts, and what else unfolds about the focus; the focus stays with its heading. */
+function closeMenu() {
+  for (const menu of document.querySelectorAll("#charts-menu[open], details[open]:focus-within")) {
+    if (menu.contains(document.activeElement)) menu.querySelector("summary").focus();
+    menu.open = false;
+  }
 }
 
 /** A key with its modifiers, as the table names it. */
@@ -65,6 +74,7 @@ function keyName(event) {
 /** Whether an element has a use of its own for a key. */
 function wants(target, name) {
   const tag = target.tagName;
+  if (name === "Escape") return false;
   if (tag === "SELECT" || tag === "TEXTAREA" || (tag === "INPUT" && !["range", "checkbox"].includes(target.type))) return true;
   return name === " " && (["BUTTON", "SUMMARY"].includes(tag) || target.type === "checkbox");
 }

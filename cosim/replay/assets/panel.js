@@ -73,7 +73,7 @@ class Panel {
     const active = activeWords(run, t);
     setMark(this.mark, this.run, active.region);
     setText(this.who, active.name);
-    setText(this.what, active.region ? regionWords(active.region) : "");
+    setText(this.what, active.region ? regionWords(run, active.index, t) : "");
     setText(this.why, active.sentence);
     const over = t > run.end && this.player.duration > 0;
     this.over.hidden = !over;
@@ -157,13 +157,13 @@ class Panel {
   _distances() {
     const { section, heading } = this._section("Distances", "distances");
     heading.append(element("span", "note", "most pressing first"));
-    this.distances = this.run.header.regions.map((region) => {
+    this.distances = this.run.header.regions.map((region, index) => {
       const item = element("li");
       const mark = element("span");
       setMark(mark, this.run, region);
       const name = element("span", "name", region.name);
       const value = element("span", "value");
-      name.title = regionWords(region);
+      name.title = regionWords(this.run, index, this.player.t);
       item.append(mark, name, value);
       return { item, value, name };
     });

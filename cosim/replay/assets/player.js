@@ -35,6 +35,11 @@ class Player {
     return filled.length ? Math.max(...filled.map((run) => run.end)) : 0;
   }
 
+  /** From when on nothing moves in any run [s]; null while rows still come. */
+  get rest() {
+    return this.growing || !this.runs.length ? null : Math.max(...this.runs.map((run) => run.rest));
+  }
+
   get duration() {
     return this.end - this.start;
   }

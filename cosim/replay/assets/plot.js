@@ -12,16 +12,15 @@ function pageColours() {
 
 /** Where the plot is in its canvas [CSS pixels], and what stands where. */
 class Frame {
-  constructor(width, height, window, range, down) {
+  constructor(width, height, window, rest, range, down) {
     Object.assign(this, { width, height, window, range });
     this.left = MARGIN.left;
     this.right = width - MARGIN.right;
     this.top = MARGIN.top;
     this.bottom = height - MARGIN.bottom;
-    const [from, to] = window;
-    const across = (this.right - this.left) / Math.max(to - from, 1e-9);
-    this.x = (t) => this.left + (t - from) * across;
-    this.time = (x) => from + (Math.min(this.right, Math.max(this.left, x)) - this.left) / across;
+    this.axis = new TimeAxis(window, rest, this.left, this.right);
+    this.x = this.axis.x;
+    this.time = (x) => this.axis.time(Math.min(this.right, Math.max(this.left, x)));
     const [low, high] = range ?? [0, 1];
     const up = (this.bottom - this.top) / (high - low);
     this.y = down ? (value) => this.top + (value - low) * up : (value) => this.bottom - (value - low) * up;
@@ -87,7 +86,8 @@ function paintAxes(context, frame, spec, colours) {
   const scale = spec.unit === "rad" ? DEGREES : 1;
   const [low, high] = frame.range;
   const heights = ticks(low * scale, high * scale, Math.max(2, (frame.bottom - frame.top) / 26));
-  const across = ticks(...frame.window, Math.max(2, (frame.right - frame.left) / 70));
+  const { axis } = frame;
+  const across = ticks(frame.window[0], axis.rest, Math.max(2, (frame.x(axis.rest) - frame.left) / 70));
   context.lineWidth = 1;
   context.strokeStyle = colours.grid;
   context.fillStyle = colours.muted;
@@ -109,6 +109,10 @@ function paintAxes(context, frame, spec, colours) {
   context.stroke();
   context.textBaseline = "top";
   const times = tickTexts(across);
+  if (axis.broken) {
+    across.push(frame.window[1]);
+    times.push(String(Number(frame.window[1].toFixed(1))));
+  }
   across.forEach((t, i) => {
     const last = i === across.length - 1;
     const text = last ? `${times[i]} s` : times[i];
@@ -116,6 +120,7 @@ function paintAxes(context, frame, spec, colours) {
     context.textAlign = "center";
     context.fillText(text, Math.min(frame.x(t), frame.width - half - 1), frame.bottom + 5);
   });
+  if (axis.broken) paintBreak(context, frame, colours);
   if (low < 0 && high > 0) {
     context.strokeStyle = colours.muted;
     context.beginPath();
@@ -124,6 +129,27 @@ function paintAxes(context, frame, spec, colours) {
     context.lineTo(frame.right, y);
     context.stroke();
   }
+}
+
+/** Where the axis of time is broken: nothing moves behind it. */
+function paintBreak(context, { axis, x, top, bottom, right }, colours) {
+  const at = x(axis.rest);
+  context.fillStyle = colours.grid;
+  context.globalAlpha = 0.45;
+  context.fillRect(at, top, right - at, bottom - top);
+  context.globalAlpha = 1;
+  context.strokeStyle = colours.muted;
+  context.lineWidth = 1.5;
+  context.beginPath();
+  for (const aside of [-2, 2]) {
+    context.moveTo(at + aside - 2.5, bottom + 4);
+    context.lineTo(at + aside + 2.5, bottom - 4);
+  }
+  context.stroke();
+  context.textAlign = "center";
+  context.textBaseline = "top";
+  if (right - at > 40) paintText(context, "at rest", (at + right) / 2, top + 2, colours.muted, colours.card);
+  context.lineWidth = 1;
 }
 
 /** What is true may lie far beyond the curves: then a line of text at the edge tells where. */

@@ -185,11 +185,11 @@ class Scene {
   }
 
   _measure() {
-    const { content, bounds } = extentOf(this.runs);
+    const { way: places, content, bounds } = extentOf(this.runs);
     this.bounds = bounds;
     this._rows = this.runs.map((run) => run.rows);
     this._regions.bounds = bounds;
-    this.camera.content = content;
+    Object.assign(this.camera, { content, way: places });
     const lead = this.runs.find((run) => run.rows);
     if (!lead) return;
     const way = Vec.sub(lead.pose(lead.end).position, lead.pose(lead.start).position);

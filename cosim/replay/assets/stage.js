@@ -92,6 +92,7 @@ class Stage {
   draw(t, follow) {
     // one camera can follow one vehicle only
     const { labels } = this;
+    this.time = t;
     this.views.forEach(({ blank, scene, covered }, i) => {
       if (!blank) scene.draw(t, { follow: follow && i === 0, trail: true, labels, covered });
     });
@@ -104,6 +105,8 @@ class Stage {
       const { left, top } = view.canvas.getBoundingClientRect();
       view.covered = over.map((box) => [box.left - left - 4, box.top - top - 4, box.width + 8, box.height + 8]);
     }
+    const { open, hidden, offsetWidth } = document.getElementById("commands") ?? {};
+    this.camera("cover", open && !hidden && 2 * offsetWidth < this.canvas.clientWidth ? offsetWidth : 0);
     this.changed();
   }
 
@@ -146,8 +149,8 @@ function tellPointed(stage, view) {
     const found = stage.under(view, x, y);
     tip.hidden = !found;
     if (!found) return;
-    const region = found.run.header.regions[found.region];
-    setText(tip, `${region.name}: ${regionWords(region)}`);
+    const { name } = found.run.header.regions[found.region];
+    setText(tip, `${name}: ${regionWords(found.run, found.region, stage.time)}`);
     const inner = canvas.getBoundingClientRect();
     const outer = tip.offsetParent.getBoundingClientRect();
     const left = Math.min(x + inner.left - outer.left + 14, outer.width - tip.offsetWidth - 6);

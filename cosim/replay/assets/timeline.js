@@ -11,6 +11,18 @@ function marksOf(run) {
   return marks;
 }
 
+/** Two cuts aslant through the ribbon: time is drawn short behind them. */
+function paintGap(context, x, height) {
+  context.strokeStyle = pageColours().card;
+  context.lineWidth = 2.5;
+  context.beginPath();
+  for (const aside of [-3, 3]) {
+    context.moveTo(x + aside - 3, height);
+    context.lineTo(x + aside + 3, 0);
+  }
+  context.stroke();
+}
+
 /** The scrubber of the selected run. */
 class Timeline {
   constructor(player) {
@@ -19,7 +31,8 @@ class Timeline {
     this.canvas = document.getElementById("ribbon");
     this.marks = document.getElementById("marks");
     this.clock = document.getElementById("clock");
-    this.input.addEventListener("input", () => player.seek(Number(this.input.value)));
+    this.axis = new TimeAxis([0, 1], null, 0, 1);
+    this.input.addEventListener("input", () => player.seek(this.axis.time(Number(this.input.value))));
     new ResizeObserver(() => this.paint()).observe(this.canvas);
   }
 
@@ -31,9 +44,8 @@ class Timeline {
 
   /** Rows were appended, or there is another run. */
   grown() {
-    const { start, end } = this.player;
-    this.input.min = start;
-    this.input.max = Math.max(end, start + 1e-9);
+    const { start, end, rest } = this.player;
+    this.axis = new TimeAxis([start, Math.max(end, start + 1e-9)], rest, 0, 1); // parts of the scrubber
     this._marks();
     this.paint();
     this.point();
@@ -41,12 +53,12 @@ class Timeline {
 
   /** Move the cursor. */
   point() {
-    const { t, start, end, playing, live } = this.player;
-    this.input.value = t;
+    const { t, end, playing, live } = this.player;
+    const part = this.axis.x(t);
+    this.input.value = part;
     setText(this.clock, `${clock(t)} / ${clock(end, 1)}`);
     // told to who reads with the ears only when the cursor rests
     if (!playing && !live) this.input.setAttribute("aria-valuetext", this.run ? `${clock(t)}, ${activeWords(this.run, t).name} active` : clock(t));
-    const part = end > start ? (t - start) / (end - start) : 0;
     this.input.parentElement.style.setProperty("--part", part.toFixed(5));
   }
 
@@ -59,8 +71,7 @@ class Timeline {
     this.canvas.height = Math.round(height * dots);
     const context = this.canvas.getContext("2d");
     context.scale(dots, dots);
-    const { start, end } = this.player;
-    const x = (t) => ((t - start) / Math.max(end - start, 1e-9)) * width;
+    const x = (t) => this.axis.x(t) * width;
     context.fillStyle = pageColours().grid;
     context.fillRect(0, 0, width, height);
     const active = this.run?.column("active");
@@ -85,18 +96,18 @@ class Timeline {
         context.fillRect(x(first), height - 4, Math.max(2, x(last) - x(first)), 4);
       }
     }
+    if (this.axis.broken) paintGap(context, x(this.axis.rest), height);
   }
 
   _marks() {
-    const { start, end } = this.player;
     const marks = this.run ? marksOf(this.run) : [];
-    const key = JSON.stringify([start, end, marks]);
+    const key = JSON.stringify([this.axis.time(0), this.axis.time(1), marks]);
     if (key === this._key) return;
     this._key = key;
     this.marks.replaceChildren(
       ...marks.slice(0, 200).map(({ time, kind, text }) => {
         const mark = element("span", `mark-at ${kind}`);
-        mark.style.left = `${(100 * (time - start)) / Math.max(end - start, 1e-9)}%`;
+        mark.style.left = `${100 * this.axis.x(time)}%`;
         mark.title = `${clock(time)}: ${text}`;
         mark.addEventListener("click", () => this.player.seek(time)); // the keyboard has keys and the list for it
         return mark;

@@ -27,6 +27,11 @@ function quantity(x, unit, digits = 3) {
   return unit ? `${figure(x, digits)} ${unit.replace(".", "\u00b7")}` : figure(x, 2);
 }
 
+/** A number in a unit that stands elsewhere: degrees for radians. */
+function reading(x, unit) {
+  return unit === "rad" ? figure(x * DEGREES, 1) : figure(x, unit ? 3 : 2);
+}
+
 /** Seconds as a clock reads them: 12.34 s, or 3:07.5 from the second minute on. */
 function clock(t, digits = 2) {
   if (t < 100) return `${t.toFixed(digits)} s`;
@@ -52,11 +57,12 @@ function timed(run) {
   return run.has("time") && Number.isFinite(run.start) && Number.isFinite(run.end);
 }
 
-/** What a region asks: "obstacle · keep out · hard". */
-function regionWords(region) {
+/** What a region asks, and whether it moves at a time: "obstacle · keep out · hard · moves". */
+function regionWords(run, index, t) {
+  const region = run.header.regions[index];
   const keep = region.keep === "in" ? "keep inside" : "keep out";
   const criterion = region.criterion ? `${region.criterion} · ${keep} · ${region.hard ? "hard" : "soft"}` : "goal · get inside";
-  return region.moves ? `${criterion} · moves` : criterion;
+  return run.moves(index, t) ? `${criterion} · moves` : criterion;
 }
 
 /** A clearance in words: "1.20 m clear", "violated by 0.03 m"; of the goal "2.00 m to go", "inside by 0.10 m". */
@@ -147,7 +153,7 @@ function troubles(run) {
   const absent = kinds.filter((kind) => !run.header.signals.some(({ name }) => name.includes(kind)));
   if (absent.length) said.push(`The record has no signals named ${absent.join(", ")}: what rests on them is left out.`);
   if (!run.rows && status) said.push("The record has no row."); // a live run has none at first, and no status
-  if (run.rows === 1) said.push("The record has one row only: there is nothing to play.");
+  if (run.rows === 1 && status) said.push("The record has one row only: there is nothing to play.");
   const { gaps = {} } = run.header; // of the whole record, which may have more rows than the page
   const holes = run.header.signals.map(({ name }) => name).filter((name) => gaps[name] || run.column(name).includes(NaN));
   if (holes.length) {

@@ -72,9 +72,10 @@ class Browser:
     def scrub(self, time):
         """Drag the scrubber to a time, as far as the page can tell."""
         self.js(
-            "const bar = document.querySelector('input[type=range]#scrubber'); bar.value = arguments[0];"
+            "const bar = document.querySelector('input[type=range]#scrubber');"
+            "bar.value = subreach.page.timeline.axis.x(arguments[0]);"
             "bar.dispatchEvent(new Event('input', { bubbles: true }));",
-            repr(float(time)),
+            float(time),
         )
         self.settle()
 
