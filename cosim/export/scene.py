@@ -15,7 +15,7 @@ from controller.regions.region_set import SHAPES, name_of, of_attitude, surface_
 from controller.regions.shape import Bounds, Shape
 from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
-from cosim.replay.activity import active_regions
+from cosim.replay.activity import RESTS_ON, active_regions, rests
 from cosim.replay.header import header_of
 from cosim.replay.steering import changes_of, log_of
 from cosim.scenario.colours import colour_of
@@ -106,9 +106,10 @@ class Scene:
 
     def active(self, rows: Array) -> list[int]:
         """Return which of the solids the arbiter gives way to at each row of the record."""
-        active = active_regions(
-            self._criteria, rows[:, self._memberships], rows[:, self._weights], rows[:, self._clearances]
-        )
+        weights, clearances = rows[:, self._weights], rows[:, self._clearances]
+        goal, *velocity = self.places(RESTS_ON)
+        resting = rests(rows[:, goal], rows[:, velocity])
+        active = active_regions(self._criteria, rows[:, self._memberships], weights, clearances, resting)
         return [int(i) for i in active]
 
     def shifts(self, solid: Solid) -> list[int]:

@@ -10,13 +10,38 @@ from numpy.typing import NDArray
 from cosim.simulation.signals import Array
 
 
+RESTS_ON = ("goal.clearance", "velocity.u", "velocity.v", "velocity.w")  # signals that `rests` needs
+_SLOW = 0.02  # m/s over ground
+_LEADS = 0.5  # weight from which on a criterion leads though the vehicle rests in the goal
+
+
+def rests(goal: Array, velocity: Array) -> NDArray[np.bool_]:
+    """Return where a vehicle rests in the goal region: it is slower than 0.02 m/s there.
+
+    Parameters
+    ----------
+    goal : ndarray, shape (rows,)
+        Clearance of the goal [m].
+    velocity : ndarray, shape (rows, 3)
+        Over ground [m/s], in any frame.
+
+    Returns
+    -------
+    ndarray of bool, shape (rows,)
+        False where a number is missing.
+    """
+    slow: NDArray[np.bool_] = np.linalg.norm(velocity, axis=1) < _SLOW
+    return slow & (goal >= 0.0)
+
+
 def active_regions(
-    criteria: Sequence[int], memberships: Array, weights: Array, clearances: Array
+    criteria: Sequence[int], memberships: Array, weights: Array, clearances: Array, resting: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
     """Return which region the arbiter gives way to.
 
-    It is the most pressing region, that of the least clearance, of the criterion with the greatest weight; the goal
-    where that criterion asks for no attention.
+    It is the most pressing region, that of the least clearance, of the criterion with the greatest weight. It is the
+    goal where that criterion asks for no attention; also where the vehicle rests in the goal region, the criterion
+    weighs less than 0.5, and its region is respected.
 
     Parameters
     ----------
@@ -26,6 +51,8 @@ def active_regions(
         Of each criterion.
     clearances : ndarray, shape (rows, n)
         Of the secondary regions [m or rad].
+    resting : ndarray of bool, shape (rows,)
+        From `rests`.
 
     Returns
     -------
@@ -40,4 +67,5 @@ def active_regions(
     belongs = of[None, :] == criterion[:, None]
     pressing = np.where(belongs & ~np.isnan(clearances), clearances, np.inf)
     asked = (memberships[rows, criterion] > 0.0) & np.isfinite(pressing).any(axis=1)
+    asked &= ~resting | (weights[rows, criterion] >= _LEADS) | (pressing.min(axis=1) < 0.0)
     return np.where(asked, np.argmin(pressing, axis=1) + 1, 0).astype(float)

@@ -11,7 +11,7 @@ from itertools import chain, pairwise
 import numpy as np
 
 from controller.regions.region_set import of_attitude
-from cosim.replay.activity import active_regions
+from cosim.replay.activity import RESTS_ON, active_regions, rests
 from cosim.replay.command_words import command_events
 from cosim.replay.steering import Log
 from cosim.results.run_result import Run
@@ -128,10 +128,10 @@ def _takeovers(run: Run) -> Iterator[tuple[float, int]]:
         [f"{of}.{name}" for name in run.scenario.criterion_names] for of in ("membership", "weight")
     )
     clearances = [f"{secondary.region.name}.clearance" for secondary in regions]
-    for block in run.record.blocks(["time", *memberships, *weights, *clearances]):
+    for block in run.record.blocks(["time", *RESTS_ON, *memberships, *weights, *clearances]):
         by_region = block.stack(clearances) if clearances else np.empty((len(block), 0))
-        places = run.scenario.criterion_places
-        active = active_regions(places, block.stack(memberships), block.stack(weights), by_region).astype(int)
+        places, resting = run.scenario.criterion_places, rests(block[RESTS_ON[0]], block.stack(RESTS_ON[1:]))
+        active = active_regions(places, block.stack(memberships), block.stack(weights), by_region, resting).astype(int)
         for row in np.flatnonzero(np.diff(active, prepend=before)).tolist():
             yield float(block["time"][row]), int(active[row])
         before = int(active[-1])

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cosim.replay.activity import active_regions
+from cosim.replay.activity import RESTS_ON, active_regions, rests
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array, Column
 from fuzzy_arbiter.engines.firing import Firing
@@ -41,6 +41,7 @@ class Viewing:
         drawn = [names[i] for i in self.picked]
         self._memberships = [drawn.index(f"membership.{name}") for name in names_of_criteria]
         self._weights = [drawn.index(f"weight.{name}") for name in names_of_criteria]
+        self._goal, *self._velocity = (drawn.index(name) for name in RESTS_ON)
         self._clearances = [drawn.index(f"{secondary.region.name}.clearance") for secondary in scenario.regions]
         system = scenario.rules.system
         self._inputs = self._memberships  # of the rules
@@ -68,7 +69,9 @@ class Viewing:
             With activity and strengths; NaN where an input of the rules is no number.
         """
         memberships = picked[:, self._memberships]
-        active = active_regions(self._criteria, memberships, picked[:, self._weights], picked[:, self._clearances])
+        weights, clearances = picked[:, self._weights], picked[:, self._clearances]
+        resting = rests(picked[:, self._goal], picked[:, self._velocity])
+        active = active_regions(self._criteria, memberships, weights, clearances, resting)
         inputs = picked[:, self._inputs]
         numbers = np.isfinite(inputs).all(axis=1)
         strengths = np.full((len(picked), len(self.columns) - len(self.picked) - 1), np.nan)

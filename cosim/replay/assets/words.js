@@ -73,6 +73,11 @@ function clearanceWords(clearance, region) {
   return clearance < 0 ? `violated by ${size}` : `${size} clear`;
 }
 
+/** Whether a vehicle is slow enough to be told of as at rest, as in cosim/replay/activity.py. */
+function slow(run, t) {
+  return Math.hypot(...["u", "v", "w"].map((axis) => run.held(`velocity.${axis}`, t))) < 0.02; // m/s
+}
+
 /** Who is active at a time, and why: index, name, and a sentence. */
 function activeWords(run, t) {
   const index = run.active(t);
@@ -85,7 +90,7 @@ function activeWords(run, t) {
     const share = Number.isFinite(weight) ? ` with weight ${figure(weight, 2)}` : "";
     sentence = `The criterion ${region.criterion} leads${share}; ${region.name} presses most: ${asked}.`;
   } else if (clearance >= 0) {
-    sentence = `The vehicle is in the goal region, ${asked}.`;
+    sentence = `${slow(run, t) ? "At rest" : "On the move"} in the goal region, ${asked}.`;
   }
   if (!run.rows || Number.isNaN(run.held("active", t))) {
     return { index: -1, name: "not recorded", region: null, sentence: "The record does not say which region is active here." };

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.replay.activity import active_regions
+from cosim.replay.activity import RESTS_ON, active_regions, rests
 from cosim.report.figures.style import POINTS, FigureData, overlap_of
 from cosim.simulation.signals import Array
 
@@ -87,6 +87,7 @@ def _given_way(data: FigureData, at: NDArray[np.intp]) -> NDArray[np.intp]:
             [f"{secondary.region.name}.clearance" for secondary in regions],
         )
     )
-    active = active_regions(criteria, memberships, weights, clearances).astype(int)
+    goal, *velocity = (data.record[name][at] for name in RESTS_ON)
+    active = active_regions(criteria, memberships, weights, clearances, rests(goal, np.column_stack(velocity))).astype(int)
     given_way: NDArray[np.intp] = np.array([-1, *criteria])[active]
     return given_way

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import struct
 import zlib
 from html.parser import HTMLParser
@@ -63,4 +64,8 @@ def active_of(header, columns, row):
             clearance = columns[f"{region['name']}.clearance"][row]
             if pressing is None or clearance < pressing[0]:
                 pressing = (clearance, i)
-    return pressing[1] if pressing and columns[f"membership.{strongest}"][row] > 0 else 0
+    if not pressing or not columns[f"membership.{strongest}"][row] > 0:
+        return 0
+    speed = math.hypot(*(columns[f"velocity.{axis}"][row] for axis in "uvw"))
+    rests = columns["goal.clearance"][row] >= 0 and speed < 0.02 and max(weights) < 0.5 and pressing[0] >= 0
+    return 0 if rests else pressing[1]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.replay.activity import active_regions
+from cosim.replay.activity import active_regions, rests
 from cosim.replay.sampling import sampled_rows
 from cosim.replay.trace import nan_to_none, trace_of
 from cosim.replay.viewing import Viewing
@@ -66,13 +66,31 @@ def test_who_is_active_agrees_with_a_reading_row_by_row(docking):
 
 def test_nothing_is_active_where_nothing_asks_or_is_known():
     nan, zero = np.nan, np.zeros((1, 3))
-    one = np.array([[1.0, 0.0, 0.0]])
-    assert active_regions([0], zero, zero, np.array([[-1.0]])).tolist() == [0.0]
-    assert active_regions([], one, one, np.empty((1, 0))).tolist() == [0.0]
-    assert active_regions([2], one, one, np.array([[-1.0]])).tolist() == [0.0]
-    assert active_regions([0, 0], one, one, np.array([[nan, 3.0]])).tolist() == [2.0]
-    assert active_regions([0], one, one, np.array([[nan]])).tolist() == [0.0]
-    assert active_regions([0], one * nan, one * nan, np.array([[1.0]])).tolist() == [0.0]
+    one, moving = np.array([[1.0, 0.0, 0.0]]), np.array([False])
+    assert active_regions([0], zero, zero, np.array([[-1.0]]), moving).tolist() == [0.0]
+    assert active_regions([], one, one, np.empty((1, 0)), moving).tolist() == [0.0]
+    assert active_regions([2], one, one, np.array([[-1.0]]), moving).tolist() == [0.0]
+    assert active_regions([0, 0], one, one, np.array([[nan, 3.0]]), moving).tolist() == [2.0]
+    assert active_regions([0], one, one, np.array([[nan]]), moving).tolist() == [0.0]
+    assert active_regions([0], one * nan, one * nan, np.array([[1.0]]), moving).tolist() == [0.0]
+
+
+@pytest.mark.parametrize(
+    ("weight", "clearance", "goal", "speed", "active"),
+    [
+        (0.05, 0.2, 0.0, 0.0199, 0.0),
+        (0.05, 0.2, 0.0, 0.0201, 1.0),
+        (0.05, 0.2, -1e-9, 0.0, 1.0),
+        (0.05, 0.2, np.nan, 0.0, 1.0),
+        (0.05, 0.2, 0.1, np.nan, 1.0),
+        (0.05, -0.2, 0.1, 0.0, 1.0),
+        (0.5, 0.2, 0.1, 0.0, 1.0),
+    ],
+)
+def test_at_rest_in_the_goal_a_region_leads_where_it_weighs_half_or_is_violated(weight, clearance, goal, speed, active):
+    resting = rests(np.array([goal]), np.array([[0.0, speed, 0.0]]))
+    asked, weights = np.array([[0.3, 0.0, 0.0]]), np.array([[weight, 0.0, 0.0]])
+    assert active_regions([0], asked, weights, np.array([[clearance]]), resting).tolist() == [active]
 
 
 def test_rule_strengths_are_minima_and_maxima_of_degrees(docking):
