@@ -7,6 +7,7 @@ import re
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,9 +95,10 @@ class Thrusters:
 
 @dataclass(frozen=True)
 class Hull:
-    """The sphere about the body origin that meets surface and bottom."""
+    """The sphere about the body origin that meets surface and bottom, and what the hull looks like."""
 
     radius: float = 0.0  # m
+    shape: Literal["frame", "sphere"] = "frame"  # as pictures show it; the dynamics do not depend on it
 
 
 @dataclass(frozen=True)
@@ -144,6 +146,7 @@ class Vehicle:
     thrust_dead_band: NDArray[np.float64]  # (n,) [-]
     thrust_curve: NDArray[np.float64]  # (n,) [-]
     hull_radius: float  # m
+    hull_shape: Literal["frame", "sphere"] = "frame"  # as pictures show it
     autopilot: Autopilot | None = None  # how one drives the thrusters; a channel and a sign for each
 
     @property
@@ -283,6 +286,7 @@ def _check(file: _File, where: str) -> Vehicle:
         thrust_dead_band=per_thruster(thrusters.dead_band, "dead_band"),
         thrust_curve=per_thruster(thrusters.curve, "curve"),
         hull_radius=file.hull.radius,
+        hull_shape=file.hull.shape,
         autopilot=file.autopilot and validate_autopilot(file.autopilot, n, require),
     )
 

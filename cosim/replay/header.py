@@ -158,4 +158,10 @@ def _vehicle(vehicle: Vehicle) -> dict[str, Any]:
                 "max": float(most),
             }
         )
-    return {"name": vehicle.name, "title": vehicle.title, "radius": float(radius), "thrusters": thrusters}
+    return {
+        "name": vehicle.name,
+        "title": vehicle.title,
+        "hull": vehicle.hull_shape,
+        "radius": float(radius),
+        "thrusters": thrusters,
+    }

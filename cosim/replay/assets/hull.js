@@ -1,5 +1,5 @@
-// The vehicle's hull: schematic, of its size, not its likeness. The yellow floats are on top, the dome is the nose; the
-// thrusters are where their lines of action are.
+// The vehicle's hull: schematic, of its size, not its likeness. Of a frame the yellow floats are on top; the dome is the
+// nose of any; the thrusters are where their lines of action are.
 
 /**
  * A face of a hull for a radius of 1, body axes: forward, starboard, down.
@@ -66,6 +66,13 @@ function frameFaces() {
   return faces;
 }
 
+/** A ball, with a dome for its nose. */
+function ballFaces() {
+  const ring = (k) => hullRing([-Math.cos((Math.PI * k) / 12), 0, 0], [1, 0, 0], Math.sin((Math.PI * k) / 12), 20);
+  const rings = Array.from({ length: 12 }, (_, k) => ring(k + 0.5));
+  return [...hullTube("float", rings.slice(0, 11)), ...hullTube("dome", rings.slice(10))];
+}
+
 /** Ducts at the thrusters, and struts to those that are outside of the frame. */
 function thrusterFaces({ thrusters, radius }) {
   return thrusters.flatMap(({ position, direction }) => {
@@ -80,11 +87,11 @@ function thrusterFaces({ thrusters, radius }) {
   });
 }
 
-const FRAME = frameFaces();
+const SHAPES = { frame: frameFaces(), sphere: ballFaces() }; // by the vehicle's file
 const HULLS = new WeakMap();
 
 /** The faces of a vehicle, made once. @returns {HullFace[]} */
 function hullOf(vehicle) {
-  if (!HULLS.has(vehicle)) HULLS.set(vehicle, [...FRAME, ...thrusterFaces(vehicle)]);
+  if (!HULLS.has(vehicle)) HULLS.set(vehicle, [...SHAPES[vehicle.hull], ...thrusterFaces(vehicle)]);
   return HULLS.get(vehicle);
 }

@@ -85,7 +85,7 @@ function paintText(context, text, x, y, colour, ground) {
 function paintAxes(context, frame, spec, colours) {
   const scale = spec.unit === "rad" ? DEGREES : 1;
   const [low, high] = frame.range;
-  const heights = ticks(low * scale, high * scale, Math.max(2, (frame.bottom - frame.top) / 26));
+  const heights = ticks(low * scale, high * scale, Math.max(2, (frame.bottom - frame.top) / 20));
   const { axis } = frame;
   const across = ticks(frame.window[0], axis.rest, Math.max(2, (frame.x(axis.rest) - frame.left) / 70));
   context.lineWidth = 1;
