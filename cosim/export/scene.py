@@ -18,7 +18,7 @@ from cosim.export.excerpt import Excerpt
 from cosim.replay.activity import RESTS_ON, active_regions, rests
 from cosim.replay.header import header_of
 from cosim.replay.steering import changes_of, log_of
-from cosim.scenario.colours import colour_of
+from cosim.scenario.colours import colours_of_regions
 from cosim.simulation.signals import Array
 
 NED, PLACE, BODY = "ned", "place", "body"  # the world; the vehicle's place, not turned; the vehicle
@@ -129,7 +129,7 @@ class Scene:
         return Solid(
             region.name,
             f"{region.name}: keep {region.keep}",
-            _rgb(colour_of(scenario, secondary.criterion if secondary else None)),
+            _rgb(colours_of_regions(scenario)[index]),
             shape,
             self._mesh(shape, limits),
             {Orientation: PLACE, Visibility: BODY}.get(type(shape), NED),

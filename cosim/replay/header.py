@@ -11,7 +11,7 @@ import numpy as np
 from controller.regions.region_set import name_of, of_attitude, shape_entry, surface_of
 from controller.regions.shape import Bounds, Shape
 from cosim.results.wording import asked
-from cosim.scenario.colours import colour_of
+from cosim.scenario.colours import colours_of_regions
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Column
 from fuzzy_arbiter import System
@@ -42,7 +42,7 @@ def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = Fa
     dict
         Of texts, numbers, booleans, lists and dicts.
     """
-    limits = limits_of(scenario)
+    limits, colours = limits_of(scenario), colours_of_regions(scenario)
     return {
         "version": VERSION,
         "name": scenario.name,
@@ -56,7 +56,7 @@ def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = Fa
         "through": scenario.actuation.through,
         "vehicle": _vehicle(scenario.vehicle),
         "criteria": [{"name": criterion.name, "colour": criterion.colour} for criterion in scenario.criteria],
-        "regions": [_region(scenario, i, limits) for i in range(len(scenario.regions) + 1)],
+        "regions": [_region(scenario, i, limits) | {"colour": colour} for i, colour in enumerate(colours)],
         "rules": rules_of(scenario.rules.system),
         "truth": {"estimate": [float(phi) for phi in scenario.true_restoring_parameters]},
         "signals": [dataclasses.asdict(column) for column in columns],
@@ -120,7 +120,6 @@ def _region(scenario: Scenario, index: int, limits: Bounds) -> dict[str, Any]:
     return {
         "name": region.name,
         "criterion": secondary.criterion if secondary else None,
-        "colour": colour_of(scenario, secondary.criterion if secondary else None),
         "keep": region.keep,
         "hard": region.hard,
         "gain": region.gain,

@@ -2,26 +2,64 @@
 
 from __future__ import annotations
 
+import colorsys
+from collections.abc import Sequence
+
 from cosim.scenario.scenario import Scenario
 
 GOAL_COLOUR = "#009E73"  # Okabe and Ito's
+_WIDEST = 50.0 / 360.0  # turns of hue between a criterion's colour and that of a region of it
+# the regions of a criterion, in turn: part of the way to the hue that is farthest, lightness added, part of saturation
+_SHADES = (
+    (0.0, 0.0, 1.0),
+    (0.8, -0.08, 0.85),
+    (0.35, 0.24, 0.9),
+    (0.2, -0.2, 0.8),
+    (0.8, 0.14, 0.75),
+    (0.0, 0.2, 0.35),
+)
 
 
-def colour_of(scenario: Scenario, criterion: str | None) -> str:
-    """Return the colour of the regions of a criterion, as ``#RRGGBB``.
+def colours_of_regions(scenario: Scenario) -> list[str]:
+    """Return the colours of the goal and of the secondary regions, as ``#RRGGBB``.
+
+    The first region of a criterion has the criterion's colour. The others have shades of it, nearer to it in hue than
+    to any other criterion and to the goal; after six regions they repeat.
 
     Parameters
     ----------
     scenario : Scenario
-        Whose criterion it is.
-    criterion : str, optional
-        None for the goal.
+        Whose regions they are.
 
     Returns
     -------
-    str
-        Such as ``"#D55E00"``.
+    list of str
+        The goal's first, such as ``["#009E73", "#D55E00"]``.
     """
-    if criterion is None:
-        return GOAL_COLOUR
-    return scenario.criteria[scenario.criterion_names.index(criterion)].colour
+    own = {criterion.name: criterion.colour for criterion in scenario.criteria}
+    seen = dict.fromkeys(own, 0)
+    colours = [GOAL_COLOUR]
+    for secondary in scenario.regions:
+        name = secondary.criterion
+        others = [GOAL_COLOUR, *(colour for other, colour in own.items() if other != name)]
+        colours.append(_shade(own[name], others, seen[name]))
+        seen[name] += 1
+    return colours
+
+
+def _shade(colour: str, others: Sequence[str], place: int) -> str:
+    place %= len(_SHADES)
+    if place == 0:
+        return colour
+    (part, lighter, full), (hue, lightness, saturation) = _SHADES[place], _hls(colour)
+    # to either side as far as half the way to the next colour, and to the wider side
+    apart = [(_hls(other)[0] - hue) % 1.0 for other in others]
+    up, down = min(apart), min(1.0 - turn for turn in apart)
+    wide = min(_WIDEST, 0.5 * up) if up > down else -min(_WIDEST, 0.5 * down)
+    lightness = min(0.8, max(0.18, lightness + lighter))
+    shade = colorsys.hls_to_rgb((hue + part * wide) % 1.0, lightness, full * saturation)
+    return "#" + "".join(f"{round(255 * channel):02X}" for channel in shade)
+
+
+def _hls(colour: str) -> tuple[float, float, float]:
+    return colorsys.rgb_to_hls(*(int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)))

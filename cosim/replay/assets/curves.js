@@ -15,7 +15,6 @@ const HUES = {
 const HUE_OF = { "#D55E00": "vermillion", "#E69F00": "orange", "#56B4E9": "sky", "#CC79A7": "purple", "#009E73": "green" };
 const IN_TURN = ["blue", "vermillion", "green", "purple"];
 const DASHES = [[], [7, 4], [2, 3], [10, 3, 2, 3], [14, 4], [4, 2, 1, 2, 1, 2]];
-const TOWARDS_INK = [0, 0.5, 0.25, 0.65]; // how far to ink regions of one criterion go, in turn
 const NAMED = 6; // regions that the chart of distances tells by name
 
 /** The dash of a run, where a page has several. */
@@ -37,7 +36,7 @@ function criteriaOf(runs) {
 
 /** The CSS colour of a hue in a theme, or of "#rrggbb", moved by `shade` towards the ink. */
 function hueColour(hue, theme, shade = 0) {
-  const base = HUES[theme][hue] ?? hue;
+  const base = HUES[theme][hue] ?? legible(hue, theme);
   if (!shade) return base;
   const [from, to] = [base, HUES[theme].ink].map((hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16)));
   return `rgb(${from.map((x, i) => Math.round(x + shade * (to[i] - x))).join(" ")})`;
@@ -89,13 +88,10 @@ function clearances(runs, unit) {
   }
   const near = [...found.values()].filter(({ region }) => region.criterion).sort((a, b) => a.least - b.least);
   const named = new Set(near.slice(0, NAMED).map(({ region }) => region.name));
-  const seen = {};
   let told = 0;
   return [...found.values()].map(({ region }) => {
     const faint = Boolean(region.criterion) && !named.has(region.name);
-    const nth = faint ? 0 : (seen[region.criterion] = (seen[region.criterion] ?? -1) + 1);
     return signal(`${region.name}.clearance`, region.name, faint ? "grey" : hueOf(region.colour), {
-      shade: faint ? 0 : TOWARDS_INK[nth % TOWARDS_INK.length],
       dash: faint ? [] : DASHES[told++ % DASHES.length],
       faint,
       values: clearanceOf(region),

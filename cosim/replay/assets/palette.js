@@ -54,7 +54,20 @@ function mixedColour(from, to, part) {
   return `#${hex.join("")}`;
 }
 
-/** The full colour of a region: that of its criterion; the goal has its own. */
+/** A colour, as much nearer to the ink of a theme as a line needs to be seen: 3 to 1 against the ground. */
+function legible(colour, theme) {
+  const [ground, ink] = theme === "dark" ? ["#121c25", "#ffffff"] : ["#ffffff", "#000000"];
+  const light = (hex) => {
+    const linear = channelsOf(hex).map((x) => (x <= 10 ? x / 3295 : ((x / 255 + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2] + 0.05;
+  };
+  const contrast = (hex) => Math.max(light(hex) / light(ground), light(ground) / light(hex));
+  let part = 0;
+  while (contrast(mixedColour(colour, ink, part)) < 3) part += 0.05;
+  return mixedColour(colour, ink, part);
+}
+
+/** The full colour of a region: a shade of its criterion's; the goal has its own. */
 function fullColour(region) {
   return region.colour;
 }

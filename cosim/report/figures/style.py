@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from controller.regions import Region, Visibility
 from controller.regions.region_set import of_attitude
 from cosim.results.record import Rows
-from cosim.scenario.colours import GOAL_COLOUR, colour_of
+from cosim.scenario.colours import colours_of_regions
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
@@ -113,9 +113,8 @@ def regions_of(scenario: Scenario) -> Iterator[tuple[Region, str]]:
     (Region, str)
         The goal first.
     """
-    yield scenario.goal_region, GOAL_COLOUR
-    for secondary in scenario.regions:
-        yield secondary.region, colour_of(scenario, secondary.criterion)
+    regions = [scenario.goal_region, *(secondary.region for secondary in scenario.regions)]
+    yield from zip(regions, colours_of_regions(scenario), strict=True)
 
 
 @dataclass(frozen=True)
