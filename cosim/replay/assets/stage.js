@@ -100,7 +100,7 @@ class Stage {
 
   /** Where buttons and commands hang over each canvas: [x, y, width, height] in its pixels. */
   _cover() {
-    const over = [...document.querySelectorAll("#scene-bar .group, #commands")].map((hung) => hung.getBoundingClientRect());
+    const over = [...document.querySelectorAll("#scene-bar .group, #commands, .caption .run-name")].map((hung) => hung.getBoundingClientRect());
     for (const view of this.views) {
       const { left, top } = view.canvas.getBoundingClientRect();
       view.covered = over.map((box) => [box.left - left - 4, box.top - top - 4, box.width + 8, box.height + 8]);
