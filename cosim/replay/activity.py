@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from cosim.simulation.signals import Array
 
-
 RESTS_ON = ("goal.clearance", "velocity.u", "velocity.v", "velocity.w")  # signals that `rests` needs
 _SLOW = 0.02  # m/s over ground
 _LEADS = 0.5  # weight from which on a criterion leads though the vehicle rests in the goal

@@ -88,6 +88,7 @@ def _given_way(data: FigureData, at: NDArray[np.intp]) -> NDArray[np.intp]:
         )
     )
     goal, *velocity = (data.record[name][at] for name in RESTS_ON)
-    active = active_regions(criteria, memberships, weights, clearances, rests(goal, np.column_stack(velocity))).astype(int)
+    resting = rests(goal, np.column_stack(velocity))
+    active = active_regions(criteria, memberships, weights, clearances, resting).astype(int)
     given_way: NDArray[np.intp] = np.array([-1, *criteria])[active]
     return given_way

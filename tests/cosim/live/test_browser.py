@@ -1,10 +1,12 @@
 """The live page in a real browser: the vehicle moves, and what is dragged arrives in the run."""
 
+import io
 import json
 import shutil
 import time
 
 import pytest
+from PIL import Image, ImageChops
 
 from cosim.results.record import load_record
 from tests.cosim.live.conftest import WAIT
@@ -123,3 +125,40 @@ def test_a_region_to_be_kept_within_is_dragged_by_its_name(browser, live):
     hand.click_and_hold().move_by_offset(-20, 30).move_by_offset(-20, 30).release().perform()
     moved = "return subreach.runs[0].held('ship.shift.x', subreach.runs[0].end)"
     until(lambda: browser.execute_script(moved) not in (None, 0))
+
+
+def test_the_page_tells_of_what_is_there_and_of_what_moves(browser, live):
+    running = live("moving-obstacle", "time.duration=4", commands=True, await_arm=False, rate=1.0)
+    until(lambda: running.view._run >= 0)
+    browser.get(running.url)
+    until(lambda: browser.execute_script("return window.subreach?.ready && subreach.runs[0]?.rows > 20"))
+    names = "return subreach.runs[0].header.regions.map(({ name, comes }) => [name, comes])"
+    regions = browser.execute_script(names)
+    assert sum(comes for _, comes in regions) > 0
+    told = browser.execute_script(
+        "return subreach.charts.find(({ spec }) => spec.key === 'distances').legend.textContent"
+    )
+    assert "farther" not in told and not [name for name, comes in regions if comes and name in told]
+    moving = browser.execute_script(
+        "const r = subreach.runs[0]; return r.header.regions.map((_, i) => r.moves(i, r.end))"
+    )
+    assert {name for (name, _), moves in zip(regions, moving, strict=True) if moves} == {
+        "goal", "crossing buoy", "oncoming buoy"
+    }  # fmt: skip
+
+
+def test_what_is_left_of_the_panel_of_commands_does_not_lie_upon_its_heading(browser, live):
+    running = live("harbour", commands=True, await_arm=False)
+    until(lambda: running.view._run >= 0)
+    browser.get(running.url)
+    until(lambda: browser.execute_script("return Boolean(window.subreach?.runs[0]?.header.verdict)"))
+    box = browser.execute_script("return document.querySelector('#commands summary').getBoundingClientRect().toJSON()")
+    inside = [box["left"] + 9, box["top"] + 2, box["right"] - 20, box["bottom"] - 2]
+
+    def heading():
+        time.sleep(0.3)
+        return Image.open(io.BytesIO(browser.get_screenshot_as_png())).convert("RGB").crop(inside)
+
+    before = heading()
+    browser.execute_script("document.getElementById('commands').scrollTop = 60")
+    assert ImageChops.difference(before, heading()).getbbox() is None
