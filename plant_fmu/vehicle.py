@@ -146,8 +146,8 @@ class Vehicle:
     thrust_dead_band: NDArray[np.float64]  # (n,) [-]
     thrust_curve: NDArray[np.float64]  # (n,) [-]
     hull_radius: float  # m
-    hull_shape: Literal["frame", "sphere"] = "frame"  # as pictures show it
     autopilot: Autopilot | None = None  # how one drives the thrusters; a channel and a sign for each
+    hull_shape: Literal["frame", "sphere"] = "frame"  # as pictures show it
 
     @property
     def n_thrusters(self) -> int:
@@ -286,8 +286,8 @@ def _check(file: _File, where: str) -> Vehicle:
         thrust_dead_band=per_thruster(thrusters.dead_band, "dead_band"),
         thrust_curve=per_thruster(thrusters.curve, "curve"),
         hull_radius=file.hull.radius,
-        hull_shape=file.hull.shape,
         autopilot=file.autopilot and validate_autopilot(file.autopilot, n, require),
+        hull_shape=file.hull.shape,
     )
 
     for key, value in vars(vehicle).items():

@@ -1,6 +1,7 @@
 """The shipped vehicles: what was published, turned here by other means, and what any sound vehicle does."""
 
 import dataclasses
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from plant_fmu import load_vehicle, shipped_vehicles
 from plant_fmu.build import neutral_members
-from plant_fmu.errors import VehicleError
+from plant_fmu.errors import TableError, VehicleError
 from tests.plant_fmu.test_build import written
 
 VEHICLES = shipped_vehicles()
@@ -184,3 +185,11 @@ def test_a_vehicle_has_a_thruster(tmp_path, rows):
     matrix = text[text.index("matrix = [") : text.index("force_min")]
     with pytest.raises(VehicleError, match=r"thrusters.matrix is \d rows of \[0?\] numbers, expected 6 rows"):
         load_vehicle(written(tmp_path, (matrix, f"matrix = {rows}\n")))
+
+
+def test_a_hull_is_a_frame_unless_its_file_says_sphere(tmp_path):
+    assert {name: load_vehicle(name).hull_shape for name in ("odin", "rexrov")} == {"odin": "sphere", "rexrov": "frame"}
+    odin = (resources.files("plant_fmu") / "vehicles" / "odin.toml").read_text()
+    (tmp_path / "egg.toml").write_text(odin.replace('shape = "sphere"', 'shape = "egg"'))
+    with pytest.raises(TableError, match=r"hull\.shape: expected one of 'frame', 'sphere' \(came: 'egg'\)"):
+        load_vehicle(tmp_path / "egg.toml")
