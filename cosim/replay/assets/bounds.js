@@ -55,9 +55,13 @@ function reachOf(shape, shift, middle, limits) {
     if (box[0].some((x, k) => x > limits[1][k]) || box[1].some((x, k) => x < limits[0][k])) return [];
     return cornersOf(box.map((corner) => corner.map((x, k) => Math.min(limits[1][k], Math.max(limits[0][k], x)))));
   }
-  return (shape.drawing?.planes ?? [])
-    .map(({ point, normal }) => Vec.along(middle, normal, Vec.dot(Vec.sub(Vec.add(point, shift), middle), normal)))
-    .filter((p) => p.every((x, k) => x >= limits[0][k] && x <= limits[1][k]));
+  return planePoints(shape, shift, middle).filter((p) => p.every((x, k) => x >= limits[0][k] && x <= limits[1][k]));
+}
+
+/** The points of a region's planes that are nearest to a point. */
+function planePoints(shape, shift, middle) {
+  const planes = shape.drawing?.planes ?? [];
+  return planes.map(({ point, normal }) => Vec.along(middle, normal, Vec.dot(Vec.sub(Vec.add(point, shift), middle), normal)));
 }
 
 /**
@@ -72,15 +76,19 @@ function extentOf(runs) {
   const room = Math.max(4 * radius, ROOM * Vec.norm(Vec.sub(high, low)));
   const limits = [low.map((x) => x - room), high.map((x) => x + room)];
   const middle = Vec.scale(Vec.add(low, high), 0.5);
-  const content = [...way];
+  const [content, beside] = [[...way], []];
   for (const run of runs) {
     run.header.regions.forEach((_, i) => {
       for (const t of [run.start, 0.5 * (run.start + run.end), run.end]) {
-        content.push(...reachOf(run.shape(i, t), run.rows ? run.shift(i, t) : [0, 0, 0], middle, limits));
+        const [shape, shift] = [run.shape(i, t), run.rows ? run.shift(i, t) : [0, 0, 0]];
+        content.push(...reachOf(shape, shift, middle, limits));
+        beside.push(...planePoints(shape, shift, middle));
       }
     });
   }
-  const bounds = boxAbout(content.filter(Vec.finite));
+  // a plane that is not far off is drawn too, as far as it is in the picture
+  const near = (p) => p.every((x, k) => x >= low[k] - 2 * room && x <= high[k] + 2 * room);
+  const bounds = boxAbout([...content, ...beside.filter(near)].filter(Vec.finite));
   const step = roundStep(Math.max(bounds[1][0] - bounds[0][0], bounds[1][1] - bounds[0][1]) / 20);
   for (const axis of [0, 1]) {
     bounds[0][axis] = step * Math.floor(bounds[0][axis] / step);

@@ -85,8 +85,17 @@ function sameRegion(entry, region, shape, shift) {
 /** Where the name of an entry stands. */
 function anchorOf({ solid, sheet, sight, shift, middle }, camera) {
   if (sight) return sight.anchor;
-  if (sheet) return sheet.corners.reduce((a, b) => (camera.project(b)[0] > camera.project(a)[0] ? b : a));
+  if (sheet) return rightmostSeen(sheet.corners, camera);
   return solid.long ? middle : [middle[0], middle[1], solid.top + shift[2]];
+}
+
+/** The point farthest to the right among the corners of a polygon and points on its edges, of those in the picture. */
+function rightmostSeen(corners, camera) {
+  const between = (a, b) => [0, 0.2, 0.4, 0.6, 0.8].map((part) => Vec.along(a, Vec.sub(b, a), part));
+  const points = corners.flatMap((a, i) => between(a, corners[(i + 1) % corners.length]));
+  const seen = points.map((p) => [p, ...camera.project(p)]);
+  const inside = seen.filter(([, x, y, depth]) => depth > camera.near && x > 0 && y > 0 && x < camera.width && y < camera.height);
+  return (inside.length ? inside : seen).reduce((a, b) => (b[1] > a[1] ? b : a))[0];
 }
 
 /** Regions to be kept out of, by entry, the nearest to the vehicle first; those to be kept within are not among them. */

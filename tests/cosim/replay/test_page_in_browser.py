@@ -119,7 +119,7 @@ def test_two_runs_overlay_and_stand_side_by_side(browser, both, docking, paper):
     browser.open(both)
     names = [run["name"] for run in browser.js("return window.subreach.runs.map((r) => ({ name: r.header.name }))")]
     assert names == [docking.folder.name, paper.folder.name]
-    browser.scrub(20.0)
+    browser.land(20.0)
     for run, drawn in zip((docking, paper), browser.drawn["runs"], strict=True):
         index = int(run.record["time"].searchsorted(20.0))
         here = [run.record[f"position.{axis}"][index] for axis in "xyz"]

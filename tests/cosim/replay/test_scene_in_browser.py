@@ -77,7 +77,11 @@ def test_the_active_region_s_colour_is_that_of_the_record_at_ten_instants(name, 
     browser.open(page.file)
     instants, seen = ten_instants(page), set()
     assert len(instants) == 10
-    signals = {column: record[column] for column in record.units if column.startswith(("weight.", "membership."))}
+    first = {region["criterion"]: region["colour"].lower() for region in reversed(page.header["regions"])}
+    assert first == {criterion: FULL[criterion] for criterion in first}
+    signals = {
+        column: record[column] for column in record.units if column.startswith(("weight.", "membership.", "velocity."))
+    }
     signals |= {column: record[column] for column in record.units if column.endswith(".clearance")}
     for row in instants:
         step = page.steps[row]
@@ -86,7 +90,7 @@ def test_the_active_region_s_colour_is_that_of_the_record_at_ten_instants(name, 
         drawn = browser.drawn["runs"][0]
         assert drawn["active"] == expected
         for i, region in enumerate(page.header["regions"]):
-            is_full = drawn["colours"][i].lower() == FULL[region["criterion"]]
+            is_full = drawn["colours"][i].lower() == region["colour"].lower()
             assert is_full == (i == expected), (record["time"][step], region["name"], drawn["colours"][i])
         seen.add(expected)
     assert len(seen) >= {"paper": 4, "docking": 2}[name]
