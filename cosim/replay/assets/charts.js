@@ -180,7 +180,7 @@ class Chart {
   }
 
   _build() {
-    this.element = element("figure", this.spec.tall ? "chart tall" : "chart");
+    this.element = element("figure", "chart");
     const caption = element("figcaption");
     const unit = this.spec.unit === "rad" ? "°" : this.spec.unit.replace(".", "\u00b7");
     const title = element("h3", "", this.spec.title);

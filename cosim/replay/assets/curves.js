@@ -118,7 +118,7 @@ function estimates(indices) {
  * The charts of some runs, without those for which no run has a signal.
  *
  * @returns {object[]} with key, title, unit, signals (name, label, hue, shade, dash, faint, context, values(run)), and
- *   where they hold zero (below it is violated), fixed ([least, most]), down (the axis points down), tall
+ *   where they hold zero (below it is violated), fixed ([least, most]), down (the axis points down)
  */
 function chartsOf(runs) {
   const criteria = (kind) =>
@@ -131,7 +131,7 @@ function chartsOf(runs) {
   const thrusters = Math.max(0, ...driven.map((run) => run.header.vehicle?.thrusters?.length ?? 0));
   const numbers = Array.from({ length: thrusters }, (_, i) => i + 1);
   return [
-    { key: "distances", title: "Distance to each region", unit: "m", zero: true, tall: true, signals: clearances(runs, "m") },
+    { key: "distances", title: "Distance to each region", unit: "m", zero: true, signals: clearances(runs, "m") },
     { key: "angles", title: "Angle to each region of attitude", unit: "rad", zero: true, signals: clearances(runs, "rad") },
     { key: "weights", title: "Weights of the arbiter", unit: "", fixed: [0, 1], signals: criteria("weight") },
     { key: "memberships", title: "Attention that each criterion asks", unit: "", fixed: [0, 1], signals: criteria("membership") },
