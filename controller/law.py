@@ -27,6 +27,8 @@ G = TypeVar("G", bound=tuple[float, ...])
 
 _AS_THE_GAINS_SAY = np.zeros(12)
 _AS_THE_GAINS_SAY.flags.writeable = False
+NOTHING_EXPECTED = np.full(6, np.nan)
+NOTHING_EXPECTED.flags.writeable = False
 
 
 class VehicleState(NamedTuple):
@@ -226,6 +228,11 @@ class CompiledLaw:
         """What the last step has to say, shape (len(diagnostics),)."""
         report: Array = self.memory.report
         return report
+
+    @property
+    def expected(self) -> Array:
+        """Position [m, NED] and velocity over ground [m/s, body] at the next step, shape (6,); NaN: not estimated."""
+        return NOTHING_EXPECTED
 
     def step(
         self, state: VehicleState, goal: PackedRegions, regions: PackedRegions, weights: Array, forces: Array

@@ -13,7 +13,7 @@ from controller.law import Diagnostic
 from controller.navigation.estimate import NavigationMemory, empty_memory
 from controller.navigation.measurements import SENSORS, VALUES, Measurements, SensorModel, empty_measurements
 from controller.regions.region_set import PackedRegions
-from cosim.simulation.arbiter_inputs import ArbiterSignals, PackedInputs, empty_signals
+from cosim.simulation.arbiter_inputs import ArbiterSignals, PackedInputs, empty_signals, empty_state
 
 Array = NDArray[np.float64]
 
@@ -66,6 +66,7 @@ class BoundLaw(NamedTuple):
     words: int
     is_wrench: bool  # what it gives; the forces of the thrusters otherwise
     estimate: Array  # (4,) in its memory
+    expected: Array  # (6,) likewise, of the next step: m, NED, and m/s, body
     report: Array  # (r,) likewise
 
 
@@ -80,6 +81,7 @@ class Workspace(NamedTuple):
     """Where a flight is computed."""
 
     state: VehicleState  # as it is told
+    arbiter_state: VehicleState  # what the arbiter decides by
     measurements: Measurements
     navigation: NavigationMemory
     now: Array  # (1,) s
@@ -114,6 +116,7 @@ def make_workspace(setup: FlightConfig, criteria: int, inputs: int, thrusters: i
     n = setup.criteria.size
     return Workspace(
         state=VehicleState(np.zeros(3), np.zeros(4), np.zeros(6), np.ones(thrusters), np.zeros(12)),
+        arbiter_state=empty_state(),
         measurements=empty_measurements(),
         navigation=empty_memory(),
         now=np.zeros(1),

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from controller import CompiledLaw, VehicleState
 from controller.allocation import allocate
 from controller.compiling.function import BoundCall
+from controller.law import NOTHING_EXPECTED
 from controller.navigation.navigator import navigate
 from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
@@ -29,7 +30,7 @@ from cosim.batch.flight_config import (
     FlightOutputs,
     Workspace,
 )
-from cosim.simulation.arbiter_inputs import compute_inputs
+from cosim.simulation.arbiter_inputs import compute_inputs, write_arbiter_state
 from cosim.simulation.compiled_rules import BoundRules
 from fuzzy_arbiter import System
 from plant_fmu.running.native import Native
@@ -79,6 +80,7 @@ def fly(  # noqa: C901 - one loop, as a whole
     m, n, inputs = setup.thrusters, setup.regions.kinds.size, native.inputs
     state, weights, clearances, seen = workspace.state, workspace.weights, workspace.clearances, workspace.seen
     by_criterion, goal_clearance = workspace.by_criterion, workspace.goal_clearance
+    arbiter_state = workspace.arbiter_state
     position, quaternion = native.outputs[:3], native.outputs[3:7]
     first_inside, last_entered, inside = -1, -1, False
     least, least_angle, most = np.inf, np.inf, -np.inf
@@ -150,12 +152,19 @@ def fly(  # noqa: C901 - one loop, as a whole
         # regions and arbiter: while the position is lost there is nothing to decide by, and the last weights hold
         if arbitrates and _is_finite(state.position):
             told_clearances = clearances
+            write_arbiter_state(state, law.expected, arbiter_state)
             if not setup.exact:
-                _clearances(setup.regions, state.position, state.quaternion, seen, workspace.at)
+                _clearances(setup.regions, arbiter_state.position, arbiter_state.quaternion, seen, workspace.at)
                 told_clearances = seen
             workspace.now[0] = now
             compute_inputs(
-                setup.inputs, setup.goal, setup.regions, state, workspace.now, told_clearances, workspace.signals
+                setup.inputs,
+                setup.goal,
+                setup.regions,
+                arbiter_state,
+                workspace.now,
+                told_clearances,
+                workspace.signals,
             )
             call_c(arbiter.address, _LAW, arbiter.words)
             for i in range(n):
@@ -308,7 +317,8 @@ def fly_law(
     is_wrench = law.output == "wrench"
     forces = workspace.wrench if setup.thrusters and is_wrench else native.inputs
     decide = law.bound(workspace.state, setup.goal, setup.regions, workspace.weights, forces)
-    bound = BoundLaw(decide.address, decide.words, is_wrench, law.estimate, law.report)
+    expected = NOTHING_EXPECTED if setup.exact else law.expected
+    bound = BoundLaw(decide.address, decide.words, is_wrench, law.estimate, expected, law.report)
     weigh = BoundRules(rules, workspace.signals.inputs, workspace.by_criterion)
     arbiter = BoundArbiter(weigh.address, weigh.words)
     out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), np.zeros(4), trace)

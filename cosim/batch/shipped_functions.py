@@ -38,7 +38,7 @@ from cosim.batch.fused_loop import fly
 from cosim.scenario.arbiter_rules import PAPER_RULES
 from cosim.scenario.criteria import PAPER
 from cosim.scenario.vehicle_model import vehicle_model
-from cosim.simulation.arbiter_inputs import compute_inputs, empty_signals, pack_inputs
+from cosim.simulation.arbiter_inputs import compute_inputs, empty_signals, pack_inputs, write_arbiter_state
 from cosim.simulation.compiled_rules import rules_text
 from cosim.simulation.environment import RegionEvaluation, RegionPlaces, evaluate_places
 from plant_fmu.compiling.compiler import cross_compiler, find_compiler
@@ -65,6 +65,7 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     yield ray_distances, (regions, state.position, _TABLE, 1.0, _FLAT)
     yield search_path, (empty_plan(1, 1), state.position, goal, regions, PathLimits(1.0, 1.0, 1.0, 1.0), 1.0, _INTEGERS)
     inputs = pack_inputs((), PAPER, PAPER_RULES, 1.0)
+    yield write_arbiter_state, (state, _FLAT, state)
     yield compute_inputs, (inputs, goal, regions, state, _FLAT, _FLAT, empty_signals(inputs, 1, 3))
     yield fly, _of_flight(goal, regions)
 
@@ -86,7 +87,7 @@ def _of_flight(goal: PackedRegions, regions: PackedRegions) -> tuple[Any, ...]:
         False, SensorModel(), _INTEGERS, _INTEGERS, _FLAT, _INTEGERS, _INTEGERS, _FLAT, False, 1, -1, Clock().numbers,
     )  # fmt: skip
     out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), _FLAT, np.zeros((0, 0)))
-    law, allocator = BoundLaw(0, 0, True, _FLAT, _FLAT), Allocator(np.zeros((1, 1, 6)), _TABLE, _TABLE, True)
+    law, allocator = BoundLaw(0, 0, True, _FLAT, _FLAT, _FLAT), Allocator(np.zeros((1, 1, 6)), _TABLE, _TABLE, True)
     arbiter = BoundArbiter(0, 0)
     return setup, native, native, native, allocator, law, arbiter, make_workspace(setup, 3, 1, 1), out
 

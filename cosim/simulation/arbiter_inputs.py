@@ -95,6 +95,32 @@ def empty_signals(packed: PackedInputs, n_regions: int, n_criteria: int) -> Arbi
     return ArbiterSignals(memberships, inputs, np.zeros(1), np.zeros(n_regions + 1), np.full(n_regions, np.inf))
 
 
+def empty_state() -> VehicleState:
+    """Return room for what `write_arbiter_state` writes."""
+    return VehicleState(np.zeros(3), np.zeros(4), np.zeros(6), np.zeros(0))
+
+
+def write_arbiter_state(measured: VehicleState, expected: Array, out: VehicleState) -> None:
+    """Write the state that the arbiter decides by: its noise would be that of the weights, and of the thrust.
+
+    Parameters
+    ----------
+    measured : VehicleState
+        Now. Attitude and rates are taken from it, and all else where the law expects nothing.
+    expected : ndarray, shape (6,)
+        What the law expected of now, as `CompiledLaw.expected`.
+    out : VehicleState
+        Receives pose and velocity; no numbers where no position is measured.
+    """
+    for i in range(3):
+        known = expected[i] == expected[i] and measured.position[i] == measured.position[i]
+        out.position[i] = expected[i] if known else measured.position[i]
+        out.velocity_body[i] = expected[3 + i] if known else measured.velocity_body[i]
+        out.velocity_body[3 + i] = measured.velocity_body[3 + i]
+    for i in range(4):
+        out.quaternion[i] = measured.quaternion[i]
+
+
 def compute_inputs(
     packed: PackedInputs,
     goal: PackedRegions,
@@ -113,7 +139,7 @@ def compute_inputs(
     goal, regions : PackedRegions
         The goal alone, and the n regions, where they are now.
     state : VehicleState
-        As measured.
+        Of the vehicle.
     now : ndarray, shape (1,)
         Time [s].
     clearances : ndarray, shape (n,)

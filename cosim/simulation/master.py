@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from controller import CompiledLaw, FunctionLaw, Law, VehicleState
+from controller.law import NOTHING_EXPECTED
 from controller.quaternion import from_axis_angle
 from cosim.scenario.law_factory import law_of, with_custom_law
 from cosim.scenario.scenario import Scenario
@@ -146,6 +147,7 @@ class Master:
             s.view(f"membership.{names[0]}", len(names)), s.view(f"weight.{names[0]}", len(names)),
             s.view(f"arbiter.{inputs[0].name}", len(inputs)) if self.scenario.arbiter.file else None,
         )  # fmt: skip
+        self._expected = NOTHING_EXPECTED  # by the law, of the next step, where what is measured is not exact
         self._estimate = s.view("estimate.phi1", 4)
         n_reports = len(self.law.diagnostics)
         self._reports = n_reports > 0
@@ -157,12 +159,8 @@ class Master:
                 self.scenario, self.environment, self.actuators, self.state, s.view("commands.armed", 7)
             )
         if self.scenario.record.lyapunov:
-            out = s.view("lyapunov.printed", 4)
-            goal, regions, weights = (
-                self.environment.goal,
-                self.environment.regions,
-                self._arbitration.region_weights,
-            )
+            out, goal, regions = s.view("lyapunov.printed", 4), self.environment.goal, self.environment.regions
+            weights = self._arbitration.region_weights
             self._lyapunov = LyapunovSignals(self.scenario, true_state, goal, regions, weights, self._estimate, out)
 
     @property
@@ -311,8 +309,9 @@ class Master:
     def _evaluate_regions(self) -> None:
         """Evaluate the regions, where they are now, at the pose that is told, and at the true one."""
         self.environment.update_positions(self.signals.row[0], self._shifts)
+        self._arbitration.observe(self._expected)
         if self._sensor is not None:
-            self.environment.evaluate(self.state, self._given_evaluation)
+            self.environment.evaluate(self._arbitration.state, self._given_evaluation)
         self.environment.evaluate(self.true_state, self._true_evaluation)
 
     def _arbitrate(self) -> None:
@@ -334,6 +333,7 @@ class Master:
     def _control(self) -> None:
         """Ask the law, or the sticks, for forces of the coming period, and bring them to the plant's inputs."""
         actuators = self.actuators
+        self._expected = NOTHING_EXPECTED
         if self.command_handler is not None and not self.command_handler.automatic_control:
             actuators.command[:] = self.command_handler.wrench()
             actuators.allocate()
@@ -348,6 +348,8 @@ class Master:
         law.step(self.state, self.environment.goal, self.environment.regions, self._arbitration.region_weights, forces)
         if self._reports:
             self._report[...] = law.report
+        if self._sensor is not None and isinstance(law, CompiledLaw):
+            self._expected = law.expected
         if by_wrench:
             actuators.allocate()
         else:
@@ -383,8 +385,6 @@ class Master:
             If there is no such region, it is not streamed, or a number is not finite.
         """
         self.environment.move(name, displacement, velocity, self._boundary)
-
-    # ---- the end ----
 
     def close(self) -> None:
         """Free the FMU. May be called twice."""

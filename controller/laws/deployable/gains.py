@@ -18,8 +18,7 @@ class DeployableGains(NamedTuple):
     acceleration: float = 0.35  # m/s2, with which the attraction speeds up and brakes
     velocity_bandwidth: float = 1.2  # rad/s, of the loop that follows the wanted velocity
     smoothing: float = 0.05  # s, over which the wanted acceleration is smoothed, to spare the thrusters noise
-    weight_smoothing: float = 0.06  # s, of two stages that smooth the arbiter's weights of soft regions, likewise
-    price_smoothing: float = 0.5  # s, the same of hard regions, whose barriers yield by these weights
+    price_smoothing: float = 0.5  # s, of two stages that smooth the weights by which barriers yield, likewise
     position_bandwidth: float = 0.8  # 1/s, of the approach to the end of the path
     depth: float = 0.3  # m, depth in the goal region at which the path ends, where the region is that deep
     attitude_bandwidth: float = 2.0  # rad/s
@@ -58,7 +57,6 @@ class DeployableGains(NamedTuple):
 
 _MAY_BE_ZERO = {
     "smoothing",
-    "weight_smoothing",
     "price_smoothing",
     "margin",
     "comfort",

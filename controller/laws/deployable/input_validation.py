@@ -29,16 +29,15 @@ _FASTEST = 100.0  # m/s, rad/s
 _RESTING, _PUSHED = 0.02, 0.05  # m/s, m/s2, sums over the axes: below and above, the vehicle rests and is about to move
 
 
-def smooth_weights(weights: Array, smoothed: Array, hard: NDArray[np.bool_], shares: tuple[float, float]) -> None:
-    """Move smoothed weights, shape (2, n), towards the arbiter's, by a share for soft regions and one for hard ones.
+def smooth_weights(weights: Array, smoothed: Array, hard: NDArray[np.bool_], share: float) -> None:
+    """Write the arbiter's weights, shape (2, n), those of hard regions moved towards them by a share.
 
     The first stage follows the arbiter, the second one the first: so noise makes small steps of small steps. The first
     weights are taken as they are. Each of the arbiter's is clipped to [0, 1]; NaN becomes 1, the cautious value.
     """
     for i in range(weights.size):
         weight = 1.0 if np.isnan(weights[i]) else min(max(weights[i], 0.0), 1.0)
-        share = shares[1] if hard[i] else shares[0]
-        if np.isnan(smoothed[0, i]):
+        if not hard[i] or np.isnan(smoothed[0, i]):
             smoothed[0, i] = smoothed[1, i] = weight
         smoothed[0, i] += share * (weight - smoothed[0, i])
         smoothed[1, i] += share * (smoothed[0, i] - smoothed[1, i])

@@ -73,8 +73,7 @@ def step(
 ) -> None:
     """Do what `CompiledLaw.step` says, by the deployable law."""
     estimate, thrusters, dynamics, period = memory.state_estimate, memory.thrusters, memory.dynamics, memory.period[0]
-    shares = (period / (period + gains.weight_smoothing), period / (period + gains.price_smoothing))
-    input_validation.smooth_weights(weights, memory.weights, regions.hard, shares)
+    input_validation.smooth_weights(weights, memory.weights, regions.hard, period / (period + gains.price_smoothing))
     R, desired, acceleration, free, against, wrench = zeros(3, 3), zeros(3), zeros(6), zeros(6), zeros(6), zeros(6)
 
     # estimate
@@ -86,8 +85,14 @@ def step(
         _hold_weight(memory, R, gains, forces)
         copy(forces, thrusters.forces)
         memory.report[15], memory.report[16] = estimate.time_since_measurement[0], NO_BOUND
-        memory.promised[:] = np.nan
+        memory.promised[:] = memory.expected[:] = np.nan
         return
+
+    for axis in range(3):
+        memory.expected[axis] = estimate.position[axis] + period * estimate.velocity[axis]
+        memory.expected[3 + axis] = 0.0
+        for k in range(3):
+            memory.expected[3 + axis] += R[k, axis] * estimate.velocity[k]
 
     # fault detection
     changed = fault_detection.detect_fault(memory.fault_state, estimate, thrusters, gains)
@@ -313,6 +318,7 @@ class DeployableLaw(CompiledLaw):
             observation=empty_observation(n_regions),
             program=empty_workspace((1 + FACES) * n_regions, m),
             predicted=empty_prediction(),
+            expected=np.full(6, np.nan),
             quaternion=desired.copy(),
             omega=np.zeros(3),
             deviation=np.zeros(12),
@@ -336,6 +342,12 @@ class DeployableLaw(CompiledLaw):
     def validate(cls, gains: Any) -> Any:
         """Return gains if the law can work with them."""
         return check_gains(gains)
+
+    @property
+    def expected(self) -> Array:
+        """Position [m, NED] and velocity over ground [m/s, body] at the next step, shape (6,); NaN: not estimated."""
+        expected: Array = self.memory.expected
+        return expected
 
     def set_attitude(self, quaternion: Array) -> None:
         """Keep another attitude, a unit `quaternion`, where no region asks for one, from the next step on."""

@@ -34,12 +34,15 @@ class DeployableMemory(NamedTuple):
     observation: RegionObservation
     program: Workspace
     predicted: PredictedState
+    expected: Array  # (6,) m, NED, and m/s, body: where the vehicle is at the next step; NaN if that is not known
     quaternion: Array  # (4,) from body to world, measured, or propagated by the model
     omega: Array  # (3,) rad/s, likewise
     deviation: Array  # (12,) of the measured state, as `VehicleState` has it
     position_variance: Array  # (3,) m2, NED, of the estimated position
     promised: Array  # (2,) m, NaN if none: what clearances may fall to, promised since; and by the last step alone
-    weights: Array  # (2, n) of the arbiter, sanitized and smoothed in two stages; NaN before the first
+    weights: (
+        Array  # (2, n) of the arbiter, sanitized, those of hard regions smoothed in two stages; NaN before the first
+    )
     reported: Array  # (m,) health of the thrusters as last reported
     filtered_acceleration: Array  # (3,) m/s2, NED, desired of the thrusters, low-pass filtered
     thruster_acceleration: Array  # (6, m) m/s2, rad/s2: of one newton of each thruster

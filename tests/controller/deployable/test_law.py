@@ -13,6 +13,7 @@ import pytest
 from controller import VehicleState
 from controller.laws.deployable import DeployableGains
 from controller.laws.deployable.estimate import LAG
+from controller.quaternion import rotation_matrix
 from controller.regions import Box, DepthBand, Region, Sphere, pack
 from controller.regions.region_set import clearance_at
 from tests.controller.deployable.scenery import GOAL, ODIN, REGIONS, Sea, fly, law_for
@@ -114,6 +115,20 @@ def test_a_sensor_that_is_dead_for_a_second_is_borne(which):
     assert np.isfinite(forces).all() and np.abs(forces).max() <= 27.0
     assert min(clear) > 0.0
     assert np.linalg.norm(sea.position - GOAL.shape.centre) < 0.5
+
+
+def test_it_expects_the_vehicle_where_it_is_next_to_a_part_of_the_noise():
+    law, sea, errors = law_for(REGIONS), Sea(noise=NOISE), []
+    assert np.isnan(law.expected).all()
+    for k in range(600):
+        fly(law, sea, steps=1, first=k)
+        errors.append(law.expected - [*sea.position, *(rotation_matrix(sea.quaternion).T @ sea.velocity)])
+    position, velocity = np.sqrt(np.mean(np.square(errors[100:]), axis=0)).reshape(2, 3).max(axis=1)
+    assert position < 0.3 * NOISE[0] and velocity < 0.7 * NOISE[1]
+    lost = sea.measured()._replace(position=np.full(3, np.nan), velocity_body=np.full(6, np.nan))
+    for k in range(round(2.0 * law.gains.coast / 0.02)):
+        fly(law, sea, steps=1, first=600 + k, change=lambda _, state: lost)
+    assert np.isnan(law.expected).all()
 
 
 def test_without_any_measurement_it_pushes_nothing():

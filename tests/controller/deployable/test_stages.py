@@ -298,11 +298,11 @@ def test_what_is_said_for_long_is_believed_in_the_end():
 
 def test_weights_and_health_are_taken_for_what_they_can_be():
     believed, hard = np.full((2, 4), np.nan), np.array([True, False, True, False])
-    input_validation.smooth_weights(np.array([-1.0, 0.3, 2.0, np.nan]), believed, hard, (0.5, 0.1))
+    input_validation.smooth_weights(np.array([-1.0, 0.3, 2.0, np.nan]), believed, hard, 0.1)
     assert believed.tolist() == [[0.0, 0.3, 1.0, 1.0]] * 2  # the first as they are
-    input_validation.smooth_weights(np.array([1.0, 0.7, np.nan, -2.0]), believed, hard, (0.5, 0.1))
-    assert believed[0] == pytest.approx([0.1, 0.5, 1.0, 0.5], rel=1e-12)
-    assert believed[1] == pytest.approx([0.01, 0.4, 1.0, 0.75], rel=1e-12)
+    input_validation.smooth_weights(np.array([1.0, 0.7, np.nan, -2.0]), believed, hard, 0.1)
+    assert believed[0] == pytest.approx([0.1, 0.7, 1.0, 0.0], rel=1e-12)
+    assert believed[1] == pytest.approx([0.01, 0.7, 1.0, 0.0], rel=1e-12)
     memory = law_for([]).memory
     memory.thrusters.health[2] = 0.0  # isolated
     input_validation.update_thrusters(memory, np.ones(8))

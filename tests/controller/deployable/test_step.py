@@ -59,7 +59,7 @@ def expected(memory, state, goal, regions, weights):
         GAINS.braking_share * dynamics.braking.min(),
         0.5 * GAINS.acceleration * (0.02**2 + seen.state[LAG] ** 2), variance, state.deviation[6:9].max(),
     )  # fmt: skip
-    rates = 0.02 / (0.02 + np.where(regions.hard, GAINS.price_smoothing, GAINS.weight_smoothing))
+    rates = 0.02 / (0.02 + np.where(regions.hard, GAINS.price_smoothing, 0.0))
     stages = memory.weights[0] + rates * (weights - memory.weights[0])
     smoothed = memory.weights[1] + rates * (stages - memory.weights[1])
     rows = barrier.write_rows(

@@ -11,7 +11,7 @@ from controller.regions import Box, Cone, DepthBand, Orientation, Region, Sphere
 from cosim.scenario.arbiter_rules import ArbiterRules, InputSignal
 from cosim.scenario.criteria import PAPER
 from cosim.scenario.tables import SecondaryRegion
-from cosim.simulation.arbiter_inputs import compute_inputs, empty_signals, pack_inputs
+from cosim.simulation.arbiter_inputs import compute_inputs, empty_signals, empty_state, pack_inputs, write_arbiter_state
 from fuzzy_arbiter import Criterion, prioritised, rising
 
 GOAL = Region("goal", Sphere((5.0, 0.0, 2.0), 1.0), "in", velocity=(0.1, 0.0, 0.0))
@@ -53,6 +53,21 @@ def inputs_of(signals, state, now=0.0):
     found = empty_signals(packed, len(REGIONS), 3)
     compute_inputs(packed, goal, regions, state, np.array([now]), clearances_of(REGIONS, state, now), found)
     return found
+
+
+def test_it_decides_by_what_the_law_expects_or_else_by_what_is_measured():
+    measured, decides = state_of([1.0, 2.0, 3.0], [0.1, 0.2, 0.3], [0.4, 0.5, 0.6, 0.7, 0.8, 0.9]), empty_state()
+    lost = measured._replace(position=np.full(3, np.nan))
+    expected, nothing = np.array([1.1, 2.1, 3.1, 0.3, 0.2, 0.1]), np.full(6, np.nan)
+    for state, by, position, velocity in (
+        (measured, expected, expected[:3], expected[3:]),
+        (measured, nothing, measured.position, measured.velocity_body[:3]),
+        (lost, expected, lost.position, lost.velocity_body[:3]),
+    ):
+        write_arbiter_state(state, by, decides)
+        assert np.array_equal(decides.position, position, equal_nan=True)
+        assert decides.velocity_body.tolist() == [*velocity, 0.7, 0.8, 0.9]
+        assert decides.quaternion.tolist() == measured.quaternion.tolist()
 
 
 small = st.floats(-1.0, 1.0)

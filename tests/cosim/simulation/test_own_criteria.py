@@ -104,6 +104,22 @@ def assert_same_to_the_last_bit(scenario):
     return run
 
 
+def test_noise_reaches_the_weights_only_as_far_as_it_moves_the_laws_estimate():
+    scenario, degrees = load_scenario(FOUR, [*NOISY, "initial.position=[2.0, 1.4, 5.45]", "time.duration=3.0"]), []
+    with Master(scenario) as master:
+        depth = master.signals.index("membership.depth")
+        for k in range(300):
+            expected = master.law.expected.copy()
+            master.step(k)
+            if k % 2 == 0 and k > 20:
+                depths = np.array([expected[2], master.state.position[2], master.true_state.position[2]])
+                degrees.append(np.interp(5.5 - depths, [0.0, 0.2], [1.0, 0.0]))
+                assert master.row[depth] == pytest.approx(degrees[-1][0], abs=1e-9)
+    by_estimate, by_measurement, of_truth = np.abs(np.diff(degrees, axis=0)).sum(axis=0)
+    assert 0.5 < of_truth < by_measurement - 0.3
+    assert by_estimate - of_truth < 0.25 * (by_measurement - of_truth)
+
+
 def test_the_fused_loop_flies_four_criteria_as_the_master_does():
     assert_same_to_the_last_bit(load_scenario(FOUR, ["time.duration=14.0", *NOISY]))
 
