@@ -63,6 +63,7 @@ class RegionObservation(NamedTuple):
     later_rotation_gradients: Array  # (n, 3)
     later_clearances: Array  # (n,)
     bound: Array  # (1,) m, of `write_rows`: what clearances may fall to, if no barrier yields
+    asked: Array  # (n,) m/s2, rad/s2: what the barrier of each region asked of the thrusters last
 
 
 class Motion(NamedTuple):
@@ -84,7 +85,7 @@ def empty_observation(n: int) -> RegionObservation:
     """Return an observation of `n` regions, all zero."""
     return RegionObservation(
         np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n), np.zeros((n, 3)),
-        np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n), np.zeros(1),
+        np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n), np.zeros(1), np.zeros(n),
     )  # fmt: skip
 
 
@@ -185,6 +186,7 @@ def write_rows(
     motion: Motion,
     lower: Array,
     upper: Array,
+    share: float,
     gains: DeployableGains,
 ) -> int:
     """Write the constraint of each hard region that the thrusters could violate; return the number of rows.
@@ -206,6 +208,8 @@ def write_rows(
         Of the vehicle.
     lower, upper : ndarray, shape (m,)
         Limits [N].
+    share : float
+        Below 1 while barriers yield: what each asks for moves by this share towards what it would ask for.
     gains : DeployableGains
         Margin, slope and rate of barriers.
 
@@ -261,6 +265,10 @@ def write_rows(
                 bound = min(bound, gains.margin + h, (rate + allowed) / gains.barrier_slope)
             slope = gains.barrier_slope if h <= 0.0 else braking / (allowed + braking / gains.barrier_slope)  # phi'
             right = -gains.barrier_rate * (rate + allowed) - slope * rate - falling - turning
+            if face == 0:
+                if share < 1.0:
+                    right = observation.asked[i] + share * (right - observation.asked[i])
+                observation.asked[i] = right
 
             rows = add_row(work, rows, n, motion.thruster_acceleration, right, price, lower, upper)
     observation.bound[0] = bound

@@ -30,6 +30,7 @@ from controller.laws.deployable.actuator_lag import empty_prediction, predict_st
 from controller.laws.deployable.attitude import empty_attitude
 from controller.laws.deployable.attraction import desired_acceleration, desired_velocity
 from controller.laws.deployable.barrier import (
+    KEPT,
     Motion,
     RegionObservation,
     empty_observation,
@@ -172,9 +173,11 @@ def step(
     rows = 0
     memory.observation.bound[0] = NO_BOUND
     if gains.barriers > 0.0:
+        yields = memory.report[12] > KEPT  # then noise would be that of barriers against each other
         rows = write_rows(
-            work, memory.observation, regions, memory.weights[1], motion, thrusters.lower, thrusters.upper, gains
-        )
+            work, memory.observation, regions, memory.weights[1], motion, thrusters.lower, thrusters.upper,
+            share if yields else 1.0, gains,
+        )  # fmt: skip
 
     # quadratic program
     steps = quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)

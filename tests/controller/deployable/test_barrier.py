@@ -1,5 +1,7 @@
 """The rows of the barriers against the equations in matrices; faces ahead against a box's own planes."""
 
+import copy
+
 import numpy as np
 import pytest
 
@@ -69,7 +71,7 @@ def written(regions, motion, quaternion, weights, limits=(-30.0, 25.0), time=1.5
     sight, work = barrier.empty_observation(n), empty_workspace((1 + faces.FACES) * n, 8)
     barrier.observe_regions(sight, packed, motion.position, quaternion, motion.velocity)
     lower, upper = (np.full(8, limit) for limit in limits)
-    count = barrier.write_rows(work, sight, packed, weights, motion, lower, upper, GAINS)
+    count = barrier.write_rows(work, sight, packed, weights, motion, lower, upper, 1.0, GAINS)
     return work.rows[:count].copy(), work.right[:count].copy(), work.price[:count].copy()
 
 
@@ -160,7 +162,7 @@ def test_the_bound_is_what_clearances_may_fall_to():
         packed, sight, work = pack([wall]), barrier.empty_observation(1), empty_workspace(1 + faces.FACES, 8)
         barrier.observe_regions(sight, packed, motion.position, np.array([1.0, 0.0, 0.0, 0.0]), motion.velocity)
         limits = np.full(8, -30.0), np.full(8, 25.0)
-        barrier.write_rows(work, sight, packed, np.ones(1), motion, *limits, GAINS)
+        barrier.write_rows(work, sight, packed, np.ones(1), motion, *limits, 1.0, GAINS)
         inwards = -np.eye(3)[0]
         distance = float(inwards @ motion.position)
         h = distance - GAINS.margin - motion.position_spread - spread(inwards, motion)
@@ -170,6 +172,27 @@ def test_the_bound_is_what_clearances_may_fall_to():
         assert sight.bound[0] == pytest.approx(expected, abs=1e-12)
         fallen += expected < 0.0
     assert 10 < fallen < 60
+
+
+def test_while_barriers_yield_what_they_ask_for_moves_by_a_share():
+    rng, packed = np.random.default_rng(7), pack([Region("wall", HalfSpace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in")])
+    sight, work, limits = (
+        barrier.empty_observation(1),
+        empty_workspace(1 + faces.FACES, 8),
+        (np.full(8, -30.0), np.full(8, 25.0)),
+    )
+    asked = None
+    for k in range(40):
+        motion, share = moving(rng, np.r_[1.0, rng.normal(size=5)]), 1.0 if k % 4 == 0 else 0.3
+        rights = []
+        for used in (1.0, share):
+            own = copy.deepcopy(sight)
+            barrier.observe_regions(own, packed, motion.position, np.array([1.0, 0.0, 0.0, 0.0]), motion.velocity)
+            assert barrier.write_rows(work, own, packed, np.ones(1), motion, *limits, used, GAINS) == 1
+            rights.append(work.right[0])
+        asked = rights[0] if share == 1.0 else asked + 0.3 * (rights[0] - asked)
+        assert rights[1] == pytest.approx(asked, rel=1e-12)
+        sight = own
 
 
 def test_a_promise_rises_with_the_bound_and_falls_only_where_it_says_why():

@@ -14,7 +14,7 @@ from controller.laws.deployable.path_planning.planner import (
     nearest_goal_point,
     uniform,
 )
-from controller.regions import Box, DepthBand, Orientation, Region, Sphere, pack
+from controller.regions import Box, DepthBand, HalfSpace, Orientation, Region, Sphere, pack
 from controller.regions.region_set import clearance_at
 
 # of the generator of random numbers, on purpose
@@ -42,9 +42,9 @@ def soft_clearance(packed, point, later=0.0):
     return clearance_at(packed, 3, point - packed.velocities[3] * later)
 
 
-def price(depth):
+def price(depth, away=0.0):
     """Return what a soft region costs beside its own price: by its depth, and half a metre for being entered."""
-    return max(depth, 0.0) + 0.5 * np.clip(depth / 0.2, 0.0, 1.0)
+    return max(depth, 0.0) + 0.5 * np.clip((depth + away) / 0.2, 0.0, 1.0)
 
 
 def expected_cost(points, packed, gains=GAINS):
@@ -52,7 +52,7 @@ def expected_cost(points, packed, gains=GAINS):
     points = np.asarray(points)
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     enough, total, penalty, through, samples = gains.clearance + 3.0 / 0.7, lengths.sum(), 0.0, 0.0, 0
-    stay = 3.0 * packed.crossing_costs[3] * price(-soft_clearance(packed, points[-1]))
+    stay = 3.0 * packed.crossing_costs[3] * price(-soft_clearance(packed, points[-1]), 0.05)
     for leg, length in enumerate(lengths):
         s = 0.0
         while s < length:
@@ -128,12 +128,28 @@ def test_soft_regions_are_avoided_where_that_is_no_long_way_round():
     assert cost_of(round_it, 2, disc)[0] == pytest.approx([2.0 * np.hypot(4.0, 1.7), 0.0, 0.0], abs=0.3)
 
 
-def test_a_stay_within_a_soft_region_costs_as_three_metres_through_it():
+def test_a_stay_within_a_soft_region_costs_as_three_metres_through_it_and_less_near_it():
     ball = pack([Region("ball", Sphere((4.0, 0.2, 2.5), 1.5), "out", hard=False, crossing_cost=7.0)])
     way = np.zeros((CORNERS + 1, 3))
     way[0] = 3.0, 0.2, 2.5
     cost, penalty, through = cost_of(way, 1, ball)[0]
     assert cost - through - 3.0 == pytest.approx(3.0 * 7.0 * (0.5 + 0.5), rel=1e-12) and penalty == 0.0
+    for outside, part in ((0.0, 0.25), (0.02, 0.15), (0.05, 0.0), (0.5, 0.0)):
+        way[0] = 2.5 - outside, 0.2, 2.5
+        cost = cost_of(way, 1, ball)[0][0]
+        assert cost - (2.5 - outside) == pytest.approx(3.0 * 7.0 * 0.5 * part, abs=1e-8)
+
+
+@pytest.mark.parametrize(("begins", "inside"), [(4.8, 0.05), (5.18, 0.02), (5.3, -0.1)])
+@pytest.mark.parametrize("cost", [0.4, 2.0, 10.0])
+def test_a_path_ends_within_a_soft_region_by_a_margin_where_the_goal_has_room(begins, inside, cost):
+    """Ends lie up to 1.2 m from the goal's middle; north of a plane lies a region to be kept in."""
+    goal, plan = pack([Region("goal", Sphere((4.0, 0.0, 2.5), 1.5), "in")]), empty_plan(1, 1)
+    beyond = HalfSpace((begins, 0.0, 0.0), (-1.0, 0.0, 0.0))
+    packed = pack([Region("beyond", beyond, "in", hard=False, crossing_cost=cost)])
+    for k in range(1500):
+        improve_path(plan, np.array([min(0.02 * k, begins), 0.0, 2.5]), goal, packed, GAINS, 0.02)
+    assert inside - 0.02 < clearance_at(packed, 0, plan.path[plan.counts[0] - 1]) < inside + 0.1
 
 
 def test_the_trees_leave_costly_regions_for_cheap_ones():

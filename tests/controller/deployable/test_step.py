@@ -62,8 +62,9 @@ def expected(memory, state, goal, regions, weights):
     rates = 0.02 / (0.02 + np.where(regions.hard, GAINS.price_smoothing, 0.0))
     stages = memory.weights[0] + rates * (weights - memory.weights[0])
     smoothed = memory.weights[1] + rates * (stages - memory.weights[1])
+    share = 0.02 / (0.02 + GAINS.smoothing) if memory.report[12] > barrier.KEPT else 1.0
     rows = barrier.write_rows(
-        memory.program, memory.observation, regions, smoothed, motion, thrusters.lower, thrusters.upper, GAINS
+        memory.program, memory.observation, regions, smoothed, motion, thrusters.lower, thrusters.upper, share, GAINS
     )
     forces, program = np.empty(8), copy.deepcopy(memory.program)
     solve(memory.program, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)

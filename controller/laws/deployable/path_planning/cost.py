@@ -34,6 +34,7 @@ _NEAR = 3.0  # m of path, cost of a metre on the surface
 _ENTERED = 0.5  # m of depth that being in a soft region costs as much as, in full from a depth of
 _SHALLOW = 0.2  # m on; in proportion where it is less deep
 _STAY = 3.0  # m of path that the stay at its end costs as much as
+_AWAY = 0.05  # m outside a soft region, from where on a stay counts as being in it: it keeps clear of the surface
 _COARSE = 0.25  # m, least distance between two evaluations near the surface of a soft region
 _SPHERE = Sphere.kind
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on do not depend on position alone
@@ -153,16 +154,19 @@ def _evaluate_place(
             beyond = clearance - far
             free = min(free, clearance)
         else:
-            soft += regions.crossing_costs[i] * _depth_cost(-clearance)
+            soft += regions.crossing_costs[i] * _depth_cost(-clearance, 0.0)
             reach = min(reach, max(abs(clearance), _COARSE))
         if beyond >= 0.0:
             cost.clear_until[i] = travelled + beyond / (1.0 + own / limits.speed)
     return free, soft, reach
 
 
-def _depth_cost(depth: float) -> float:
-    """Return what the crossing cost of a soft region is multiplied with at a depth [m] in it, below 0 outside."""
-    return _ENTERED * min(depth / _SHALLOW, 1.0) + depth if depth > 0.0 else 0.0
+def _depth_cost(depth: float, away: float) -> float:
+    """Return what the crossing cost of a soft region is multiplied with at a depth [m] in it, below 0 outside.
+
+    Being in it counts from a distance `away` [m] on, and in full `_SHALLOW` deeper.
+    """
+    return _ENTERED * min((depth + away) / _SHALLOW, 1.0) + max(depth, 0.0) if depth > -away else 0.0
 
 
 def _stay_cost(end: Array, regions: PackedRegions) -> float:
@@ -170,5 +174,5 @@ def _stay_cost(end: Array, regions: PackedRegions) -> float:
     total, room = 0.0, zeros(3)
     for i in range(regions.kinds.size):
         if not regions.hard[i] and regions.kinds[i] < _ATTITUDE:
-            total += regions.crossing_costs[i] * _depth_cost(-clearance_of_place(regions, i, end, room))
+            total += regions.crossing_costs[i] * _depth_cost(-clearance_of_place(regions, i, end, room), _AWAY)
     return total
