@@ -31,6 +31,8 @@ class FlightConfig(NamedTuple):
     control_every: int  # plant steps
     arbiter_every: int  # plant steps
     moving: bool  # whether any region moves
+    goal_places: Array  # (p, 3) m, NED: how far the goal is from where the scenario has it at its next places, in turn
+    goal_stay: int  # plant steps that the vehicle has to stay within it before it goes on
     exact: bool  # what is measured is the truth
     noise: Array  # (control steps, 6) added to position and linear velocity, anew at each of them; (0, 6) if exact
     dead_from: float  # s, when position and linear velocity are lost
@@ -137,7 +139,7 @@ def make_workspace(setup: FlightConfig, criteria: int, inputs: int, thrusters: i
 class FlightMetrics(NamedTuple):
     """What a flight came to. Steps are those of the plant; -1: there was none."""
 
-    first_inside: float  # step at which it was inside the goal region first
+    first_inside: float  # step at which it was inside the goal region first, at the last of its places
     last_entered: float  # step since when it was inside the last time
     inside: bool  # it still was at the end
     least_clearance: float  # m, of all hard regions of place; negative: violated; inf: there is none

@@ -33,6 +33,7 @@ from cosim.scenario.scenario import Scenario
 from cosim.scenario.sensor_suite import outage_schedule, scenario_sensors, sensor_model
 from cosim.scenario.start_values import start_values
 from cosim.simulation.arbiter_inputs import pack_inputs
+from cosim.simulation.environment import shape_center, stay_steps
 from cosim.simulation.sensor import STREAM
 from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant, PlantError
@@ -227,6 +228,8 @@ def _setup(scenario: Scenario, thrusters: int, clock: NDArray[np.int64]) -> Flig
         control_every=scenario.control_every,
         arbiter_every=scenario.arbiter_every,
         moving=bool(scenario.moving),
+        goal_places=(np.reshape(scenario.goal_then, (-1, 3)) - shape_center(scenario.goal)).astype(float),
+        goal_stay=stay_steps(scenario),
         exact=sensing.exact,
         noise=noise,
         dead_from=sensing.dead_from,
@@ -276,7 +279,7 @@ def _outcome(metrics: FlightMetrics, setup: FlightConfig, native: Native, estima
         "violated": metrics.least_clearance < 0.0 or metrics.least_angle < 0.0,
         "min_clearance": metrics.least_clearance,
         "weighted_violation": metrics.weighted_violation,
-        "closest_to_goal": -metrics.goal_clearance,
+        "closest_to_goal": -metrics.goal_clearance if metrics.goal_clearance > -math.inf else math.nan,
         "effort": metrics.effort,
         "max_force": metrics.max_force,
         "max_speed": metrics.max_speed,

@@ -83,6 +83,7 @@ def fly(  # noqa: C901 - one loop, as a whole
     arbiter_state = workspace.arbiter_state
     position, quaternion = native.outputs[:3], native.outputs[3:7]
     first_inside, last_entered, inside = -1, -1, False
+    place, stayed = 0, 0
     least, least_angle, most = np.inf, np.inf, -np.inf
     effort, thrust_effort, variation, violation = 0.0, 0.0, 0.0, 0.0
     max_force, max_speed, worst, refused = 0.0, 0.0, 0.0, -1
@@ -117,6 +118,9 @@ def fly(  # noqa: C901 - one loop, as a whole
         # marks
         if setup.moving or k == 0:
             _move(setup, now)
+        if place > 0:
+            for axis in range(3):
+                setup.goal.shifts[0, axis] += setup.goal_places[place - 1, axis]
         _clearances(setup.regions, position, quaternion, clearances, workspace.at)
         _clearances(setup.goal, position, quaternion, goal_clearance, workspace.at)
         for i in range(n):
@@ -129,12 +133,17 @@ def fly(  # noqa: C901 - one loop, as a whole
                     least_angle = _least(clearances[i], least_angle)
             if k < setup.steps and not clearances[i] >= 0.0:
                 violation -= setup.priorities[i] * clearances[i] * setup.step
-        most = max(most, goal_clearance[0])
-        if goal_clearance[0] >= 0.0 and not inside:
-            last_entered = k
-            if first_inside < 0:
-                first_inside = k
-        inside = goal_clearance[0] >= 0.0
+        if place == setup.goal_places.shape[0]:
+            most = max(most, goal_clearance[0])
+            if goal_clearance[0] >= 0.0 and not inside:
+                last_entered = k
+                if first_inside < 0:
+                    first_inside = k
+            inside = goal_clearance[0] >= 0.0
+        else:
+            stayed = stayed + 1 if goal_clearance[0] >= 0.0 else 0
+            if stayed > setup.goal_stay:
+                place, stayed = place + 1, 0
         u, v, w = native.outputs[7], native.outputs[8], native.outputs[9]
         max_speed = max(max_speed, math.sqrt(u * u + v * v + w * w))
         controls = k % setup.control_every == 0

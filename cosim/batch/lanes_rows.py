@@ -216,6 +216,7 @@ def require_lanes(scenario: Scenario) -> None:
         ("commands.enabled", s.commands.enabled, False),
         ("sensing", "noisy" if not s.sensing.exact else "exact", "exact"),
         ("failures", len(s.failures), 0),
+        ("goal.then", s.goal_then, ()),
         *((f"{_PARAMETERS}{name}", s.plant.parameters[name], 0.0) for name in clocks),
     ):
         if received != expected:

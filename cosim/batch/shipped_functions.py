@@ -83,8 +83,9 @@ def _of_flight(goal: PackedRegions, regions: PackedRegions) -> tuple[Any, ...]:
     native = Native(0, 0, 0, 0, references, _FLAT, references, _FLAT, _INTEGERS)
     inputs = pack_inputs((), PAPER, PAPER_RULES, 1.0)
     setup = FlightConfig(
-        goal, regions, _INTEGERS, _FLAT, inputs, 1.0, 1, 1, 1, False, True, np.zeros((0, 6)), 0.0, 0.0, False,
-        False, SensorModel(), _INTEGERS, _INTEGERS, _FLAT, _INTEGERS, _INTEGERS, _FLAT, False, 1, -1, Clock().numbers,
+        goal, regions, _INTEGERS, _FLAT, inputs, 1.0, 1, 1, 1, False, _TABLE, 1, True, np.zeros((0, 6)), 0.0, 0.0,
+        False, False, SensorModel(), _INTEGERS, _INTEGERS, _FLAT, _INTEGERS, _INTEGERS, _FLAT, False, 1, -1,
+        Clock().numbers,
     )  # fmt: skip
     out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), _FLAT, np.zeros((0, 0)))
     law, allocator = BoundLaw(0, 0, True, _FLAT, _FLAT, _FLAT), Allocator(np.zeros((1, 1, 6)), _TABLE, _TABLE, True)

@@ -27,9 +27,10 @@ def add_verb(verbs: Any) -> None:
         help="of the first scene, the others follow (default: 0); the same seed gives the same scene",
     )  # fmt: skip
     scenes.add_argument(
-        "--kind", choices=("plain", "hard", "conflict", "trial"), default="plain",
+        "--kind", choices=("plain", "hard", "conflict", "tour", "trial"), default="plain",
         help="hard: more obstacles, drift, a stronger current, noise, a thruster that fails; conflict: regions that "
-        "exclude each other, on three vehicles; trial: what tries one part of a law each (default: plain)",
+        "exclude each other, on three vehicles; tour: the same with goals in turn; trial: what tries one part of a law "
+        "each (default: plain)",
     )  # fmt: skip
     scenes.add_argument("--out", type=Path, metavar="FILE", help="file to write (default: standard output)")
 

@@ -47,6 +47,9 @@ def region_findings(scenario: Scenario) -> Iterator[Finding]:
     yield from _common(goal, placed, low, high, moving)
     yield from _between(placed, low, high)
     yield _way(scenario, [r for r in placed if r not in violated], [r.name for r in violated])
+    if scenario.goal_then:
+        text = f"The goal's next {len(scenario.goal_then)} places are not looked at: what is found is of the first."
+        yield Finding("regions", "next places", "note", text)
 
 
 def _box(goal: Region, regions: Sequence[Region], start: tuple[float, float, float]) -> tuple[Array, Array]:

@@ -116,8 +116,9 @@ class _Course:
         self._weights = [f"weight.{name}" for name in scenario.criterion_names]
         self.signals = [
             "time", "goal.clearance", *self._clearances, *_FORCE, *_ASKED, *_SPEED, *_PLACE, *_ESTIMATE,
-            *self._weights, *self._flags,
+            *self._weights, *self._flags, *(["goal.place"] if scenario.goal_then else []),
         ]  # fmt: skip
+        self._last_place = len(scenario.goal_then)
         # rows that come; the last row of a whole run decides, but acts no more
         self._acting = math.ceil(scenario.steps / max(1, round(period / scenario.time.step)))
         # extremes are of the numbers that there are: fmin and fmax pass over what is none
@@ -143,6 +144,8 @@ class _Course:
     def add(self, block: Rows) -> None:
         """Take the next rows."""
         time, goal = block["time"], block["goal.clearance"]
+        if self._last_place:
+            goal = np.where(block["goal.place"] == self._last_place, goal, np.nan)
         for span in self.inside.add(goal >= 0.0, time):
             self._visits = [*self._visits[:1], span]
         if self._together:

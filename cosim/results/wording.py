@@ -47,7 +47,8 @@ def asked(scenario: Scenario) -> str:
     kind = kind_of(scenario.goal)
     centre = [sum(pair) / 2.0 for pair in zip(*scenario.goal.bounds(), strict=True)]
     at = f" about ({', '.join(f'{x:g}' for x in centre)}) m" if all(map(math.isfinite, centre)) else ""
-    return f"From ({start}) m into the goal region, a {kind}{at}{respecting}; {scenario.law.name} law."
+    then = f", then to {len(scenario.goal_then)} more places in turn" if scenario.goal_then else ""
+    return f"From ({start}) m into the goal region, a {kind}{at}{then}{respecting}; {scenario.law.name} law."
 
 
 def kind_of(shape: Shape) -> str:

@@ -81,7 +81,7 @@ def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
         at = next((r for r in regions if r["name"] == rest[0]), None) or regions[int(rest[0])]
         return _of_region(at["name"], at, rest[1:])
     if head == "goal" and rest:
-        own = rest[0] in ("velocity", "streamed")
+        own = rest[0] in ("velocity", "streamed", "then", "stay")
         return _of_region("the goal", table["goal"] | {"shape": table["goal"]}, rest if own else ["shape", *rest])
     if head in ("failures", "outages") and len(rest) == 2:
         return KeyName(f"{rest[1]} of {head[:-1]} {rest[0]}", KEYS[f"{head}[].{rest[1]}"].unit)

@@ -51,6 +51,8 @@ KEYS = {
     "goal": Key("", "a shape in space: the primary region", ", see below"),
     "goal.velocity": Key("m/s", "as of a region", ", below", default="0 0 0"),
     "goal.streamed": Key("", "as of a region", ", below", default="false"),
+    "goal.then": Key("m", "middles of the goal, north east down, where it is next in turn", ", below", default="none"),
+    "goal.stay": Key("s", "how long the vehicle is within the goal before the goal goes on", default="5"),
     "law.name": Key(
         "", "one of `controller.LAWS`",
         "; naming another one than the base drops the base's gains. In the folder of a run that "

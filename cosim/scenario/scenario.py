@@ -106,6 +106,8 @@ class Scenario:
     goal: Shape  # the primary region, kept within, at time 0
     goal_velocity: Vector3  # m/s, NED
     goal_streamed: bool  # moved from outside while the run goes on
+    goal_then: tuple[Vector3, ...]  # m, NED: where its middle is next, in turn
+    goal_stay: float  # s within it, before it goes on
     regions: tuple[SecondaryRegion, ...]
     intersection: tuple[int, ...]  # indices of the regions whose overlap the summary reports
     compare: str  # the claims that the report holds the run against
@@ -197,7 +199,7 @@ class Scenario:
     @property
     def moving(self) -> tuple[str, ...]:
         """Names of the regions, goal included, that may be elsewhere than where the scenario has them."""
-        goal = ("goal",) if self.goal_streamed or any(self.goal_velocity) else ()
+        goal = ("goal",) if self.goal_streamed or self.goal_then or any(self.goal_velocity) else ()
         commanded = self.commands.enabled  # to be anywhere, what is at a place at all
         regions = [s for s in self.regions if s.moves or (commanded and not isinstance(s.region.shape, Orientation))]
         return (*goal, *(secondary.region.name for secondary in regions))
@@ -299,7 +301,7 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
     check_texts(file)
     time = check_time(file.time)
     check_numbers(file)
-    goal, goal_velocity, goal_streamed = check_goal(file.goal)
+    goal, motion = check_goal(file.goal, file.commands.enabled, file.record.lyapunov)
     regions = check_regions(file.regions)
     criterion_entries, criteria = check_criteria(file.criteria)
     overlapping = check_intersection(file.intersection, regions)
@@ -349,8 +351,10 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
         commands=file.commands,
         tell_failures=file.tell_failures,
         goal=goal,
-        goal_velocity=goal_velocity,
-        goal_streamed=goal_streamed or file.commands.enabled,
+        goal_velocity=motion.velocity,
+        goal_streamed=motion.streamed or file.commands.enabled,
+        goal_then=motion.then,
+        goal_stay=motion.stay,
         regions=regions + seen,
         intersection=overlapping,
         compare=file.compare,

@@ -58,11 +58,13 @@ _OWN_KEYS = {
 
 
 @dataclass(frozen=True)
-class _Motion:
+class GoalMotion:
     """What stands beside the keys of the goal's shape."""
 
     velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
     streamed: bool = False
+    then: tuple[Vector3, ...] = ()  # m, NED: where its middle is next, in turn
+    stay: float = 5.0  # s within it, before it goes on
 
 
 def check_texts(file: File) -> None:
@@ -176,15 +178,23 @@ def check_commands(
     )
 
 
-def check_goal(table: dict[str, Any]) -> tuple[Shape, Vector3, bool]:
-    """Return the goal's shape, its velocity [m/s, NED], and whether it is streamed."""
-    beside = ("velocity", "streamed")
+def check_goal(table: dict[str, Any], commanded: bool, lyapunov: bool) -> tuple[Shape, GoalMotion]:
+    """Return the goal's shape, and how it moves; whether it is `commanded`, or V recorded, says what it cannot."""
+    beside = ("velocity", "streamed", "then", "stay")
     shape = _shape({key: value for key, value in table.items() if key not in beside}, "goal")
     _require(not of_attitude(shape), "goal.type", repr(table["type"]), "a shape in space")
-    motion = decode({key: table[key] for key in beside if key in table}, _Motion, "goal")
+    motion = decode({key: table[key] for key in beside if key in table}, GoalMotion, "goal")
     _require(all(map(math.isfinite, motion.velocity)), "goal.velocity", motion.velocity, "finite numbers")
     Region("goal", shape, "in", motion.velocity)  # says now what it cannot be
-    return shape, motion.velocity, motion.streamed
+    _require(0.0 <= motion.stay < math.inf, "goal.stay", motion.stay, "a finite number, 0 s or above")
+    for i, place in enumerate(motion.then):
+        _require(all(map(math.isfinite, place)), f"goal.then.{i}", place, "finite numbers")
+    if motion.then:
+        _require(not any(motion.velocity), "goal.velocity", motion.velocity, "0 0 0 beside goal.then")
+        _require(not motion.streamed, "goal.streamed", "true", "false beside goal.then")
+        _require(not commanded, "commands.enabled", "true", "false beside goal.then: a mission says what is next")
+        _require(not lyapunov, "record.lyapunov", "true", "false beside goal.then: V is of one target")
+    return shape, motion
 
 
 def check_regions(entries: tuple[RegionEntry, ...]) -> tuple[SecondaryRegion, ...]:

@@ -100,6 +100,7 @@ def _columns(
             for name in scenario.moving
             for axis, where in zip("xyz", ("north", "east", "down"), strict=True)
         ),
+        *([Column("goal.place", "", "Which of the goal's places it is at, from 0")] if scenario.goal_then else []),
         *_sensed(scenario),
         *_ordered(scenario),
         *(Column(f"law.{d.name}", d.unit, d.description) for d in diagnostics),

@@ -20,6 +20,7 @@ from cosim.scenario.tables import PARKED_POSITION, Vector3
 from cosim.simulation.signals import Array
 
 _AT_REST = (0.0, 0.0, 0.0)
+_ROUNDING = 1e-6  # of a step
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,8 @@ class RegionEnvironment:
         self.regions = pack(secondary)
         self._goal_region, self._middle = scenario.goal_region, shape_center(scenario.goal)
         self._target = self._reached = self._new_target(None, self._middle)
+        self._then = [np.subtract(place, self._middle) for place in scenario.goal_then]
+        self._place, self._stay, self._stayed = 0, stay_steps(scenario), 0
         self._places = RegionPlaces(self.goal, self.regions)
         self._names = ["goal", *(region.name for region in secondary)]
         self._streamed = ["goal"] if scenario.goal_streamed else []
@@ -129,6 +132,24 @@ class RegionEnvironment:
             Receives what they say.
         """
         self._evaluate_places(self._places, state, evaluation)
+
+    def advance_goal(self, clearance: float, place: Array) -> None:
+        """Let the goal go on to its next place, from the next step on, once the vehicle has stayed in it long enough.
+
+        Parameters
+        ----------
+        clearance : float
+            Of the goal at the true position, once a step [m].
+        place : ndarray, shape (1,)
+            Receives which place it is at, from 0; of a goal that stays where it is, shape (0,).
+        """
+        place[:] = self._place
+        if self._place == len(self._then):
+            return
+        self._stayed = self._stayed + 1 if clearance >= 0.0 else 0
+        if self._stayed > self._stay:
+            self._target.origin[:] = self._then[self._place]
+            self._place, self._stayed = self._place + 1, 0
 
     # ---- moved from outside ----
 
@@ -275,6 +296,11 @@ def evaluate_places(places: RegionPlaces, state: VehicleState, found: RegionEval
     p, e, g, c = state.position, state.quaternion, found.values, found.clearances
     evaluate_packed(places.goal, p, e, g[:1], found.gradients[:1], found.rotation_gradients[:1], c[:1])
     evaluate_packed(places.regions, p, e, g[1:], found.gradients[1:], found.rotation_gradients[1:], c[1:])
+
+
+def stay_steps(scenario: Scenario) -> int:
+    """Return for how many steps the vehicle has to stay within the goal before that goes on."""
+    return math.ceil(scenario.goal_stay / scenario.time.step - _ROUNDING)
 
 
 def shape_center(shape: Shape) -> Vector3:

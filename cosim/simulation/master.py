@@ -139,7 +139,8 @@ class Master:
         self._true_evaluation = self._given_evaluation = self.environment.empty_evaluation(values, clearances)
         if self._sensor is not None:
             self._given_evaluation = self.environment.empty_evaluation(np.zeros(n + 1), np.zeros(n + 1))
-        moving = self.scenario.moving
+        moving, then = self.scenario.moving, self.scenario.goal_then
+        self._goal_place = s.view("goal.place", 1) if then else np.empty(0)
         self._shifts = s.view(f"{moving[0]}.shift.x", 3 * len(moving)).reshape(-1, 3) if moving else np.empty((0, 3))
         names, inputs = self.scenario.criterion_names, self.scenario.rules.inputs
         self._arbitration = Arbitration(
@@ -313,6 +314,7 @@ class Master:
         if self._sensor is not None:
             self.environment.evaluate(self._arbitration.state, self._given_evaluation)
         self.environment.evaluate(self.true_state, self._true_evaluation)
+        self.environment.advance_goal(self._true_evaluation.clearances[0], self._goal_place)
 
     def _arbitrate(self) -> None:
         """Decide by the regions as they stand; while the position is lost, the last weights hold."""
@@ -362,8 +364,6 @@ class Master:
         raised = flags.tobytes()
         if raised != self._raised:
             self._flags[...], self._raised = flags, raised
-
-    # ---- regions moved from outside ----
 
     def move_region(self, name: str, displacement: Array, velocity: Array) -> None:
         """Say where a streamed region is from the next step on, and how it goes on from there.

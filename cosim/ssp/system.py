@@ -150,6 +150,7 @@ def _require(scenario: Scenario) -> None:
         (not scenario.failures, "failures", "given", "none"),
         (not scenario.commands.enabled, "commands.enabled", "true", "false: nobody steers a system from outside"),
         (not scenario.goal_streamed, "goal.streamed", "true", "false"),
+        (not scenario.goal_then, "goal.then", "given", "none"),
         (not streamed, f"regions.{streamed[0]}.streamed" if streamed else "", "true", "false"),
     ):
         if not good:

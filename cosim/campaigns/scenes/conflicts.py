@@ -17,6 +17,7 @@ from plant_fmu.vehicle import Vehicle, load_vehicle
 
 Generator = np.random.Generator
 Table = dict[str, Any]
+Kinds = dict[str, Callable[[Generator], tuple[Table, list[Table]]]]
 
 _LAGS = {"odin": 0.0, "bluerov2_heavy": 0.15, "rexrov": None}  # s, of the thrusters; None: as the vehicle's file has it
 _PRIORITY = 4.0  # of a criterion beside the next one
@@ -42,6 +43,22 @@ def make_conflict(seed: int) -> Table:
     return draw_conflict(np.random.default_rng([20261124, seed]), seed)
 
 
+def make_tour(seed: int) -> Table:
+    """Make the tour of a seed: a conflict with goals in turn.
+
+    Parameters
+    ----------
+    seed : int
+        0 or above.
+
+    Returns
+    -------
+    dict
+        As `make_conflict` does.
+    """
+    return _draw(np.random.default_rng([20261125, seed]), seed, _TOURS, "Tour", 120.0)
+
+
 def draw_conflict(rng: Any, seed: int) -> Table:
     """Make a conflict of random numbers.
 
@@ -57,10 +74,14 @@ def draw_conflict(rng: Any, seed: int) -> Table:
     dict
         As `make_conflict` does.
     """
+    return _draw(rng, seed, _KINDS, "Conflict", 60.0)
+
+
+def _draw(rng: Any, seed: int, kinds: Kinds, family: str, duration: float) -> Table:
     vehicle = load_vehicle(list(_LAGS)[int(rng.integers(len(_LAGS)))])
-    kind = list(_KINDS)[int(rng.integers(len(_KINDS)))]
+    kind = list(kinds)[int(rng.integers(len(kinds)))]
     order = rng.permutation(len(_CRITERIA)).tolist()  # place of each criterion
-    goal, regions = _KINDS[kind](rng)
+    goal, regions = kinds[kind](rng)
     heading, speed = rng.uniform(-np.pi, np.pi), rng.uniform(0.0, _CURRENT)
     criteria: list[Table] = [{"name": name, "order": 1 + place} for name, place in zip(_CRITERIA, order, strict=True)]
     criteria[-1]["membership"] = {"clearance": {"falling": [-0.2, 0.1]}}
@@ -68,9 +89,9 @@ def draw_conflict(rng: Any, seed: int) -> Table:
         place = order[_CRITERIA.index(region["criterion"])]
         region |= {"gain": 100.0 * _scale(vehicle), "priority": _PRIORITY ** (len(_CRITERIA) - 1 - place)}
     table = {
-        "title": f"Conflict {seed}: {kind}, {vehicle.name}",
+        "title": f"{family} {seed}: {kind}, {vehicle.name}",
         "vehicle": vehicle.name,
-        "time": {"duration": 60.0, "step": 0.01, "control": 0.02, "arbiter": 0.02},
+        "time": {"duration": duration, "step": 0.01, "control": 0.02, "arbiter": 0.02},
         "plant": {
             "current": [float(speed * np.cos(heading)), float(speed * np.sin(heading)), 0.0],
             "substep": 0.01,
@@ -226,7 +247,29 @@ def _view(rng: Generator) -> tuple[Table, list[Table]]:
     ]
 
 
-_KINDS: dict[str, Callable[[Generator], tuple[Table, list[Table]]]] = {
+def _in_turn(goal: Table, *places: tuple[float, float, float]) -> Table:
+    """Return a goal that goes on to other places."""
+    return goal | {"then": [[float(x) for x in place] for place in places], "stay": 3.0}
+
+
+def _sides_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
+    """Make goals beyond an obstacle, back at the start, and beyond it again, with a soft region on each side of it."""
+    goal, regions = _sides(rng)
+    back = (rng.uniform(-1.0, 0.0), rng.uniform(-2.0, 2.0), rng.uniform(3.5, 4.5))
+    return _in_turn(goal, back, (10.0, rng.uniform(-2.0, 2.0), rng.uniform(3.5, 4.5))), regions
+
+
+def _depths_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
+    """Make goals that lie about a least and a greatest depth by turns, both soft, that exclude each other."""
+    goal, regions = _squeeze(rng)
+    x, y, z = goal["centre"]
+    deep, shallow = z + rng.uniform(0.2, 0.8), z - rng.uniform(0.2, 0.8)
+    goal["centre"][2] = float(deep)
+    return _in_turn(goal, (rng.uniform(0.0, 4.0), rng.uniform(-2.0, 2.0), shallow), (x, y, deep)), regions
+
+
+_TOURS: Kinds = {"sides in turn": _sides_in_turn, "depths in turn": _depths_in_turn}
+_KINDS: Kinds = {
     "ceiling": _ceiling,
     "dock": _dock,
     "door": _door,

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.campaigns.scenes.conflicts import make_conflict
+from cosim.campaigns.scenes.conflicts import make_conflict, make_tour
 from cosim.campaigns.scenes.trials import make_trial
 
 MOST_OBSTACLES = {"plain": 6, "hard": 14}
@@ -46,8 +46,8 @@ def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[
         How many.
     seed : int
         Of the first, 0 or above.
-    kind : {"plain", "hard", "conflict", "trial"}
-        Of all of them; the last two as in `conflicts` and `trials` beside this module.
+    kind : {"plain", "hard", "conflict", "tour", "trial"}
+        Of all of them; the last three as in `conflicts` and `trials` beside this module.
 
     Yields
     ------
@@ -140,5 +140,6 @@ MAKERS: dict[str, Callable[[int], dict[str, Any]]] = {
     "plain": make_scene,
     "hard": functools.partial(make_scene, kind="hard"),
     "conflict": make_conflict,
+    "tour": make_tour,
     "trial": make_trial,
 }

@@ -10,7 +10,7 @@ from controller import LAWS
 from controller.regions.region_set import clearance_at, pack
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.conflicts import make_conflict
+from cosim.campaigns.scenes.conflicts import make_conflict, make_tour
 from cosim.campaigns.scenes.flyer import SceneFlyer
 from cosim.campaigns.scenes.generator import generate_scenes
 from cosim.campaigns.scenes.kinds import kind_of
@@ -37,7 +37,7 @@ def made(make, wanted, count=1):
     return [scene for scene in scenes if scene["kind"].startswith(wanted)][:count]
 
 
-@pytest.mark.parametrize("kind", ["conflict", "trial"])
+@pytest.mark.parametrize("kind", ["conflict", "tour", "trial"])
 def test_scenes_are_those_of_their_seed(kind):
     one, other = (list(generate_scenes(4, 7, kind)) for _ in range(2))
     assert one == other and list(generate_scenes(1, 9, kind)) == one[2:3]
@@ -59,6 +59,19 @@ def test_kinds_and_vehicles_are_about_as_frequent():
     assert len(kinds) == 18 and min(kinds.values()) > 25 and max(kinds.values()) < 80  # 50 expected
     trials = collections.Counter(make_trial(seed)["kind"] for seed in range(700))
     assert len(trials) == 7 and min(trials.values()) > 65 and max(trials.values()) < 140  # 100 expected
+
+
+def test_a_tour_has_goals_in_turn_on_both_sides_of_what_conflicts():
+    kinds = collections.Counter(make_tour(seed)["kind"] for seed in range(300))
+    assert len(kinds) == 6 and min(kinds.values()) > 25  # 50 expected
+    for seed in range(20):
+        scenario = scenario_of(make_tour(seed))
+        first, then = np.array(scenario.goal.centre), np.array(scenario.goal_then)
+        assert then.shape == (2, 3) and scenario.goal_stay == 3.0
+        axis, middle = (
+            (0, 5.0) if scenario.title.startswith(f"Tour {seed}: sides") else (2, 0.5 * (first[2] + then[0, 2]))
+        )
+        assert np.sign(first[axis] - middle) == np.sign(then[1, axis] - middle) == -np.sign(then[0, axis] - middle)
 
 
 @pytest.mark.parametrize("kind", ["ceiling", "dock"])
