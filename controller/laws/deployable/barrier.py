@@ -72,7 +72,7 @@ class Motion(NamedTuple):
     position: Array  # (3,) m, NED
     velocity: Array  # (6,) m/s over ground, rad/s
     free_acceleration: Array  # (6,) m/s2, rad/s2: acceleration without thrust
-    thruster_acceleration: Array  # (6, m) m/s2, rad/s2: acceleration of one commanded newton of each thruster
+    thruster_acceleration: Array  # (6, m) m/s2, rad/s2: acceleration of one newton that each thruster gives
     mass: float  # kg
     inertia: float  # kg m2, mean
     braking: float  # m/s2 that is always available

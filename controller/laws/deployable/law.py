@@ -151,18 +151,19 @@ def step(
         work.nominal[j] = 0.0
         for k in range(6):
             work.nominal[j] += thrusters.allocator[j, k] * wrench[k]
-        work.nominal[j] /= max(thrusters.effectiveness[j], _LEAST_EFFECTIVENESS)
-    model.limit_stuck_thrusters(thrusters)
+        work.nominal[j] *= min(thrusters.effectiveness[j] / _LEAST_EFFECTIVENESS, 1.0)
+    lower, upper = memory.given_limits[0], memory.given_limits[1]
+    model.write_given_limits(thrusters, memory.given_limits)
 
     # barriers
     model.write_thruster_acceleration(
-        dynamics, thrusters, R, R_ahead, memory.thruster_acceleration, memory.effective_acceleration
+        dynamics, thrusters, R, R_ahead, memory.thruster_acceleration, memory.acceleration_ahead
     )
     motion = Motion(
         ahead.position,
         ahead.velocity,
         free,
-        memory.effective_acceleration,
+        memory.acceleration_ahead,
         dynamics.translational_mass[0],
         (dynamics.mass[3, 3] + dynamics.mass[4, 4] + dynamics.mass[5, 5]) / 3.0,
         gains.braking_share * model.available_braking(dynamics, thrusters),
@@ -175,15 +176,13 @@ def step(
     if gains.barriers > 0.0:
         yields = memory.report[12] > KEPT  # then noise would be that of barriers against each other
         rows = write_rows(
-            work, memory.observation, regions, memory.weights[1], motion, thrusters.lower, thrusters.upper,
+            work, memory.observation, regions, memory.weights[1], motion, lower, upper,
             share if yields else 1.0, gains,
         )  # fmt: skip
 
     # quadratic program
-    steps = quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
-    for j in range(forces.size):  # else a working one would give what it is wrongly thought to be stuck at
-        if not np.isnan(thrusters.stuck[j]):
-            forces[j] = 0.0
+    steps = quadratic_program.solve(work, rows, thrusters.inverse, lower, upper, forces)
+    model.command_forces(thrusters, forces)
     copy(forces, thrusters.forces)
     memory.estimate[0] = estimate.net_weight[0]
     copy(estimate.moments, memory.estimate[1:])
@@ -331,7 +330,8 @@ class DeployableLaw(CompiledLaw):
             reported=np.ones(m),
             filtered_acceleration=np.zeros(3),
             thruster_acceleration=np.zeros((6, m)),
-            effective_acceleration=np.zeros((6, m)),
+            acceleration_ahead=np.zeros((6, m)),
+            given_limits=np.zeros((2, m)),
         )
 
     @classmethod

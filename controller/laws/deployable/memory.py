@@ -46,4 +46,5 @@ class DeployableMemory(NamedTuple):
     reported: Array  # (m,) health of the thrusters as last reported
     filtered_acceleration: Array  # (3,) m/s2, NED, desired of the thrusters, low-pass filtered
     thruster_acceleration: Array  # (6, m) m/s2, rad/s2: of one newton of each thruster
-    effective_acceleration: Array  # (6, m) the same of one commanded newton
+    acceleration_ahead: Array  # (6, m) the same, at the attitude ahead of the lag
+    given_limits: Array  # (2, m) N that each thruster gives at its lower and upper limit

@@ -245,32 +245,49 @@ def free_acceleration(
 
 
 def write_thruster_acceleration(
-    dynamics: Dynamics, thrusters: Thrusters, R: Array, R_ahead: Array, of_force: Array, of_command: Array
+    dynamics: Dynamics, thrusters: Thrusters, R: Array, R_ahead: Array, out: Array, ahead: Array
 ) -> None:
-    """Write the acceleration of one newton of each thruster, and of one commanded newton, shape (6, m) each.
+    """Write the acceleration of one newton that each thruster gives, shape (6, m): at the attitude `R`, and at `R_ahead`.
 
-    Linear in NED [m/s2], angular in body axes [rad/s2]; a force acts at the attitude `R`, a command at `R_ahead`. A
-    thruster that is stuck follows no command: its limits are the force that it gives.
+    Linear in NED [m/s2], angular in body axes [rad/s2].
     """
     body = zeros(6)
     for j in range(thrusters.health.size):
-        given = thrusters.effectiveness[j] if np.isnan(thrusters.stuck[j]) else 1.0
         for i in range(6):
             body[i] = 0.0
             for k in range(6):
                 body[i] += dynamics.inverse_mass[i, k] * thrusters.matrix[k, j]
         for i in range(6):
-            of_force[i, j], of_command[i, j] = body[i], body[i] * given
+            out[i, j] = ahead[i, j] = body[i]
         for i in range(3):
-            of_force[i, j] = R[i, 0] * body[0] + R[i, 1] * body[1] + R[i, 2] * body[2]
-            of_command[i, j] = (R_ahead[i, 0] * body[0] + R_ahead[i, 1] * body[1] + R_ahead[i, 2] * body[2]) * given
+            out[i, j] = R[i, 0] * body[0] + R[i, 1] * body[1] + R[i, 2] * body[2]
+            ahead[i, j] = R_ahead[i, 0] * body[0] + R_ahead[i, 1] * body[1] + R_ahead[i, 2] * body[2]
 
 
-def limit_stuck_thrusters(thrusters: Thrusters) -> None:
-    """Set both limits of each thruster that is stuck to the force that it is estimated to give."""
+def write_given_limits(thrusters: Thrusters, limits: Array) -> None:
+    """Write the force [N] that each thruster gives at its lower and upper limit, shape (2, m).
+
+    A thruster that is stuck follows no command: both limits are the force that it is estimated to give.
+    """
     for j in range(thrusters.health.size):
         if not np.isnan(thrusters.stuck[j]):
             thrusters.lower[j] = thrusters.upper[j] = thrusters.stuck[j] * thrusters.effectiveness[j]
+            limits[0, j] = limits[1, j] = thrusters.lower[j]
+        else:
+            limits[0, j] = thrusters.lower[j] * thrusters.effectiveness[j]
+            limits[1, j] = thrusters.upper[j] * thrusters.effectiveness[j]
+
+
+def command_forces(thrusters: Thrusters, forces: Array) -> None:
+    """Turn the forces that thrusters shall give [N] into commands [N]: more of one that has lost force.
+
+    A stuck one gets none, else a working one would give what it is wrongly thought to be stuck at.
+    """
+    for j in range(forces.size):
+        if not np.isnan(thrusters.stuck[j]):
+            forces[j] = 0.0
+        elif thrusters.effectiveness[j] > 0.0:
+            forces[j] = min(max(forces[j] / thrusters.effectiveness[j], thrusters.lower[j]), thrusters.upper[j])
 
 
 def smallest(values: Array) -> float:

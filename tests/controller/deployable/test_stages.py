@@ -19,6 +19,7 @@ from controller.laws.deployable.model import (
     free_acceleration,
     make_thrusters,
     reallocate,
+    write_given_limits,
     write_thruster_acceleration,
 )
 from controller.laws.deployable.path_planning.planner import CORNERS, empty_plan
@@ -80,13 +81,16 @@ def test_what_a_newton_of_each_thruster_does():
     dynamics, thrusters = askew(np.random.default_rng(3)), make_thrusters(ODIN)
     body = dynamics.inverse_mass @ thrusters.matrix
     expected, ahead = np.vstack([TURNED @ body[:3], body[3:]]), TURNED @ TURNED
-    push, asked = np.zeros((6, thrusters.health.size)), np.zeros((6, thrusters.health.size))
+    push, later = np.zeros((6, thrusters.health.size)), np.zeros((6, thrusters.health.size))
+    limits = np.zeros((2, thrusters.health.size))
     thrusters.effectiveness[:], thrusters.stuck[5] = np.linspace(0.2, 0.9, 8), 4.0
-    write_thruster_acceleration(dynamics, thrusters, TURNED, ahead, push, asked)
+    write_thruster_acceleration(dynamics, thrusters, TURNED, ahead, push, later)
     assert push == pytest.approx(expected, rel=1e-12, abs=1e-15)
-    given = np.where(np.arange(8) == 5, 1.0, thrusters.effectiveness)  # the limits of one that is stuck are its force
-    expected[:3] = ahead @ body[:3]
-    assert asked == pytest.approx(expected * given, rel=1e-12, abs=1e-15)
+    assert later == pytest.approx(np.vstack([ahead @ body[:3], body[3:]]), rel=1e-12, abs=1e-15)
+    lower, upper = ODIN.thrust_min * thrusters.effectiveness, ODIN.thrust_max * thrusters.effectiveness
+    lower[5] = upper[5] = 4.0 * thrusters.effectiveness[5]  # it gives what it is stuck at, whatever is commanded
+    write_given_limits(thrusters, limits)
+    assert limits == pytest.approx(np.array([lower, upper]), rel=1e-12)
 
 
 def test_violated_soft_regions_push_out_of_them():

@@ -7,14 +7,14 @@ import pytest
 
 from controller.laws.deployable import actuator_lag, attitude, barrier, input_validation, law, model
 from controller.laws.deployable.attraction import desired_acceleration, desired_velocity
-from controller.laws.deployable.estimate import CURRENT, LAG, MOMENTS, VELOCITY, publish
+from controller.laws.deployable.estimate import CURRENT, EFFECTIVENESS, LAG, MOMENTS, VELOCITY, publish
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.path_planning.planner import improve_path
 from controller.laws.deployable.path_planning.search import PathLimits
 from controller.quadratic_program import solve
 from controller.quaternion import rotation_matrix
-from controller.regions import Orientation, Region, pack
-from tests.controller.deployable.scenery import GOAL, REGIONS, Sea, fly, law_for
+from controller.regions import HalfSpace, Orientation, Region, pack
+from tests.controller.deployable.scenery import GOAL, ODIN, REGIONS, Sea, fly, law_for
 
 # of the generator of random numbers, on purpose
 pytestmark = pytest.mark.filterwarnings("ignore:overflow encountered:RuntimeWarning")
@@ -51,10 +51,11 @@ def expected(memory, state, goal, regions, weights):
     model.free_wrench(dynamics, R, velocity, turn, loads, against)
     attitude.compute_moment(memory.attitude, dynamics, ahead.quaternion, turn, against, GAINS, moment)
     wrench = np.r_[dynamics.mass[:3, :3] @ R.T @ pushed, moment]
-    memory.program.nominal[:] = thrusters.allocator @ wrench / thrusters.effectiveness
+    memory.program.nominal[:] = thrusters.allocator @ wrench
+    lower, upper = thrusters.lower * thrusters.effectiveness, thrusters.upper * thrusters.effectiveness
     turned = np.kron(np.diag([1, 0]), R) + np.kron(np.diag([0, 1]), np.eye(3))
     motion = barrier.Motion(
-        position, ahead.velocity, free, turned @ dynamics.inverse_mass @ thrusters.matrix * thrusters.effectiveness,
+        position, ahead.velocity, free, turned @ dynamics.inverse_mass @ thrusters.matrix,
         np.trace(dynamics.mass[:3, :3]) / 3.0, np.trace(dynamics.mass[3:, 3:]) / 3.0,
         GAINS.braking_share * dynamics.braking.min(),
         0.5 * GAINS.acceleration * (0.02**2 + seen.state[LAG] ** 2), variance, state.deviation[6:9].max(),
@@ -63,12 +64,10 @@ def expected(memory, state, goal, regions, weights):
     stages = memory.weights[0] + rates * (weights - memory.weights[0])
     smoothed = memory.weights[1] + rates * (stages - memory.weights[1])
     share = 0.02 / (0.02 + GAINS.smoothing) if memory.report[12] > barrier.KEPT else 1.0
-    rows = barrier.write_rows(
-        memory.program, memory.observation, regions, smoothed, motion, thrusters.lower, thrusters.upper, share, GAINS
-    )
+    rows = barrier.write_rows(memory.program, memory.observation, regions, smoothed, motion, lower, upper, share, GAINS)
     forces, program = np.empty(8), copy.deepcopy(memory.program)
-    solve(memory.program, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
-    return pushed, rows, program, forces
+    solve(memory.program, rows, thrusters.inverse, lower, upper, forces)
+    return pushed, rows, program, np.clip(forces / thrusters.effectiveness, thrusters.lower, thrusters.upper)
 
 
 def test_a_step_is_its_stages():
@@ -96,6 +95,24 @@ def test_a_step_is_its_stages():
         assert np.array_equal(own.memory.thrusters.forces, forces)
         assert own.estimate.tolist() == [own.memory.state_estimate.net_weight[0], *own.memory.state_estimate.moments]
     assert most >= 2
+
+
+def test_thrusters_of_uneven_effectiveness_do_not_push_against_each_other_at_a_barrier():
+    """What is given at a wall is the least that keeps it: no part of it without a wrench."""
+    wall = Region("wall", HalfSpace((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in")
+    for uneven in (0.0, 0.15):
+        own, sea, forces = law_for([wall]), Sea(noise=(0.02, 0.01)), np.empty(8)
+        fly(own, sea, regions=[wall], steps=4)
+        state, thrusters = own.memory.state_estimate.state, own.memory.thrusters
+        state[EFFECTIVENESS : EFFECTIVENESS + 8] = 0.9 + uneven * np.array([1, -1, 1, 1, -1, 1, -1, -1])
+        state[:3] = sea.position = np.array([0.85, 0.0, 2.5])
+        state[VELOCITY : VELOCITY + 3] = sea.velocity = np.array([0.05, 0.0, 0.0])
+        publish(own.memory.state_estimate)
+        own.step(sea.measured(), pack([GOAL]), pack([wall]), np.ones(1), forces)
+        given = forces * thrusters.effectiveness
+        idle = given - np.linalg.pinv(ODIN.thruster_matrix) @ ODIN.thruster_matrix @ given
+        assert own.report[11] == 1.0 and np.abs(given).max() > 3.0
+        assert np.linalg.norm(idle) < 0.02 * np.linalg.norm(given)
 
 
 def test_without_measurements_it_goes_no_faster_than_it_stops_in_time_and_then_drifts():
