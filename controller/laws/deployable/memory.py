@@ -40,9 +40,7 @@ class DeployableMemory(NamedTuple):
     deviation: Array  # (12,) of the measured state, as `VehicleState` has it
     position_variance: Array  # (3,) m2, NED, of the estimated position
     promised: Array  # (2,) m, NaN if none: what clearances may fall to, promised since; and by the last step alone
-    weights: (
-        Array  # (2, n) of the arbiter, sanitized, those of hard regions smoothed in two stages; NaN before the first
-    )
+    weights: Array  # (2, n) of the arbiter, sanitized; those of hard regions smoothed in two stages; NaN at first
     reported: Array  # (m,) health of the thrusters as last reported
     filtered_acceleration: Array  # (3,) m/s2, NED, desired of the thrusters, low-pass filtered
     thruster_acceleration: Array  # (6, m) m/s2, rad/s2: of one newton of each thruster

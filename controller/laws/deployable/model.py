@@ -247,7 +247,7 @@ def free_acceleration(
 def write_thruster_acceleration(
     dynamics: Dynamics, thrusters: Thrusters, R: Array, R_ahead: Array, out: Array, ahead: Array
 ) -> None:
-    """Write the acceleration of one newton that each thruster gives, shape (6, m): at the attitude `R`, and at `R_ahead`.
+    """Write the acceleration of one newton that each thruster gives, shape (6, m), at the attitudes `R` and `R_ahead`.
 
     Linear in NED [m/s2], angular in body axes [rad/s2].
     """
