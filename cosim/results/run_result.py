@@ -28,6 +28,8 @@ SUMMARY = "summary.json"
 COMMANDS_LOG = "commands.jsonl"
 REPORT = "report.html"
 REPLAY = "replay.html"
+IMPORT = "import.json"  # of a run that was imported: where each signal is from
+IMPORTED = "imported"  # the status of such a run
 
 _LONGEST = 1e12  # s, of the wall clock
 
@@ -55,7 +57,7 @@ class Run:
     def files(self) -> dict[str, Path]:
         """Return those files of the run that exist, by what they are."""
         named = {"scenario": SCENARIO, "record": RECORD, "summary": SUMMARY, "report": REPORT, "replay": REPLAY}
-        named |= {"commands": COMMANDS_LOG}
+        named |= {"commands": COMMANDS_LOG, "import": IMPORT}
         return {what: self.folder / name for what, name in named.items() if (self.folder / name).exists()}
 
     def table(self) -> Any:
@@ -185,7 +187,7 @@ def load_run(path: Path) -> Run:
     """
     if not (path / SCENARIO).is_file():
         raise RunError(f"{path}: holds no run ({SCENARIO} is missing)")
-    scenario = load_scenario(path / SCENARIO)
+    scenario = load_scenario(path / SCENARIO, imported=True)
     status, wall_time = "killed", None
     if (path / SUMMARY).exists():
         scenario, status, wall_time = _concluded(path / SUMMARY, scenario)

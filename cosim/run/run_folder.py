@@ -19,7 +19,7 @@ from cosim.replay.pages import write_replay
 from cosim.report.report import FIGURES, write_report
 from cosim.results.record import PARTS, RECORD, part_files, require_utf8
 from cosim.results.recorder import Recorder
-from cosim.results.run_result import COMMANDS_LOG, REPLAY, REPORT, SCENARIO, SUMMARY, Run, load_run, open_run
+from cosim.results.run_result import COMMANDS_LOG, IMPORT, REPLAY, REPORT, SCENARIO, SUMMARY, Run, load_run, open_run
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario
 
 
@@ -61,7 +61,7 @@ class RunFolder:
 
     def discard(self) -> None:
         """Take away all that a run without a record has made. May be called twice."""
-        for name in (SCENARIO, VEHICLE_COPY, COMMANDS_LOG):
+        for name in (SCENARIO, VEHICLE_COPY, COMMANDS_LOG, IMPORT, RECORD):
             (self.path / name).unlink(missing_ok=True)
         shutil.rmtree(self.path / PARTS, ignore_errors=True)
         if self.created:
@@ -121,7 +121,7 @@ def claim(out: Path | None, scenario: Scenario, overwrite: bool = False) -> RunF
 
 def _remove_run(path: Path) -> None:
     """Remove what a run has made in its folder, and raise a RunError if the folder holds anything else."""
-    made = {SCENARIO, VEHICLE_COPY, COMMANDS_LOG, RECORD, PARTS, SUMMARY, REPORT, REPLAY, FIGURES}
+    made = {SCENARIO, VEHICLE_COPY, COMMANDS_LOG, IMPORT, RECORD, PARTS, SUMMARY, REPORT, REPLAY, FIGURES}
     odd = sorted(file.name for file in path.iterdir() if file.name not in made and not file.match("report*.*"))
     if odd or not (path / SCENARIO).is_file():
         what = f"{odd[0]!r}, which no run makes" if odd else "no run"

@@ -67,7 +67,8 @@ class _Motion:
 
 def check_texts(file: File) -> None:
     """Raise `ScenarioError` unless a terminal only shows, and does not obey, the texts that come to it."""
-    for key, text in (("title", file.title), ("law.name", file.law.name), *(("changed", key) for key in file.changed)):
+    texts = (("title", file.title), ("log", file.log), ("law.name", file.law.name))
+    for key, text in (*texts, *(("changed", key) for key in file.changed)):
         good = text.isprintable() and len(text) <= MAX_TEXT
         _require(good, key, repr(text), f"one line of at most {MAX_TEXT} printable characters")
 
@@ -176,8 +177,15 @@ def check_commands(
     )
 
 
-def check_goal(table: dict[str, Any]) -> tuple[Shape, Vector3, bool]:
-    """Return the goal's shape, its velocity [m/s, NED], and whether it is streamed."""
+def check_goal(table: dict[str, Any], log: str, start: Vector3) -> tuple[Shape, Vector3, bool]:
+    """Return the goal's shape, its velocity [m/s, NED], and whether it is streamed.
+
+    The run of a log may have none: then it is a sphere about the start that nothing shows or judges by.
+    """
+    if not table and log:
+        return Sphere(start, 1.0), (0.0, 0.0, 0.0), False
+    if not table:
+        raise ScenarioError("file: table missing required field 'goal'")
     beside = ("velocity", "streamed")
     shape = _shape({key: value for key, value in table.items() if key not in beside}, "goal")
     _require(not of_attitude(shape), "goal.type", repr(table["type"]), "a shape in space")
