@@ -25,7 +25,8 @@ from cosim.logs.spool import LogContents, Source
 from cosim.logs.topics import Topic, clean
 from cosim.results.record import MAX_ROWS
 from cosim.results.recorder import Recorder
-from cosim.results.run_result import IMPORT, IMPORTED, Run
+from cosim.results.run_result import IMPORT, Run
+from cosim.results.wording import IMPORTED
 from cosim.run.run_folder import claim, conclude
 from cosim.scenario.scenario import Scenario, load_scenario, validate_scenario
 from cosim.simulation.columns import columns_without_plant
@@ -38,6 +39,7 @@ RATES = (5, 10, 20, 25, 50, 100, 200)  # Hz, one of which the rows have unless a
 _MOTION = ("attitude", "position", "depth")  # of which a log must have one
 _KEPT = ("goal", "regions", "criteria", "arbiter", "intersection", "title")  # of a scenario that judges a log
 _SEA_LEVEL, _SPECIFIC = 101325.0, 9800.0  # Pa, Pa/m: as ArduPilot turns pressure into depth
+_EDGE = 5.0  # s, at the start and at the end, in which not all of the motion may be known
 _UNREAD = 12  # kinds of messages that a report names
 
 
@@ -183,8 +185,7 @@ def _write(
     for name in COMMANDS:
         if name in topics and topics[name] is not command:
             contents.unread[f"{topics[name].name} ({name})"] += topics.pop(name).count
-    start = min(topic.start for topic in topics.values() if topic.quantity != "voltage")
-    end = max(topic.end for topic in topics.values() if topic.quantity != "voltage")
+    start, end = _span(topics)
     told = f"{voltage:g} V" if voltage else f"the voltage of {topics['voltage'].name}" if "voltage" in topics else ""
     commands = commands_of(command, vehicle, curve, told, contents.parameters) if command else None
     hertz = rate or _rate_of(topics)
@@ -240,12 +241,17 @@ def _topics(contents: LogContents, scratch: Path) -> tuple[dict[str, Topic], Veh
             "Nothing can be identified from it."
         )
     for when in clock.restarts:
-        contents.remarks.append(f"the vehicle's clock began anew {when - _start(topics):.1f} s after the start")
+        contents.remarks.append(f"The vehicle's clock began anew {when - _span(topics)[0]:.1f} s after the start")
     return topics, clock
 
 
-def _start(topics: Mapping[str, Topic]) -> float:
-    return min(topic.start for topic in topics.values())
+def _span(topics: Mapping[str, Topic]) -> tuple[float, float]:
+    """Return when the rows begin and end [s]: where all of the motion is known, unless that would cost seconds."""
+    motion = [topics[name] for name in _MOTION if name in topics]
+    starts, ends = [topic.start for topic in motion], [topic.end for topic in motion]
+    start = max(starts) if max(starts) - min(starts) < _EDGE else min(starts)
+    end = min(ends) if max(ends) - min(ends) < _EDGE else max(ends)
+    return start, max(start, end)
 
 
 def _vehicle_clock(contents: LogContents) -> VehicleClock:

@@ -49,6 +49,7 @@ def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = Fa
         "title": scenario.title,
         "asked": asked(scenario),
         "law": scenario.law.name,
+        "imported": scenario.log,
         "step": scenario.time.step,
         "duration": scenario.time.duration,
         "ramp": scenario.arbiter.ramp,
@@ -125,7 +126,8 @@ def _region(scenario: Scenario, index: int, limits: Bounds) -> dict[str, Any]:
         "hard": region.hard,
         "gain": region.gain,
         "moves": region.name in scenario.moving,
-        "comes": bool(secondary and secondary.is_dynamic),  # is there only while it is shifted
+        # is there only while it is shifted; so is, never, the goal of a log that has none
+        "comes": secondary.is_dynamic if secondary else not scenario.has_goal,
         "unit": "rad" if of_attitude(region.shape) else "m",  # of its clearance
         "shape": shape_of(region.shape, limits),
     }

@@ -29,7 +29,6 @@ COMMANDS_LOG = "commands.jsonl"
 REPORT = "report.html"
 REPLAY = "replay.html"
 IMPORT = "import.json"  # of a run that was imported: where each signal is from
-IMPORTED = "imported"  # the status of such a run
 
 _LONGEST = 1e12  # s, of the wall clock
 

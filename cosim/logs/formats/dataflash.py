@@ -63,9 +63,9 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
     if not any_message:
         raise ImportLogError("holds no message, expected a dataflash log of ArduPilot")
     if lost:
-        contents.remarks.append(f"{lost} bytes of the log are no messages and were passed over")
+        contents.remarks.append(f"{lost} bytes of the log are no messages and were passed over.")
     for _, by in takers.clock.jumps:
-        contents.remarks.append(f"the autopilot's clock jumps by {by:+.4g} s: a second stands for it")
+        contents.remarks.append(f"The autopilot's clock jumps by {by:+.4g} s: a second stands for it.")
     takers.conclude()
 
 

@@ -78,14 +78,14 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
         except (McapError, *_FAILURES) as error:
             if not topics:
                 raise ImportLogError(f"cannot be read as a bag: {error}") from error
-            contents.remarks.append(f"the bag breaks off: {error or type(error).__name__}"[:200])
+            contents.remarks.append(f"The bag breaks off: {error or type(error).__name__}"[:200])
     missing = sorted(set(takers) - topics)
     if missing:
         raise ImportLogError(f"has no topic {missing[0]!r}, which the map names; {hint(missing[0], topics)}")
     for taker in (taker for several in takers.values() for taker in several):
         taker.flush()
     for _, by in clock.jumps:
-        contents.remarks.append(f"the clock of the bag's writer jumps by {by:+.4g} s: a second stands for it")
+        contents.remarks.append(f"The clock of the bag's writer jumps by {by:+.4g} s: a second stands for it.")
 
 
 class _Taker:

@@ -64,7 +64,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
             columns.put(contents, name, at[time], values)
     for time, clock in clocks.items():
         for _, by in clock.jumps:
-            contents.remarks.append(f"column {time.column!r} jumps by {by:+.4g} s: a second stands for it")
+            contents.remarks.append(f"Column {time.column!r} jumps by {by:+.4g} s: a second stands for it.")
 
 
 def _batches(path: Path, contents: LogContents, wanted: set[str], texts: set[str], moved: Moved) -> Iterator[Any]:

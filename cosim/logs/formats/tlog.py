@@ -190,9 +190,9 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
         for _, message in gate.frame(frame, header):
             vehicle.take(header, message, written)
     if lost:
-        contents.remarks.append(f"{lost} bytes of the log are no MAVLink frames and were passed over")
+        contents.remarks.append(f"{lost} bytes of the log are no MAVLink frames and were passed over.")
     for _, by in clock.jumps:
-        contents.remarks.append(f"the clock of the log's writer jumps by {by:+.4g} s: a second stands for it")
+        contents.remarks.append(f"The clock of the log's writer jumps by {by:+.4g} s: a second stands for it.")
     contents.preferences |= {
         "attitude": ("ODOMETRY", "ATTITUDE_QUATERNION", "ATTITUDE"),
         "rates": ("ODOMETRY", "ATTITUDE_QUATERNION", "ATTITUDE"),

@@ -69,9 +69,9 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
             contents.unread[name] += 1
     if log.dropouts:
         lost = sum(dropout.duration for dropout in log.dropouts) * 1e-3
-        contents.remarks.append(f"the log says that it lost {len(log.dropouts)} times data, {lost:.3g} s in all")
+        contents.remarks.append(f"The log says that it lost data {len(log.dropouts)} times, {lost:.3g} s in all.")
     if log.file_corruption:
-        contents.remarks.append("the file is damaged; what could be read of it is here")
+        contents.remarks.append("The file is damaged; what could be read of it is here.")
     contents.preferences |= {"rates": ("vehicle_angular_velocity[0]", "vehicle_attitude[0]")}
 
 

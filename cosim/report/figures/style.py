@@ -111,9 +111,10 @@ def regions_of(scenario: Scenario) -> Iterator[tuple[Region, str]]:
     Yields
     ------
     (Region, str)
-        The goal first.
+        The goal first, if there is one.
     """
-    yield scenario.goal_region, GOAL_COLOUR
+    if scenario.has_goal:
+        yield scenario.goal_region, GOAL_COLOUR
     for secondary in scenario.regions:
         yield secondary.region, colour_of(scenario, secondary.criterion)
 
