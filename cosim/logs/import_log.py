@@ -23,9 +23,10 @@ from cosim.logs.quantities import COMMANDS, QUANTITIES
 from cosim.logs.rows import RowMaker
 from cosim.logs.spool import LogContents, Source
 from cosim.logs.topics import Topic, clean
+from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts
 from cosim.results.record import MAX_ROWS
 from cosim.results.recorder import Recorder
-from cosim.results.run_result import IMPORT, Run
+from cosim.results.run_result import Run
 from cosim.results.wording import IMPORTED
 from cosim.run.run_folder import claim, conclude
 from cosim.scenario.scenario import Scenario, load_scenario, validate_scenario
@@ -157,6 +158,8 @@ def _map_of(form: LogFormat, columns: str | Path | None) -> Any:
 
 def _require_vehicle(contents: LogContents, vehicle: Vehicle) -> None:
     """Refuse the log of another kind of vehicle."""
+    if contents.kind:
+        raise ImportLogError(f"is of a {printable(contents.kind)}, expected the log of an underwater vehicle")
     frame = contents.frame.lower()
     table = vehicle.autopilot
     if frame and table is not None and frame != table.frame.lower():
@@ -210,7 +213,7 @@ def _write(
                     recorder.observe(k, row)
                     k += 1
         recorder.close()
-        write_atomic(folder.path / IMPORT, json_text(facts))
+        write_atomic(folder.path / IMPORT, json_text(dataclasses.asdict(facts)))
         return conclude(folder.path, _flown_by(flown, contents), IMPORTED, None, report)
     except OSError as error:
         folder.discard()
@@ -345,33 +348,22 @@ def _flown_by(scenario: Scenario, contents: LogContents) -> Scenario:
 def _facts(
     path: Path, contents: LogContents, topics: Mapping[str, Topic], commands: Commands | None, clock: VehicleClock,
     hertz: float, start: float,
-) -> dict[str, Any]:  # fmt: skip
+) -> LogFacts:  # fmt: skip
     """Return what a reader must know of where the run is from."""
     remarks = list(contents.remarks)
     if clock.words():
         remarks.append(f"Clocks: {clock.words()}.")
-    return {
-        "log": printable(path.name),
-        "bytes": path.stat().st_size,
-        "start": start,  # s, on the log's clock
-        "rate": hertz,
-        "commands": commands.words if commands else None,
-        "topics": [_told(topic, start) for topic in topics.values()],
-        "unread": {printable(name): count for name, count in contents.unread.most_common()},
-        "remarks": [printable(remark) for remark in remarks],
-    }
+    return LogFacts(
+        printable(path.name), path.stat().st_size, start, hertz, commands.words if commands else "",
+        tuple(_told(topic, start) for topic in topics.values()),
+        {printable(name): count for name, count in contents.unread.most_common()},
+        tuple(printable(remark) for remark in remarks),
+    )  # fmt: skip
 
 
-def _told(topic: Topic, start: float) -> dict[str, Any]:
-    return {
-        "quantity": topic.quantity,
-        "source": printable(topic.name),
-        "samples": topic.count,
-        "rate": topic.rate,
-        "gaps": topic.gap_count,
-        "longest_gaps": [[begin - start, end - start] for begin, end in topic.gaps[:_UNREAD]],
-        "held": topic.held,
-        "bursts": topic.burst,
-        "late": topic.late,
-        "broken": topic.broken,
-    }
+def _told(topic: Topic, start: float) -> TopicFacts:
+    gaps = tuple((begin - start, end - start) for begin, end in topic.gaps[:_UNREAD])
+    return TopicFacts(
+        topic.quantity, printable(topic.name), topic.count, topic.rate, topic.longest, topic.gap_count, gaps,
+        topic.held, topic.burst, topic.late, topic.broken,
+    )  # fmt: skip

@@ -91,6 +91,8 @@ class LogContents:
         What the log calls the arrangement of the thrusters; empty where it does not say.
     autopilot : str
         Who flew, such as ``ardupilot``; empty where the log does not say.
+    kind : str
+        What it is of, where that is no underwater vehicle.
     unread : Counter
         Messages, topics or columns of which nothing is made, and how often each comes.
     remarks : list of str
@@ -105,6 +107,7 @@ class LogContents:
         self.parameters: dict[str, float] = {}
         self.frame = ""
         self.autopilot = ""
+        self.kind = ""
         self.unread: Counter[str] = Counter()
         self.remarks: list[str] = []
         self.preferences: dict[str, tuple[str, ...]] = {}

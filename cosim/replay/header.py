@@ -96,7 +96,8 @@ def shape_of(shape: Shape, limits: Bounds) -> dict[str, Any]:
 
 def limits_of(scenario: Scenario) -> Bounds:
     """Return the corners of a box about the start and all regions that end somewhere, with as much room about them."""
-    regions = [scenario.goal_region, *(secondary.region for secondary in scenario.regions if not secondary.is_dynamic)]
+    goal = [scenario.goal_region] if scenario.has_goal else []
+    regions = [*goal, *(secondary.region for secondary in scenario.regions if not secondary.is_dynamic)]
     corners = [np.array(corner) for region in regions for corner in region.shape.bounds()]
     points = np.array([scenario.initial.position, *(corner for corner in corners if np.isfinite(corner).all())])
     low, high = points.min(axis=0), points.max(axis=0)

@@ -12,9 +12,10 @@ from controller.laws import LAWS
 from cosim.replay.events import turns_of
 from cosim.report.log_contents import effort_of_log, log_remarks, log_tables, setting_of_log
 from cosim.report.table import Table
+from cosim.results.log_facts import IMPORT
 from cosim.results.paper_claims import paper_claims
 from cosim.results.record import PARTS, RECORD
-from cosim.results.run_result import COMMANDS_LOG, IMPORT, SCENARIO, SUMMARY, Run
+from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY, Run
 from cosim.results.spans import Spans
 from cosim.results.wording import asked, kind_of, number, verdict
 from cosim.scenario.scenario import Scenario

@@ -15,6 +15,7 @@ from controller import LAWS
 from cosim.errors import RunError
 from cosim.io.strict_json import read_json
 from cosim.results.as_flown import scenario_as_flown
+from cosim.results.log_facts import IMPORT
 from cosim.results.record import RECORD, Record, load_record
 from cosim.results.required_columns import require_columns
 from cosim.results.summary import summarise
@@ -28,7 +29,6 @@ SUMMARY = "summary.json"
 COMMANDS_LOG = "commands.jsonl"
 REPORT = "report.html"
 REPLAY = "replay.html"
-IMPORT = "import.json"  # of a run that was imported: where each signal is from
 
 _LONGEST = 1e12  # s, of the wall clock
 

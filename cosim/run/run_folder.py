@@ -17,9 +17,10 @@ from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
 from cosim.replay.pages import write_replay
 from cosim.report.report import FIGURES, write_report
+from cosim.results.log_facts import IMPORT
 from cosim.results.record import PARTS, RECORD, part_files, require_utf8
 from cosim.results.recorder import Recorder
-from cosim.results.run_result import COMMANDS_LOG, IMPORT, REPLAY, REPORT, SCENARIO, SUMMARY, Run, load_run, open_run
+from cosim.results.run_result import COMMANDS_LOG, REPLAY, REPORT, SCENARIO, SUMMARY, Run, load_run, open_run
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario
 
 

@@ -313,7 +313,7 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
     check_texts(file)
     time = check_time(file.time)
     check_numbers(file)
-    goal, goal_velocity, goal_streamed = check_goal(file.goal, file.log, file.initial.position)
+    goal, goal_velocity, goal_streamed = check_goal(file.goal, file.log)
     regions = check_regions(file.regions)
     criterion_entries, criteria = check_criteria(file.criteria)
     overlapping = check_intersection(file.intersection, regions)

@@ -177,13 +177,13 @@ def check_commands(
     )
 
 
-def check_goal(table: dict[str, Any], log: str, start: Vector3) -> tuple[Shape, Vector3, bool]:
+def check_goal(table: dict[str, Any], log: str) -> tuple[Shape, Vector3, bool]:
     """Return the goal's shape, its velocity [m/s, NED], and whether it is streamed.
 
-    The run of a log may have none: then it is a sphere about the start that nothing shows or judges by.
+    The run of a log may have none: then it is a sphere far away that nothing shows or judges by.
     """
     if not table and log:
-        return Sphere(start, 1.0), (0.0, 0.0, 0.0), False
+        return Sphere(PARKED_POSITION, 1.0), (0.0, 0.0, 0.0), False
     if not table:
         raise ScenarioError("file: table missing required field 'goal'")
     beside = ("velocity", "streamed")

@@ -24,6 +24,7 @@ _NOTHING = math.nan
 _FRAMES = (
     "bluerov1", "vectored", "vectored_6dof", "vectored_6dof_90deg", "simplerov_3", "simplerov_4", "simplerov_5",
 )  # fmt: skip
+_OTHERS = ("ArduCopter", "ArduPlane", "ArduRover", "AntennaTracker", "Blimp")
 _OF_THE_LOG = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "VER"}
 
 Fields = dict[str, Any]
@@ -113,6 +114,11 @@ class _Takers:
         self._contents.parameters[str(m["Name"])] = float(m["Value"])
         if m["Name"] == "FRAME_CONFIG" and 0 <= m["Value"] < len(_FRAMES):
             self._contents.frame = _FRAMES[int(m["Value"])]
+
+    def _on_msg(self, m: Fields, at: float) -> None:
+        firmware = str(m["Message"]).split(" ")[0]
+        if firmware in _OTHERS:
+            self._contents.kind = f"vehicle of {firmware}"
 
     def _on_att(self, m: Fields, at: float) -> None:
         angles = [math.radians(m[name]) for name in ("Roll", "Pitch", "Yaw")]

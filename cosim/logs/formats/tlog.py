@@ -24,6 +24,7 @@ _EARLIEST, _LATEST = 9e8, 4.1e9  # s since 1970, of a stamp that can be one
 _LOCAL_NED, _BODY_FRD, _DOWNWARDS = 1, 12, 25
 _INVALID_STICK = 0x7FFF
 _HEARTBEAT, _AUTOPILOT = 0, 1  # a message, and the component that is the vehicle's
+_SWIM = (0, 11, 12)  # of MAV_TYPE: no word, a boat and a submarine
 _OF_OTHERS = ("MANUAL_CONTROL", "VISION_POSITION_DELTA")  # messages of the pilot's station and of a DVL's driver
 _ARDUPILOT, _PX4, _NO_AUTOPILOT = 3, 12, 8
 _RESTS_IN_THE_MIDDLE = (_ARDUPILOT, _PX4)
@@ -37,10 +38,11 @@ NO_STAMP = math.nan
 class _Vehicle:
     """Takes messages of the vehicle and its pilot into the contents of a log."""
 
-    def __init__(self, contents: LogContents, system: int, autopilot: int) -> None:
+    def __init__(self, contents: LogContents, system: int, autopilot: int, kind: int) -> None:
         self._contents = contents
         self._put = contents.put
         self._system, self._autopilot = system, autopilot
+        contents.kind = kind_of(kind)
         contents.autopilot = {_ARDUPILOT: "ardupilot", _PX4: "px4"}.get(autopilot, "")
         self._takers: dict[str, Callable[[Any, float], None]] = {
             name.removeprefix("_on_").upper(): getattr(self, name) for name in dir(self) if name.startswith("_on_")
@@ -202,14 +204,22 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
     }
 
 
-def _find_vehicle(path: Path) -> tuple[int, int]:
-    """Return the system of the first autopilot that is heard, and which autopilot it is."""
+def kind_of(number: int) -> str:
+    """Return which kind of vehicle a number of MAV_TYPE is, empty for one that swims or says nothing."""
+    entry = dialect().enums["MAV_TYPE"].get(number)
+    if number in _SWIM or entry is None:
+        return ""
+    return str(entry.name).removeprefix("MAV_TYPE_").replace("_", " ").lower()
+
+
+def _find_vehicle(path: Path) -> tuple[int, int, int]:
+    """Return the system of the first autopilot that is heard, which autopilot it is, and of which kind of vehicle."""
     gate = Gate(Counts())
     for _, frame, header in _frames(path, lambda part: None):
         if header is not None and (header.message, header.component) == (_HEARTBEAT, _AUTOPILOT):
             for _, message in gate.frame(frame, header):
                 if message.autopilot != _NO_AUTOPILOT:
-                    return header.system, message.autopilot
+                    return header.system, message.autopilot, message.type
     raise ImportLogError("holds no heartbeat of an autopilot, expected a telemetry log of a vehicle")
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from cosim.errors import ImportLogError
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.format import LogFormat, Moved
+from cosim.logs.formats.tlog import kind_of
 from cosim.logs.spool import LogContents
 from cosim.simulation.signals import Array
 
@@ -60,6 +61,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
         raise ImportLogError(f"cannot be read as a ULog file: {error}") from error
     contents.autopilot = "px4"
     contents.parameters |= {name: float(value) for name, value in log.initial_parameters.items()}
+    contents.kind = kind_of(int(contents.parameters.get("MAV_TYPE", 0)))
     names = {f"{data.name}[{data.multi_id}]" for data in log.data_list}
     for data in log.data_list:
         _take(data, contents, f"{data.name}[{data.multi_id}]")

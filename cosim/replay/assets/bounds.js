@@ -13,7 +13,7 @@ function placesOf(run) {
   const kept = places.filter(Vec.finite);
   const { shape } = run.header.regions[0]; // the goal
   const solid = surfaceOf(shape);
-  if (solid) {
+  if (solid && isThere(solid.centre)) {
     const { centre, radius } = solid;
     for (const t of [run.start, run.end]) {
       const at = Vec.add(centre, run.shift(0, t));
