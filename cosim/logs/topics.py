@@ -168,7 +168,20 @@ def _survey(source: Source, times: Callable[[Array, Array], Array]) -> tuple[int
     stretch = _held_for(runs) if QUANTITIES[source.quantity].kind in ("sensor", "state") else 1
     mean = sum(spans) / counted if counted else 0.0
     quick_count = source.count - 1 - steps_all.above(_QUICK * mean) if mean else 0
-    return stretch, mean if mean and quick_count > _BURSTING * source.count else 0.0
+    bursting = mean > 0.0 and quick_count > _BURSTING * source.count and _comes_in_groups(source, times, 0.5 * mean)
+    return stretch, mean if bursting else 0.0
+
+
+def _comes_in_groups(source: Source, times: Callable[[Array, Array], Array], apart: float) -> bool:
+    """Return whether most samples have neighbors, where groups are so far apart [s]: a quick phase is no burst."""
+    groups = alone = 0
+    last = -np.inf
+    for at, _ in _timed(source, times):
+        begins = np.diff(at, prepend=last) > apart
+        groups += int(np.count_nonzero(begins))
+        alone += int(np.count_nonzero(begins[:-1] & begins[1:]))
+        last = at[-1]
+    return alone < 0.5 * groups
 
 
 def _held_for(runs: NDArray[np.int64]) -> int:
@@ -214,7 +227,7 @@ def _evenly(at: Array, before: float, period: float, topic: Topic) -> Array:
     sizes = np.diff(ends, prepend=-1)
     since = np.diff(at[ends], prepend=before)
     with np.errstate(invalid="ignore"):
-        spacing = np.where(since < 2.0 * sizes * period, since / sizes, period)
+        spacing = np.where(since < 2.0 * sizes * period, since / sizes, period)  # none of the first one: NaN
     back = np.repeat(ends, sizes) - np.arange(len(at))
     topic.burst += int(np.count_nonzero(back))
     evened: Array = np.repeat(at[ends], sizes) - back * np.repeat(spacing, sizes)

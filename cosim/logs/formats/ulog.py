@@ -56,7 +56,8 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
     from pyulog.core import ULogException
 
     try:
-        log = ULog(str(path), list(_TOPICS), True)
+        with path.open("rb") as file:
+            log = ULog(file, list(_TOPICS), True)
     except (ULogException, *_FAILURES) as error:
         raise ImportLogError(f"cannot be read as a ULog file: {error}") from error
     contents.autopilot = "px4"

@@ -108,3 +108,11 @@ def test_attitudes_go_the_shorter_way_and_stay_unit(contents, tmp_path):
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0)
     expected = np.column_stack([np.cos(grid / 2), np.sin(grid / 2)])
     assert np.abs(np.abs((found[:, [0, 3]] * expected).sum(axis=1)) - 1.0).max() < 1e-4
+
+
+def test_a_quick_phase_is_no_burst(contents, tmp_path):
+    """A link that is quick for a while, and slow for the rest."""
+    times = np.concatenate([np.arange(0.0, 5.0, 0.02), np.arange(5.0, 100.0, 0.5)])
+    topic, rows = cleaned(contents, tmp_path, "depth", times, np.sin(times))
+    assert topic.burst == 0
+    np.testing.assert_array_equal(rows[:, 0], times)
