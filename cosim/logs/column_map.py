@@ -1,4 +1,4 @@
-"""Column maps: a TOML file that says which columns of a table, or fields of topics, are what, in which unit and frame."""
+"""Column maps: TOML files that say which columns or fields are what, in which unit and frame."""
 
 from __future__ import annotations
 

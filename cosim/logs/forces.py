@@ -87,7 +87,9 @@ def commands_of(
         return Commands(topic.quantity, "thrusters", lambda values, _: values, f"thruster forces of {topic.name}")
     least, most = vehicle.thrust_min, vehicle.thrust_max
     words = f"{topic.name}, each part of the thruster's greatest force"
-    return Commands(topic.quantity, "thrusters", lambda values, _: np.where(values < 0.0, -values * least, values * most), words)
+    return Commands(
+        topic.quantity, "thrusters", lambda values, _: np.where(values < 0.0, -values * least, values * most), words
+    )
 
 
 def _of_pulses(
@@ -130,7 +132,9 @@ def _of_pulses(
         scaled = np.where(parts < 0.0, -parts * vehicle.thrust_min, parts * vehicle.thrust_max)
         return used * np.where(missing, np.nan, scaled)
 
-    return Commands(topic.quantity, "thrusters", forces, f"pulses of {topic.name} by the {shape.curve} curve of {vehicle.name}")
+    return Commands(
+        topic.quantity, "thrusters", forces, f"pulses of {topic.name} by the {shape.curve} curve of {vehicle.name}"
+    )
 
 
 def channels_of(table: Autopilot, vehicle: Vehicle, parameters: Mapping[str, float]) -> tuple[int, ...]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import math
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +20,11 @@ from cosim.logs.column_map import read_map
 from cosim.logs.forces import CURVES, Commands, commands_of
 from cosim.logs.format import LogFormat, Moved
 from cosim.logs.formats import FORMATS
-from cosim.logs.quantities import COMMANDS, QUANTITIES
+from cosim.logs.quantities import COMMANDS
 from cosim.logs.rows import RowMaker
-from cosim.logs.spool import LogContents, Source
-from cosim.logs.topics import Topic, clean
+from cosim.logs.selection import rate_of, select_topics, span_of
+from cosim.logs.spool import LogContents
+from cosim.logs.topics import Topic
 from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts
 from cosim.results.record import MAX_ROWS
 from cosim.results.recorder import Recorder
@@ -36,11 +38,7 @@ from plant_fmu import Vehicle, load_vehicle
 from plant_fmu.errors import printable
 from plant_fmu.installing import install_hint
 
-RATES = (5, 10, 20, 25, 50, 100, 200)  # Hz, one of which the rows have unless another is asked for
-_MOTION = ("attitude", "position", "depth")  # of which a log must have one
 _KEPT = ("goal", "regions", "criteria", "arbiter", "intersection", "title")  # of a scenario that judges a log
-_SEA_LEVEL, _SPECIFIC = 101325.0, 9800.0  # Pa, Pa/m: as ArduPilot turns pressure into depth
-_EDGE = 5.0  # s, at the start and at the end, in which not all of the motion may be known
 _UNREAD = 12  # kinds of messages that a report names
 
 
@@ -73,7 +71,7 @@ def import_log(
     columns : str or Path, optional
         The column map that ``.csv``, ``.parquet`` and ``.mcap`` need.
     rate : float, optional
-        Rows a second [Hz]. Default: the least of `RATES` that no state or command exceeds.
+        Rows a second [Hz]. Default: the least of 5, 10, 20, 25, 50, 100 and 200 that no state or command exceeds.
     curve : str, optional
         From pulse to force: ``linear``, ``quadratic`` or ``t200``. Default: that of the vehicle's table ``autopilot``.
     voltage : float, optional
@@ -128,8 +126,9 @@ def import_log(
                     raise
                 raise ImportLogError(f"needs {error.name}; {install_hint(*form.needs)}") from error
             _require_vehicle(contents, craft)
-            return _write(path, contents, Path(scratch), craft, str(vehicle), scenario, out, rate, curve, voltage,
-                          report, overwrite)  # fmt: skip
+            folder = None if out is None else Path(out)
+            wanted = _Wanted(str(vehicle), scenario, folder, rate, curve, voltage, report, overwrite)
+            return _write(path, contents, Path(scratch), craft, wanted)
     except ImportLogError as error:
         raise ImportLogError(f"{path}: {error}") from error
     except OSError as error:
@@ -169,41 +168,49 @@ def _require_vehicle(contents: LogContents, vehicle: Vehicle) -> None:
         )
 
 
-def _write(
-    path: Path,
-    contents: LogContents,
-    scratch: Path,
-    vehicle: Vehicle,
-    vehicle_name: str,
-    judge: str | Path | None,
-    out: str | Path | None,
-    rate: float | None,
-    curve: str | None,
-    voltage: float | None,
-    report: bool,
-    overwrite: bool,
-) -> Run:
-    topics, clock = _topics(contents, scratch)
+@dataclass(frozen=True)
+class _Wanted:
+    """What the caller asked for."""
+
+    vehicle: str
+    scenario: str | Path | None
+    out: Path | None
+    rate: float | None
+    curve: str | None
+    voltage: float | None
+    report: bool
+    overwrite: bool
+
+
+def _write(path: Path, contents: LogContents, scratch: Path, vehicle: Vehicle, wanted: _Wanted) -> Run:
+    """Write what a log says as a run folder."""
+    topics, clock = select_topics(contents, scratch)
     command = next((topics[name] for name in COMMANDS if name in topics), None)
     for name in COMMANDS:
         if name in topics and topics[name] is not command:
             contents.unread[f"{topics[name].name} ({name})"] += topics.pop(name).count
-    start, end = _span(topics)
-    told = f"{voltage:g} V" if voltage else f"the voltage of {topics['voltage'].name}" if "voltage" in topics else ""
-    commands = commands_of(command, vehicle, curve, told, contents.parameters) if command else None
-    hertz = rate or _rate_of(topics)
+    start, end = span_of(topics)
+    told = (
+        f"{wanted.voltage:g} V"
+        if wanted.voltage
+        else f"the voltage of {topics['voltage'].name}"
+        if "voltage" in topics
+        else ""
+    )
+    commands = commands_of(command, vehicle, wanted.curve, told, contents.parameters) if command else None
+    hertz = wanted.rate or rate_of(topics)
     steps = max(1, math.floor((end - start) * hertz + 1e-6))
     if steps >= MAX_ROWS:
         raise ImportLogError(f"lasts {end - start:.4g} s: {steps} rows at {hertz:g} Hz, expected less than {MAX_ROWS}")
     through = commands.through if commands else "thrusters" if vehicle.n_thrusters else "wrench"
-    draft = _scenario(path, vehicle, vehicle_name, judge, through, steps, 1.0 / hertz)
-    volts = math.nan if voltage is None else voltage
+    draft = _scenario(path, vehicle, wanted, through, steps, 1.0 / hertz)
+    volts = math.nan if wanted.voltage is None else wanted.voltage
     columns = columns_without_plant(draft)
     with RowMaker(draft, columns, topics, commands, volts, start) as maker:
         first = next(maker.blocks())
     flown = _from_first(draft, first, [column.name for column in columns])
     facts = _facts(path, contents, topics, commands, clock, hertz, start)
-    folder = claim(None if out is None else Path(out), flown, overwrite)
+    folder = claim(wanted.out, flown, wanted.overwrite)
     try:
         recorder = Recorder(folder.path, columns)
         with RowMaker(flown, columns, topics, commands, volts, start) as maker:
@@ -214,7 +221,7 @@ def _write(
                     k += 1
         recorder.close()
         write_atomic(folder.path / IMPORT, json_text(dataclasses.asdict(facts)))
-        return conclude(folder.path, _flown_by(flown, contents), IMPORTED, None, report)
+        return conclude(folder.path, _flown_by(flown, contents), IMPORTED, None, wanted.report)
     except OSError as error:
         folder.discard()
         raise RunError(f"{folder.path}: {error.strerror or error}") from error
@@ -223,100 +230,15 @@ def _write(
         raise
 
 
-def _topics(contents: LogContents, scratch: Path) -> tuple[dict[str, Topic], VehicleClock]:
-    """Return the topics that a run is made of, by quantity; what is there twice is told as not read."""
-    clock = _vehicle_clock(contents)
-    topics: dict[str, Topic] = {}
-    for quantity in QUANTITIES:
-        source = contents.best(quantity)
-        for (of, name), other in contents.sources.items():
-            if of == quantity and other is not source and other.count:
-                contents.unread[f"{name} ({quantity})"] += other.count
-        if source is not None:
-            topics[quantity] = clean(source, clock.times, None, scratch)
-    _depth_of_pressure(contents, topics, clock, scratch)
-    if not any(name in topics for name in _MOTION):
-        what = ", ".join(f"{name} ({QUANTITIES[name].what})" for name in _MOTION)
-        raise ImportLogError(f"says nothing of the motion, expected one of {what}")
-    if not any(name in topics for name in COMMANDS):
-        contents.remarks.append(
-            "The log has no commands of thrusters: servo outputs, forces, a wrench or sticks. "
-            "Nothing can be identified from it."
-        )
-    for when in clock.restarts:
-        contents.remarks.append(f"The vehicle's clock began anew {when - _span(topics)[0]:.1f} s after the start")
-    return topics, clock
-
-
-def _span(topics: Mapping[str, Topic]) -> tuple[float, float]:
-    """Return when the rows begin and end [s]: where all of the motion is known, unless that would cost seconds."""
-    motion = [topics[name] for name in _MOTION if name in topics]
-    starts, ends = [topic.start for topic in motion], [topic.end for topic in motion]
-    start = max(starts) if max(starts) - min(starts) < _EDGE else min(starts)
-    end = min(ends) if max(ends) - min(ends) < _EDGE else max(ends)
-    return start, max(start, end)
-
-
-def _vehicle_clock(contents: LogContents) -> VehicleClock:
-    """Return the vehicle's clock, by all stamps in the order in which they were written."""
-    clock = VehicleClock()
-    stamped = [source for source in contents.sources.values() if next(_stamps(source), None) is not None]
-    if stamped:  # the source with the most stamps tells: others are of the same clock
-        best = max(stamped, key=lambda source: source.count)
-        for block in _stamps(best):
-            for stamp, written in block.tolist():
-                clock.put(stamp, written)
-    return clock
-
-
-def _stamps(source: Source) -> Iterator[Array]:
-    """Yield stamps and times of writing of a source that has stamps."""
-    for block in source.blocks():
-        known = block[~np.isnan(block[:, 0]), :2]
-        if not len(known):
-            return
-        yield known
-
-
-def _depth_of_pressure(
-    contents: LogContents, topics: dict[str, Topic], clock: VehicleClock, scratch: Path
-) -> None:
-    """Turn pressure into depth as the autopilot does, where no depth is there itself."""
-    if "pressure" not in topics:
-        return
-    pressure = topics.pop("pressure")
-    if "depth" in topics:
-        contents.unread[f"{pressure.name} (pressure)"] += pressure.count
-        return
-    ground = contents.parameters.get("BARO2_GND_PRESS", contents.parameters.get("GND_ABS_PRESS2", math.nan))
-    gravity = contents.parameters.get("BARO_SPEC_GRAV", contents.parameters.get("GND_SPEC_GRAV", 1.0))
-    if not (math.isfinite(ground) and 0.0 < gravity < 10.0):
-        ground, gravity = _SEA_LEVEL, 1.0
-        contents.remarks.append("The log has no BARO2_GND_PRESS: depth is from 101325 Pa at the surface.")
-    scale = _SPECIFIC * gravity
-    source = contents.sources["pressure", pressure.name]
-    deep: Callable[[Array], Array] = lambda values: (values - ground) / scale  # noqa: E731
-    topics["depth"] = dataclasses.replace(clean(source, clock.times, deep, scratch), quantity="depth")
-
-
-def _rate_of(topics: Mapping[str, Topic]) -> float:
-    """Return the least rate that no state or command exceeds."""
-    fast = max((t.rate for t in topics.values() if QUANTITIES[t.quantity].kind in ("state", "command")), default=0.0)
-    fast = fast or max(topic.rate for topic in topics.values())
-    return float(next((rate for rate in RATES if rate >= 0.98 * fast), RATES[-1]))
-
-
-def _scenario(
-    path: Path, vehicle: Vehicle, vehicle_name: str, judge: str | Path | None, through: str, steps: int, step: float
-) -> Scenario:
+def _scenario(path: Path, vehicle: Vehicle, wanted: _Wanted, through: str, steps: int, step: float) -> Scenario:
     """Return the scenario of a log's run: the vehicle, and what it is judged by."""
     table: dict[str, Any] = {"title": f"Imported from {printable(path.name)}"[:200]}
-    if judge is not None:
-        given = load_scenario(judge, ["commands.enabled=false"]).table
+    if wanted.scenario is not None:
+        given = load_scenario(wanted.scenario, ["commands.enabled=false"]).table
         table |= {key: given[key] for key in _KEPT if key in given}
         table["title"] = f"{table['title']}, imported from {printable(path.name)}"[:200]
     table |= {
-        "vehicle": vehicle_name,
+        "vehicle": wanted.vehicle,
         "log": printable(path.name),
         "time": {"duration": steps * step, "step": step},
         "initial": {"position": [0.0, 0.0, 0.0]},

@@ -60,7 +60,9 @@ QUANTITIES = {
         Quantity("effort", 0, "", "command", 1.001, "", "part of its greatest force asked of each thruster"),
         Quantity("pulses", 0, "us", "command", 2500.0, "", "pulse that each thruster's speed controller gets"),
         Quantity("wrench", 6, "N, N m", "command", 1e6, "body", "commanded wrench on the body"),
-        Quantity("sticks", 6, "", "command", 1.001, "body", "sticks from -1 to 1: surge, sway, heave, roll, pitch, yaw"),
+        Quantity(
+            "sticks", 6, "", "command", 1.001, "body", "sticks from -1 to 1: surge, sway, heave, roll, pitch, yaw"
+        ),
         Quantity("voltage", 1, "V", "voltage", 1000.0, "", "voltage of the thrusters' supply"),
     )
 }

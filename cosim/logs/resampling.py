@@ -11,7 +11,7 @@ from cosim.logs.spool import BLOCK
 from cosim.logs.topics import Topic
 from cosim.simulation.signals import Array
 
-_EXACT = 1e-9  # s
+_EXACT = 1e-6  # s; of seconds since 1970 a float64 holds a quarter of that
 
 
 class TopicReader:

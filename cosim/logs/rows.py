@@ -75,8 +75,7 @@ class RowMaker:
         """Yield the rows of the whole run in order, each block of shape (n, columns)."""
         step, rows = self._scenario.time.step, self._scenario.steps + 1
         for first in range(0, rows, BLOCK):
-            time = np.arange(first, min(first + BLOCK, rows)) * step
-            yield self._block(time)
+            yield self._block(np.arange(first, min(first + BLOCK, rows)) * np.float64(step))
 
     def _block(self, time: Array) -> Array:
         rows = np.full((len(time), len(self._at)), np.nan)
@@ -165,7 +164,7 @@ class _Judge:
 
     def put(self, rows: Array) -> None:
         """Write values, clearances and shifts into rows; NaN where the pose is not known."""
-        known = np.isfinite(rows[:, [*self._position, *self._quaternion]]).all(axis=1)
+        known = np.asarray(np.isfinite(rows[:, [*self._position, *self._quaternion]]).all(axis=1))
         still = np.zeros(6)
         for k, row in enumerate(rows):
             self._environment.update_positions(float(row[self._time]), self._shift)

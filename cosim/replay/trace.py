@@ -94,7 +94,11 @@ def trace_of(run: Run) -> Trace:
         "summary": {key: summary[key] for key in ("min_clearance", "reach_time", "settle_time")},
         "changes": changes,
         "events": [dataclasses.asdict(event) for event in events],
-        "gaps": {name: int(count) for name, count in zip(names, missing, strict=True) if 0 < count < len(record) or count and not scenario.log},
+        "gaps": {
+            name: int(count)
+            for name, count in zip(names, missing, strict=True)
+            if 0 < count < len(record) or (count and not scenario.log)
+        },
     }
     return Trace(nan_to_none(header), rows, steps)
 

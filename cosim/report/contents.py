@@ -66,9 +66,7 @@ def contents_of(run: Run) -> Contents:
         regions=_regions(run),
         numbers=tuple(
             table
-            for table in (
-                *log_tables(run), _criteria(run), _goal(run), _effort(run), _estimates(run), _lyapunov(run)
-            )
+            for table in (*log_tables(run), _criteria(run), _goal(run), _effort(run), _estimates(run), _lyapunov(run))
             if table
         ),
         setting=_setting(run),

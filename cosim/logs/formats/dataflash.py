@@ -201,7 +201,7 @@ def _learn(fields: tuple[Any, ...], formats: dict[int, tuple[DFFormat, struct.St
     try:
         form = DFFormat(kind, name, size, letters, columns)
         unpack = struct.Struct(form.msg_struct)
-    except Exception as error:  # noqa: BLE001 - pymavlink raises no narrower one
+    except Exception as error:
         raise ImportLogError(f"message {name!r} has the format {letters!r}, which is unknown") from error
     if unpack.size != size - 3 or len(form.columns) != len(letters):
         raise ImportLogError(f"message {name!r} has {size} bytes, expected {unpack.size + 3} by its format {letters!r}")

@@ -122,7 +122,9 @@ def _walk(path: str, topic: str) -> Callable[[Any], Any]:
     while at < len(path):
         part = _PART.match(path, at)
         if part is None:
-            raise ImportLogError(f"field {path!r} of {topic} is no path, expected one such as pose.position.x or data[3]")
+            raise ImportLogError(
+                f"field {path!r} of {topic} is no path, expected one such as pose.position.x or data[3]"
+            )
         parts.append(part[1] if part[1] is not None else int(part[2]))
         at = part.end()
 

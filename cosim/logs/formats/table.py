@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import csv
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -86,7 +87,8 @@ def _batches(path: Path, contents: LogContents, wanted: set[str], texts: set[str
             "read_options": pa.csv.ReadOptions(block_size=_BLOCK),
             "parse_options": pa.csv.ParseOptions(delimiter=separator),
         }
-        names = [name.strip().strip('"') for name in first.decode("utf-8-sig", "replace").strip().split(separator)]
+        line = first.decode("utf-8-sig", "replace").rstrip("\r\n")
+        names = next(csv.reader([line], delimiter=separator), [])
         _require(names, wanted, contents)
         types = {column: pa.string() if column in texts else pa.float64() for column in wanted}
         convert = pa.csv.ConvertOptions(
@@ -98,7 +100,7 @@ def _batches(path: Path, contents: LogContents, wanted: set[str], texts: set[str
                 done += _BLOCK
                 moved(min(1.0, done / total))
                 yield batch
-    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
+    except (pa.ArrowException, OSError, UnicodeDecodeError, csv.Error) as error:
         raise ImportLogError(f"cannot be read: {error}") from error
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cosim.errors import ImportLogError
 from cosim.logs.column_map import ColumnMap
@@ -17,7 +18,10 @@ from cosim.simulation.signals import Array
 
 # quantity, fields with [] for numbered ones; the fields' units are of SI, their frames NED and FRD
 _TOPICS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
-    "vehicle_attitude": (("attitude", ("q[0]", "q[1]", "q[2]", "q[3]")), ("rates", ("rollspeed", "pitchspeed", "yawspeed"))),
+    "vehicle_attitude": (
+        ("attitude", ("q[0]", "q[1]", "q[2]", "q[3]")),
+        ("rates", ("rollspeed", "pitchspeed", "yawspeed")),
+    ),
     "vehicle_angular_velocity": (("rates", ("xyz[0]", "xyz[1]", "xyz[2]")),),
     "vehicle_local_position": (("position", ("x", "y", "z")), ("velocity_world", ("vx", "vy", "vz"))),
     "sensor_combined": (
@@ -82,14 +86,15 @@ def _take(data: Any, contents: LogContents, name: str) -> None:
     """Take the samples of a topic."""
     fields: dict[str, Array] = data.data
     times = np.asarray(fields["timestamp"], float) * 1e-6
-    valid = np.ones(len(times), bool)
+    valid: NDArray[np.bool_] = np.ones(len(times), bool)
     if data.name == "distance_sensor" and "orientation" in fields:
         valid &= fields["orientation"] == _DOWNWARDS
     for quantity, columns in _TOPICS[data.name]:
         here = [column for column in columns if column in fields]
         if quantity in ("pulses", "effort"):
             values = np.column_stack([np.asarray(fields[c], float) for c in here]) if here else np.empty((0, 0))
-            here = [c for c, used in zip(here, np.isfinite(values).any(axis=0), strict=True) if used]
+            used = np.asarray(np.isfinite(values).any(axis=0)).tolist()
+            here = [column for column, is_used in zip(here, used, strict=True) if is_used]
         elif len(here) < len(columns):
             continue
         if not here or not valid.any():

@@ -46,7 +46,9 @@ def _figures(data: FigureData) -> Iterator[tuple[str, str, Callable[[FigureData]
         )
     if targets_of(data):
         moved += " Diamonds: the targets before the last one, numbered as they were commanded."
-    way = "" if data.scenario.log else "; the path is in a criterion's colour while the arbiter gives way to its regions"
+    way = (
+        "" if data.scenario.log else "; the path is in a criterion's colour while the arbiter gives way to its regions"
+    )
     after = dict.fromkeys(("5a", "5b", "7"), "") if data.scenario.log else _AFTER
     if is_known(data):
         yield (

@@ -181,19 +181,14 @@ def test_sticks_are_the_commands_where_no_servo_output_is_logged(tmp_path):
     np.testing.assert_allclose(record["attitude.yaw"][20:-20], math.radians(30.0), rtol=1e-6)
 
 
-@pytest.mark.parametrize("cut", [0.3, 0.61803, 0.9])
-@pytest.mark.parametrize("path", [TLOG, DATAFLASH])
+@pytest.mark.parametrize(("path", "cut"), [(TLOG, 0.3), (DATAFLASH, 0.61803), (DATAFLASH, 0.9)])
 def test_a_log_that_breaks_off_is_read_as_far_as_it_goes(tmp_path, path, cut, six_thrusters):
     data = path.read_bytes()
     (tmp_path / path.name).write_bytes(data[: int(cut * len(data))])
     vehicle = "bluerov2_heavy" if path is TLOG else six_thrusters
-    try:
-        run = cosim.import_log(tmp_path / path.name, vehicle, tmp_path / "run", report=False)
-    except ImportLogError as error:
-        assert cut == 0.3 and path is DATAFLASH, error  # which begins with its formats and parameters
-        assert not (tmp_path / "run").exists()
-    else:
-        assert np.isfinite(run.record["attitude.yaw"]).mean() > 0.9
+    run = cosim.import_log(tmp_path / path.name, vehicle, tmp_path / "run", report=False)
+    assert np.isfinite(run.record["attitude.yaw"]).mean() > 0.9
+    assert run.summary["simulated_time"] > (60.0 if path is TLOG else 5.0)
 
 
 def test_junk_within_a_log_costs_no_more_than_what_it_hides(tmp_path):

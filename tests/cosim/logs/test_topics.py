@@ -91,7 +91,9 @@ def test_what_is_no_number_is_left_out_and_counted(contents, tmp_path):
     assert np.isfinite(rows).all()
 
 
-@pytest.mark.parametrize(("quantity", "value"), [("rates", 80.0), ("depth", 2e4), ("pulses", 1.5e6), ("sticks", 1000.0)])
+@pytest.mark.parametrize(
+    ("quantity", "value"), [("rates", 80.0), ("depth", 2e4), ("pulses", 1.5e6), ("sticks", 1000.0)]
+)
 def test_a_size_that_cannot_be_is_a_wrong_unit(contents, tmp_path, quantity, value):
     with pytest.raises(ImportLogError, match=rf"it: {quantity} reaches .* expected at most .* check its unit"):
         cleaned(contents, tmp_path, quantity, np.arange(9.0), np.full((9, 3), value))
