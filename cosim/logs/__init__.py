@@ -3,9 +3,9 @@
 A reader in `formats` puts what a log says on disk; clocks are aligned, held values and bursts undone, gaps marked; rows
 of a record are made of that. Public: `import_log`.
 
-Imports: controller, io, mavlink.wire, plant_fmu, results, run, scenario, simulation, simulation.commands.
+Imports: controller, io, plant_fmu, results, run, scenario, simulation, simulation.commands.
 """
 
-from cosim.logs.import_log import import_log
+from cosim.logs.importing import import_log
 
 __all__ = ["import_log"]

@@ -20,6 +20,7 @@ CURVES = ("linear", "quadratic", "t200")
 PILOT_GAIN = 0.5  # part of the greatest wrench that full sticks give, as ArduSub has it at the start
 _MOTORS = 33  # SERVOn_FUNCTION of the first motor
 _MOST_MOTORS = 8
+_NEUTRAL = 1500.0  # us, of a T200
 
 
 @dataclass(frozen=True)
@@ -116,9 +117,10 @@ def _of_pulses(
             raise ImportLogError("--curve t200 needs the voltage, expected --voltage V: the log does not tell it")
 
         def thrust(values: Array, volts: Array) -> Array:
-            pulses = np.where(values[:, places] > 0.0, values[:, places], 1500.0)
+            pulses = np.where(values[:, places] <= 0.0, _NEUTRAL, values[:, places])  # 0: the output is off
             at = np.repeat(volts[:, None], len(places), axis=1)
-            return used * signs * force_of_pulse(pulses, at)
+            force: Array = used * signs * force_of_pulse(pulses, at)
+            return force
 
         words = f"pulses of {topic.name} by the T200's published curve, at {voltage}, cut at {VOLTAGES[0]:g} V"
         return Commands(topic.quantity, "thrusters", thrust, f"{words} and {VOLTAGES[-1]:g} V")

@@ -2,7 +2,7 @@
 
 A module that is put here is a format, known by the suffixes that it names.
 
-Imports: controller, io, logs, mavlink, mavlink.wire, simulation.
+Imports: mavlink.wire, plant_fmu, simulation.
 """
 
 from importlib import import_module

@@ -97,3 +97,11 @@ def test_what_pulses_need_is_named(vehicle, curve, what):
         commands_of(topic("pulses"), load_vehicle(vehicle), curve, "", {})
     with pytest.raises(ImportLogError, match="has 4 outputs, expected 8"):
         commands_of(topic("pulses", 4), HEAVY, None, "", {})
+
+
+@pytest.mark.parametrize("curve", ["linear", "quadratic", "t200"])
+def test_a_gap_of_pulses_is_a_gap_of_forces_and_an_output_that_is_off_gives_none(curve):
+    commands = commands_of(topic("pulses"), HEAVY, curve, "15 V", {})
+    pulses = np.array([[np.nan] * 16, [0.0] * 16, [1700.0] * 16])
+    forces = commands.forces(pulses, np.full(3, 15.0))
+    assert np.isnan(forces[0]).all() and not forces[1].any() and (forces[2] < -5.0).all()

@@ -56,7 +56,7 @@ def import_log(
     overwrite: bool = False,
     moved: Moved = lambda part: None,
 ) -> Run:
-    """Read a log of a vehicle and write it as a run folder.
+    r"""Read a log of a vehicle and write it as a run folder.
 
     Parameters
     ----------
@@ -101,10 +101,10 @@ def import_log(
     --------
     >>> import math, pathlib, cosim
     >>> rows = [f"{0.1 * k},{0.02 * k},{math.sin(0.1 * k)},0,0" for k in range(50)]
-    >>> _ = pathlib.Path("dive.csv").write_text("\\n".join(["t,depth,yaw,pitch,roll", *rows]))
+    >>> _ = pathlib.Path("dive.csv").write_text("\n".join(["t,depth,yaw,pitch,roll", *rows]))
     >>> _ = pathlib.Path("dive.toml").write_text(
-    ...     'time = { column = "t" }\\n[depth]\\ncolumns = ["depth"]\\n'
-    ...     '[attitude]\\ncolumns = ["yaw", "pitch", "roll"]\\neuler = "ZYX"\\n'
+    ...     'time = { column = "t" }\n[depth]\ncolumns = ["depth"]\n'
+    ...     '[attitude]\ncolumns = ["yaw", "pitch", "roll"]\neuler = "ZYX"\n'
     ... )
     >>> run = cosim.import_log("dive.csv", "bluerov2_heavy", "dive", columns="dive.toml", report=False)
     >>> run.summary["status"], len(run.record)
@@ -190,13 +190,8 @@ def _write(path: Path, contents: LogContents, scratch: Path, vehicle: Vehicle, w
         if name in topics and topics[name] is not command:
             contents.unread[f"{topics[name].name} ({name})"] += topics.pop(name).count
     start, end = span_of(topics)
-    told = (
-        f"{wanted.voltage:g} V"
-        if wanted.voltage
-        else f"the voltage of {topics['voltage'].name}"
-        if "voltage" in topics
-        else ""
-    )
+    told = f"the voltage of {topics['voltage'].name}" if "voltage" in topics else ""
+    told = f"{wanted.voltage:g} V" if wanted.voltage else told
     commands = commands_of(command, vehicle, wanted.curve, told, contents.parameters) if command else None
     hertz = wanted.rate or rate_of(topics)
     steps = max(1, math.floor((end - start) * hertz + 1e-6))
