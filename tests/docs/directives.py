@@ -10,7 +10,8 @@ The same for a page that is to be free of them stands in ``beside/PAGE.toml``, b
 ``given: PATH as NAME``                     a file of the repository is copied into the folder before
 ``file: NAME``                              the block is written into the folder
 ``setup sh`` or ``setup python``, lines     done before the block, or with a ``"PREFIX"`` before the first command so
-``scenario``, ``vehicle``, ``arbiter``, ``column map``      what a block of TOML is; with ``onto: NAME`` it is merged onto a shipped one
+``scenario``, ``vehicle``, ``arbiter``      what a block of TOML is; with ``onto: NAME`` it is merged onto a shipped one
+``column map``                              likewise, of the columns of a log
 ``scenes``                                  of a block of JSON: each line is a scene of a campaign
 ``commands of: SCENARIO``                     of a block of JSON: each line is a command that a run of it takes
 ``compile with: FLAGS``                     of a block of C
@@ -32,8 +33,8 @@ _KIND = re.compile(r"(scenario|vehicle|arbiter|column map|scenes)(?: onto: (\S+)
 _COMMANDS = re.compile(r"commands of: (\S+)")
 _SETUP = re.compile(r'setup (sh|python)(?: "([^"]+)")?\n(.*)', re.S)
 _WORDS = re.compile(
-    r"(page run|run with|not run|exits|given|file:|setup|scenario|vehicle|arbiter|column map|scenes|commands of|compile with|alone"
-    r"|slow)\b"
+    r"(page run|run with|not run|exits|given|file:|setup|scenario|vehicle|arbiter|column map|scenes|commands of"
+    r"|compile with|alone|slow)\b"
 )
 
 

@@ -278,3 +278,19 @@ def test_a_scenario_judges_a_log(tmp_path):
 def test_an_imported_run_cannot_be_run(tlog):
     with pytest.raises(CosimError, match=r"log is 'small\.tlog', expected none: a run that was imported cannot be run"):
         cosim.load_scenario(tlog.folder / "scenario.toml")
+
+
+@pytest.mark.slow
+def test_a_run_that_goes_out_as_telemetry_comes_back_as_it_was(tmp_path):
+    """Through our own MAVLink and back: what was flown, at the rates of the link."""
+    over = {"time.duration": 10.0, "vehicle": "bluerov2_heavy", "actuation.through": "thrusters"}
+    flown = cosim.run_scenario(cosim.load_scenario("depth-transit").replace(over), tmp_path / "flown", report=False)
+    (log,) = cosim.export_run(flown.folder, "tlog", tmp_path / "it.tlog")
+    back = cosim.import_log(log, "bluerov2_heavy", tmp_path / "back", report=False).record
+    for name, bound in (("position.x", 1e-5), ("velocity.u", 1e-6), ("attitude.yaw", 1e-7), ("velocity.r", 1e-7)):
+        expected = np.interp(back["time"], flown.record["time"], flown.record[name])
+        np.testing.assert_allclose(back[name], expected, atol=bound, err_msg=name)
+    thrust, said = flown.record["thrust[1]"], back["thrust[1]"]
+    every = np.interp(np.round(back["time"] / 0.2) * 0.2, flown.record["time"], thrust)
+    known = np.isfinite(said) & np.isclose(back["time"] % 0.2, 0.0, atol=1e-3)
+    assert np.median(np.abs(said - every)[known]) < 0.5  # N: pulses are whole microseconds

@@ -1,6 +1,8 @@
 """CSV and Parquet with column maps: units, frames, orders of Euler angles, clocks, and everything that can be wrong."""
 
 import datetime
+import subprocess
+import sys
 
 import numpy as np
 import pandas as pd
@@ -258,19 +260,18 @@ radius = 0.3
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_memory_stays_as_it_is_however_long_the_log_is(tmp_path):
-    """A log ten times as long takes no more memory than a tenth more."""
-    import subprocess
-    import sys
-
+    """A log that is eight times as long has 300 MB more of numbers, and takes no such memory."""
     (tmp_path / "map.toml").write_text(MAP)
     code = """
-import resource, sys, cosim
+import sys, cosim
 cosim.import_log(sys.argv[1], "bluerov2_heavy", sys.argv[2], columns=sys.argv[3], report=False)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+with open("/proc/self/status") as status:  # of this process alone
+    print(next(line.split()[1] for line in status if line.startswith("VmHWM")))
 """
     used = []
-    for seconds in (1_000.0, 10_000.0):
+    for seconds in (1_000.0, 8_000.0):
         path = tmp_path / f"{seconds:.0f}.csv"
         frame_of(Dive(np.arange(0.0, seconds, 0.02))).to_csv(path, index=False)
         done = subprocess.run(
@@ -278,4 +279,4 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
             capture_output=True, text=True, check=True,
         )  # fmt: skip
         used.append(int(done.stdout))
-    assert used[1] < 1.3 * used[0], used
+    assert used[1] - used[0] < 150_000, used  # kB
