@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from cosim.companion.options import CompanionOptions
     from cosim.errors import CosimError, RunError
     from cosim.export import export_run
+    from cosim.logs import import_log
     from cosim.mavlink.setup import Mavlink
     from cosim.mavlink.wire.endpoint import parse_endpoint
     from cosim.mavlink.wire.options import MavlinkOptions
@@ -61,6 +62,7 @@ __all__ = [
     "compare",
     "export_run",
     "generate_scenes",
+    "import_log",
     "list_scenarios",
     "load_run",
     "load_scenario",
@@ -84,6 +86,7 @@ _HOMES = {
     "companion.options": {"CompanionOptions"},
     "errors": {"CosimError", "RunError"},
     "export": {"export_run"},
+    "logs": {"import_log"},
     "mavlink.setup": {"Mavlink"},
     "mavlink.wire.endpoint": {"parse_endpoint"},
     "mavlink.wire.options": {"MavlinkOptions"},

@@ -29,3 +29,7 @@ class CommandError(CosimError):
 
 class ExportError(CosimError):
     """A run that cannot be written in another format."""
+
+
+class ImportLogError(CosimError):
+    """A log of a vehicle that cannot be read as a run."""

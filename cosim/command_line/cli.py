@@ -18,8 +18,8 @@ from cosim.command_line import (
     campaigns,
     companion,
     completion,
-    export,
     falsify,
+    import_export,
     mavlink,
     package,
     replay,
@@ -120,7 +120,7 @@ def _parser() -> argparse.ArgumentParser:
     calibrate = verbs.add_parser("calibrate", help="fit the force limit and lag that bring the paper's window about")
     calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
 
-    export.add_verb(verbs)
+    import_export.add_verbs(verbs)
     package.add_verb(verbs)
     scenes.add_verb(verbs)
     campaigns.add_verbs(verbs)
@@ -264,7 +264,8 @@ _VERBS = {
     "show": _show,
     "check": _check,
     "calibrate": _calibrate,
-    "export": export.export,
+    "import": import_export.import_,
+    "export": import_export.export,
     "package": package.package,
     "scenes": scenes.scenes,
     "ablate": campaigns.ablate,

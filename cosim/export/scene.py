@@ -91,6 +91,7 @@ class Scene:
         later = [(c["time"], c["region"], _shape(c["shape"])) for c in changes_of(excerpt.run, self.log)]
         # an obstacle that may come has its numbers from where it waits, far away
         waiting = {i + 1 for i, secondary in enumerate(scenario.regions) if secondary.is_dynamic}
+        waiting |= set() if scenario.has_goal else {0}
         all_shapes = [*enumerate(begun), *((i, shape) for _, i, shape in later)]
         limits = self._limits([shape for i, shape in all_shapes if i not in waiting])
         self.solids = tuple(self._solid(i, shape, limits) for i, shape in enumerate(begun))

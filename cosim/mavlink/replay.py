@@ -65,7 +65,7 @@ def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions,
     """
     if not (folder / SCENARIO).is_file():
         raise RunError(f"{folder}: holds no run ({SCENARIO} is missing)")
-    scenario, record = load_scenario(folder / SCENARIO), load_record(folder)
+    scenario, record = load_scenario(folder / SCENARIO, imported=True), load_record(folder)
     require_columns(scenario, record)
     known = set(names_of(scenario))  # what else a record has could stand between what is read side by side
     columns = [column for column in record.columns if column.name in known or column.name.startswith("law.")]

@@ -16,6 +16,7 @@ from cosim.replay.command_words import command_events
 from cosim.replay.steering import Log
 from cosim.results.run_result import Run
 from cosim.results.spans import Flags, Span, Spans
+from cosim.results.wording import IMPORTED
 from cosim.scenario.sensor_suite import SENSOR_NAMES
 from cosim.simulation.signals import Array
 
@@ -170,6 +171,7 @@ def _end(run: Run) -> Event:
         "interrupted": "The run was interrupted",
         "reset": "The run was reset",
         "killed": "The run was killed: its record ends here",
+        IMPORTED: "End of the log",
     }
     return Event(run.record.value("time", -1), "end", words.get(status, f"The run {status}"))
 

@@ -49,6 +49,7 @@ def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = Fa
         "title": scenario.title,
         "asked": asked(scenario),
         "law": scenario.law.name,
+        "imported": scenario.log,
         "step": scenario.time.step,
         "duration": scenario.time.duration,
         "ramp": scenario.arbiter.ramp,
@@ -95,7 +96,8 @@ def shape_of(shape: Shape, limits: Bounds) -> dict[str, Any]:
 
 def limits_of(scenario: Scenario) -> Bounds:
     """Return the corners of a box about the start and all regions that end somewhere, with as much room about them."""
-    regions = [scenario.goal_region, *(secondary.region for secondary in scenario.regions if not secondary.is_dynamic)]
+    goal = [scenario.goal_region] if scenario.has_goal else []
+    regions = [*goal, *(secondary.region for secondary in scenario.regions if not secondary.is_dynamic)]
     corners = [np.array(corner) for region in regions for corner in region.shape.bounds()]
     points = np.array([scenario.initial.position, *(corner for corner in corners if np.isfinite(corner).all())])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -124,7 +126,8 @@ def _region(scenario: Scenario, index: int, limits: Bounds) -> dict[str, Any]:
         "hard": region.hard,
         "gain": region.gain,
         "moves": region.name in scenario.moving,
-        "comes": bool(secondary and secondary.is_dynamic),  # is there only while it is shifted
+        # is there only while it is shifted; so is, never, the goal of a log that has none
+        "comes": secondary.is_dynamic if secondary else not scenario.has_goal,
         "unit": "rad" if of_attitude(region.shape) else "m",  # of its clearance
         "shape": shape_of(region.shape, limits),
     }

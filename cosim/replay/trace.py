@@ -82,17 +82,25 @@ def trace_of(run: Run) -> Trace:
     steps = sampled_rows(record, len(viewing.columns), telling, 1 + len(clearances), moments)
     names = [record.columns[i].name for i in viewing.picked]
     picked, missing = _read(record, names, steps)
+    rows, columns = viewing.extended(picked), viewing.columns
+    if scenario.log:  # what no log tells, such as weights, is not shown as a gap
+        told = [i for i in range(len(columns)) if i >= len(names) or missing[i] < len(record)]
+        rows, columns = rows[:, told], tuple(columns[i] for i in told)
     # the goal's shape at the start: what it came to stands in the changes
     begun = dataclasses.replace(scenario, goal=run.planned.goal)
-    header = header_of(begun, viewing.columns) | {
+    header = header_of(begun, columns) | {
         "verdict": verdict(summary),
         "status": summary["status"],
         "summary": {key: summary[key] for key in ("min_clearance", "reach_time", "settle_time")},
         "changes": changes,
         "events": [dataclasses.asdict(event) for event in events],
-        "gaps": {name: int(count) for name, count in zip(names, missing, strict=True) if count},
+        "gaps": {
+            name: int(count)
+            for name, count in zip(names, missing, strict=True)
+            if 0 < count < len(record) or (count and not scenario.log)
+        },
     }
-    return Trace(nan_to_none(header), viewing.extended(picked), steps)
+    return Trace(nan_to_none(header), rows, steps)
 
 
 def _read(record: Rows, names: Sequence[str], steps: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:

@@ -74,6 +74,7 @@ class Viewing:
         active = active_regions(self._criteria, memberships, weights, clearances, resting)
         inputs = picked[:, self._inputs]
         numbers = np.isfinite(inputs).all(axis=1)
+        active[np.isnan(picked[:, self._weights]).all(axis=1)] = np.nan  # nobody says whom the arbiter gives way to
         strengths = np.full((len(picked), len(self.columns) - len(self.picked) - 1), np.nan)
         if numbers.any():
             strengths[numbers] = np.column_stack(

@@ -10,6 +10,9 @@ import numpy as np
 
 from controller.laws import LAWS
 from cosim.replay.events import turns_of
+from cosim.report.log_contents import effort_of_log, log_remarks, log_tables, setting_of_log
+from cosim.report.table import Table
+from cosim.results.log_facts import IMPORT
 from cosim.results.paper_claims import paper_claims
 from cosim.results.record import PARTS, RECORD
 from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY, Run
@@ -20,16 +23,6 @@ from cosim.scenario.tables import Sensing
 from cosim.simulation.signals import Array
 
 _TURNS = 6  # of a criterion that a table names
-
-
-@dataclass(frozen=True)
-class Table:
-    """Texts in rows."""
-
-    title: str
-    head: tuple[str, ...]  # empty for a table of names and values
-    rows: tuple[tuple[str, ...], ...]
-    widths: tuple[float, ...]  # of the columns, relative
 
 
 @dataclass(frozen=True)
@@ -72,7 +65,9 @@ def contents_of(run: Run) -> Contents:
         claims=_claims(run),
         regions=_regions(run),
         numbers=tuple(
-            table for table in (_criteria(run), _goal(run), _effort(run), _estimates(run), _lyapunov(run)) if table
+            table
+            for table in (*log_tables(run), _criteria(run), _goal(run), _effort(run), _estimates(run), _lyapunov(run))
+            if table
         ),
         setting=_setting(run),
         scenario=run.scenario.toml(),
@@ -83,7 +78,8 @@ def contents_of(run: Run) -> Contents:
 
 
 def _remarks(run: Run) -> tuple[str, ...]:
-    names = [*(f"position.{axis}" for axis in "xyz"), "goal.clearance"]
+    names = [f"position.{axis}" for axis in "xyz"]
+    names += ["goal.clearance"] if run.scenario.has_goal else []
     names += [f"{secondary.region.name}.clearance" for secondary in run.scenario.regions]
     count, first = 0, math.inf
     for block in run.record.blocks(["time", *names]):
@@ -91,9 +87,9 @@ def _remarks(run: Run) -> tuple[str, ...]:
         if broken.any():
             count, first = count + int(np.count_nonzero(broken)), min(first, block["time"][np.argmax(broken)])
     if not count:
-        return ()
+        return log_remarks(run)
     many = f"{count} of {len(run.record)} rows of the record hold places or clearances that are no numbers"
-    return (f"{many}; the first is at {first:g} s. Figures have gaps there.",)
+    return (f"{many}; the first is at {first:g} s. Figures have gaps there.", *log_remarks(run))
 
 
 def _claims(run: Run) -> Table | None:
@@ -160,7 +156,7 @@ class _Violation:
 def _criteria(run: Run) -> Table | None:
     """Return when the arbiter gave way to regions of each criterion, and why this asks."""
     scenario = run.scenario
-    if not scenario.regions:
+    if not scenario.regions or scenario.log:
         return None
     turns, end = turns_of(run), run.record.value("time", -1)
     rows = []
@@ -189,16 +185,21 @@ def _goal(run: Run) -> Table:
         ("first within the goal [s]", number(s["reach_time"], 5) if s["reached"] else "never"),
         ("within it for good from [s]", number(s["settle_time"], 5) if s["settled"] else "never"),
         ("deepest in the goal, or nearest to its surface", nearest if math.isfinite(outside) else "no number"),
+    ]
+    rows = [
+        *(rows if run.scenario.has_goal else []),
         ("position at the end: north, east, down [m]", ", ".join(number(x, 4) for x in s["final_position"])),
         ("greatest speed through the ground [m/s]", number(s["max_speed"], 4)),
     ]
     if s["intersection"]:
         rows.append(("within the overlap of regions [s]", windows or "never"))
-    return Table("Goal and way", (), tuple(rows), (1.0, 1.0))
+    return Table("Goal and way" if run.scenario.has_goal else "Way", (), tuple(rows), (1.0, 1.0))
 
 
 def _effort(run: Run) -> Table:
     s = run.summary
+    if run.scenario.log:
+        return effort_of_log(s)
     factor = s["real_time_factor"]
     rows = (
         ("greatest force that the law asked for, norm [N]", number(s["max_force_asked"], 4)),
@@ -218,7 +219,9 @@ def _effort(run: Run) -> Table:
     return Table("Effort and course", (), rows, (1.0, 1.0))
 
 
-def _estimates(run: Run) -> Table:
+def _estimates(run: Run) -> Table | None:
+    if run.scenario.log:
+        return None
     s = run.summary
     names = (
         "weight less buoyancy, W − B [N]",
@@ -256,6 +259,8 @@ def _lyapunov(run: Run) -> Table | None:
 
 def _setting(run: Run) -> Table:
     s = run.scenario
+    if s.log:
+        return setting_of_log(run)
     through = "the thrusters" if s.actuation.through == "thrusters" else "the body directly, as a wrench"
     rows = [
         ("vehicle", f"{s.vehicle.title}. {s.vehicle.source}".strip()),
@@ -299,6 +304,8 @@ def _told(sensing: Sensing) -> str:
 def _repeating(run: Run) -> tuple[tuple[str, ...], str]:
     """Return the commands that repeat a run, and what they do."""
     again = ("cosim report . --format html,png", "cosim replay .")
+    if run.scenario.log:
+        return again, f"The run is imported from {run.scenario.log}: it cannot be repeated, but be shown again."
     if run.scenario.law.own:
         whose = f"The law that flew this run, {run.scenario.law.name}, is its user's own and in no file here"
         return again, f"{whose}: the run is repeated from where the law is, and can be shown again from here."
@@ -324,4 +331,6 @@ def _files(run: Run) -> tuple[tuple[str, str], ...]:
     ]
     if (run.folder / COMMANDS_LOG).exists():
         files.append((COMMANDS_LOG, "what was commanded, and when"))
+    if (run.folder / IMPORT).exists():
+        files.append((IMPORT, "where each signal is from, its rate and its gaps, and what was not read"))
     return tuple(files)

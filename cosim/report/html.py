@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from importlib import resources
 from string import Template
 
-from cosim.report.contents import Contents, Table
+from cosim.report.contents import Contents
+from cosim.report.table import Table
 from cosim.results.run_result import REPLAY
 
 

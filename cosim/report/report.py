@@ -70,4 +70,6 @@ def _with_figures(run: Run, data: FigureData, formats: Collection[str], folder: 
 def about(run: Run) -> str:
     """Return the run in a line."""
     s = run.scenario
+    if s.log:
+        return f"A log of {s.vehicle.title}, imported from {s.log}."
     return f"A run of the scenario {s.name}: {s.vehicle.title}, {s.law.name} law, {s.arbiter.engine} arbiter."

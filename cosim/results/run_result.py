@@ -15,6 +15,7 @@ from controller import LAWS
 from cosim.errors import RunError
 from cosim.io.strict_json import read_json
 from cosim.results.as_flown import scenario_as_flown
+from cosim.results.log_facts import IMPORT
 from cosim.results.record import RECORD, Record, load_record
 from cosim.results.required_columns import require_columns
 from cosim.results.summary import summarise
@@ -55,7 +56,7 @@ class Run:
     def files(self) -> dict[str, Path]:
         """Return those files of the run that exist, by what they are."""
         named = {"scenario": SCENARIO, "record": RECORD, "summary": SUMMARY, "report": REPORT, "replay": REPLAY}
-        named |= {"commands": COMMANDS_LOG}
+        named |= {"commands": COMMANDS_LOG, "import": IMPORT}
         return {what: self.folder / name for what, name in named.items() if (self.folder / name).exists()}
 
     def table(self) -> Any:
@@ -185,7 +186,7 @@ def load_run(path: Path) -> Run:
     """
     if not (path / SCENARIO).is_file():
         raise RunError(f"{path}: holds no run ({SCENARIO} is missing)")
-    scenario = load_scenario(path / SCENARIO)
+    scenario = load_scenario(path / SCENARIO, imported=True)
     status, wall_time = "killed", None
     if (path / SUMMARY).exists():
         scenario, status, wall_time = _concluded(path / SUMMARY, scenario)

@@ -72,6 +72,7 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
         "arbiter": scenario.arbiter.engine,
         "vehicle": scenario.vehicle.name,
         "status": status,
+        "has_goal": scenario.has_goal,
         "simulated_time": simulated,
         "reached": bool(visits),
         "reach_time": visits[0].start if visits else None,

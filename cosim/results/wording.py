@@ -9,6 +9,8 @@ from controller.regions.region_set import SHAPES
 from controller.regions.shape import Shape
 from cosim.scenario.scenario import Scenario
 
+IMPORTED = "imported"  # the status of a log's run
+
 
 def newtons(force: float) -> str:
     """Return a force [N] in four digits, such as ``26.82 kN``.
@@ -39,6 +41,8 @@ def asked(scenario: Scenario) -> str:
     str
         Plain text.
     """
+    if not scenario.has_goal:
+        return f"Imported from {scenario.log}, which has no goal and no regions to judge it by."
     start = ", ".join(f"{x:g}" for x in scenario.initial.position)
     regions = [
         f"{'within' if r.region.keep == 'in' else 'out of'} {r.region.name} ({r.criterion})" for r in scenario.regions
@@ -48,7 +52,8 @@ def asked(scenario: Scenario) -> str:
     centre = [sum(pair) / 2.0 for pair in zip(*scenario.goal.bounds(), strict=True)]
     at = f" about ({', '.join(f'{x:g}' for x in centre)}) m" if all(map(math.isfinite, centre)) else ""
     then = f", then to {len(scenario.goal_then)} more places in turn" if scenario.goal_then else ""
-    return f"From ({start}) m into the goal region, a {kind}{at}{then}{respecting}; {scenario.law.name} law."
+    by = f"{scenario.law.name} law" if not scenario.log else f"imported from {scenario.log}"
+    return f"From ({start}) m into the goal region, a {kind}{at}{then}{respecting}; {by}."
 
 
 def kind_of(shape: Shape) -> str:
@@ -102,6 +107,8 @@ def verdict(summary: dict[str, Any]) -> str:
     str
         Plain text.
     """
+    if not summary["has_goal"]:
+        return f"A log of {summary['simulated_time']:.1f} s, without goal and regions.{_of_commands(summary)}"
     if summary["settled"]:
         entered, settled = summary["reach_time"], summary["settle_time"]
         stayed = "and stayed" if settled == entered else f"and was in for good from {settled:.2f} s"
@@ -117,6 +124,8 @@ def verdict(summary: dict[str, Any]) -> str:
     if broken:
         but = "" if summary["hard_violated"] or not summary["hard"] else "kept every hard region but "
         kept = f"; it {but}violated {', '.join(broken)}."
+    if summary["status"] == IMPORTED:
+        return f"{goal}{kept}{_of_commands(summary)}"
     wanted, acted = newtons(summary["max_force_asked"]), newtons(summary["max_force"])
     force = f" The law asked for up to {wanted}" + ("." if wanted == acted else f"; up to {acted} acted.")
     if not math.isfinite(summary["max_force"]):
@@ -130,6 +139,14 @@ def verdict(summary: dict[str, Any]) -> str:
     commands = summary.get("commands", 0)
     steered = f" It was given {commands} command{'s' if commands > 1 else ''} on the way." if commands else ""
     return goal + kept + force + steered + ended
+
+
+def _of_commands(summary: dict[str, Any]) -> str:
+    """Return what the commands of a log ask for."""
+    force = summary["max_force_asked"]
+    if not math.isfinite(force):
+        return " It has no commands."
+    return f" Its commands ask for forces of up to {newtons(force)}."
 
 
 def _broken(summary: dict[str, Any], name: str) -> str:

@@ -17,6 +17,7 @@ from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
 from cosim.replay.pages import write_replay
 from cosim.report.report import FIGURES, write_report
+from cosim.results.log_facts import IMPORT
 from cosim.results.record import PARTS, RECORD, part_files, require_utf8
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import COMMANDS_LOG, REPLAY, REPORT, SCENARIO, SUMMARY, Run, load_run, open_run
@@ -61,7 +62,7 @@ class RunFolder:
 
     def discard(self) -> None:
         """Take away all that a run without a record has made. May be called twice."""
-        for name in (SCENARIO, VEHICLE_COPY, COMMANDS_LOG):
+        for name in (SCENARIO, VEHICLE_COPY, COMMANDS_LOG, IMPORT, RECORD):
             (self.path / name).unlink(missing_ok=True)
         shutil.rmtree(self.path / PARTS, ignore_errors=True)
         if self.created:
@@ -121,7 +122,7 @@ def claim(out: Path | None, scenario: Scenario, overwrite: bool = False) -> RunF
 
 def _remove_run(path: Path) -> None:
     """Remove what a run has made in its folder, and raise a RunError if the folder holds anything else."""
-    made = {SCENARIO, VEHICLE_COPY, COMMANDS_LOG, RECORD, PARTS, SUMMARY, REPORT, REPLAY, FIGURES}
+    made = {SCENARIO, VEHICLE_COPY, COMMANDS_LOG, IMPORT, RECORD, PARTS, SUMMARY, REPORT, REPLAY, FIGURES}
     odd = sorted(file.name for file in path.iterdir() if file.name not in made and not file.match("report*.*"))
     if odd or not (path / SCENARIO).is_file():
         what = f"{odd[0]!r}, which no run makes" if odd else "no run"

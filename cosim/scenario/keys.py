@@ -32,6 +32,10 @@ KEYS = {
         ", see [below](#titles); runs write it into their folder",
         default="none",
     ),
+    "log": Key(
+        "", "name of the log that a run was imported from",
+        "; `cosim import` writes it into the run folder, and no scenario with it can be run", default="none",
+    ),
     "compare": Key("", '`"paper"` puts the paper\'s claims beside the run'),
     "intersection": Key("", "names of the regions, to be kept out of, whose overlap is reported", default="all"),
     "tell_failures": Key("", "law and allocation are told when a thruster fails"),

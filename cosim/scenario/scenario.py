@@ -192,6 +192,16 @@ class Scenario:
         return not self.arbiter.file and self.arbiter.rules == "ordered" and self.criteria == PAPER
 
     @property
+    def log(self) -> str:
+        """Name of the log that a run was imported from; empty where it was simulated."""
+        return str(self.table["log"])
+
+    @property
+    def has_goal(self) -> bool:
+        """Whether there is a goal to judge by: a log may have come without one."""
+        return bool(self.table["goal"])
+
+    @property
     def goal_region(self) -> Region:
         """The goal as a region among others."""
         return Region("goal", self.goal, "in", self.goal_velocity)
@@ -215,7 +225,7 @@ class Scenario:
         return parameters(over.get("weight", v.weight), over.get("buoyancy", v.buoyancy), r_G, r_B)
 
 
-def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Scenario:
+def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = (), imported: bool = False) -> Scenario:
     """Load a shipped scenario by name, or any scenario by its file.
 
     Parameters
@@ -224,6 +234,8 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Sc
         Such as ``"paper"`` or ``"mine.toml"``.
     overrides : sequence of str
         ``key=value``, with dots between the keys and a TOML value; regions go by index or by name.
+    imported : bool
+        Allow that of a run that was imported from a log, which can be looked at and not be run.
 
     Returns
     -------
@@ -256,6 +268,8 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Sc
             table.pop("changed", None)
             titled = table
         scenario = validate_scenario(table, name)
+        if scenario.log and not imported:
+            raise ScenarioError(f"log is {scenario.log!r}, expected none: a run that was imported cannot be run")
         return scenario if table == titled else _with_changes(scenario, table, titled)
     except (PlantFmuError, ControllerError, ScenarioError) as error:
         raise ScenarioError(f"{text}: {error}") from error
@@ -301,7 +315,7 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
     check_texts(file)
     time = check_time(file.time)
     check_numbers(file)
-    goal, motion = check_goal(file.goal, file.commands.enabled, file.record.lyapunov)
+    goal, motion = check_goal(file)
     regions = check_regions(file.regions)
     criterion_entries, criteria = check_criteria(file.criteria)
     overlapping = check_intersection(file.intersection, regions)

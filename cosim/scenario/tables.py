@@ -204,8 +204,9 @@ class File:
     vehicle: str
     time: TimeEntry
     initial: Initial
-    goal: dict[str, Any]
+    goal: dict[str, Any] = field(default_factory=dict)  # none only where a log came without one
     title: str = ""
+    log: str = ""  # name of the file that the run was imported from
     changed: tuple[str, ...] = ()  # keys, since the title was written
     compare: Literal["", "paper"] = ""
     intersection: tuple[str, ...] = ()

@@ -69,7 +69,8 @@ class GoalMotion:
 
 def check_texts(file: File) -> None:
     """Raise `ScenarioError` unless a terminal only shows, and does not obey, the texts that come to it."""
-    for key, text in (("title", file.title), ("law.name", file.law.name), *(("changed", key) for key in file.changed)):
+    texts = (("title", file.title), ("log", file.log), ("law.name", file.law.name))
+    for key, text in (*texts, *(("changed", key) for key in file.changed)):
         good = text.isprintable() and len(text) <= MAX_TEXT
         _require(good, key, repr(text), f"one line of at most {MAX_TEXT} printable characters")
 
@@ -178,8 +179,16 @@ def check_commands(
     )
 
 
-def check_goal(table: dict[str, Any], commanded: bool, lyapunov: bool) -> tuple[Shape, GoalMotion]:
-    """Return the goal's shape, and how it moves; whether it is `commanded`, or V recorded, says what it cannot."""
+def check_goal(file: File) -> tuple[Shape, GoalMotion]:
+    """Return the goal's shape, and how it moves.
+
+    The run of a log may have none: then it is a sphere far away that nothing shows or judges by.
+    """
+    table = file.goal
+    if not table and file.log:
+        return Sphere(PARKED_POSITION, 1.0), GoalMotion()
+    if not table:
+        raise ScenarioError("file: table missing required field 'goal'")
     beside = ("velocity", "streamed", "then", "stay")
     shape = _shape({key: value for key, value in table.items() if key not in beside}, "goal")
     _require(not of_attitude(shape), "goal.type", repr(table["type"]), "a shape in space")
@@ -192,8 +201,10 @@ def check_goal(table: dict[str, Any], commanded: bool, lyapunov: bool) -> tuple[
     if motion.then:
         _require(not any(motion.velocity), "goal.velocity", motion.velocity, "0 0 0 beside goal.then")
         _require(not motion.streamed, "goal.streamed", "true", "false beside goal.then")
-        _require(not commanded, "commands.enabled", "true", "false beside goal.then: a mission says what is next")
-        _require(not lyapunov, "record.lyapunov", "true", "false beside goal.then: V is of one target")
+        _require(
+            not file.commands.enabled, "commands.enabled", "true", "false beside goal.then: a mission says what is next"
+        )
+        _require(not file.record.lyapunov, "record.lyapunov", "true", "false beside goal.then: V is of one target")
     return shape, motion
 
 

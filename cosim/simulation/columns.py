@@ -52,13 +52,29 @@ def names_of(scenario: Scenario) -> list[str]:
     list of str
         In the order of the row.
     """
+    return [column.name for column in columns_without_plant(scenario)]
+
+
+def columns_without_plant(scenario: Scenario) -> list[Column]:
+    """Return the columns of a run as `columns_of` does, from the vehicle's table of variables and a shipped law.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of a run.
+
+    Returns
+    -------
+    list of Column
+        In the order of the row.
+    """
     table = [v for v in variables(scenario.vehicle) if not v.local]
     outputs, flags, inputs = (
         [Channel(v.name, v.quantity.unit, v.description) for v in table if v.role in roles and v.type == kind]
         for roles, kind in ((("state", "output"), "real"), (("output",), "boolean"), (("input",), "real"))
     )
     law = LAWS.get(scenario.law.name)
-    return [column.name for column in _columns(scenario, outputs, flags, inputs, law.diagnostics if law else ())]
+    return _columns(scenario, outputs, flags, inputs, law.diagnostics if law else ())
 
 
 def _columns(

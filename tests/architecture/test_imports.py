@@ -20,7 +20,7 @@ MAY_IMPORT = {
 # the rooms of cosim from the ground up: each imports rooms above it in this list, and none below
 FLOORS = (
     *("io", "scenario", "simulation", "results", "batch", "ssp", "replay", "mavlink", "report", "export", "live"),
-    *("precheck", "run", "companion", "sitl", "campaigns", "command_line"),
+    *("precheck", "run", "logs", "companion", "sitl", "campaigns", "command_line"),
 )
 MOST_MODULES = 20  # in one room
 MOST_AT_THE_ROOT = 8  # modules of cosim
@@ -35,11 +35,13 @@ ONE_PLACE = {
     "foxglove_schemas_protobuf": {"cosim.export.mcap_writer", "cosim.export.foxglove_scene"},
     "google": {"cosim.export.foxglove_scene", "cosim.export.protobuf_table"},
     "libcosimpy": {"plant_fmu.importers.libcosim"},
-    "mcap": {"cosim.export.mcap_writer"},
+    "mcap": {"cosim.export.mcap_writer", "cosim.logs.formats.mcap"},
+    "mcap_ros2": {"cosim.logs.formats.mcap"},
     "mcap_protobuf": {"cosim.export.mcap_writer"},
     "numba": {"fuzzy_arbiter.export.compiled"},
     "pandas": {"cosim.results.run_result"},
-    "pymavlink": {"cosim.mavlink.wire.dialect"},
+    "pymavlink": {"cosim.mavlink.wire.dialect", "cosim.logs.formats.dataflash"},
+    "pyulog": {"cosim.logs.formats.ulog"},
     "rerun": {"cosim.export.rrd_writer"},
     "rich": {"cosim.command_line.watch", "cosim.live.watching.bars", "cosim.live.watching.picture"},
     "shtab": {"cosim.command_line.completion"},
@@ -57,7 +59,7 @@ OPTIONAL = {
     "fmu_manipulation_toolbox",
     "foxglove_schemas_protobuf",
 }
-OPTIONAL |= {"google", "libcosimpy", "mcap", "mcap_protobuf", "pandas", "rerun"}
+OPTIONAL |= {"google", "libcosimpy", "mcap", "mcap_protobuf", "mcap_ros2", "pandas", "pyulog", "rerun"}
 WANT_AN_EXTRA = {
     "cosim.export.mcap_writer",
     "cosim.export.rrd_writer",

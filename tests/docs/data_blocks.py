@@ -13,6 +13,7 @@ import tomli_w
 
 from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.live.command_desk import CommandDesk
+from cosim.logs.column_map import read_map
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands import CommandQueue
 from fuzzy_arbiter.formats import load
@@ -21,7 +22,12 @@ from plant_fmu.compiling.compiler import find_compiler
 from tests.docs.directives import PageError
 from tests.docs.pages import Block
 
-_LOADERS: dict[str, Callable[[str], object]] = {"scenario": load_scenario, "vehicle": load_vehicle, "arbiter": load}
+_LOADERS: dict[str, Callable[[str], object]] = {
+    "scenario": load_scenario,
+    "vehicle": load_vehicle,
+    "arbiter": load,
+    "column map": lambda name: read_map(Path(name)),
+}
 
 
 def whole(block: Block) -> str:

@@ -11,6 +11,7 @@ The same for a page that is to be free of them stands in ``beside/PAGE.toml``, b
 ``file: NAME``                              the block is written into the folder
 ``setup sh`` or ``setup python``, lines     done before the block, or with a ``"PREFIX"`` before the first command so
 ``scenario``, ``vehicle``, ``arbiter``      what a block of TOML is; with ``onto: NAME`` it is merged onto a shipped one
+``column map``                              likewise, of the columns of a log
 ``scenes``                                  of a block of JSON: each line is a scene of a campaign
 ``commands of: SCENARIO``                     of a block of JSON: each line is a command that a run of it takes
 ``compile with: FLAGS``                     of a block of C
@@ -28,12 +29,12 @@ REASONS = ("needs ", "takes ", "changes ", "formula", "drawing", "template ", "e
 _PREFIXED = re.compile(r'(page run with|run with|not run|exits)(?: "([^"]+)")?: (\S.*)')
 _GIVEN = re.compile(r"given: (\S+) as (\S+)")
 _NAMED = re.compile(r"(file|compile with): (\S.*)")
-_KIND = re.compile(r"(scenario|vehicle|arbiter|scenes)(?: onto: (\S+))?")
+_KIND = re.compile(r"(scenario|vehicle|arbiter|column map|scenes)(?: onto: (\S+))?")
 _COMMANDS = re.compile(r"commands of: (\S+)")
 _SETUP = re.compile(r'setup (sh|python)(?: "([^"]+)")?\n(.*)', re.S)
 _WORDS = re.compile(
-    r"(page run|run with|not run|exits|given|file:|setup|scenario|vehicle|arbiter|scenes|commands of|compile with|alone"
-    r"|slow)\b"
+    r"(page run|run with|not run|exits|given|file:|setup|scenario|vehicle|arbiter|column map|scenes|commands of"
+    r"|compile with|alone|slow)\b"
 )
 
 

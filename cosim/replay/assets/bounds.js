@@ -16,7 +16,7 @@ function placesOf(run) {
   const kept = places.flatMap((p) => cornersOf([p.map((x) => x - radius), p.map((x) => x + radius)]));
   const { shape } = run.header.regions[0]; // the goal
   const solid = surfaceOf(shape);
-  for (const t of solid ? [run.start, run.end] : []) {
+  for (const t of solid && isThere(solid.centre) ? [run.start, run.end] : []) {
     const at = Vec.add(solid.centre, run.shift(0, t));
     if (Vec.finite(at)) kept.push(...cornersOf([at.map((x) => x - solid.radius), at.map((x) => x + solid.radius)]));
   }

@@ -156,7 +156,8 @@ class Run {
 
   _isThere(region, row) {
     const { name, comes } = this.header.regions[region];
-    return !comes || ["x", "y", "z"].some((axis) => this.column(`${name}.shift.${axis}`)[row] !== 0);
+    // an imported log has no goal, and with it no shift of one
+    return !comes || (this.has(`${name}.shift.x`) && ["x", "y", "z"].some((axis) => this.column(`${name}.shift.${axis}`)[row] !== 0));
   }
 
   _between(t) {

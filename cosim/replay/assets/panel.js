@@ -135,6 +135,7 @@ class Panel {
 
   _weights() {
     const { section, heading } = this._section("Weights", "weights");
+    section.hidden = Boolean(this.run.header.imported); // no arbiter decided in a log
     heading.append(element("span", "note", "bar: weight, tick: attention asked"));
     this.weights = this.run.header.criteria.map(({ name, colour }, i) => {
       return [name, new BarRow(`${name} α${i + 1}`, hueOf(colour))];
@@ -144,6 +145,7 @@ class Panel {
 
   _rules() {
     const { section, heading } = this._section("Rules", "rules");
+    section.hidden = Boolean(this.run.header.imported);
     this.ruled = element("span", "note");
     heading.append(this.ruled);
     this.rules = this.run.header.rules.map((rule) => {
@@ -156,6 +158,7 @@ class Panel {
 
   _distances() {
     const { section, heading } = this._section("Distances", "distances");
+    section.hidden = this.run.header.imported && this.run.header.regions.length === 1;
     heading.append(element("span", "note", "most pressing first"));
     this.distances = this.run.header.regions.map((region, index) => {
       const item = element("li");

@@ -84,6 +84,9 @@ function activeWords(run, t) {
   const region = run.header.regions[index];
   const clearance = run.held(`${region.name}.clearance`, t);
   const asked = clearanceWords(clearance, region);
+  if (run.header.imported) {
+    return { index: -1, name: "imported", region: null, sentence: `Imported from ${run.header.imported}: no arbiter decided here.` };
+  }
   let sentence = `Nothing presses: the goal region alone steers, ${asked}.`;
   if (region.criterion) {
     const weight = run.held(`weight.${region.criterion}`, t);
@@ -140,10 +143,10 @@ function numbersAt(run, t) {
 
 /** Whether a run did all it was asked: "good", "bad" (a hard region violated, or never settled), or "fair". */
 function outcome(run) {
-  const { summary, regions } = run.header;
+  const { summary, regions, imported } = run.header;
   if (!summary) return "fair";
   const broken = regions.filter((region) => summary.min_clearance?.[region.name] < 0);
-  if (broken.some((region) => region.hard) || summary.settle_time === null) return "bad";
+  if (broken.some((region) => region.hard) || (summary.settle_time === null && !imported)) return "bad";
   return broken.length ? "fair" : "good";
 }
 
@@ -151,12 +154,13 @@ function outcome(run) {
 function troubles(run) {
   const { status } = run.header;
   const said = [];
-  if (status && status !== "completed") said.push(UNFINISHED[status] ?? `This run did not complete: it ${status}.`);
+  const { imported } = run.header;
+  if (status && status !== "completed" && !imported) said.push(UNFINISHED[status] ?? `This run did not complete: it ${status}.`);
   const missing = NEEDED.filter((name) => !run.has(name));
   if (missing.length) said.push(`The record has no ${missing.join(", ")}: the scene cannot be drawn.`);
   const kinds = ["clearance", "membership.", "weight.", "command.", "actuation.", "estimate.", "active", "rule."];
   const absent = kinds.filter((kind) => !run.header.signals.some(({ name }) => name.includes(kind)));
-  if (absent.length) said.push(`The record has no signals named ${absent.join(", ")}: what rests on them is left out.`);
+  if (absent.length && !imported) said.push(`The record has no signals named ${absent.join(", ")}: what rests on them is left out.`);
   if (!run.rows && status) said.push("The record has no row."); // a live run has none at first, and no status
   if (run.rows === 1 && status) said.push("The record has one row only: there is nothing to play.");
   const { gaps = {} } = run.header; // of the whole record, which may have more rows than the page

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 
 import matplotlib as mpl
@@ -13,6 +14,8 @@ from cosim.report.figures import time_series as over_time
 from cosim.report.figures.layout import FIGURE_STYLE
 from cosim.report.figures.style import FigureData, NamedFigure
 from cosim.report.figures.trajectory import is_known, targets_of
+
+_AFTER = {figure: f" (after Fig. {figure})" for figure in ("5a", "5b", "7")}  # of the paper
 
 
 def drawings(data: FigureData) -> Iterator[NamedFigure]:
@@ -43,51 +46,65 @@ def _figures(data: FigureData) -> Iterator[tuple[str, str, Callable[[FigureData]
         )
     if targets_of(data):
         moved += " Diamonds: the targets before the last one, numbered as they were commanded."
-    way = "; the path is in a criterion's colour while the arbiter gives way to a region of it"
+    way = (
+        "" if data.scenario.log else "; the path is in a criterion's colour while the arbiter gives way to its regions"
+    )
+    after = dict.fromkeys(("5a", "5b", "7"), "") if data.scenario.log else _AFTER
     if is_known(data):
         yield (
             "path-3d",
-            f"Path in space (after Fig. 5a), seen from the south-east{way}. Grey: its shadow on the deepest plane.",
+            f"Path in space{after['5a']}, seen from the south-east{way}. Grey: its shadow on the deepest plane.",
             in_space.path_3d,
         )
         yield (
             "path-plane",
-            f"Path from the side and from above (after Fig. 5b), with outlines of the regions: full to be kept out of, "
+            f"Path from the side and from above{after['5b']}, with outlines of the regions: full to be kept out of, "
             f"dashed to be kept within{way}.{moved}",
             in_space.path_plane,
         )
-    yield (
-        "position-error",
-        "Position error: distance from the middle of the goal over √3 (after Fig. 6; the quantity is assumed).",
-        over_time.position_error,
-    )
-    yield "attitude", "Attitude (after Fig. 7): Euler angles from NED to the body frame.", over_time.attitude
+    judged, imported = data.scenario.has_goal, bool(data.scenario.log)
+    if judged:
+        yield (
+            "position-error",
+            "Position error: distance from the middle of the goal over √3 (after Fig. 6; the quantity is assumed).",
+            over_time.position_error,
+        )
+    yield "attitude", f"Attitude{after['7']}: Euler angles from NED to the body frame.", over_time.attitude
     if data.summary["intersection_windows"]:
         yield (
             "weights-overlap",
             "Normalized weights around each overlap of regions (after Fig. 8; assumed).",
             over_time.weights_overlap,
         )
-    yield "weights", f"Memberships and weights of the criteria.{_zoom(data)}", over_time.weights
-    yield (
-        "clearance",
-        f"Clearance to the goal and to each region; red: below 0 it is violated, or the goal not reached.{_zoom(data)}",
-        over_time.clearance,
-    )
+    if not imported:
+        yield "weights", f"Memberships and weights of the criteria.{_zoom(data)}", over_time.weights
+    if judged:
+        red = "below 0 it is violated, or the goal not reached"
+        yield (
+            "clearance",
+            f"Clearance to the goal and to each region; red: {red}.{_zoom(data)}",
+            over_time.clearance,
+        )
     if data.scenario.commands.enabled:
         yield "control-mode", "Who steered, as it was commanded; grey where disarmed.", over_time.control_mode
-    yield (
-        "forces",
-        "Force on the body: its norm, as the law asks for it and as it acts; and what acts forward (X), to starboard "
-        "(Y) and down (Z).",
-        of_forces.forces,
-    )
-    yield "thrusters", of_forces.thruster_caption(data.scenario), of_forces.thrusters
-    yield (
-        "estimates",
-        "Estimates of φ in (12), weight less buoyancy and its levers along the body axes, against the truth (dotted).",
-        of_forces.estimates,
-    )
+    if imported:
+        yield "velocity", "Velocity over ground and angular velocity, body frame.", over_time.velocities
+    if math.isfinite(data.summary["max_force_asked"]):
+        who = "the log's commands ask" if imported else "the law asks"
+        yield (
+            "forces",
+            f"Force on the body: its norm, as {who} for it and as it acts; and what acts forward (X), to starboard "
+            "(Y) and down (Z).",
+            of_forces.forces,
+        )
+        yield "thrusters", of_forces.thruster_caption(data.scenario), of_forces.thrusters
+    if not imported:
+        yield (
+            "estimates",
+            "Estimates of φ in (12), weight less buoyancy and its levers along the body axes, against the truth "
+            "(dotted).",
+            of_forces.estimates,
+        )
     if data.summary["lyapunov"]:
         yield (
             "lyapunov",

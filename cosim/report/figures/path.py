@@ -186,7 +186,9 @@ def _targets(ax: Axes, way: SampledPath, view: Array) -> None:
 def _entries(data: FigureData, way: SampledPath) -> dict[str, Artist]:
     """Return what the legend of a picture in space tells, only of what there is."""
     shown = {secondary.criterion for secondary in data.scenario.regions}
-    entries: dict[str, Artist] = {"goal": Patch(color=GOAL_COLOUR, alpha=0.4)}
+    entries: dict[str, Artist] = {}
+    if data.scenario.has_goal:
+        entries["goal"] = Patch(color=GOAL_COLOUR, alpha=0.4)
     entries |= {c.name: Patch(color=c.colour, alpha=0.4) for c in data.scenario.criteria if c.name in shown}
     entries["path"] = Line2D([], [], color=PATH_COLOUR, linewidth=1.6)
     for i, criterion in enumerate(data.scenario.criteria):

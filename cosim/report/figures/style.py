@@ -111,10 +111,12 @@ def regions_of(scenario: Scenario) -> Iterator[tuple[Region, str]]:
     Yields
     ------
     (Region, str)
-        The goal first.
+        The goal first, if there is one.
     """
-    regions = [scenario.goal_region, *(secondary.region for secondary in scenario.regions)]
-    yield from zip(regions, colours_of_regions(scenario), strict=True)
+    goal, *colours = colours_of_regions(scenario)
+    if scenario.has_goal:
+        yield scenario.goal_region, goal
+    yield from zip((secondary.region for secondary in scenario.regions), colours, strict=True)
 
 
 @dataclass(frozen=True)

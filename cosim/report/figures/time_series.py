@@ -151,6 +151,21 @@ def attitude(data: FigureData) -> Figure:
     return figure
 
 
+def velocities(data: FigureData) -> Figure:
+    """Draw linear and angular velocity."""
+    groups = (("uvw", "velocity [m/s]", 0.1), ("pqr", "angular velocity [rad/s]", 0.05))
+    figure, axes = over_time(data, [1.7, 1.7], list("uvwpqr"))
+    entries: dict[str, Artist] = {}
+    for ax, (names, label, least) in zip(axes, groups, strict=True):
+        signals = {name: data.record[f"velocity.{name}"] for name in names}
+        for (name, signal), colour, dashes in zip(signals.items(), (BLUE, RED, GREEN), DASHES, strict=False):
+            entries[name] = curve(ax, data, signal, color=colour, linestyle=dashes)
+        ax.set_ylim(*limits_of(list(signals.values()), least=least))
+        ax.set_ylabel(label)
+    legend(figure, entries)
+    return figure
+
+
 def weights_overlap(data: FigureData) -> Figure:
     """Draw the weights around each window in which the regions overlap, at most the first three."""
     windows = data.summary["intersection_windows"][:_WINDOWS]

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import termios
 import time
+from pathlib import Path
 
 import pytest
 
@@ -256,6 +257,10 @@ VERBS = {  # {run}: a run folder
     "show": ["paper"],
     "check": ["paper"],
     "calibrate": [],
+    "import": [
+        str(Path(__file__).parents[2] / "data" / "logs" / "small.tlog"), "--vehicle", "bluerov2_heavy", "--no-report",
+        "--rate", "1", "--out", "out",
+    ],
     "export": ["{run}", "--to", "npz"],
     "package": ["paper", "--set", "arbiter.engine=closed"],
     "scenes": ["--count", "3"],

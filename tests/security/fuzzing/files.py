@@ -9,11 +9,17 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet as pq
+
 from controller import LAWS
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.scenes.scene_store import SceneStore
+from cosim.logs import import_log
+from cosim.logs.column_map import read_map
 from cosim.mavlink.wire.signing import read_key
 from cosim.scenario.scenario import load_scenario
 from fuzzy_arbiter import Arbiter
@@ -169,3 +175,58 @@ def state(seeds: Seeds) -> Case:
         plant.free(plant.deserialise(content))
 
     return Case((plant.serialise(plant.save()),), read)
+
+
+# ---- logs of vehicles ----------------------------------------------------------------------------------------------
+
+LOGS = ROOT / "tests" / "data" / "logs"
+MAP = (
+    b'time = { column = "t", unit = "ms" }\nworld = "ENU"\n[attitude]\ncolumns = ["yaw", "pitch", "roll"]\n'
+    b'euler = "ZYX"\nunit = "deg"\n[depth]\ncolumns = ["depth"]\nsign = -1\n'
+)
+TABLE = b"t,depth,yaw,pitch,roll\n0,1.5,90,0,1\n100,1.6,91,0,1\n200,1.7,,0,1\n300,1.8,93,0,1\n"
+
+
+def _log(seeds: Seeds, name: str, *contents: bytes, columns: bytes = b"") -> Case:
+    """Return the case of a log: it becomes a run, or is refused and leaves none."""
+    folder = seeds.folder()
+    (folder / "map.toml").write_bytes(columns)
+
+    def read(path: Path) -> None:
+        out = folder / "run"
+        try:
+            import_log(path, "bluerov2_heavy", out, columns=folder / "map.toml" if columns else None, report=False)
+        except KINDS:
+            assert not out.exists()
+            raise
+        shutil.rmtree(out)
+
+    return seeds.file(name, read, *contents)
+
+
+@reader("column map", "toml", "plant_fmu.toml_tables:read_toml", "plant_fmu.toml_tables:decode")
+def column_map(seeds: Seeds) -> Case:
+    return seeds.file("map.toml", read_map, MAP)
+
+
+@reader("table of a log", "text", "cosim.logs.formats.table:_batches")
+def table_of_a_log(seeds: Seeds) -> Case:
+    return _log(seeds, "it.csv", TABLE, columns=MAP)
+
+
+@reader("table of a log in Parquet", "parquet", "cosim.logs.formats.table:_batches")
+def parquet_of_a_log(seeds: Seeds) -> Case:
+    made = io.BytesIO()
+    pq.write_table(pa.csv.read_csv(io.BytesIO(TABLE)), made)
+    return _log(seeds, "it.parquet", made.getvalue(), columns=MAP)
+
+
+@reader("telemetry log", "bytes", "cosim.logs.formats.tlog:_frames", "cosim.mavlink.wire.framing:header_at")
+def telemetry_log(seeds: Seeds) -> Case:
+    return _log(seeds, "it.tlog", (LOGS / "small.tlog").read_bytes()[:40_000])
+
+
+@reader("dataflash log", "bytes", "cosim.logs.formats.dataflash:_messages", "cosim.logs.formats.dataflash:_learn")
+def dataflash_log(seeds: Seeds) -> Case:
+    data = (LOGS / "small.BIN").read_bytes()[:60_000]  # of a vehicle with six thrusters, which it now does not say
+    return _log(seeds, "it.bin", data.replace(b"FRAME_CONFIG", b"FRAME_CONFIX").replace(b"SERVO", b"SERVX"))

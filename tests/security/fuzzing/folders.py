@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -24,10 +24,12 @@ from cosim.campaigns.scenes.rows import SCHEMA
 from cosim.campaigns.store.folder import PLAN, RESULTS, SUMMARY
 from cosim.campaigns.store.parts import Parts
 from cosim.campaigns.store.results import Results
+from cosim.io.strict_json import json_text
 from cosim.replay.events import events_of
 from cosim.replay.page import is_page, write_page
 from cosim.replay.steering import changes_of
 from cosim.replay.trace import trace_of
+from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts, load_log_facts
 from cosim.results.record import PARTS, RECORD, load_record
 from cosim.results.run_result import _concluded, load_run, open_run
 from cosim.scenario.scenario import load_scenario
@@ -42,6 +44,13 @@ from tests.security.fuzzing.registry import SCENES, Case, Seeds, reader
 def summary(seeds: Seeds) -> Case:
     planned = load_run(seeds.run).planned
     return seeds.file("summary.json", lambda path: _concluded(path, planned), (seeds.run / "summary.json").read_bytes())
+
+
+@reader("facts of an imported run", "json", "cosim.io.strict_json:read_json", "cosim.results.log_facts:load_log_facts")
+def log_facts(seeds: Seeds) -> Case:
+    topic = TopicFacts("depth", "BARO", 9, 10.0, 0.3, 1, ((1.0, 2.0),), 0, 0, 0, 0)
+    facts = LogFacts("it.bin", 99, 0.5, 10.0, "pulses", (topic,), {"GPS": 3}, ("a remark",))
+    return seeds.file(IMPORT, lambda path: load_log_facts(path.parent), json_text(asdict(facts)).encode())
 
 
 @reader("commands of a run", "jsonl", "cosim.simulation.commands.sources:read_log")

@@ -1,0 +1,121 @@
+"""The clocks of a log: jumps of the writer's clock, and the vehicle's clock beside it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cosim.simulation.signals import Array
+
+_BACK = 1.0  # s; a step back by more is a jump, not a message out of order
+_AHEAD = 3600.0  # s; a step ahead by more is a jump, not a pause
+_PAUSE = 1.0  # s, that stands for a jump, of which nobody knows how long it took
+_WINDOW = 60.0  # s of the vehicle's clock, of which the quickest message counts
+_MOST_DRIFT = 5e-4  # of a clock; a fit that says more is of something else
+
+
+class Clock:
+    """Turns a clock that jumps into times that rise; each jump becomes a pause of one second.
+
+    Attributes
+    ----------
+    jumps : list of (float, float)
+        When [s, as turned], and by how much [s] the clock jumped.
+    """
+
+    def __init__(self) -> None:
+        self.jumps: list[tuple[float, float]] = []
+        self._shift, self._last = 0.0, math.nan
+
+    def time(self, said: float) -> float:
+        """Return the time [s] for what the clock says [s]; call it in the order of the log."""
+        time = said + self._shift
+        by = time - self._last
+        if by < -_BACK or by > _AHEAD:
+            self._shift += _PAUSE - by
+            time = self._last + _PAUSE
+            self.jumps.append((time, by))
+        if not time <= self._last:
+            self._last = time
+        return time
+
+    def times(self, said: Array) -> Array:
+        """Return the times for what the clock says, shape (n,)."""
+        turned: Array = np.asarray(said, float) + self._shift
+        first = 0
+        known = np.flatnonzero(np.isfinite(turned))
+        highest = np.maximum.accumulate(turned[known]) if known.size else turned[known]
+        before = np.concatenate([[self._last], highest[:-1]])
+        steps = turned[known] - before
+        while (odd := np.flatnonzero((steps[first:] < -_BACK) | (steps[first:] > _AHEAD))).size:
+            at = first + int(odd[0])
+            turned[known[at] :] += _PAUSE - steps[at]
+            self.jumps.append((float(turned[known[at]]), float(steps[at])))
+            self._shift += _PAUSE - float(steps[at])
+            highest = np.maximum.accumulate(np.concatenate([before[at : at + 1], turned[known[at:]]]))[1:]
+            before = np.concatenate([before[: at + 1], highest[:-1]])
+            steps = turned[known] - before
+            first = at + 1
+        if known.size:
+            self._last = float(np.fmax(self._last, turned[known].max()))
+        return turned
+
+
+class VehicleClock:
+    """Puts stamps of the vehicle's own clock on the clock of the log's writer.
+
+    A message is late, never early: of each minute, the quickest message tells how far the clocks are apart. A line
+    through these also tells the drift. A stamp that steps back means that the vehicle began anew.
+    """
+
+    def __init__(self) -> None:
+        self._last = -math.inf
+        self._restarts: list[float] = []  # on the writer's clock
+        self._offsets: list[dict[int, tuple[float, float]]] = [{}]  # by start of the vehicle and minute
+        self._lines: list[tuple[float, float]] | None = None
+
+    @property
+    def restarts(self) -> list[float]:
+        """When the vehicle's clock began anew [s]."""
+        return self._restarts
+
+    def put(self, stamp: float, written: float) -> None:
+        """Take a stamp [s] and when it was written [s], in the order of the log."""
+        if stamp < self._last - _BACK:
+            self._restarts.append(written)
+            self._offsets.append({})
+            self._last = stamp
+        self._last = max(self._last, stamp)
+        minutes, minute = self._offsets[-1], int(stamp // _WINDOW)
+        offset = written - stamp
+        if minute not in minutes or offset < minutes[minute][1]:
+            minutes[minute] = (stamp, offset)
+
+    def times(self, stamps: Array, written: Array) -> Array:
+        """Return times on the writer's clock, shape (n,), of stamps; of NaN, when it was written."""
+        if self._lines is None:
+            self._lines = [_line(minutes) for minutes in self._offsets]
+        lines = np.array(self._lines)
+        drift, offset = lines[np.searchsorted(self._restarts, written, "right")].T
+        return np.where(np.isnan(stamps), written, stamps * (1.0 + drift) + offset)
+
+    def words(self) -> str:
+        """Return how the clocks were aligned, in a sentence; empty where no stamp came."""
+        if not any(self._offsets):
+            return ""
+        drift = _line(self._offsets[0])[0]
+        told = f", drift {drift * 1e6:+.0f} ppm" if drift else ""
+        return f"the vehicle's clock is put on that of the log's writer by its quickest message of each minute{told}"
+
+
+def _line(minutes: dict[int, tuple[float, float]]) -> tuple[float, float]:
+    """Return drift and offset [s] of a clock from the least offset of each minute."""
+    if not minutes:
+        return 0.0, 0.0
+    stamps, offsets = np.array(sorted(minutes.values())).T
+    if len(stamps) >= 3:
+        drift, _ = np.polyfit(stamps - stamps.mean(), offsets, 1)
+        if abs(drift) < _MOST_DRIFT:
+            return float(drift), float((offsets - drift * stamps).min())
+    return 0.0, float(offsets.min())

@@ -1,0 +1,202 @@
+"""Column maps: TOML files that say which columns or fields are what, in which unit and frame."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from cosim.errors import ImportLogError
+from cosim.logs.frames import BODIES, UNITS, WORLDS, quaternions_of_angles, turn_quaternions
+from cosim.logs.quantities import QUANTITIES
+from cosim.logs.spool import LogContents
+from cosim.simulation.signals import Array
+from plant_fmu.errors import TableError
+from plant_fmu.toml_tables import decode, read_toml
+
+_ORDER = re.compile(r"[XYZ]{3}|[xyz]{3}")
+World = Literal["NED", "ENU", "NWU"]
+Body = Literal["FRD", "FLU", "RFU"]
+
+
+@dataclass(frozen=True)
+class TimeColumn:
+    """Where times stand."""
+
+    column: str
+    unit: Literal["s", "ms", "us", "ns", "iso8601"] = "s"
+
+
+@dataclass(frozen=True)
+class MappedQuantity:
+    """Where a quantity stands, and how."""
+
+    columns: tuple[str, ...] = ()
+    unit: str | None = None  # default: the one of SI
+    topic: str = ""  # of a bag
+    time: TimeColumn | None = None  # default: that of the map
+    euler: str = ""  # of angles: their axes in the order of the columns; capital letters: about the body as turned
+    quaternion: Literal["wxyz", "xyzw"] = "wxyz"  # where the scalar part stands
+    inverse: bool = False  # the attitude is from world to body
+    sign: Literal[1, -1] = 1  # -1 for a depth or an altitude that is counted the other way
+    world: World | None = None  # default: that of the map
+    body: Body | None = None  # default: that of the map
+
+
+@dataclass(frozen=True)
+class ColumnMap:
+    """A whole column map."""
+
+    time: TimeColumn | None = None
+    world: World = "NED"
+    body: Body = "FRD"
+    position: MappedQuantity | None = None
+    attitude: MappedQuantity | None = None
+    velocity_world: MappedQuantity | None = None
+    velocity: MappedQuantity | None = None
+    rates: MappedQuantity | None = None
+    altitude: MappedQuantity | None = None
+    depth: MappedQuantity | None = None
+    dvl: MappedQuantity | None = None
+    acceleration: MappedQuantity | None = None
+    gyro: MappedQuantity | None = None
+    heading: MappedQuantity | None = None
+    fix: MappedQuantity | None = None
+    thrust: MappedQuantity | None = None
+    effort: MappedQuantity | None = None
+    pulses: MappedQuantity | None = None
+    wrench: MappedQuantity | None = None
+    sticks: MappedQuantity | None = None
+    voltage: MappedQuantity | None = None
+
+    @property
+    def quantities(self) -> dict[str, MappedQuantity]:
+        """What is mapped, by the name of the quantity."""
+        found = {name: getattr(self, name, None) for name in QUANTITIES}
+        return {name: mapped for name, mapped in found.items() if mapped is not None}
+
+    def time_of(self, name: str) -> TimeColumn | None:
+        """Return where the times of a quantity stand."""
+        mapped = self.quantities[name]
+        return mapped.time or self.time
+
+    def put(self, contents: LogContents, name: str, times: Array, values: Array) -> None:
+        """Put samples of a quantity, as its columns have them, into the contents of a log.
+
+        Parameters
+        ----------
+        contents : LogContents
+            Receives them in SI units, NED and FRD.
+        name : str
+            Of the quantity.
+        times : ndarray, shape (n,)
+            [s].
+        values : ndarray, shape (n, columns)
+            In the map's unit and frame.
+        """
+        mapped = self.quantities[name]
+        source = contents.source(name, source_name(mapped), QUANTITIES[name].size or len(mapped.columns))
+        source.put_many(times, self._converted(name, mapped, values))
+
+    def _converted(self, name: str, mapped: MappedQuantity, values: Array) -> Array:
+        quantity = QUANTITIES[name]
+        world, body = mapped.world or self.world, mapped.body or self.body
+        if name == "attitude":
+            return _attitudes(mapped, values, world, body)
+        values = mapped.sign * values * UNITS[quantity.unit][mapped.unit or quantity.unit]
+        if quantity.frame:
+            turn = WORLDS[world] if quantity.frame == "world" else BODIES[body]
+            parts = [values[:, i : i + 3] @ turn.T for i in range(0, quantity.size, 3)]
+            values = np.hstack(parts)
+        return values
+
+
+def source_name(mapped: MappedQuantity) -> str:
+    """Return what a report calls the columns of a quantity."""
+    shown = ", ".join(mapped.columns[:3]) + (" ..." if len(mapped.columns) > 3 else "")
+    return f"{mapped.topic}: {shown}" if mapped.topic else shown
+
+
+def _attitudes(mapped: MappedQuantity, values: Array, world: str, body: str) -> Array:
+    known = np.isfinite(values).all(axis=1)
+    if mapped.euler:
+        angles = values[known] * UNITS["rad"][mapped.unit or "rad"]
+        _require_angles(mapped, angles)
+        quaternions = quaternions_of_angles(angles, mapped.euler)
+    else:
+        quaternions = values[known] if mapped.quaternion == "wxyz" else values[known][:, [3, 0, 1, 2]]
+        length = np.linalg.norm(quaternions, axis=1)
+        if (np.abs(length - 1.0) > 0.05).any():
+            worst = float(length[np.argmax(np.abs(length - 1.0))])
+            raise ImportLogError(
+                f"{source_name(mapped)}: quaternion of length {worst:.4g}, expected 1; for angles set euler"
+            )
+    if mapped.inverse:
+        quaternions = quaternions * np.array([1.0, -1.0, -1.0, -1.0])
+    result = np.full((len(values), 4), np.nan)
+    if known.any():
+        result[known] = turn_quaternions(quaternions, world, body)
+    return result
+
+
+def _require_angles(mapped: MappedQuantity, angles: Array) -> None:
+    most = float(np.abs(angles).max(initial=0.0))
+    if most > 2.0 * np.pi + 0.01:
+        raise ImportLogError(
+            f"{source_name(mapped)}: attitude reaches {most:.4g} rad, expected at most 6.293 rad: "
+            'check its unit, such as unit = "deg"'
+        )
+
+
+def read_map(path: Path) -> ColumnMap:
+    """Read a column map.
+
+    Parameters
+    ----------
+    path : Path
+        A TOML file.
+
+    Returns
+    -------
+    ColumnMap
+        Checked.
+
+    Raises
+    ------
+    ImportLogError
+        If it cannot be read, or a key is unknown, missing or cannot be.
+    """
+    try:
+        columns = decode(read_toml(path), ColumnMap)
+        for name, mapped in columns.quantities.items():
+            _check(name, mapped)
+        if not columns.quantities:
+            raise TableError("maps no quantity, expected tables such as [attitude], [depth] and [pulses]")
+    except TableError as error:
+        raise ImportLogError(f"{path}: {error}") from error
+    return columns
+
+
+def _check(name: str, mapped: MappedQuantity) -> None:
+    quantity = QUANTITIES[name]
+    size = 3 if mapped.euler else quantity.size
+    given = len(mapped.columns)
+    if size and given != size:
+        more = " (or 3 with euler)" if name == "attitude" and not mapped.euler else ""
+        raise TableError(f"{name}.columns has {given} names, expected {size}{more}: {quantity.what}")
+    if not given:
+        raise TableError(f"{name}.columns has no names, expected one for each thruster: {quantity.what}")
+    if mapped.euler and (name != "attitude" or not _valid_order(mapped.euler)):
+        raise TableError(
+            f"{name}.euler is {mapped.euler!r}, expected three axes of an attitude such as 'ZYX' for yaw, pitch, roll"
+        )
+    known = UNITS["rad" if mapped.euler else quantity.unit]
+    if mapped.unit is not None and mapped.unit not in known:
+        raise TableError(f"{name}.unit is {mapped.unit!r}, expected one of {', '.join(map(repr, known))}")
+
+
+def _valid_order(order: str) -> bool:
+    return _ORDER.fullmatch(order) is not None and order[0] != order[1] and order[1] != order[2]

@@ -1,0 +1,27 @@
+"""Formats of logs, one module each, which names its `LogFormat` as ``FORMAT``.
+
+A module that is put here is a format, known by the suffixes that it names.
+
+Imports: mavlink.wire, plant_fmu, simulation.
+"""
+
+from importlib import import_module
+from pkgutil import iter_modules
+
+from cosim.logs.format import LogFormat
+
+__all__ = ["FORMATS"]
+
+
+def _find_formats() -> dict[str, LogFormat]:
+    """Return the entry of each suffix."""
+    found: dict[str, LogFormat] = {}
+    for module in iter_modules(__path__):
+        entry = getattr(import_module(f"{__name__}.{module.name}"), "FORMAT", None)
+        if not isinstance(entry, LogFormat):
+            raise TypeError(f"{__name__}.{module.name} has no FORMAT, expected its LogFormat")
+        found |= dict.fromkeys(entry.suffixes, entry)
+    return found
+
+
+FORMATS: dict[str, LogFormat] = _find_formats()

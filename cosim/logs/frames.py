@@ -1,0 +1,108 @@
+"""From the frames and units of a log to SI, NED and FRD."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cosim.simulation.signals import Array
+
+WORLDS = {  # matrix from the named world frame to NED
+    "NED": np.eye(3),
+    "ENU": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
+    "NWU": np.diag([1.0, -1.0, -1.0]),
+}
+BODIES = {  # from the named body frame to FRD
+    "FRD": np.eye(3),
+    "FLU": np.diag([1.0, -1.0, -1.0]),
+    "RFU": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
+}
+UNITS = {  # of what SI has, by the unit that it becomes
+    "m": {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048},
+    "m/s": {"m/s": 1.0, "cm/s": 0.01, "mm/s": 0.001, "knot": 1852.0 / 3600.0},
+    "rad": {"rad": 1.0, "deg": math.pi / 180.0},
+    "rad/s": {"rad/s": 1.0, "deg/s": math.pi / 180.0, "mrad/s": 0.001},
+    "m/s2": {"m/s2": 1.0, "g": 9.80665, "mg": 0.00980665},
+    "Pa": {"Pa": 1.0, "hPa": 100.0, "mbar": 100.0, "kPa": 1000.0, "bar": 1e5},
+    "N": {"N": 1.0, "kgf": 9.80665, "kN": 1000.0},
+    "N, N m": {"N, N m": 1.0},
+    "us": {"us": 1.0, "ms": 1000.0},
+    "V": {"V": 1.0, "mV": 0.001},
+    "": {"": 1.0, "percent": 0.01, "permille": 0.001},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+}
+
+
+def quaternions_of_angles(angles: Array, order: str) -> Array:
+    """Return unit quaternions of Euler angles.
+
+    Parameters
+    ----------
+    angles : ndarray, shape (n, 3)
+        [rad], in the order of the letters.
+    order : str
+        Three axes. Capital letters: each turns about the body as turned so far, such as ``ZYX`` for yaw, pitch, roll.
+        Small letters: each turns about the world.
+
+    Returns
+    -------
+    ndarray, shape (n, 4)
+        From body to world, scalar first.
+    """
+    x, y, z, w = Rotation.from_euler(order, angles).as_quat().T
+    return np.column_stack([w, x, y, z])
+
+
+def turn_quaternions(quaternions: Array, world: str, body: str) -> Array:
+    """Return attitudes between other frames as attitudes from FRD to NED.
+
+    Parameters
+    ----------
+    quaternions : ndarray, shape (n, 4)
+        From the body frame `body` to the world frame `world`, scalar first.
+    world, body : str
+        Of `WORLDS` and `BODIES`.
+
+    Returns
+    -------
+    ndarray, shape (n, 4)
+        From FRD to NED, scalar first.
+    """
+    e0, e1, e2, e3 = quaternions.T
+    R = Rotation.from_quat(np.column_stack([e1, e2, e3, e0]))
+    turned = Rotation.from_matrix(WORLDS[world]) * R * Rotation.from_matrix(BODIES[body].T)
+    x, y, z, w = turned.as_quat().T
+    return np.column_stack([w, x, y, z])
+
+
+def euler_zyx(quaternions: Array) -> Array:
+    """Return roll, pitch and yaw [rad], shape (n, 3), of quaternions from body to world, shape (n, 4)."""
+    w, x, y, z = quaternions.T
+    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return np.column_stack([roll, pitch, yaw])
+
+
+def rotate_to_body(quaternions: Array, vectors: Array) -> Array:
+    """Return vectors of the world in the body frame, shape (n, 3), by quaternions from body to world, shape (n, 4)."""
+    w, r = quaternions[:, :1], -quaternions[:, 1:]
+    t = 2.0 * np.cross(r, vectors)
+    turned: Array = vectors + w * t + np.cross(r, t)
+    return turned
+
+
+def quaternion_of_angles(roll: float, pitch: float, yaw: float) -> Sequence[float]:
+    """Return the unit quaternion of roll, pitch and yaw [rad], scalar first; of one sample, without arrays."""
+    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
+    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
+    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )

@@ -1,0 +1,286 @@
+"""A log of a vehicle as a run folder, which report, replay and export read as any other."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.errors import ImportLogError, RunError
+from cosim.io.atomic_file import write_atomic
+from cosim.io.strict_json import json_text
+from cosim.logs.clocks import VehicleClock
+from cosim.logs.column_map import read_map
+from cosim.logs.forces import CURVES, Commands, commands_of
+from cosim.logs.format import LogFormat, Moved
+from cosim.logs.formats import FORMATS
+from cosim.logs.quantities import COMMANDS
+from cosim.logs.rows import RowMaker
+from cosim.logs.selection import rate_of, select_topics, span_of
+from cosim.logs.spool import LogContents
+from cosim.logs.topics import Topic
+from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts
+from cosim.results.record import MAX_ROWS
+from cosim.results.recorder import Recorder
+from cosim.results.run_result import Run
+from cosim.results.wording import IMPORTED
+from cosim.run.run_folder import claim, conclude
+from cosim.scenario.scenario import Scenario, load_scenario, validate_scenario
+from cosim.simulation.columns import columns_without_plant
+from cosim.simulation.signals import Array
+from plant_fmu import Vehicle, load_vehicle
+from plant_fmu.errors import printable
+from plant_fmu.installing import install_hint
+
+_KEPT = ("goal", "regions", "criteria", "arbiter", "intersection", "title")  # of a scenario that judges a log
+_UNREAD = 12  # kinds of messages that a report names
+
+
+def import_log(
+    log: str | Path,
+    vehicle: str | Path,
+    out: str | Path | None = None,
+    *,
+    scenario: str | Path | None = None,
+    columns: str | Path | None = None,
+    rate: float | None = None,
+    curve: str | None = None,
+    voltage: float | None = None,
+    report: bool = True,
+    overwrite: bool = False,
+    moved: Moved = lambda part: None,
+) -> Run:
+    r"""Read a log of a vehicle and write it as a run folder.
+
+    Parameters
+    ----------
+    log : str or Path
+        ``.bin``, ``.tlog``, ``.ulg``, ``.csv``, ``.parquet`` or ``.mcap``.
+    vehicle : str or Path
+        A shipped vehicle or a TOML file: whose thrusters the commands drive.
+    out : str or Path, optional
+        The run folder; it must not exist, or be empty. Default: a new one below ``runs``.
+    scenario : str or Path, optional
+        Its goal and regions judge the log. Default: none.
+    columns : str or Path, optional
+        The column map that ``.csv``, ``.parquet`` and ``.mcap`` need.
+    rate : float, optional
+        Rows a second [Hz]. Default: the least of 5, 10, 20, 25, 50, 100 and 200 that no state or command exceeds.
+    curve : str, optional
+        From pulse to force: ``linear``, ``quadratic`` or ``t200``. Default: that of the vehicle's table ``autopilot``.
+    voltage : float, optional
+        Of the thrusters' supply [V], in the place of what the log says.
+    report : bool
+        Write report and replay.
+    overwrite : bool
+        Replace a run that `out` holds.
+    moved : callable
+        Is told how much of the log has been read, 0 to 1.
+
+    Returns
+    -------
+    Run
+        Its status is ``"imported"``.
+
+    Raises
+    ------
+    ImportLogError
+        If the log cannot be read, is of another vehicle, or lacks what is needed. No folder is left.
+    RunError
+        If the folder cannot be written.
+    ScenarioError, VehicleError
+        If scenario or vehicle cannot be.
+
+    Examples
+    --------
+    >>> import math, pathlib, cosim
+    >>> rows = [f"{0.1 * k},{0.02 * k},{math.sin(0.1 * k)},0,0" for k in range(50)]
+    >>> _ = pathlib.Path("dive.csv").write_text("\n".join(["t,depth,yaw,pitch,roll", *rows]))
+    >>> _ = pathlib.Path("dive.toml").write_text(
+    ...     'time = { column = "t" }\n[depth]\ncolumns = ["depth"]\n'
+    ...     '[attitude]\ncolumns = ["yaw", "pitch", "roll"]\neuler = "ZYX"\n'
+    ... )
+    >>> run = cosim.import_log("dive.csv", "bluerov2_heavy", "dive", columns="dive.toml", report=False)
+    >>> run.summary["status"], len(run.record)
+    ('imported', 50)
+    """
+    path = Path(log)
+    try:
+        form = _format_of(path)
+        column_map = _map_of(form, columns)
+        craft = load_vehicle(Path(vehicle) if str(vehicle).endswith(".toml") else str(vehicle))
+        if curve is not None and curve not in CURVES:
+            raise ImportLogError(f"curve is {curve!r}, expected one of {', '.join(CURVES)}")
+        with tempfile.TemporaryDirectory(prefix="cosim-import-") as scratch:
+            contents = LogContents(Path(scratch))
+            try:
+                form.read(path, column_map, contents, moved)
+            except ModuleNotFoundError as error:
+                if not form.needs or (error.name or "").startswith("cosim"):
+                    raise
+                raise ImportLogError(f"needs {error.name}; {install_hint(*form.needs)}") from error
+            _require_vehicle(contents, craft)
+            folder = None if out is None else Path(out)
+            wanted = _Wanted(str(vehicle), scenario, folder, rate, curve, voltage, report, overwrite)
+            return _write(path, contents, Path(scratch), craft, wanted)
+    except ImportLogError as error:
+        raise ImportLogError(f"{path}: {error}") from error
+    except OSError as error:
+        raise ImportLogError(f"{path}: {error.strerror or error}") from error
+
+
+def _format_of(path: Path) -> LogFormat:
+    known = ", ".join(sorted(FORMATS))
+    form = FORMATS.get(path.suffix.lower())
+    if form is None:
+        raise ImportLogError(f"ends in {path.suffix!r}, expected one of {known}")
+    if not path.is_file():
+        raise ImportLogError("is a folder or a device, expected a file" if path.exists() else "no such file")
+    if not path.stat().st_size:
+        raise ImportLogError("is empty, expected a log")
+    return form
+
+
+def _map_of(form: LogFormat, columns: str | Path | None) -> Any:
+    if form.mapped and columns is None:
+        raise ImportLogError("needs a column map, expected --map FILE: it says which column is what")
+    if not form.mapped and columns is not None:
+        raise ImportLogError("a column map is given, expected none: its messages say what they are")
+    return None if columns is None else read_map(Path(columns))
+
+
+def _require_vehicle(contents: LogContents, vehicle: Vehicle) -> None:
+    """Refuse the log of another kind of vehicle."""
+    if contents.kind:
+        raise ImportLogError(f"is of a {printable(contents.kind)}, expected the log of an underwater vehicle")
+    frame = contents.frame.lower()
+    table = vehicle.autopilot
+    if frame and table is not None and frame != table.frame.lower():
+        raise ImportLogError(
+            f"the autopilot's frame is {printable(contents.frame)}, expected {table.frame} as vehicle "
+            f"{vehicle.name!r} has: another vehicle flew this log"
+        )
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """What the caller asked for."""
+
+    vehicle: str
+    scenario: str | Path | None
+    out: Path | None
+    rate: float | None
+    curve: str | None
+    voltage: float | None
+    report: bool
+    overwrite: bool
+
+
+def _write(path: Path, contents: LogContents, scratch: Path, vehicle: Vehicle, wanted: _Wanted) -> Run:
+    """Write what a log says as a run folder."""
+    topics, clock = select_topics(contents, scratch)
+    command = next((topics[name] for name in COMMANDS if name in topics), None)
+    for name in COMMANDS:
+        if name in topics and topics[name] is not command:
+            contents.unread[f"{topics[name].name} ({name})"] += topics.pop(name).count
+    start, end = span_of(topics)
+    told = f"the voltage of {topics['voltage'].name}" if "voltage" in topics else ""
+    told = f"{wanted.voltage:g} V" if wanted.voltage else told
+    commands = commands_of(command, vehicle, wanted.curve, told, contents.parameters) if command else None
+    hertz = wanted.rate or rate_of(topics)
+    steps = max(1, math.floor((end - start) * hertz + 1e-6))
+    if steps >= MAX_ROWS:
+        raise ImportLogError(f"lasts {end - start:.4g} s: {steps} rows at {hertz:g} Hz, expected less than {MAX_ROWS}")
+    through = commands.through if commands else "thrusters" if vehicle.n_thrusters else "wrench"
+    draft = _scenario(path, vehicle, wanted, through, steps, 1.0 / hertz)
+    volts = math.nan if wanted.voltage is None else wanted.voltage
+    columns = columns_without_plant(draft)
+    with RowMaker(draft, columns, topics, commands, volts, start) as maker:
+        first = next(maker.blocks())
+    flown = _from_first(draft, first, [column.name for column in columns])
+    facts = _facts(path, contents, topics, commands, clock, hertz, start)
+    folder = claim(wanted.out, flown, wanted.overwrite)
+    try:
+        recorder = Recorder(folder.path, columns)
+        with RowMaker(flown, columns, topics, commands, volts, start) as maker:
+            k = 0
+            for block in maker.blocks():
+                for row in block:
+                    recorder.observe(k, row)
+                    k += 1
+        recorder.close()
+        write_atomic(folder.path / IMPORT, json_text(dataclasses.asdict(facts)))
+        return conclude(folder.path, _flown_by(flown, contents), IMPORTED, None, wanted.report)
+    except OSError as error:
+        folder.discard()
+        raise RunError(f"{folder.path}: {error.strerror or error}") from error
+    except BaseException:
+        folder.discard()
+        raise
+
+
+def _scenario(path: Path, vehicle: Vehicle, wanted: _Wanted, through: str, steps: int, step: float) -> Scenario:
+    """Return the scenario of a log's run: the vehicle, and what it is judged by."""
+    table: dict[str, Any] = {"title": f"Imported from {printable(path.name)}"[:200]}
+    if wanted.scenario is not None:
+        given = load_scenario(wanted.scenario, ["commands.enabled=false"]).table
+        table |= {key: given[key] for key in _KEPT if key in given}
+        table["title"] = f"{table['title']}, imported from {printable(path.name)}"[:200]
+    table |= {
+        "vehicle": wanted.vehicle,
+        "log": printable(path.name),
+        "time": {"duration": steps * step, "step": step},
+        "initial": {"position": [0.0, 0.0, 0.0]},
+        "actuation": {"through": through},
+    }
+    return validate_scenario(table, printable(path.stem), vehicle)
+
+
+def _from_first(scenario: Scenario, rows: Array, names: list[str]) -> Scenario:
+    """Return a scenario that starts where the log does, as far as its first rows know it."""
+    initial = scenario.initial
+    for key, columns in (
+        ("position", [f"position.{a}" for a in "xyz"]),
+        ("quaternion", [f"quaternion.e{i}" for i in range(4)]),
+    ):
+        values = rows[:, [names.index(column) for column in columns]]
+        known = np.flatnonzero(np.isfinite(values).all(axis=1))
+        if known.size:
+            initial = dataclasses.replace(initial, **{key: tuple(values[known[0]].tolist())})
+    table = scenario.table | {"initial": dataclasses.asdict(initial)}
+    return validate_scenario(table, scenario.name, scenario.vehicle)
+
+
+def _flown_by(scenario: Scenario, contents: LogContents) -> Scenario:
+    name = contents.autopilot or "log"
+    return dataclasses.replace(scenario, law=dataclasses.replace(scenario.law, name=name))
+
+
+def _facts(
+    path: Path, contents: LogContents, topics: Mapping[str, Topic], commands: Commands | None, clock: VehicleClock,
+    hertz: float, start: float,
+) -> LogFacts:  # fmt: skip
+    """Return what a reader must know of where the run is from."""
+    remarks = list(contents.remarks)
+    if clock.words():
+        remarks.append(f"Clocks: {clock.words()}.")
+    return LogFacts(
+        printable(path.name), path.stat().st_size, start, hertz, commands.words if commands else "",
+        tuple(_told(topic, start) for topic in topics.values()),
+        {printable(name): count for name, count in contents.unread.most_common()},
+        tuple(printable(remark) for remark in remarks),
+    )  # fmt: skip
+
+
+def _told(topic: Topic, start: float) -> TopicFacts:
+    gaps = tuple((begin - start, end - start) for begin, end in topic.gaps[:_UNREAD])
+    return TopicFacts(
+        topic.quantity, printable(topic.name), topic.count, topic.rate, topic.longest, topic.gap_count, gaps,
+        topic.held, topic.burst, topic.late, topic.broken,
+    )  # fmt: skip

@@ -1,0 +1,85 @@
+"""Samples at the times of rows: interpolated where they are states, held where they are not, NaN in gaps."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from cosim.logs.spool import BLOCK
+from cosim.logs.topics import Topic
+from cosim.simulation.signals import Array
+
+_EXACT = 1e-6  # s; of seconds since 1970 a float64 holds a quarter of that
+
+
+class TopicReader:
+    """Reads a topic forward, a window at a time, and keeps no more of it than that.
+
+    Parameters
+    ----------
+    topic : Topic
+        To be read.
+    """
+
+    def __init__(self, topic: Topic) -> None:
+        self.topic = topic
+        self._file = topic.path.open("rb")
+        self._width = 1 + topic.size
+        self._rows: Array = np.empty((0, self._width))
+        self._more = True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        self._file.close()
+
+    def window(self, start: float, end: float) -> tuple[Array, Array]:
+        """Return times [s] and components from the last sample before `start` to the first one after `end`.
+
+        Each call begins no earlier than the one before.
+        """
+        while self._more and not (len(self._rows) and self._rows[-1, 0] > end):
+            block = np.fromfile(self._file, count=BLOCK * self._width).reshape(-1, self._width)
+            self._more = len(block) > 0
+            self._rows = np.vstack([self._rows, block])
+        first = max(0, int(np.searchsorted(self._rows[:, 0], start, "right")) - 1)
+        self._rows = self._rows[first:]
+        last = int(np.searchsorted(self._rows[:, 0], end, "right")) + 1
+        return self._rows[:last, 0], self._rows[:last, 1:]
+
+    def interpolated(self, at: Array) -> Array:
+        """Return the components at times (rising, shape (n,)) between samples, shape (n, size); NaN in gaps."""
+        times, values = self.window(float(at[0]), float(at[-1]))
+        result = np.full((len(at), self.topic.size), np.nan)
+        if not len(times):
+            return result
+        i = np.searchsorted(times, at + _EXACT, "right") - 1
+        j = np.minimum(i + 1, len(times) - 1)
+        i = np.maximum(i, 0)
+        on = np.abs(times[i] - at) <= _EXACT
+        inside = (times[i] <= at) & (at <= times[j]) & (times[j] - times[i] <= self.topic.longest)
+        span = np.where(times[j] > times[i], times[j] - times[i], 1.0)
+        part = np.where(on, 0.0, (at - times[i]) / span)[:, None]
+        good = inside | on
+        a, b = values[i], values[j]
+        if self.topic.quantity == "attitude":  # the shorter way; between close samples a chord is the arc
+            b = np.where((a * b).sum(axis=1, keepdims=True) < 0.0, -b, b)
+        mixed = a + part * (b - a)
+        if self.topic.quantity == "attitude":
+            mixed /= np.linalg.norm(mixed, axis=1, keepdims=True)
+        result[good] = mixed[good]
+        return result
+
+    def held(self, at: Array) -> tuple[Array, Array]:
+        """Return the last sample's components and time at times (rising), shapes (n, size) and (n,); NaN in gaps."""
+        times, values = self.window(float(at[0]), float(at[-1]))
+        result, when = np.full((len(at), self.topic.size), np.nan), np.full(len(at), np.nan)
+        if not len(times):
+            return result, when
+        i = np.searchsorted(times, at + _EXACT, "right") - 1
+        known = (i >= 0) & (at - times[np.maximum(i, 0)] <= self.topic.longest)
+        result[known], when[known] = values[i[known]], times[i[known]]
+        return result, when

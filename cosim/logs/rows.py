@@ -1,0 +1,179 @@
+"""From the topics of a log to rows of a record, block by block."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+
+from controller import VehicleState
+from cosim.logs.forces import Commands
+from cosim.logs.frames import euler_zyx, rotate_to_body
+from cosim.logs.resampling import TopicReader
+from cosim.logs.topics import Topic
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.environment import RegionEnvironment
+from cosim.simulation.signals import Array, Column
+
+BLOCK = 4096  # rows that are made at once
+_POSITION, _QUATERNION = [f"position.{a}" for a in "xyz"], [f"quaternion.e{i}" for i in range(4)]
+_WRENCH = "XYZKMN"
+_SENSORS = {  # quantity: columns, and that of the time of the sample
+    "depth": (("measured.depth",), "depth_sensor"),
+    "dvl": (tuple(f"measured.velocity.{a}" for a in "uvw"), "dvl"),
+    "altitude": (("measured.altitude",), "dvl"),
+    "acceleration": (tuple(f"measured.acceleration.{a}" for a in "xyz"), "imu"),
+    "gyro": (tuple(f"measured.angular_velocity.{a}" for a in "pqr"), "imu"),
+    "heading": (("measured.heading",), "compass"),
+    "fix": (tuple(f"measured.position.{a}" for a in "xyz"), "usbl"),
+}
+
+
+class RowMaker:
+    """Makes the rows of a record from topics.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of the run: its vehicle, and the regions to judge by.
+    columns : list of Column
+        Of the record.
+    topics : mapping of str to Topic
+        By quantity.
+    commands : Commands or None
+        What the log's commands are, as forces.
+    voltage : float
+        [V] where no topic tells it; NaN for none.
+    start : float
+        Time [s] of the first row, on the clock of the topics.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        columns: list[Column],
+        topics: Mapping[str, Topic],
+        commands: Commands | None,
+        voltage: float,
+        start: float,
+    ) -> None:
+        self._scenario, self._topics, self._commands = scenario, topics, commands
+        self._voltage, self._start = voltage, start
+        self._at = {column.name: i for i, column in enumerate(columns)}
+        self._stack = contextlib.ExitStack()
+        self._readers = {name: self._stack.enter_context(TopicReader(topic)) for name, topic in topics.items()}
+        self._judge = _Judge(scenario, self._at) if scenario.has_goal or scenario.regions else None
+
+    def __enter__(self) -> RowMaker:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def blocks(self) -> Iterator[Array]:
+        """Yield the rows of the whole run in order, each block of shape (n, columns)."""
+        step, rows = self._scenario.time.step, self._scenario.steps + 1
+        for first in range(0, rows, BLOCK):
+            yield self._block(np.arange(first, min(first + BLOCK, rows)) * np.float64(step))
+
+    def _block(self, time: Array) -> Array:
+        rows = np.full((len(time), len(self._at)), np.nan)
+
+        def put(names: tuple[str, ...] | list[str], values: Array) -> None:
+            rows[:, [self._at[name] for name in names]] = values
+
+        put(["time"], time[:, None])
+        at = time + self._start
+        self._put_motion(put, at)
+        for quantity, (names, sensor) in _SENSORS.items():
+            if quantity in self._readers:
+                values, when = self._readers[quantity].held(at)
+                put(names, values)
+                put([f"measured.time.{sensor}"], (when - self._start)[:, None])
+                if quantity == "altitude":
+                    put(["altitude"], values)
+        self._put_commands(put, at)
+        if self._judge is not None:
+            self._judge.put(rows)
+        return rows
+
+    def _put_motion(self, put: Callable[..., None], at: Array) -> None:
+        readers = self._readers
+        if "position" in readers:
+            put(_POSITION, readers["position"].interpolated(at))
+        elif "depth" in readers:
+            put(["position.z"], readers["depth"].interpolated(at))
+        quaternions = readers["attitude"].interpolated(at) if "attitude" in readers else None
+        if quaternions is not None:
+            put(_QUATERNION, quaternions)
+            put([f"attitude.{name}" for name in ("roll", "pitch", "yaw")], euler_zyx(quaternions))
+        if "velocity" in readers:
+            put([f"velocity.{a}" for a in "uvw"], readers["velocity"].interpolated(at))
+        elif "velocity_world" in readers and quaternions is not None:
+            over_ground = readers["velocity_world"].interpolated(at)
+            put([f"velocity.{a}" for a in "uvw"], rotate_to_body(quaternions, over_ground))
+        rates = readers.get("rates") or readers.get("gyro")
+        if rates is not None:
+            put([f"velocity.{a}" for a in "pqr"], rates.interpolated(at))
+
+    def _put_commands(self, put: Callable[..., None], at: Array) -> None:
+        if self._commands is None:
+            return
+        quantity = next(name for name in self._readers if name == self._commands.quantity)
+        values, _ = self._readers[quantity].held(at)
+        volts = np.full(len(at), self._voltage)
+        if "voltage" in self._readers and not np.isfinite(self._voltage):
+            volts = self._readers["voltage"].held(at)[0][:, 0]
+        forces = self._commands.forces(values, volts)
+        vehicle = self._scenario.vehicle
+        if self._commands.through == "wrench":
+            put([f"wrench.{a}" for a in _WRENCH], forces)
+            put([f"thrust[{i + 1}]" for i in range(vehicle.n_thrusters)], np.zeros((len(at), vehicle.n_thrusters)))
+            for kind in ("command", "actuation"):
+                put([f"{kind}.{a}" for a in _WRENCH], forces)
+            return
+        acting = np.clip(forces, vehicle.thrust_min, vehicle.thrust_max)
+        names = [str(i + 1) for i in range(vehicle.n_thrusters)]
+        put([f"thrust[{i}]" for i in names], forces)
+        put([f"thruster_force[{i}]" for i in names], acting)
+        put([f"wrench.{a}" for a in _WRENCH], np.zeros((len(at), 6)))
+        put([f"command.{a}" for a in _WRENCH], forces @ vehicle.thruster_matrix.T)
+        put([f"actuation.{a}" for a in _WRENCH], acting @ vehicle.thruster_matrix.T)
+        saturated = np.where(np.isnan(forces), np.nan, acting != forces)
+        put([f"thrust_saturated[{i}]" for i in names], saturated)
+        put(["allocation_saturated"], saturated.max(axis=1, keepdims=True, initial=0.0))
+
+
+class _Judge:
+    """Evaluates the goal and the regions of a scenario at the poses of rows."""
+
+    def __init__(self, scenario: Scenario, at: Mapping[str, int]) -> None:
+        names = [*(["goal"] if scenario.has_goal else []), *(s.region.name for s in scenario.regions)]
+        self._first = 0 if scenario.has_goal else 1
+        self._values = [at[f"{name}.value"] for name in names]
+        self._clearances = [at[f"{name}.clearance"] for name in names]
+        self._shifts = [at[f"{name}.shift.{a}"] for name in scenario.moving for a in "xyz"]
+        self._position, self._quaternion = [at[n] for n in _POSITION], [at[n] for n in _QUATERNION]
+        n = 1 + len(scenario.regions)
+        self._environment = RegionEnvironment(scenario)
+        self._evaluation = self._environment.empty_evaluation(np.zeros(n), np.zeros(n))
+        self._shift: Array = np.zeros((len(scenario.moving), 3))
+        self._health = np.ones(scenario.vehicle.n_thrusters)
+        self._time = at["time"]
+
+    def put(self, rows: Array) -> None:
+        """Write values, clearances and shifts into rows; NaN where the pose is not known."""
+        known = np.asarray(np.isfinite(rows[:, [*self._position, *self._quaternion]]).all(axis=1))
+        still = np.zeros(6)
+        for k, row in enumerate(rows):
+            self._environment.update_positions(float(row[self._time]), self._shift)
+            row[self._shifts] = self._shift.ravel()
+            if known[k]:
+                state = VehicleState(
+                    np.ascontiguousarray(row[self._position]), np.ascontiguousarray(row[self._quaternion]), still,
+                    self._health,
+                )  # fmt: skip
+                self._environment.evaluate(state, self._evaluation)
+                row[self._values] = self._evaluation.values[self._first :]
+                row[self._clearances] = self._evaluation.clearances[self._first :]

@@ -1,0 +1,124 @@
+"""Which sources of a log a run is made of, on one clock, and over which time."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from cosim.errors import ImportLogError
+from cosim.logs.clocks import VehicleClock
+from cosim.logs.quantities import COMMANDS, QUANTITIES
+from cosim.logs.spool import LogContents, Source
+from cosim.logs.topics import Topic, clean
+from cosim.simulation.signals import Array
+
+RATES = (5, 10, 20, 25, 50, 100, 200)  # Hz, one of which the rows have unless another is asked for
+_MOTION = ("attitude", "position", "depth")  # of which a log must have one
+_SEA_LEVEL, _SPECIFIC = 101325.0, 9800.0  # Pa, Pa/m: as ArduPilot turns pressure into depth
+_EDGE = 5.0  # s, at the start and at the end, in which not all of the motion may be known
+
+
+def select_topics(contents: LogContents, scratch: Path) -> tuple[dict[str, Topic], VehicleClock]:
+    """Select what a run is made of.
+
+    Parameters
+    ----------
+    contents : LogContents
+        Of the log. Receives as not read what is there twice, and remarks.
+    scratch : Path
+        Folder for the topics' files.
+
+    Returns
+    -------
+    dict of str to Topic, VehicleClock
+        By quantity; and the clock by which their times are.
+
+    Raises
+    ------
+    ImportLogError
+        If nothing tells of the motion.
+    """
+    clock = _vehicle_clock(contents)
+    topics: dict[str, Topic] = {}
+    for quantity in QUANTITIES:
+        source = contents.best(quantity)
+        for (of, name), other in contents.sources.items():
+            if of == quantity and other is not source and other.count:
+                contents.unread[f"{name} ({quantity})"] += other.count
+        if source is not None:
+            topics[quantity] = clean(source, clock.times, None, scratch)
+    _depth_of_pressure(contents, topics, clock, scratch)
+    if not any(name in topics for name in _MOTION):
+        what = ", ".join(f"{name} ({QUANTITIES[name].what})" for name in _MOTION)
+        raise ImportLogError(f"says nothing of the motion, expected one of {what}")
+    if not any(name in topics for name in COMMANDS):
+        contents.remarks.append(
+            "The log has no commands of thrusters: servo outputs, forces, a wrench or sticks. "
+            "Nothing can be identified from it."
+        )
+    for when in clock.restarts:
+        contents.remarks.append(f"The vehicle's clock began anew {when - span_of(topics)[0]:.1f} s after the start")
+    return topics, clock
+
+
+def span_of(topics: Mapping[str, Topic]) -> tuple[float, float]:
+    """Return when the rows begin and end [s]: where all of the motion is known, unless that would cost seconds."""
+    motion = [topics[name] for name in _MOTION if name in topics]
+    starts, ends = [topic.start for topic in motion], [topic.end for topic in motion]
+    start = max(starts) if max(starts) - min(starts) < _EDGE else min(starts)
+    end = min(ends) if max(ends) - min(ends) < _EDGE else max(ends)
+    return start, max(start, end)
+
+
+def _vehicle_clock(contents: LogContents) -> VehicleClock:
+    """Return the vehicle's clock, by all stamps in the order in which they were written."""
+    clock = VehicleClock()
+    stamped = [source for source in contents.sources.values() if next(_stamps(source), None) is not None]
+    if stamped:  # the source with the most stamps tells: others are of the same clock
+        best = max(stamped, key=lambda source: source.count)
+        for block in _stamps(best):
+            for stamp, written in block.tolist():
+                clock.put(stamp, written)
+    return clock
+
+
+def _stamps(source: Source) -> Iterator[Array]:
+    """Yield stamps and times of writing of a source that has stamps."""
+    for block in source.blocks():
+        known = block[~np.isnan(block[:, 0]), :2]
+        if not len(known):
+            return
+        yield known
+
+
+def _depth_of_pressure(contents: LogContents, topics: dict[str, Topic], clock: VehicleClock, scratch: Path) -> None:
+    """Turn pressure into depth as the autopilot does, where no depth is there itself."""
+    if "pressure" not in topics:
+        return
+    pressure = topics.pop("pressure")
+    if "depth" in topics:
+        contents.unread[f"{pressure.name} (pressure)"] += pressure.count
+        return
+    ground = contents.parameters.get("BARO2_GND_PRESS", contents.parameters.get("GND_ABS_PRESS2", math.nan))
+    gravity = contents.parameters.get("BARO_SPEC_GRAV", contents.parameters.get("GND_SPEC_GRAV", 1.0))
+    if not (math.isfinite(ground) and 0.0 < gravity < 10.0):
+        ground, gravity = _SEA_LEVEL, 1.0
+        contents.remarks.append("The log has no BARO2_GND_PRESS: depth is from 101325 Pa at the surface.")
+    scale = _SPECIFIC * gravity
+    source = contents.sources["pressure", pressure.name]
+
+    def deep(values: Array) -> Array:
+        return (values - ground) / scale
+
+    topics["depth"] = dataclasses.replace(clean(source, clock.times, deep, scratch), quantity="depth")
+
+
+def rate_of(topics: Mapping[str, Topic]) -> float:
+    """Return the least rate that no state or command exceeds."""
+    fast = max((t.rate for t in topics.values() if QUANTITIES[t.quantity].kind in ("state", "command")), default=0.0)
+    fast = fast or max(topic.rate for topic in topics.values())
+    return float(next((rate for rate in RATES if rate >= 0.98 * fast), RATES[-1]))

@@ -1,0 +1,245 @@
+"""Samples made fit for use: in the order of time, without repeats of held values, bursts spread, gaps counted."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.errors import ImportLogError
+from cosim.logs.quantities import QUANTITIES
+from cosim.logs.spool import Source
+from cosim.simulation.signals import Array
+
+Convert = Callable[[Array], Array]
+
+_EDGES = np.logspace(-6, 5, 4401)  # s, of a histogram of periods; neighbors differ by 0.6 %
+_AROUND = 8  # bins to either side of the median whose mean is the period
+_GAP_PERIODS, _LEAST_GAP = 3.0, 0.3  # a pause of more periods, and seconds, is a gap
+_LISTED = 100  # gaps that are named
+_RUNS, _REGULAR = 10, 0.6  # runs of equal values from which on, and part of them alike, by which values count as held
+_LONGEST_RUN = 1000  # samples
+_QUICK, _BURSTING = 0.2, 0.3  # part of the mean period, and of all samples that follow so quickly, of bursts
+
+
+@dataclass
+class Topic:
+    """A quantity of a log, ready to be read: its file has a time [s] and the components of each sample."""
+
+    quantity: str
+    name: str  # of its source
+    path: Path
+    size: int
+    count: int = 0
+    start: float = 0.0  # s
+    end: float = 0.0  # s
+    period: float = 0.0  # s, median
+    held: int = 0  # repeats of a value that were left out
+    burst: int = 0  # samples whose time was spread
+    late: int = 0  # samples that were left out because a later one had come
+    broken: int = 0  # samples with a number that is none
+    gap_count: int = 0
+    gaps: list[tuple[float, float]] = field(default_factory=list)  # s, begin and end of the longest ones
+
+    @property
+    def longest(self) -> float:
+        """The longest pause [s] that is no gap."""
+        return max(_GAP_PERIODS * self.period, _LEAST_GAP)
+
+    @property
+    def rate(self) -> float:
+        """Samples a second [Hz]."""
+        return 1.0 / self.period if self.period else 0.0
+
+
+def clean(source: Source, times: Callable[[Array, Array], Array], convert: Convert | None, folder: Path) -> Topic:
+    """Return a source's samples as a topic.
+
+    Parameters
+    ----------
+    source : Source
+        As read.
+    times : callable
+        From stamps and times of writing, each of shape (n,), to times [s].
+    convert : callable, optional
+        From components as read to those of the topic, shape (n, size) both.
+    folder : Path
+        For the topic's file.
+
+    Returns
+    -------
+    Topic
+        At least one sample.
+
+    Raises
+    ------
+    ImportLogError
+        If a component is so great that its unit or frame must be wrong.
+    """
+    topic = Topic(source.quantity, source.name, folder / f"{source.quantity}.topic", 0, broken=source.broken)
+    stretch, bursts = _survey(source, times)
+    spread = _spread(_timed(source, times), bursts, topic) if bursts else _timed(source, times)
+    periods, heap, last, first = _Periods(), list[tuple[float, float]](), -np.inf, True
+    previous, repeats = np.full(source.size, np.nan), 0
+    with topic.path.open("wb") as file:
+        for at, values in spread:
+            highest = np.maximum.accumulate(np.concatenate([[last], at]))[:-1]
+            rising = at > highest
+            topic.late += int(np.count_nonzero(~rising))
+            at, values = at[rising], values[rising]
+            if not at.size:
+                continue
+            last = float(at[-1])
+            fresh, repeats = _fresh(values, previous, repeats, stretch)
+            previous = values[-1]
+            topic.held += int(np.count_nonzero(~fresh))
+            at, values = at[fresh], values[fresh]
+            if not at.size:
+                continue
+            values = values if convert is None else convert(values)
+            _require_plausible(source, values)
+            steps = np.diff(at, prepend=np.nan if first else topic.end)
+            for i in np.flatnonzero(steps > _LEAST_GAP):
+                push = heapq.heappush if len(heap) < 10 * _LISTED else heapq.heappushpop
+                push(heap, (float(steps[i]), float(at[i])))
+            periods.add(steps)
+            topic.start = float(at[0]) if first else topic.start
+            first, topic.end, topic.size = False, float(at[-1]), values.shape[1]
+            topic.count += len(at)
+            np.column_stack([at, values]).tofile(file)
+    topic.period = periods.median()
+    topic.gap_count = periods.above(topic.longest)
+    topic.gaps = sorted((end - size, end) for size, end in heapq.nlargest(_LISTED, heap) if size > topic.longest)
+    return topic
+
+
+class _Periods:
+    """A histogram of the times between samples."""
+
+    def __init__(self) -> None:
+        self.counts: NDArray[np.int64] = np.zeros(len(_EDGES) + 1, np.int64)
+        self.sums: Array = np.zeros(len(_EDGES) + 1)
+
+    def add(self, steps: Array) -> None:
+        steps = steps[steps > 0.0]
+        bins = np.searchsorted(_EDGES, steps)
+        self.counts += np.bincount(bins, minlength=len(self.counts))
+        self.sums += np.bincount(bins, steps, minlength=len(self.sums))
+
+    def median(self) -> float:
+        total = int(self.counts.sum())
+        if not total:
+            return 0.0
+        middle = int(np.searchsorted(np.cumsum(self.counts), 0.5 * total))
+        near = slice(max(0, middle - _AROUND), middle + _AROUND + 1)
+        return float(self.sums[near].sum() / self.counts[near].sum())
+
+    def above(self, size: float) -> int:
+        return int(self.counts[np.searchsorted(_EDGES, size) + 1 :].sum())
+
+
+def _timed(source: Source, times: Callable[[Array, Array], Array]) -> Iterator[tuple[Array, Array]]:
+    for block in source.blocks():
+        yield times(block[:, 0], block[:, 1]), block[:, 2:]
+
+
+def _survey(source: Source, times: Callable[[Array, Array], Array]) -> tuple[int, float]:
+    """Return how many samples a value is held for, 1 for not at all; and the mean period [s] of bursts, 0 for none."""
+    runs: NDArray[np.int64] = np.zeros(_LONGEST_RUN + 1, np.int64)
+    steps_all, run = _Periods(), 1
+    previous, last, counted = np.full(source.size, np.nan), np.nan, 0
+    spans: list[float] = []
+    for at, values in _timed(source, times):
+        same = (values == np.vstack([previous, values[:-1]])).all(axis=1)
+        changes = np.flatnonzero(~same)
+        lengths = np.diff(np.concatenate([[-run], changes]))
+        lengths = lengths[1:] if counted == 0 else lengths
+        runs += np.bincount(np.minimum(lengths, _LONGEST_RUN), minlength=len(runs))
+        run = len(values) - int(changes[-1]) if changes.size else run + len(values)
+        steps = np.diff(at, prepend=last)
+        steps_all.add(steps)
+        spans.append(float(steps[(steps > 0.0) & (steps < 2.0)].sum()))
+        counted += int(np.count_nonzero(steps < 2.0))
+        previous, last = values[-1], at[-1]
+    stretch = _held_for(runs) if QUANTITIES[source.quantity].kind in ("sensor", "state") else 1
+    mean = sum(spans) / counted if counted else 0.0
+    quick_count = source.count - 1 - steps_all.above(_QUICK * mean) if mean else 0
+    bursting = mean > 0.0 and quick_count > _BURSTING * source.count and _comes_in_groups(source, times, 0.5 * mean)
+    return stretch, mean if bursting else 0.0
+
+
+def _comes_in_groups(source: Source, times: Callable[[Array, Array], Array], apart: float) -> bool:
+    """Return whether most samples have neighbors, where groups are so far apart [s]: a quick phase is no burst."""
+    groups = alone = 0
+    last = -np.inf
+    for at, _ in _timed(source, times):
+        begins = np.diff(at, prepend=last) > apart
+        groups += int(np.count_nonzero(begins))
+        alone += int(np.count_nonzero(begins[:-1] & begins[1:]))
+        last = at[-1]
+    return alone < 0.5 * groups
+
+
+def _held_for(runs: NDArray[np.int64]) -> int:
+    """Return how many samples a value is held for, by how often runs of each length come; 1 where it is not."""
+    total = int(runs.sum())
+    if total < _RUNS:
+        return 1
+    middle = int(np.searchsorted(np.cumsum(runs), 0.5 * total))
+    alike = int(runs[max(1, middle - 1) : middle + 2].sum())
+    return middle + 1 if middle >= 2 and alike >= _REGULAR * total else 1  # one more: lengths differ by one
+
+
+def _fresh(values: Array, previous: Array, repeats: int, stretch: int) -> tuple[NDArray[np.bool_], int]:
+    """Return which samples are new: those that differ from the one before, and each of so many that are equal."""
+    if stretch <= 1:
+        return np.ones(len(values), bool), 0
+    same = (values == np.vstack([previous, values[:-1]])).all(axis=1)
+    index = np.arange(len(values))
+    began = np.maximum.accumulate(np.where(same, -1 - repeats, index))  # where the run of equal values began
+    age = index - began
+    fresh: NDArray[np.bool_] = age % stretch == 0
+    return fresh, int(age[-1])
+
+
+def _spread(samples: Iterator[tuple[Array, Array]], period: float, topic: Topic) -> Iterator[tuple[Array, Array]]:
+    """Spread samples that came in bursts evenly: the last one of a burst is on time, the others were kept back."""
+    at, values = np.empty(0), None
+    before = np.nan
+    for more_at, more_values in samples:
+        at = np.concatenate([at, more_at])
+        values = more_values if values is None else np.vstack([values, more_values])
+        ends = np.flatnonzero(np.diff(at) > 0.5 * period)
+        if ends.size:
+            done = int(ends[-1]) + 1
+            yield _evenly(at[:done], before, period, topic), values[:done]
+            before, at, values = float(at[done - 1]), at[done:], values[done:]
+    if values is not None and at.size:
+        yield _evenly(at, before, period, topic), values
+
+
+def _evenly(at: Array, before: float, period: float, topic: Topic) -> Array:
+    ends = np.append(np.flatnonzero(np.diff(at) > 0.5 * period), len(at) - 1)
+    sizes = np.diff(ends, prepend=-1)
+    since = np.diff(at[ends], prepend=before)
+    with np.errstate(invalid="ignore"):
+        spacing = np.where(since < 2.0 * sizes * period, since / sizes, period)  # none of the first one: NaN
+    back = np.repeat(ends, sizes) - np.arange(len(at))
+    topic.burst += int(np.count_nonzero(back))
+    evened: Array = np.repeat(at[ends], sizes) - back * np.repeat(spacing, sizes)
+    return evened
+
+
+def _require_plausible(source: Source, values: Array) -> None:
+    most = QUANTITIES[source.quantity].most
+    size = float(np.abs(values).max(initial=0.0))
+    if not size <= most:
+        unit = QUANTITIES[source.quantity].unit
+        raise ImportLogError(
+            f"{source.name}: {source.quantity} reaches {size:.4g} {unit}".rstrip()
+            + f", expected at most {most:.4g}: check its unit and frame"
+        )

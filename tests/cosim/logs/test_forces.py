@@ -1,0 +1,107 @@
+"""Pulses, sticks and wrenches as forces: the maker's numbers, and the curves that a simulated autopilot flies by."""
+
+import numpy as np
+import pytest
+
+from cosim.errors import ImportLogError
+from cosim.logs.forces import channels_of, commands_of
+from cosim.logs.t200 import force_of_pulse
+from cosim.logs.topics import Topic
+from plant_fmu import load_vehicle
+from plant_fmu.autopilot import effort_of_pulse
+
+HEAVY = load_vehicle("bluerov2_heavy")
+
+
+def topic(quantity, size=16):
+    return Topic(quantity, "RCOU", None, size)
+
+
+@pytest.mark.parametrize(
+    ("pulse", "voltage", "kilograms"),  # of the maker's table; the middle ones are none of the points kept here
+    [
+        (1900, 10, 2.93), (1100, 12, -2.90), (1900, 12, 3.71), (1900, 14, 4.52), (1100, 16, -4.07), (1900, 16, 5.25),
+        (1900, 18, 6.02), (1900, 20, 6.72), (1500, 16, 0.0), (1700, 16, 1.82), (1300, 16, -1.44),
+    ],
+)  # fmt: skip
+def test_the_t200_gives_what_its_maker_measured(pulse, voltage, kilograms):
+    force = force_of_pulse(np.array([float(pulse)]), np.array([float(voltage)]))[0]
+    assert force == pytest.approx(kilograms * 9.80665, abs=1e-9)
+
+
+def test_the_t200_gives_more_at_more_voltage_and_nothing_about_neutral():
+    pulses = np.arange(1100.0, 1901.0, 5.0)
+    low, high = (force_of_pulse(pulses, np.full_like(pulses, volts)) for volts in (12.0, 15.3))
+    assert (np.diff(high) >= 0.0).all()
+    assert (np.abs(high) >= np.abs(low)).all()
+    assert not force_of_pulse(np.array([1470.0, 1530.0]), np.array([13.0, 13.0])).any()
+    assert np.isnan(force_of_pulse(np.array([np.nan, 1600.0]), np.array([15.0, np.nan]))).all()
+
+
+def test_pulses_give_the_forces_that_a_simulated_autopilot_gives_by_them():
+    commands = commands_of(topic("pulses"), HEAVY, None, "", {})
+    pulses = np.array([[1500.0, 1520.0, 1600.0, 1400.0, 1900.0, 1100.0, 1750.0, 1250.0, *[0.0] * 8]])
+    table = HEAVY.autopilot
+    expected = [40.0 * effort_of_pulse(table, -1)(pulse) for pulse in pulses[0, :8]]
+    np.testing.assert_allclose(commands.forces(pulses, np.array([np.nan]))[0], expected)
+    assert commands.through == "thrusters"
+
+
+def test_a_reversed_motor_pushes_the_other_way_also_by_the_curve_of_the_t200():
+    pulses = np.full((1, 16), 1600.0)
+    for curve in (None, "t200"):
+        plain, turned = (
+            commands_of(topic("pulses"), HEAVY, curve, "15 V", p).forces(pulses, np.array([15.0]))[0]
+            for p in ({}, {"MOT_3_DIRECTION": -1.0})
+        )
+        assert (plain < 0.0).all()  # the vehicle's signs
+        np.testing.assert_allclose(turned, plain * np.where(np.arange(8) == 2, -1.0, 1.0))
+
+
+def test_the_autopilot_says_which_output_drives_which_motor():
+    swapped = {f"SERVO{n}_FUNCTION": 33.0 + motor for n, motor in enumerate([1, 0, 2, 3, 4, 5, 6, 7], 1)}
+    assert channels_of(HEAVY.autopilot, HEAVY, swapped) == (2, 1, 3, 4, 5, 6, 7, 8)
+    six = {f"SERVO{n}_FUNCTION": 32.0 + n for n in range(1, 7)}
+    with pytest.raises(ImportLogError, match=r"drives 6 motors .* expected 8 as vehicle 'bluerov2_heavy' has"):
+        channels_of(HEAVY.autopilot, HEAVY, six)
+
+
+def test_efforts_and_forces_go_by_the_thrusters_limits():
+    values = np.array([[1.0, -1.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.25]])
+    effort = commands_of(topic("effort", 8), HEAVY, None, "", {}).forces(values, np.zeros(1))
+    np.testing.assert_allclose(effort, 40.0 * values)
+    assert (commands_of(topic("thrust", 8), HEAVY, None, "", {}).forces(values, np.zeros(1)) == values).all()
+    with pytest.raises(ImportLogError, match="commands of 6 thrusters, expected 8"):
+        commands_of(topic("thrust", 6), HEAVY, None, "", {})
+
+
+def test_sticks_and_wrenches_act_on_the_body():
+    sticks = commands_of(topic("sticks", 6), HEAVY, None, "", {})
+    surge = sticks.forces(np.array([[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]]), np.zeros(1))[0]
+    # four thrusters of 40 N at 45 degrees, of which ArduSub's first gain takes a half
+    np.testing.assert_allclose(surge, [0.5 * 4.0 * 40.0 * np.sqrt(0.5), 0, 0, 0, 0, 0], atol=1e-9)
+    assert sticks.through == "wrench"
+    wrench = np.arange(6.0)[None]
+    assert (commands_of(topic("wrench", 6), HEAVY, None, "", {}).forces(wrench, np.zeros(1)) == wrench).all()
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "curve", "what"),
+    [
+        ("odin", None, r"vehicle 'odin' has no table \[autopilot\]"),
+        ("bluerov2_heavy", "t200", "--curve t200 needs the voltage, expected --voltage"),
+    ],
+)
+def test_what_pulses_need_is_named(vehicle, curve, what):
+    with pytest.raises(ImportLogError, match=what):
+        commands_of(topic("pulses"), load_vehicle(vehicle), curve, "", {})
+    with pytest.raises(ImportLogError, match="has 4 outputs, expected 8"):
+        commands_of(topic("pulses", 4), HEAVY, None, "", {})
+
+
+@pytest.mark.parametrize("curve", ["linear", "quadratic", "t200"])
+def test_a_gap_of_pulses_is_a_gap_of_forces_and_an_output_that_is_off_gives_none(curve):
+    commands = commands_of(topic("pulses"), HEAVY, curve, "15 V", {})
+    pulses = np.array([[np.nan] * 16, [0.0] * 16, [1700.0] * 16])
+    forces = commands.forces(pulses, np.full(3, 15.0))
+    assert np.isnan(forces[0]).all() and not forces[1].any() and (forces[2] < -5.0).all()
