@@ -107,13 +107,18 @@ def companion(options: argparse.Namespace) -> int:
     scenario = load_scenario(options.scenario, options.overrides)
     key = read_key(options.signing_key) if options.signing_key else None
     with NetworkLink(endpoint, key, (options.system_id, _COMPONENT)) as link:
-        run = Companion(scenario, link, chosen).run(options.out, not options.no_report, _show)
+        companion = Companion(scenario, link, chosen)
+        untold = [companion.session.failsafes]
+
+        def show(state: str, missing: str) -> None:
+            if state != "waiting" and untold:
+                for line in untold.pop().text():
+                    tell(line)
+            tell(state.replace("_", " ") + ("" if missing == "nothing" else f", waits for {missing}"))
+
+        run = companion.run(options.out, not options.no_report, show)
     print_run(options, run, not options.no_report)
     return INTERRUPTED if run.summary["status"] == "interrupted" else 0
-
-
-def _show(state: str, missing: str) -> None:
-    tell(state.replace("_", " ") + ("" if missing == "nothing" else f", waits for {missing}"))
 
 
 def _position(text: str) -> tuple[float, float, float]:
