@@ -12,6 +12,7 @@ from controller.laws.deployable.gains import SPREADS
 from controller.regions.region_set import of_attitude
 from cosim.companion.link import AutopilotLink
 from cosim.companion.options import CompanionOptions
+from cosim.companion.outputs import SteerBy
 from cosim.companion.remote_vehicle import RemoteVehicle
 from cosim.companion.safety import State
 from cosim.companion.session import AutopilotSession
@@ -28,13 +29,29 @@ _RELEASE = 2.0  # s at the most, that letting go takes at the end
 _STEADY = 0.1  # m, of drift between two sources, up to which it is their noise
 
 
-def scenario_to_steer(scenario: Scenario) -> Scenario:
+# the autopilot has the thrusters: what one of them does is not what the law asked of it
+_NOT_ISOLATED = {"law.gains.failure_threshold": 0.0}
+# its velocity loop takes care of weight, moments, current and lag: what the law would find out of them is not so
+_NOT_ESTIMATED = _NOT_ISOLATED | {
+    "law.gains.effectiveness_estimation": 0.0,
+    "law.gains.lag_bound": 0.0,
+    "law.gains.adaptation": 0.0,
+    "law.gains.restoring_drift": 0.0,
+    "law.gains.restoring_bound": 1e-3,
+    "law.gains.moment_bound": 1e-3,
+    "law.gains.current_bound": 1e-3,
+}
+
+
+def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks") -> Scenario:
     """Return a scenario as the companion flies it: a step is a control period, and the state is what is reported.
 
     Parameters
     ----------
     scenario : Scenario
         As it is simulated.
+    steer_by : str
+        What the autopilot is told.
 
     Raises
     ------
@@ -49,10 +66,9 @@ def scenario_to_steer(scenario: Scenario) -> Scenario:
     period = scenario.time.control
     arbiter = max(1, round(scenario.time.arbiter / period)) * period
     duration = max(1, round(scenario.time.duration / period)) * period
-    # the autopilot has the thrusters: what one of them does is not what the law asked of it
-    without_isolation = {"law.gains.failure_threshold": 0.0} if scenario.law.name == "deployable" else {}
+    gains = _NOT_ESTIMATED if steer_by == "velocity" else _NOT_ISOLATED
     return scenario.replace(
-        without_isolation
+        (gains if scenario.law.name == "deployable" else {})
         | {
             "time.step": period,
             "time.arbiter": arbiter,
@@ -106,7 +122,7 @@ class Companion:
     """
 
     def __init__(self, scenario: Scenario, link: AutopilotLink, options: CompanionOptions) -> None:
-        self.scenario = scenario_to_steer(scenario)
+        self.scenario = scenario_to_steer(scenario, options.steer_by)
         self._options = options
         self.session = AutopilotSession(link, self.scenario.vehicle, options)
         self._reported = ("", "")

@@ -23,11 +23,11 @@ STEERED_IN: dict[SteerBy, Mode] = {"sticks": "stabilize", "wrench": "manual", "v
 
 _FULL = 1000.0
 _PITCH, _ROLL = 1, 2  # enabled_extensions
-_VELOCITY_ONLY = 0b110111000111  # type_mask
+_VELOCITY_ONLY, _YAW_RATE_IGNORED = 0b010111000111, 1 << 11  # type_mask
 _LOCAL_NED = 1
 _MOSTLY = 0.6  # of the greatest part that a thruster has in an axis, from which on it works for that axis
 _YAW_LAG = 0.3  # s, of an autopilot's rate loop
-_FASTEST = 0.5  # m/s, of a velocity that is asked for
+_FASTEST, _FASTEST_TURN = 0.5, 0.6  # m/s, rad/s, that are asked for
 _NEUTRAL: Array = np.zeros(6)
 
 
@@ -157,6 +157,12 @@ class VelocityLead:
         self._mass: Array = vehicle.mass + np.diag(vehicle.added_mass)[:3]
         self._linear, self._quadratic = vehicle.linear_damping[:3], vehicle.quadratic_damping[:3]
         self._lag = lag
+        self._yaw_inertia = float(vehicle.inertia[2, 2] + vehicle.added_mass[5, 5])
+
+    def yaw_rate(self, wrench: Array, state: ReportedState) -> float:
+        """Return the rate of yaw [rad/s], of at most 0.6 rad/s, by which a rate loop turns as the wrench would."""
+        asked = float(state.rates[2]) + _YAW_LAG * float(wrench[5]) / self._yaw_inertia
+        return min(max(asked, -_FASTEST_TURN), _FASTEST_TURN) if math.isfinite(asked) else 0.0
 
     def velocity(self, wrench: Array, state: ReportedState) -> Array:
         """Return the velocity [m/s, NED], shape (3,), of at most 0.5 m/s."""
@@ -170,10 +176,11 @@ class VelocityLead:
         return asked * min(1.0, _FASTEST / length) if length > 0.0 else asked
 
 
-def velocity_target(mavlink: Any, system: int, velocity: Array) -> Any:
-    """Return SET_POSITION_TARGET_LOCAL_NED with a velocity [m/s, NED] alone."""
+def velocity_target(mavlink: Any, system: int, velocity: Array, yaw_rate: float | None) -> Any:
+    """Return SET_POSITION_TARGET_LOCAL_NED with a velocity [m/s, NED] and a rate of yaw [rad/s], if there is one."""
     x, y, z = velocity.tolist()
+    mask = _VELOCITY_ONLY | (_YAW_RATE_IGNORED if yaw_rate is None else 0)
     zeros = (0.0,) * 3
     return mavlink.MAVLink_set_position_target_local_ned_message(
-        0, system, 1, _LOCAL_NED, _VELOCITY_ONLY, *zeros, x, y, z, *zeros, 0.0, 0.0
+        0, system, 1, _LOCAL_NED, mask, *zeros, x, y, z, *zeros, 0.0, yaw_rate or 0.0
     )

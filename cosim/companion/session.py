@@ -234,9 +234,11 @@ class AutopilotSession:
         """Return the message that asks for a wrench, and note what is in it."""
         m, system = self._mavlink, self.reported.system or 0
         if self._options.steer_by == "velocity":
+            turn = 0.0 if self.profile.name == "ardusub" else None
             if not still:
                 self.velocity[:] = self._lead.velocity(wrench, self.reported)
-            return velocity_target(m, system, self.velocity)
+                turn = None if turn is None else self._lead.yaw_rate(wrench, self.reported)
+            return velocity_target(m, system, self.velocity, turn)
         all_axes = self._options.steer_by == "wrench"
         self.sticks[:] = self._scale.sticks(wrench)
         if not all_axes:
