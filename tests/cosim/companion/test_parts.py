@@ -2,6 +2,7 @@
 
 import math
 import struct
+import time
 
 import numpy as np
 import pytest
@@ -10,11 +11,13 @@ from pymavlink.dialects.v20 import all as mavlink
 from cosim.companion.clock_sync import ClockSync
 from cosim.companion.failsafes import Failsafes
 from cosim.companion.frame_alignment import FrameAlignment, SceneOrigin
+from cosim.companion.link import NetworkLink
 from cosim.companion.outputs import VelocityLead, manual_control, scale_of, velocity_target
 from cosim.companion.safety import CONDITIONS, Observation, Supervisor
 from cosim.companion.vehicle_state import ReportedState
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.vehicle.profile import PROFILES
+from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.simulation.commands.commands import ManualControl
 from plant_fmu import load_vehicle
 from tests.cosim.mavlink.station import Station, scenario
@@ -245,3 +248,11 @@ def test_whole_numbers_of_a_px4_come_as_bits():
     (bits,) = struct.unpack("<f", struct.pack("<i", 3))
     failsafes.take(decoded(value_of("NAV_RCL_ACT", bits, kind=6)))
     assert failsafes.values == {"NAV_RCL_ACT": 3.0}
+
+
+def test_the_clock_of_a_simulated_autopilot_goes_as_fast_as_it_is_said_to():
+    with NetworkLink(parse_endpoint("udpout:127.0.0.1:14598"), speedup=5.0) as link:
+        before, wall = link.clock(), time.monotonic()
+        link.receive(0.1)  # a fiftieth of a second of the wall's
+        assert link.clock() - before >= 0.1
+        assert link.clock() == pytest.approx(5.0 * wall, abs=5.0 * (time.monotonic() - wall) + 1e-6)
