@@ -79,6 +79,10 @@ def add_verb(verbs: Any) -> None:
     verb.add_argument(
         "--timeout", type=number(0.1, 1e6), metavar="S", help="end if steering cannot begin in so many seconds"
     )
+    verb.add_argument(
+        "--speedup", type=number(0.01, 100.0), default=1.0, metavar="N",
+        help="of a simulated autopilot: its seconds a second of the wall clock (default: 1)",
+    )  # fmt: skip
     verb.add_argument("--allow-remote", action="store_true", help="let the link leave this machine")
     verb.add_argument("--signing-key", type=Path, metavar="FILE", help="sign with the key in this file")
     verb.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: runs/SCENARIO-TIME)")
@@ -106,14 +110,19 @@ def companion(options: argparse.Namespace) -> int:
     )  # fmt: skip
     scenario = load_scenario(options.scenario, options.overrides)
     key = read_key(options.signing_key) if options.signing_key else None
-    with NetworkLink(endpoint, key, (options.system_id, _COMPONENT)) as link:
-        run = Companion(scenario, link, chosen).run(options.out, not options.no_report, _show)
+    with NetworkLink(endpoint, key, (options.system_id, _COMPONENT), options.speedup) as link:
+        companion = Companion(scenario, link, chosen)
+        untold = [companion.session.failsafes]
+
+        def show(state: str, missing: str) -> None:
+            if state != "waiting" and untold:
+                for line in untold.pop().text():
+                    tell(line)
+            tell(state.replace("_", " ") + ("" if missing == "nothing" else f", waits for {missing}"))
+
+        run = companion.run(options.out, not options.no_report, show)
     print_run(options, run, not options.no_report)
     return INTERRUPTED if run.summary["status"] == "interrupted" else 0
-
-
-def _show(state: str, missing: str) -> None:
-    tell(state.replace("_", " ") + ("" if missing == "nothing" else f", waits for {missing}"))
 
 
 def _position(text: str) -> tuple[float, float, float]:

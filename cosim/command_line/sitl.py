@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from cosim.sitl.ports import PORTS
 
 if TYPE_CHECKING:
     from cosim.results.run_result import Run
+    from cosim.sitl.autopilot_link import AutopilotLink
 
 
 def add_verbs(verbs: Any) -> None:
@@ -49,6 +51,21 @@ def add_verbs(verbs: Any) -> None:
         "--record-rate", type=number(1e-3, 1e6), default=100.0, metavar="HZ",
         help="rows of the record a simulated second at the most (default: 100)",
     )  # fmt: skip
+    sitl.add_argument(
+        "--autopilot", metavar="ENDPOINT",
+        help="a port of the autopilot, such as tcp:127.0.0.1:5762: record its own estimate (ardupilot alone)",
+    )  # fmt: skip
+    sitl.add_argument(
+        "--dvl", type=number(0.1, 100.0), metavar="HZ",
+        help="tell it there, so many times a simulated second, the velocity over ground: VISION_POSITION_DELTA",
+    )  # fmt: skip
+    sitl.add_argument(
+        "--dvl-latency", type=number(0.0, 10.0), default=0.1, metavar="S", help="of those messages (default: 0.1)"
+    )
+    sitl.add_argument(
+        "--dvl-dropout", type=number(0.0, 1.0), default=0.0, metavar="PART",
+        help="part of those messages that do not come (default: 0)",
+    )  # fmt: skip
     sitl.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: runs/SCENARIO-TIME)")
     sitl.add_argument("--no-report", action="store_true", help="leave out the report, its figures and the replay")
 
@@ -60,25 +77,51 @@ def sitl(options: argparse.Namespace) -> int:
     from cosim.sitl.law import law_of_controls, law_of_pwm
     from cosim.sitl.server import JsonServer
 
+    _check(options)
     address = _address(options.host, options.port or PORTS[options.backend], options.allow_remote)
     chosen = FlightOptions(
         options.scenario, tuple(options.overrides), options.vehicle, options.out, options.record_rate,
         not options.no_report,
     )  # fmt: skip
     server: JsonServer | HilServer
+    link = None
     if options.backend == "px4":
         server = HilServer(Flights(chosen, options.backend, law_of_controls), address, options.timeout, tell)
         tell("waiting for PX4 on TCP {}:{}".format(*server.address))
     else:
-        server = JsonServer(Flights(chosen, options.backend, law_of_pwm), address, options.timeout, tell)
+        link = _autopilot_link(options)
+        flights = Flights(chosen, options.backend, lambda vehicle: law_of_pwm(vehicle, link))
+        server = JsonServer(flights, address, options.timeout, tell)
         tell("waiting for ArduPilot on UDP {}:{}".format(*server.address))
-    outcome = server.serve()
+    with contextlib.closing(link) if link is not None else contextlib.nullcontext():
+        outcome = server.serve()
     c = outcome.counts
     ignored = f"{c.malformed} datagrams malformed, {c.refused} of other senders"
-    say(options, f"{c.steps} steps, {c.resent} frames resent, {c.lost} lost; {ignored}")
+    say(options, f"{c.steps} steps after {c.waited} frames at rest, {c.resent} resent, {c.lost} lost; {ignored}")
     for run in outcome.runs:
         print_run(options, run, not options.no_report)
     return _code(outcome.runs)
+
+
+def _check(options: argparse.Namespace) -> None:
+    from cosim.errors import RunError
+
+    if options.dvl is not None and options.autopilot is None:
+        raise RunError("--dvl: nobody to tell it; expected --autopilot ENDPOINT too")
+    if options.autopilot is not None and options.backend == "px4":
+        raise RunError("--autopilot: supported with --backend ardupilot alone")
+
+
+def _autopilot_link(options: argparse.Namespace) -> AutopilotLink | None:
+    """Return the link to the autopilot's own port, if one is named."""
+    from cosim.mavlink.wire.endpoint import parse_endpoint
+    from cosim.sitl.autopilot_link import AutopilotLink, DvlOptions
+
+    if options.autopilot is None:
+        return None
+    endpoint = parse_endpoint(options.autopilot, options.allow_remote)
+    dvl = None if options.dvl is None else DvlOptions(options.dvl, options.dvl_latency, options.dvl_dropout)
+    return AutopilotLink(endpoint, dvl)
 
 
 def _code(runs: list[Run]) -> int:

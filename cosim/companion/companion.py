@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from controller.laws.deployable.gains import SPREADS
 from controller.regions.region_set import of_attitude
 from cosim.companion.link import AutopilotLink
 from cosim.companion.options import CompanionOptions
+from cosim.companion.outputs import SteerBy
 from cosim.companion.remote_vehicle import RemoteVehicle
 from cosim.companion.safety import State
 from cosim.companion.session import AutopilotSession
@@ -24,15 +26,32 @@ from cosim.scenario.tables import SecondaryRegion
 from cosim.simulation.master import Master
 
 _RELEASE = 2.0  # s at the most, that letting go takes at the end
+_STEADY = 0.1  # m, of drift between two sources, up to which it is their noise
 
 
-def scenario_to_steer(scenario: Scenario) -> Scenario:
+# the autopilot has the thrusters: what one of them does is not what the law asked of it
+_NOT_ISOLATED = {"law.gains.failure_threshold": 0.0}
+# its velocity loop takes care of weight, moments, current and lag: what the law would find out of them is not so
+_NOT_ESTIMATED = _NOT_ISOLATED | {
+    "law.gains.effectiveness_estimation": 0.0,
+    "law.gains.lag_bound": 0.0,
+    "law.gains.adaptation": 0.0,
+    "law.gains.restoring_drift": 0.0,
+    "law.gains.restoring_bound": 1e-3,
+    "law.gains.moment_bound": 1e-3,
+    "law.gains.current_bound": 1e-3,
+}
+
+
+def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks") -> Scenario:
     """Return a scenario as the companion flies it: a step is a control period, and the state is what is reported.
 
     Parameters
     ----------
     scenario : Scenario
         As it is simulated.
+    steer_by : str
+        What the autopilot is told.
 
     Raises
     ------
@@ -47,8 +66,10 @@ def scenario_to_steer(scenario: Scenario) -> Scenario:
     period = scenario.time.control
     arbiter = max(1, round(scenario.time.arbiter / period)) * period
     duration = max(1, round(scenario.time.duration / period)) * period
+    gains = _NOT_ESTIMATED if steer_by == "velocity" else _NOT_ISOLATED
     return scenario.replace(
-        {
+        (gains if scenario.law.name == "deployable" else {})
+        | {
             "time.step": period,
             "time.arbiter": arbiter,
             "time.duration": duration,
@@ -101,7 +122,7 @@ class Companion:
     """
 
     def __init__(self, scenario: Scenario, link: AutopilotLink, options: CompanionOptions) -> None:
-        self.scenario = scenario_to_steer(scenario)
+        self.scenario = scenario_to_steer(scenario, options.steer_by)
         self._options = options
         self.session = AutopilotSession(link, self.scenario.vehicle, options)
         self._reported = ("", "")
@@ -164,8 +185,16 @@ class Companion:
             now = session.clock()
             session.exchange(np.zeros(6), now, now + period)
             self._report(on_state)
+            self._require_ears()
             if self._options.timeout is not None and now - begun > self._options.timeout:
                 raise RunError(f"{self._options.timeout:g} s have gone by, waiting for {session.missing()}")
+
+    def _require_ears(self) -> None:
+        """RunError if the autopilot would not take our sticks."""
+        o, session = self._options, self.session
+        deaf = session.failsafes.deaf_to(session.identity[0])
+        if deaf and o.steer_by != "velocity" and not o.dry_run:
+            raise RunError(f"{deaf}; expected the same number, or --steer-by velocity")
 
     def _steer(self, master: Master, recorder: Recorder, on_state: Callable[[State, str], None] | None) -> str:
         session = self.session
@@ -175,6 +204,8 @@ class Companion:
             for k in range(self.scenario.steps + 1):
                 master.step(k, session)
                 recorder.observe(k, master.row)
+                drift = session.alignment.drift
+                master.environment.doubt_positions(drift / SPREADS if drift > _STEADY else 0.0)
                 violated = clearances[self._hard]
                 session.outside = float(max(0.0, -np.nanmin(violated))) if np.isfinite(violated).any() else 0.0
                 self._report(on_state)

@@ -6,7 +6,10 @@ import time
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from cosim.mavlink.wire.ground_end import GroundLink, Heard
+from cosim.mavlink.wire.endpoint import Endpoint
+from cosim.mavlink.wire.ground_end import GroundLink, Heard, Identity
+
+COMPANION: Identity = (255, 191)  # MAV_COMP_ID_ONBOARD_COMPUTER of the ground station's system
 
 
 class AutopilotLink(Protocol):
@@ -29,7 +32,7 @@ class AutopilotLink(Protocol):
 
 
 class NetworkLink(GroundLink):
-    """An endpoint, by the wall clock.
+    """An endpoint, by the wall clock, or for a simulated autopilot by a faster or slower one.
 
     Parameters
     ----------
@@ -39,6 +42,8 @@ class NetworkLink(GroundLink):
         To sign with; then only what is signed with it is heard.
     identity : (int, int)
         System and component that the companion is.
+    speedup : float
+        Of a simulated autopilot: seconds of its clock a second of the wall's. A real one's is 1.
 
     Raises
     ------
@@ -53,10 +58,20 @@ class NetworkLink(GroundLink):
     []
     """
 
+    def __init__(
+        self, endpoint: Endpoint, key: bytes | None = None, identity: Identity = COMPANION, speedup: float = 1.0
+    ) -> None:
+        super().__init__(endpoint, key, identity)
+        self._speedup = speedup
+
     def __enter__(self) -> NetworkLink:
         return self
 
-    @staticmethod
-    def clock() -> float:
-        """Return `time.monotonic()` [s]."""
-        return time.monotonic()
+    def clock(self) -> float:
+        """Return `time.monotonic()` [s], as many times as fast as the speedup says."""
+        return self._speedup * time.monotonic()
+
+    def receive(self, timeout: float) -> list[Heard]:
+        """Return what has come, as `GroundLink.receive` does, by this clock."""
+        heard = super().receive(timeout / self._speedup)
+        return [one._replace(time=self._speedup * one.time) for one in heard]

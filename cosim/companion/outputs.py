@@ -23,10 +23,11 @@ STEERED_IN: dict[SteerBy, Mode] = {"sticks": "stabilize", "wrench": "manual", "v
 
 _FULL = 1000.0
 _PITCH, _ROLL = 1, 2  # enabled_extensions
-_VELOCITY_ONLY = 0b110111000111  # type_mask
+_VELOCITY_ONLY, _YAW_RATE_IGNORED = 0b010111000111, 1 << 11  # type_mask
 _LOCAL_NED = 1
+_MOSTLY = 0.6  # of the greatest part that a thruster has in an axis, from which on it works for that axis
 _YAW_LAG = 0.3  # s, of an autopilot's rate loop
-_FASTEST = 0.5  # m/s, of a velocity that is asked for
+_FASTEST, _FASTEST_TURN = 0.5, 0.6  # m/s, rad/s, that are asked for
 _NEUTRAL: Array = np.zeros(6)
 
 
@@ -36,34 +37,47 @@ class StickScale:
 
     Attributes
     ----------
-    reach : ndarray, shape (6,)
-        Greatest wrench along and about each body axis alone [N, N m].
+    efforts : ndarray, shape (n, 6)
+        Each thruster's part of its greatest force for a wrench along or about each body axis [1/N, 1/(N m)].
+    mixer : ndarray, shape (n, 6)
+        What a full stick of each axis, at a gain of 1, asks of each thruster: 1, 0 or -1 of its greatest force. Of an
+        autopilot that allocates forces by itself, both are of axes instead of thrusters.
     gain : float
-        The pilot's: the part of it that full sticks give.
+        The pilot's: what scales the sticks of surge, sway, heave and yaw.
+    scales_all : bool
+        Whether it scales those of roll and pitch, too.
     quadratic : bool
         Whether a thruster's force goes with the square of what the autopilot asks of it.
     yaw_inertia : float
         With the added one [kg m2].
     """
 
-    reach: Array
+    efforts: Array
+    mixer: Array
     gain: float
+    scales_all: bool
     quadratic: bool
     yaw_inertia: float
 
     def sticks(self, wrench: Array) -> Array:
-        """Return the sticks that ask for a wrench, shape (6,), X Y Z K M N from -1 to 1, each axis by itself.
+        """Return the sticks that ask for a wrench, shape (6,), X Y Z K M N from -1 to 1.
+
+        An autopilot adds what all sticks ask of a thruster, and where its force goes with the square, it goes with the
+        square of that sum. So each thruster's force is turned into what it is to be asked for, and that into sticks.
 
         Parameters
         ----------
         wrench : ndarray, shape (6,)
             [N, N m], body frame; what is not finite asks for nothing.
         """
-        share = np.divide(wrench, self.reach, out=np.zeros(6), where=self.reach > 0.0)
-        share = np.where(np.isfinite(share), share, 0.0)
+        share = self.efforts @ np.where(np.isfinite(wrench), wrench, 0.0)
         if self.quadratic:
             share = np.copysign(np.sqrt(np.abs(share)), share)
-        clipped: Array = np.clip(share / self.gain, -1.0, 1.0)
+        asked = np.linalg.lstsq(self.mixer, share, rcond=None)[0]
+        asked[[0, 1, 2, 5]] /= self.gain
+        if self.scales_all:
+            asked[3:5] /= self.gain
+        clipped: Array = np.clip(asked, -1.0, 1.0)
         return clipped
 
     def yaw_rate_stick(self, moment: float, rate: float) -> float:
@@ -95,7 +109,15 @@ def scale_of(vehicle: Vehicle, profile: Profile, gain: float) -> StickScale:
     reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
     table = vehicle.autopilot
     quadratic = profile.name == "ardusub" and table is not None and table.curve == "quadratic"
-    return StickScale(reach, gain, quadratic, float(vehicle.inertia[2, 2] + vehicle.added_mass[5, 5]))
+    yaw_inertia = float(vehicle.inertia[2, 2] + vehicle.added_mass[5, 5])
+    if profile.name != "ardusub":  # it brings each axis to the thrusters by itself
+        share = np.diag(np.divide(1.0, reach, out=np.zeros(6), where=reach > 0.0))
+        return StickScale(share, np.eye(6), gain, True, quadratic, yaw_inertia)
+    matrix = vehicle.thruster_matrix
+    mixer = np.where(np.abs(matrix) > _MOSTLY * np.abs(matrix).max(axis=1, keepdims=True), np.sign(matrix), 0.0).T
+    most = 0.5 * (vehicle.thrust_max - vehicle.thrust_min)
+    made = (matrix * most) @ mixer  # by full sticks, one axis a column, with what comes along in others
+    return StickScale(mixer @ np.linalg.pinv(made), mixer, gain, False, quadratic, yaw_inertia)
 
 
 def manual_control(mavlink: Any, system: int, profile: Profile, sticks: Array, all_axes: bool) -> Any:
@@ -107,7 +129,8 @@ def manual_control(mavlink: Any, system: int, profile: Profile, sticks: Array, a
     message = mavlink.MAVLink_manual_control_message(system, x, y, z, r, 0)
     if all_axes:
         message.enabled_extensions = _PITCH | _ROLL
-        message.s, message.t = round(_FULL * pitch), round(_FULL * roll)
+        full = profile.full_tilt_stick
+        message.s, message.t = round(full * pitch), round(full * roll)
     return message
 
 
@@ -134,6 +157,12 @@ class VelocityLead:
         self._mass: Array = vehicle.mass + np.diag(vehicle.added_mass)[:3]
         self._linear, self._quadratic = vehicle.linear_damping[:3], vehicle.quadratic_damping[:3]
         self._lag = lag
+        self._yaw_inertia = float(vehicle.inertia[2, 2] + vehicle.added_mass[5, 5])
+
+    def yaw_rate(self, wrench: Array, state: ReportedState) -> float:
+        """Return the rate of yaw [rad/s], of at most 0.6 rad/s, by which a rate loop turns as the wrench would."""
+        asked = float(state.rates[2]) + _YAW_LAG * float(wrench[5]) / self._yaw_inertia
+        return min(max(asked, -_FASTEST_TURN), _FASTEST_TURN) if math.isfinite(asked) else 0.0
 
     def velocity(self, wrench: Array, state: ReportedState) -> Array:
         """Return the velocity [m/s, NED], shape (3,), of at most 0.5 m/s."""
@@ -147,10 +176,11 @@ class VelocityLead:
         return asked * min(1.0, _FASTEST / length) if length > 0.0 else asked
 
 
-def velocity_target(mavlink: Any, system: int, velocity: Array) -> Any:
-    """Return SET_POSITION_TARGET_LOCAL_NED with a velocity [m/s, NED] alone."""
+def velocity_target(mavlink: Any, system: int, velocity: Array, yaw_rate: float | None) -> Any:
+    """Return SET_POSITION_TARGET_LOCAL_NED with a velocity [m/s, NED] and a rate of yaw [rad/s], if there is one."""
     x, y, z = velocity.tolist()
+    mask = _VELOCITY_ONLY | (_YAW_RATE_IGNORED if yaw_rate is None else 0)
     zeros = (0.0,) * 3
     return mavlink.MAVLink_set_position_target_local_ned_message(
-        0, system, 1, _LOCAL_NED, _VELOCITY_ONLY, *zeros, x, y, z, *zeros, 0.0, 0.0
+        0, system, 1, _LOCAL_NED, mask, *zeros, x, y, z, *zeros, 0.0, yaw_rate or 0.0
     )

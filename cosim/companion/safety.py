@@ -10,7 +10,7 @@ State = Literal["waiting", "aligning", "disarmed", "engaging", "dry_run", "steer
 STATES: tuple[State, ...] = get_args(State)  # a state's index is its number in the record
 
 MEANINGS: dict[State, str] = {
-    "waiting": "no vehicle, or no position and attitude of it yet; nothing is sent but requests",
+    "waiting": "no vehicle, or no position, attitude or failsafe parameters of it yet; nothing is sent but requests",
     "aligning": "the autopilot's frame is not known in the scene yet; nothing is sent but requests",
     "disarmed": "all is known; arming is awaited, or asked for where the user said so",
     "engaging": "armed; the mode that is steered in is asked for",

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from cosim.companion.clock_sync import timesync
+from cosim.companion.failsafes import Failsafes
 from cosim.companion.frame_alignment import FrameAlignment
 from cosim.companion.link import AutopilotLink
 from cosim.companion.options import CompanionOptions
@@ -60,6 +61,8 @@ class AutopilotSession:
         Who decides whether the law steers.
     profile : Profile
         Which autopilot it is.
+    failsafes : Failsafes
+        Its own, as its parameters say.
     sticks, velocity : ndarray, shape (6,), (3,)
         As sent last, -1 to 1 and [m/s, NED], or in a dry run as they would be; else zero.
     lateness : float
@@ -77,6 +80,7 @@ class AutopilotSession:
         self._mode = self.profile.numbers[STEERED_IN[options.steer_by]]
         self.reported = ReportedState(link.identity)
         self.alignment = FrameAlignment(options.origin)
+        self.failsafes = Failsafes(options.profile)
         self.supervisor = Supervisor(options.dry_run)
         self.sticks: Array = np.zeros(6)
         self.velocity: Array = np.zeros(3)
@@ -90,6 +94,11 @@ class AutopilotSession:
     def clock(self) -> float:
         """Return the link's time [s]."""
         return self._link.clock()
+
+    @property
+    def identity(self) -> tuple[int, int]:
+        """System and component that we are."""
+        return self._link.identity
 
     def take(self, k: int) -> Sequence[Command]:
         """Return the command that lets the law work, or stops it, where that has changed."""
@@ -144,6 +153,8 @@ class AutopilotSession:
             return "a heartbeat of an autopilot"
         if not math.isfinite(reported.age(now)):
             return "LOCAL_POSITION_NED and ATTITUDE_QUATERNION, or ODOMETRY"
+        if not self.failsafes.is_read(now):
+            return "its failsafe parameters"
         return self.alignment.missing(reported) or {
             "disarmed": "arming", "held": f"somebody to resume after: {self.supervisor.reason}",
             "pilot": f"somebody to resume after: {self.supervisor.reason}", "engaging": f"mode {self._mode}",
@@ -153,7 +164,7 @@ class AutopilotSession:
 
     def _observation(self, now: float) -> Observation:
         reported, alignment = self.reported, self.alignment
-        has_state = math.isfinite(reported.age(now))
+        has_state = math.isfinite(reported.age(now)) and self.failsafes.is_read(now)
         values = {
             "lost link": now - reported.heard_at,
             "stale estimate": reported.age(now),
@@ -197,6 +208,9 @@ class AutopilotSession:
             return
         if self._due("sync", _SYNC, now):
             self._link.send(timesync(m, self.reported.sync.request(now)))
+        is_up = math.isfinite(self.reported.age(now))  # one that starts answers no such requests
+        for name in self.failsafes.wanted(now) if is_up else ():
+            self._link.send(m.MAVLink_param_request_read_message(self.reported.system, 1, name.encode(), -1))
         if self._due("rates", _RATES, now):
             for message_id, rate in RATES.items():
                 self._command(m.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate)
@@ -220,9 +234,11 @@ class AutopilotSession:
         """Return the message that asks for a wrench, and note what is in it."""
         m, system = self._mavlink, self.reported.system or 0
         if self._options.steer_by == "velocity":
+            turn = 0.0 if self.profile.name == "ardusub" else None
             if not still:
                 self.velocity[:] = self._lead.velocity(wrench, self.reported)
-            return velocity_target(m, system, self.velocity)
+                turn = None if turn is None else self._lead.yaw_rate(wrench, self.reported)
+            return velocity_target(m, system, self.velocity, turn)
         all_axes = self._options.steer_by == "wrench"
         self.sticks[:] = self._scale.sticks(wrench)
         if not all_axes:
@@ -265,6 +281,8 @@ class AutopilotSession:
         if message.get_type() == "COMMAND_LONG":
             self._commanded(system, component, message)
             return
+        if message.get_type() == "PARAM_VALUE" and (system, component) == (self.reported.system, 1):
+            self.failsafes.take(message)
         self.reported.take(system, component, message, at)
         self.alignment.update(self.reported, at)
 

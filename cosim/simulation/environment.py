@@ -66,6 +66,7 @@ class RegionEnvironment:
     def __init__(self, scenario: Scenario) -> None:
         secondary = [region.region for region in scenario.regions]
         self.regions = pack(secondary)
+        self._deviations = self.regions.deviations.copy()  # m, as the scenario has them
         self._goal_region, self._middle = scenario.goal_region, shape_center(scenario.goal)
         self._target = self._reached = self._new_target(None, self._middle)
         self._then = [np.subtract(place, self._middle) for place in scenario.goal_then]
@@ -104,6 +105,10 @@ class RegionEnvironment:
             packed.shifts[:] += origins
         for i, at in enumerate(self._moving):
             shifts[i] = self.regions.shifts[at - 1] if at else self.target - self._middle
+
+    def doubt_positions(self, deviation: float) -> None:
+        """Let every region's place be uncertain by a standard deviation [m] more, so that margins are wider."""
+        np.hypot(self._deviations, deviation, out=self.regions.deviations)
 
     def empty_evaluation(self, values: Array, clearances: Array) -> RegionEvaluation:
         """Return room for what `evaluate` finds.

@@ -2,5 +2,5 @@
 
 The other side of ArduPilot's and PX4's simulators in the loop.
 
-Imports: controller, mavlink.vehicle, mavlink.wire, plant_fmu, results, run, scenario, simulation.
+Imports: companion, controller, mavlink.vehicle, mavlink.wire, plant_fmu, results, run, scenario, simulation.
 """

@@ -14,7 +14,7 @@ from cosim.run.run_folder import claim, conclude
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.master import Master
 from cosim.sitl.law import AutopilotLaw
-from cosim.sitl.motion import Motion, MotionReader
+from cosim.sitl.motion import Motion, MotionReader, at_rest
 
 
 class Flight:
@@ -37,6 +37,8 @@ class Flight:
         The run folder.
     steps : int
         That were made.
+    waited : int
+        Frames of the autopilot before them, in which the vehicle was held where it starts.
 
     Raises
     ------
@@ -64,7 +66,7 @@ class Flight:
         self._every = max(1, round(1.0 / (record_rate * scenario.time.step)))
         self._started = time.perf_counter()
         self._wall_time: float | None = None
-        self.steps = 0
+        self.steps = self.waited = 0
 
     @property
     def done(self) -> bool:
@@ -91,9 +93,14 @@ class Flight:
         self.steps += 1
         return self.motion()
 
+    def wait(self) -> Motion:
+        """Let a frame go by with the vehicle held where it starts; only the autopilot's time goes on."""
+        self.waited += 1
+        return at_rest(self.motion())
+
     def motion(self) -> Motion:
-        """Return the vehicle's motion as it is now."""
-        return self._reader.read(self.steps * self.scenario.time.step)
+        """Return the vehicle's motion as it is now, by the autopilot's time."""
+        return self._reader.read((self.waited + self.steps) * self.scenario.time.step)
 
     def _record(self) -> None:
         """Keep the row of the step that was made last, if it is due."""

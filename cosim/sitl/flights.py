@@ -24,6 +24,7 @@ class Counts:
     """Frames of the autopilot, by what became of them."""
 
     steps: int = 0
+    waited: int = 0  # before the first one, with the vehicle held
     resent: int = 0  # answered again, without a step
     lost: int = 0  # that have not come
     malformed: int = 0

@@ -13,8 +13,8 @@ from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.options import ORIGIN
 from cosim.sitl.flight import Flight
 from cosim.sitl.flights import Counts, Flights, Outcome
-from cosim.sitl.hil_messages import at_rest, hil_messages
-from cosim.sitl.motion import Motion
+from cosim.sitl.hil_messages import hil_messages
+from cosim.sitl.motion import Motion, at_rest
 
 log = logging.getLogger(__name__)
 

@@ -88,10 +88,3 @@ def air_pressure(altitude: float) -> float:
 
 def _cut(value: float, most: int) -> int:
     return round(min(max(value, -float(most)), float(most)))
-
-
-def at_rest(motion: Motion) -> Motion:
-    """Return the motion of a vehicle that is held where it is: the IMU feels gravity alone."""
-    fx, fy, fz = (rotation_matrix(np.array(motion.quaternion)).T @ np.array([0.0, 0.0, -_GRAVITY])).tolist()
-    still = (0.0, 0.0, 0.0)
-    return motion._replace(gyro=still, specific_force=(fx, fy, fz), velocity_ned=still)

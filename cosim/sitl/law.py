@@ -12,6 +12,7 @@ from controller.law import Diagnostic, Output
 from controller.regions.region_set import PackedRegions
 from cosim.errors import RunError
 from cosim.simulation.signals import Array
+from cosim.sitl.autopilot_link import ESTIMATE, AutopilotLink
 from plant_fmu import Vehicle
 from plant_fmu.autopilot import Curve, effort_of_pulse
 
@@ -31,17 +32,30 @@ class AutopilotLaw:
         Name of an output in the record, such as ``pwm``.
     unit : str
         Of what an output says.
+    idle : float
+        What the outputs of an autopilot that is not armed say, where they say anything but 0.
+    link : AutopilotLink, optional
+        Hears the autopilot's own estimate, which is reported too.
 
     Attributes
     ----------
     lost : int
         Frames of the autopilot that have not come, so far.
+    link : AutopilotLink or None
+        As given.
     """
 
     output: ClassVar[Output] = "thrusters"
 
     def __init__(
-        self, channels: Sequence[int], efforts: Sequence[Curve], vehicle: Vehicle, what: str, unit: str
+        self,
+        channels: Sequence[int],
+        efforts: Sequence[Curve],
+        vehicle: Vehicle,
+        what: str,
+        unit: str,
+        idle: float = 0.0,
+        link: AutopilotLink | None = None,
     ) -> None:
         limits = zip(vehicle.thrust_min.tolist(), vehicle.thrust_max.tolist(), strict=True)
         # thruster, its output from 0, effort, and the force of the efforts -1 and 1
@@ -56,8 +70,11 @@ class AutopilotLaw:
                 for i, at, *_ in self._driven
             ),
             Diagnostic("lost", "", "Frames of the autopilot that have not come, so far"),
+            *(ESTIMATE if link is not None else ()),
         )
         self.lost = 0
+        self.link, self._idle = link, idle
+        self._drives = False
         self._estimate: Array = np.zeros(4)
         self._report: Array = np.zeros(len(self.diagnostics))
         self._forces: Array = np.zeros(vehicle.n_thrusters)
@@ -70,6 +87,12 @@ class AutopilotLaw:
             part = effort(said)
             self._forces[i] = part * most if part >= 0.0 else -part * least
             self._report[place] = said
+        self._drives = any(said not in (0.0, self._idle) for said in self._report[: len(self._driven)].tolist())
+
+    @property
+    def is_driving(self) -> bool:
+        """Whether it is armed, or its outputs for thrusters say anything but idle."""
+        return self._drives or (self.link is not None and self.link.is_armed)
 
     @property
     def estimate(self) -> Array:
@@ -78,8 +101,11 @@ class AutopilotLaw:
 
     @property
     def report(self) -> Array:
-        """What the outputs said, and how many frames are lost, shape (len(diagnostics),)."""
-        self._report[-1] = self.lost
+        """What the outputs said, how many frames are lost, and the estimate, shape (len(diagnostics),)."""
+        n = len(self._driven)
+        self._report[n] = self.lost
+        if self.link is not None:
+            self._report[n + 1 :] = self.link.estimate
         return self._report
 
     def step(
@@ -89,13 +115,15 @@ class AutopilotLaw:
         forces[:] = self._forces
 
 
-def law_of_pwm(vehicle: Vehicle) -> AutopilotLaw:
+def law_of_pwm(vehicle: Vehicle, link: AutopilotLink | None = None) -> AutopilotLaw:
     """Return the law of an autopilot that gives servo pulses.
 
     Parameters
     ----------
     vehicle : Vehicle
         Its table ``autopilot`` says which pulse gives which force.
+    link : AutopilotLink, optional
+        To the autopilot.
 
     Returns
     -------
@@ -112,7 +140,7 @@ def law_of_pwm(vehicle: Vehicle) -> AutopilotLaw:
     table = vehicle.autopilot
     signs = table.signs if isinstance(table.signs, tuple) else (table.signs,) * vehicle.n_thrusters
     efforts = [effort_of_pulse(table, sign) for sign in signs]
-    return AutopilotLaw(table.channels, efforts, vehicle, "pwm", "us")
+    return AutopilotLaw(table.channels, efforts, vehicle, "pwm", "us", table.pwm_neutral, link)
 
 
 def law_of_controls(vehicle: Vehicle) -> AutopilotLaw:

@@ -18,7 +18,9 @@ _NAMES = (
     *(f"position.{axis}" for axis in "xyz"),
     *(f"attitude.{name}" for name in ("roll", "pitch", "yaw")),
     "measured.altitude",
+    *(f"measured.velocity.{name}" for name in "uvw"),
 )
+_GRAVITY = 9.81  # m/s2, as ArduPilot and PX4 have it, near enough
 
 
 class Motion(NamedTuple):
@@ -32,6 +34,7 @@ class Motion(NamedTuple):
     attitude: Three  # rad, roll, pitch, yaw
     quaternion: tuple[float, float, float, float]  # from body to world, scalar first
     altitude: float | None  # m, above the bottom as the DVL measures it; None where there is no bottom
+    dvl: Three  # m/s, over ground, body frame, as the DVL measures it
 
 
 class MotionReader:
@@ -54,10 +57,17 @@ class MotionReader:
 
     def read(self, time: float) -> Motion:
         """Return the motion as it is after the plant's last step, which ended at a time [s]."""
-        p, q, r, fx, fy, fz, x, y, z, roll, pitch, yaw, altitude = self._values[self._at].tolist()
+        p, q, r, fx, fy, fz, x, y, z, roll, pitch, yaw, altitude, u, v, w = self._values[self._at].tolist()
         e0, e1, e2, e3 = self._quaternion.tolist()
         vx, vy, vz = (rotation_matrix(self._quaternion) @ self._velocity_body).tolist()  # (15)
         return Motion(
             time, (p, q, r), (fx, fy, fz), (x, y, z), (vx, vy, vz), (roll, pitch, yaw), (e0, e1, e2, e3),
-            altitude if self._bottom else None,
+            altitude if self._bottom else None, (u, v, w),
         )  # fmt: skip
+
+
+def at_rest(motion: Motion) -> Motion:
+    """Return the motion of a vehicle that is held where it is: the IMU feels gravity alone."""
+    fx, fy, fz = (rotation_matrix(np.array(motion.quaternion)).T @ np.array([0.0, 0.0, -_GRAVITY])).tolist()
+    still = (0.0, 0.0, 0.0)
+    return motion._replace(gyro=still, specific_force=(fx, fy, fz), velocity_ned=still, dvl=still)

@@ -164,9 +164,17 @@ class JsonServer:
     def _step(self, packet: wire.ServoPacket) -> None:
         flight = self._flights.flight
         assert flight is not None
-        self._flights.law.take(packet.pwm)
-        self._answer = wire.encode(flight.step())
-        self.counts.steps += 1
+        law = self._flights.law
+        law.take(packet.pwm)
+        if flight.steps or law.is_driving:
+            motion = flight.step()
+            self.counts.steps += 1
+        else:  # it starts, or is not armed yet
+            motion = flight.wait()
+            self.counts.waited += 1
+        if law.link is not None:
+            law.link.exchange(motion)
+        self._answer = wire.encode(motion)
 
     def _warn(self, kind: str, text: str) -> None:
         """Warn, of each kind now and then."""

@@ -66,7 +66,7 @@ def encode(motion: Motion) -> bytes:
     RunError
         If a number is not finite, which JSON cannot say.
     """
-    t, (p, q, r), (fx, fy, fz), (x, y, z), (vx, vy, vz), (roll, pitch, yaw), (e0, e1, e2, e3), altitude = motion
+    t, (p, q, r), (fx, fy, fz), (x, y, z), (vx, vy, vz), (roll, pitch, yaw), (e0, e1, e2, e3), altitude, _ = motion
     total = t + p + q + r + fx + fy + fz + x + y + z + vx + vy + vz + roll + pitch + yaw + e0 + e1 + e2 + e3
     if not math.isfinite(total + (altitude or 0.0)):
         raise RunError(f"t = {t:g} s: the vehicle's state is not finite: {motion}")

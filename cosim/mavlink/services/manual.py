@@ -91,21 +91,25 @@ class Manual(Service):
         if context.profile.name != "ardusub" or table is None or table.curve != "quadratic":
             return sticks
         gain = context.settings["commands.pilot_gain"]
+        scales = (gain, gain, gain, 1.0 / gain, 1.0 / gain, gain)  # the gain leaves roll and pitch alone
         squared = 6 if context.mode_ahead == "manual" else 3  # in other modes the last three ask for angles and rates
-        x, y, z, k, m, n = (gain * s * abs(s) if i < squared else s for i, s in enumerate(sticks))
+        x, y, z, k, m, n = (
+            scale * s * abs(s) if i < squared else s for i, (scale, s) in enumerate(zip(scales, sticks, strict=True))
+        )
         return x, y, z, k, m, n
 
     def _wrench(self, message: Any) -> Vector6:
         """Return X Y Z K M N from -1 to 1; the vertical stick is up where positive, Z is down."""
         centre = self.context.profile.centred_stick
         up = 0.0 if message.z == _INVALID else _part((message.z - centre) / (_FULL - centre))
-        roll = _axis(message.t) if message.enabled_extensions & _ROLL else 0.0
-        pitch = _axis(message.s) if message.enabled_extensions & _PITCH else 0.0
+        full = self.context.profile.full_tilt_stick
+        roll = _axis(message.t, full) if message.enabled_extensions & _ROLL else 0.0
+        pitch = _axis(message.s, full) if message.enabled_extensions & _PITCH else 0.0
         return _axis(message.x), _axis(message.y), -up + 0.0, roll, pitch, _axis(message.r)
 
 
-def _axis(value: int) -> float:
-    return 0.0 if value == _INVALID else _part(value / _FULL)
+def _axis(value: int, full: float = _FULL) -> float:
+    return 0.0 if value == _INVALID else _part(value / full)
 
 
 def _part(value: float) -> float:

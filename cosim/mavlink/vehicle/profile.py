@@ -68,6 +68,8 @@ class Profile:
         Whether a mode's number is PX4's: main mode shifted by 16 bits, sub-mode by 24.
     centred_stick : int
         Where the vertical stick of MANUAL_CONTROL rests.
+    full_tilt_stick : int
+        What the sticks of roll and pitch of MANUAL_CONTROL, its extensions, ask all with.
     home_is_first : bool
         Whether item 0 of a mission is home, as ArduPilot has it.
     stands_for : tuple of int or None
@@ -79,6 +81,7 @@ class Profile:
     numbers: dict[Mode, int]
     packed: bool
     centred_stick: int
+    full_tilt_stick: int
     home_is_first: bool
     stands_for: tuple[int, int, int] | None = None
 
@@ -143,8 +146,24 @@ _PX4: dict[Mode, int] = {
 
 PROFILES: dict[ProfileName, Profile] = {
     "ardusub": Profile(
-        "ardusub", 3, _ARDUSUB, packed=False, centred_stick=500, home_is_first=True, stands_for=(4, 5, 0)
+        "ardusub",
+        3,
+        _ARDUSUB,
+        packed=False,
+        centred_stick=500,
+        full_tilt_stick=400,
+        home_is_first=True,
+        stands_for=(4, 5, 0),
     ),
-    "px4": Profile("px4", 12, _PX4, packed=True, centred_stick=500, home_is_first=False, stands_for=(1, 15, 0)),
-    "generic": Profile("generic", 0, _PX4, packed=True, centred_stick=0, home_is_first=False),
+    "px4": Profile(
+        "px4",
+        12,
+        _PX4,
+        packed=True,
+        centred_stick=500,
+        full_tilt_stick=1000,
+        home_is_first=False,
+        stands_for=(1, 15, 0),
+    ),
+    "generic": Profile("generic", 0, _PX4, packed=True, centred_stick=0, full_tilt_stick=1000, home_is_first=False),
 }

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from controller.laws.deployable.gains import SPREADS
 from cosim.companion.companion import Companion, scenario_to_steer
 from cosim.companion.frame_alignment import SceneOrigin
 from cosim.companion.options import CompanionOptions
@@ -13,6 +14,7 @@ from cosim.mavlink.wire.options import ORIGIN
 from cosim.results.run_result import load_run
 from cosim.run.run_folder import report_again
 from cosim.scenario.scenario import load_scenario
+from cosim.simulation.environment import RegionEnvironment
 from tests.architecture.modules import ROOT
 from tests.cosim.companion.stand_in import IDENTITY, StandIn
 
@@ -27,7 +29,7 @@ class Flight:
 
     def __init__(self, tmp_path, seconds=6.0, events=(), link=None, **options):
         self.link = link or StandIn(profile="generic", shift=SHIFT)
-        self.link.events = [(EVENT, event) for event in events]
+        self.link.events += [(EVENT, event) for event in events]
         options = {"profile": "generic", "origin": GLOBE, "timeout": 10.0, **options}
         scenario = load_scenario("pipe-inspection", [f"time.duration={seconds}"])
         self.companion = Companion(scenario, self.link, CompanionOptions(**options))
@@ -133,6 +135,16 @@ def changed(link, kind, **fields):
     link.tamper[kind] = lambda message: message.__dict__.update(fields)
 
 
+def position_creeps(link, by):
+    """Let the local position creep away by so many metres in two seconds, and stay there."""
+    begun = link.clock()
+
+    def creep(message):
+        message.x += by * min(1.0, 0.5 * (link.clock() - begun))
+
+    link.tamper["LOCAL_POSITION_NED"] = creep
+
+
 def drift(link):
     begun = link.clock()
 
@@ -183,6 +195,26 @@ def test_drift_between_the_sources_holds(tmp_path):
     link = StandIn(profile="generic", shift=SHIFT)
     flight = Flight(tmp_path, 8.0, link=link, events=[lambda: drift(link)])
     assert flight.status == "held: frame drift" and flight.companion.session.alignment.drift > 0.5
+
+
+def test_drift_widens_the_margins_before_it_holds(tmp_path, monkeypatch):
+    """Of sources that come apart by 0.3 m, the margins of all regions are as much wider, and it goes on."""
+    doubts, doubt = [], RegionEnvironment.doubt_positions
+    monkeypatch.setattr(RegionEnvironment, "doubt_positions", lambda self, by: (doubts.append(by), doubt(self, by)))
+    link = StandIn(profile="generic", shift=SHIFT)
+    flight = Flight(tmp_path, 8.0, link=link, events=[lambda: position_creeps(link, 0.3)])
+    assert flight.status == "completed"
+    assert 0.2 < flight.companion.session.alignment.drift < 0.4
+    assert doubts[0] == 0.0 and SPREADS * doubts[-1] == pytest.approx(0.3, abs=0.1)
+
+
+def test_sticks_that_the_autopilot_would_not_take_are_not_sent(tmp_path):
+    link = StandIn(profile="ardusub", shift=SHIFT)
+    told = mavlink.MAVLink_param_value_message(b"SYSID_MYGCS", 250.0, 9, 1, 0)
+    link.events = [(0.5, lambda: link.hear(told, 1, 1))]
+    with pytest.raises(RunError, match=r"SYSID_MYGCS is 250, and the companion's system id 255"):
+        Flight(tmp_path, link=link, profile="ardusub")
+    assert not [m for _, m in link.sent if m.get_type() in STICKS]
 
 
 def test_a_violated_hard_region_holds(tmp_path):

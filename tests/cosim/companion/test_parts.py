@@ -1,18 +1,23 @@
 """The companion's parts, each against a number that stands elsewhere."""
 
 import math
+import struct
+import time
 
 import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.companion.clock_sync import ClockSync
+from cosim.companion.failsafes import Failsafes
 from cosim.companion.frame_alignment import FrameAlignment, SceneOrigin
+from cosim.companion.link import NetworkLink
 from cosim.companion.outputs import VelocityLead, manual_control, scale_of, velocity_target
 from cosim.companion.safety import CONDITIONS, Observation, Supervisor
 from cosim.companion.vehicle_state import ReportedState
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.vehicle.profile import PROFILES
+from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.simulation.commands.commands import ManualControl
 from plant_fmu import load_vehicle
 from tests.cosim.mavlink.station import Station, scenario
@@ -92,11 +97,33 @@ def test_full_surge_of_a_bluerov2_at_half_gain_is_28_newtons():
     scale = scale_of(HEAVY, ARDUSUB, 0.5)
     sticks = scale.sticks(np.array([28.28, 0.0, 0.0, 0.0, 0.0, 0.0]))
     assert sticks[0] == pytest.approx(1.0, abs=0.01)
-    assert scale.sticks(np.full(6, -1e3)).tolist() == [-1.0] * 6
-    assert scale.sticks(np.array([math.nan, math.inf, 0, 0, 0, 0]))[:2].tolist() == [0.0, 0.0]
+    assert np.abs(scale.sticks(np.full(6, -1e3))).max() <= 1.0
+    assert scale.sticks(np.array([math.nan, math.inf, 0, 0, 0, 0])) == pytest.approx(np.zeros(6), abs=1e-12)
 
 
-@pytest.mark.parametrize("profile", ["ardusub", "generic"])
+# ArduSub's vectored_6dof, thruster by thruster: forward, lateral, down, roll, pitch, yaw
+VECTORED_6DOF = np.array(
+    [
+        (-1, 1, 0, 0, 0, 1), (-1, -1, 0, 0, 0, -1), (1, 1, 0, 0, 0, -1), (1, -1, 0, 0, 0, 1),
+        (0, 0, 1, 1, -1, 0), (0, 0, 1, -1, -1, 0), (0, 0, 1, 1, 1, 0), (0, 0, 1, -1, 1, 0),
+    ]
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "wrench", [(113, 0, 0, 0, 0, 0), (28, 28, 0, 0, 0, 0), (28, -20, 10, 0, 0, 1), (0, 0, -40, 2, 2, 0)]
+)
+def test_an_ardusub_makes_of_the_sticks_the_wrench_that_they_were_made_for(wrench):
+    """It adds the sticks in each motor, and its force goes with the square; our thrusters push the other way."""
+    scale = scale_of(HEAVY, ARDUSUB, 0.5)
+    sticks = scale.sticks(0.25 * np.array(wrench, dtype=float))
+    pilot = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 0.5])  # the gain leaves roll and pitch alone
+    motors = VECTORED_6DOF @ (pilot * sticks)
+    made = HEAVY.thruster_matrix @ (-40.0 * motors * np.abs(motors))
+    assert made == pytest.approx(0.25 * np.array(wrench), rel=0.1, abs=0.3)
+
+
+@pytest.mark.parametrize("profile", ["px4", "generic"])
 def test_sticks_give_the_wrench_that_they_were_made_for(profile):
     """Through the vehicle's own service for sticks, whose parts of the greatest wrench the pilot's gain scales."""
     station = Station(profile, of=scenario("vehicle='bluerov2_heavy'", name="pipe-inspection"))
@@ -106,7 +133,7 @@ def test_sticks_give_the_wrench_that_they_were_made_for(profile):
     station.send(manual_control(mavlink, 1, PROFILES[profile], scale.sticks(wrench), all_axes=True))
     (command,) = station.commanded()
     assert isinstance(command, ManualControl)
-    assert 0.5 * np.array(command.wrench) * scale.reach == pytest.approx(wrench, rel=0.02)
+    assert 0.5 * np.array(command.wrench) / np.diag(scale.efforts) == pytest.approx(wrench, rel=0.02)
 
 
 def test_a_velocity_leads_by_the_acceleration_that_the_wrench_gives():
@@ -118,8 +145,10 @@ def test_a_velocity_leads_by_the_acceleration_that_the_wrench_gives():
     drag = 13.7 * steady + 141.0 * steady**2
     assert lead.velocity(np.array([drag, 0, 0, 0, 0, 0]), state) == pytest.approx([steady, 0.0, 0.0])
     assert np.linalg.norm(lead.velocity(np.full(6, 1e5), state)) == pytest.approx(0.5)
-    message = velocity_target(mavlink, 1, asked)
-    assert message.type_mask == 0b110111000111 and message.coordinate_frame == mavlink.MAV_FRAME_LOCAL_NED
+    message = velocity_target(mavlink, 1, asked, 0.25)
+    assert message.type_mask == 0b010111000111 and message.yaw_rate == 0.25
+    assert velocity_target(mavlink, 1, asked, None).type_mask == 0b110111000111
+    assert message.coordinate_frame == mavlink.MAV_FRAME_LOCAL_NED
 
 
 # ---- who may steer ----
@@ -175,3 +204,55 @@ def test_overridden_channels_are_a_pilots_too():
     pulses = [0, 0xFFFF, 1500, 1500, 1700, 0, 0, 0]
     state.take(255, 190, mavlink.MAVLink_rc_channels_override_message(1, 1, *pulses), 6.0)
     assert state.pilot_at == 6.0
+
+
+# ---- the autopilot's own failsafes ----
+
+
+def value_of(name, value, kind=9):
+    return mavlink.MAVLink_param_value_message(name.encode(), value, kind, 1, 0)
+
+
+def decoded(message):
+    (found,) = mavlink.MAVLink(None).parse_buffer(message.pack(mavlink.MAVLink(None, 1, 1)))
+    return found
+
+
+def test_failsafe_parameters_are_asked_for_until_they_come_or_for_three_seconds():
+    failsafes = Failsafes("ardusub")
+    assert not failsafes.is_read(0.0)
+    asked = [len(failsafes.wanted(0.25 * k)) for k in range(9)]
+    assert asked == [12, 0, 12, 0, 12, 0, 12, 0, 12]
+    for name, value in (("FS_GCS_ENABLE", 2.0), ("FS_GCS_TIMEOUT", 5.0), ("SOMETHING_ELSE", 1.0)):
+        failsafes.take(decoded(value_of(name, value)))
+    assert "FS_GCS_ENABLE" not in failsafes.wanted(2.5)
+    assert not failsafes.is_read(3.0) and failsafes.is_read(3.1) and not failsafes.wanted(4.0)
+    first, second, silent = failsafes.text()
+    assert first == "FS_GCS_ENABLE 2: on a ground station that falls silent it disarms"
+    assert second == "FS_GCS_TIMEOUT 5: s until then"
+    assert silent.startswith("not answered by the autopilot: FS_PILOT_INPUT,")
+
+
+def test_nothing_that_follows_is_warned_about_and_a_deaf_autopilot_is_known():
+    failsafes = Failsafes("ardusub")
+    for name in ("FS_PILOT_INPUT", "FS_GCS_ENABLE"):
+        failsafes.take(decoded(value_of(name, 0.0)))
+    assert failsafes.text()[-1].startswith("WARNING: nothing is known to follow if the companion dies")
+    assert failsafes.deaf_to(255) == ""
+    failsafes.take(decoded(value_of("SYSID_MYGCS", 250.0)))
+    assert failsafes.deaf_to(250) == "" and "SYSID_MYGCS is 250" in failsafes.deaf_to(255)
+
+
+def test_whole_numbers_of_a_px4_come_as_bits():
+    failsafes = Failsafes("px4")
+    (bits,) = struct.unpack("<f", struct.pack("<i", 3))
+    failsafes.take(decoded(value_of("NAV_RCL_ACT", bits, kind=6)))
+    assert failsafes.values == {"NAV_RCL_ACT": 3.0}
+
+
+def test_the_clock_of_a_simulated_autopilot_goes_as_fast_as_it_is_said_to():
+    with NetworkLink(parse_endpoint("udpout:127.0.0.1:14598"), speedup=5.0) as link:
+        before, wall = link.clock(), time.monotonic()
+        link.receive(0.1)  # a fiftieth of a second of the wall's
+        assert link.clock() - before >= 0.1
+        assert link.clock() == pytest.approx(5.0 * wall, abs=5.0 * (time.monotonic() - wall) + 1e-6)

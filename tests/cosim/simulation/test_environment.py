@@ -5,6 +5,7 @@ import pytest
 
 from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario
+from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.master import Master
 from tests.cosim.simulation.test_master import Keep
 
@@ -95,3 +96,13 @@ def test_faults_are_named(name, to, velocity, words):
     streamed = ["goal.streamed=true", "regions.SR2.streamed=true", "regions.SR1.velocity=[1,0,0]"]
     with Master(load_scenario("paper", [*SHORT, *streamed])) as master, pytest.raises(RunError, match=words):
         master.move_region(name, to, velocity)
+
+
+def test_doubt_about_positions_adds_to_that_of_each_place():
+    environment = RegionEnvironment(load_scenario("pipe-inspection"))
+    environment._deviations[1] = 0.3
+    environment.doubt_positions(0.4)
+    assert environment.regions.deviations[1] == pytest.approx([0.5] * 3)
+    assert environment.regions.deviations[2] == pytest.approx([0.4] * 3)
+    environment.doubt_positions(0.0)
+    assert environment.regions.deviations[:2] == pytest.approx(np.array([[0.0] * 3, [0.3] * 3]))

@@ -91,7 +91,8 @@ class StandIn:
         return parse(newest_line(self.exchange(pwm)))
 
 
-NEUTRAL = (1500,) * 8
+DISARMED = (1500,) * 8
+NEUTRAL = (1501,) * 8  # armed, inside the dead band
 
 
 def heave(u):

@@ -64,7 +64,7 @@ def test_a_signal_ends_it_with_a_readable_run(tmp_path, sent):
     process.send_signal(sent)
     printed, said = process.communicate(timeout=240)
     assert process.returncode == 130
-    assert "240 steps, 0 frames resent, 0 lost" in printed and "was interrupted at 0.190 s" in printed
+    assert "240 steps after 0 frames at rest, 0 resent, 0 lost" in printed and "was interrupted at 0.190 s" in printed
     assert "Traceback" not in said
     assert len(load_record(out)["time"]) == 20  # 100 Hz of 0.2 s
 

@@ -240,7 +240,7 @@ def test_the_pressure_gives_the_altitude_back(altitude):
 def test_field_and_speeds_are_told_in_their_frames_and_cut_where_they_do_not_fit():
     """Facing east the field's north is to the left."""
     zero, east = (0.0,) * 3, (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
-    motion = Motion(0.0, zero, (0.0, 0.0, -9.8), zero, (1e4, 0.0, -1e4), zero, east, 3.0)
+    motion = Motion(0.0, zero, (0.0, 0.0, -9.8), zero, (1e4, 0.0, -1e4), zero, east, 3.0, zero)
     gps, truth, sensor = hil_messages(dialect(), motion, 4000, (55.0, -3.0), True)
     assert (sensor.xmag, sensor.ymag, sensor.zmag) == pytest.approx((FIELD_NED[1], -FIELD_NED[0], FIELD_NED[2]))
     assert (gps.vn, gps.vd, gps.vel) == (32767, -32767, 65535)

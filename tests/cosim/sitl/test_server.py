@@ -17,7 +17,7 @@ from cosim.sitl.lockstep import Lockstep
 from cosim.sitl.scenario import scenario_to_fly
 from cosim.sitl.server import JsonServer
 from plant_fmu import load_vehicle
-from tests.cosim.sitl.stand_in import NEUTRAL, StandIn, frame, heave, newest_line, parse
+from tests.cosim.sitl.stand_in import DISARMED, NEUTRAL, StandIn, frame, heave, newest_line, parse
 
 DT = 1.0 / 1200
 
@@ -76,6 +76,22 @@ def test_at_rest_the_imu_feels_gravity_alone_and_the_bottom_is_below(serve):
     assert said[0]["position"] == pytest.approx((1.0, 2.0, 3.0))
     assert said[0]["quaternion"] == (1.0, 0.0, 0.0, 0.0)
     assert said[0]["rng_1"] == pytest.approx(27.0)
+
+
+def test_it_is_held_where_it_starts_until_a_thruster_is_driven(serve):
+    """Rolled over and 1 N light it would move; time and the record's time begin apart."""
+    half = 0.5**0.5
+    served = serve("time.duration=0.1", f"initial.quaternion=[{half},{half},0,0]", "initial.position=[1,2,3]")
+    with StandIn(served.address) as pilot:
+        waited = [pilot.fly(pwm) for pwm in 100 * (DISARMED, (0,) * 8)]
+        flown = [pilot.fly(NEUTRAL) for _ in range(120)]
+    assert [s["timestamp"] for s in waited + flown] == pytest.approx([(k + 1) * DT for k in range(320)], abs=1e-12)
+    assert all(s["position"] == (1.0, 2.0, 3.0) and not any(s["velocity"] + s["gyro"]) for s in waited)
+    assert waited[0]["accel_body"] == pytest.approx((0.0, -9.81, 0.0), abs=1e-9)
+    assert any(flown[-1]["velocity"])
+    outcome = served.outcome()
+    assert (outcome.counts.waited, outcome.counts.steps) == (200, 120)
+    assert load_record(outcome.runs[0].folder)["time"][-1] == pytest.approx(0.1)
 
 
 def test_velocity_is_told_north_east_down(serve):
@@ -214,7 +230,7 @@ def test_a_second_sender_is_refused_while_the_first_is_there(serve):
             other.socket.recv(100)
     assert outcome.counts.steps == 120
     assert outcome.counts.refused >= 119  # the last may have come too late
-    assert set(load_record(outcome.runs[0].folder)["law.pwm5"]) == {1500.0}
+    assert set(load_record(outcome.runs[0].folder)["law.pwm5"]) == {1501.0}
 
 
 def test_an_autopilot_from_another_port_takes_over_from_a_silent_one(serve, monkeypatch):

@@ -1,0 +1,134 @@
+"""What the autopilot does by itself when the companion falls silent: its parameters, read and shown, never set."""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+from typing import Any
+
+from cosim.mavlink.wire.options import ProfileName
+
+_EVERY = 0.5  # s, between two requests of what has not come
+_PATIENCE = 3.0  # s after the first request, for what an autopilot does not have; an ArduSub is silent then
+_MAV_PARAM_TYPE_INT32 = 6
+
+_ON_SILENCE = {0: "does nothing", 1: "warns", 2: "disarms"}
+_ON_GCS_LOSS = {**_ON_SILENCE, 3: "holds the depth", 4: "surfaces"}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of an autopilot, and what its values mean where they are choices."""
+
+    name: str
+    words: str
+    choices: dict[int, str] | None = None
+
+
+PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
+    "ardusub": (
+        Parameter("FS_PILOT_INPUT", "on sticks that stop coming", _ON_SILENCE),
+        Parameter("FS_PILOT_TIMEOUT", "s until then"),
+        Parameter("FS_GCS_ENABLE", "on a ground station that falls silent", _ON_GCS_LOSS),
+        Parameter("FS_GCS_TIMEOUT", "s until then"),
+        Parameter("FS_EKF_ACTION", "on an estimate that is not to be trusted", _ON_SILENCE),
+        Parameter("FS_EKF_THRESH", "variance from which on it is not"),
+        Parameter("FS_LEAK_ENABLE", "on a leak", {0: "does nothing", 1: "warns", 2: "surfaces"}),
+        Parameter("FS_CRASH_CHECK", "on a crash", _ON_SILENCE),
+        Parameter("BATT_FS_LOW_ACT", "on a low battery", {0: "does nothing", 2: "disarms", 3: "surfaces"}),
+        Parameter("SYSID_MYGCS", "system that sticks are taken from"),
+        Parameter("MAV_GCS_SYSID", "system that sticks are taken from, from 4.7 on"),
+        Parameter("JS_GAIN_DEFAULT", "pilot gain"),
+    ),
+    "px4": (
+        Parameter("COM_OF_LOSS_T", "s until set-points that stop coming count as lost"),
+        Parameter("COM_OBL_RC_ACT", "what follows then, as PX4 numbers it"),
+        Parameter("COM_RC_LOSS_T", "s until sticks that stop coming count as lost"),
+        Parameter("NAV_RCL_ACT", "what follows then, as PX4 numbers it"),
+        Parameter("COM_DL_LOSS_T", "s until a ground station that falls silent counts as lost"),
+        Parameter("NAV_DLL_ACT", "what follows then, as PX4 numbers it"),
+    ),
+    "generic": (),
+}
+_ACTS = {  # of which one at least must not be 0, for anything to follow when the companion dies
+    "ardusub": ("FS_PILOT_INPUT", "FS_GCS_ENABLE"),
+    "px4": ("COM_OBL_RC_ACT", "NAV_RCL_ACT", "NAV_DLL_ACT"),
+}
+_STICK_SYSTEM = ("SYSID_MYGCS", "MAV_GCS_SYSID")
+
+
+class Failsafes:
+    """Reads the parameters of one autopilot.
+
+    Parameters
+    ----------
+    profile : str
+        Which autopilot it is.
+
+    Attributes
+    ----------
+    values : dict of str to float
+        That were read so far, by name.
+
+    Examples
+    --------
+    >>> from cosim.companion.failsafes import Failsafes
+    >>> failsafes = Failsafes("ardusub")
+    >>> failsafes.wanted(100.0)[:2]
+    ['FS_PILOT_INPUT', 'FS_PILOT_TIMEOUT']
+    """
+
+    def __init__(self, profile: ProfileName) -> None:
+        self._profile: ProfileName = profile
+        self.values: dict[str, float] = {}
+        self._first, self._last = math.inf, -math.inf  # s, of requests
+
+    def wanted(self, now: float) -> list[str]:
+        """Return what is to be asked for now, by name; empty most of the time. `now` is our time [s]."""
+        if self.is_read(now) or now - self._last < _EVERY:
+            return []
+        self._first = min(self._first, now)
+        self._last = now
+        return self._missing()
+
+    def take(self, message: Any) -> None:
+        """Take a PARAM_VALUE."""
+        name, value = message.param_id, float(message.param_value)
+        if name in {parameter.name for parameter in PARAMETERS[self._profile]}:
+            if self._profile == "px4" and message.param_type == _MAV_PARAM_TYPE_INT32:  # its bits in a float's place
+                (value,) = struct.unpack("<i", struct.pack("<f", value))
+            self.values[name] = float(value)
+
+    def is_read(self, now: float) -> bool:
+        """Return whether all has come, or what has not is not to be waited for any more."""
+        return not self._missing() or now - self._first > _PATIENCE
+
+    def text(self) -> list[str]:
+        """Return what was read, in lines for people; the last ones are warnings."""
+        lines = [self._line(parameter) for parameter in PARAMETERS[self._profile] if parameter.name in self.values]
+        silent = [name for name in self._missing() if name not in _STICK_SYSTEM]
+        if silent:
+            lines.append(f"not answered by the autopilot: {', '.join(silent)}")
+        acts = _ACTS.get(self._profile, ())
+        if acts and all(self.values.get(name, 0.0) == 0.0 for name in acts):
+            lines.append(
+                f"WARNING: nothing is known to follow if the companion dies: {', '.join(acts)} are 0 or unknown"
+            )
+        return lines
+
+    def deaf_to(self, system: int) -> str:
+        """Return why sticks of a system id are not taken, in words; empty where nothing is known against them."""
+        for name in _STICK_SYSTEM:
+            heard = self.values.get(name)
+            if heard is not None and heard != system:
+                return f"{name} is {heard:g}, and the companion's system id {system}: its sticks would not be taken"
+        return ""
+
+    def _line(self, parameter: Parameter) -> str:
+        value = self.values[parameter.name]
+        chosen = (parameter.choices or {}).get(round(value))
+        return f"{parameter.name} {value:g}: {parameter.words}" + (f" it {chosen}" if chosen else "")
+
+    def _missing(self) -> list[str]:
+        return [p.name for p in PARAMETERS[self._profile] if p.name not in self.values]

@@ -1,0 +1,165 @@
+"""A MAVLink link beside the lockstep: hears the autopilot's own estimate, and tells it what a DVL measures."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from controller.law import Diagnostic
+from cosim.companion.vehicle_state import ReportedState
+from cosim.errors import TelemetryError
+from cosim.mavlink.vehicle.layout import euler_of
+from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.endpoint import Endpoint
+from cosim.mavlink.wire.ground_end import GroundLink, Identity
+from cosim.simulation.signals import Array
+from cosim.sitl.motion import Motion
+
+IDENTITY: Identity = (1, 197)  # MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY of the vehicle: no ground station
+ESTIMATE = (
+    *(Diagnostic(f"estimate.{a}", "m", "Position as the autopilot estimates it, in its own frame") for a in "xyz"),
+    *(Diagnostic(f"estimate.v{a}", "m/s", "Velocity as the autopilot estimates it, NED") for a in "xyz"),
+    *(Diagnostic(f"estimate.{a}", "rad", "Attitude as the autopilot estimates it") for a in ("roll", "pitch", "yaw")),
+    Diagnostic("mode", "", "Custom mode of the autopilot's heartbeat"),
+    Diagnostic("armed", "", "The autopilot says that it is armed"),
+)
+
+_RATES = {0: 5.0, 31: 50.0, 32: 50.0}  # Hz, by message id: HEARTBEAT, ATTITUDE_QUATERNION, LOCAL_POSITION_NED
+_LISTENING = 0.005  # s of simulated time between two looks at the link
+_ASKING, _HEARTBEAT = 10.0, 1.0  # s of the link's clock
+_MICRO = 1e6
+
+
+@dataclass(frozen=True)
+class DvlOptions:
+    """How the autopilot is told the velocity over ground, as VISION_POSITION_DELTA."""
+
+    rate: float = 8.0  # Hz
+    latency: float = 0.1  # s, between the end of an interval and its message
+    dropout: float = 0.0  # part of the messages that do not come, 0 to 1
+    seed: int = 1  # of those
+
+
+class Dvl:
+    """Integrates the DVL's velocity and the gyro over each interval.
+
+    Parameters
+    ----------
+    options : DvlOptions
+        How often, how late, and how much is lost.
+
+    Examples
+    --------
+    The autopilot's time in microseconds, the interval, the turn and the way in it:
+
+    >>> from cosim.sitl.autopilot_link import Dvl, DvlOptions
+    >>> from cosim.sitl.motion import Motion
+    >>> still, ahead = (0.0, 0.0, 0.0), (0.25, 0.0, 0.0)
+    >>> motion = Motion(0.0, still, still, still, ahead, still, (1.0, 0.0, 0.0, 0.0), None, ahead)
+    >>> dvl = Dvl(DvlOptions(rate=8.0, latency=0.0))
+    >>> [told for k in range(9) for told in dvl.take(motion._replace(time=k / 64))]
+    [(125000, 125000, (0.0, 0.0, 0.0), (0.03125, 0.0, 0.0))]
+    """
+
+    def __init__(self, options: DvlOptions) -> None:
+        self._options = options
+        self._random = np.random.default_rng(options.seed)
+        self._turned: Array = np.zeros(3)
+        self._moved: Array = np.zeros(3)
+        self._begun = self._last = math.nan
+        self._due: deque[tuple[float, Any]] = deque()
+
+    def take(self, motion: Motion) -> list[Any]:
+        """Take the motion at an instant; return what is told now: time and interval [us], turn [rad], way [m]."""
+        now = motion.time
+        if not self._last <= now:
+            self._begun = self._last = now
+        self._turned += (now - self._last) * np.array(motion.gyro)
+        self._moved += (now - self._last) * np.array(motion.dvl)
+        self._last = now
+        interval = now - self._begun
+        if interval >= 1.0 / self._options.rate - 1e-9:
+            turned, moved = tuple(self._turned.tolist()), tuple(self._moved.tolist())
+            if self._random.random() >= self._options.dropout:
+                told = round(now * _MICRO), round(interval * _MICRO), turned, moved
+                self._due.append((now + self._options.latency, told))
+            self._turned[:] = self._moved[:] = 0.0
+            self._begun = now
+        return [self._due.popleft()[1] for _ in range(sum(at <= now for at, _ in self._due))]
+
+
+class AutopilotLink:
+    """Listens to the autopilot that flies the plant.
+
+    Parameters
+    ----------
+    endpoint : Endpoint
+        One of its ports; messages go out as component 197 of the vehicle.
+    dvl : DvlOptions, optional
+        Tell it what a DVL measures; default: nothing.
+
+    Attributes
+    ----------
+    estimate : ndarray, shape (len(ESTIMATE),)
+        As `ESTIMATE` names it; NaN before it is heard.
+
+    Raises
+    ------
+    TelemetryError
+        If the endpoint is a file, or cannot be opened.
+    """
+
+    def __init__(self, endpoint: Endpoint, dvl: DvlOptions | None = None) -> None:
+        if endpoint.kind == "tlog":
+            raise TelemetryError(f"endpoint {endpoint.text!r}: expected a network or a serial device, not a file")
+        self._link, self._mavlink = GroundLink(endpoint, identity=IDENTITY), dialect()
+        self._reported = ReportedState(IDENTITY)
+        self._dvl = None if dvl is None else Dvl(dvl)
+        self.estimate: Array = np.full(len(ESTIMATE), math.nan)
+        self._listened = self._asked = self._beat = -math.inf
+
+    @property
+    def is_armed(self) -> bool:
+        """Whether the autopilot said so last."""
+        return self._reported.is_armed
+
+    def close(self) -> None:
+        """Close the link. May be called twice."""
+        self._link.close()
+
+    def exchange(self, motion: Motion) -> None:
+        """Tell what is measured at an instant, and listen now and then."""
+        m = self._mavlink
+        if self._dvl is not None:
+            for stamp, interval, turned, moved in self._dvl.take(motion):
+                self._link.send(m.MAVLink_vision_position_delta_message(stamp, interval, turned, moved, 100.0))
+        if 0.0 <= motion.time - self._listened < _LISTENING:
+            return
+        self._listened = motion.time
+        now, reported = time.monotonic(), self._reported
+        for one in self._link.receive(0.0):
+            reported.take(one.system, one.component, one.message, now)
+        self._ask(now)
+        self.estimate[:3], self.estimate[3:6] = reported.position, reported.velocity
+        if math.isfinite(reported.age(now)):
+            self.estimate[6:9] = euler_of(reported.quaternion.tolist())
+        self.estimate[9:] = reported.mode, reported.is_armed
+
+    def _ask(self, now: float) -> None:
+        m, system = self._mavlink, self._reported.system
+        if now - self._beat >= _HEARTBEAT:
+            self._beat = now
+            self._link.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_ONBOARD_CONTROLLER, 8, 0, 0, m.MAV_STATE_ACTIVE, 3))
+        if system is not None and now - self._asked >= _ASKING:
+            self._asked = now
+            for message_id, rate in _RATES.items():
+                self._link.send(
+                    m.MAVLink_command_long_message(
+                        system, 1, m.MAV_CMD_SET_MESSAGE_INTERVAL, 0, message_id, 1e6 / rate, 0, 0, 0, 0, 0
+                    )
+                )

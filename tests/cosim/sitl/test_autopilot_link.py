@@ -1,0 +1,94 @@
+"""The link beside the lockstep: the autopilot's estimate in the record, and the DVL that it is told of."""
+
+import contextlib
+
+import numpy as np
+import pytest
+
+from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.endpoint import parse_endpoint
+from cosim.mavlink.wire.ground_end import GroundLink
+from cosim.results.record import load_record
+from cosim.sitl.autopilot_link import AutopilotLink, Dvl, DvlOptions
+from cosim.sitl.flights import FlightOptions, Flights
+from cosim.sitl.law import law_of_pwm
+from cosim.sitl.motion import Motion
+from cosim.sitl.server import JsonServer
+from tests.cosim.sitl.conftest import Served
+from tests.cosim.sitl.stand_in import DISARMED, StandIn, frame
+from tests.cosim.sitl.test_command import free_port
+
+STILL = (0.0, 0.0, 0.0)
+STEPS = 48
+
+
+def motion(time, velocity, gyro=STILL):
+    return Motion(time, gyro, STILL, STILL, velocity, STILL, (1.0, 0.0, 0.0, 0.0), None, velocity)
+
+
+def told(options, seconds=10.0, rate=400):
+    """What a DVL tells of a vehicle that goes ahead at 0.5 m/s and turns to starboard at 0.1 rad/s."""
+    dvl = Dvl(options)
+    found = []
+    for k in range(round(seconds * rate) + 1):
+        time = k / rate
+        found += [(time, *one) for one in dvl.take(motion(time, (0.5, 0.0, 0.0), (0.0, 0.0, 0.1)))]
+    return found
+
+
+def test_the_ways_of_a_dvl_add_up():
+    found = told(DvlOptions(rate=8.0, latency=0.0))
+    assert len(found) == 80
+    assert {interval for _, _, interval, _, _ in found} == {125_000}
+    assert np.sum([moved for *_, moved in found], axis=0) == pytest.approx((5.0, 0.0, 0.0))
+    assert np.sum([turned for *_, turned, _ in found], axis=0) == pytest.approx((0.0, 0.0, 1.0))
+
+
+def test_a_dvl_is_late_and_loses_what_it_is_said_to():
+    late = told(DvlOptions(rate=8.0, latency=0.25))
+    assert [time - stamp / 1e6 for time, stamp, *_ in late] == pytest.approx([0.25] * len(late), abs=1e-6)
+    lossy = told(DvlOptions(rate=8.0, latency=0.0, dropout=0.3), seconds=100.0)
+    assert 480 <= len(lossy) <= 640  # of 800
+    assert [one[1] for one in lossy] == [one[1] for one in told(DvlOptions(8.0, 0.0, 0.3), seconds=100.0)]
+
+
+def test_the_estimate_is_in_the_record_and_arming_lets_go(tmp_path):
+    m, port = dialect(), free_port()
+    link = AutopilotLink(parse_endpoint(f"udpin:127.0.0.1:{port}"), DvlOptions(rate=100.0, latency=0.0))
+    options = FlightOptions(
+        "sitl", (f"time.duration={STEPS / 1200}",), "bluerov2_heavy", tmp_path / "run", 2000.0, report=False
+    )
+    flights = Flights(options, "ardupilot", lambda vehicle: law_of_pwm(vehicle, link))
+    served = Served(JsonServer(flights, ("127.0.0.1", 0), 60.0))
+    served.start()
+    heard = []
+    with (
+        StandIn(served.address) as pilot,
+        GroundLink(parse_endpoint(f"udpout:127.0.0.1:{port}"), identity=(1, 1)) as autopilot,
+    ):
+
+        def say(armed):
+            autopilot.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_SUBMARINE, 3, 1 | armed, 19, 4, 3))
+            autopilot.send(m.MAVLink_local_position_ned_message(1, 4.0, 5.0, 6.0, 0.1, 0.2, 0.3))
+
+        say(armed=0)
+        for _ in range(60):  # 50 ms, of which it listens to each sixth
+            pilot.fly(DISARMED)
+        while served.is_alive():
+            say(armed=128)
+            heard += [one.message for one in autopilot.receive(0.0)]
+            pilot.send(frame(pilot.count, DISARMED))
+            with contextlib.suppress(TimeoutError):
+                pilot.socket.settimeout(0.05)
+                pilot.socket.recv(65000)
+                pilot.count += 1
+    outcome = served.outcome()
+    link.close()
+    assert outcome.counts.steps == STEPS and outcome.counts.waited >= 60
+    deltas = [one for one in heard if one.get_type() == "VISION_POSITION_DELTA"]
+    assert deltas and np.abs([one.position_delta for one in deltas]).max() < 1e-3
+    asked = {one.param1 for one in heard if one.get_type() == "COMMAND_LONG"}
+    assert asked == {0.0, 31.0, 32.0}
+    record = load_record(outcome.runs[0].folder)
+    assert [record[f"law.estimate.{name}"][-1] for name in ("x", "y", "z", "vz")] == pytest.approx([4, 5, 6, 0.3])
+    assert (record["law.mode"][-1], record["law.armed"][-1]) == (19.0, 1.0)
