@@ -75,7 +75,13 @@ def numbers_of(memory):
 def assert_sound(law, forces):
     assert np.isfinite(forces).all() and np.abs(forces).max() <= 27.0
     for key, value in numbers_of(law.memory):
-        if key not in ("state_estimate.last_measured", "plan.new_cost.clear_until", "promised", "thrusters.stuck"):
+        if key not in (
+            "state_estimate.last_measured",
+            "plan.new_cost.clear_until",
+            "expected",
+            "promised",
+            "thrusters.stuck",
+        ):
             assert np.isfinite(value).all(), key
 
 
