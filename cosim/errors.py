@@ -29,3 +29,7 @@ class CommandError(CosimError):
 
 class ExportError(CosimError):
     """A run that cannot be written in another format."""
+
+
+class IdentificationError(CosimError):
+    """Runs that vehicle parameters cannot be identified from."""

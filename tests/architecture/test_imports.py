@@ -20,7 +20,7 @@ MAY_IMPORT = {
 # the rooms of cosim from the ground up: each imports rooms above it in this list, and none below
 FLOORS = (
     *("io", "scenario", "simulation", "results", "batch", "ssp", "replay", "mavlink", "report", "export", "live"),
-    *("precheck", "run", "companion", "sitl", "campaigns", "command_line"),
+    *("precheck", "run", "companion", "identification", "sitl", "campaigns", "command_line"),
 )
 MOST_MODULES = 20  # in one room
 MOST_AT_THE_ROOT = 8  # modules of cosim
