@@ -35,7 +35,8 @@ class _Request(ctypes.Structure):
         ("step", ctypes.c_double),
         *((name, ctypes.c_void_p) for name in (
             "references", "values", "start", "wrench", "force", "start_tangents", "parameter_directions",
-            "input_directions", "force_tangents", "wrench_tangents", "times", "states", "rates", "state_tangents", "work",
+            "input_directions", "force_tangents", "wrench_tangents", "times", "states", "rates", "state_tangents",
+            "work",
         )),
     )  # fmt: skip
 
