@@ -20,6 +20,7 @@ from cosim.command_line import (
     completion,
     export,
     falsify,
+    identify,
     mavlink,
     package,
     replay,
@@ -126,6 +127,7 @@ def _parser() -> argparse.ArgumentParser:
     campaigns.add_verbs(verbs)
     sweep.add_verbs(verbs)
     falsify.add_verb(verbs)
+    identify.add_verb(verbs)
     mavlink.add_verbs(verbs)
     sitl.add_verbs(verbs)
     companion.add_verb(verbs)
@@ -273,6 +275,7 @@ _VERBS = {
     "sweep": sweep.sweep,
     "rerun": sweep.rerun,
     "falsify": falsify.falsify,
+    "identify": identify.identify,
     "listen": mavlink.listen,
     "stream": mavlink.stream,
     "mavlink-check": mavlink.mavlink_check,

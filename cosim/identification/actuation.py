@@ -1,4 +1,4 @@
-"""The wrench that commands put on the body, step by step, and how it depends on delay, lag and thrust."""
+"""The wrench that commands put on the body, step by step, and how it depends on lag and thrust."""
 
 from __future__ import annotations
 
@@ -20,12 +20,11 @@ _LEAST_LAG = 1e-4  # s; a shorter one is none
 
 @dataclass(frozen=True)
 class Actuation:
-    """Wrenches that are constant over each step of a grid, and their derivatives."""
+    """Wrenches that are linear over each step of a grid: mean and change from begin to end, and their derivatives."""
 
-    wrench: Array  # (steps, 6) N, N m
-    by_lag: Array  # (steps, 6), by the time constant of all thrusters
-    by_delay: Array  # (steps, 6), by the delay of all commands
-    by_scale: Array  # (thrusters, steps, 6), by a factor of each thruster
+    wrench: Array  # (steps, 2, 6) N, N m
+    by_lag: Array  # (steps, 2, 6), by the time constant of all thrusters
+    by_scale: Array  # (thrusters, steps, 2, 6), by a factor of each thruster
 
 
 class CommandedForces:
@@ -48,32 +47,26 @@ class CommandedForces:
 
     def __init__(self, log: Log, vehicle: Vehicle, step: float) -> None:
         if vehicle.thrust_rate_limit.any():
-            raise IdentificationError(f"{vehicle.name}: thrusters.rate_limit is above 0, expected thrusters without one")
+            raise IdentificationError(f"{vehicle.name}: thrusters.rate_limit is above 0, expected none")
         self.step, self.start = step, float(log.times[0])
         self.steps = max(1, math.floor((log.times[-1] - self.start) / step))
         forces = np.concatenate([steady_forces(log.thrust, vehicle), log.wrench], axis=1)
         spans = np.diff(log.times, append=log.times[-1])
         self._times = log.times - self.start
-        self._impulse = np.concatenate([np.zeros((1, forces.shape[1])), np.cumsum(forces * spans[:, None], axis=0)])[:-1]
+        self._impulse = np.cumsum(forces * spans[:, None], axis=0) - forces * spans[:, None]
         self._forces = forces
         self._matrix = vehicle.thruster_matrix
 
-    def _mean(self, delay: float) -> tuple[Array, Array]:
-        """Return the mean force of each step, shape (steps, thrusters + 6), and its derivative by the delay."""
-        edges = np.arange(self.steps + 1) * self.step - delay
+        edges = np.arange(self.steps + 1) * step
         at = np.clip(np.searchsorted(self._times, edges, side="right") - 1, 0, len(self._times) - 1)
-        force = self._forces[at]
-        impulse = self._impulse[at] + force * (edges - self._times[at])[:, None]
-        result: tuple[Array, Array] = np.diff(impulse, axis=0) / self.step, -np.diff(force, axis=0) / self.step
-        return result
+        impulse = self._impulse[at] + forces[at] * (edges - self._times[at])[:, None]
+        self._mean: Array = np.diff(impulse, axis=0) / step
 
-    def actuation(self, delay: float, lag: float, scales: Array) -> Actuation:
+    def actuation(self, lag: float, scales: Array) -> Actuation:
         """Return the wrench of each step.
 
         Parameters
         ----------
-        delay : float
-            Of all commands [s].
         lag : float
             Time constant of all thrusters [s].
         scales : ndarray, shape (thrusters,)
@@ -85,14 +78,12 @@ class CommandedForces:
             With its derivatives.
         """
         n = self._matrix.shape[1]
-        mean, by_delay = self._mean(delay)
-        force, by_lag = _lagged(mean[:, :n], lag, self.step)
-        delayed, _ = _lagged(by_delay[:, :n], lag, self.step)
-        matrix = self._matrix * scales
-        by_scale = self._matrix.T[:, None, :] * force.T[:, :, None]
-        return Actuation(
-            force @ matrix.T + mean[:, n:], by_lag @ matrix.T, delayed @ matrix.T + by_delay[:, n:], by_scale
-        )
+        force, by_lag = _lagged(self._mean[:, :n], lag, self.step)
+        matrix = (self._matrix * scales).T
+        wrench = force @ matrix
+        wrench[:, 0] += self._mean[:, n:]
+        by_scale = self._matrix.T[:, None, None, :] * np.moveaxis(force, 2, 0)[..., None]
+        return Actuation(wrench, by_lag @ matrix, by_scale)
 
 
 def steady_forces(commands: Array, vehicle: Vehicle) -> Array:
@@ -120,25 +111,25 @@ def steady_forces(commands: Array, vehicle: Vehicle) -> Array:
 
 
 def _lagged(forces: Array, lag: float, step: float) -> tuple[Array, Array]:
-    """Return the means of forces behind a lag, over steps in each of which they head for one value, and by the lag."""
+    """Return forces behind a lag, shape (steps, 2, n): mean and change of each step; and the same by the lag.
+
+    Over a step they head for one value. Before the first they are at rest with it.
+    """
+    zero = np.zeros((1, forces.shape[1]))
     if lag < _LEAST_LAG:
-        return forces, -_behind(forces, step)
+        behind = np.diff(forces, axis=0, prepend=forces[:1]) / step
+        return np.stack([forces, 0.0 * forces], axis=1), np.stack([-behind, 0.0 * behind], axis=1)
     pole = math.exp(-step / lag)
     pole_by_lag = pole * step / lag**2
-    share = lag / step * (1.0 - pole)  # of the gap at the step's beginning, in its mean
+    share = lag / step * (1.0 - pole)  # of the gap at the step's begin, in its mean
     share_by_lag = (1.0 - pole) / step - lag / step * pole_by_lag
-    zero = np.zeros((1, forces.shape[1]))
-    first = forces[:1] * pole  # at rest with the first command
-    ends, _ = lfilter([1.0 - pole], [1.0, -pole], forces, axis=0, zi=first)
+    ends, _ = lfilter([1.0 - pole], [1.0, -pole], forces, axis=0, zi=forces[:1] * pole)
     begins = np.concatenate([forces[:1], ends[:-1]])
     gaps = begins - forces
     ends_by_lag, _ = lfilter([1.0], [1.0, -pole], gaps * pole_by_lag, axis=0, zi=zero)
     begins_by_lag = np.concatenate([zero, ends_by_lag[:-1]])
-    return forces + gaps * share, gaps * share_by_lag + begins_by_lag * share
-
-
-def _behind(forces: Array, step: float) -> Array:
-    """Return the limit of the derivative by a lag that vanishes."""
-    begins = np.concatenate([forces[:1], forces[:-1]])
-    result: Array = (forces - begins) / step
-    return result
+    means_by_lag = gaps * share_by_lag + begins_by_lag * share
+    return (
+        np.stack([forces + gaps * share, ends - begins], axis=1),
+        np.stack([means_by_lag, ends_by_lag - begins_by_lag], axis=1),
+    )

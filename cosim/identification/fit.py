@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from cosim.errors import IdentificationError
-from cosim.identification.intervals import Intervals, estimate_intervals
+from cosim.identification.intervals import RESTS, Intervals, estimate_intervals
 from cosim.identification.log import Log
 from cosim.identification.parameters import Parameter
 from cosim.identification.residuals import Reduced, Residuals
@@ -20,8 +21,9 @@ from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-STEP = 0.02  # s, of the integration
+LONGEST_STEP, SHORTEST_STEP = 0.03, 0.015  # s, of the integration
 STAGES = (4.0, 20.0)  # s, lengths of windows: short ones find the numbers from afar, long ones tell them apart
+_ROUGH, _PRECISION = 1e-3, 1e-6  # part of the cost that a round leaves: of all stages, and of the last
 _EVALUATIONS = 20  # of each round, at the most
 _ROUNDS = 2  # of each stage: fit, weigh anew
 _HUBER = 3.0  # standard deviations, beyond which a residual counts by its magnitude
@@ -42,9 +44,34 @@ class Fit:
     outliers: int  # samples' components
     samples: int  # samples' components in all
 
+    step: float  # s, of the integration
+
     def vehicle_part(self) -> list[int]:
         """Return the places of the vehicle's own numbers."""
         return [i for i, p in enumerate(self.parameters) if not p.is_nuisance]
+
+    def resting(self) -> list[int]:
+        """Return the places of the vehicle's numbers that rest on their priors."""
+        return [i for i in self.vehicle_part() if self.intervals.prior_part[i] > RESTS]
+
+    def alike(self, least: float) -> Iterator[tuple[str, str]]:
+        """Yield pairs of numbers whose correlation is beyond `least`, the most alike first."""
+        size = np.abs(np.triu(self.intervals.correlation, 1))
+        for i, j in sorted(np.argwhere(size > least), key=lambda pair: -size[tuple(pair)]):
+            yield self.parameters[i].name, self.parameters[j].name
+
+    def worst_topic(self) -> tuple[str, float]:
+        """Return the topic that is explained worst, and the root mean square of its residuals in its noise."""
+        sums: dict[str, list[float]] = {}
+        for window, reduced in zip(self.windows, self.residuals, strict=True):
+            count = 0
+            for topic in window.topics:
+                size = len(topic.times) * len(topic.components)
+                sums.setdefault(topic.name, []).extend(np.square(reduced.residual[count : count + size]))
+                count += size
+        means = {name: float(np.sqrt(np.mean(squares))) for name, squares in sums.items()}
+        worst = max(means, key=lambda name: means[name])
+        return worst, means[worst]
 
 
 def fit(
@@ -78,13 +105,13 @@ def fit(
     """
     parameters = tuple(parameters)
     margins = MARGINS if any(p.kind == "delay" for p in parameters) else (0.0, 0.0)
-    values = _inside(parameters)
+    values, step = _inside(parameters), integration_step(logs)
     done, total = 0, len(STAGES) * _ROUNDS * _EVALUATIONS
     for stage, length in enumerate(STAGES):
-        windows, rejected = cut_windows(logs, vehicle, STEP, length, margins)
+        windows, rejected = cut_windows(logs, vehicle, step, length, margins)
         if not windows:
             raise IdentificationError(_nothing_left(rejected))
-        problem = Problem(Residuals(logs, vehicle, parameters, windows, STEP))
+        problem = Problem(Residuals(logs, vehicle, parameters, windows, step))
         for turn in range(_ROUNDS):
             begun = done
 
@@ -93,16 +120,17 @@ def fit(
                 done = min(done + 1, begun + _EVALUATIONS)
                 progress(done / total)
 
+            last = stage == len(STAGES) - 1
             problem.residuals.holds_starts = stage == turn == 0
-            values = problem.solve(values, tick)
+            values = problem.solve(values, tick, _PRECISION if last else _ROUGH)
             done = (stage * _ROUNDS + turn + 1) * _EVALUATIONS
-            if not (stage == len(STAGES) - 1 and turn == _ROUNDS - 1):
+            if not (last and turn == _ROUNDS - 1):
                 problem.reweigh()
     progress(1.0)
     plain = [r.residual / w for r, w in zip(problem.reduced, problem.residuals.weights, strict=True)]
     return Fit(
         parameters, values, estimate_intervals(parameters, values, problem.reduced, windows), tuple(windows), rejected,
-        tuple(problem.reduced), sum(int((np.abs(r) > _OUTLIER).sum()) for r in plain), sum(map(len, plain)),
+        tuple(problem.reduced), sum(int((np.abs(r) > _OUTLIER).sum()) for r in plain), sum(map(len, plain)), step,
     )  # fmt: skip
 
 
@@ -124,7 +152,7 @@ class Problem:
         self._deviation = np.array([p.deviation for p in parameters])
         self._bounds = np.array([p.least for p in parameters]), np.array([p.most for p in parameters])
 
-    def solve(self, values: Array, tick: Callable[[], None]) -> Array:
+    def solve(self, values: Array, tick: Callable[[], None], precision: float) -> Array:
         """Return the best values from some on."""
 
         def residual(x: Array) -> Array:
@@ -136,7 +164,7 @@ class Problem:
             raise IdentificationError("the start vehicle predicts no motion that stays within numbers")
         found = least_squares(
             residual, values, lambda x: self._evaluate(x)[1], bounds=self._bounds, x_scale=self._deviation,
-            ftol=1e-7, xtol=1e-7, gtol=1e-9, max_nfev=_EVALUATIONS,
+            ftol=precision, xtol=1e-7, gtol=1e-9, max_nfev=_EVALUATIONS,
         )  # fmt: skip
         result: Array = found.x
         self._evaluate(result)
@@ -166,6 +194,31 @@ class Problem:
             self.reduced = reduced
             self._known = key, rows_of_all[:, p], rows_of_all[:, :p]
         return self._known[1], self._known[2]
+
+
+def integration_step(logs: Sequence[Log]) -> float:
+    """Return a step on whose grid commands change, as far as they change at one rate.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        The runs.
+
+    Returns
+    -------
+    float
+        15 to 30 ms: a whole part of the usual time between changes, or a multiple of it [s].
+    """
+    spans = []
+    for log in logs:
+        commands = np.concatenate([log.thrust, log.wrench], axis=1)
+        changes = log.times[1:][(np.diff(commands, axis=0) != 0.0).any(axis=1)]
+        spans.append(np.diff(changes))
+    all_spans = np.concatenate(spans)
+    usual = float(np.median(all_spans)) if len(all_spans) else LONGEST_STEP
+    if usual >= SHORTEST_STEP:
+        return usual / math.ceil(usual / LONGEST_STEP - 1e-6)
+    return usual * math.ceil(SHORTEST_STEP / usual - 1e-6)
 
 
 def _inside(parameters: Sequence[Parameter]) -> Array:

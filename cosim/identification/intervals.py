@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,8 +81,9 @@ def estimate_intervals(
     jackknife = np.sqrt((n - 1.0) / n * np.sum(np.square(moved - moved.mean(axis=0)), axis=0)) if n > 1 else nominal
     deviations = np.maximum(jackknife, nominal)
     scale = deviations / nominal
+    covariance: Any = inverse * np.outer(scale, scale)
     return Intervals(
-        deviations=deviations, nominal=nominal, covariance=inverse * np.outer(scale, scale),
+        deviations=deviations, nominal=nominal, covariance=covariance,
         factor=float(student.ppf(0.5 + _COVERED / 2.0, max(1, n - 1))), clusters=clusters, chi2=chi2,
         prior_part=nominal * np.sqrt(prior),
     )  # fmt: skip

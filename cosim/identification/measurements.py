@@ -110,7 +110,7 @@ def derivative_by_errors(topic: Topic, states: Array, errors: Errors, kind: str,
 
 
 def _attitude_matrix(measured: Array, states: Array) -> tuple[Array, Array]:
-    """Return the matrix that gives the vector part of conj(measured) times a quaternion, and the sign of the scalar part.
+    """Return the matrix of the vector part of conj(measured) times a quaternion, and the sign of the scalar part.
 
     Twice that vector part is the rotation from the sample to the prediction, seen from the body, while it is small.
     """

@@ -1,16 +1,17 @@
-"""What is free in an identification: keys of the vehicle's file and nuisances of the runs, with what is known before."""
+"""What is free in an identification: keys of the vehicle's file, and nuisances of the runs, with their priors."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
+from cosim.identification.log import TOPICS, Log
 from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -21,7 +22,7 @@ DEFAULT_FREE = (
     "hydrodynamics.added_mass", "hydrodynamics.linear_damping", "hydrodynamics.quadratic_damping",
     "hydrostatics.buoyancy", "hydrostatics.center_of_buoyancy", "thrusters.time_constant",
 )  # fmt: skip
-NUISANCES = ("current", "force", "delay", "lever", "bias", "scale")
+NUISANCES: tuple[Kind, ...] = ("current", "force", "delay", "lever", "bias", "scale")
 DEFAULT_NUISANCES = ("current", "lever", "bias")
 
 _ELEMENT = re.compile(r"(?P<key>[a-z_]+\.[a-z_]+)(?:\.(?P<row>\d+)(?:\.(?P<column>\d+))?|\.(?P<part>diagonal))?")
@@ -30,11 +31,10 @@ _COUPLING = 0.3  # standard deviation of an off-diagonal element, in geometric m
 _RELATIVE = 1.0  # of damping and added mass: the start is known to about a factor of two
 _LEAST_LINEAR, _LEAST_QUADRATIC = (10.0, 0.5), (50.0, 1.0)  # the least deviations, along and about the axes
 _BUOYANCY = 0.05  # of the weight
-_LEVER, _CENTER = 0.3, 0.03  # m
+_CENTER = 0.03  # m
 _MASS, _INERTIA = 0.02, 0.2  # parts
-_LAG, _MOST_LAG, _DELAY = 0.2, 2.0, 0.1  # s
-_THRUST, _SCALE = 0.05, 0.01  # parts
-_CURRENT, _FORCE, _BIAS = 0.3, 0.5, 0.01  # m/s, N, rad/s
+_LAG, _MOST_LAG = 0.2, 2.0  # s
+_THRUST = 0.05  # part
 
 
 @dataclass(frozen=True)
@@ -93,36 +93,39 @@ def free_parameters(vehicle: Vehicle, keys: Sequence[str]) -> list[Parameter]:
     return list(found.values())
 
 
-def nuisances(names: Iterable[str], runs: int) -> list[Parameter]:
+def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
     """Return the free numbers that are not of the vehicle.
 
     Parameters
     ----------
-    names : iterable of str
-        Of `NUISANCES`: a current and a constant force of each run, north and east; one delay of the commands; the lever
-        arm, and the scale error of the DVL; the gyro's biases of each run.
-    runs : int
-        How many runs there are.
+    names : sequence of str
+        Of `NUISANCES`: a current and a constant force of each run, north and east; the delay of each topic behind the
+        commands; the lever arm and the scale error of the DVL; the gyro's biases of each run.
+    logs : sequence of Log
+        The runs.
 
     Returns
     -------
     list of Parameter
         Each about 0.
+
+    Raises
+    ------
+    IdentificationError
+        If a name is unknown.
     """
+    topics = [name for name in TOPICS if any(log.topic(name) for log in logs)]
     made: list[Parameter] = []
-    for name in names:
-        of_runs = range(runs) if name in ("current", "force", "bias") else (None,)
-        for run in of_runs:
+    if odd := [name for name in names if name not in NUISANCES]:
+        raise IdentificationError(f"--nuisance {odd[0]}: is unknown, expected some of {', '.join(NUISANCES)}")
+    for name in (known for known in NUISANCES if known in names):
+        label, unit, deviation, axes = _NUISANCES[name]
+        for run in range(len(logs)) if name in ("current", "force", "bias") else (None,):
             said = "" if run is None else f" of run {run + 1}"
-            for index, axis in enumerate({"current": "xy", "force": "xy", "lever": "xyz", "bias": "pqr"}.get(name, " ")):
-                unit, deviation = {
-                    "current": ("m/s", _CURRENT), "force": ("N", _FORCE), "delay": ("s", _DELAY), "lever": ("m", _LEVER),
-                    "bias": ("rad/s", _BIAS), "scale": ("", _SCALE),
-                }[name]  # fmt: skip
-                plant = f"current.{axis}" if name == "current" else ""
-                label = {"lever": "DVL lever", "bias": "gyro bias", "scale": "DVL scale error"}.get(name, name)
+            for index, axis in enumerate(topics if name == "delay" else axes):
+                plant = f"current.{axis}" if name == "current" else axis if name == "delay" else ""
                 made.append(Parameter(
-                    f"{label} {axis}".strip() + said, unit, name, 0.0, deviation, plant=plant, index=index, run=run  # type: ignore[arg-type]
+                    f"{label} {axis}".strip() + said, unit, name, 0.0, deviation, plant=plant, index=index, run=run
                 ))  # fmt: skip
     return made
 
@@ -144,7 +147,7 @@ def with_values(vehicle: Vehicle, parameters: Sequence[Parameter], values: Array
     Vehicle
         Not checked.
     """
-    changed = {name: np.array(getattr(vehicle, name)) for name in (
+    changed: dict[str, Any] = {name: np.array(getattr(vehicle, name)) for name in (
         "added_mass", "linear_damping", "quadratic_damping", "r_B", "r_G", "inertia", "thruster_matrix",
         "thrust_time_constant", "mass", "weight", "buoyancy",
     )}  # fmt: skip
@@ -159,8 +162,9 @@ def with_values(vehicle: Vehicle, parameters: Sequence[Parameter], values: Array
             changed[name][place[::-1]] = value
     for array in changed.values():
         array.setflags(write=False)
-    scalars = {name: float(changed.pop(name)) for name in ("mass", "weight", "buoyancy")}
-    return replace(vehicle, **changed, **scalars)
+    for name in ("mass", "weight", "buoyancy"):
+        changed[name] = float(changed[name])
+    return replace(vehicle, **changed)
 
 
 def _place_of(name: str) -> tuple[str, tuple[int, ...]]:
@@ -215,9 +219,7 @@ def _of_water(vehicle: Vehicle, key: str) -> Iterator[Parameter]:
     units = ("N s/m", "N m s/rad") if kind == "linear_damping" else ("N s2/m2", "N m s2/rad2")
     for i in range(6):
         size = max(_RELATIVE * float(values[i]), least[i > 2])
-        yield Parameter(
-            f"{key}.{i + 1}", units[i > 2], "plant", float(values[i]), size, 0.0, plant=f"{kind}[{i + 1}]"
-        )
+        yield Parameter(f"{key}.{i + 1}", units[i > 2], "plant", float(values[i]), size, 0.0, plant=f"{kind}[{i + 1}]")
 
 
 def _of_thrusters(vehicle: Vehicle, key: str) -> Iterator[Parameter]:
@@ -228,6 +230,14 @@ def _of_thrusters(vehicle: Vehicle, key: str) -> Iterator[Parameter]:
         yield Parameter(f"{key}.{i + 1}", "", "thrust", 1.0, _THRUST, 0.1, 10.0, index=i)
 
 
+_NUISANCES: dict[str, tuple[str, str, float, str]] = {  # name, unit, deviation of the prior, axes
+    "current": ("current", "m/s", 0.3, "xy"),
+    "force": ("constant force", "N", 0.5, "xy"),
+    "delay": ("delay of", "s", 0.1, ""),
+    "lever": ("DVL lever", "m", 0.3, "xyz"),
+    "bias": ("gyro bias", "rad/s", 0.01, "pqr"),
+    "scale": ("DVL scale error", "", 0.01, " "),
+}
 _KEYS = {
     "_of_body": (
         "rigid_body.mass", "rigid_body.weight", "rigid_body.inertia", "rigid_body.center_of_gravity",

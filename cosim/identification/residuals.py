@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-_START_DEVIATIONS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0)  # m, rad, m/s, rad/s: as good as none
+_START_DEVIATIONS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0)  # m, rad, m/s, rad/s
 _SOLVED = 0.05  # of a start's standard deviation: what is left is linear
 _MOST_SOLVES = 8
 
@@ -76,7 +77,12 @@ class Residuals:
     """
 
     def __init__(
-        self, logs: Sequence[Log], vehicle: Vehicle, parameters: Sequence[Parameter], windows: Sequence[Window], step: float
+        self,
+        logs: Sequence[Log],
+        vehicle: Vehicle,
+        parameters: Sequence[Parameter],
+        windows: Sequence[Window],
+        step: float,
     ) -> None:
         self.parameters, self.windows = tuple(parameters), tuple(windows)
         self._shooter, self._step, self._thrusters = Shooter(vehicle), step, vehicle.n_thrusters
@@ -117,7 +123,7 @@ class Residuals:
                     bias[p.index] = x
                 case "scale":
                     scale = float(x)
-        return Setting(plant, self._forces[run].actuation(0.0, lag, scales), force, Errors(lever, scale, bias), delays)
+        return Setting(plant, self._forces[run].actuation(lag, scales), force, Errors(lever, scale, bias), delays)
 
     def raw(self, i: int, settings: Sequence[Setting], start: Array, full: bool) -> tuple[Array, Array, Array]:
         """Return residuals of a window from a start, with derivatives by the start and, if `full`, the free numbers.
@@ -200,7 +206,7 @@ class Residuals:
                 inputs[row] = len(wrenches)
                 change = setting.actuation.by_lag if p.kind == "lag" else setting.actuation.by_scale[p.index]
                 wrenches.append(change[inside])
-        wrench = np.stack(wrenches) if wrenches else np.empty((0, 0, 6))
+        wrench = np.stack(wrenches) if wrenches else np.empty((0, 0, 2, 6))
         return Directions(tangents, names, inputs, force, wrench)
 
     def _add_errors(
@@ -247,6 +253,7 @@ class Residuals:
         weight = self.weights[i]
         left, by_start, jacobian = weight * residual, weight[:, None] * by_start, weight[:, None] * jacobian
         deviations = np.array([_START_DEVIATIONS[k] for k in self._starts])
+        slope: Any
         q, r = np.linalg.qr(np.concatenate([by_start, np.diag(1.0 / deviations)]))
         top = q[: len(by_start)]
         slope = -np.linalg.solve(r, top.T @ jacobian)

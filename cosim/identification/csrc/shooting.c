@@ -15,15 +15,16 @@ typedef struct {
     double *tangent, *stage, *slopes[4]; /* (n_directions, 13) each */
 } Shooter;
 
-/* Rate of the state in the model, and of each direction's tangent in `along`. */
-static void evaluate(Shooter *s, int k, const double *along, double rate[N_RIGID], double *slope)
+/* Rate of the state in the model at a part of step k, and of each direction's tangent in `along`. */
+static void evaluate(Shooter *s, int k, double part, const double *along, double rate[N_RIGID], double *slope)
 {
     const Prediction *asked = s->asked;
-    const double *wrench = asked->wrench + 6 * (size_t)k, *force = asked->force;
+    const double *wrench = asked->wrench + 12 * (size_t)k, *force = asked->force, off = part - 0.5;
     double R[3][3], dR[3][3], dwater[3], tau[6], pushed[3];
 
     plant_rotation(s->model.state.rigid + 3, R);
-    memcpy(tau, wrench, sizeof tau);
+    for (int i = 0; i < 6; i++)
+        tau[i] = wrench[i] + off * wrench[6 + i];
     to_body((const double(*)[3])R, force, pushed);
     for (int i = 0; i < 3; i++)
         tau[i] += pushed[i];
@@ -41,9 +42,9 @@ static void evaluate(Shooter *s, int k, const double *along, double rate[N_RIGID
         for (int i = 0; i < 3; i++)
             dtau[i] = turned[i] + pushed[i];
         if (input >= 0) {
-            const double *change = asked->wrench_tangents + 6 * ((size_t)input * asked->n_steps + k);
+            const double *change = asked->wrench_tangents + 12 * ((size_t)input * asked->n_steps + k);
             for (int i = 0; i < 6; i++)
-                dtau[i] += change[i];
+                dtau[i] += change[i] + off * change[6 + i];
         }
         double *seeded = parameter >= 0 ? variable_real(&s->seed, &VARIABLES[parameter]) : NULL;
         if (seeded)
@@ -126,7 +127,7 @@ static int advance(Shooter *s, int k, int *next)
         if (stage > 0)
             move(s, from, rates[stage - 1], s->slopes[stage - 1], parts[stage] * h);
         s->model.time = begin + parts[stage] * h;
-        evaluate(s, k, s->stage, rates[stage], s->slopes[stage]);
+        evaluate(s, k, parts[stage], s->stage, rates[stage], s->slopes[stage]);
     }
     for (; *next < asked->n_samples && (asked->times[*next] <= begin + h || k == asked->n_steps - 1); ++*next)
         sample(s, *next, (asked->times[*next] - begin) / h, from, (const double(*)[N_RIGID])rates);

@@ -21,13 +21,13 @@ typedef struct { /* one prediction; arrays are row by row */
     const unsigned *references;     /* (n_parameters,) value references */
     const double *values;           /* (n_parameters,) */
     const double *start;            /* (13,) */
-    const double *wrench;           /* (n_steps, 6) N, N m, body frame, constant over each step */
+    const double *wrench;           /* (n_steps, 2, 6) N, N m, body frame: mean over a step, and change from its begin to its end */
     const double *force;            /* (3,) N, constant, world frame */
     const double *start_tangents;   /* (n_directions, 13) */
     const int *parameter_directions; /* (n_directions,) value reference of the parameter that changes; -1: none */
     const int *input_directions;    /* (n_directions,) row of wrench_tangents; -1: none */
     const double *force_tangents;   /* (n_directions, 3) */
-    const double *wrench_tangents;  /* (n_inputs, n_steps, 6) */
+    const double *wrench_tangents;  /* (n_inputs, n_steps, 2, 6) */
     const double *times;            /* (n_samples,) s since the start, rising */
 
     double *states;         /* (n_samples, 13) */

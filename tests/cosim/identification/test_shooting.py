@@ -29,7 +29,7 @@ def start_and_wrench(seed=1):
     start = np.concatenate([[0.3, -0.2, 2.0], [0.9, 0.2, -0.3, 0.25], 0.5 * rng.standard_normal(6)])
     start[3:7] /= np.linalg.norm(start[3:7])
     wrench = np.repeat(rng.standard_normal((STEPS // 10, 6)) * [20, 20, 20, 2, 2, 2], 10, axis=0)
-    return start, wrench
+    return start, np.stack([wrench, np.zeros_like(wrench)], axis=1)
 
 
 def test_the_prediction_is_the_motion_of_the_fmu(vehicle, shooter):
@@ -41,7 +41,7 @@ def test_the_prediction_is_the_motion_of_the_fmu(vehicle, shooter):
         plant.set(BODY | dict(zip(names, start, strict=True)))
         plant.initialise()
         expected = []
-        for tau in wrench:
+        for tau in wrench[:, 0]:
             plant.set({f"wrench.{name}": x for name, x in zip("XYZKMN", tau, strict=True)})
             plant.step(STEP)
             expected.append([plant[name] for name in names])
@@ -62,7 +62,7 @@ def test_samples_between_steps_lie_on_the_motion(shooter):
 
 
 def all_directions(rng):
-    n_start, inputs = STATE_SIZE, rng.standard_normal((2, STEPS, 6))
+    n_start, inputs = STATE_SIZE, rng.standard_normal((2, STEPS, 2, 6))
     count = n_start + len(BODY) + 2 + 2
     start, force = np.zeros((count, STATE_SIZE)), np.zeros((count, 3))
     start[:n_start] = np.eye(STATE_SIZE)
@@ -70,6 +70,17 @@ def all_directions(rng):
     rows = [None] * (count - 4) + [0, 1, None, None]
     force[-2, 0] = force[-1, 1] = 1.0
     return Directions(start, parameters, rows, force, inputs)
+
+
+def test_a_wrench_may_change_within_a_step(shooter):
+    start, wrench = start_and_wrench()
+    wrench[:, 1] = np.random.default_rng(5).standard_normal((STEPS, 6))
+    fine = np.repeat(wrench, 40, axis=0)
+    fine[:, 0] += fine[:, 1] * np.tile((np.arange(40) - 19.5) / 40, STEPS)[:, None]
+    fine[:, 1] = 0.0
+    times = np.array([0.5, 2.0])
+    found, expected = (shooter.predict(BODY, start, w, STEP * STEPS / len(w), times).states for w in (wrench, fine))
+    assert np.abs(found - expected).max() < 1e-4
 
 
 def name_of(along, j):
