@@ -48,7 +48,7 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
         yield (
             f"The model does not explain these runs to within the sensors' noise: chi² is {fit.intervals.chi2:.2f} by "
             f"degrees of freedom, and more than {DISAGREES} says that something is missing in it. Worst is the "
-            f"{worst.replace('_', ' ')}, whose residuals are {size:.1f} times its noise. The intervals are those of the "
+            f"{worst.replace('_', ' ')}: its residuals are {size:.1f} times its noise. The intervals are those of a "
             "jackknife, and hold as far as the pieces of the runs are alike. Look for a disturbance, unequal "
             "thrusters, a delay (--nuisance delay), the DVL's scale (--nuisance scale), a tether (--nuisance force)."
         )
@@ -64,7 +64,7 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
         yield f"These are hardly told apart (correlation above {_ALIKE}): {_listed(pairs)}."
     if not any(p.kind == "thrust" for p in fit.parameters):
         yield (
-            "All is in units of the thrust that the start vehicle's thrusters give. If they give 5 % more, then damping, "
+            "All is in units of the thrust that the start vehicle's thrusters give. If they give 5 % more, damping, "
             "mass with added mass, and weight less buoyancy are 5 % greater."
         )
     if fit.rejected:
