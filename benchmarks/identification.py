@@ -1,7 +1,7 @@
 """Identification of vehicles whose numbers are known: errors, coverage of the 95 % intervals, and times.
 
-``python -m benchmarks.identification N [--seed K] [--duration S] [--noise F]``. Each vehicle is a BlueROV2 Heavy with
-other damping, added mass (all 21 elements), buoyancy, center of buoyancy and thruster lag, in a current. The FMU moves it
+``python -m benchmarks.identification N [--seed K] [--duration S] [--noise F]``. Each is a BlueROV2 Heavy with
+other damping, added mass (all 21 elements), buoyancy, its center and thruster lag, in a current. The FMU moves it
 by multisines on all axes about a station that it keeps; sensors are white: DVL 5 mm/s at 6.7 Hz, gyro 2 mrad/s with
 biases, attitude 5 mrad and depth 3 mm at 20 Hz. The search starts from the shipped numbers.
 """
@@ -37,7 +37,8 @@ _FORCE = np.array([22.0, 22.0, 22.0, 1.5, 1.5, 2.0])  # N, N m
 _STATION = (30.0, 25.0)  # N/m, N s/m, of what brings it back
 _LEVEL = (6.0, 1.5)  # N m/rad, N m s/rad
 _NAMES = (
-    *(f"position.{axis}" for axis in "xyz"), *(f"quaternion.e{i}" for i in range(4)), *(f"velocity.{a}" for a in "uvwpqr"),
+    *(f"position.{axis}" for axis in "xyz"), *(f"quaternion.e{i}" for i in range(4)),
+    *(f"velocity.{name}" for name in "uvwpqr"),
 )  # fmt: skip
 _DEPTH = 5.0  # m
 

@@ -113,7 +113,7 @@ def steady_forces(commands: Array, vehicle: Vehicle) -> Array:
 def _lagged(forces: Array, lag: float, step: float) -> tuple[Array, Array]:
     """Return forces behind a lag, shape (steps, 2, n): mean and change of each step; and the same by the lag.
 
-    Over a step they head for one value. Before the first they are at rest with it.
+    Over a step they head for one value. Before the first they are taken to be at rest with it.
     """
     zero = np.zeros((1, forces.shape[1]))
     if lag < _LEAST_LAG:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from threadpoolctl import threadpool_limits
 
 from cosim.errors import IdentificationError
 from cosim.identification.intervals import RESTS, Intervals, estimate_intervals
@@ -23,7 +24,7 @@ Array = NDArray[np.float64]
 
 LONGEST_STEP, SHORTEST_STEP = 0.03, 0.015  # s, of the integration
 STAGES = (4.0, 20.0)  # s, lengths of windows: short ones find the numbers from afar, long ones tell them apart
-_ROUGH, _PRECISION = 1e-3, 1e-6  # part of the cost that a round leaves: of all stages, and of the last
+_HELD, _ROUGH, _PRECISION = 0.1, 1e-2, 1e-6  # part of the cost, below which a step ends a round: first, others, last
 _EVALUATIONS = 20  # of each round, at the most
 _ROUNDS = 2  # of each stage: fit, weigh anew
 _HUBER = 3.0  # standard deviations, beyond which a residual counts by its magnitude
@@ -103,7 +104,13 @@ def fit(
     IdentificationError
         If no window is left, or the start predicts no motion.
     """
-    parameters = tuple(parameters)
+    with threadpool_limits(1):  # the matrices are small: further threads would wait for each other most of the time
+        return _fit(logs, vehicle, tuple(parameters), progress)
+
+
+def _fit(
+    logs: Sequence[Log], vehicle: Vehicle, parameters: tuple[Parameter, ...], progress: Callable[[float], None]
+) -> Fit:
     margins = MARGINS if any(p.kind == "delay" for p in parameters) else (0.0, 0.0)
     values, step = _inside(parameters), integration_step(logs)
     done, total = 0, len(STAGES) * _ROUNDS * _EVALUATIONS
@@ -122,7 +129,8 @@ def fit(
 
             last = stage == len(STAGES) - 1
             problem.residuals.holds_starts = stage == turn == 0
-            values = problem.solve(values, tick, _PRECISION if last else _ROUGH)
+            rough = _HELD if problem.residuals.holds_starts else _ROUGH
+            values = problem.solve(values, tick, _PRECISION if last else rough)
             done = (stage * _ROUNDS + turn + 1) * _EVALUATIONS
             if not (last and turn == _ROUNDS - 1):
                 problem.reweigh()

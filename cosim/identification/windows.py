@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 MARGINS = (0.4, 0.1)  # s, at the ends of a window without samples, where delays are free
 
 _SHORTEST = 0.6  # part of a full window, below which the rest of a run is dropped
+_SETTLED = 1.0  # s, after a run's first command: forces that lag are then known by the commands since
 _MOST_GAP = 1.0  # s without a command, or without a sample of velocity or position
 _FASTEST = 3.0  # rad/s
 _STEEPEST = math.radians(80.0)  # of pitch
@@ -78,7 +79,7 @@ def _pieces(log: Log, step: float, length: float) -> Iterator[tuple[int, int]]:
     """Yield first step and number of steps of windows of about one length."""
     total = math.floor((log.times[-1] - log.times[0]) / step)
     steps = max(1, round(length / step))
-    for first in range(0, total, steps):
+    for first in range(math.ceil(_SETTLED / step), total, steps):
         count = min(steps, total - first)
         if count >= _SHORTEST * steps:
             yield first, count

@@ -44,6 +44,7 @@ ONE_PLACE = {
     "rich": {"cosim.command_line.watch", "cosim.live.watching.bars", "cosim.live.watching.picture"},
     "shtab": {"cosim.command_line.completion"},
     "skfuzzy": {"fuzzy_arbiter.engines.scikit"},
+    "threadpoolctl": {"cosim.identification.fit"},
     "tomli_w": {"cosim.scenario.toml_text"},
     "websockets": {"cosim.live.server", "cosim.live.watching.sources"},
 }
