@@ -22,8 +22,6 @@ from cosim.command_line import (
     falsify,
     identify,
     mavlink,
-    package,
-    replay,
     report,
     run,
     scenes,
@@ -102,9 +100,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_verb(verbs)
     watch.add_verb(verbs)
 
-    report.add_verb(verbs)
-
-    replay.add_verb(verbs)
+    report.add_verbs(verbs)
 
     listing = verbs.add_parser("list", help="list the shipped scenarios")
     listing.add_argument("--json", action="store_true", help="print it as JSON")
@@ -121,8 +117,7 @@ def _parser() -> argparse.ArgumentParser:
     calibrate = verbs.add_parser("calibrate", help="fit the force limit and lag that bring the paper's window about")
     calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
 
-    export.add_verb(verbs)
-    package.add_verb(verbs)
+    export.add_verbs(verbs)
     scenes.add_verb(verbs)
     campaigns.add_verbs(verbs)
     sweep.add_verbs(verbs)
@@ -259,7 +254,7 @@ _VERBS = {
     "run": run.run,
     "watch": watch.watch,
     "report": report.report,
-    "replay": replay.replay,
+    "replay": report.replay,
     "list": _list,
     "help": _help,
     "completion": completion.completion,
@@ -267,7 +262,7 @@ _VERBS = {
     "check": _check,
     "calibrate": _calibrate,
     "export": export.export,
-    "package": package.package,
+    "package": export.package,
     "scenes": scenes.scenes,
     "ablate": campaigns.ablate,
     "campaign": campaigns.campaign,

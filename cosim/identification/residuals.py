@@ -251,16 +251,18 @@ class Residuals:
         state = self.solve_start(i, settings, values)
         residual, by_start, jacobian = self.raw(i, settings, state, full=True)
         weight = self.weights[i]
-        left, by_start, jacobian = weight * residual, weight[:, None] * by_start, weight[:, None] * jacobian
+        left: Array = weight * residual
+        by_start, jacobian = weight[:, None] * by_start, weight[:, None] * jacobian
         deviations = np.array([_START_DEVIATIONS[k] for k in self._starts])
-        slope: Any
+        q: Any
+        r: Any
         q, r = np.linalg.qr(np.concatenate([by_start, np.diag(1.0 / deviations)]))
         top = q[: len(by_start)]
-        slope = -np.linalg.solve(r, top.T @ jacobian)
+        slope: Array = -np.linalg.solve(r, top.T @ jacobian)
         if self.holds_starts:
             return Reduced(left, jacobian, self._row_times(i))
         self._found[i] = _Start(state, values.copy(), slope)
-        step = -np.linalg.solve(r, top.T @ left)
+        step: Array = -np.linalg.solve(r, top.T @ left)
         return Reduced(left + by_start @ step, jacobian + by_start @ slope, self._row_times(i))
 
     def _row_times(self, i: int) -> Array:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cosim.errors import IdentificationError
+from cosim.identification.findings import warnings
 from cosim.identification.fit import fit, integration_step
 from cosim.identification.log import Log, make_topic
 from cosim.identification.parameters import DEFAULT_FREE, free_parameters, nuisances, with_values
@@ -82,6 +83,7 @@ def test_the_nominal_intervals_are_those_of_the_information(found):
     assert (found.intervals.deviations >= found.intervals.nominal).all()
 
 
+@pytest.mark.slow
 def test_the_gradient_is_that_of_the_cost(log, vehicle, found):
     """The start of each window is eliminated; cost and gradient are still those of all."""
     from cosim.identification.fit import Problem
@@ -105,10 +107,36 @@ def test_it_predicts_better_than_to_hold_the_velocity(log, vehicle, found):
             assert p.identified[0] < p.start_vehicle[0] and p.identified[0] < 0.5 * p.held[0]
 
 
+@pytest.mark.slow
 def test_what_no_run_tells_rests_on_its_prior(log, vehicle):
     parameters = free_parameters(vehicle, ("thrusters.time_constant", "hydrodynamics.quadratic_damping.1"))
     found = fit([log], vehicle, parameters)
     assert [found.parameters[i].name for i in found.resting()] == ["thrusters.time_constant"]
+
+
+@pytest.mark.slow
+def test_a_late_topic_is_found_late(log, vehicle):
+    """All samples of velocity are 0.1 s late by their stamps."""
+    late = tuple(dataclasses.replace(t, times=t.times + 0.1) if t.name == "velocity" else t for t in log.topics)
+    delayed = dataclasses.replace(log, topics=late)
+    parameters = free_parameters(vehicle, FREE) + nuisances(("current", "bias", "delay"), [delayed])
+    done = fit([delayed], vehicle, parameters)
+    found = {p.plant: x for p, x in zip(parameters, done.values, strict=True) if p.kind == "delay"}
+    assert found["velocity"] == pytest.approx(0.1, abs=0.01)
+    assert [found[name] for name in ("angular_velocity", "depth")] == pytest.approx([0.0, 0.0], abs=0.01)
+    assert done.values[0] == pytest.approx(TRUTH["quadratic_damping[1]"], rel=0.02)
+
+
+@pytest.mark.slow
+def test_a_disturbance_is_said_and_widens_the_intervals(log, vehicle):
+    """A velocity that wanders by 2 cm/s within seconds: the noise alone does not explain it."""
+    wander = 0.02 * np.sin(2 * np.pi * log.topic("velocity").times[:, None] / [5.0, 7.0, 9.0])
+    moved = tuple(dataclasses.replace(t, values=t.values + wander) if t.name == "velocity" else t for t in log.topics)
+    parameters = free_parameters(vehicle, FREE) + nuisances(("current", "bias"), [log])
+    done = fit([dataclasses.replace(log, topics=moved)], vehicle, parameters)
+    said = " ".join(warnings(done, [log]))
+    assert done.intervals.chi2 > 1.2 and "does not explain" in said and "the velocity:" in said
+    assert (done.intervals.deviations[:3] > 1.5 * done.intervals.nominal[:3]).any()
 
 
 def test_free_numbers_are_found_by_their_keys(vehicle):
