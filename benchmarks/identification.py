@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,7 @@ def draw_truth(parameters: list[Parameter], vehicle: Vehicle, rng: np.random.Gen
 
 def simulate(vehicle: Vehicle, truth: dict[str, float], duration: float, noise: float, rng: np.random.Generator) -> Log:
     """Return the log of a vehicle whose FMU has true numbers, and how far it went."""
-    times = PERIOD * np.arange(int(duration / PERIOD))
+    times: Any = PERIOD * np.arange(int(duration / PERIOD))
     phases = rng.uniform(0.0, 2.0 * np.pi, (6, len(_FREQUENCIES)))
     spread = 1.0 + 0.06 * np.arange(6)[:, None]
     waves = np.sin(2.0 * np.pi * spread[..., None] * _FREQUENCIES[:, None] * times + phases[..., None]).sum(axis=1)
@@ -91,27 +92,24 @@ def simulate(vehicle: Vehicle, truth: dict[str, float], duration: float, noise: 
             plant.step(PERIOD)
     moved: Array = np.array(states, np.float64)
 
-    def white(shape: tuple[int, ...]) -> Array:
-        drawn: Array = rng.standard_normal(shape)
-        return drawn
+    def noisy(values: Array, deviation: float) -> Array:
+        found: Array = values + deviation * noise * rng.standard_normal(values.shape)
+        return found
 
     turned: Array = np.array([
         multiply(q, from_axis_angle(a / np.linalg.norm(a), float(np.linalg.norm(a))))
-        for q, a in zip(moved[:, 3:7], 0.005 * noise * white((len(moved), 3)) + 1e-12, strict=True)
+        for q, a in zip(moved[:, 3:7], noisy(np.zeros((len(moved), 3)), 0.005), strict=True)
     ], np.float64)  # fmt: skip
-    bias: Array = np.asarray(rng.uniform(-0.003, 0.003, 3), np.float64)
+    bias: Any = rng.uniform(-0.003, 0.003, 3)
     dvl = slice(None, None, 3)
     topics = (
-        make_topic(
-            "velocity", times[dvl], moved[dvl, 7:10] + 0.005 * noise * white((len(moved[dvl]), 3)), 0.005 * noise
-        ),
-        make_topic(
-            "angular_velocity", times, moved[:, 10:] + bias + 0.002 * noise * white((len(moved), 3)), 0.002 * noise
-        ),
-        make_topic("depth", times, moved[:, 2:3] + 0.003 * noise * white((len(moved), 1)), 0.003 * noise),
+        make_topic("velocity", times[dvl], noisy(moved[dvl, 7:10], 0.005), 0.005 * noise),
+        make_topic("angular_velocity", times, noisy(moved[:, 10:] + bias, 0.002), 0.002 * noise),
+        make_topic("depth", times, noisy(moved[:, 2:3], 0.003), 0.003 * noise),
         make_topic("attitude", times, turned, 0.005 * noise),
     )
-    return Log("simulated", times, np.array(thrust), np.zeros((len(times), 6)), topics)
+    commands: Any = np.array(thrust)
+    return Log("simulated", times, commands, np.zeros((len(times), 6)), topics)
 
 
 def relative_errors(parameters: list[Parameter], truth: Array, found: Array) -> dict[str, list[float]]:

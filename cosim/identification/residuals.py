@@ -262,8 +262,9 @@ class Residuals:
         if self.holds_starts:
             return Reduced(left, jacobian, self._row_times(i))
         self._found[i] = _Start(state, values.copy(), slope)
-        step: Array = -np.linalg.solve(r, top.T @ left)
-        return Reduced(left + by_start @ step, jacobian + by_start @ slope, self._row_times(i))
+        step: Any = -np.linalg.solve(r, top.T @ left)
+        best: Any = left + by_start @ step
+        return Reduced(best, jacobian + by_start @ slope, self._row_times(i))
 
     def _row_times(self, i: int) -> Array:
         return np.concatenate([np.repeat(t.times, len(t.components)) for t in self.windows[i].topics])
@@ -271,8 +272,9 @@ class Residuals:
     def _step_of(self, residual: Array, by_start: Array) -> Array:
         deviations = np.array([_START_DEVIATIONS[k] for k in self._starts])
         normal = by_start.T @ by_start + np.diag(deviations**-2.0)
-        result: Array = -np.linalg.solve(normal, by_start.T @ residual)
-        return result
+        result: Any = np.linalg.solve(normal, by_start.T @ residual)
+        step: Array = -result
+        return step
 
     def _moved(self, state: Array, step: Array) -> Array:
         """Return a start that is moved along its own directions."""
