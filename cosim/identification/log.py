@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
 from cosim.results.record import Record, load_record
+from cosim.results.run_result import SCENARIO
+from plant_fmu.toml_tables import read_toml
 from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -136,8 +138,11 @@ def load_log(folder: Path, vehicle: Vehicle) -> Log:
     ------
     RunError
         If it cannot be read.
+    TableError
+        If its scenario cannot be read.
     IdentificationError
-        If it has no commands, no attitude, or neither velocities nor positions.
+        If it has no commands, no attitude, or neither velocities nor positions; if its scenario has failures of
+        thrusters, or a limit or lag of the wrench that it commands.
     """
     record = load_record(folder)
     thrusters = [f"thrust[{i + 1}]" for i in range(vehicle.n_thrusters)]
@@ -157,7 +162,23 @@ def load_log(folder: Path, vehicle: Vehicle) -> Log:
         if not names & needed:
             raise IdentificationError(f"{folder}: has no {said} that changes, expected {_FEWEST} samples at the least")
     n = vehicle.n_thrusters
+    _require_steady_actuators(folder, bool(np.any(commands[known, n:])))
     return Log(folder.name, time[known], commands[known, :n], commands[known, n:], topics)
+
+
+def _require_steady_actuators(folder: Path, has_wrench: bool) -> None:
+    """Refuse a run of which the scenario says that commands do not come to what the prediction takes them for."""
+    file = folder / SCENARIO
+    if not file.exists():
+        return
+    tables = read_toml(file)
+    if tables.get("failures"):
+        raise IdentificationError(f"{folder}: thrusters fail in it ({SCENARIO}: failures), expected runs without")
+    limit = tables.get("limit", {})
+    if has_wrench and (limit.get("force", np.inf) < np.inf or limit.get("time_constant", 0.0) > 0.0):
+        raise IdentificationError(
+            f"{folder}: its wrench has a limit or a lag ({SCENARIO}: limit), expected commands of thrusters"
+        )
 
 
 def _topics(record: Record, time: Array) -> Iterator[Topic]:

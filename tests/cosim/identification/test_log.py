@@ -88,3 +88,17 @@ def test_positions_stand_in_for_velocities(tmp_path):
     columns |= {f"position.{axis}": np.sin(columns["time"]) for axis in "xy"}
     log = load_log(write(tmp_path, columns), VEHICLE)
     assert log.topic("velocity") is None and len(log.topic("position").times) == ROWS
+
+
+@pytest.mark.parametrize(
+    ("scenario", "message"),
+    [
+        ("failures = [{ thruster = 1, time = 3.0 }]", "thrusters fail"),
+        ("limit = { force = 50.0 }", "has a limit or a lag"),
+    ],
+)
+def test_commands_that_the_scenario_bends_are_refused(tmp_path, scenario, message):
+    folder = write(tmp_path, signals() | {"wrench.X": signals()["thrust[1]"]})
+    (folder / "scenario.toml").write_text(scenario)
+    with pytest.raises(IdentificationError, match=message):
+        load_log(folder, VEHICLE)
