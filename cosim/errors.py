@@ -33,3 +33,7 @@ class ExportError(CosimError):
 
 class ImportLogError(CosimError):
     """A log of a vehicle that cannot be read as a run."""
+
+
+class IdentificationError(CosimError):
+    """Runs that vehicle parameters cannot be identified from."""

@@ -1,4 +1,4 @@
-"""The compiled library of one vehicle's lanes: plant, paper's law and arbiter, for this very machine."""
+"""Libraries compiled for this very machine, and that of one vehicle's lanes: plant, paper's law and arbiter."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import hashlib
 import os
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -64,26 +64,57 @@ def lanes_library(vehicle: Vehicle, flags: tuple[str, ...] = (), beside: Path | 
     BuildError
         If there is no C compiler, or it fails.
     """
-    compiler = find_compiler()
-    flags = (*_NARROW, *_tuned(compiler), *flags)
     files = _files(vehicle, beside)
+    sources = [name for name in files if name.endswith(".c") and not name.startswith("many/")]
+    return machine_library("lanes", vehicle.name, files, sources, (*_NARROW, *flags))
+
+
+def machine_library(
+    kind: str, name: str, files: Mapping[str, bytes], sources: Iterable[str], flags: Sequence[str] = ()
+) -> ctypes.CDLL:
+    """Return a library for this very machine's processor, compiled first where it is not in the cache.
+
+    Parameters
+    ----------
+    kind : str
+        Folder of the user's cache.
+    name : str
+        Beginning of the file's name; a digest of all that the library is made from follows.
+    files : mapping of str to bytes
+        C files and headers, by names relative to one folder.
+    sources : iterable of str
+        Which of them are compiled.
+    flags : sequence of str, optional
+        For the compiler, after its own.
+
+    Returns
+    -------
+    CDLL
+        The library, loaded.
+
+    Raises
+    ------
+    BuildError
+        If there is no C compiler, or it fails.
+    """
+    compiler = find_compiler()
+    flags = (*_tuned(compiler), *flags)
     made_from = hashlib.sha256(
         repr((native_platform().name, compiler, FLAGS, flags, _machine(compiler, flags))).encode()
     )
-    for name, text in sorted(files.items()):
-        made_from.update(f"\n{name} {len(text)}\n".encode() + text)
-    name = f"{vehicle.name}-{made_from.hexdigest()[:16]}{native_platform().suffix}"
-    path = Path(platformdirs.user_cache_dir("subreach")) / "lanes" / name
+    for file, text in sorted(files.items()):
+        made_from.update(f"\n{file} {len(text)}\n".encode() + text)
+    name = f"{name}-{made_from.hexdigest()[:16]}{native_platform().suffix}"
+    path = Path(platformdirs.user_cache_dir("subreach")) / kind / name
     if is_whole(path):
         return ctypes.CDLL(str(path))
-    with tempfile.TemporaryDirectory(prefix="lanes-", ignore_cleanup_errors=True) as scratch:
+    with tempfile.TemporaryDirectory(prefix=f"{kind}-", ignore_cleanup_errors=True) as scratch:
         folder = Path(scratch)
         for file, text in files.items():
             (folder / file).parent.mkdir(exist_ok=True)
             (folder / file).write_bytes(text)
-        sources = [folder / file for file in sorted(files) if file.endswith(".c") and not file.startswith("many/")]
         built = folder / name
-        compile_library(compiler, native_platform(), sources, [], built, flags)
+        compile_library(compiler, native_platform(), [folder / file for file in sorted(sources)], [], built, flags)
         return ctypes.CDLL(str(keep(built, path.parent)))
 
 

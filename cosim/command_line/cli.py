@@ -18,11 +18,11 @@ from cosim.command_line import (
     campaigns,
     companion,
     completion,
+    export,
     falsify,
-    import_export,
+    identify,
+    import_log,
     mavlink,
-    package,
-    replay,
     report,
     run,
     scenes,
@@ -101,9 +101,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_verb(verbs)
     watch.add_verb(verbs)
 
-    report.add_verb(verbs)
-
-    replay.add_verb(verbs)
+    report.add_verbs(verbs)
 
     listing = verbs.add_parser("list", help="list the shipped scenarios")
     listing.add_argument("--json", action="store_true", help="print it as JSON")
@@ -120,12 +118,13 @@ def _parser() -> argparse.ArgumentParser:
     calibrate = verbs.add_parser("calibrate", help="fit the force limit and lag that bring the paper's window about")
     calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
 
-    import_export.add_verbs(verbs)
-    package.add_verb(verbs)
+    import_log.add_verb(verbs)
+    export.add_verbs(verbs)
     scenes.add_verb(verbs)
     campaigns.add_verbs(verbs)
     sweep.add_verbs(verbs)
     falsify.add_verb(verbs)
+    identify.add_verb(verbs)
     mavlink.add_verbs(verbs)
     sitl.add_verbs(verbs)
     companion.add_verb(verbs)
@@ -257,16 +256,16 @@ _VERBS = {
     "run": run.run,
     "watch": watch.watch,
     "report": report.report,
-    "replay": replay.replay,
+    "replay": report.replay,
     "list": _list,
     "help": _help,
     "completion": completion.completion,
     "show": _show,
     "check": _check,
     "calibrate": _calibrate,
-    "import": import_export.import_,
-    "export": import_export.export,
-    "package": package.package,
+    "import": import_log.import_,
+    "export": export.export,
+    "package": export.package,
     "scenes": scenes.scenes,
     "ablate": campaigns.ablate,
     "campaign": campaigns.campaign,
@@ -274,6 +273,7 @@ _VERBS = {
     "sweep": sweep.sweep,
     "rerun": sweep.rerun,
     "falsify": falsify.falsify,
+    "identify": identify.identify,
     "listen": mavlink.listen,
     "stream": mavlink.stream,
     "mavlink-check": mavlink.mavlink_check,

@@ -1,4 +1,4 @@
-"""``cosim report``."""
+"""``cosim report`` and ``cosim replay``."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from cosim.command_line.results import say
 _FORMATS = ("html", "png")
 
 
-def add_verb(verbs: Any) -> None:
-    """Add the verb to the parser.
+def add_verbs(verbs: Any) -> None:
+    """Add the verbs to the parser.
 
     Parameters
     ----------
@@ -27,6 +27,14 @@ def add_verb(verbs: Any) -> None:
         help="html: a page with its figures, and the replay (default), which browsers print; png: the figures as "
         "pictures; both with a comma between them",
     )  # fmt: skip
+
+    replay = verbs.add_parser("replay", help="write the page in which one or several runs can be seen again")
+    replay.add_argument("folders", type=Path, nargs="+", metavar="RUN", help="a run folder, also of a killed run")
+    replay.add_argument(
+        "--out", type=Path, metavar="FILE",
+        help="file to write (default: replay.html, in the folder of a single run, or here for several)",
+    )  # fmt: skip
+    replay.add_argument("--title", help="of the page (default: the scenario's)")
 
 
 def _formats(text: str) -> list[str]:
@@ -57,3 +65,11 @@ def report(options: argparse.Namespace) -> int:
         say(options, verdict(summary))
         print(*files, sep="\n")
     return FAULT if bad else 0
+
+
+def replay(options: argparse.Namespace) -> int:
+    """Run ``cosim replay``."""
+    from cosim.replay.pages import replay as write
+
+    print(write(options.folders, options.out, options.title))
+    return 0

@@ -20,7 +20,7 @@ MAY_IMPORT = {
 # the rooms of cosim from the ground up: each imports rooms above it in this list, and none below
 FLOORS = (
     *("io", "scenario", "simulation", "results", "batch", "ssp", "replay", "mavlink", "report", "export", "live"),
-    *("precheck", "run", "logs", "companion", "sitl", "campaigns", "command_line"),
+    *("precheck", "run", "logs", "companion", "identification", "sitl", "campaigns", "command_line"),
 )
 MOST_MODULES = 20  # in one room
 MOST_AT_THE_ROOT = 8  # modules of cosim
@@ -46,6 +46,7 @@ ONE_PLACE = {
     "rich": {"cosim.command_line.watch", "cosim.live.watching.bars", "cosim.live.watching.picture"},
     "shtab": {"cosim.command_line.completion"},
     "skfuzzy": {"fuzzy_arbiter.engines.scikit"},
+    "threadpoolctl": {"cosim.identification.fit"},
     "tomli_w": {"cosim.scenario.toml_text"},
     "websockets": {"cosim.live.server", "cosim.live.watching.sources"},
 }

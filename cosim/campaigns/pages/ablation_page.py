@@ -10,7 +10,6 @@ import numpy as np
 
 from cosim.campaigns.ablation import NUMBERS, PAGE, VARIANTS, WHOLE
 from cosim.campaigns.analysis.worst_rows import LISTED
-from cosim.campaigns.pages.page import Html, Page, code, interval, number, write_figures
 from cosim.campaigns.pages.replays import Replay, write_page_with_replays
 from cosim.campaigns.pages.sections import basis
 from cosim.campaigns.reruns.repeat import complete_results
@@ -19,6 +18,7 @@ from cosim.campaigns.scenes.rows import SCHEMA
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
 from cosim.io.strict_json import read_json, understood
+from cosim.report.web_page import Html, Page, code, interval, number, write_figures
 
 if TYPE_CHECKING:
     from cosim.report.figures.style import NamedFigure

@@ -10,7 +10,6 @@ import numpy as np
 
 from cosim.campaigns.analysis.summary import OF_ALL, SPREADS, rates_of
 from cosim.campaigns.analysis.worst_rows import LISTED, Worst, worst_rows
-from cosim.campaigns.pages.page import Html, Page, code, interval, wall, write_figures
 from cosim.campaigns.pages.replays import Replay, write_page_with_replays
 from cosim.campaigns.pages.sections import (
     Group,
@@ -28,6 +27,7 @@ from cosim.campaigns.store.plan import SCENES
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
 from cosim.io.strict_json import read_json, understood
+from cosim.report.web_page import Html, Page, code, interval, wall, write_figures
 
 if TYPE_CHECKING:
     from cosim.report.figures.style import NamedFigure

@@ -12,7 +12,6 @@ from controller import LAWS
 from cosim.campaigns.analysis.summary import SPREADS
 from cosim.campaigns.analysis.worst_rows import ORDER, Worst, rerun_command, worst_rows
 from cosim.campaigns.pages.campaign_page import FACTS, group_of, spreads_of
-from cosim.campaigns.pages.page import Html, Page, code, interval, number, wall, write_figures
 from cosim.campaigns.pages.replays import Replay, write_page_with_replays
 from cosim.campaigns.pages.sections import LABELS, basis, quantiles_table, rates_table
 from cosim.campaigns.reruns.repeat import complete_results
@@ -21,6 +20,7 @@ from cosim.campaigns.store.folder import SUMMARY
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
 from cosim.io.strict_json import read_json, understood
+from cosim.report.web_page import Html, Page, code, interval, number, wall, write_figures
 
 if TYPE_CHECKING:
     from cosim.report.figures.style import NamedFigure

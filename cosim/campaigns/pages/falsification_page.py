@@ -7,13 +7,13 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cosim.campaigns.pages.page import Html, Page, code, number, write_figures
 from cosim.campaigns.pages.replays import Replay, write_page_with_replays
 from cosim.campaigns.pages.sections import basis, refused_section
 from cosim.campaigns.reruns.repeat import require_complete
 from cosim.campaigns.store.folder import PLAN, RESULTS, SUMMARY, held
 from cosim.errors import RunError
 from cosim.io.strict_json import read_json, understood
+from cosim.report.web_page import Html, Page, code, number, write_figures
 
 if TYPE_CHECKING:
     from cosim.report.figures.style import NamedFigure

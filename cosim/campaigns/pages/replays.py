@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.campaigns.pages.page import Html, Page, link
 from cosim.campaigns.reruns.repeat import Repeat, repeat_of
 from cosim.errors import CosimError, RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text, read_json, understood
 from cosim.replay.page import write_page
 from cosim.replay.trace import trace_of
+from cosim.report.web_page import Html, Page, link
 from cosim.results.run_result import REPLAY, load_run
 from cosim.run.run import run_scenario
 from plant_fmu import PlantError

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from cosim.campaigns.analysis.statistics import QUANTILES
 from cosim.campaigns.analysis.worst_rows import ORDER, Worst, rerun_command
-from cosim.campaigns.pages.page import Page, code, interval, number
 from cosim.campaigns.pages.replays import Replay
+from cosim.report.web_page import Page, code, interval, number
 
 LABELS = {  # of columns: what they are called, with unit
     "reached": "reached the goal",

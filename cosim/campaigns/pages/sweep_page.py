@@ -11,7 +11,6 @@ import numpy as np
 from cosim.batch.outcome import FIELDS
 from cosim.campaigns.analysis.statistics import CHANCE
 from cosim.campaigns.analysis.worst_rows import LISTED, Worst, worst_rows
-from cosim.campaigns.pages.page import Html, Page, code, interval, number, write_figures
 from cosim.campaigns.pages.replays import Replay, write_page_with_replays
 from cosim.campaigns.pages.sections import (
     LABELS,
@@ -30,6 +29,7 @@ from cosim.campaigns.sweeps.rows import schema_of
 from cosim.campaigns.sweeps.summary import FACTS
 from cosim.errors import RunError
 from cosim.io.strict_json import read_json, understood
+from cosim.report.web_page import Html, Page, code, interval, number, write_figures
 from cosim.results.run_result import SCENARIO
 
 if TYPE_CHECKING:

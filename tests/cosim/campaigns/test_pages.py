@@ -13,12 +13,12 @@ from cosim.campaigns.analysis.statistics import quantiles
 from cosim.campaigns.pages.campaign_page import write_campaign_page
 from cosim.campaigns.pages.comparison_page import write_comparison_page
 from cosim.campaigns.pages.figures import distributions, shares_up_to
-from cosim.campaigns.pages.page import Page, number
 from cosim.campaigns.pages.sections import Group, quantiles_table
 from cosim.campaigns.pages.sweep_page import write_sweep_page
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.command_line.cli import main
 from cosim.errors import RunError
+from cosim.report.web_page import Page, number
 from tests.cosim.campaigns.fake import design, fakes, paper
 from tests.cosim.campaigns.scene_data import BRIEF, HARD, PLAIN, write
 from tests.cosim.campaigns.test_comparison import idle

@@ -14,7 +14,6 @@ from controller import LAWS
 from cosim.campaigns.analysis.summary import summarise
 from cosim.campaigns.pages.campaign_page import write_campaign_page
 from cosim.campaigns.pages.comparison_page import NUMBERS, write_comparison_page
-from cosim.campaigns.pages.page import Html
 from cosim.campaigns.pages.replays import replay_of
 from cosim.campaigns.pages.sweep_page import write_sweep_page
 from cosim.campaigns.reruns.repeat import repeat_of
@@ -29,6 +28,7 @@ from cosim.replay.events import events_of
 from cosim.replay.page import is_page, write_page
 from cosim.replay.steering import changes_of
 from cosim.replay.trace import trace_of
+from cosim.report.web_page import Html
 from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts, load_log_facts
 from cosim.results.record import PARTS, RECORD, load_record
 from cosim.results.run_result import _concluded, load_run, open_run

@@ -1,4 +1,4 @@
-"""``cosim import`` and ``cosim export``: from a log to a run, and from a run to a file of another tool."""
+"""``cosim import``."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.numbers import number, whole
+from cosim.command_line.numbers import number
 from cosim.command_line.results import print_run
 
 _BAR = "{desc} {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
 
 
-def add_verbs(verbs: Any) -> None:
-    """Add the verbs to the parser.
+def add_verb(verbs: Any) -> None:
+    """Add the verb to the parser.
 
     Parameters
     ----------
@@ -39,25 +39,6 @@ def add_verbs(verbs: Any) -> None:
     log.add_argument("--overwrite", action="store_true", help="replace the run that the folder holds")
     log.add_argument("--no-report", action="store_true", help="write no report and no replay")
 
-    export = verbs.add_parser("export", help="write a run in the format of another tool")
-    export.add_argument("folder", type=Path, metavar="RUN", help="the run folder")
-    export.add_argument(
-        "--to", required=True, metavar="FORMAT",
-        help="csv (pandas), npz (NumPy), mat (MATLAB), mcap (Foxglove, PlotJuggler), rrd (Rerun), "
-        "tlog (QGroundControl)",
-    )  # fmt: skip
-    export.add_argument("--out", type=Path, metavar="FILE", help="file to write (default: RUN.FORMAT here)")
-    thinned = export.add_mutually_exclusive_group()
-    thinned.add_argument(
-        "--every", type=whole(1, 10**9), default=1, metavar="N", help="one step of so many (default: all)"
-    )
-    thinned.add_argument("--rate", type=number(1e-9, 1e9), metavar="HZ", help="steps a simulated second, in its place")
-    export.add_argument(
-        "--signals", nargs="+", action="extend", default=[], metavar="GLOB",
-        help="names or patterns such as 'position.*' '*.clearance' (default: all); the time is always there",
-    )  # fmt: skip
-    export.add_argument("--force", action="store_true", help="replace a file that exists")
-
 
 def import_(options: argparse.Namespace) -> int:
     """Run ``cosim import``."""
@@ -71,16 +52,4 @@ def import_(options: argparse.Namespace) -> int:
             voltage=options.voltage, report=not options.no_report, overwrite=options.overwrite, moved=bar.update_to,
         )  # fmt: skip
     print_run(options, run, not options.no_report)
-    return 0
-
-
-def export(options: argparse.Namespace) -> int:
-    """Run ``cosim export``."""
-    from cosim.export import export_run
-
-    for file in export_run(
-        options.folder, options.to, options.out,
-        signals=options.signals, every=options.every, rate=options.rate, force=options.force,
-    ):  # fmt: skip
-        print(file)
     return 0

@@ -1,4 +1,4 @@
-"""The pages of campaigns: one HTML file that opens without a network, its figures in it and as files beside it."""
+"""Pages put together piece by piece: one HTML file that opens without a network, with its figures."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ def write_figures(folder: Path, drawings: Iterable[NamedFigure]) -> dict[str, Ht
     scratch = Path(tempfile.mkdtemp(prefix=f".{FIGURES}-", dir=folder))
     try:
         with mpl.rc_context(STYLE):  # while they are made, and while they are written
-            shown = {drawing.name: _figure(drawing, scratch) for drawing in drawings}
+            shown = {drawing.name: inline_figure(drawing, scratch) for drawing in drawings}
         scratch.chmod(0o755)
         shutil.rmtree(folder / FIGURES, ignore_errors=True)
         if shown:
@@ -172,7 +172,8 @@ def write_figures(folder: Path, drawings: Iterable[NamedFigure]) -> dict[str, Ht
     return shown
 
 
-def _figure(drawing: NamedFigure, folder: Path) -> Html:
+def inline_figure(drawing: NamedFigure, folder: Path) -> Html:
+    """Return a figure with its caption as HTML, once it is written into a folder."""
     svg = drawing.write(folder)
     caption = html.escape(drawing.caption)
     inline = svg[svg.index("<svg") :].replace("<svg", f'<svg role="img" aria-label="{caption}"', 1)

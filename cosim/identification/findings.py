@@ -1,0 +1,112 @@
+"""What an identification says in words: how far to trust it, what the runs cannot tell, and what to drive next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from cosim.identification.fit import Fit
+from cosim.identification.intervals import DISAGREES
+from cosim.identification.log import UNITS, Log
+
+_ALIKE = 0.95  # correlation, beyond which two numbers are not told apart
+_LISTED = 6
+_NEEDS = {  # motions that tell the numbers of a key apart
+    "hydrodynamics.added_mass": "quick changes of speed along and about the axis: steps of full stick, a second each",
+    "hydrodynamics.linear_damping": "slow and fast motion along the axis, each held for some seconds",
+    "hydrodynamics.quadratic_damping": "slow and fast motion along the axis, each held for some seconds",
+    "hydrostatics.buoyancy": "vertical motion up and down at the same thrust, or ten seconds without thrust",
+    "hydrostatics.center_of_buoyancy": "roll and pitch of 20 degrees or more, to both sides, held for some seconds",
+    "rigid_body.center_of_gravity": "roll and pitch of 20 degrees or more, to both sides, held for some seconds",
+    "thrusters.time_constant": "steps of thrust, with angular velocities at 20 Hz or more",
+    "thrusters.matrix": "a force that is known: a bollard pull of each thruster",
+}  # fmt: skip
+
+
+def verdict(fit: Fit) -> str:
+    """Return the one sentence that says what came of it."""
+    free = fit.vehicle_part()
+    told = len(free) - len(fit.resting())
+    seconds = sum(window.steps for window in fit.windows) * fit.step
+    text = f"{told} of {len(free)} numbers are told by {seconds:.0f} s of motion in {len(fit.windows)} windows"
+    return f"{text}; chi² is {fit.intervals.chi2:.2f} by degrees of freedom."
+
+
+def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
+    """Yield what a user must know before the numbers are used.
+
+    Parameters
+    ----------
+    fit : Fit
+        What came of it.
+    logs : sequence of Log
+        The runs.
+    """
+    if fit.intervals.chi2 > DISAGREES:
+        worst, size = fit.worst_topic()
+        yield (
+            f"The model does not explain these runs to within the sensors' noise: chi² is {fit.intervals.chi2:.2f} by "
+            f"degrees of freedom, and more than {DISAGREES} says that something is missing in it. Worst is the "
+            f"{worst.replace('_', ' ')}: its residuals are {size:.1f} times its noise. The intervals are those of a "
+            "jackknife, and hold as far as the pieces of the runs are alike. Look for a disturbance, unequal "
+            "thrusters, a delay (--nuisance delay), the DVL's scale (--nuisance scale), a tether (--nuisance force)."
+        )
+    resting = [fit.parameters[i].name for i in fit.resting()]
+    if resting:
+        yield (
+            f"These numbers rest on what was known before, not on the runs: {_listed(resting)}. Nothing in these logs "
+            "excites them enough."
+        )
+    alike = list(fit.alike(_ALIKE))
+    if alike:
+        pairs = [f"{one} and {other}" for one, other in alike[:_LISTED]]
+        yield f"These are hardly told apart (correlation above {_ALIKE}): {_listed(pairs)}."
+    if not any(p.kind == "thrust" for p in fit.parameters):
+        yield (
+            "All is in units of the thrust that the start vehicle's thrusters give. If they give 5 % more, damping, "
+            "mass with added mass, and weight less buoyancy are 5 % greater."
+        )
+    if fit.rejected:
+        counts = "; ".join(f"{n} since {reason}" for reason, n in fit.rejected.most_common())
+        yield f"{fit.rejected.total()} windows were rejected: {counts}."
+    if fit.outliers:
+        yield f"{fit.outliers} of {fit.samples} measured components are outliers, and count by Huber's weights."
+    missing = {"velocity", "angular_velocity", "depth"} - {topic.name for log in logs for topic in log.topics}
+    for name in sorted(missing):
+        yield f"There are no samples of {name.replace('_', ' ')} in these runs."
+
+
+def advice(fit: Fit) -> Iterator[str]:
+    """Yield what to drive next: for the numbers that are known worst."""
+    worst: dict[str, float] = {}
+    for i in fit.vehicle_part():
+        p = fit.parameters[i]
+        key = ".".join(p.name.split(".")[:2])
+        part = float(fit.intervals.prior_part[i])
+        if part > 0.1:  # the runs have told less than a hundred times what was known
+            worst[key] = max(worst.get(key, 0.0), part)
+    for key in sorted(worst, key=lambda key: -worst[key])[:3]:
+        yield f"For {key}: {_NEEDS.get(key, 'motion along and about all axes')}."
+    if not worst:
+        yield "Every free number is told by these runs; more runs make the intervals smaller."
+
+
+def topic_rows(logs: Sequence[Log]) -> Iterator[tuple[str, ...]]:
+    """Yield a row for each topic of each run: samples, rate, noise."""
+    for log in logs:
+        for topic in log.topics:
+            rate = (len(topic.times) - 1) / max(1e-9, float(topic.times[-1] - topic.times[0]))
+            noise = ", ".join(f"{x:.2g}" for x in np.unique(topic.noise.round(6)))
+            yield (
+                log.name,
+                topic.name.replace("_", " "),
+                f"{len(topic.times)}",
+                f"{rate:.1f}",
+                f"{noise} {UNITS[topic.name]}",
+            )
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return ", ".join(names[:_LISTED]) + more

@@ -1,0 +1,243 @@
+"""The fit: prediction errors of staged windows made least, robustly, with what was known before as a prior."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from threadpoolctl import threadpool_limits
+
+from cosim.errors import IdentificationError
+from cosim.identification.intervals import RESTS, Intervals, estimate_intervals
+from cosim.identification.log import Log
+from cosim.identification.parameters import Parameter
+from cosim.identification.residuals import Reduced, Residuals
+from cosim.identification.windows import MARGINS, Window, cut_windows
+from plant_fmu.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+LONGEST_STEP, SHORTEST_STEP = 0.03, 0.015  # s, of the integration
+STAGES = (4.0, 20.0)  # s, lengths of windows: short ones find the numbers from afar, long ones tell them apart
+_HELD, _ROUGH, _PRECISION = 0.1, 1e-2, 1e-6  # part of the cost, below which a step ends a round: first, others, last
+_EVALUATIONS = 20  # of each round, at the most
+_ROUNDS = 2  # of each stage: fit, weigh anew
+_HUBER = 3.0  # standard deviations, beyond which a residual counts by its magnitude
+_OUTLIER = 6.0  # standard deviations, beyond which a sample is called an outlier
+_INSIDE = 0.05  # of a deviation: how far from its bound a number starts
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What came of an identification."""
+
+    parameters: tuple[Parameter, ...]
+    values: Array  # (p,)
+    intervals: Intervals
+    windows: tuple[Window, ...]  # of the last stage
+    rejected: Counter[str]  # windows of the last stage, by the rule that rejected them
+    residuals: tuple[Reduced, ...]  # of each window, weighted
+    outliers: int  # samples' components
+    samples: int  # samples' components in all
+
+    step: float  # s, of the integration
+
+    def vehicle_part(self) -> list[int]:
+        """Return the places of the vehicle's own numbers."""
+        return [i for i, p in enumerate(self.parameters) if not p.is_nuisance]
+
+    def resting(self) -> list[int]:
+        """Return the places of the vehicle's numbers that rest on their priors."""
+        return [i for i in self.vehicle_part() if self.intervals.prior_part[i] > RESTS]
+
+    def alike(self, least: float) -> Iterator[tuple[str, str]]:
+        """Yield pairs of numbers whose correlation is beyond `least`, the most alike first."""
+        size = np.abs(np.triu(self.intervals.correlation, 1))
+        for i, j in sorted(np.argwhere(size > least), key=lambda pair: -size[tuple(pair)]):
+            yield self.parameters[i].name, self.parameters[j].name
+
+    def worst_topic(self) -> tuple[str, float]:
+        """Return the topic that is explained worst, and the root mean square of its residuals in its noise."""
+        sums: dict[str, list[float]] = {}
+        for window, reduced in zip(self.windows, self.residuals, strict=True):
+            count = 0
+            for topic in window.topics:
+                size = len(topic.times) * len(topic.components)
+                sums.setdefault(topic.name, []).extend(np.square(reduced.residual[count : count + size]))
+                count += size
+        means = {name: float(np.sqrt(np.mean(squares))) for name, squares in sums.items()}
+        worst = max(means, key=lambda name: means[name])
+        return worst, means[worst]
+
+
+def fit(
+    logs: Sequence[Log],
+    vehicle: Vehicle,
+    parameters: Sequence[Parameter],
+    progress: Callable[[float], None] = lambda part: None,
+) -> Fit:
+    """Find the numbers under which windows of runs are predicted best.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        The runs.
+    vehicle : Vehicle
+        Where the search starts.
+    parameters : sequence of Parameter
+        What is free.
+    progress : callable
+        Told what part of the work is done, 0 to 1.
+
+    Returns
+    -------
+    Fit
+        Numbers with their intervals.
+
+    Raises
+    ------
+    IdentificationError
+        If no window is left, or the start predicts no motion.
+    """
+    with threadpool_limits(1):  # the matrices are small: further threads would wait for each other most of the time
+        return _fit(logs, vehicle, tuple(parameters), progress)
+
+
+def _fit(
+    logs: Sequence[Log], vehicle: Vehicle, parameters: tuple[Parameter, ...], progress: Callable[[float], None]
+) -> Fit:
+    margins = MARGINS if any(p.kind == "delay" for p in parameters) else (0.0, 0.0)
+    values, step = _inside(parameters), integration_step(logs)
+    done, total = 0, len(STAGES) * _ROUNDS * _EVALUATIONS
+    for stage, length in enumerate(STAGES):
+        windows, rejected = cut_windows(logs, vehicle, step, length, margins)
+        if not windows:
+            raise IdentificationError(_nothing_left(rejected))
+        problem = Problem(Residuals(logs, vehicle, parameters, windows, step))
+        for turn in range(_ROUNDS):
+            begun = done
+
+            def tick(begun: int = begun) -> None:
+                nonlocal done
+                done = min(done + 1, begun + _EVALUATIONS)
+                progress(done / total)
+
+            last = stage == len(STAGES) - 1
+            problem.residuals.holds_starts = stage == turn == 0
+            rough = _HELD if problem.residuals.holds_starts else _ROUGH
+            values = problem.solve(values, tick, _PRECISION if last else rough)
+            done = (stage * _ROUNDS + turn + 1) * _EVALUATIONS
+            if not (last and turn == _ROUNDS - 1):
+                problem.reweigh()
+    progress(1.0)
+    plain = [r.residual / w for r, w in zip(problem.reduced, problem.residuals.weights, strict=True)]
+    return Fit(
+        parameters, values, estimate_intervals(parameters, values, problem.reduced, windows), tuple(windows), rejected,
+        tuple(problem.reduced), sum(int((np.abs(r) > _OUTLIER).sum()) for r in plain), sum(map(len, plain)), step,
+    )  # fmt: skip
+
+
+class Problem:
+    """The residuals as `scipy.optimize.least_squares` takes them: each window's rows rotated to as few as there can be.
+
+    Parameters
+    ----------
+    residuals : Residuals
+        Of all windows.
+    """
+
+    def __init__(self, residuals: Residuals) -> None:
+        self.residuals = residuals
+        self.reduced: list[Reduced] = []
+        self._known: tuple[bytes, Array, Array] | None = None
+        parameters = residuals.parameters
+        self._start = np.array([p.start for p in parameters])
+        self._deviation = np.array([p.deviation for p in parameters])
+        self._bounds = np.array([p.least for p in parameters]), np.array([p.most for p in parameters])
+
+    def solve(self, values: Array, tick: Callable[[], None], precision: float) -> Array:
+        """Return the best values from some on."""
+
+        def residual(x: Array) -> Array:
+            tick()
+            return self._evaluate(x)[0]
+
+        self._known = None
+        if not np.isfinite(self._evaluate(values)[0]).all():
+            raise IdentificationError("the start vehicle predicts no motion that stays within numbers")
+        found = least_squares(
+            residual, values, lambda x: self._evaluate(x)[1], bounds=self._bounds, x_scale=self._deviation,
+            ftol=precision, xtol=1e-7, gtol=1e-9, max_nfev=_EVALUATIONS,
+        )  # fmt: skip
+        result: Array = found.x
+        self._evaluate(result)
+        return result
+
+    def reweigh(self) -> None:
+        """Weigh the residuals by Huber's function of what they are now."""
+        for i, reduced in enumerate(self.reduced):
+            size = np.abs(reduced.residual / self.residuals.weights[i])
+            self.residuals.weights[i] = np.sqrt(np.minimum(1.0, _HUBER / np.maximum(size, 1e-12)))
+
+    def _evaluate(self, values: Array) -> tuple[Array, Array]:
+        """Return residuals and their derivatives, those of the prior last; NaN where there is no motion."""
+        key = values.tobytes()
+        if self._known is None or self._known[0] != key:
+            settings = self.residuals.settings(values)
+            p = len(values)
+            try:
+                reduced = [self.residuals.reduced(i, settings, values) for i in range(len(self.residuals.windows))]
+            except IdentificationError:
+                rows = sum(min(len(w), p + 1) for w in self.residuals.weights) + p
+                return np.full(rows, np.nan), np.full((rows, p), np.nan)
+            few = [np.linalg.qr(np.column_stack([r.jacobian, r.residual]), mode="r") for r in reduced]
+            rows_of_all = np.concatenate([*few, np.column_stack([
+                np.diag(1.0 / self._deviation), (values - self._start) / self._deviation
+            ])])  # fmt: skip
+            self.reduced = reduced
+            self._known = key, rows_of_all[:, p], rows_of_all[:, :p]
+        return self._known[1], self._known[2]
+
+
+def integration_step(logs: Sequence[Log]) -> float:
+    """Return a step on whose grid commands change, as far as they change at one rate.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        The runs.
+
+    Returns
+    -------
+    float
+        15 to 30 ms: a whole part of the usual time between changes, or a multiple of it [s].
+    """
+    spans = []
+    for log in logs:
+        commands = np.concatenate([log.thrust, log.wrench], axis=1)
+        changes = log.times[1:][(np.diff(commands, axis=0) != 0.0).any(axis=1)]
+        spans.append(np.diff(changes))
+    all_spans = np.concatenate(spans)
+    usual = float(np.median(all_spans)) if len(all_spans) else LONGEST_STEP
+    if usual >= SHORTEST_STEP:
+        return usual / math.ceil(usual / LONGEST_STEP - 1e-6)
+    return usual * math.ceil(SHORTEST_STEP / usual - 1e-6)
+
+
+def _inside(parameters: Sequence[Parameter]) -> Array:
+    """Return the starts, off their bounds."""
+    return np.array([
+        np.clip(p.start, p.least + _INSIDE * p.deviation, p.most - _INSIDE * p.deviation) for p in parameters
+    ])  # fmt: skip
+
+
+def _nothing_left(rejected: Counter[str]) -> str:
+    if not rejected:
+        return f"no run is long enough, expected {STAGES[-1]:g} s of commands with samples"
+    reason, count = rejected.most_common(1)[0]
+    return f"no window is left: {count} of {rejected.total()} rejected, since {reason}"

@@ -1,0 +1,118 @@
+"""Identification from run folders to a vehicle's file and its page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from cosim.errors import IdentificationError
+from cosim.identification import findings
+from cosim.identification.fit import Fit, fit
+from cosim.identification.log import Log, load_log
+from cosim.identification.parameters import DEFAULT_FREE, DEFAULT_NUISANCES, free_parameters, nuisances
+from cosim.identification.validation import Prediction, validate
+from cosim.identification.vehicle_file import name_of_file, vehicle_text
+from cosim.io.atomic_file import write_atomic
+from plant_fmu.vehicle import Vehicle, load_vehicle
+
+
+@dataclass(frozen=True)
+class Identification:
+    """An identification and what its page shows."""
+
+    start: str  # the shipped vehicle or the file where the search started
+    vehicle: Vehicle  # the same, loaded
+    logs: tuple[Log, ...]  # that were fitted
+    held_out: tuple[Log, ...]  # that were not
+    fit: Fit
+    predictions: tuple[Prediction, ...]  # of the runs held out, or of those fitted where there are none
+
+
+def identify(
+    runs: Sequence[Path],
+    start: str,
+    free: Sequence[str] = DEFAULT_FREE,
+    nuisance: Sequence[str] = DEFAULT_NUISANCES,
+    held_out: Sequence[Path] = (),
+    progress: Callable[[float], None] = lambda part: None,
+) -> Identification:
+    """Identify parameters of a vehicle from recorded runs.
+
+    Parameters
+    ----------
+    runs : sequence of Path
+        Run folders.
+    start : str
+        A shipped vehicle, or a vehicle's file: where the search starts, and what stays of the other numbers.
+    free : sequence of str
+        Keys of the vehicle's file, as `free_parameters` takes them.
+    nuisance : sequence of str
+        As `nuisances` takes them.
+    held_out : sequence of Path
+        Run folders that are predicted, and not fitted.
+    progress : callable
+        Told what part of the work is done, 0 to 1.
+
+    Returns
+    -------
+    Identification
+        With the fit.
+
+    Raises
+    ------
+    RunError, VehicleError, TableError
+        If a run or the vehicle cannot be read.
+    IdentificationError
+        If the runs do not have what it needs.
+
+    Examples
+    --------
+    >>> from cosim.identification.identify import identify
+    >>> identify([], "odin")
+    Traceback (most recent call last):
+        ...
+    cosim.errors.IdentificationError: no run is given, expected one at the least
+    """
+    if not runs:
+        raise IdentificationError("no run is given, expected one at the least")
+    vehicle = load_vehicle(start)
+    parameters = free_parameters(vehicle, free)
+    if not parameters:
+        raise IdentificationError("--free: nothing is free, expected one key at the least")
+    logs, others = (tuple(load_log(run, vehicle) for run in folders) for folders in (runs, held_out))
+    parameters += nuisances(nuisance, logs)
+    found = fit(logs, vehicle, parameters, progress)
+    predictions = validate(others or logs, vehicle, parameters, found.values, found.step)
+    return Identification(start, vehicle, logs, others, found, tuple(predictions))
+
+
+def write_vehicle(done: Identification, out: Path) -> None:
+    """Write the identified vehicle, and check that its file can be read.
+
+    Parameters
+    ----------
+    done : Identification
+        What came of it.
+    out : Path
+        The file, which ends in ``.toml``.
+
+    Raises
+    ------
+    IdentificationError
+        If it cannot be written, or its name is none of a vehicle's file.
+    """
+    names = ", ".join(log.name for log in done.logs)
+    provenance = [
+        f"Identified by cosim identify from {names}, starting from {done.vehicle.name}. Behind a number stands half of "
+        "its 95 % interval.",
+        findings.verdict(done.fit),
+        *findings.warnings(done.fit, done.logs),
+    ]
+    text = vehicle_text(done.start, done.vehicle, done.fit, name_of_file(out), provenance)
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_atomic(out, text)
+    except OSError as error:
+        raise IdentificationError(f"{out}: {error.strerror or error}") from error
+    load_vehicle(out)

@@ -1,0 +1,124 @@
+"""What sensors measure of a predicted motion: residuals of each topic, and their exact derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.identification.log import Topic
+
+Array = NDArray[np.float64]
+
+_POSITION, _ATTITUDE, _LINEAR, _ANGULAR = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13)
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Constant errors of the sensors."""
+
+    lever: Array  # (3,) m, from the body origin to the DVL
+    scale: float  # part of the velocity that the DVL measures too much
+    bias: Array  # (3,) rad/s, of the gyro
+
+
+def residual(topic: Topic, states: Array, errors: Errors) -> Array:
+    """Return prediction less sample, shape (n, c), in standard deviations of the noise.
+
+    Parameters
+    ----------
+    topic : Topic
+        With n samples of c components.
+    states : ndarray, shape (n, 13)
+        Predicted at their times.
+    errors : Errors
+        Of the sensors.
+    """
+    if topic.name == "velocity":
+        found = (1.0 + errors.scale) * (states[:, _LINEAR] + np.cross(states[:, _ANGULAR], errors.lever)) - topic.values
+    elif topic.name == "angular_velocity":
+        found = states[:, _ANGULAR] + errors.bias - topic.values
+    elif topic.name == "depth":
+        found = states[:, 2:3] - topic.values
+    elif topic.name == "position":
+        found = states[:, _POSITION] - topic.values
+    else:
+        matrix, sign = _attitude_matrix(topic.values, states)
+        found = 2.0 * sign * np.einsum("nij,nj->ni", matrix, states[:, _ATTITUDE])
+    result: Array = found / topic.noise
+    return result
+
+
+def derivative(topic: Topic, states: Array, tangents: Array, errors: Errors) -> Array:
+    """Return the derivatives of the residual along d directions, shape (n, c, d).
+
+    Parameters
+    ----------
+    topic : Topic
+        With n samples of c components.
+    states : ndarray, shape (n, 13)
+        Predicted at their times.
+    tangents : ndarray, shape (n, d, 13)
+        Of the states.
+    errors : Errors
+        Of the sensors.
+    """
+    if topic.name == "velocity":
+        turned = np.cross(tangents[:, :, _ANGULAR], errors.lever)
+        found = (1.0 + errors.scale) * (tangents[:, :, _LINEAR] + turned)
+    elif topic.name == "angular_velocity":
+        found = tangents[:, :, _ANGULAR]
+    elif topic.name == "depth":
+        found = tangents[:, :, 2:3]
+    elif topic.name == "position":
+        found = tangents[:, :, _POSITION]
+    else:
+        matrix, sign = _attitude_matrix(topic.values, states)
+        found = 2.0 * sign[:, :, None] * np.einsum("nij,ndj->ndi", matrix, tangents[:, :, _ATTITUDE])
+    result: Array = np.swapaxes(found, 1, 2) / topic.noise[:, None]
+    return result
+
+
+def derivative_by_errors(topic: Topic, states: Array, errors: Errors, kind: str, axis: int) -> Array | None:
+    """Return the derivative of the residual by one constant error, shape (n, c); None where it has none.
+
+    Parameters
+    ----------
+    topic : Topic
+        With n samples of c components.
+    states : ndarray, shape (n, 13)
+        Predicted at their times.
+    errors : Errors
+        Of the sensors.
+    kind : str
+        ``lever``, ``scale`` or ``bias``.
+    axis : int
+        Of lever and bias.
+    """
+    unit = np.eye(3)[axis]
+    if topic.name == "velocity" and kind == "lever":
+        found = (1.0 + errors.scale) * np.cross(states[:, _ANGULAR], unit)
+    elif topic.name == "velocity" and kind == "scale":
+        found = states[:, _LINEAR] + np.cross(states[:, _ANGULAR], errors.lever)
+    elif topic.name == "angular_velocity" and kind == "bias":
+        found = np.broadcast_to(unit, (len(states), 3))
+    else:
+        return None
+    result: Array = found / topic.noise
+    return result
+
+
+def _attitude_matrix(measured: Array, states: Array) -> tuple[Array, Array]:
+    """Return the matrix of the vector part of conj(measured) times a quaternion, and the sign of the scalar part.
+
+    Twice that vector part is the rotation from the sample to the prediction, seen from the body, while it is small.
+    """
+    e0, e1, e2, e3 = measured.T
+    matrix = np.stack([
+        np.stack([-e1, e0, e3, -e2], axis=1),
+        np.stack([-e2, -e3, e0, e1], axis=1),
+        np.stack([-e3, e2, -e1, e0], axis=1),
+    ], axis=1)  # fmt: skip
+    scalar = np.sum(measured * states[:, _ATTITUDE], axis=1, keepdims=True)
+    return matrix, np.where(scalar < 0.0, -1.0, 1.0)

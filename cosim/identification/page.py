@@ -1,0 +1,113 @@
+"""The page of an identification."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from cosim.errors import IdentificationError
+from cosim.identification import findings
+from cosim.identification.identify import Identification
+from cosim.identification.log import UNITS
+from cosim.io.atomic_file import write_atomic
+from cosim.report.web_page import Html, Page, code, inline_figure, number
+
+
+def write_page(done: Identification, out: Path) -> Path:
+    """Write the page beside the vehicle's file.
+
+    Parameters
+    ----------
+    done : Identification
+        What came of it.
+    out : Path
+        The vehicle's file.
+
+    Returns
+    -------
+    Path
+        The page: the same name, with ``.html``.
+
+    Raises
+    ------
+    IdentificationError
+        If it cannot be written.
+    """
+    import matplotlib as mpl
+
+    from cosim.identification.figures import figures_of
+    from cosim.report.figures.style import STYLE
+
+    with tempfile.TemporaryDirectory(prefix="identify-") as scratch, mpl.rc_context(STYLE):
+        figures = {f.name: inline_figure(f, Path(scratch)) for f in figures_of(done.fit, done.predictions)}
+    path = out.with_suffix(".html")
+    try:
+        write_atomic(path, _page(done, out, figures).html())
+    except OSError as error:
+        raise IdentificationError(f"{path}: {error.strerror or error}") from error
+    return path
+
+
+def _page(done: Identification, out: Path, figures: dict[str, Html]) -> Page:
+    fit = done.fit
+    page = Page(f"{done.vehicle.title}, identified")
+    page.verdict(findings.verdict(fit))
+    for text in findings.warnings(fit, done.logs):
+        page.paragraph(text)
+    page.paragraph(f'The vehicle\'s file is {out.name}; it begins a scenario as vehicle = "{out.name}".', faint=True)
+    page.heading("The numbers")
+    page.table(("Number", "Start", "Found", "± 95 %", "Unit", "Rests on"), _rows(done, nuisance=False))
+    page.paragraph(
+        f"Intervals are those of a jackknife that leaves out {fit.intervals.clusters}, or nominal ones where those are "
+        "wider. A number rests on its prior where the runs leave more than half of what was not known before.",
+        faint=True,
+    )
+    page.add(figures["numbers"])
+    nuisance = list(_rows(done, nuisance=True))
+    if nuisance:
+        page.heading("What was estimated beside")
+        page.table(("Number", "Start", "Found", "± 95 %", "Unit", "Rests on"), nuisance)
+    page.heading("How well it fits")
+    page.add(figures["residuals"])
+    _add_predictions(page, done, figures)
+    page.heading("What is told apart")
+    page.add(figures["correlation"])
+    page.heading("What to drive next")
+    for text in findings.advice(fit):
+        page.paragraph(text)
+    page.heading("The runs")
+    page.table(("Run", "Topic", "Samples", "Hz", "Noise"), findings.topic_rows(done.logs))
+    free = " ".join(dict.fromkeys(".".join(fit.parameters[i].name.split(".")[:2]) for i in fit.vehicle_part()))
+    command = f"cosim identify {' '.join(log.name for log in done.logs)} --vehicle {done.start} --free {free}"
+    page.add(Html(f"<p>{code(f'{command} --out {out.name}')}</p>"))
+    return page
+
+
+def _add_predictions(page: Page, done: Identification, figures: dict[str, Html]) -> None:
+    if not done.predictions:
+        return
+    page.heading("How far it predicts")
+    if done.held_out:
+        page.paragraph(f"Of {', '.join(log.name for log in done.held_out)}, which the fit has not seen.")
+    else:
+        page.paragraph("Of the runs that were fitted themselves: none was held out (--held-out), so this flatters.")
+    page.add(figures["predictions"])
+    rows = []
+    for p in done.predictions:
+        cells = [", ".join(number(x, 3) for x in values) for values in (p.identified, p.start_vehicle, p.held)]
+        rows.append((f"{p.topic.replace('_', ' ')} [{UNITS[p.topic]}], {p.horizon:g} s", f"{p.windows}", *cells))
+    page.table(("Error, root mean square", "Windows", "Identified", "Start vehicle", "Hold the start velocity"), rows)
+
+
+def _rows(done: Identification, nuisance: bool) -> list[tuple[str, ...]]:
+    fit = done.fit
+    rows: list[tuple[str, ...]] = []
+    resting = set(fit.resting())
+    for i, p in enumerate(fit.parameters):
+        if p.is_nuisance != nuisance:
+            continue
+        half = fit.intervals.factor * fit.intervals.deviations[i]
+        rests = "prior" if i in resting or (nuisance and fit.intervals.prior_part[i] > 0.5) else "runs"
+        cells = (p.name, number(p.start), number(float(fit.values[i])), number(float(half), 2), p.unit, rests)
+        rows.append(cells)
+    return rows

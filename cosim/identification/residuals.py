@@ -1,0 +1,300 @@
+"""Residuals of all windows, from which each window's own start is eliminated.
+
+The start of a window is known from its samples alone. At each value of the free numbers it is solved for, and the
+residuals are projected onto what it cannot explain (variable projection; Golub and Pereyra 1973). What is left depends
+on the free numbers only, and keeps cost and gradient.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.identification import measurements
+from cosim.identification.actuation import Actuation, CommandedForces
+from cosim.identification.log import Log, Topic
+from cosim.identification.measurements import Errors
+from cosim.identification.parameters import Parameter
+from cosim.identification.shooting import STATE_SIZE, Directions, Motion, Shooter
+from cosim.identification.windows import Window
+from plant_fmu.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+_START_DEVIATIONS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0)  # m, rad, m/s, rad/s
+_SOLVED = 0.05  # of a start's standard deviation: what is left is linear
+_MOST_SOLVES = 8
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What the free numbers mean for one run."""
+
+    plant: dict[str, float]
+    actuation: Actuation
+    force: Array  # (3,) N
+    errors: Errors
+    delays: dict[str, float]  # s, by topic
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """Residuals of one window without its start."""
+
+    residual: Array  # (rows,) at the best start, in standard deviations, weighted
+    jacobian: Array  # (rows, parameters)
+    times: Array  # (rows,) s since the window's begin
+
+
+@dataclass
+class _Start:
+    """The best start of a window, and how it changes with the free numbers about where it was found."""
+
+    state: Array  # (13,)
+    values: Array
+    slope: Array  # (starts, parameters)
+
+
+class Residuals:
+    """The residuals of windows as a function of the free numbers.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        The runs.
+    vehicle : Vehicle
+        Where the search starts.
+    parameters : sequence of Parameter
+        What is free.
+    windows : sequence of Window
+        What is predicted.
+    step : float
+        Of the integration and of the windows' grid [s].
+    """
+
+    def __init__(
+        self,
+        logs: Sequence[Log],
+        vehicle: Vehicle,
+        parameters: Sequence[Parameter],
+        windows: Sequence[Window],
+        step: float,
+    ) -> None:
+        self.parameters, self.windows = tuple(parameters), tuple(windows)
+        self._shooter, self._step, self._thrusters = Shooter(vehicle), step, vehicle.n_thrusters
+        self._lag = float(vehicle.thrust_time_constant.mean())
+        self._forces = [CommandedForces(log, vehicle, step) for log in logs]
+        has_position = any(topic.name == "position" for log in logs for topic in log.topics)
+        has_depth = has_position or any(topic.name == "depth" for log in logs for topic in log.topics)
+        self._starts = [*((0, 1) if has_position else ()), *((2,) if has_depth else ()), *range(3, 12)]
+        self.holds_starts = False  # as samples have them, while the free numbers are far off
+        self._found: dict[int, _Start] = {}
+        self.weights: list[Array] = [np.ones(rows_of(window)) for window in windows]
+
+    def settings(self, values: Array) -> list[Setting]:
+        """Return what the free numbers mean for each run."""
+        return [self._setting(run, values) for run in range(len(self._forces))]
+
+    def _setting(self, run: int, values: Array) -> Setting:
+        plant: dict[str, float] = {}
+        scales, lag, delays = np.ones(self._thrusters), self._lag, dict[str, float]()
+        force, lever, bias, scale = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
+        for p, x in zip(self.parameters, values, strict=True):
+            if p.run not in (None, run):
+                continue
+            match p.kind:
+                case "plant" | "current":
+                    plant[p.plant] = float(x)
+                case "lag":
+                    lag = float(x)
+                case "thrust":
+                    scales[p.index] = x
+                case "delay":
+                    delays[p.plant] = float(x)
+                case "force":
+                    force[p.index] = x
+                case "lever":
+                    lever[p.index] = x
+                case "bias":
+                    bias[p.index] = x
+                case "scale":
+                    scale = float(x)
+        return Setting(plant, self._forces[run].actuation(lag, scales), force, Errors(lever, scale, bias), delays)
+
+    def raw(self, i: int, settings: Sequence[Setting], start: Array, full: bool) -> tuple[Array, Array, Array]:
+        """Return residuals of a window from a start, with derivatives by the start and, if `full`, the free numbers.
+
+        Parameters
+        ----------
+        i : int
+            The window.
+        settings : sequence of Setting
+            Of each run.
+        start : ndarray, shape (13,)
+            Where it begins.
+        full : bool
+            Whether the derivatives by the free numbers are asked for.
+
+        Returns
+        -------
+        residual : ndarray, shape (rows,)
+            In standard deviations.
+        by_start : ndarray, shape (rows, starts)
+            Derivatives.
+        jacobian : ndarray, shape (rows, parameters)
+            Derivatives, zero unless asked for.
+
+        Raises
+        ------
+        IdentificationError
+            If the motion grows beyond numbers, or the parameters are of no body.
+        """
+        window = self.windows[i]
+        setting = settings[window.run]
+        inside = slice(window.first, window.first + window.steps)
+        moving = [j for j, p in enumerate(self.parameters) if full and self._moves(p, window.run)]
+        times = [topic.times - setting.delays.get(topic.name, 0.0) for topic in window.topics]
+        order = np.argsort(np.concatenate(times), kind="stable")
+        motion = self._shooter.predict(
+            setting.plant, start, setting.actuation.wrench[inside], self._step, np.concatenate(times)[order],
+            self._directions(moving, setting, inside, start), setting.force,
+        )  # fmt: skip
+        back = np.empty_like(order)
+        back[order] = np.arange(len(order))
+        count, residuals, starts, rows = 0, [], [], []
+        for topic in window.topics:
+            at = back[count : count + len(topic.times)]
+            count += len(topic.times)
+            residuals.append(measurements.residual(topic, motion.states[at], setting.errors).ravel())
+            along = measurements.derivative(topic, motion.states[at], motion.tangents[at], setting.errors)
+            along = along.reshape(len(residuals[-1]), -1)
+            starts.append(along[:, : len(self._starts)])
+            jacobian = np.zeros((len(along), len(self.parameters)))
+            jacobian[:, moving] = along[:, len(self._starts) :]
+            if full:
+                self._add_errors(jacobian, topic, motion, at, setting, window.run)
+            rows.append(jacobian)
+        return np.concatenate(residuals), np.concatenate(starts), np.concatenate(rows)
+
+    @staticmethod
+    def _moves(p: Parameter, run: int) -> bool:
+        """Whether a parameter changes the motion of a run, rather than what is measured of it."""
+        return p.run in (None, run) and p.kind in ("plant", "lag", "thrust", "current", "force")
+
+    def _directions(self, moving: Sequence[int], setting: Setting, inside: slice, start: Array) -> Directions:
+        n, count = len(self._starts), len(self._starts) + len(moving)
+        tangents, force = np.zeros((count, STATE_SIZE)), np.zeros((count, 3))
+        for row, which in enumerate(self._starts):
+            if 3 <= which < 6:
+                tangents[row, 3:7] = _turn(start[3:7], which - 3)
+            else:
+                tangents[row, which if which < 3 else which + 1] = 1.0
+        names: list[str | None] = [None] * count
+        inputs: list[int | None] = [None] * count
+        wrenches: list[Array] = []
+        for row, j in enumerate(moving, n):
+            p = self.parameters[j]
+            if p.kind in ("plant", "current"):
+                names[row] = p.plant
+            elif p.kind == "force":
+                force[row, p.index] = 1.0
+            else:
+                inputs[row] = len(wrenches)
+                change = setting.actuation.by_lag if p.kind == "lag" else setting.actuation.by_scale[p.index]
+                wrenches.append(change[inside])
+        wrench = np.stack(wrenches) if wrenches else np.empty((0, 0, 2, 6))
+        return Directions(tangents, names, inputs, force, wrench)
+
+    def _add_errors(
+        self, jacobian: Array, topic: Topic, motion: Motion, at: NDArray[np.intp], setting: Setting, run: int
+    ) -> None:
+        """Write the derivatives by what changes no motion."""
+        for j, p in enumerate(self.parameters):
+            if p.run not in (None, run):
+                continue
+            if p.kind == "delay" and p.plant == topic.name:
+                late = measurements.derivative(topic, motion.states[at], -motion.rates[at][:, None], setting.errors)
+                jacobian[:, j] = late.ravel()
+            elif p.kind in ("lever", "scale", "bias"):
+                by = measurements.derivative_by_errors(topic, motion.states[at], setting.errors, p.kind, p.index)
+                if by is not None:
+                    jacobian[:, j] = by.ravel()
+
+    def solve_start(self, i: int, settings: Sequence[Setting], values: Array) -> Array:
+        """Return the best start of a window, shape (13,)."""
+        known = self._found.get(i)
+        state = self.windows[i].start
+        if self.holds_starts:
+            return state
+        if known is not None:
+            state = self._moved(known.state, known.slope @ (values - known.values))
+        weight, best, step = self.weights[i], np.inf, np.zeros(len(self._starts))
+        for _ in range(_MOST_SOLVES):
+            residual, by_start, _ = self.raw(i, settings, state, full=False)
+            cost = float(np.sum(np.square(weight * residual)))
+            if cost > best + 1.0:  # too far: half of the last step back
+                step = -0.5 * step
+                state = self._moved(state, step)
+                continue
+            best, step = cost, self._step_of(weight * residual, weight[:, None] * by_start)
+            state = self._moved(state, step)
+            if float(np.sum(np.square(weight * (by_start @ step)))) < _SOLVED**2:
+                break
+        return state
+
+    def reduced(self, i: int, settings: Sequence[Setting], values: Array) -> Reduced:
+        """Return the residuals of a window without its start, and with their derivatives."""
+        state = self.solve_start(i, settings, values)
+        residual, by_start, jacobian = self.raw(i, settings, state, full=True)
+        weight = self.weights[i]
+        left: Array = weight * residual
+        by_start, jacobian = weight[:, None] * by_start, weight[:, None] * jacobian
+        deviations = np.array([_START_DEVIATIONS[k] for k in self._starts])
+        q: Any
+        r: Any
+        q, r = np.linalg.qr(np.concatenate([by_start, np.diag(1.0 / deviations)]))
+        top = q[: len(by_start)]
+        slope: Array = -np.linalg.solve(r, top.T @ jacobian)
+        if self.holds_starts:
+            return Reduced(left, jacobian, self._row_times(i))
+        self._found[i] = _Start(state, values.copy(), slope)
+        step: Any = -np.linalg.solve(r, top.T @ left)
+        best: Any = left + by_start @ step
+        return Reduced(best, jacobian + by_start @ slope, self._row_times(i))
+
+    def _row_times(self, i: int) -> Array:
+        return np.concatenate([np.repeat(t.times, len(t.components)) for t in self.windows[i].topics])
+
+    def _step_of(self, residual: Array, by_start: Array) -> Array:
+        deviations = np.array([_START_DEVIATIONS[k] for k in self._starts])
+        normal = by_start.T @ by_start + np.diag(deviations**-2.0)
+        result: Any = np.linalg.solve(normal, by_start.T @ residual)
+        step: Array = -result
+        return step
+
+    def _moved(self, state: Array, step: Array) -> Array:
+        """Return a start that is moved along its own directions."""
+        moved = state.copy()
+        for which, by in zip(self._starts, step, strict=True):
+            if 3 <= which < 6:
+                moved[3:7] += by * _turn(state[3:7], which - 3)
+            else:
+                moved[which if which < 3 else which + 1] += by
+        moved[3:7] /= np.linalg.norm(moved[3:7])
+        return moved
+
+
+def rows_of(window: Window) -> int:
+    """Return how many residuals a window has."""
+    return sum(len(topic.times) * len(topic.components) for topic in window.topics)
+
+
+def _turn(quaternion: Array, axis: int) -> Array:
+    """Return the tangent of q exp(angle axis / 2) at angle 0, body axes."""
+    e0, e1, e2, e3 = quaternion
+    columns = ((-e1, e0, e3, -e2), (-e2, -e3, e0, e1), (-e3, e2, -e1, e0))
+    return 0.5 * np.array(columns[axis])

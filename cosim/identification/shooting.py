@@ -1,0 +1,177 @@
+"""Predictions of the plant's motion with exact sensitivities, in one compiled loop."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.batch.lanes_library import machine_library
+from cosim.errors import IdentificationError
+from plant_fmu.compiling.sources import c_sources, header
+from plant_fmu.variables import variables
+from plant_fmu.vehicle import Vehicle
+from plant_fmu.vehicle_component import of_vehicle
+
+Array = NDArray[np.float64]
+
+STATE_SIZE = 13  # position 3, quaternion 4, velocity 6
+_TOKEN = "shooting"  # noqa: S105 -- no secret: there is no description that the library could go with
+_FMI = ("fmi3.c", "fmi3_unsupported.c")
+_FAST = ("-ffp-contract=fast",)  # other last bits than the FMU's, in three quarters of the time
+_INCLUDED = "tangent.c"  # by shooting.c
+
+
+class _Request(ctypes.Structure):
+    """Prediction of csrc/shooting.h."""
+
+    _fields_ = (
+        *((name, ctypes.c_int) for name in ("n_parameters", "n_steps", "n_directions", "n_inputs", "n_samples")),
+        ("step", ctypes.c_double),
+        *((name, ctypes.c_void_p) for name in (
+            "references", "values", "start", "wrench", "force", "start_tangents", "parameter_directions",
+            "input_directions", "force_tangents", "wrench_tangents", "times", "states", "rates", "state_tangents",
+            "work",
+        )),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Directions:
+    """Along what a prediction is differentiated: d directions, each a change of start, parameter, wrench or force."""
+
+    start: Array  # (d, 13) tangent of the start
+    parameters: Sequence[str | None]  # (d,) of the FMU
+    inputs: Sequence[int | None]  # (d,) row of `wrench`
+    force: Array  # (d, 3) tangent of the constant force, world frame
+    wrench: Array  # (n, steps, 2, 6) tangents of the wrench
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A predicted motion at n sample times, and its sensitivities along d directions."""
+
+    states: Array  # (n, 13) position [m], quaternion, velocity [m/s, rad/s]
+    rates: Array  # (n, 13) time derivatives of the states
+    tangents: Array  # (n, d, 13)
+
+
+class Shooter:
+    """Predicts the motion of a vehicle from a start, by the FMU's equations and exact derivatives.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Whose numbers the parameters are that a prediction does not name.
+
+    Raises
+    ------
+    BuildError
+        If there is no C compiler, or it fails.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from cosim.identification.shooting import Shooter
+    >>> from plant_fmu import load_vehicle
+    >>> start = np.zeros(13)
+    >>> start[3] = 1.0
+    >>> shooter = Shooter(load_vehicle("bluerov2_heavy"))
+    >>> motion = shooter.predict({}, start, np.zeros((50, 2, 6)), 0.02, np.array([1.0]))
+    >>> bool(motion.states[0, 2] > 0.0)  # it is heavier than its water
+    True
+    """
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self._references = {v.name: i for i, v in enumerate(variables(vehicle)) if v.role == "parameter"}
+        self._predict: Any = _library(vehicle).shooting_predict
+        self._predict.argtypes, self._predict.restype = [ctypes.POINTER(_Request)], ctypes.c_char_p
+
+    def predict(
+        self,
+        parameters: Mapping[str, float],
+        start: Array,
+        wrench: Array,
+        step: float,
+        times: Array,
+        directions: Directions | None = None,
+        force: Array | None = None,
+    ) -> Motion:
+        """Predict the motion under a wrench that is linear over each step.
+
+        Parameters
+        ----------
+        parameters : mapping of str to float
+            Of the FMU, by name, over those of the vehicle.
+        start : ndarray, shape (13,)
+            Position [m, NED], quaternion, velocity [m/s, rad/s, body frame].
+        wrench : ndarray, shape (steps, 2, 6)
+            Of the actuators [N, N m, body frame]: its mean over each step, and its change from begin to end.
+        step : float
+            [s].
+        times : ndarray, shape (n,)
+            Of the samples [s since the start], rising.
+        directions : Directions, optional
+            Along what there are sensitivities; default: none.
+        force : ndarray, shape (3,), optional
+            Constant force on the body's origin [N, NED].
+
+        Returns
+        -------
+        Motion
+            At the sample times.
+
+        Raises
+        ------
+        IdentificationError
+            If the parameters are of no body, or the motion grows beyond numbers.
+        """
+        along = directions or NO_DIRECTIONS
+        d, n = len(along.parameters), len(times)
+        references = [self._references[name] for name in parameters]
+        moved = [-1 if name is None else self._references[name] for name in along.parameters]
+        found = Motion(np.empty((n, STATE_SIZE)), np.empty((n, STATE_SIZE)), np.empty((n, d, STATE_SIZE)))
+        arrays: dict[str, NDArray[Any]] = {
+            "references": np.array(references, np.uint32),
+            "values": np.array(list(parameters.values()), float),
+            "start": np.ascontiguousarray(start, float),
+            "wrench": np.ascontiguousarray(wrench, float).reshape(len(wrench), 2, 6),
+            "force": np.zeros(3) if force is None else np.ascontiguousarray(force, float),
+            "start_tangents": np.ascontiguousarray(along.start, float),
+            "parameter_directions": np.array(moved, np.intc),
+            "input_directions": np.array([-1 if i is None else i for i in along.inputs], np.intc),
+            "force_tangents": np.ascontiguousarray(along.force, float),
+            "wrench_tangents": np.ascontiguousarray(along.wrench, float).reshape(*along.wrench.shape[:2], 2, 6),
+            "times": np.ascontiguousarray(times, float),
+            "states": found.states,
+            "rates": found.rates,
+            "state_tangents": found.tangents,
+            "work": np.empty((6, d, STATE_SIZE)),
+        }
+        request = _Request(len(references), len(wrench), d, len(along.wrench), n, step)
+        for name, array in arrays.items():
+            setattr(request, name, array.ctypes.data)
+        wrong = self._predict(ctypes.byref(request))
+        if wrong:
+            raise IdentificationError(f"prediction: {wrong.decode()}")
+        return found
+
+
+NO_DIRECTIONS = Directions(np.empty((0, STATE_SIZE)), (), (), np.empty((0, 3)), np.empty((0, 0, 2, 6)))
+
+
+@functools.cache
+def _library(vehicle: Vehicle) -> ctypes.CDLL:
+    component = of_vehicle(vehicle)
+    own = resources.files("cosim.identification").joinpath("csrc")
+    files = {name: text for name, text in c_sources(component, 3).items() if name not in _FMI}
+    files |= {file.name: file.read_bytes() for file in own.iterdir() if file.name.endswith((".c", ".h"))}
+    files[component.header] = header(component, _TOKEN).encode()
+    sources = [name for name in files if name.endswith(".c") and name != _INCLUDED]
+    return machine_library("shooting", vehicle.name, files, sources, _FAST)

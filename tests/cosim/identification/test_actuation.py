@@ -1,0 +1,79 @@
+"""The wrench of a run's commands against the plant's own thrusters, and its derivatives against differences."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from cosim.errors import IdentificationError
+from cosim.identification.actuation import CommandedForces
+from cosim.identification.log import Log
+from plant_fmu import Plant, load_vehicle
+
+STEP = 0.02
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    return load_vehicle("bluerov2_heavy")
+
+
+def log_of(vehicle, seed=0, rows=60, period=0.05):
+    rng = np.random.default_rng(seed)
+    thrust = rng.uniform(-50.0, 50.0, (rows, vehicle.n_thrusters))
+    wrench = rng.uniform(-1.0, 1.0, (rows, 6))
+    return Log("one", period * np.arange(rows), thrust, wrench, ())
+
+
+def test_the_wrench_is_that_of_the_plant(vehicle):
+    """The FMU gives the wrench at moments; its mean over a step follows from Simpson's rule on its substeps."""
+    bent = dataclasses.replace(
+        vehicle, thrust_time_constant=np.full(8, 0.12), thrust_curve=np.full(8, 0.5), thrust_dead_band=np.full(8, 0.05)
+    )
+    log = log_of(vehicle)
+    forces = CommandedForces(log, bent, STEP / 4)
+    found = forces.actuation(0.12, np.ones(8)).wrench[:, 0]
+    names = [f"actuation.{name}" for name in "XYZKMN"]
+    with Plant(bent) as plant:
+        plant.set({"position.z": 5.0})
+        plant.set({f"thrust[{i + 1}]": x for i, x in enumerate(log.thrust[0])})
+        plant.set({f"wrench.{name}": x for name, x in zip("XYZKMN", log.wrench[0], strict=True)})
+        plant.set({f"actuator.thrust[{i + 1}]": x for i, x in enumerate(forces._forces[0, :8])})
+        plant.initialise()
+        for k in range(10 * 20):
+            row = int(k * STEP / 4 / 0.05 + 1e-9)
+            plant.set({f"thrust[{i + 1}]": x for i, x in enumerate(log.thrust[row])})
+            plant.set({f"wrench.{name}": x for name, x in zip("XYZKMN", log.wrench[row], strict=True)})
+            plant.step(STEP / 8)
+            middle = [plant[name] for name in names]
+            plant.step(STEP / 8)
+            assert found[k] == pytest.approx(middle, abs=2e-2)  # mean and middle differ by h^2/24 of the curvature
+
+
+@pytest.mark.parametrize("lag", [0.03, 0.1, 0.4])
+def test_derivatives_are_those_of_the_wrench(vehicle, lag):
+    forces, scales, h = CommandedForces(log_of(vehicle), vehicle, STEP), np.linspace(0.9, 1.1, 8), 1e-6
+    found = forces.actuation(lag, scales)
+    both = [forces.actuation(lag + by, scales).wrench for by in (h, -h)]
+    assert found.by_lag == pytest.approx((both[0] - both[1]) / (2.0 * h), rel=1e-6, abs=1e-4)
+    for i in range(8):
+        bit = np.where(np.arange(8) == i, h, 0.0)
+        both = [forces.actuation(lag, scales + sign * bit).wrench for sign in (1, -1)]
+        assert found.by_scale[i] == pytest.approx((both[0] - both[1]) / (2.0 * h), abs=1e-6)
+
+
+def test_a_lag_keeps_the_impulse(vehicle):
+    """All that is commanded arrives, but for what is still on its way: the gap at the end, times the lag."""
+    log, lag = log_of(vehicle), 0.1
+    forces = CommandedForces(log, vehicle, STEP)
+    now, late = (forces.actuation(T, np.ones(8)).wrench for T in (0.0, lag))
+    missing = STEP * (now[:, 0] - late[:, 0]).sum(axis=0)
+    steady = vehicle.thruster_matrix @ np.clip(log.thrust, vehicle.thrust_min, vehicle.thrust_max)[[0, -2]].T
+    reached = late[-1, 0] + late[-1, 1] / 2.0 - log.wrench[-2]
+    assert missing == pytest.approx(lag * (reached - steady[:, 0]), abs=1e-2 * np.abs(steady).max() * lag)
+
+
+def test_a_rate_limit_is_refused(vehicle):
+    slow = dataclasses.replace(vehicle, thrust_rate_limit=np.full(8, 10.0))
+    with pytest.raises(IdentificationError, match="rate_limit"):
+        CommandedForces(log_of(vehicle), slow, STEP)

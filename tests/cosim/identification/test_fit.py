@@ -1,0 +1,185 @@
+"""Numbers of a vehicle found again from samples of its FMU, with noise that is known."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from cosim.errors import IdentificationError
+from cosim.identification.findings import warnings
+from cosim.identification.fit import fit, integration_step
+from cosim.identification.log import Log, make_topic
+from cosim.identification.parameters import DEFAULT_FREE, free_parameters, nuisances, with_values
+from cosim.identification.validation import validate
+from cosim.identification.windows import cut_windows
+from plant_fmu import Plant, load_vehicle
+
+TRUTH = {
+    "quadratic_damping[1]": 110.0, "added_mass[1,1]": 8.0, "buoyancy": 131.0, "current.x": 0.06, "current.y": -0.04,
+}  # fmt: skip
+FREE = ("hydrodynamics.quadratic_damping.1", "hydrodynamics.added_mass.1.1", "hydrostatics.buoyancy")
+PERIOD, SECONDS, BIAS = 0.05, 42.0, np.array([0.002, -0.001, 0.003])
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    return load_vehicle("bluerov2_heavy")
+
+
+@pytest.fixture(scope="module")
+def log(vehicle):
+    """A run of the FMU: surge to and fro, heave, yaw; sensors with white noise."""
+    rng = np.random.default_rng(4)
+    times = PERIOD * np.arange(int(SECONDS / PERIOD))
+    wrench = np.stack([
+        25.0 * np.sign(np.sin(2 * np.pi * 0.13 * times)), 8.0 * np.sin(1.1 * times), 6.0 * np.sin(0.7 * times),
+        0.5 * np.sin(0.9 * times), 0.5 * np.sin(1.3 * times), 1.0 * np.sin(0.5 * times),
+    ], axis=1)  # fmt: skip
+    names = (
+        [f"position.{a}" for a in "xyz"] + [f"quaternion.e{i}" for i in range(4)] + [f"velocity.{a}" for a in "uvwpqr"]
+    )
+    states = []
+    with Plant(vehicle) as plant:
+        plant.set(TRUTH | {"position.z": 5.0})
+        plant.initialise()
+        for tau in wrench:
+            states.append([plant[name] for name in names])
+            plant.set({f"wrench.{name}": x for name, x in zip("XYZKMN", tau, strict=True)})
+            plant.step(PERIOD)
+    states = np.array(states)
+
+    def noisy(columns, deviation):
+        return states[:, columns] + deviation * rng.standard_normal((len(states), len(states[0, columns])))
+
+    topics = (
+        make_topic("velocity", times[::2], noisy(slice(7, 10), 0.005)[::2], 0.005),
+        make_topic("angular_velocity", times, noisy(slice(10, 13), 0.002) + BIAS, 0.002),
+        make_topic("depth", times, noisy(slice(2, 3), 0.003), 0.003),
+        make_topic("attitude", times, noisy(slice(3, 7), 0.001), 0.002),
+    )
+    return Log("pool", times, np.zeros((len(times), 8)), wrench, topics)
+
+
+@pytest.fixture(scope="module")
+def found(log, vehicle):
+    parameters = free_parameters(vehicle, FREE) + nuisances(("current", "bias"), [log])
+    return fit([log], vehicle, parameters)
+
+
+def test_the_numbers_are_found_again(found):
+    truth = np.array([TRUTH[p.plant] if p.plant else BIAS[p.index] for p in found.parameters])
+    off = (found.values - truth) / found.intervals.deviations
+    assert np.abs(off).max() < 4.0
+    assert found.values[:3] == pytest.approx(truth[:3], rel=0.02)
+    assert found.intervals.chi2 == pytest.approx(1.0, abs=0.1)
+    assert not found.resting() and not found.rejected and found.outliers == 0
+
+
+def test_the_nominal_intervals_are_those_of_the_information(found):
+    """Computed anew from the rows, prior included."""
+    rows = [r.jacobian for r in found.residuals] + [np.diag([1.0 / p.deviation for p in found.parameters])]
+    covariance = np.linalg.pinv(np.concatenate(rows)) @ np.linalg.pinv(np.concatenate(rows)).T
+    assert found.intervals.nominal == pytest.approx(np.sqrt(np.diag(covariance)), rel=1e-6)
+    assert (found.intervals.deviations >= found.intervals.nominal).all()
+
+
+@pytest.mark.slow
+def test_the_gradient_is_that_of_the_cost(log, vehicle, found):
+    """The start of each window is eliminated; cost and gradient are still those of all."""
+    from cosim.identification.fit import Problem
+    from cosim.identification.residuals import Residuals
+
+    windows, _ = cut_windows([log], vehicle, found.step, 20.0)
+    problem = Problem(Residuals([log], vehicle, found.parameters, windows, found.step))
+    deviations = found.intervals.nominal
+    x = found.values + 3.0 * deviations
+    residual, jacobian = problem._evaluate(x)
+    gradient = jacobian.T @ residual
+    for j in range(3):
+        bit = np.where(np.arange(len(x)) == j, 0.3 * deviations, 0.0)
+        ahead, back = (0.5 * np.sum(np.square(problem._evaluate(x + sign * bit)[0])) for sign in (1, -1))
+        assert gradient[j] == pytest.approx((ahead - back) / (2.0 * bit[j]), rel=0.02)
+
+
+def test_it_predicts_better_than_to_hold_the_velocity(log, vehicle, found):
+    for p in validate([log], vehicle, found.parameters, found.values, found.step):
+        if p.topic == "velocity":
+            assert p.identified[0] < p.start_vehicle[0] and p.identified[0] < 0.5 * p.held[0]
+
+
+@pytest.mark.slow
+def test_what_no_run_tells_rests_on_its_prior(log, vehicle):
+    parameters = free_parameters(vehicle, ("thrusters.time_constant", "hydrodynamics.quadratic_damping.1"))
+    found = fit([log], vehicle, parameters)
+    assert [found.parameters[i].name for i in found.resting()] == ["thrusters.time_constant"]
+
+
+@pytest.mark.slow
+def test_a_late_topic_is_found_late(log, vehicle):
+    """All samples of velocity are 0.1 s late by their stamps."""
+    late = tuple(dataclasses.replace(t, times=t.times + 0.1) if t.name == "velocity" else t for t in log.topics)
+    delayed = dataclasses.replace(log, topics=late)
+    parameters = free_parameters(vehicle, FREE) + nuisances(("current", "bias", "delay"), [delayed])
+    done = fit([delayed], vehicle, parameters)
+    found = {p.plant: x for p, x in zip(parameters, done.values, strict=True) if p.kind == "delay"}
+    assert found["velocity"] == pytest.approx(0.1, abs=0.01)
+    assert [found[name] for name in ("angular_velocity", "depth")] == pytest.approx([0.0, 0.0], abs=0.01)
+    assert done.values[0] == pytest.approx(TRUTH["quadratic_damping[1]"], rel=0.02)
+
+
+@pytest.mark.slow
+def test_a_disturbance_is_said_and_widens_the_intervals(log, vehicle):
+    """A velocity that wanders by 2 cm/s within seconds: the noise alone does not explain it."""
+    wander = 0.02 * np.sin(2 * np.pi * log.topic("velocity").times[:, None] / [5.0, 7.0, 9.0])
+    moved = tuple(dataclasses.replace(t, values=t.values + wander) if t.name == "velocity" else t for t in log.topics)
+    parameters = free_parameters(vehicle, FREE) + nuisances(("current", "bias"), [log])
+    done = fit([dataclasses.replace(log, topics=moved)], vehicle, parameters)
+    said = " ".join(warnings(done, [log]))
+    assert done.intervals.chi2 > 1.2 and "does not explain" in said and "the velocity:" in said
+    assert (done.intervals.deviations[:3] > 1.5 * done.intervals.nominal[:3]).any()
+
+
+def test_free_numbers_are_found_by_their_keys(vehicle):
+    names = [p.name for p in free_parameters(vehicle, ("hydrodynamics.added_mass.diagonal",))]
+    assert names == [f"hydrodynamics.added_mass.{i}.{i}" for i in range(1, 7)]
+    assert len(free_parameters(vehicle, DEFAULT_FREE)) == 21 + 12 + 4 + 1
+    assert [p.plant for p in free_parameters(vehicle, ("hydrodynamics.added_mass.6.2",))] == ["added_mass[2,6]"]
+    for key in ("hydrodynamics.added_mass.7.7", "hull.radius", "mass"):
+        with pytest.raises(IdentificationError, match="--free"):
+            free_parameters(vehicle, (key,))
+
+
+def test_a_vehicle_takes_the_numbers(vehicle):
+    keys = ("hydrodynamics.added_mass.2.6", "thrusters.matrix.3", "thrusters.time_constant", "hydrostatics.buoyancy")
+    changed = with_values(vehicle, free_parameters(vehicle, keys), np.array([0.5, 1.1, 0.2, 130.0]))
+    assert changed.added_mass[1, 5] == changed.added_mass[5, 1] == 0.5
+    assert changed.thruster_matrix[:, 2] == pytest.approx(1.1 * vehicle.thruster_matrix[:, 2])
+    assert (changed.thrust_time_constant == 0.2).all() and changed.buoyancy == 130.0
+
+
+def test_windows_that_tumble_or_have_gaps_are_rejected(log, vehicle):
+    step = integration_step([log])
+    rates = next(t for t in log.topics if t.name == "angular_velocity")
+    fast = dataclasses.replace(rates, values=np.where(rates.times[:, None] > 30.0, 4.0, rates.values))
+    tumbling = dataclasses.replace(log, topics=tuple(fast if t.name == rates.name else t for t in log.topics))
+    _, rejected = cut_windows([tumbling], vehicle, step, 4.0)
+    assert rejected == {"it turns at more than 3 rad/s": 3}
+    keep = (log.times < 10.0) | (log.times > 12.0)
+    gappy = dataclasses.replace(log, times=log.times[keep], thrust=log.thrust[keep], wrench=log.wrench[keep])
+    _, rejected = cut_windows([gappy], vehicle, step, 4.0)
+    assert list(rejected) == ["a gap of more than 1 s in the commands"]
+    with pytest.raises(IdentificationError, match="no window is left"):
+        fit([dataclasses.replace(tumbling, topics=(dataclasses.replace(rates, values=rates.values + 9.0),))], vehicle,
+            free_parameters(vehicle, FREE))  # fmt: skip
+
+
+def test_commands_change_on_the_grid(log):
+    assert integration_step([log]) == pytest.approx(PERIOD / 2)
+
+
+def test_noise_is_estimated_from_fourth_differences():
+    rng = np.random.default_rng(0)
+    times = np.arange(0.0, 60.0, 0.1)
+    smooth = np.stack([np.sin(0.5 * times)] * 3, axis=1)
+    topic = make_topic("velocity", times, smooth + 0.02 * rng.standard_normal(smooth.shape))
+    assert topic.noise == pytest.approx(np.full(3, 0.02), rel=0.15)

@@ -1,0 +1,68 @@
+"""The command: from a run of another plant than the start's to a file that builds, and its page."""
+
+import json
+import math
+import re
+
+import pytest
+
+from cosim.command_line.cli import main
+from plant_fmu import Plant, load_vehicle
+
+TRUTH = {"quadratic_damping[1]": 100.0, "buoyancy": 130.5}
+SCENARIO = """
+vehicle = "bluerov2_heavy"
+time = { duration = 26.0, step = 0.01, control = 0.05 }
+initial = { position = [0.0, 0.0, 3.0] }
+goal = { type = "sphere", centre = [0.0, 0.0, 3.0], radius = 5.0 }
+law = { name = "pd" }
+actuation = { through = "thrusters" }
+commands = { enabled = true }
+plant = { parameters = { "quadratic_damping[1]" = 100.0, "buoyancy" = 130.5 } }
+"""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs")
+    (folder / "pool.toml").write_text(SCENARIO)
+    lines = [{"step": 0, "command": {"command": "set_mode", "mode": "depth_hold"}}]
+    for k in range(0, 2600, 10):
+        sticks = [0.6 * math.sin(0.02 * k), 0.0, 0.8 * math.sin(0.007 * k), 0.0, 0.0, 0.1 * math.sin(0.01 * k)]
+        lines.append({"step": k, "command": {"command": "manual_control", "wrench": sticks}})
+    (folder / "sticks.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
+    arguments = ["--replay-commands", str(folder / "sticks.jsonl"), "--no-report", "--out", str(folder / "run"), "-q"]
+    assert main(["run", str(folder / "pool.toml"), *arguments]) == 0
+    return folder / "run"
+
+
+@pytest.mark.slow
+def test_a_run_becomes_a_vehicle_that_builds(run, tmp_path, capsys):
+    out = tmp_path / "mine.toml"
+    free = ["hydrodynamics.quadratic_damping.1", "hydrostatics.buoyancy", "hydrodynamics.added_mass.4.4"]
+    arguments = ["--vehicle", "bluerov2_heavy", "--nuisance", "current", "--out", str(out)]
+    assert main(["identify", str(run), *arguments, "--free", *free]) == 0
+    assert "chi² is" in capsys.readouterr().out
+    found = load_vehicle(out)
+    assert found.name == "mine"
+    assert found.quadratic_damping[0] == pytest.approx(100.0, rel=0.02)
+    assert found.buoyancy == pytest.approx(130.5, abs=0.02)
+    assert found.linear_damping == pytest.approx(load_vehicle("bluerov2_heavy").linear_damping)
+    text = out.read_text()
+    assert text.startswith("# Identified by cosim identify from run") and " ± " in text
+    page = out.with_suffix(".html").read_text()
+    assert not re.search(r'(src|href)="https?:', page) and "Hold the start velocity" in page
+    with Plant(found) as plant:
+        plant.initialise()
+        plant.step(0.1)
+
+
+def test_a_name_that_no_vehicle_can_have_is_refused_before_the_work(run, tmp_path, capsys):
+    assert main(["identify", str(run), "--vehicle", "odin", "--out", str(tmp_path / "1.toml")]) == 2
+    assert "no vehicle's file" in capsys.readouterr().err
+
+
+def test_an_unknown_nuisance_is_named(run, tmp_path, capsys):
+    arguments = ["--vehicle", "bluerov2_heavy", "--nuisance", "wind", "--out", str(tmp_path / "a.toml")]
+    assert main(["identify", str(run), *arguments]) == 2
+    assert "--nuisance wind: is unknown" in capsys.readouterr().err

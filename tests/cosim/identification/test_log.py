@@ -1,0 +1,104 @@
+"""What a run recorded: samples without held rows and gaps, from the columns that hold them best."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.errors import IdentificationError
+from cosim.identification.log import load_log
+from cosim.results.recorder import Recorder
+from cosim.simulation.signals import Column
+from plant_fmu import load_vehicle
+
+ROWS, STEP = 500, 0.02
+VEHICLE = load_vehicle("bluerov2_heavy")
+
+
+def signals():
+    """Columns of a log: the DVL at 5 Hz, held; a gap of the attitude; the gyro in the state's own columns."""
+    time = STEP * np.arange(ROWS)
+    rng = np.random.default_rng(0)
+    held = 10 * (np.arange(ROWS) // 10)
+    found = {"time": time}
+    for i in range(8):
+        found[f"thrust[{i + 1}]"] = np.sin(time + i)
+    found |= {f"wrench.{name}": 0.0 * time for name in "XYZKMN"}
+    for i, name in enumerate("uvw"):
+        found[f"measured.velocity.{name}"] = rng.standard_normal(ROWS)[held] + i
+        found[f"velocity.{name}"] = np.full(ROWS, np.nan)
+    found["measured.time.dvl"] = np.where(held > 0, time[held] - 0.05, -1e12)
+    found |= {f"velocity.{name}": np.sin(2.0 * time) for name in "pqr"}
+    found["position.z"] = 3.0 + np.sin(time)
+    for i in range(4):
+        found[f"quaternion.e{i}"] = np.where(
+            (time > 4.0) & (time < 5.0), np.nan, np.cos(0.1 * time) if i == 0 else 0.01 * time
+        )
+    return found
+
+
+def write(folder: Path, columns: dict[str, np.ndarray]) -> Path:
+    recorder = Recorder(folder, [Column(name, "", "") for name in columns])
+    for k, row in enumerate(np.column_stack(list(columns.values()))):
+        recorder.observe(k, row)
+    recorder.close()
+    return folder
+
+
+def test_held_samples_and_gaps_are_no_samples(tmp_path):
+    log = load_log(write(tmp_path, signals()), VEHICLE)
+    dvl = log.topic("velocity")
+    assert len(dvl.times) == ROWS // 10 - 1
+    assert dvl.times == pytest.approx(0.2 * np.arange(1, ROWS // 10) - 0.05)
+    assert dvl.values == pytest.approx(np.column_stack([signals()[f"measured.velocity.{n}"] for n in "uvw"])[10::10])
+    attitude = log.topic("attitude")
+    assert not ((attitude.times > 4.0) & (attitude.times < 5.0)).any()
+    assert np.linalg.norm(attitude.values, axis=1) == pytest.approx(np.ones(len(attitude.times)))
+    assert log.topic("position") is None and log.thrust.shape == (ROWS, 8)
+
+
+@pytest.mark.parametrize(
+    ("without", "message"),
+    [
+        (("thrust[8]",), r"no column 'thrust\[8\]'"),
+        (("quaternion.e0",), "no attitude"),
+        (("measured.velocity.u", "velocity.u"), "no velocity or position"),
+    ],
+)
+def test_what_is_missing_is_named(tmp_path, without, message):
+    columns = {name: x for name, x in signals().items() if name not in without}
+    with pytest.raises(IdentificationError, match=message):
+        load_log(write(tmp_path, columns), VEHICLE)
+
+
+def test_thrusters_that_rest_are_named(tmp_path):
+    columns = {name: 0.0 * x if name.startswith("thrust[") else x for name, x in signals().items()}
+    with pytest.raises(IdentificationError, match="the thrusters rest"):
+        load_log(write(tmp_path, columns), VEHICLE)
+
+
+def test_another_vehicle_is_named(tmp_path):
+    columns = signals() | {"thrust[9]": signals()["time"]}
+    with pytest.raises(IdentificationError, match="more thrusters than the 8"):
+        load_log(write(tmp_path, columns), VEHICLE)
+
+
+def test_positions_stand_in_for_velocities(tmp_path):
+    columns = {name: x for name, x in signals().items() if "velocity.u" not in name}
+    columns |= {f"position.{axis}": np.sin(columns["time"]) for axis in "xy"}
+    log = load_log(write(tmp_path, columns), VEHICLE)
+    assert log.topic("velocity") is None and len(log.topic("position").times) == ROWS
+
+
+@pytest.mark.parametrize(
+    ("scenario", "message"),
+    [
+        ("failures = [{ thruster = 1, time = 3.0 }]", "thrusters fail"),
+        ("limit = { force = 50.0 }", "has a limit or a lag"),
+    ],
+)
+def test_commands_that_the_scenario_bends_are_refused(tmp_path, scenario, message):
+    folder = write(tmp_path, signals() | {"wrench.X": signals()["thrust[1]"]})
+    (folder / "scenario.toml").write_text(scenario)
+    with pytest.raises(IdentificationError, match=message):
+        load_log(folder, VEHICLE)
