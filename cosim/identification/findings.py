@@ -6,10 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from cosim.identification.fit import Fit
+from cosim.identification.fit import STAGES, Fit
 from cosim.identification.intervals import DISAGREES
 from cosim.identification.log import UNITS, Log
 
+_LOST = 10.0  # chi2 by degrees of freedom, above which nothing was identified
 _ALIKE = 0.95  # correlation, beyond which two numbers are not told apart
 _LISTED = 6
 _NEEDS = {  # motions that tell the numbers of a key apart
@@ -43,7 +44,12 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
     logs : sequence of Log
         The runs.
     """
-    if fit.intervals.chi2 > DISAGREES:
+    if fit.intervals.chi2 > _LOST:
+        yield (
+            f"Do not use these numbers: chi² is {fit.intervals.chi2:.0f} by degrees of freedom, and no better were "
+            "found. Free fewer numbers, start from a vehicle that is nearer, or drive more manoeuvres."
+        )
+    elif fit.intervals.chi2 > DISAGREES:
         worst, size = fit.worst_topic()
         yield (
             f"The model does not explain these runs to within the sensors' noise: chi² is {fit.intervals.chi2:.2f} by "
@@ -51,6 +57,11 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
             f"{worst.replace('_', ' ')}: its residuals are {size:.1f} times its noise. The intervals are those of a "
             "jackknife, and hold as far as the pieces of the runs are alike. Look for a disturbance, unequal "
             "thrusters, a delay (--nuisance delay), the DVL's scale (--nuisance scale), a tether (--nuisance force)."
+        )
+    if fit.windows[0].steps * fit.step < 0.5 * STAGES[-1]:
+        yield (
+            f"Predictions over {STAGES[-1]:g} s fail, as they do where a motion is unstable without its control: the "
+            f"numbers are those of windows of {STAGES[0]:g} s."
         )
     resting = [fit.parameters[i].name for i in fit.resting()]
     if resting:

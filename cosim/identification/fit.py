@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
 from cosim.errors import IdentificationError
-from cosim.identification.intervals import RESTS, Intervals, estimate_intervals
+from cosim.identification.intervals import DISAGREES, RESTS, Intervals, estimate_intervals
 from cosim.identification.log import Log
 from cosim.identification.parameters import Parameter
 from cosim.identification.residuals import Reduced, Residuals
@@ -25,8 +25,10 @@ Array = NDArray[np.float64]
 LONGEST_STEP, SHORTEST_STEP = 0.03, 0.015  # s, of the integration
 STAGES = (4.0, 20.0)  # s, lengths of windows: short ones find the numbers from afar, long ones tell them apart
 _HELD, _ROUGH, _PRECISION = 0.1, 1e-2, 1e-6  # part of the cost, below which a step ends a round: first, others, last
+_FAR = 0.03  # weight of all residuals in the first round: starts as sampled are off by some 30 deviations of the noise
 _EVALUATIONS = 20  # of each round, at the most
-_ROUNDS = 2  # of each stage: fit, weigh anew
+_ROUNDS = (3, 2)  # of each stage: fit, weigh anew; the first of all from starts as sampled
+_WORSE = 3.0  # times the chi2 of short windows, beyond which long ones are not explained, and the short ones count
 _HUBER = 3.0  # standard deviations, beyond which a residual counts by its magnitude
 _OUTLIER = 6.0  # standard deviations, beyond which a sample is called an outlier
 _INSIDE = 0.05  # of a deviation: how far from its bound a number starts
@@ -113,13 +115,14 @@ def _fit(
 ) -> Fit:
     margins = MARGINS if any(p.kind == "delay" for p in parameters) else (0.0, 0.0)
     values, step = _inside(parameters), integration_step(logs)
-    done, total = 0, len(STAGES) * _ROUNDS * _EVALUATIONS
-    for stage, length in enumerate(STAGES):
+    found: list[Fit] = []
+    done, total = 0, sum(_ROUNDS) * _EVALUATIONS
+    for length, rounds in zip(STAGES, _ROUNDS, strict=True):
         windows, rejected = cut_windows(logs, vehicle, step, length, margins)
         if not windows:
             raise IdentificationError(_nothing_left(rejected))
         problem = Problem(Residuals(logs, vehicle, parameters, windows, step))
-        for turn in range(_ROUNDS):
+        for turn in range(rounds):
             begun = done
 
             def tick(begun: int = begun) -> None:
@@ -127,18 +130,27 @@ def _fit(
                 done = min(done + 1, begun + _EVALUATIONS)
                 progress(done / total)
 
-            last = stage == len(STAGES) - 1
-            problem.residuals.holds_starts = stage == turn == 0
-            rough = _HELD if problem.residuals.holds_starts else _ROUGH
-            values = problem.solve(values, tick, _PRECISION if last else rough)
-            done = (stage * _ROUNDS + turn + 1) * _EVALUATIONS
-            if not (last and turn == _ROUNDS - 1):
+            precision = _PRECISION if turn == rounds - 1 else _ROUGH
+            problem.residuals.holds_starts = not found and turn == 0
+            if problem.residuals.holds_starts:  # residuals are those of wrong starts: numbers stay near their priors
+                precision = _HELD
+                problem.residuals.weights = [np.full(len(w), _FAR) for w in problem.residuals.weights]
+            values = problem.solve(values, tick, precision)
+            done = begun + _EVALUATIONS
+            if turn < rounds - 1:
                 problem.reweigh()
+        found.append(_result(problem, values, windows, rejected, step))
     progress(1.0)
-    plain = [r.residual / w for r, w in zip(problem.reduced, problem.residuals.weights, strict=True)]
+    first, last = found[0], found[-1]
+    return last if last.intervals.chi2 <= max(DISAGREES, _WORSE * first.intervals.chi2) else first
+
+
+def _result(problem: Problem, values: Array, windows: Sequence[Window], rejected: Counter[str], step: float) -> Fit:
+    parameters, reduced = problem.residuals.parameters, problem.reduced
+    plain = [r.residual / w for r, w in zip(reduced, problem.residuals.weights, strict=True)]
     return Fit(
-        parameters, values, estimate_intervals(parameters, values, problem.reduced, windows), tuple(windows), rejected,
-        tuple(problem.reduced), sum(int((np.abs(r) > _OUTLIER).sum()) for r in plain), sum(map(len, plain)), step,
+        parameters, values, estimate_intervals(parameters, values, reduced, windows), tuple(windows), rejected,
+        tuple(reduced), sum(int((np.abs(r) > _OUTLIER).sum()) for r in plain), sum(map(len, plain)), step,
     )  # fmt: skip
 
 
@@ -155,6 +167,7 @@ class Problem:
         self.residuals = residuals
         self.reduced: list[Reduced] = []
         self._known: tuple[bytes, Array, Array] | None = None
+        self._least = np.inf  # cost, of those evaluated since the weights changed
         parameters = residuals.parameters
         self._start = np.array([p.start for p in parameters])
         self._deviation = np.array([p.deviation for p in parameters])
@@ -167,7 +180,7 @@ class Problem:
             tick()
             return self._evaluate(x)[0]
 
-        self._known = None
+        self._known, self._least = None, np.inf
         if not np.isfinite(self._evaluate(values)[0]).all():
             raise IdentificationError("the start vehicle predicts no motion that stays within numbers")
         found = least_squares(
@@ -199,6 +212,10 @@ class Problem:
             rows_of_all = np.concatenate([*few, np.column_stack([
                 np.diag(1.0 / self._deviation), (values - self._start) / self._deviation
             ])])  # fmt: skip
+            cost = float(rows_of_all[:, p] @ rows_of_all[:, p])
+            if cost <= self._least:
+                self._least = cost
+                self.residuals.keep_starts()
             self.reduced = reduced
             self._known = key, rows_of_all[:, p], rows_of_all[:, :p]
         return self._known[1], self._known[2]

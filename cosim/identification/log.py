@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 TOPICS = ("velocity", "angular_velocity", "depth", "attitude", "position")
 UNITS = {"velocity": "m/s", "angular_velocity": "rad/s", "depth": "m", "attitude": "rad", "position": "m"}
 _AXES = {"velocity": "uvw", "angular_velocity": "pqr", "depth": "z", "attitude": "xyz", "position": "xyz"}
-_LEAST_NOISE = {"velocity": 1e-3, "angular_velocity": 1e-3, "depth": 1e-3, "attitude": 1e-3, "position": 5e-3}
+_LEAST_NOISE = {"velocity": 1e-3, "angular_velocity": 1e-3, "depth": 1e-3, "attitude": 1e-2, "position": 5e-3}
 _MOST_SAMPLES = 50.0  # Hz; faster topics are averaged over blocks
 _FEWEST = 20  # samples of a topic
 _DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # whose variance on white noise is 70 times that of the noise
@@ -93,7 +93,7 @@ def make_topic(name: str, times: Array, values: Array, noise: float | None = Non
         Without gaps.
     noise : float, optional
         Standard deviation of each component; default: that of fourth differences, by their median, and at the least
-        1 mm/s, 1 mrad/s, 1 mm, 1 mrad and, of positions, 5 mm.
+        1 mm/s, 1 mrad/s, 1 mm, of positions 5 mm, and of attitudes, which filters smooth, 10 mrad.
 
     Returns
     -------
@@ -116,7 +116,8 @@ def make_topic(name: str, times: Array, values: Array, noise: float | None = Non
         deviations = deviations / np.sqrt(block)
     if name == "attitude":
         values = values / np.linalg.norm(values, axis=1, keepdims=True)
-    return Topic(name, times, values, np.maximum(deviations, _LEAST_NOISE[name]))
+    least = _LEAST_NOISE[name] if noise is None else 0.0
+    return Topic(name, times, values, np.maximum(deviations, least))
 
 
 def load_log(folder: Path, vehicle: Vehicle) -> Log:

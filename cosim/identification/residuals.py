@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 _START_DEVIATIONS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0)  # m, rad, m/s, rad/s
 _SOLVED = 0.05  # of a start's standard deviation: what is left is linear
-_MOST_SOLVES = 8
+_MOST_SOLVES = 12
 
 
 @dataclass(frozen=True)
@@ -93,6 +93,7 @@ class Residuals:
         self._starts = [*((0, 1) if has_position else ()), *((2,) if has_depth else ()), *range(3, 12)]
         self.holds_starts = False  # as samples have them, while the free numbers are far off
         self._found: dict[int, _Start] = {}
+        self._tried: dict[int, _Start] = {}
         self.weights: list[Array] = [np.ones(rows_of(window)) for window in windows]
 
     def settings(self, values: Array) -> list[Setting]:
@@ -232,19 +233,23 @@ class Residuals:
             return state
         if known is not None:
             state = self._moved(known.state, known.slope @ (values - known.values))
-        weight, best, step = self.weights[i], np.inf, np.zeros(len(self._starts))
+        weight, best, base, step = self.weights[i], np.inf, state, np.zeros(len(self._starts))
         for _ in range(_MOST_SOLVES):
             residual, by_start, _ = self.raw(i, settings, state, full=False)
             cost = float(np.sum(np.square(weight * residual)))
-            if cost > best + 1.0:  # too far: half of the last step back
-                step = -0.5 * step
-                state = self._moved(state, step)
+            if cost > best + 1.0:  # too far
+                step = 0.5 * step
+                state = self._moved(base, step)
                 continue
-            best, step = cost, self._step_of(weight * residual, weight[:, None] * by_start)
-            state = self._moved(state, step)
+            best, base, step = cost, state, self._step_of(weight * residual, weight[:, None] * by_start)
+            state = self._moved(base, step)
             if float(np.sum(np.square(weight * (by_start @ step)))) < _SOLVED**2:
                 break
         return state
+
+    def keep_starts(self) -> None:
+        """Search for starts from now on about those of the last evaluation, as is right where that was the best."""
+        self._found = dict(self._tried)
 
     def reduced(self, i: int, settings: Sequence[Setting], values: Array) -> Reduced:
         """Return the residuals of a window without its start, and with their derivatives."""
@@ -261,7 +266,7 @@ class Residuals:
         slope: Array = -np.linalg.solve(r, top.T @ jacobian)
         if self.holds_starts:
             return Reduced(left, jacobian, self._row_times(i))
-        self._found[i] = _Start(state, values.copy(), slope)
+        self._tried[i] = _Start(state, values.copy(), slope)
         step: Any = -np.linalg.solve(r, top.T @ left)
         best: Any = left + by_start @ step
         return Reduced(best, jacobian + by_start @ slope, self._row_times(i))

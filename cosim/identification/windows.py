@@ -19,7 +19,7 @@ MARGINS = (0.4, 0.1)  # s, at the ends of a window without samples, where delays
 
 _SHORTEST = 0.6  # part of a full window, below which the rest of a run is dropped
 _SETTLED = 1.0  # s, after a run's first command: forces that lag are then known by the commands since
-_MOST_GAP = 1.0  # s without a command, or without a sample of velocity or position
+_MOST_GAP = 1.0  # s without a command, or without a sample of velocity, position or attitude
 _FASTEST = 3.0  # rad/s
 _STEEPEST = math.radians(80.0)  # of pitch
 _MOST_SATURATED = 0.1  # part of a window that a thruster may be commanded beyond its limits
@@ -117,7 +117,7 @@ def _fault(log: Log, vehicle: Vehicle, window: Window, length: float) -> str:
     if commanded.sum() < 2 or np.diff(log.times[commanded]).max() > _MOST_GAP:
         return f"a gap of more than {_MOST_GAP:g} s in the commands"
     for topic in window.topics:
-        if topic.name in ("velocity", "position"):
+        if topic.name in ("velocity", "position", "attitude"):
             times = np.concatenate([[0.0], topic.times, [length]])
             if np.diff(times).max() > _MOST_GAP + 0.5:
                 return f"a gap of more than {_MOST_GAP:g} s in the {topic.name}"
