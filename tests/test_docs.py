@@ -42,7 +42,7 @@ def test_the_keys_of_a_scenario_are_documented_as_the_code_has_them():
     assert module.PAGE.read_text() == module.page(), f"run python {path.relative_to(ROOT)}"
     assert "| `time.step` | s | 0.001 |" in module.page() and "| `limit.force` | N | `inf` |" in module.page()
     listed = {key for key, _ in module.defaults(File)}
-    assert listed | {"goal.velocity", "goal.streamed"} == set(KEYS)
+    assert listed | {"goal.velocity", "goal.streamed", "goal.then", "goal.stay"} == set(KEYS)
 
 
 @pytest.mark.slow

@@ -98,7 +98,8 @@ class Failsafes:
         if name in {parameter.name for parameter in PARAMETERS[self._profile]}:
             if self._profile == "px4" and message.param_type == _MAV_PARAM_TYPE_INT32:  # its bits in a float's place
                 (value,) = struct.unpack("<i", struct.pack("<f", value))
-            self.values[name] = float(value)
+            if math.isfinite(value):
+                self.values[name] = float(value)
 
     def is_read(self, now: float) -> bool:
         """Return whether all has come, or what has not is not to be waited for any more."""

@@ -105,7 +105,8 @@ def _of_region(name: str, region: dict[str, Any], path: list[str]) -> KeyName:
         value, unit = region["shape"].get(key), unit_of_shape(region["shape"]["type"], key)
     else:
         key, *places = path
-        value, unit = region.get(key), KEYS[f"regions[].{key}"].unit
+        of = KEYS.get(f"regions[].{key}") or KEYS[f"goal.{key}"]
+        value, unit = region.get(key), of.unit
     words = key.replace("_", " ")
     if len(places) == 2:  # a corner or point of several
         words, value, places = f"{words.removesuffix('s')} {places[0]}", value[int(places[0])], places[1:]

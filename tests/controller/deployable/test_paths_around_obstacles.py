@@ -149,7 +149,7 @@ def test_a_path_ends_within_a_soft_region_by_a_margin_where_the_goal_has_room(be
     packed = pack([Region("beyond", beyond, "in", hard=False, crossing_cost=cost)])
     for k in range(1500):
         improve_path(plan, np.array([min(0.02 * k, begins), 0.0, 2.5]), goal, packed, GAINS, 0.02)
-    assert inside - 0.02 < clearance_at(packed, 0, plan.path[plan.counts[0] - 1]) < inside + 0.1
+    assert inside - 0.025 < clearance_at(packed, 0, plan.path[plan.counts[0] - 1]) < inside + 0.1
 
 
 def test_the_trees_leave_costly_regions_for_cheap_ones():

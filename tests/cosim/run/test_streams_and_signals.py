@@ -268,6 +268,7 @@ VERBS = {  # {run}: a run folder
     "compare": ["scenes.jsonl", "--laws", "ismail_dunnigan,pd", *CAMPAIGN],
     "ablate": ["scenes.jsonl", "--variants", "lag", *CAMPAIGN],
     "falsify": ["plain", "--law", "pd", "--budget", "2", *CAMPAIGN],
+    "identify": ["dive", "--vehicle", "bluerov2_heavy", "--free", "hydrostatics.buoyancy", "--out", "mine.toml"],
     "sweep": ["paper", *QUICK, "--vary", "initial.position.1=-1:1", "--samples", "2", *CAMPAIGN],
     "rerun": ["out", "0", "--out", "again"],
     "listen": ["udpin:127.0.0.1:14571", "--seconds", "0.1"],
@@ -292,6 +293,7 @@ SLOW = {
     "compare",
     "ablate",
     "falsify",
+    "identify",
     "sweep",
     "rerun",
     "mavlink-check",
@@ -318,6 +320,8 @@ def test_D12_a_reader_that_goes_away_ends_every_verb_alike(verb, flown, place, u
         pytest.importorskip(NEED[verb])
     if verb == "rerun":
         assert main(["sweep", *VERBS["sweep"]]) == 0
+    if verb == "identify":
+        assert main(["run", "depth-transit", "--set", "time.duration=25", "--no-report", "--out", "dive"]) == 0
     capsys.readouterr()
     with contextlib.ExitStack() as stack:
         if verb == "sitl":
