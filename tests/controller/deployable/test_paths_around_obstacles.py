@@ -406,7 +406,7 @@ class Change:
             way[-1] = self.end(way[-2] if corners else START)
             return [way[-1]] if self.draw() < 0.5 else way
         if choice < 0.2:
-            reach = 0.05 + self.draw() * 0.5
+            reach = 0.02 * 30.0 ** self.draw()
             way[-1] = self.end(way[-1] + reach * np.array([self.spread() for _ in range(3)]))
             return way
         if choice < 0.3 and corners:

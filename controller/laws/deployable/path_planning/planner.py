@@ -315,8 +315,8 @@ def _mutate_path(plan: PathPlan, start: Array, goal: PackedRegions, limits: Path
         if uniform(random) < 0.5:
             copy(candidate[last], candidate[0])
             count = 1
-    elif choice < 0.2:  # another end
-        reach = 0.05 + uniform(random) * 0.5
+    elif choice < 0.2:  # another end, a little off or far
+        reach = 0.02 * exponential(_LN_30 * uniform(random))
         for axis in range(3):
             candidate[last, axis] += reach * _bell_shaped(random)
         nearest_goal_point(goal, candidate[last], limits.depth, candidate[last])
