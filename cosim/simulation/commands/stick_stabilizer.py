@@ -68,6 +68,10 @@ class StickStabilizer:
         ndarray, shape (6,)
             [N, N m], body frame; nothing where the state that it needs is not known.
         """
+        if math.isnan(self._heading):  # not known so far, or not any more
+            self._heading = self._yaw()
+        if math.isnan(self._depth):
+            self._depth = float(self._state.position[2])
         wrench: Array = gain * sticks * self._reach
         wrench[3:] = self._moment(sticks, gain)
         if keep_depth:
@@ -101,7 +105,8 @@ class StickStabilizer:
         error_down = self._depth - depth
         force = self._mass * _DEPTH * _DEPTH * error_down
         most = float(self._reach[2])
-        self._integral = min(max(self._integral + _INTEGRAL * force * self._period, -most), most)
+        if math.isfinite(force):
+            self._integral = min(max(self._integral + _INTEGRAL * force * self._period, -most), most)
         speed = float(R[2] @ self._state.velocity_body[:3])
         return force + self._mass * _DEPTH * 2.0 * (rate - speed) + self._integral
 
