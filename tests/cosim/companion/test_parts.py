@@ -223,7 +223,8 @@ def test_failsafe_parameters_are_asked_for_until_they_come_or_for_three_seconds(
     assert not failsafes.is_read(0.0)
     asked = [len(failsafes.wanted(0.25 * k)) for k in range(9)]
     assert asked == [12, 0, 12, 0, 12, 0, 12, 0, 12]
-    for name, value in (("FS_GCS_ENABLE", 2.0), ("FS_GCS_TIMEOUT", 5.0), ("SOMETHING_ELSE", 1.0), ("FS_EKF_ACTION", float("nan"))):
+    values = {"FS_GCS_ENABLE": 2.0, "FS_GCS_TIMEOUT": 5.0, "SOMETHING_ELSE": 1.0, "FS_EKF_ACTION": float("nan")}
+    for name, value in values.items():
         failsafes.take(decoded(value_of(name, value)))
     assert "FS_GCS_ENABLE" not in failsafes.wanted(2.5)
     assert not failsafes.is_read(3.0) and failsafes.is_read(3.1) and not failsafes.wanted(4.0)
