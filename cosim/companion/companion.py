@@ -178,7 +178,10 @@ class Companion:
             return conclude(folder.path, self.scenario, status, wall_time, report)
 
     def prepare(self, on_state: Callable[[State, str], None] | None = None) -> None:
-        """Exchange messages until the vehicle can be steered; RunError if that takes longer than the options allow."""
+        """Exchange messages until the vehicle can be steered; RunError if that takes longer than the options allow.
+
+        `on_state` is as of `run`.
+        """
         session, period = self.session, self.scenario.time.step
         begun = session.clock()
         while not session.supervisor.is_steering:

@@ -23,8 +23,8 @@ class Actuation:
     """Wrenches that are linear over each step of a grid: mean and change from begin to end, and their derivatives."""
 
     wrench: Array  # (steps, 2, 6) N, N m
-    by_lag: Array  # (steps, 2, 6), by the time constant of all thrusters
-    by_scale: Array  # (thrusters, steps, 2, 6), by a factor of each thruster
+    by_lag: Array  # (steps, 2, 6) N/s, N m/s, by the time constant of all thrusters
+    by_scale: Array  # (thrusters, steps, 2, 6) N, N m, by a factor of each thruster
 
 
 class CommandedForces:

@@ -174,7 +174,7 @@ class Problem:
         self._bounds = np.array([p.least for p in parameters]), np.array([p.most for p in parameters])
 
     def solve(self, values: Array, tick: Callable[[], None], precision: float) -> Array:
-        """Return the best values from some on."""
+        """Return the best values from some on; IdentificationError if they predict no motion that stays finite."""
 
         def residual(x: Array) -> Array:
             tick()

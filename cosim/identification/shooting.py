@@ -49,8 +49,8 @@ class Directions:
     start: Array  # (d, 13) tangent of the start
     parameters: Sequence[str | None]  # (d,) of the FMU
     inputs: Sequence[int | None]  # (d,) row of `wrench`
-    force: Array  # (d, 3) tangent of the constant force, world frame
-    wrench: Array  # (n, steps, 2, 6) tangents of the wrench
+    force: Array  # (d, 3) N, tangent of the constant force, world frame
+    wrench: Array  # (n, steps, 2, 6) N, N m, tangents of the wrench
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ def vehicle_text(start: str, vehicle: Vehicle, fit: Fit, name: str, provenance: 
 
 
 def name_of_file(out: Path) -> str:
-    """Return the name of a vehicle in a file: that of the file, as far as it can be one."""
+    """Return the name of a vehicle in a file: that of the file; IdentificationError if that cannot be one."""
     name = re.sub(r"\W", "_", out.stem, flags=re.ASCII)[:64]
     if out.suffix != ".toml" or not name or name[0].isdigit():
         raise IdentificationError(

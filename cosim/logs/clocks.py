@@ -41,7 +41,7 @@ class Clock:
         return time
 
     def times(self, said: Array) -> Array:
-        """Return the times for what the clock says, shape (n,)."""
+        """Return the times [s] for what the clock says [s], shape (n,)."""
         turned: Array = np.asarray(said, float) + self._shift
         first = 0
         known = np.flatnonzero(np.isfinite(turned))
@@ -93,7 +93,7 @@ class VehicleClock:
             minutes[minute] = (stamp, offset)
 
     def times(self, stamps: Array, written: Array) -> Array:
-        """Return times on the writer's clock, shape (n,), of stamps; of NaN, when it was written."""
+        """Return times [s] on the writer's clock, shape (n,), of stamps [s]; of NaN, when it was written."""
         if self._lines is None:
             self._lines = [_line(minutes) for minutes in self._offsets]
         lines = np.array(self._lines)

@@ -180,7 +180,7 @@ def check_commands(
 
 
 def check_goal(file: File) -> tuple[Shape, GoalMotion]:
-    """Return the goal's shape, and how it moves.
+    """Return the goal's shape, and how it moves; ScenarioError if that cannot be.
 
     The run of a log may have none: then it is a sphere far away that nothing shows or judges by.
     """
