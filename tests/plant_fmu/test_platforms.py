@@ -22,6 +22,8 @@ from plant_fmu.errors import BuildError
 from tests.plant_fmu.conftest import STATES, CoSimulationInstance
 from tests.plant_fmu.libraries import parts, read_libraries
 
+pytestmark = pytest.mark.timeout(900)  # libraries for all platforms take minutes beside other tests
+
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 FOLDERS = {
     2: {"linux64": ".so", "aarch64-linux": ".so", "win64": ".dll", "darwin64": ".dylib", "aarch64-darwin": ".dylib"},

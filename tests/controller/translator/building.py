@@ -24,7 +24,7 @@ def compiled(text, folder, *flags, compiler=None):
     source.write_text(text, encoding="utf-8")
     done = subprocess.run(
         [*command, *FLAGS, *WARNINGS, *flags, str(source), "-o", str(library), "-lm"],
-        capture_output=True, text=True, timeout=300, check=False,
+        capture_output=True, text=True, timeout=900, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[:4000]
     return library

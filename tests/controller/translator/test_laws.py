@@ -14,6 +14,8 @@ from tests.controller.translator.building import Called, compiled
 from tests.controller.translator.flights import Flight, same_bits
 from tests.controller.translator.numba_reference import by_numba
 
+pytestmark = pytest.mark.timeout(900)  # compilers take minutes for a law beside other tests
+
 HERE = Path(__file__).parent
 
 

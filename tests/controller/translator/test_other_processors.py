@@ -16,6 +16,8 @@ from controller.translator.static_data import static_data
 from controller.translator.types import type_of
 from tests.controller.translator.flights import GOAL, PERIOD, REGIONS, Flight
 
+pytestmark = pytest.mark.timeout(900)  # compilers and emulators take minutes for a law beside other tests
+
 STEPS = 1500
 # reads what each step is given, and writes forces, estimate and report
 MAIN = """
@@ -74,7 +76,7 @@ def test_bits_are_those_of_this_machine(law, target, tmp_path):
             sys.executable, "-m", "ziglang", "cc", "-target", target, "-std=c99", "-O2", "-ffp-contract=off", "-Wall",
             "-Wextra", "-Wpedantic", "-Werror", str(tmp_path / "law.c"), "-o", str(built), "-lm",
         ],
-        check=True, timeout=300,
+        check=True, timeout=900,
     )  # fmt: skip
     inputs, outputs, step = bytearray(), [], BoundCall(flight.function, flight.arguments).call
     for _ in range(STEPS):
@@ -84,12 +86,12 @@ def test_bits_are_those_of_this_machine(law, target, tmp_path):
         outputs += [flight.forces.copy(), flight.memory.estimate.copy(), flight.memory.report.copy()]
     given.write_bytes(inputs)
     if target.startswith("wasm"):
-        subprocess.run([sys.executable, "-c", WASM, str(built), str(given), str(taken)], check=True, timeout=300)
+        subprocess.run([sys.executable, "-c", WASM, str(built), str(given), str(taken)], check=True, timeout=900)
         found = np.fromfile(taken)
     else:
         with given.open("rb") as file:
             command = [emulator, str(built)] if emulator else [str(built)]
-            done = subprocess.run(command, stdin=file, capture_output=True, check=True, timeout=300)
+            done = subprocess.run(command, stdin=file, capture_output=True, check=True, timeout=900)
         found = np.frombuffer(done.stdout)
     np.testing.assert_array_equal(found, np.concatenate(outputs))
 

