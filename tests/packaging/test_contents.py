@@ -12,9 +12,8 @@ import packaging.utils
 import pytest
 from fmpy.validation import validate_fmu
 
-from controller.compiling.function import c_text
 from controller.compiling.library import library_name
-from cosim.batch.shipped_functions import shipped_functions
+from cosim.batch.shipped_functions import shipped_texts
 from plant_fmu import build_fmu, load_vehicle, shipped_vehicles
 from plant_fmu.build import cached_fmu
 from plant_fmu.compiling import prebuilt
@@ -41,7 +40,7 @@ def expected_libraries():
 
 def expected_functions(platforms):
     """Libraries of what is run as C, with their checksums."""
-    names = {library_name(c_text(function, arguments)) for function, arguments in shipped_functions()}
+    names = {library_name(text) for text in shipped_texts().values()}
     files = {f"{platform.name}/{name}{platform.suffix}" for platform in platforms for name in names}
     return {f"controller/prebuilt/{file}{end}" for file in files for end in ("", ".sha256")}
 
@@ -97,7 +96,7 @@ def test_each_dependency_has_a_lower_bound(project):
     extras = [text for texts in project["optional-dependencies"].values() for text in texts]
     for text in (*project["dependencies"], *extras):
         assert ">=" in text or text.startswith(("subreach[", "fuzzy-arbiter[skfuzzy]==")), text
-    wanted = {"build", "campaign", "importers", "mcap", "numba", "rerun"}
+    wanted = {"build", "campaign", "falsify", "importers", "logs", "mcap", "numba", "rerun"}
     (everything,) = project["optional-dependencies"]["all"]
     assert set(everything.removeprefix("subreach[").removesuffix("]").split(",")) == wanted
 
