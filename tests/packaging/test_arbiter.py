@@ -83,7 +83,9 @@ def test_what_needs_more_names_its_extra(alone, code, line):
 def test_its_tests_run_from_the_source_distribution(arbiter_dist, arbiter_wheel, tmp_path):
     (path,) = arbiter_dist.glob("*.tar.gz")
     with tarfile.open(path) as archive:
-        archive.extractall(tmp_path, filter="data")
+        archive.extractall(
+            tmp_path, **({"filter": "data"} if hasattr(tarfile, "data_filter") else {})
+        )  # from 3.11.4 on
     (folder,) = tmp_path.iterdir()
     with zipfile.ZipFile(arbiter_wheel) as archive:
         archive.extractall(tmp_path / "installed")
