@@ -9,7 +9,7 @@ from pathlib import Path
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.spool import LogContents
 
-Moved = Callable[[float], None]  # is told how much of the log has been read, 0 to 1
+Moved = Callable[[float], None]  # gets how much of the log has been read, 0 to 1
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,9 @@ class LogFormat:
     suffixes : tuple of str
         Of its files, in small letters.
     read : callable
-        Reads a log into `LogContents`. It imports what the base installation does not bring.
+        ``read(path, columns, contents, moved)`` reads a log into `contents`; `columns` is None where messages say what
+        they are, and `moved` gets how much has been read. It imports what the base installation does not bring, and
+        raises ImportLogError if the file is no such log.
     mapped : bool
         Whether a column map says what its columns are; otherwise it takes none.
     needs : tuple of str

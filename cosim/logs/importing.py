@@ -81,7 +81,7 @@ def import_log(
     overwrite : bool
         Replace a run that `out` holds.
     moved : callable
-        Is told how much of the log has been read, 0 to 1.
+        Gets how much of the log has been read, 0 to 1.
 
     Returns
     -------

@@ -31,24 +31,7 @@ Fields = dict[str, Any]
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
-    """Read a dataflash log.
-
-    Parameters
-    ----------
-    path : Path
-        The log.
-    columns : ColumnMap or None
-        None: its messages say what they are.
-    contents : LogContents
-        Receives what it says.
-    moved : callable
-        Is told how much has been read.
-
-    Raises
-    ------
-    ImportLogError
-        If it is no dataflash log.
-    """
+    """Read a dataflash log, as `LogFormat` says; ImportLogError if it is none."""
     contents.autopilot = "ardupilot"
     takers = _Takers(contents)
     lost, any_message = 0, False

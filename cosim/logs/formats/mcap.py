@@ -28,24 +28,7 @@ Getter = Callable[[Any], float]
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
-    """Read a bag.
-
-    Parameters
-    ----------
-    path : Path
-        The bag.
-    columns : ColumnMap or None
-        Which fields of which topics are what.
-    contents : LogContents
-        Receives what they say.
-    moved : callable
-        Is told how much has been read.
-
-    Raises
-    ------
-    ImportLogError
-        If it is no bag, or a topic or field is missing.
-    """
+    """Read a bag, as `LogFormat` says; ImportLogError if it is none, or lacks a topic or field."""
     from mcap.exceptions import McapError
     from mcap.reader import NonSeekingReader
     from mcap_ros2.decoder import DecoderFactory

@@ -29,24 +29,7 @@ _MISSING = ["", "nan", "NaN", "NAN", "null", "NULL", "None", "N/A", "n/a", "inf"
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
-    """Read a table.
-
-    Parameters
-    ----------
-    path : Path
-        A CSV file with a line of names, or a Parquet file.
-    columns : ColumnMap or None
-        Which columns are what.
-    contents : LogContents
-        Receives what they say.
-    moved : callable
-        Is told how much has been read.
-
-    Raises
-    ------
-    ImportLogError
-        If it cannot be read, or a column is missing or holds what is no number.
-    """
+    """Read a table, as `LogFormat` says; ImportLogError if a column is missing or holds what is no number."""
     assert columns is not None
     times = {name: columns.time_of(name) for name in columns.quantities}
     untimed = next((name for name, time in times.items() if time is None), None)

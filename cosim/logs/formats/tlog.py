@@ -157,24 +157,7 @@ def _part(value: float) -> float:
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
-    """Read a telemetry log.
-
-    Parameters
-    ----------
-    path : Path
-        The log.
-    columns : ColumnMap or None
-        None: its messages say what they are.
-    contents : LogContents
-        Receives what it says.
-    moved : callable
-        Is told how much has been read.
-
-    Raises
-    ------
-    ImportLogError
-        If it holds no vehicle.
-    """
+    """Read a telemetry log, as `LogFormat` says; ImportLogError if it holds no vehicle."""
     counts, clock = Counts(), Clock()
     gate, vehicle, names = Gate(counts), _Vehicle(contents, *_find_vehicle(path)), dialect().mavlink_map
     lost = 0

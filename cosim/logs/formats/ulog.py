@@ -38,24 +38,7 @@ _FAILURES = (TypeError, ValueError, KeyError, IndexError, struct.error, UnicodeD
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
-    """Read a log of PX4.
-
-    Parameters
-    ----------
-    path : Path
-        The log.
-    columns : ColumnMap or None
-        None: its topics say what they are.
-    contents : LogContents
-        Receives what it says.
-    moved : callable
-        Is told how much has been read.
-
-    Raises
-    ------
-    ImportLogError
-        If it is no such log.
-    """
+    """Read a log of PX4, as `LogFormat` says; ImportLogError if it is none."""
     from pyulog import ULog
     from pyulog.core import ULogException
 
