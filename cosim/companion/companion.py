@@ -51,7 +51,7 @@ def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks") -> Scena
     scenario : Scenario
         As it is simulated.
     steer_by : str
-        What the autopilot is told.
+        What the autopilot gets: ``sticks``, ``wrench`` or ``velocity``.
 
     Raises
     ------

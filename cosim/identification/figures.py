@@ -34,7 +34,7 @@ _PREDICTIONS = (
     "Free-running prediction: root mean square error of the speed and the angular velocity along and about each axis, "
     "from starts that the samples give."
 )
-_CORRELATION = "Correlation of the numbers: two that are dark beside each other are hardly told apart."
+_CORRELATION = "Correlation of the numbers: these runs hardly separate two that are dark."
 
 
 def _numbers(fit: Fit) -> Figure:

@@ -11,7 +11,7 @@ from cosim.identification.intervals import DISAGREES
 from cosim.identification.log import UNITS, Log
 
 _LOST = 10.0  # chi2 by degrees of freedom, above which nothing was identified
-_ALIKE = 0.95  # correlation, beyond which two numbers are not told apart
+_ALIKE = 0.95  # correlation, beyond which runs do not separate two numbers
 _LISTED = 6
 _NEEDS = {  # motions that tell the numbers of a key apart
     "hydrodynamics.added_mass": "quick changes of speed along and about the axis: steps of full stick, a second each",
@@ -28,9 +28,11 @@ _NEEDS = {  # motions that tell the numbers of a key apart
 def verdict(fit: Fit) -> str:
     """Return the one sentence that says what came of it."""
     free = fit.vehicle_part()
-    told = len(free) - len(fit.resting())
+    determined = len(free) - len(fit.resting())
     seconds = sum(window.steps for window in fit.windows) * fit.step
-    text = f"{told} of {len(free)} numbers are told by {seconds:.0f} s of motion in {len(fit.windows)} windows"
+    text = (
+        f"{determined} of {len(free)} numbers are determined by {seconds:.0f} s of motion in {len(fit.windows)} windows"
+    )
     return f"{text}; chi² is {fit.intervals.chi2:.2f} by degrees of freedom."
 
 
@@ -72,7 +74,7 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
     alike = list(fit.alike(_ALIKE))
     if alike:
         pairs = [f"{one} and {other}" for one, other in alike[:_LISTED]]
-        yield f"These are hardly told apart (correlation above {_ALIKE}): {_listed(pairs)}."
+        yield f"These runs hardly separate (correlation above {_ALIKE}): {_listed(pairs)}."
     if not any(p.kind == "thrust" for p in fit.parameters):
         yield (
             "All is in units of the thrust that the start vehicle's thrusters give. If they give 5 % more, damping, "
@@ -95,12 +97,12 @@ def advice(fit: Fit) -> Iterator[str]:
         p = fit.parameters[i]
         key = ".".join(p.name.split(".")[:2])
         part = float(fit.intervals.prior_part[i])
-        if part > 0.1:  # the runs have told less than a hundred times what was known
+        if part > 0.1:  # of the prior's deviation
             worst[key] = max(worst.get(key, 0.0), part)
     for key in sorted(worst, key=lambda key: -worst[key])[:3]:
         yield f"For {key}: {_NEEDS.get(key, 'motion along and about all axes')}."
     if not worst:
-        yield "Every free number is told by these runs; more runs make the intervals smaller."
+        yield "These runs determine every free number; more runs make the intervals smaller."
 
 
 def topic_rows(logs: Sequence[Log]) -> Iterator[tuple[str, ...]]:

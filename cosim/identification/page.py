@@ -70,7 +70,7 @@ def _page(done: Identification, out: Path, figures: dict[str, Html]) -> Page:
     page.heading("How well it fits")
     page.add(figures["residuals"])
     _add_predictions(page, done, figures)
-    page.heading("What is told apart")
+    page.heading("Which numbers go together")
     page.add(figures["correlation"])
     page.heading("What to drive next")
     for text in findings.advice(fit):

@@ -37,7 +37,7 @@ _MICRO = 1e6
 
 @dataclass(frozen=True)
 class DvlOptions:
-    """How the autopilot is told the velocity over ground, as VISION_POSITION_DELTA."""
+    """How the autopilot gets the velocity over ground, as VISION_POSITION_DELTA."""
 
     rate: float = 8.0  # Hz
     latency: float = 0.1  # s, between the end of an interval and its message
@@ -75,7 +75,7 @@ class Dvl:
         self._due: deque[tuple[float, Any]] = deque()
 
     def take(self, motion: Motion) -> list[Any]:
-        """Take the motion at an instant; return what is told now: time and interval [us], turn [rad], way [m]."""
+        """Take the motion at an instant; return what is sent now: time and interval [us], turn [rad], way [m]."""
         now = motion.time
         if not self._last <= now:
             self._begun = self._last = now
@@ -86,8 +86,8 @@ class Dvl:
         if interval >= 1.0 / self._options.rate - 1e-9:
             turned, moved = tuple(self._turned.tolist()), tuple(self._moved.tolist())
             if self._random.random() >= self._options.dropout:
-                told = round(now * _MICRO), round(interval * _MICRO), turned, moved
-                self._due.append((now + self._options.latency, told))
+                delta = round(now * _MICRO), round(interval * _MICRO), turned, moved
+                self._due.append((now + self._options.latency, delta))
             self._turned[:] = self._moved[:] = 0.0
             self._begun = now
         return [self._due.popleft()[1] for _ in range(sum(at <= now for at, _ in self._due))]

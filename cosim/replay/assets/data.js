@@ -121,7 +121,7 @@ class Run {
     return Number.isFinite(index) ? index : 0;
   }
 
-  /** From when on the vehicle stays where it is at the end, the arbiter changes nothing, and nothing is told of [s]. */
+  /** From when on the vehicle stays where it is at the end, the arbiter changes nothing, and no event comes [s]. */
   get rest() {
     if (this._rest?.rows === this.rows) return this._rest.time;
     const all = (names) => names.map((name) => this.column(name)).filter(Boolean);
@@ -134,8 +134,8 @@ class Run {
     ];
     let row = last;
     while (row > 0 && still.every((rests) => rests(row - 1))) row -= 1;
-    const told = (this.header.events ?? []).filter(({ kind }) => kind !== "end").flatMap(({ time, until }) => [time, until ?? time]);
-    const time = Math.max(this.rows ? this.time[row] : 0, ...told);
+    const events = (this.header.events ?? []).filter(({ kind }) => kind !== "end").flatMap(({ time, until }) => [time, until ?? time]);
+    const time = Math.max(this.rows ? this.time[row] : 0, ...events);
     this._rest = { rows: this.rows, time: time + 0.05 * (time - this.start) };
     return this._rest.time;
   }
