@@ -50,6 +50,9 @@ def _figures(data: FigureData) -> Iterator[tuple[str, str, Callable[[FigureData]
         "" if data.scenario.log else "; the path is in a criterion's colour while the arbiter gives way to its regions"
     )
     after = dict.fromkeys(("5a", "5b", "7"), "") if data.scenario.log else _AFTER
+    outlines = ", with outlines of the regions: full to be kept out of, dashed to be kept within"
+    if not (data.scenario.has_goal or data.scenario.regions):
+        outlines = ""
     if is_known(data):
         yield (
             "path-3d",
@@ -58,8 +61,7 @@ def _figures(data: FigureData) -> Iterator[tuple[str, str, Callable[[FigureData]
         )
         yield (
             "path-plane",
-            f"Path from the side and from above{after['5b']}, with outlines of the regions: full to be kept out of, "
-            f"dashed to be kept within{way}.{moved}",
+            f"Path from the side and from above{after['5b']}{outlines}{way}.{moved}",
             in_space.path_plane,
         )
     judged, imported = data.scenario.has_goal, bool(data.scenario.log)
