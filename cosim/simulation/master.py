@@ -308,7 +308,7 @@ class Master:
         command_handler.mark_applied()
 
     def _evaluate_regions(self) -> None:
-        """Evaluate the regions, where they are now, at the pose that is told, and at the true one."""
+        """Evaluate the regions, where they are now, at the pose that the arbiter decides by, and at the true one."""
         self.environment.update_positions(self.signals.row[0], self._shifts)
         self._arbitration.observe(self._expected)
         if self._sensor is not None:
