@@ -124,7 +124,7 @@ def test_it_is_held_until_controls_come_and_then_each_is_a_step(serve_px4):
     with Px4(served.address) as px4:
         held = [px4.sensors() for _ in range(3)]
         for fields in held:
-            assert fields[1:4] == pytest.approx((0.0, 0.0, -9.80665), abs=1e-5)
+            assert fields[1:4] == pytest.approx((0.0, 0.0, -9.81), abs=1e-6)
         times = [fields[0] for fields in held]
         for _ in range(100):
             px4.answer(down(0.5))
