@@ -8,6 +8,7 @@ import os
 import signal
 import time
 import zlib
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -23,8 +24,9 @@ DATA = Path(__file__).parent / "data"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--slow", action="store_true", help="also run the tests marked slow")
-    parser.addoption("--share", default="1/1", metavar="K/N", help="of the slow ones the K-th of N shares")
+    parser.addoption("--medium", action="store_true", help="also run the tests marked medium")
+    parser.addoption("--slow", action="store_true", help="also run the tests marked medium or slow")
+    parser.addoption("--share", default="1/1", metavar="K/N", help="of the medium and slow ones the K-th of N shares")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -34,11 +36,24 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     share, shares = map(int, config.getoption("--share").split("/"))
-    for item in (item for item in items if "slow" in item.keywords):
-        if not config.getoption("--slow"):
-            item.add_marker(pytest.mark.skip(reason="slow; run with --slow"))
-        elif zlib.crc32(item.nodeid.encode()) % shares != share % shares:
-            item.add_marker(pytest.mark.skip(reason="slow, and of another --share"))
+    slow = config.getoption("--slow")
+    fast: Counter[str] = Counter()  # cases that run always, by function
+    for item in items:
+        medium, function = item.get_closest_marker("medium"), item.nodeid.partition("[")[0]
+        if "slow" in item.keywords:
+            if not slow:
+                item.add_marker(pytest.mark.skip(reason="slow; run with --slow"))
+                continue
+        elif medium is None:
+            continue
+        elif fast[function] < medium.kwargs.get("fast", 0):
+            fast[function] += 1
+            continue
+        elif not slow and not config.getoption("--medium"):
+            item.add_marker(pytest.mark.skip(reason="medium; run with --medium"))
+            continue
+        if zlib.crc32(item.nodeid.encode()) % shares != share % shares:
+            item.add_marker(pytest.mark.skip(reason="of another --share"))
     # of two processes one begins with these, and has compiled the laws when the other one comes to them
     items.sort(key=lambda item: item.nodeid.startswith(("tests/controller/", "tests/cosim/")))
 

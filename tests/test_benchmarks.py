@@ -172,11 +172,13 @@ def test_a_straight_growth_has_a_fixed_part_and_one_for_each():
 # ---- the peers ----
 
 
+@pytest.mark.medium
 def test_a_peer_answers_from_its_own_process(here):
     with peer(here, "numpy", "numpy_body", "steps", _setup()) as contestant:
         assert contestant.seconds(3) > 0.0
 
 
+@pytest.mark.medium
 def test_a_peer_that_is_missing_or_breaks_says_so(here):
     with pytest.raises(NotMeasuredError, match="not installed: no-such-peer"):
         here.python("no-such-peer")

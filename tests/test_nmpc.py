@@ -41,6 +41,7 @@ def flown(monkeypatch):
     return scene, planner, score
 
 
+@pytest.mark.medium
 def test_it_is_given_what_laws_are_given_ten_times_a_second(flown):
     scene, planner, _ = flown
     assert len(planner.given) == 20 and len(nmpc.NmpcLaw.function.times) == 20

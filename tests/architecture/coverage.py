@@ -1,4 +1,4 @@
-"""How much of the code its own fast tests go through, against floors: ``make coverage``.
+"""How much of the code its own tests that take no seconds go through, against floors: ``make coverage``.
 
 Only where the number means something. What is run as C is seen by nobody unless Python runs it itself; what other
 processes and browsers do goes unseen as well. The floors stand a little below what was measured.
@@ -83,6 +83,7 @@ def measure(part: Part, folder: Path) -> tuple[bool, str]:
         "-m",
         "pytest",
         "-q",
+        "--medium",
         *quiet,
         *part.tests,
     ]

@@ -19,6 +19,7 @@ def with_examples():
             yield name, thing.__doc__
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize(("name", "text"), [*with_examples(), ("cosim", importlib.import_module("cosim").__doc__)])
 def test_the_example_gives_what_it_shows(name, text, tmp_path, monkeypatch):
     if ".pictures." in name:

@@ -36,6 +36,7 @@ def test_nothing_else_speaks_of_installing():
     assert [str(path) for path in files if wrong.search(path.read_text(encoding="utf-8"))] == []
 
 
+@pytest.mark.medium
 def test_what_is_named_has_the_bound_that_is_tried():
     named = {
         (module, node.value)

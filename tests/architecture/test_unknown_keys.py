@@ -127,6 +127,7 @@ def cases():
                 yield pytest.param(read, table, path, id="-".join(filter(None, kind)))
 
 
+@pytest.mark.medium(fast=18)
 @pytest.mark.parametrize(("read", "table", "path"), list(cases()))
 def test_unknown_keys_are_refused_by_name(read, table, path, tmp_path):
     inner = at(table, path)

@@ -125,18 +125,21 @@ def fly(law, net_weight, seconds, start=(0.0, 0.0, 2.0), regions=(), drag=60.0, 
     return np.array(positions), np.array(estimates)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", NAMES)
 def test_each_reaches_a_free_goal_and_stays(name):
     positions, _ = fly(law_of(name), net_weight=0.0, seconds=100.0)
     assert np.linalg.norm(positions[-500:] - [8.0, 1.0, 3.0], axis=1).max() < 0.5
 
 
+@pytest.mark.medium
 def test_pd_droops_by_the_net_weight_over_its_gain():
     law = law_of("pd", k_p1=100.0, limit=60.0)
     positions, _ = fly(law, net_weight=12.0, seconds=100.0)
     assert positions[-1] == pytest.approx([8.0, 1.0, 3.12], abs=1e-3)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", ["sun_cheah", "antonelli"])
 @pytest.mark.parametrize("net_weight", [-12.0, pytest.param(12.0, marks=pytest.mark.slow)])
 def test_adaptive_set_points_cancel_the_net_weight(name, net_weight):
@@ -146,6 +149,7 @@ def test_adaptive_set_points_cancel_the_net_weight(name, net_weight):
     assert estimates[-1, 0] == pytest.approx(net_weight, abs=0.1)
 
 
+@pytest.mark.medium
 def test_the_unarbitrated_law_cancels_the_net_weight_to_what_its_region_forgives():
     """Its pull ends within the region, wherever it came to rest: there the estimate alone carries the weight."""
     law = law_of("unarbitrated", k_p1=100.0, k_v1=150.0, limit=40.0, margin=0.2, **QUICK)
@@ -154,6 +158,7 @@ def test_the_unarbitrated_law_cancels_the_net_weight_to_what_its_region_forgives
     assert estimates[-1, 0] == pytest.approx(10.0, abs=0.5)
 
 
+@pytest.mark.medium
 def test_only_antonellis_law_cancels_a_current():
     """60 N s/m in 0.25 m/s sideways: 15 N, which the law of four parameters leaves to its proportional action."""
     drift = {}
@@ -164,6 +169,7 @@ def test_only_antonellis_law_cancels_a_current():
     assert drift == pytest.approx({"sun_cheah": 0.15, "antonelli": 0.0}, abs=1e-2)
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("name", ADAPTIVE)
 def test_estimates_stay_within_their_bounds_however_long_something_holds_the_vehicle(name):
     law = law_of(name, bound=20.0, k_p1=100.0, limit=40.0, **ADAPTING[name])
@@ -171,6 +177,7 @@ def test_estimates_stay_within_their_bounds_however_long_something_holds_the_veh
     assert np.abs(estimates[:, 0]).max() == 20.0
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", NAMES)
 def test_an_obstacle_beside_the_way_is_passed_without_a_touch(name):
     rock = Region("rock", Sphere((4.0, 0.9, 2.5), 0.8), "out")

@@ -213,6 +213,7 @@ def unit_rows(rng, m):
     return rows / np.linalg.norm(rows, axis=1, keepdims=True)
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("keep", ["in", "out"])
 def test_regions_are_those_of_python(library, name, keep):

@@ -31,6 +31,7 @@ def fly(law, sea, seconds, regions=(), goal=GOAL):
     return (np.array(column) for column in zip(*rows, strict=True))
 
 
+@pytest.mark.medium
 def test_both_poles_of_the_observer_are_where_its_bandwidth_says():
     """At rest in still water, held by no force, with a push that the model lacks: two equal real poles."""
     omega, net_weight, kept = 3.0, 6.0, []
@@ -49,6 +50,7 @@ def test_both_poles_of_the_observer_are_where_its_bandwidth_says():
     assert missing[0] == pytest.approx(acceleration) and abs(missing[-1]) < 0.2 * acceleration
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("net_weight", [-14.0, 9.0])
 def test_net_weight_and_current_leave_no_steady_error(net_weight):
     law, sea = law_of(), Sea(current=(0.1, -0.2, 0.0), restoring=net_weight)
@@ -57,6 +59,7 @@ def test_net_weight_and_current_leave_no_steady_error(net_weight):
     assert law.estimate[0] == pytest.approx(net_weight, abs=0.1)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("velocity", "center"), [((0.0, 0.0, 0.0), (2.5, 0.05, 2.5)), ((-0.1, 0.05, 0.0), (3.0, -0.2, 2.4))]
 )
@@ -77,12 +80,14 @@ def test_along_the_motion_each_clearance_keeps_the_barriers_inequality(velocity,
     assert np.sum(np.abs(psi[ample]) < 0.02) > 50  # it acts for a second and more
 
 
+@pytest.mark.medium
 def test_without_the_barrier_it_would_run_into_the_same_obstacle():
     region = Region("ball", Sphere((2.5, 0.05, 2.5), 0.7), "out", hard=False)
     positions, _, _ = fly(law_of((region,), repulsion=0.0, limit=60.0), Sea((0.0, 0.0, 0.0), 0.0), 14.0, (region,))
     assert np.linalg.norm(positions - [2.5, 0.05, 2.5], axis=1).min() < 0.6
 
 
+@pytest.mark.medium
 def test_it_passes_obstacles_in_noise_and_reaches_the_goal():
     regions = (BALL, Region("drifting", Sphere((5.8, -0.9, 2.2), 0.5), "out", (-0.03, 0.05, 0.0)), BAND)
     positions, _, forces = fly(law_of(regions), Sea(noise=(0.02, 0.01), seed=3), 60.0, regions)
@@ -91,6 +96,7 @@ def test_it_passes_obstacles_in_noise_and_reaches_the_goal():
     assert np.abs(forces).max() <= 27.0
 
 
+@pytest.mark.medium
 def test_attitude_is_kept_against_a_righting_moment():
     law, sea = law_of(observer=3.0), Sea(current=(0.0, 0.0, 0.0), restoring=0.0)
     sea.quaternion = np.array([math.cos(0.2), math.sin(0.2), 0.0, 0.0])

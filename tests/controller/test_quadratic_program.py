@@ -86,6 +86,7 @@ def solved_exactly(programs):
 PROGRAMS = pytest.mark.parametrize("programs", [5, pytest.param(40, marks=pytest.mark.slow)])
 
 
+@pytest.mark.medium
 @PROGRAMS
 def test_forces_are_nearer_to_the_exact_ones_than_those_of_quadprog(programs):
     """Each no farther from them than rounding explains, see `rounding`, and ours by far the nearest.
@@ -178,6 +179,7 @@ def test_a_row_that_thrusters_hardly_move_is_paid_for_in_part():
 QUICK = ("any", "enclosed")
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("kind", [*QUICK, *(pytest.param(k, marks=pytest.mark.slow) for k in KINDS if k not in QUICK)])
 def test_the_solution_fulfils_the_conditions_of_kuhn_and_tucker(kind):
     """Stationary, within the limits, multipliers >= 0 and only where a row holds; steps within their bound."""
@@ -232,6 +234,7 @@ def test_what_is_not_finite_moves_nothing(bad):
     assert np.array_equal(forces, alone)
 
 
+@pytest.mark.medium
 def test_forces_stay_within_their_limits_whatever_the_numbers():
     """Whose products may be beyond the greatest number."""
     rng, far = np.random.default_rng(2), np.array([1.0, 1.0, 1.0, 1e-300, 1e-150, 1e-30, 1e30, 1e150, 1e300])

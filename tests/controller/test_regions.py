@@ -122,6 +122,7 @@ def test_all_shapes_are_here():
     assert sorted(cls.kind for cls in SHAPES.values()) == list(range(len(SHAPES)))
 
 
+@pytest.mark.medium(fast=4)
 @each_shape
 @given(p=points, e=attitudes)
 def test_sign_says_inside_or_outside(shape, p, e):
@@ -131,6 +132,7 @@ def test_sign_says_inside_or_outside(shape, p, e):
         assert (clearance > 0.0) == contains(shape, p, e)
 
 
+@pytest.mark.medium(fast=2)
 @each_shape
 @given(p=points, e=attitudes)
 def test_gradient_and_turning_are_those_of_the_value(shape, p, e):
@@ -148,6 +150,7 @@ def test_gradient_and_turning_are_those_of_the_value(shape, p, e):
     assert derivatives == pytest.approx((ahead - behind) / (2 * h), abs=0.5 * kink + 1e-6)
 
 
+@pytest.mark.medium(fast=6)
 @each_shape
 def test_most_places_and_attitudes_are_no_ridge(shape):
     """Keep the test above from passing by looking away."""
@@ -164,6 +167,7 @@ def test_most_places_and_attitudes_are_no_ridge(shape):
     assert smooth >= 58
 
 
+@pytest.mark.medium(fast=3)
 @each_shape_in_space
 @given(p=points, e=attitudes)
 def test_shapes_in_space_do_not_look_at_the_attitude(shape, p, e):
@@ -173,6 +177,7 @@ def test_shapes_in_space_do_not_look_at_the_attitude(shape, p, e):
     assert not turning.any()
 
 
+@pytest.mark.medium(fast=4)
 @each_shape_in_space
 @given(p=points, q=points)
 def test_distance_changes_no_faster_than_one_moves(shape, p, q):
@@ -206,6 +211,7 @@ def test_distance_is_that_of_the_nearest_point_of_the_surface(shape):
             assert not all(contains(shape, p + (0.03 - 1.02 * distance) * d) for d in directions)
 
 
+@pytest.mark.medium(fast=4)
 @each_shape
 @given(p=points, e=attitudes)
 def test_keeping_out_is_the_opposite_of_keeping_in(shape, p, e):
@@ -335,6 +341,7 @@ def test_visibility_has_numbers_on_its_axis(feature, angle):
     assert not turning.any()
 
 
+@pytest.mark.medium(fast=3)
 @each_shape
 @given(p=points, e=attitudes, velocity=points)
 def test_a_moving_region_is_where_it_would_be_seen_from_its_own_place(shape, p, e, velocity):

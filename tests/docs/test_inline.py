@@ -10,7 +10,16 @@ from tests.docs.programs import MODULES, check_foreign, flags, parses, program, 
 
 PAGES = all_pages()
 # flags of other programs that the pages speak of
-FOREIGN = {"--dialect", "--editable", "--interface-type", "--nthreads", "--resolution", "--slow", "--speedup"}
+FOREIGN = {
+    "--dialect",
+    "--editable",
+    "--interface-type",
+    "--medium",
+    "--nthreads",
+    "--resolution",
+    "--slow",
+    "--speedup",
+}
 OURS = set().union(*(known for name in MODULES for known in flags(name).values()))
 
 
@@ -34,12 +43,14 @@ def pieces(page):
             yield from ((block.line, text) for text in in_comments(block))
 
 
+@pytest.mark.medium(fast=18)
 @pytest.mark.parametrize("page", PAGES, ids=page_name)
 def test_verbs_and_flags_in_the_text_exist(page):
     wrong = [(line, text, unknown) for line, text in pieces(page) if (unknown := wrong_flags(words(text)))]
     assert not wrong
 
 
+@pytest.mark.medium(fast=33)
 @pytest.mark.parametrize("page", PAGES, ids=page_name)
 def test_flags_that_stand_alone_are_of_some_program(page):
     named = [
@@ -50,6 +61,7 @@ def test_flags_that_stand_alone_are_of_some_program(page):
     assert not [(line, flag) for line, flag in named if flag not in OURS | FOREIGN]
 
 
+@pytest.mark.medium(fast=29)
 @pytest.mark.parametrize("page", PAGES, ids=page_name)
 def test_extras_and_targets_in_the_text_exist(page):
     for _, text in inline_code(page):

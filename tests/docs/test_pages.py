@@ -19,11 +19,13 @@ def _marks(page: Path) -> list[pytest.MarkDecorator]:
         return []
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("page", [pytest.param(page, marks=_marks(page), id=page_name(page)) for page in PAGES])
 def test_blocks_run_and_show_what_they_give(page, tmp_path):
     run_blocks(blocks(page), tmp_path)
 
 
+@pytest.mark.medium(fast=9)
 @pytest.mark.parametrize("page", PAGES, ids=page_name)
 def test_blocks_are_understood_and_those_not_run_say_why(page):
     for block in blocks(page):

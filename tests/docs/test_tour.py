@@ -85,6 +85,7 @@ def test_what_should_go_on_and_ends_by_itself_fails(go):
     assert failed == 1 and "[FAILED: ended by itself]" in table
 
 
+@pytest.mark.medium
 def test_what_hangs_is_ended(go, monkeypatch):
     monkeypatch.setattr(tour, "LIMIT", 0.2)
     failed, table = go(sh("sh -c 'sleep 1000'"))

@@ -256,6 +256,7 @@ def test_ramp_is_one_up_to_the_boundary_and_falls_outside():
     assert math.isnan(ramp(math.nan, 0.0))
 
 
+@pytest.mark.medium
 def test_alone_it_needs_neither_the_vehicle_nor_matplotlib():
     code = (
         "import sys, fuzzy_arbiter; a = fuzzy_arbiter.Arbiter();"

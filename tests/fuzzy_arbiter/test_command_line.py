@@ -249,6 +249,7 @@ PLOTS = [
 ]
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(("words", "panels"), PLOTS, ids=lambda value: value[0] if isinstance(value, list) else "")
 def test_plot_draws_every_kind(run, tmp_path, words, panels):
     assert run("plot", "section-vi", *words, "--out", "a.svg") == (0, "a.svg\n", "")
@@ -259,6 +260,7 @@ def test_plot_draws_every_kind(run, tmp_path, words, panels):
     assert (tmp_path / "a.svg").read_bytes() == first
 
 
+@pytest.mark.medium
 def test_rules_without_a_sample_are_drawn_at_the_middle_and_say_so(run, tmp_path, gap):
     status, out, err = run("plot", "section-vi", "rules", "--out", "a.svg")
     assert (status, out) == (0, "a.svg\n") and err.count("\n") == 1
@@ -272,6 +274,7 @@ def test_rules_without_a_sample_are_drawn_at_the_middle_and_say_so(run, tmp_path
     assert run("plot", gap, "rules", "--at", "7", "--out", "a.svg")[:2] == (0, "a.svg\n")
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(("suffix", "magic"), [("png", b"\x89PNG"), ("PDF", b"%PDF")])
 def test_plot_writes_what_the_suffix_says(run, tmp_path, suffix, magic):
     assert run("plot", "section-vi", "terms", "--input", "depth", "--out", f"a.{suffix}")[0] == 0

@@ -36,6 +36,7 @@ def smoothstep(h):
     return 3.0 * h**2 - 2.0 * h**3
 
 
+@pytest.mark.medium
 def test_the_afternoon_belongs_to_the_room(ran):
     # smoke below 0.5 %/m asks for nothing; air asks to 0.25, the room to 0.75, of which the air leaves all
     assert ran["weights"] == pytest.approx((0.0, smoothstep(0.25), smoothstep(0.75)), abs=1e-15)
@@ -113,6 +114,7 @@ def table(heading):
     return [[cell.strip().strip("`") for cell in row.strip("|").split("|")] for row in rows if "---" not in row]
 
 
+@pytest.mark.medium
 def test_the_forms_have_as_many_rules_as_the_manual_says():
     for form, _, sizes, _ in table("Four forms of the same rules")[1:]:
         for n, size in zip((3, 10), sizes.split(","), strict=True):

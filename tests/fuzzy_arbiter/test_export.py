@@ -143,6 +143,7 @@ def bad(system):
         yield from (([*good[:i], value, *good[i + 1 :]], -i - 1) for value in values)
 
 
+@pytest.mark.medium(fast=3)
 @pytest.mark.parametrize(
     "system",
     [pytest.param(name, marks=pytest.mark.slow) if name == "long" else name for name in SYSTEMS],
@@ -178,6 +179,7 @@ def test_systems_of_several_files_go_into_one_program(tmp_path):
     subprocess.run([*compiler(), *flags, *sources], check=True)
 
 
+@pytest.mark.medium(fast=5)
 def test_python(system):
     module = {}
     exec(compile(to_python(system).encode(), "<arbiter>", "exec"), module)  # from bytes, as of a file
@@ -193,6 +195,7 @@ def test_python(system):
             module["weights"](x)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     "name", ["section VI", *(pytest.param(name, marks=pytest.mark.slow) for name in ("rational", "wide, shared"))]
 )
@@ -293,6 +296,7 @@ JOINED = {
 }
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("system", JOINED.values(), ids=JOINED)
 def test_curves_hedges_norms_and_values_are_exported(system, tmp_path):
     rows = [*np.linspace(0.0, 10.0, 201).tolist(), 4.999999999]

@@ -125,6 +125,7 @@ def test_forty_criteria():
     assert sum(h([0.8] * 40, 0.0)) == 1
 
 
+@pytest.mark.medium
 @given(
     st.lists(st.tuples(*[st.sampled_from([0, 0.1, 0.2, 0.5, 0.8, 0.9, 1])] * 3, st.floats(0, 0.2)), max_size=40),
     st.integers(0, 40),

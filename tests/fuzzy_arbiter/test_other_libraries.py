@@ -44,6 +44,7 @@ def test_their_centroids_are_ours_within_their_error(library, system):
     assert errors["100"] / errors["1000"] == pytest.approx(10**order, rel=0.1)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(("library", "system"), TABLES)
 def test_the_tables_are_what_the_libraries_give(library, system):
     peers = pytest.importorskip("benchmarks.fuzzy", reason="a source distribution holds no benchmarks")

@@ -76,6 +76,7 @@ def everything(arbiter, ax=None):
     yield "decisions", lambda ax=None: pictures.decisions(arbiter, (first, second), ax=ax, points=11)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("criteria", [None, pytest.param(MEASURED, marks=pytest.mark.slow)], ids=["three", "six"])
 def test_every_picture_draws_on_new_axes_or_on_those_given(criteria):
     arbiter = Arbiter(engine="exact") if criteria is None else Arbiter(criteria, engine="exact")
@@ -95,6 +96,7 @@ def test_pictures_leave_pyplot_alone(arbiter):
     assert plt.get_fignums() == []
 
 
+@pytest.mark.medium
 def test_the_package_comes_without_matplotlib():
     code = (
         "import sys; sys.modules['matplotlib'] = None\n"

@@ -120,6 +120,7 @@ def test_with_a_default_a_gap_is_no_fault():
 # sizes and forms
 
 
+@pytest.mark.medium(fast=8)
 @pytest.mark.parametrize("form", ["hierarchical", "minimal", "conjunctive", "complete"])
 @pytest.mark.parametrize("n", [1, 2, 3, 5])
 def test_all_forms_verify(form, n):
@@ -141,6 +142,7 @@ def test_many_criteria_are_decided(n):
     assert rest.place == {f"c{i}": "off" for i in range(n)}
 
 
+@pytest.mark.medium
 def test_the_order_of_inputs_does_not_matter():
     s = prioritised([Criterion(f"c{i}") for i in range(20)])
     assert verdicts(verify(System(s.inputs[::-1], s.outputs, s.rules))) == (True,) * 6

@@ -3,6 +3,7 @@
 import itertools
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -133,6 +134,7 @@ def check_graded(s, v):
             assert np.all(faults(s, at(s, inputs), 0.5)[NAMES[3:].index(name)]), (name, place)
 
 
+@pytest.mark.medium
 @settings(max_examples=examples(150))
 @given(systems())
 def test_verdicts_on_graded_inputs_against_brute_force(s):
@@ -141,6 +143,7 @@ def test_verdicts_on_graded_inputs_against_brute_force(s):
     check_graded(s, v)
 
 
+@pytest.mark.medium
 @settings(max_examples=examples(80))
 @given(systems(connectives=True))
 def test_verdicts_with_other_connectives_against_brute_force(s):
@@ -149,6 +152,7 @@ def test_verdicts_with_other_connectives_against_brute_force(s):
     check_graded(s, v)
 
 
+@pytest.mark.medium
 @settings(max_examples=examples(100))
 @given(systems())
 def test_verdicts_on_crisp_rows_against_all_rows(s):

@@ -117,8 +117,7 @@ def _test(order: Order, note: Path) -> None:
         options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of what is imported before
         options += ["-W", "ignore::RuntimeWarning"]  # of overflow and the like, of which compiled code says nothing
         options += ["--basetemp", str(Path("mutation-scratch").absolute())]
-        if order.slow:
-            options.append("--slow")
+        options.append("--slow" if order.slow else "--medium")
         if order.collect_only:
             options.append("--collect-only")
             sys.dont_write_bytecode = False

@@ -78,6 +78,7 @@ def nodes(tree):
             yield from nodes(child)
 
 
+@pytest.mark.medium
 def test_python_signs_are_those_of_the_syntax_tree():
     """Counted once more by Python's own parser, over all sources."""
     kinds = {}
@@ -95,6 +96,7 @@ def test_python_signs_are_those_of_the_syntax_tree():
     assert kinds == expected
 
 
+@pytest.mark.medium
 def test_every_source_of_the_controller_and_the_plants_core_has_a_part():
     for path in [*(ROOT / "controller").rglob("*.py"), *(ROOT / "controller").rglob("*.c")]:
         name = path.relative_to(ROOT).as_posix()
@@ -104,11 +106,13 @@ def test_every_source_of_the_controller_and_the_plants_core_has_a_part():
         assert part_of(path.relative_to(ROOT).as_posix())
 
 
+@pytest.mark.medium
 def test_tests_of_the_plan_are_there_and_what_is_listed_exists():
     assert all((ROOT / test).is_file() for part in parts() for test in part.tests)
     assert all(reason for reason in equivalent().values())
 
 
+@pytest.mark.medium
 def test_a_sample_repeats_and_has_both_languages():
     mutants = all_mutants()
     one, same, other = (sample(mutants, 40, seed) for seed in (1, 1, 2))

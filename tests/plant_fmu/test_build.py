@@ -36,6 +36,7 @@ def written(tmp_path, *changes):
     return path
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize(
     "words",
     [
@@ -177,6 +178,7 @@ def test_missing_compiler_is_one_line(tmp_path, capsys, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.medium(fast=3)
 @pytest.mark.parametrize(
     ("compiler", "words"),
     [

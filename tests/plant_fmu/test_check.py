@@ -99,6 +99,7 @@ def test_an_importer_that_ends_elsewhere_fails(monkeypatch, odin):
     assert verdicts["libcosim"].result.status == "ok"
 
 
+@pytest.mark.medium
 def test_what_the_fmu_says_is_in_the_note(odin):
     result = run_importer(FMPY, read_fmu(odin), Task(stop_time=0.1, start={"mass": -1.0}))
     assert result.status == "failed"
@@ -112,12 +113,14 @@ def test_an_importer_that_is_not_there_does_not_fail(odin):
     assert result.note.endswith('-m pip install "no-such-importer>=1"')
 
 
+@pytest.mark.medium
 def test_an_importer_that_cannot_be_loaded_is_no_fault_of_the_fmu(odin):
     result = run_importer(dataclasses.replace(FMPY, module="no_such_driver"), read_fmu(odin), Task())
     assert result.status == "not installed"
     assert "cannot be loaded" in result.note
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("deed", "words"),
     [

@@ -88,6 +88,7 @@ def test_values_are_those_of_the_transcription(somewhere):
     assert slave.get(*expected) == pytest.approx(list(np.real(list(expected.values()))), rel=1e-10, abs=1e-11)
 
 
+@pytest.mark.medium(fast=1)
 def test_jacobian_is_that_of_complex_steps(somewhere):
     """Every known, parameters too, and to 1e-12 of the greatest element of each row."""
     slave, values = somewhere

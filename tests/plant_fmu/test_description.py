@@ -22,6 +22,7 @@ from plant_fmu.vehicle_component import of_vehicle
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     "name", ["odin", *(pytest.param(v, marks=pytest.mark.slow) for v in shipped_vehicles() if v != "odin")]
 )

@@ -40,6 +40,7 @@ def mass_matrices():
 START = dict(zip(STATES[3:], (0.6, 0.5, -0.4, 0.48, 0.7, -0.3, 0.4, 0.5, -0.6, 0.3), strict=True))
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
 def test_follows_fossens_matrix_equation_with_nothing_symmetric(make_slave, fmi):
     """A direct transcription with C(nu) from the parametrisation theorem (Fossen 2011, 3.46), integrated by SciPy."""

@@ -77,6 +77,7 @@ def test_an_axis_that_begins_to_vary_later_begins_from_the_process_s_own_distrib
     assert slave.get("water_velocity.z")[0] == pytest.approx(begin + (then - begin) * 0.4 / dt, abs=1e-12)
 
 
+@pytest.mark.medium
 def test_its_deviation_and_correlation_are_those_asked_for(make_slave):
     T, s = 2.0, 0.3
     slave = make_slave().start(
@@ -147,6 +148,7 @@ def test_a_heavy_vehicle_comes_to_rest_on_the_bottom(make_slave, fmi):
     assert slave.flag("bottom_contact")
 
 
+@pytest.mark.medium(fast=11)
 @pytest.mark.parametrize("substep", [0.001, 0.02, 0.2])
 @pytest.mark.parametrize("speed", [0.1, 3.0, 100.0])
 @pytest.mark.parametrize("time_constant", [0.0, 0.02, 0.5])

@@ -36,6 +36,7 @@ def fuzzer(tmp_path_factory):
     return build
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("seed", "calls", "level"),
     [(1, 50_000, "-O0"), pytest.param(2, 1_000_000, "-O1", marks=pytest.mark.slow)],

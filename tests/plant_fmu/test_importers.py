@@ -54,11 +54,13 @@ def difference(ours, theirs):
     return max(abs(ours.values[name] - theirs.values[name]) for name in ours.values)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", ["FMPy validation", pytest.param("fmu-manipulation-toolbox", marks=pytest.mark.slow)])
 def test_validators_find_nothing(name, fmu):
     assert "no problems" in answer(name, fmu).note
 
 
+@pytest.mark.medium
 def test_the_motion_is_in_all_six_degrees_of_freedom(fmu):
     values = answer("FMPy", fmu).values
     assert len(values) == len(fmu.of("output"))
@@ -75,11 +77,13 @@ def test_co_simulation_agrees(name, fmu):
     assert difference(answer("FMPy", fmu), answer(name, fmu)) < 1e-10
 
 
+@pytest.mark.medium
 def test_state_is_saved_and_restored_to_the_bit(fmu):
     assert "another instance" in answer("FMPy FMU state", fmu).note
     assert difference(answer("FMPy", fmu), answer("FMPy FMU state", fmu)) == 0.0
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
 @pytest.mark.parametrize("name", ["FMPy CVode", "CasADi"])
 def test_model_exchange_ends_where_co_simulation_does(name, fmu):
@@ -113,6 +117,7 @@ def directional_derivatives(fmu, folder):
     return [v.name for v in states], [v.name for v in knowns], np.array(columns, dtype=float).T
 
 
+@pytest.mark.medium(fast=1)
 def test_casadi_reads_the_directional_derivatives(fmu, tmp_path):
     jacobian = answer("CasADi", fmu).jacobian
     states, knowns, expected = directional_derivatives(fmu, tmp_path / "fmu")

@@ -71,6 +71,7 @@ def test_ticks_go_on_through_time_zero(make_slave, fmi):
             assert after > following
 
 
+@pytest.mark.medium
 def test_a_master_that_adds_up_its_time_gets_every_sample(make_slave, fmi):
     """A minute and more of 10 ms steps at 100 Hz: each step ends with its own sample."""
     slave = make_slave(fmi=fmi).start(**{"depth_sensor.rate": 100.0, "wrench.Z": 20.0, "substep": 0.01})

@@ -49,6 +49,7 @@ def cosimulated(make_slave, fmi, values, end, step=0.01, **more):
     return slave
 
 
+@pytest.mark.medium(fast=3)
 @pytest.mark.parametrize("more", [{}, LAGS, {"current_shear.y": 0.1, "bottom_depth": 3.0, "hull_radius": 0.3}])
 def test_cvode_ends_where_co_simulation_does(make_slave, fmi, more):
     result = by_cvode(fmi, MOVING | more, 10.0, 1.0, STATES)
@@ -89,6 +90,7 @@ def test_samples_are_the_same_in_both(make_slave, fmi):
     assert [at[t] for t in off_grid] == pytest.approx([ours[t] for t in off_grid], abs=1e-7)
 
 
+@pytest.mark.medium(fast=1)
 def test_scipy_integrates_the_derivatives(make_slave, fmi):
     """Through the plain functions alone: set time, set states, get derivatives."""
     model = make_slave(fmi=fmi, interface="me").start(**MOVING, **LAGS)

@@ -27,6 +27,7 @@ def test_the_sweep_knows_every_function(fmi, library):
     assert known == exports(fmi) == set().union(*(part.exports for part in read_libraries(library[0].read_bytes())))
 
 
+@pytest.mark.medium(fast=1)
 def test_null_is_refused_everywhere(fmi, library, tmp_path):
     path, description = library
     rows = sweep(

@@ -107,6 +107,7 @@ def test_a_picture_is_the_same_file_each_time(suffix):
     assert image(PICTURES["thrusters"](vehicle), suffix) == image(PICTURES["thrusters"](vehicle), suffix)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("picture", PICTURES)
 def test_the_command_writes_a_picture(picture, tmp_path, capsys):
     out = tmp_path / "out.png"
@@ -124,6 +125,7 @@ def test_the_command_refuses_other_files_and_unknown_vehicles(tmp_path, capsys):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.medium
 def test_matplotlib_is_imported_only_for_a_picture():
     code = "import sys, plant_fmu, plant_fmu.pictures, plant_fmu.__main__; print('matplotlib' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

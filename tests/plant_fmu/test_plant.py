@@ -92,6 +92,7 @@ def test_values_are_sent_by_their_type(make_plant, fmi):
     assert (plant["seed"], plant["free_surface"]) == (8, False)
 
 
+@pytest.mark.medium(fast=13)
 @pytest.mark.parametrize(
     ("name", "value", "words"),
     [

@@ -98,6 +98,7 @@ def test_other_orders_no_inputs_no_flags_no_states(make_plant, tmp_path):
 # ---- nothing is left behind ----
 
 
+@pytest.mark.medium
 def test_a_forgotten_plant_is_freed(scratch):
     plant = Plant("odin")
     assert len(list(scratch.iterdir())) == 1

@@ -83,6 +83,7 @@ def test_states_are_freed_once_and_never_used_again(make_plant, fmi):
         plant.restore(state)
 
 
+@pytest.mark.medium
 def test_states_that_nobody_holds_are_freed(make_plant, monkeypatch):
     plant = make_plant()
     freed = []
@@ -113,6 +114,7 @@ def test_accelerations_by_wrench_are_the_inverse_of_the_mass_matrix(make_plant, 
         np.testing.assert_allclose(plant.jacobian(actuation, thrusts), vehicle.thruster_matrix, atol=1e-12)
 
 
+@pytest.mark.medium
 def test_derivatives_see_inputs_that_no_step_has_sent_yet(make_plant):
     plant = make_plant()
     assert plant.jacobian(["actuation.X"], ["thrust[1]"])[0, 0] > 0.7
@@ -122,6 +124,7 @@ def test_derivatives_see_inputs_that_no_step_has_sent_yet(make_plant):
     assert plant.jacobian(["actuation.X"], []).shape == (1, 0)
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(
     ("unknowns", "knowns", "words"),
     [

@@ -67,6 +67,7 @@ def binary(path):
         return name
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     "vehicle", [name if name == "odin" else pytest.param(name, marks=pytest.mark.slow) for name in shipped_vehicles()]
 )

@@ -29,6 +29,7 @@ def drive(slave, run, rows):
     return np.array(states)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", RUNS)
 def test_every_state_at_every_row(name, fmi, make_slave):
     rows = np.loadtxt(DATA / f"{name}.csv", delimiter=",", skiprows=1)

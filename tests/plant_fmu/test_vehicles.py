@@ -67,6 +67,7 @@ def test_rights_itself(name, axis, make_slave):
     assert np.ptp(angles[-200:]) < 0.5 * np.ptp(angles[:200])
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_how_an_autopilot_drives_it_changes_no_byte_of_the_fmu(fmi):
     vehicle = load_vehicle("bluerov2_heavy")

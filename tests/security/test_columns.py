@@ -71,6 +71,7 @@ def kind(request):
     return scenario, names_of(scenario)
 
 
+@pytest.mark.medium
 def test_d6_each_column_dropped_singly_is_named_or_warned_of(kind, monkeypatch, caplog):
     scenario, names = kind
     monkeypatch.setattr("cosim.simulation.columns.names_of", lambda _: names)
@@ -131,6 +132,7 @@ def lacking(tmp_path, ordered_run):
     return made
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("read", READERS.values(), ids=READERS)
 def test_d6_every_reader_names_the_column_and_the_file(read, lacking):
     for name in (
@@ -150,6 +152,7 @@ def test_d6_every_reader_names_the_column_and_the_file(read, lacking):
         assert sorted(folder.iterdir()) == before
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("read", READERS.values(), ids=READERS)
 def test_d6_every_reader_does_without_what_nothing_is_made_of(read, lacking, caplog):
     folder = lacking("water_velocity.y", "goal.value")

@@ -75,6 +75,7 @@ def test_each_part_of_a_killed_run_is_looked_at(tmp_path, monkeypatch, odd):
         load_record(tmp_path)
 
 
+@pytest.mark.medium
 @given(st.data())
 def test_any_change_of_a_record_is_read_or_refused(tmp_path_factory, data):
     folder = tmp_path_factory.mktemp("record")
@@ -154,6 +155,7 @@ def test_d5_a_summary_that_lacks_a_key_names_it(tmp_path, ordered_run, key):
         load_run(folder)
 
 
+@pytest.mark.medium
 def test_d5_texts_of_a_summary_are_shown_only(tmp_path, shipped_run):
     folder = tmp_path / "run"
     shutil.copytree(shipped_run("paper", "time.duration=0.1").folder, folder)
@@ -166,6 +168,7 @@ def test_d5_texts_of_a_summary_are_shown_only(tmp_path, shipped_run):
     }  # fmt: skip
 
 
+@pytest.mark.medium
 @pytest.mark.skipif(os.name != "posix", reason="names of files are no bytes here")
 def test_d5_a_scenario_whose_name_commands_a_terminal_has_one_that_is_shown_only(tmp_path):
     file = tmp_path / os.fsdecode(b"a\x1b[31m\xff.toml")

@@ -117,6 +117,7 @@ def test_there_is_one_model_description(tmp_path, read):
     assert "would be written over" in read(archive(tmp_path / "it.fmu", [("modelDescription.xml", "<other/>")]))
 
 
+@pytest.mark.medium(fast=1)
 def test_bombs_are_refused_unread(tmp_path, read):
     path = tmp_path / "it.fmu"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as made:
@@ -333,6 +334,7 @@ def test_any_change_of_an_fmu_is_read_or_refused(tmp_path_factory, data):
     read_or_refused(path)
 
 
+@pytest.mark.medium
 @given(st.data())
 def test_any_change_of_a_description_is_read_or_refused(tmp_path_factory, data):
     text = SOUND

@@ -44,6 +44,7 @@ PLACES = {
 }
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("of", PLACES.values(), ids=PLACES)
 @pytest.mark.parametrize("there", [False, True], ids=["new", "of its user"])
 def test_d9_the_same_command_works_once_there_is_room(tmp_path, monkeypatch, of, there):

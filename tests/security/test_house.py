@@ -58,6 +58,7 @@ def test_nothing_runs_what_it_reads(path):
             assert name == "plant_fmu/unpacking.py" or name.startswith("plant_fmu/importers/"), call
 
 
+@pytest.mark.medium
 def test_no_address_but_of_this_machine_is_a_default():
     for path in FILES.values():
         for node in ast.walk(tree_of(path)):

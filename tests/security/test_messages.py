@@ -81,6 +81,7 @@ COMMANDS = {
 }
 
 
+@pytest.mark.medium(fast=35)
 @pytest.mark.parametrize("command", COMMANDS.values(), ids=COMMANDS)
 @pytest.mark.parametrize(
     "name", [f"it{COMMANDS_LOG}", "it" + "a" * 900, os.fsdecode(b"it\xff\xfe")], ids=["commands", "long", "bytes"]

@@ -80,6 +80,7 @@ def test_a_title_adds_no_element(attacked, plain, name):
     assert not any(name.startswith("on") for _, names in ours.found for name in names)
 
 
+@pytest.mark.medium
 def test_the_data_of_a_page_stay_in_their_script(attacked):
     """A reader of HTML finds the data whole: nothing within them ends the element that they stand in."""
     (data,) = (s for s in Elements((attacked / "replay.html").read_text(encoding="utf-8")).scripts if s[:2] == "[{")
@@ -120,12 +121,14 @@ def test_the_page_within_an_fmu(tmp_path, attacked):
     assert ours == plain
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("kind", PICTURES)
 def test_pictures_of_a_vehicle_take_any_title(attacked, kind):
     svg = image(PICTURES[kind](load_vehicle(attacked / "vehicle.toml")), "svg").decode()
     assert "<img" not in svg and "<script" not in svg
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("kind", ["terms", "profile", "surface", "decisions"])
 def test_pictures_of_an_arbiter_take_any_name(tmp_path, kind):
     name = r"<img src=x onerror='harm()'>$\frac{$"

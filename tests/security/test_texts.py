@@ -70,12 +70,14 @@ BROKEN = {
 }
 
 
+@pytest.mark.medium(fast=9)
 @pytest.mark.parametrize("text", BROKEN.values(), ids=BROKEN)
 @pytest.mark.parametrize("read", [scenario, vehicle])
 def test_files_that_cannot_be(read, tmp_path, text):
     assert said_of(read, tmp_path / "it.toml", text)
 
 
+@pytest.mark.medium(fast=32)
 @pytest.mark.parametrize("text", BROKEN.values(), ids=BROKEN)
 @pytest.mark.parametrize("format", ["toml", "json", "fcl", "fis", "fll"])
 def test_arbiters_that_cannot_be(tmp_path, text, format):

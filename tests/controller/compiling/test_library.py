@@ -125,6 +125,7 @@ def test_an_error_of_the_compiler_is_its_first(cache):
         library_of("unknown answer;\n")
 
 
+@pytest.mark.medium
 def test_processes_that_compile_the_same_at_once_leave_one_whole_library(cache):
     code = f"from controller.compiling.library import library_of; print(library_of({TEXT!r}).answer())"
     several = [

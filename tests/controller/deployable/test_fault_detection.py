@@ -20,6 +20,7 @@ def isolated(law):
     return [int(j) for j in np.flatnonzero(law.memory.thrusters.health == 0.0)]
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("lag", [0.0, pytest.param(0.3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("failed", [0, 6, *(pytest.param(j, marks=pytest.mark.slow) for j in (1, 2, 3, 4, 5, 7))])
 def test_a_thruster_that_fails_under_way_is_found_and_in_the_end_no_other(failed, lag):
@@ -33,6 +34,7 @@ def test_a_thruster_that_fails_under_way_is_found_and_in_the_end_no_other(failed
     assert np.abs(forces[-50:, failed]).max() < 1.0  # what fails while it gives next to nothing may count as stuck
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("lag", [0.0, 0.15, 0.6])
 @pytest.mark.parametrize("noise", [(0.0, 0.0), NOISE])
 def test_nothing_is_isolated_where_nothing_fails(noise, lag):
@@ -44,6 +46,7 @@ def test_nothing_is_isolated_where_nothing_fails(noise, lag):
     assert np.all(np.isfinite(law.memory.fault_state.ratio))
 
 
+@pytest.mark.medium
 def test_a_thruster_that_loses_part_of_its_force_goes_on_with_the_rest():
     for failed in (1, 5):
         law, sea = law_for(REGIONS), Sea(noise=NOISE)
@@ -56,6 +59,7 @@ def test_a_thruster_that_loses_part_of_its_force_goes_on_with_the_rest():
         assert abs(x[EFFECTIVENESS + failed] - 0.4) < 4.0 * spread + 0.05
 
 
+@pytest.mark.medium
 def test_a_thruster_that_is_stuck_is_found_with_its_force():
     for failed in (0, 2):
         law, sea = law_for(REGIONS), Sea(noise=NOISE)
@@ -69,6 +73,7 @@ def test_a_thruster_that_is_stuck_is_found_with_its_force():
         assert np.linalg.norm(sea.position - (8.0, 0.5, 2.5)) < 0.6
 
 
+@pytest.mark.medium
 def test_a_dead_thruster_that_was_taken_for_a_stuck_one_does_not_carry_the_vehicle_away():
     """The force that it is supposed to give is estimated on, and found to be none."""
     law, sea = law_for([]), Sea(noise=NOISE)
@@ -82,6 +87,7 @@ def test_a_dead_thruster_that_was_taken_for_a_stuck_one_does_not_carry_the_vehic
     assert np.linalg.norm(sea.position - (8.0, 0.5, 2.5)) < 0.6
 
 
+@pytest.mark.medium
 def test_it_can_be_switched_off():
     law, sea = law_for(REGIONS, DeployableGains(failure_threshold=0.0)), Sea()
     sea.left[2] = 0.0
@@ -89,6 +95,7 @@ def test_it_can_be_switched_off():
     assert isolated(law) == []
 
 
+@pytest.mark.medium
 def test_a_thruster_that_was_isolated_wrongly_is_tried_again():
     law, sea = law_for(REGIONS), Sea(noise=NOISE)
     fly(law, sea, steps=100)
@@ -145,6 +152,7 @@ def test_of_several_isolated_each_is_tried_again_after_a_while_and_ever_more_rar
     assert tried == [1, 4, 1]
 
 
+@pytest.mark.medium
 def test_two_that_were_isolated_wrongly_work_again():
     """While another one has failed; of the two, one is thought to be stuck."""
     law, sea = law_for(REGIONS), Sea(noise=NOISE)
@@ -189,6 +197,7 @@ def periods(count, rng, left, stuck):
         yield k, state, before, estimate
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(("hypothesis", "left", "stuck"), [(3, 0.0, None), (8 + 3, 1.0, 0.95 * 8.0 * np.sin(1.9 + 3))])
 def test_what_a_hypothesis_expects_is_what_is_measured_where_it_holds(hypothesis, left, stuck):
     """The deviation, propagated from the failure on, makes the innovations: their products equal its squares."""

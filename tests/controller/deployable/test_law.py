@@ -22,6 +22,7 @@ ROOT = Path(__file__).parents[3]
 NOISE = (0.02, 0.01)
 
 
+@pytest.mark.medium
 def test_the_memory_is_all_that_it_keeps():
     """A law that is given a copy of another's memory in mid-flight goes on as that one does, to the last bit."""
     law, sea = law_for(REGIONS), Sea(noise=NOISE)
@@ -61,6 +62,7 @@ def test_the_law_without_its_compiler_is_the_same_to_rounding():
     assert plain.any(axis=1).all()
 
 
+@pytest.mark.medium
 def test_it_reaches_the_goal_clear_of_the_regions_and_within_the_limits():
     law, sea, clear = law_for(REGIONS), Sea(noise=NOISE), []
 
@@ -94,6 +96,7 @@ def dead(which):
     return change
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     "which",
     [
@@ -117,6 +120,7 @@ def test_a_sensor_that_is_dead_for_a_second_is_borne(which):
     assert np.linalg.norm(sea.position - GOAL.shape.centre) < 0.5
 
 
+@pytest.mark.medium
 def test_it_expects_the_vehicle_where_it_is_next_to_a_part_of_the_noise():
     law, sea, errors = law_for(REGIONS), Sea(noise=NOISE), []
     assert np.isnan(law.expected).all()
@@ -138,6 +142,7 @@ def test_without_any_measurement_it_pushes_nothing():
     assert not fly(law_for(REGIONS), Sea(), steps=50, change=nothing).any()
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("rise", [0.0, 5.0])
 def test_with_all_but_its_attitude_lost_it_holds_its_weight(rise):
     """The vertical speed settles where drag balances `rise`; without one it is the estimate's error that is left."""
@@ -153,6 +158,7 @@ def test_with_all_but_its_attitude_lost_it_holds_its_weight(rise):
     assert own.memory.report[15] > 2.0 and own.memory.report[16] == -1e6
 
 
+@pytest.mark.medium
 def test_an_uncertain_state_is_flown_with_wider_margins():
     """At a goal that a ball covers it waits at the margin, which grows by three standard deviations."""
     ball, waits = REGIONS[0], []
@@ -166,6 +172,7 @@ def test_an_uncertain_state_is_flown_with_wider_margins():
     assert waits[1] - waits[0] == pytest.approx(0.3, abs=0.01)
 
 
+@pytest.mark.medium
 def test_where_regions_exclude_each_other_clearances_keep_what_is_promised():
     """A plate comes down onto the band in which the vehicle is: one of them must be violated, and says so before."""
     plate = Region("plate", Box((0.0, 0.0, -1.2), (40.0, 40.0, 1.0)), "out", (0.0, 0.0, 0.1))
@@ -182,6 +189,7 @@ def test_where_regions_exclude_each_other_clearances_keep_what_is_promised():
     assert np.all(clearance[1:] >= bound[:-1] - 1e-3)
 
 
+@pytest.mark.medium
 def test_a_delay_is_taken_for_a_lag_and_regions_are_kept():
     """Commands come 0.2 s late, and forces follow them behind a lag of 0.15 s; the law is given neither."""
     own, sea, least, packed = law_for(REGIONS), Sea(noise=NOISE, lag=0.15, delay=10), [], pack(REGIONS)
@@ -196,6 +204,7 @@ def test_a_delay_is_taken_for_a_lag_and_regions_are_kept():
     assert own.memory.thrusters.health.all()
 
 
+@pytest.mark.medium
 def test_a_region_whose_place_is_uncertain_is_kept_farther_off():
     clear = []
     for deviation in (0.0, 0.1):
@@ -217,6 +226,7 @@ def test_without_regions_it_reaches_the_goal():
     assert np.linalg.norm(sea.position - GOAL.shape.centre) < 0.5
 
 
+@pytest.mark.medium
 def test_regions_that_contradict_each_other_leave_finite_forces_within_limits():
     """The vehicle within one ball, and two more closing it in from either side."""
     walls = [Region(f"{x}", Sphere((x, 0.0, 2.5), 1.2), "out") for x in (-1.0, 0.05, 1.0)]
@@ -226,6 +236,7 @@ def test_regions_that_contradict_each_other_leave_finite_forces_within_limits():
     assert np.isfinite(law.report).all()
 
 
+@pytest.mark.medium
 def test_two_thrusters_that_are_told_stay_given_up():
     def told(t, state):
         health = np.ones(8)

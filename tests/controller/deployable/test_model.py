@@ -99,6 +99,7 @@ def with_thrusters(model, keep):
     return model._replace(thruster_matrix=matrix, thrust_min=model.thrust_min[keep], thrust_max=model.thrust_max[keep])
 
 
+@pytest.mark.medium
 def test_a_vehicle_that_cannot_push_everywhere_is_refused():
     with pytest.raises(LawError, match=r"6 thrusters push 0 N in the worst direction"):
         least_forces(with_thrusters(MODELS["bluerov2_heavy"], [0, 1, 2, 3, 4, 6]))
@@ -125,6 +126,7 @@ def test_nothing_untold_enters_the_model():
         assert np.array_equal(ours, theirs)
 
 
+@pytest.mark.medium
 def test_the_least_force_of_uneven_thrusters_is_that_of_the_weaker_way():
     """Vertical thrusters that push down less than up: the worst direction is among those that go down, or up."""
     for low, high in ((-5.0, 27.0), (-27.0, 5.0)):

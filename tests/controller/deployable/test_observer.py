@@ -198,6 +198,7 @@ def test_unknowns_keep_their_bounds_on_either_side(index, bound, sign):
     assert estimate.state[index] == pytest.approx(sign * bound)
 
 
+@pytest.mark.medium
 def test_what_drives_the_vehicle_is_found_to_the_accuracy_that_is_stated():
     """Current, W - B, righting moment, lag and effectiveness, in noise, while the law flies."""
     for name, lag in (("quick", 0.0), ("slow", 0.25)):
@@ -213,6 +214,7 @@ def test_what_drives_the_vehicle_is_found_to_the_accuracy_that_is_stated():
         assert np.all(spread[EFFECTIVENESS : EFFECTIVENESS + 4] < 0.1) and spread[LAG] < 0.15
 
 
+@pytest.mark.medium
 def test_unknowns_do_not_wind_up():
     """A vehicle that is held fast while the thrusters push."""
     estimate, dynamics, thrusters = started()

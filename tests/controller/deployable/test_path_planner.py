@@ -146,6 +146,7 @@ def run(regions, steps=400, goal=GOAL, start=START, plan=None, moved=None):
     return plan, packed
 
 
+@pytest.mark.medium
 def test_it_finds_a_way_round_what_lies_across():
     """Of 20 fields of six balls, straight through which no way is free, within 8 s of the vehicle's waiting."""
     found = blocked = 0
@@ -237,6 +238,7 @@ def test_looks_are_bounded(monkeypatch):
     assert max(np.diff(calls)) <= 64 * 3 and len(looked) == 512 * 3
 
 
+@pytest.mark.medium
 def test_a_search_at_rest_ends_with_a_free_way_or_after_its_periods():
     plan, periods = empty_plan(2, 1), np.array([2000, 0])
     regions, goal = pack([Region("wall", Box((4.0, 0.0, 2.5), (0.5, 4.0, 9.0)), "out")]), pack([GOAL])

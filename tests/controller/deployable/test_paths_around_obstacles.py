@@ -91,6 +91,7 @@ def random_way(rng, reach=1.0):
     return way, count
 
 
+@pytest.mark.medium
 def test_the_cost_is_that_of_looking_everywhere():
     rng, packed, dear, long, soft, calls = np.random.default_rng(1), pack(REGIONS), 0, 0, 0, []
     for k in range(60):
@@ -140,6 +141,7 @@ def test_a_stay_within_a_soft_region_costs_as_three_metres_through_it_and_less_n
         assert cost - (2.5 - outside) == pytest.approx(3.0 * 7.0 * 0.5 * part, abs=1e-8)
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(("begins", "inside"), [(4.8, 0.05), (5.18, 0.02), (5.3, -0.1)])
 @pytest.mark.parametrize("cost", [0.4, 2.0, 10.0])
 def test_a_path_ends_within_a_soft_region_by_a_margin_where_the_goal_has_room(begins, inside, cost):
@@ -152,6 +154,7 @@ def test_a_path_ends_within_a_soft_region_by_a_margin_where_the_goal_has_room(be
     assert inside - 0.025 < clearance_at(packed, 0, plan.path[plan.counts[0] - 1]) < inside + 0.1
 
 
+@pytest.mark.medium
 def test_the_trees_leave_costly_regions_for_cheap_ones():
     """A wall has a door, and ends; a region lies in the door, another one beside the wall: the cheap one is passed."""
     start, goal = np.array([0.0, 0.0, 2.5]), pack([GOAL])
@@ -347,11 +350,13 @@ def walk(seed, packed, steps):
     return found
 
 
+@pytest.mark.medium
 def test_the_search_is_that_of_the_transcription():
     found = walk(4, pack(REGIONS), 240)
     assert max(found) >= 3 and found.count(0) > 20
 
 
+@pytest.mark.medium
 def test_a_found_way_is_free_all_along():
     rng, packed, way, checked = np.random.default_rng(6), pack(REGIONS), np.zeros((9, 3)), 0
     state, end = search.empty_search(), np.array([8.0, 0.5, 2.5])
@@ -363,6 +368,7 @@ def test_a_found_way_is_free_all_along():
     assert checked > 20
 
 
+@pytest.mark.medium
 def test_a_tree_that_is_full_starts_anew_and_a_chain_too_long_is_no_path():
     packed, state, rng = pack([]), search.empty_search(), np.random.default_rng(7)
     way, end = np.zeros((9, 3)), np.array([8.0, 0.5, 2.5])
@@ -435,6 +441,7 @@ def test_changes_are_those_of_the_transcription():
         assert plan.random[0] == change.random[0]
 
 
+@pytest.mark.medium
 def test_a_way_is_kept_up_and_replaced_by_one_that_saves_enough():
     """Turn by turn: the end goes with the goal, corners are passed, the cheaper way stays."""
     wall = Region("box", Box((5.0, -0.8, 2.6), (1.0, 9.0, 9.0)), "out", (-0.03, 0.0, 0.02))

@@ -72,6 +72,7 @@ def rows_by_differences(memory, sensor):
     return np.array(rows).T / (2.0 * step)
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("sensor", list(PLACES))
 def test_a_sample_corrects_as_by_plain_matrices(sensor):
     rng = np.random.default_rng(sensor)
@@ -93,6 +94,7 @@ def test_a_sample_corrects_as_by_plain_matrices(sensor):
         assert memory.innovations[sensor, 1] == len(H)
 
 
+@pytest.mark.medium(fast=3)
 @pytest.mark.parametrize("sensor", list(PLACES))
 def test_a_late_sample_corrects_what_has_become_of_its_error(sensor):
     """Errors 0.1 s ago, carried on: a sample of then, told now, corrects what has become of them, to second order."""

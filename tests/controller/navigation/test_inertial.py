@@ -95,6 +95,7 @@ def test_the_covariance_is_propagated_as_by_plain_matrices():
         assert memory.covariance == pytest.approx(F @ P @ F.T + np.diag(Q), rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.medium
 def test_errors_grow_as_the_covariance_says():
     """A small error of the start and of each constant, carried on: what the transition of the covariance says."""
     rng = np.random.default_rng(3)

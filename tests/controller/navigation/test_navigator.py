@@ -132,6 +132,7 @@ def test_an_estimate_that_no_sample_agrees_with_is_given_up_and_found_anew():
     assert (pitch, roll) == pytest.approx((0.0, 0.0), abs=1e-3)
 
 
+@pytest.mark.medium
 def test_a_filter_is_consistent_on_a_motion_of_its_own():
     """Circles with a swell, by 30 sets of noise and constant errors; NEES and NIS within 99.9 % of a consistent one."""
     rng, h, runs = np.random.default_rng(11), 0.01, 30

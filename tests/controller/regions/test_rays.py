@@ -124,6 +124,7 @@ def test_upright_cylinder(bearing):
 # ---- any shape -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.medium(fast=5)
 @each_shape
 @settings(max_examples=examples(60), deadline=None)
 @given(origins, directions)

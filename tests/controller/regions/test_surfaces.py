@@ -111,6 +111,7 @@ def test_planes_are_patches_as_large_as_what_is_seen(shape):
 coordinate = st.floats(-3.0, 3.0)
 
 
+@pytest.mark.medium
 @given(st.lists(st.tuples(coordinate, coordinate, coordinate), min_size=2, max_size=5), st.floats(0.05, 1.0))
 @example([(0.0, 0.0, 3.0), (0.0, 0.0, 0.0), (0.0, 0.125, 0.0)], 0.125)  # a ray along 3 m, 5 mm inside the surface
 @example([(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], 1.0)  # the way back, after a bend

@@ -122,6 +122,7 @@ def test_rate_is_minus_w_where_the_force_has_the_potential():
     assert np.abs(unit_gradient - expected).max() > 1e-3 * scale
 
 
+@pytest.mark.medium
 def test_with_unit_gradients_the_three_forms_are_one():
     expected, rates = followed(Loop([FLAT], BETAS[:1]))
     for rate in rates:

@@ -181,6 +181,7 @@ def shifts(random, out):
     out[0] = float((x * np.uint64(0x2545F4914F6CDD1D)) >> np.uint64(11))
 
 
+@pytest.mark.medium(fast=4)
 @pytest.mark.parametrize(
     "function", [arithmetic, choices, loops, views, tuples, order, records, special], ids=lambda f: f.__name__
 )

@@ -46,6 +46,7 @@ def first_difference(law, library, steps, seed, compiled_by=lambda function: fun
     return None
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("law", sorted(LAWS))
 def test_forces_and_memory_are_those_of_python_itself(law):

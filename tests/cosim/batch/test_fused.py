@@ -72,6 +72,7 @@ NOISY = [
 ]  # fmt: skip
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("frozen", ["true", "false"])
 def test_noise_and_gaps_in_what_is_measured_are_the_masters(frozen):
     # the paper's law, told nothing, asks for nothing that a plant takes: it is told the last values, or does not steer
@@ -80,6 +81,7 @@ def test_noise_and_gaps_in_what_is_measured_are_the_masters(frozen):
     assert_same_flight(scenario_of(law, *BRISK, *NOISY, f"sensing.frozen={frozen}", "limit.force=150.0", *gap))
 
 
+@pytest.mark.medium
 def test_flights_by_sensors_are_the_masters():
     """With noise, delays, lost samples and outliers of the data sheets, and two outages."""
     outages = "outages=[{sensor='dvl', time=3.0, duration=1.5}, {sensor='usbl', time=2.015, duration=9.0}]"
@@ -87,6 +89,7 @@ def test_flights_by_sensors_are_the_masters():
     assert_same_flight(scenario_of("pd", *BRISK, *sensors, "limit.force=150.0"))
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("told", ["true", "false"])
 @pytest.mark.parametrize(
     "failures",

@@ -120,6 +120,7 @@ def distances(scene, positions, step):
     return np.min([*of, positions[:, 2] - shallow, deep - positions[:, 2]], axis=0)
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("scene", [PLAIN[0], HARD[1]], ids=["plain", "hard"])
 @pytest.mark.parametrize(
     "law",
@@ -253,6 +254,7 @@ def test_an_unknown_law_is_named_with_the_known_ones():
         SceneFlyer("ismail_duningan")
 
 
+@pytest.mark.medium
 @pytest.mark.filterwarnings("ignore:Exception ignored")
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs an alarm clock")
 def test_a_signal_in_mid_flight_raises_after_it(flyer):

@@ -58,6 +58,7 @@ def test_flights_of_the_paper_are_those_of_the_fused_loop():
     assert 0 < flown.outcomes["violated"].sum() < 19 and flown.outcomes["reached"].any()
 
 
+@pytest.mark.medium
 def test_one_flight_alone_and_none():
     of = variation()
     values, seeds = drawn(of, 9)
@@ -83,6 +84,7 @@ REGIONS = {
 }
 
 
+@pytest.mark.medium(fast=3)
 @pytest.mark.parametrize("name", REGIONS)
 def test_any_shape_flies_as_in_the_fused_loop(name):
     region = f'{{name="it", criterion="obstacle", gain=80.0, {REGIONS[name]}}}'
@@ -92,6 +94,7 @@ def test_any_shape_flies_as_in_the_fused_loop(name):
     compare(of, *drawn(of, 3))
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize(
     "overrides",
     [

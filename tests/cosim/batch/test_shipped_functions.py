@@ -42,6 +42,7 @@ def called(monkeypatch):
     return found
 
 
+@pytest.mark.medium
 def test_what_flights_call_is_shipped_and_what_is_shipped_is_called(called, tmp_path):
     for name in ("docking", "harbour", "pipe-inspection", "moving-obstacle"):
         scenario = load_scenario(name, ["time.duration=0.1"])

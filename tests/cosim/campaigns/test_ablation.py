@@ -33,6 +33,7 @@ def scenes(tmp_path):
     return write(tmp_path / "scenes.jsonl", [squeeze, door])
 
 
+@pytest.mark.medium
 def test_variants_stand_beside_the_whole_law(tmp_path, scenes):
     out = tmp_path / "out"
     done = ablate(scenes, out, ["arbiter-none", "barriers"])
@@ -50,6 +51,7 @@ def test_variants_stand_beside_the_whole_law(tmp_path, scenes):
     assert "arbiter-none" in page and "squeeze, odin" in page and "Where it changed most" in page
 
 
+@pytest.mark.medium
 def test_an_ablation_goes_on_with_what_is_left(tmp_path, scenes):
     ablate(scenes, tmp_path / "out", ["arbiter-crisp"])
     more = ablate(scenes, tmp_path / "out", ["arbiter-crisp", "net-weight"])
@@ -84,6 +86,7 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path, scenes):
         ablate(scenes, tmp_path / "out", ["lag"])
 
 
+@pytest.mark.medium
 def test_the_command_says_what_came_of_it(tmp_path, scenes, capsys):
     arguments = ["ablate", str(scenes), "--out", str(tmp_path / "out"), "--variants", "lag", "--replays", "0"]
     assert main(arguments) == 0

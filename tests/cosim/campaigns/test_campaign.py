@@ -67,12 +67,14 @@ def test_rows_are_what_the_flyer_scores(tmp_path):
             assert row["violation"] == (score.min_clearance < 0.0)
 
 
+@pytest.mark.medium
 def test_another_law_is_refused_by_its_name_alone(tmp_path, scenes):
     run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
     with pytest.raises(RunError, match=r"another campaign \(law is 'ismail_dunnigan', now 'deployable'\)"):
         run_campaign(scenes, "deployable", tmp_path / "out", BRIEF)
 
 
+@pytest.mark.medium
 def test_what_is_interrupted_goes_on_without_losing_or_repeating(tmp_path, scenes, monkeypatch):
     whole = run_campaign(scenes, "ismail_dunnigan", tmp_path / "whole", BRIEF)
     flown = []
@@ -100,6 +102,7 @@ def test_what_is_interrupted_goes_on_without_losing_or_repeating(tmp_path, scene
     assert not (tmp_path / "out" / PARTS).exists()
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("at", ["join", "write_atomic"])
 def test_killed_at_the_end_nothing_is_flown_again(tmp_path, scenes, monkeypatch, at):
     with monkeypatch.context() as patch:
@@ -112,6 +115,7 @@ def test_killed_at_the_end_nothing_is_flown_again(tmp_path, scenes, monkeypatch,
     assert (tmp_path / "out" / SUMMARY).exists() and not (tmp_path / "out" / PARTS).exists()
 
 
+@pytest.mark.medium
 def test_a_damaged_part_is_flown_again(tmp_path, scenes, monkeypatch):
     whole = run_campaign(scenes, "ismail_dunnigan", tmp_path / "whole", BRIEF)
     batches_of(monkeypatch, 5)
@@ -127,6 +131,7 @@ def test_a_damaged_part_is_flown_again(tmp_path, scenes, monkeypatch):
     assert done.flown == 5 and rows(done.results) == rows(whole.results)
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -36,6 +36,7 @@ def scenes(tmp_path):
     return write(tmp_path / "scenes.jsonl", HARD[:2])
 
 
+@pytest.mark.medium
 def test_laws_stand_side_by_side(tmp_path, scenes, idle):
     out = tmp_path / "out"
     done = compare(scenes, ["ismail_dunnigan", "idle"], out, BRIEF, {"ismail_dunnigan": Gains(k_p1=9.0)})

@@ -80,6 +80,7 @@ def test_values_stay_in_their_ranges_and_other_seeds_give_others(kind):
     assert not np.any(values == other.values(all_rows(other)))
 
 
+@pytest.mark.medium
 def test_every_row_has_a_seed_of_its_own_that_fmi_can_hold():
     found = Design(TWO, "random", MOST, 5)
     seeds = found.seeds(np.arange(1_000_000))

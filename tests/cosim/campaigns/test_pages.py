@@ -84,6 +84,7 @@ def flown(tmp_path_factory):
     return folder / "out"
 
 
+@pytest.mark.medium
 def test_the_page_of_a_campaign_is_whole_and_says_what_the_summary_says(flown):
     checker = check(flown / "campaign.html")
     s = json.loads((flown / "summary.json").read_text())
@@ -143,6 +144,7 @@ def test_ctrl_c_while_replays_are_flown_leaves_the_page_without_them(tmp_path, m
     assert len(check(out / "campaign.html").asked) == 2
 
 
+@pytest.mark.medium
 def test_a_flight_that_comes_out_otherwise_is_said_beside_its_replay(tmp_path, monkeypatch):
     from cosim.campaigns.reruns.repeat import Repeat
 
@@ -153,6 +155,7 @@ def test_a_flight_that_comes_out_otherwise_is_said_beside_its_replay(tmp_path, m
     assert "it came out otherwise: min_clearance" in (out / "campaign.html").read_text()
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("scenes", [[REFUSED], PLAIN[:1]], ids=["none that could be flown", "one"])
 def test_few_scenes_have_a_page_too(tmp_path, scenes):
     run_campaign(write(tmp_path / "s.jsonl", scenes), "ismail_dunnigan", tmp_path / "out", BRIEF)
@@ -162,6 +165,7 @@ def test_few_scenes_have_a_page_too(tmp_path, scenes):
     assert (tmp_path / "out" / "figures").exists() == (scenes[0] is not REFUSED)
 
 
+@pytest.mark.medium
 def test_a_flight_that_the_plant_stops_can_be_seen_until_then(tmp_path):
     out = tmp_path / "out"
     done = run_campaign(

@@ -31,6 +31,7 @@ def joined(found, folder):
     return pq.read_table(folder / "all.parquet")
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("batches", [1, 2, 3, 8, 9, 26, 27, 28, 100])
 def test_parts_merge_before_they_are_many_and_keep_every_row(tmp_path, monkeypatch, batches):
     monkeypatch.setattr(parts, "MERGED", 3)
@@ -107,6 +108,7 @@ def test_a_merge_for_which_there_is_no_room_loses_nothing(tmp_path, monkeypatch)
     assert joined(again, tmp_path)["row"].to_pylist() == [0, 1, 2, 3]
 
 
+@pytest.mark.medium
 @given(st.lists(st.sets(st.integers(0, 10**6), min_size=1, max_size=30), min_size=1, max_size=8), st.integers(1, 7))
 def test_files_are_joined_in_order_whatever_rows_they_hold(rows, chunk):
     taken, disjoint = set(), []

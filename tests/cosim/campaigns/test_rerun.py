@@ -47,6 +47,7 @@ def folder(swept, tmp_path):
     return shutil.copytree(swept, tmp_path / "swept")
 
 
+@pytest.mark.medium
 def test_a_row_of_a_sweep_comes_again_to_the_last_bit_and_as_a_run(folder, tmp_path, capsys):
     assert main(["rerun", str(folder), "4", "--out", str(tmp_path / "run")]) == 0
     said = capsys.readouterr().out.splitlines()

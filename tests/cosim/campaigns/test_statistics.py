@@ -96,6 +96,7 @@ OUTCOMES = {
 }
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("kind", OUTCOMES)
 @pytest.mark.parametrize("values", [None, 4], ids=["range", "four values"])
 def test_chance_alone_comes_above_the_floor_in_a_hundredth_of_all_cells(kind, values):
@@ -108,6 +109,7 @@ def test_chance_alone_comes_above_the_floor_in_a_hundredth_of_all_cells(kind, va
     assert above < 0.03 and np.mean([of["share"] for of in found if of]) == pytest.approx(0.0, abs=0.01)
 
 
+@pytest.mark.medium
 def test_the_floor_is_that_of_the_analysis_of_variance():
     rng = np.random.default_rng(7)
     decided = []
@@ -151,6 +153,7 @@ def test_the_exact_test_counts_how_coins_fall():
     assert paired(one, one)["p"] is None
 
 
+@pytest.mark.medium
 def test_the_interval_of_a_median_holds_it_as_often_as_it_says():
     rng = np.random.default_rng(2)
     found = [median_difference(rng.exponential(size=25) - math.log(2.0)) for _ in range(300)]

@@ -65,6 +65,7 @@ def test_the_folder_tells_the_whole_sweep(tmp_path, fakes):
     assert load_scenario(tmp_path / "out" / "scenario.toml").limit.force == 900.0
 
 
+@pytest.mark.medium
 def test_a_vehicle_file_goes_with_the_sweep_wherever_it_came_from(tmp_path, fakes, monkeypatch):
     from importlib import resources
 
@@ -93,6 +94,7 @@ def test_two_processes_and_executors_give_the_same_rows(tmp_path, fakes):
         assert pq.read_table(tmp_path / name / RESULTS).to_pylist() == expected(), name
 
 
+@pytest.mark.medium
 def test_threads_take_turns(tmp_path, fakes, monkeypatch):
     inside, fly = [], Fake.fly
 
@@ -118,6 +120,7 @@ def test_an_executor_that_is_closed_is_one_line(tmp_path, fakes):
     assert run_sweep(paper(), design(), tmp_path / "out", "fake").flown == 50
 
 
+@pytest.mark.medium
 def test_what_is_interrupted_goes_on_without_losing_or_repeating(tmp_path, fakes, monkeypatch):
     batches_of(monkeypatch, 7)
     add, left = CampaignFolder.add, [2]
@@ -154,6 +157,7 @@ def test_a_row_that_is_refused_is_a_row_and_says_why(tmp_path, fakes, caplog):
     assert done.summary["reached"]["rows"] == sum(row["reached"] is True for row in rows)
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -109,6 +109,7 @@ def test_a_number_of_workers_that_cannot_be(capsys, workers):
     assert left.value.code == 2 and "from 1 to 1024" in capsys.readouterr().err
 
 
+@pytest.mark.medium
 def test_scenes_come_by_standard_input_too(tmp_path, capsys, monkeypatch):
     scenes = write(tmp_path / "s.jsonl", HARD[:1])
     out = tmp_path / "out"

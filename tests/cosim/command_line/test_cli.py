@@ -156,6 +156,7 @@ sys.exit(main({arguments!r}))
     assert "building for this process alone" in done.stderr
 
 
+@pytest.mark.medium
 @pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="looks into /proc")
 @pytest.mark.parametrize("delay", [0.3, *(pytest.param(delay, marks=pytest.mark.slow) for delay in (0.0, 0.8))])
 def test_ctrl_c_is_heeded_from_the_first_imports(tmp_path, delay):

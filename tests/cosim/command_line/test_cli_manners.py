@@ -77,10 +77,12 @@ def test_list_as_json_is_the_same_list(capsys):
     assert [entry["name"] for entry in listed] == list_scenarios()
 
 
+@pytest.mark.medium
 def test_titles_that_are_listed_are_those_of_the_scenarios():
     assert shipped_titles() == {name: load_scenario(name).title for name in list_scenarios()}
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("words", [["list"], ["list", "--json"], ["help", "run"]])
 def test_what_asks_for_nothing_heavy_loads_nothing_heavy(words):
     code = f"import sys, cosim.command_line.cli; cosim.command_line.cli.main({words!r}); print('loaded', *sys.modules)"

@@ -70,6 +70,7 @@ class Flight:
             assert (message.x, message.y, message.z, message.r) == (0, 0, 0, 0)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     "steer_by", ["sticks", *(pytest.param(by, marks=pytest.mark.slow) for by in ("wrench", "velocity"))]
 )
@@ -87,6 +88,7 @@ def test_a_goal_is_reached_and_regions_are_kept_by_the_truth(tmp_path, steer_by)
     assert told == pytest.approx(true, abs=0.03)
 
 
+@pytest.mark.medium
 def test_without_the_frame_the_same_flight_ends_elsewhere(tmp_path):
     """A surveyed origin is believed: a wrong one is what the frame step is there against."""
     flight = Flight(tmp_path, 20.0, origin=SceneOrigin(surveyed=(0.0, 0.0, 0.0)))
@@ -94,6 +96,7 @@ def test_without_the_frame_the_same_flight_ends_elsewhere(tmp_path):
     assert np.linalg.norm(true - flight.target()) > 1.0
 
 
+@pytest.mark.medium
 def test_nothing_is_steered_before_the_frame_is_known(tmp_path):
     with pytest.raises(RunError, match="where the scene's origin is"):
         Flight(tmp_path, origin=SceneOrigin())
@@ -104,6 +107,7 @@ def test_nothing_is_steered_before_the_frame_is_known(tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.medium
 def test_it_waits_for_arming_and_does_not_arm_by_itself(tmp_path):
     link = StandIn(profile="generic", armed=False)
     with pytest.raises(RunError, match="waiting for arming"):
@@ -113,6 +117,7 @@ def test_it_waits_for_arming_and_does_not_arm_by_itself(tmp_path):
     assert armed.status == "completed" and armed.link.now("commands.armed") == 1.0
 
 
+@pytest.mark.medium
 def test_a_dry_run_sends_no_sticks_and_no_command_but_for_messages(tmp_path):
     flight = Flight(tmp_path, 3.0, dry_run=True)
     assert flight.status == "completed" and flight.states[-1][1] == "dry_run"
@@ -171,6 +176,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("reason", FAULTS)
 def test_a_fault_holds_the_vehicle_within_a_second(tmp_path, reason):
     link = StandIn(profile="generic", shift=SHIFT)
@@ -180,6 +186,7 @@ def test_a_fault_holds_the_vehicle_within_a_second(tmp_path, reason):
         assert link.mode() == 1 and link.autopilot._context.sticks == (0.0,) * 6  # position hold
 
 
+@pytest.mark.medium
 def test_a_refused_mode_holds_within_a_second_of_asking(tmp_path):
     link = StandIn(profile="generic", shift=SHIFT)
     link.deaf.add(176)
@@ -191,12 +198,14 @@ def test_a_refused_mode_holds_within_a_second_of_asking(tmp_path):
     assert held - first <= 1.0
 
 
+@pytest.mark.medium
 def test_drift_between_the_sources_holds(tmp_path):
     link = StandIn(profile="generic", shift=SHIFT)
     flight = Flight(tmp_path, 8.0, link=link, events=[lambda: drift(link)])
     assert flight.status == "held: frame drift" and flight.companion.session.alignment.drift > 0.5
 
 
+@pytest.mark.medium
 def test_drift_widens_the_margins_before_it_holds(tmp_path, monkeypatch):
     """Of sources that come apart by 0.3 m, the margins of all regions are as much wider, and it goes on."""
     doubts, doubt = [], RegionEnvironment.doubt_positions
@@ -217,6 +226,7 @@ def test_sticks_that_the_autopilot_would_not_take_are_not_sent(tmp_path):
     assert not [m for _, m in link.sent if m.get_type() in STICKS]
 
 
+@pytest.mark.medium
 def test_a_violated_hard_region_holds(tmp_path):
     flight = Flight(tmp_path, 8.0, origin=SceneOrigin(surveyed=(0.0, 3.2, -1.9)))  # as if it were beside the pipe
     assert flight.status in ("held: geofence", "completed")
@@ -239,6 +249,7 @@ PILOTS = {
 }
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("reason", PILOTS)
 def test_a_pilot_wins_within_a_second_and_is_left_alone(tmp_path, reason):
     link = StandIn(profile="generic", shift=SHIFT)
@@ -249,6 +260,7 @@ def test_a_pilot_wins_within_a_second_and_is_left_alone(tmp_path, reason):
     assert not [m for m in flight.sent_after(since, "COMMAND_LONG") if m.command == 176]
 
 
+@pytest.mark.medium
 def test_who_took_over_can_resume(tmp_path):
     link = StandIn(profile="generic", shift=SHIFT)
     ours = {"system": IDENTITY[0], "component": IDENTITY[1]}

@@ -43,6 +43,7 @@ def read(run, tmp_path_factory):
     return Read(path)
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("which", ["run", "killed"])
 def test_every_signal_is_a_series_to_the_last_bit(which, read, request, tmp_path):
     record = load_record(request.getfixturevalue(which))

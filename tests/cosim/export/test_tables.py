@@ -89,6 +89,7 @@ def test_more_than_a_mat_file_holds_is_refused(run, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.medium
 @given(st.lists(st.text(min_size=1), unique=True))
 def test_legal_names_are_names_of_matlab_and_protobuf_and_differ(names):
     made = legal(names)

@@ -25,6 +25,7 @@ def log_of(vehicle, seed=0, rows=60, period=0.05):
     return Log("one", period * np.arange(rows), thrust, wrench, ())
 
 
+@pytest.mark.medium
 def test_the_wrench_is_that_of_the_plant(vehicle):
     """The FMU gives the wrench at moments; its mean over a step follows from Simpson's rule on its substeps."""
     bent = dataclasses.replace(

@@ -66,6 +66,7 @@ def found(log, vehicle):
     return fit([log], vehicle, parameters)
 
 
+@pytest.mark.medium
 def test_the_numbers_are_found_again(found):
     truth = np.array([TRUTH[p.plant] if p.plant else BIAS[p.index] for p in found.parameters])
     off = (found.values - truth) / found.intervals.deviations

@@ -56,6 +56,7 @@ def test_the_page_is_served_alone_and_to_our_own_pages(live):
         viewer.until("end")
 
 
+@pytest.mark.medium
 def test_nothing_that_comes_hurts_the_run(live, tmp_path, caplog):
     running = live(commands=True)
     host, port = running.url.removeprefix("http://").strip("/").split(":")

@@ -22,6 +22,7 @@ def commanded(viewer, *commands):
     return viewer.said("refused")[:-1]
 
 
+@pytest.mark.medium
 def test_commands_are_followed_told_to_all_and_repeat_to_the_last_bit(live, tmp_path):
     running = live("harbour", commands=True)
     with running.viewer() as viewer, running.viewer() as other:
@@ -80,6 +81,7 @@ def test_what_cannot_be_is_refused_with_the_reason(live):
     assert running.end().summary["commands"] == 1
 
 
+@pytest.mark.medium
 def test_without_commands_every_order_is_refused(live):
     running = live(rate=4.0)
     with running.viewer() as viewer:

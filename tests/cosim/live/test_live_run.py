@@ -14,6 +14,7 @@ from cosim.scenario.scenario import load_scenario
 from tests.cosim.live.conftest import ARM, same
 
 
+@pytest.mark.medium
 def test_viewers_see_rows_of_the_record_to_the_last_bit(live):
     running = live(rate=2.0)
     with running.viewer() as viewer:
@@ -28,6 +29,7 @@ def test_viewers_see_rows_of_the_record_to_the_last_bit(live):
     assert end == {"type": "end", "status": "completed", "verdict": verdict(done.summary)}
 
 
+@pytest.mark.medium
 def test_the_record_is_the_same_whoever_watches(live, tmp_path):
     alone = run_scenario(load_scenario("harbour", ["time.duration=2"]), tmp_path / "alone", report=False)
     running = live(rate=4.0)

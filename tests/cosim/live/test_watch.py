@@ -34,6 +34,7 @@ def drawn(look, width, height, **options):
     return console.file.getvalue()
 
 
+@pytest.mark.medium
 def test_without_a_terminal_one_picture_tells_how_it_ended(paper, capsys):
     assert main(["watch", str(paper.folder)]) == 0
     out = capsys.readouterr().out
@@ -46,6 +47,7 @@ def test_without_a_terminal_one_picture_tells_how_it_ended(paper, capsys):
     assert "completed: The vehicle entered the goal region" in out
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("size", [(80, 24), (100, 24), (200, 50)])
 def test_every_picture_of_a_run_fits_its_terminal(paper, size):
     frames = list(looks(str(paper.folder), rate=None))

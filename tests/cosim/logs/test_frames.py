@@ -58,6 +58,7 @@ def test_a_vehicle_that_looks_north_in_enu_looks_north_in_ned():
     np.testing.assert_allclose(euler_zyx(turn_quaternions(bow_up, "ENU", "FLU"))[0], (0.0, 0.3, 0.0), atol=1e-12)
 
 
+@pytest.mark.medium(fast=5)
 @pytest.mark.parametrize("world", WORLDS)
 @pytest.mark.parametrize("body", BODIES)
 @given(angles=ANGLES)

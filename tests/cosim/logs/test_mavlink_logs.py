@@ -52,6 +52,7 @@ def facts_by_quantity(run):
     return {topic.quantity: topic for topic in load_log_facts(run.folder).topics}
 
 
+@pytest.mark.medium
 def test_every_sample_of_a_tlog_is_there(tlog):
     read = messages_of(TLOG, "ATTITUDE", "LOCAL_POSITION_NED", "SERVO_OUTPUT_RAW", "SCALED_PRESSURE2")
     topics = facts_by_quantity(tlog)
@@ -140,6 +141,7 @@ def test_a_dataflash_log_is_what_pymavlink_reads(dataflash):
         np.testing.assert_allclose(np.abs(record[name])[known], np.abs(expected)[known], atol=2e-5)
 
 
+@pytest.mark.medium
 def test_a_vehicle_of_another_frame_is_refused_and_leaves_nothing(tmp_path):
     with pytest.raises(ImportLogError, match=r"small\.BIN: the autopilot's frame is vectored, expected vectored_6dof"):
         cosim.import_log(DATAFLASH, "bluerov2_heavy", tmp_path / "run")
@@ -181,6 +183,7 @@ def test_sticks_are_the_commands_where_no_servo_output_is_logged(tmp_path):
     np.testing.assert_allclose(record["attitude.yaw"][20:-20], math.radians(30.0), rtol=1e-6)
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize(("path", "cut"), [(TLOG, 0.3), (DATAFLASH, 0.61803), (DATAFLASH, 0.9)])
 def test_a_log_that_breaks_off_is_read_as_far_as_it_goes(tmp_path, path, cut, six_thrusters):
     data = path.read_bytes()
@@ -191,6 +194,7 @@ def test_a_log_that_breaks_off_is_read_as_far_as_it_goes(tmp_path, path, cut, si
     assert run.summary["simulated_time"] > (60.0 if path is TLOG else 5.0)
 
 
+@pytest.mark.medium
 def test_junk_within_a_log_costs_no_more_than_what_it_hides(tmp_path):
     data = bytearray(TLOG.read_bytes())
     rng = np.random.default_rng(3)
@@ -247,6 +251,7 @@ def test_dataflash_formats_are_those_of_pymavlink():
     close(log)
 
 
+@pytest.mark.medium
 def test_report_replay_and_export_work_on_it(tlog, tmp_path):
     folder = tmp_path / "small"
     shutil.copytree(tlog.folder, folder)
@@ -263,6 +268,7 @@ def test_report_replay_and_export_work_on_it(tlog, tmp_path):
         assert Path(cosim.export_run(folder, form, tmp_path / f"out.{form}")[0]).stat().st_size > 10_000
 
 
+@pytest.mark.medium
 def test_a_scenario_judges_a_log(tmp_path):
     run = cosim.import_log(TLOG, "bluerov2_heavy", tmp_path / "run", scenario="depth-transit", report=False)
     record = run.record

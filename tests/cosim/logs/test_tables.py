@@ -95,6 +95,7 @@ def test_a_dive_in_other_units_and_frames_comes_out_as_it_was(write, suffix, sep
     assert set(facts.unread) == {"junk, with a comma"}
 
 
+@pytest.mark.medium(fast=5)
 @pytest.mark.parametrize("order", ["ZYX", "zyx", "XZY", "YXZ", "ZXZ"])
 @pytest.mark.parametrize("inverse", [False, True])
 def test_euler_angles_in_whichever_order(write, order, inverse):

@@ -123,6 +123,7 @@ def test_a_station_that_falls_silent(action, commands):
     assert station.wire.of("HEARTBEAT")[-1].system_status == mavlink.MAV_STATE_ACTIVE
 
 
+@pytest.mark.medium
 def test_none_is_none():
     station = commanding("none")
     station.wait(100.0, 0.5)
@@ -146,6 +147,7 @@ def test_only_who_commands_is_missed():
     assert station.commanded() == [Arm(False)]
 
 
+@pytest.mark.medium
 def test_simulated_time_does_not_count():
     station = commanding("disarm")
     for k in range(200):

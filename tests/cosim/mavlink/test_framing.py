@@ -127,6 +127,7 @@ def test_a_bad_datagram_costs_none_of_the_next_fifty(bad):
     assert found == list(range(50))
 
 
+@pytest.mark.medium
 def test_a_frame_with_a_wrong_bit_is_refused_and_the_stream_goes_on():
     station = Station()
     good = station.pack(odometry())

@@ -166,6 +166,7 @@ def test_a_speed_of_a_mission_is_a_parameter_from_then_on(station):
     assert station.commanded() == [ChangeSetting("law.gains.speed", 1.0)]
 
 
+@pytest.mark.medium(fast=11)
 @pytest.mark.parametrize(
     ("fields", "result"),
     [

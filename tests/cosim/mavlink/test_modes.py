@@ -26,6 +26,7 @@ def test_arming(station):
     assert station.commanded() == [Arm(True), Arm(False)]
 
 
+@pytest.mark.medium(fast=13)
 @pytest.mark.parametrize(
     ("profile", "numbers", "mode"),
     [
@@ -52,6 +53,7 @@ def test_each_profile_has_its_numbers(profile, numbers, mode):
     assert station.commanded()[-2:] == [SetMode(mode), SetMode(mode)]
 
 
+@pytest.mark.medium(fast=11)
 @pytest.mark.parametrize("profile", ["px4", "generic"])
 @pytest.mark.parametrize("number", [0, 3, 4, 9, 16, 19, 20, 21])
 def test_a_number_of_ardusub_means_nothing_else(profile, number):

@@ -115,6 +115,7 @@ def test_each_sector_has_the_nearest_that_is_in_it():
             assert 100.0 * nearest - 1.0 <= distance <= 100.0 * farthest + 1.0
 
 
+@pytest.mark.medium(fast=13)
 @pytest.mark.parametrize("bearing", np.radians(np.arange(0.0, 360.0, 7.3)))
 def test_nothing_wider_than_it_tells_slips_through(bearing):
     away = 19.6 * np.array([math.cos(bearing), math.sin(bearing), 0.0])

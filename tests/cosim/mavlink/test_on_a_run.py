@@ -54,6 +54,7 @@ def test_disarm_and_arm(flight):
     assert flight.wire.texts[-2:] == ["Disarmed", "Armed"]
 
 
+@pytest.mark.medium
 def test_a_velocity_is_flown_and_ends(flight):
     """MAVSDK's set_velocity_ned, streamed at 10 Hz."""
     flight.fly(0.1)
@@ -112,6 +113,7 @@ def test_by_hand(flight):
     assert flight.last("LOCAL_POSITION_NED").vx > 0.05
 
 
+@pytest.mark.medium
 def test_a_mission_of_regions(flight):
     flight.fly(0.1)
     places = [(0.6, 0.0, 1.0), (1.2, 0.4, 1.2)]
@@ -144,6 +146,7 @@ def test_who_listens_changes_nothing():
     assert rows[0].tobytes() == rows[1].tobytes()
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("value", [0.0, 1e-30, 1e9, -1e9])
 def test_no_parameter_ends_the_run(flight, value):
     flight.send(mavlink.MAVLink_param_request_list_message(1, 1))

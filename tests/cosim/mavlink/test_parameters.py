@@ -126,6 +126,7 @@ def test_the_frame_is_that_of_the_vehicle():
     assert read(Station("px4", of=heavy), "SYS_AUTOSTART")[0].param_value == 60002.0
 
 
+@pytest.mark.medium(fast=6)
 @pytest.mark.parametrize("name", list_scenarios())
 def test_no_setting_is_hidden_by_a_name_that_stations_look_for(name):
     keys = [setting.key for setting in LiveSettings(scenario(name=name))]

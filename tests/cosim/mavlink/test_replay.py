@@ -46,6 +46,7 @@ def logged(recorded, tmp_path_factory):
     return done, list(frames(log))
 
 
+@pytest.mark.medium
 def test_as_fast_as_it_goes_nothing_is_left_out(logged):
     done, messages = logged
     assert done.simulated == pytest.approx(4.0) and done.troubles == []

@@ -30,6 +30,7 @@ def run(station, seconds, step=0.01, **values):
     return station.wire.counts()
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(
     ("interval", "count"),
     [(20_000, 500), (15_000, 667), (33_333, 300), (1_000_000, 10), (1, 1000), (9_999, 1000), (-1, 0)],
@@ -39,6 +40,7 @@ def test_an_interval_is_kept_exactly(station, interval, count):
     assert run(station, 10.0)["ATTITUDE"] == pytest.approx(count, abs=1 if count else 0)
 
 
+@pytest.mark.medium
 def test_nothing_drifts_when_steps_do_not_fit(station):
     station.command(SET, ATTITUDE, 25_000)
     run(station, 60.0, step=0.007)
@@ -77,6 +79,7 @@ def test_an_interval_for_nothing(station, numbers):
     assert station.command(SET, *numbers) in (DENIED, FAILED)
 
 
+@pytest.mark.medium
 def test_a_link_carries_so_much_and_no_more(station):
     results = [station.command(SET, message_id, 1) for message_id in MESSAGES]
     assert DENIED in results and results[0] == ACCEPTED
@@ -85,6 +88,7 @@ def test_a_link_carries_so_much_and_no_more(station):
     assert sum(12 + len(m.get_payload()) for m in station.wire.got) <= GREATEST_LOAD
 
 
+@pytest.mark.medium(fast=9)
 @pytest.mark.parametrize("message_id", MESSAGES)
 def test_everything_in_the_table_can_be_asked_for(station, message_id):
     station.look(1.0, altitude=3.0, measured__altitude=3.0, **{"goal.clearance": (-3.0, 2.0, 2.0, 2.0, 3.0, 3.0)})

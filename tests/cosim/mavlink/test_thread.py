@@ -305,6 +305,7 @@ class Loud(StubVehicle):
             link.send(odometry(round(row[0] * 100) + 1))
 
 
+@pytest.mark.medium
 def test_a_client_that_never_reads_costs_no_other_client_a_frame():
     server = TcpIn(HERE, 0)
     link = link_of(server)

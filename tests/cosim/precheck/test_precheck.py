@@ -46,6 +46,7 @@ def paper():
 EACH_SCENARIO = [name if name == "paper" else pytest.param(name, marks=pytest.mark.slow) for name in list_scenarios()]
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", EACH_SCENARIO)
 def test_every_shipped_scenario_can_be_checked(name):
     result = check_scenario(load_scenario(name, [CLOSED]))
@@ -56,6 +57,7 @@ def test_every_shipped_scenario_can_be_checked(name):
     assert check_text(result).splitlines()[0].startswith(result.title)
 
 
+@pytest.mark.medium
 def test_properties_of_the_papers_vehicle(paper):
     assert [paper[name].status for name in ("Property 1", "Property 2", "Property 3", "(12)")] == [
         "holds", "holds", "note", "holds",
@@ -116,6 +118,7 @@ def test_start_near_the_goal_holds():
     assert near["(38) 1, 2"].status == near["(45) 1"].status == "holds"
 
 
+@pytest.mark.medium
 def test_goals_that_are_no_sphere():
     box = "goal={type='box',centre=[8,0,5],size=[1,1,1]}"
     found = of_law(box)
@@ -132,6 +135,7 @@ def test_start_inside_a_hard_region_fails_and_the_advice_leads_out():
     assert [float(x) for x in place.split(",")] == pytest.approx([0.0, 0.0, 0.7], abs=0.01)
 
 
+@pytest.mark.medium
 def test_covered_goal_fails_and_names_who_covers_it():
     found = of_regions("regions.SR2.shape.centre=[8,0,5.1]", "regions.SR2.shape.radius=0.8")
     assert found["goal and regions"].status == "fails"
@@ -144,6 +148,7 @@ def test_covered_goal_fails_and_names_who_covers_it():
     assert found["way"].status == "fails"
 
 
+@pytest.mark.medium
 def test_contradictory_regions_fail():
     found = of_regions(
         "regions.SR1.keep=in",
@@ -175,11 +180,13 @@ def test_a_vehicle_that_is_too_heavy_is_not_blamed_on_the_current():
     assert found.status == "fails" and "Trim" in found.advice
 
 
+@pytest.mark.medium
 def test_thruster_that_cannot_be_missed_is_a_note():
     found = of_thrust("plant.parameters.weight=1320")["one thruster lost"]
     assert found.status == "note" and "5, 6, 7, 8" in found.text
 
 
+@pytest.mark.medium
 def test_other_laws_are_not_held_to_the_printed_laws_theory():
     changes = ("law.name=deployable", "law.gains={}", "actuation.through=thrusters")
     result = check_scenario(load_scenario("paper", [CLOSED, *changes]))
@@ -210,6 +217,7 @@ def test_no_regions():
     assert "goal and regions" not in found and found["way"].status == "holds"
 
 
+@pytest.mark.medium
 def test_command_says_what_to_change_and_fails(capsys):
     assert main(["check", "paper", "--set", CLOSED]) == 1
     said = capsys.readouterr().out
@@ -217,6 +225,7 @@ def test_command_says_what_to_change_and_fails(capsys):
     assert "within 1.64 m" in said and "26.82 kN" in said
 
 
+@pytest.mark.medium
 def test_command_succeeds_where_nothing_fails(capsys):
     arguments = [word for change in (CLOSED, *MENDED) for word in ("--set", change)]
     assert main(["check", "paper", *arguments]) == 0

@@ -49,6 +49,7 @@ def margin(current, weight=ODIN.weight, quaternion=LEVEL, vehicle=ODIN):
     return thrust_margin(vehicle, phi, quaternion, np.array(current))
 
 
+@pytest.mark.medium
 def test_still_water():
     m = margin(STILL)
     assert m.drag == 0.0 and m.excess_weight == pytest.approx(-2.0)
@@ -57,6 +58,7 @@ def test_still_water():
     assert [left.force for left in m.left_without[4:]] == pytest.approx([52.0] * 4)
 
 
+@pytest.mark.medium
 def test_current_takes_its_drag():
     """48 N s2/m2 at 0.4 m/s from the south: 7.68 N, of which 1/sqrt(2) along the weak diagonal."""
     m = margin([0.4, 0.0, 0.0])
@@ -66,6 +68,7 @@ def test_current_takes_its_drag():
     assert m.left.force == pytest.approx(54.0 - 7.68 / math.sqrt(2.0))
 
 
+@pytest.mark.medium
 def test_weight_narrows_the_vertical():
     m = margin(STILL, weight=ODIN.buoyancy + 100.0)
     assert m.hold[2] == pytest.approx(-100.0)  # up
@@ -77,6 +80,7 @@ def test_too_much_cannot_be_held():
     assert margin([2.0, 0.0, 0.0]).left is None
 
 
+@pytest.mark.medium
 def test_munks_moment_is_held_too():
     """A long body in an oblique stream wants to turn across it."""
     rov = load_vehicle("bluerov2_heavy")
@@ -86,6 +90,7 @@ def test_munks_moment_is_held_too():
     assert m.hold[5] == pytest.approx((sway - surge) * 0.3 * 0.3)
 
 
+@pytest.mark.medium
 def test_attitude_turns_the_thrusters_with_it():
     turned = Rotation.from_euler("z", 45, degrees=True).as_quat(scalar_first=True)
     m = margin(STILL, quaternion=turned)

@@ -18,6 +18,7 @@ from tests.cosim.replay.decoding import read_page
 NO_ROOT = pytest.mark.skipif(hasattr(os, "geteuid") and os.geteuid() == 0, reason="root may write everywhere")
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(
     ("kind", "status", "rows", "last"),
     [
@@ -96,6 +97,7 @@ def _bad_scenario(folder):
     (folder / "scenario.toml").write_text("vehicle = 7\n")
 
 
+@pytest.mark.medium(fast=5)
 @pytest.mark.parametrize(
     ("spoilt", "text"),
     [
@@ -121,6 +123,7 @@ def test_what_is_no_run_is_one_clear_line_and_leaves_the_page_alone(spoilt, text
     assert sorted(folder.rglob("*")) == before
 
 
+@pytest.mark.medium
 def test_a_run_has_its_page_unless_no_report_is_wanted(tmp_path, capsys):
     quick = ["--set", "arbiter.engine=closed", "--set", "time.duration=0.05"]
     assert main(["run", "docking", "--out", str(tmp_path / "with"), *quick]) == 0

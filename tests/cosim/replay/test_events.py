@@ -46,6 +46,7 @@ def told(run, kind, log=()):
     return [(event.time, event.text) for event in events_of(run, log) if event.kind == kind]
 
 
+@pytest.mark.medium
 def test_the_paper_s_run_is_told_in_order(paper):
     events = events_of(paper, ())
     assert [event.time for event in events] == sorted(event.time for event in events)

@@ -54,6 +54,7 @@ def streamed(monkeypatch):
     return reopened
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", RUNS)
 def test_what_is_told_of_a_run_does_not_depend_on_how_it_is_read(name, run_of, streamed):
     run = run_of(name)
@@ -72,6 +73,7 @@ def test_gaps_are_told_as_they_are(docking, copy_of, spoil, streamed):
     assert trace_of(long).as_json() == trace_of(run).as_json()
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize(("every", "rate"), [(1, None), (7, None), (1, 30.0)])
 def test_an_excerpt_is_the_same(every, rate, docking, streamed):
     held, long = (excerpt_of(run.folder, every=every, rate=rate) for run in (docking, docking))
@@ -82,6 +84,7 @@ def test_an_excerpt_is_the_same(every, rate, docking, streamed):
     assert long.take(steps, ["time"])["time"].tolist() == held.signal("time")[steps].tolist()
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("name", RUNS)
 def test_figures_of_a_long_run_draw_few_rows_and_miss_no_extreme(name, run_of, streamed, monkeypatch):
     monkeypatch.setattr("cosim.report.figures.sampled_rows._MOST", 2000)

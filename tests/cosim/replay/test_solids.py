@@ -105,6 +105,7 @@ def test_a_mesh_is_drawn_as_it_comes():
     assert sum(edge[4] for edge in solid["edges"]) == 12  # those between its sides alone are sharp
 
 
+@pytest.mark.medium(fast=8)
 @pytest.mark.parametrize("name", BOUNDED)
 def test_the_points_of_a_surface_are_on_it(surfaces, name):
     points = np.reshape(surfaces[name]["points"], (-1, 3))
@@ -157,6 +158,7 @@ def test_a_point_is_hidden_where_the_line_from_the_eye_meets_the_shape(name):
     assert (np.array(hidden) == (least < 0.0))[clear].all()
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize(
     "shape",
     [DepthBand(3.0, 1.0), HalfSpace((1.0, 2.0, 3.0), (0.3, -1.0, 0.4)), HalfSpace((0.0, 0.0, 4.0), (0.0, 0.0, 1.0))],
@@ -265,6 +267,7 @@ def test_down_is_downwards_north_is_up_from_above_and_to_the_right_from_the_side
         assert (np.ptp(seen, axis=0) > [600.0, 400.0]).any()
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("name", ["sphere", "ellipsoid"])
 def test_lines_of_sight_along_the_outline_of_a_ball_touch_it(name):
     outline = run(

@@ -44,6 +44,7 @@ def within(areas, points):
     return np.round(turns) != 0
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("view", [SIDE, ABOVE, ASLANT], ids=["side", "above", "aslant"])
 @pytest.mark.parametrize("name", SHAPES)
 def test_an_area_is_what_lines_of_sight_meet(name, view):

@@ -74,6 +74,7 @@ def test_every_figure_can_be_drawn(request, name):
 LABELLED = re.compile(r"\[(m|s|N|N m|W|°|–)\]$")
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", ["inspection", "drifting"])
 def test_every_axis_of_every_figure_has_a_name_and_a_unit(request, name):
     for drawing in drawings(request.getfixturevalue(name)):
@@ -119,6 +120,7 @@ def shown(text):
     return True
 
 
+@pytest.mark.medium
 def test_a_view_from_above_has_east_to_the_right_of_north(drifting):
     (figure,) = (drawing.figure for drawing in drawings(drifting) if drawing.name == "path-plane")
     side, above = figure.axes

@@ -13,6 +13,7 @@ from cosim.errors import RunError
 VERBS = [["report", "{run}"], ["export", "{run}", "--to", "npz"], ["replay", "{run}", "--out", "replay.html"]]
 
 
+@pytest.mark.medium(fast=4)
 @pytest.mark.parametrize("verb", VERBS, ids=lambda words: words[0])
 @pytest.mark.parametrize(("said", "named"), [(None, "1"), ({"format": "3"}, "3"), ({"format": "x\x1b"}, "x")])
 def test_a_record_of_another_form_is_refused(shipped_run, tmp_path, monkeypatch, capsys, verb, said, named):

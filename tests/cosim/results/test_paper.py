@@ -27,6 +27,7 @@ def test_paper_without_a_limit(shipped_run, engine):
     assert summary["saturated_time"] == 0.0
 
 
+@pytest.mark.medium
 def test_shipped_paper_runs_scikit_fuzzy(shipped_run):
     assert shipped_run("paper", "arbiter.engine=skfuzzy", "time.duration=5").summary["arbiter"] == "skfuzzy"
     from cosim.scenario.scenario import load_scenario
@@ -66,6 +67,7 @@ def test_paper_limited_to_108_newtons(shipped_run):
     assert record["estimate.phi1"][60_000] == pytest.approx(-61.6, abs=1.0)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("limit", "window", "speed"),
     [pytest.param(76.4, (3.24, 3.92), 1.4, marks=pytest.mark.slow), (100.0, (2.82, 3.42), 1.6)],
@@ -86,6 +88,7 @@ def test_paper_calibrated_meets_the_papers_window(shipped_run):
     assert left == pytest.approx(2.95, abs=0.12)
 
 
+@pytest.mark.medium
 def test_a_run_repeats_to_the_last_bit(shipped_run, tmp_path):
     """The scenario file in a run folder is all that a run depends on."""
     from cosim.run.run import run_scenario

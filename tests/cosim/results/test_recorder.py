@@ -150,6 +150,7 @@ def test_a_long_record_has_larger_row_groups_and_few(tmp_path, monkeypatch):
     assert load_record(tmp_path)["x"].tolist() == [2.0 * k for k in range(12_345)]
 
 
+@pytest.mark.medium
 def test_a_part_holds_64_mib_at_the_most(tmp_path, monkeypatch):
     monkeypatch.setattr("cosim.results.recorder.time.monotonic", lambda: 0.0)
     columns = [Column(f"c{i}", "", "x") for i in range(2000)]
@@ -227,6 +228,7 @@ def test_where_the_whole_finds_no_room_parts_hold_what_there_is_room_for(tmp_pat
     assert not list((tmp_path / PARTS).glob("*.tmp"))
 
 
+@pytest.mark.medium
 def test_a_slow_run_takes_no_more_memory_as_it_goes_on(tmp_path, monkeypatch):
     now = itertools.count(0.0, 0.3)
     monkeypatch.setattr("cosim.results.recorder.time.monotonic", lambda: next(now))

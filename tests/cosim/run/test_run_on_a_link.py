@@ -89,6 +89,7 @@ def patient_links(monkeypatch):
         monkeypatch.setattr(f"cosim.mavlink.thread.{limit}", 120.0)
 
 
+@pytest.mark.medium
 def test_the_record_is_the_same_to_the_last_bit_whoever_listens(tmp_path):
     scenario = load_scenario("harbour", SHORT)
     alone = run_scenario(scenario, tmp_path / "alone", report=False)

@@ -53,6 +53,7 @@ def test_D7_a_closed_standard_output_is_one_line_and_nothing_is_done(program, wo
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("program", MAINS)
 def test_D7_a_process_without_standard_output(program):
     command = f"{sys.executable} -m {program} {' '.join(PRINTS[program])} >&-"
@@ -78,6 +79,7 @@ def test_D7_without_standard_input_scenes_are_none(tmp_path, capsys, monkeypatch
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
 @pytest.mark.parametrize("program", MAINS)
 def test_D7_a_full_standard_output_is_one_line(program):
@@ -106,6 +108,7 @@ SETTINGS = {
 }
 
 
+@pytest.mark.medium(fast=11)
 @pytest.mark.parametrize("setting", SETTINGS.values(), ids=SETTINGS)
 @pytest.mark.parametrize(
     "words",
@@ -312,6 +315,7 @@ def test_D12_every_verb_is_tried():
     assert set(VERBS) == set(cli._VERBS)
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(
     "verb", [pytest.param(verb, marks=pytest.mark.slow) if verb in SLOW | WAITING else verb for verb in VERBS]
 )
@@ -357,6 +361,7 @@ OTHERS = [
 ]
 
 
+@pytest.mark.medium(fast=3)
 @pytest.mark.parametrize(("program", "words"), OTHERS, ids=lambda value: value if isinstance(value, str) else value[0])
 def test_D12_a_reader_that_goes_away_ends_the_other_commands_alike(
     program, words, tmp_path, unread, capsys, monkeypatch
@@ -370,6 +375,7 @@ def test_D12_a_reader_that_goes_away_ends_the_other_commands_alike(
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(
     ("program", "words"),
     [*PRINTS.items(), ("cosim", ["scenes", "--count", "3000"]), ("cosim", ["--help"]), ("plant_fmu", ["--help"])],
@@ -410,6 +416,7 @@ def make_trap(kind, path):
         path.symlink_to(kind)
 
 
+@pytest.mark.medium(fast=17)
 @pytest.mark.parametrize("kind", ["pipe", "folder", "socket", "/dev/null", "/dev/zero"])
 @pytest.mark.parametrize("role", ["scenario", "base", "vehicle", "vehicle of a plant", "definition"])
 def test_D13_what_is_no_file_is_one_line_and_no_hang(role, kind, tmp_path, capsys, monkeypatch):

@@ -69,6 +69,7 @@ def test_a_killed_run_says_whose_law_it_was(scenario, named, tmp_path):
     assert load_run(run.folder).summary["law"] == NAME
 
 
+@pytest.mark.medium
 def test_the_file_of_such_a_run_is_read_but_not_run(scenario, named, tmp_path):
     run = run_scenario(scenario, tmp_path / "run", report=False, law=named)
     again = load_scenario(run.folder / "scenario.toml")

@@ -22,6 +22,7 @@ def weights(variant, criteria, memberships):
     return Arbiter(system=system)([by_name[variable.name] for variable in system.inputs])
 
 
+@pytest.mark.medium
 def test_reversed_rules_are_those_of_the_reversed_order():
     last_first = Arbiter(system=prioritised(SECTION_VI[::-1]))
     for memberships in itertools.product(PLACES, repeat=3):

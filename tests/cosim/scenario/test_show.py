@@ -29,6 +29,7 @@ def shown(capsys):
     return show
 
 
+@pytest.mark.medium(fast=3)
 @pytest.mark.parametrize("name", list_scenarios())
 def test_what_is_shown_is_the_same_scenario(name, shown, tmp_path):
     (tmp_path / "mine.toml").write_text(shown(name))
@@ -135,6 +136,7 @@ VALUE = st.recursive(
 )
 
 
+@pytest.mark.medium
 @given(st.dictionaries(TEXT, VALUE, max_size=5))
 def test_any_table_reads_back_as_it_was(table):
     for said in ({}, {"time.step": "s, a comment", **dict.fromkeys(table, "one\tmore")}):

@@ -74,6 +74,7 @@ def test_it_goes_round_a_rock():
     assert flight.clearance(ROCK).min() > 0.0
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(("weight", "share"), [(0.0, 1e-3), (1.0, 1e-6)])
 def test_a_barrier_that_works_gives_way_by_a_small_share_of_what_it_asks_for(weight, share):
     """A rock alone on the way: the slack is never 0 then, but far below what docs/deployable.md counts as kept."""
@@ -84,10 +85,12 @@ def test_a_barrier_that_works_gives_way_by_a_small_share_of_what_it_asks_for(wei
     assert 0.1 * share * most < yielding.max() < share * most
 
 
+@pytest.mark.medium
 def test_no_regions_at_all_is_a_scene_too():
     assert reached(fly([]))
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("length", [1.0, 5.0])
 def test_a_measurement_of_nan_is_bridged_then_waited_for(length):
     """Within `coast` it goes on by its model and stops the vehicle; after it, the thrusters rest until it is back."""
@@ -100,6 +103,7 @@ def test_a_measurement_of_nan_is_bridged_then_waited_for(length):
     assert rests.any() == (length > 2.0) and not flight.forces[rests].any()
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("lost", ["velocity", "position"])
 def test_what_is_left_of_the_measurements_is_enough(lost):
     """From 2 s to the end: a position without a velocity, or a velocity without a position."""
@@ -117,6 +121,7 @@ def test_what_is_left_of_the_measurements_is_enough(lost):
     assert flight.report("time_since_measurement").max() < 0.05
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("held", [False, True])
 def test_navigation_at_one_hertz_is_slower_but_keeps_clear(held):
     """Between two measurements there is nothing, or the last one again."""
@@ -140,6 +145,7 @@ def test_navigation_at_one_hertz_is_slower_but_keeps_clear(held):
     assert flight.report("desired_speed")[flight.time > 3.0].max() < 0.6
 
 
+@pytest.mark.medium
 def test_a_frozen_sensor_is_a_dead_one():
     held = {}
 
@@ -176,12 +182,14 @@ def test_without_any_measurement_the_thrusters_rest():
     assert not flight.forces.any()
 
 
+@pytest.mark.medium
 def test_infinite_and_unnormalized_measurements_are_none():
     bad = VehicleState(np.array([np.inf, 0.0, 0.0]), np.array([5.0, 0.0, 0.0, 0.0]), np.full(6, np.inf), np.ones(8))
     flight = fly([ROCK], spoil=lambda t, s: bad if 2.0 < t < 3.0 else s)
     assert reached(flight) and within_limits(flight) and flight.clearance(ROCK).min() > 0.0
 
 
+@pytest.mark.medium
 def test_a_single_outlier_is_not_believed():
     off = np.array([2.0, -1.0, 1.0])
     calm = fly([ROCK])
@@ -189,6 +197,7 @@ def test_a_single_outlier_is_not_believed():
     assert np.abs(flight.position - calm.position).max() < 0.1
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(("weights", "kept"), [((1.0, 0.0), 0), ((0.0, 1.0), 1)])
 def test_of_two_regions_that_exclude_each_other_the_weightier_is_kept(weights, kept):
     """North of 1 m and south of 0 m at once: the arbiter's weight says which of them yields."""
@@ -201,6 +210,7 @@ def test_of_two_regions_that_exclude_each_other_the_weightier_is_kept(weights, k
     assert flight.report("constraint_slack")[-1] > 0.1
 
 
+@pytest.mark.medium
 def test_with_equal_weights_both_yield_alike():
     south = Region("south", HalfSpace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in")
     north = Region("north", HalfSpace((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)), "in")
@@ -208,6 +218,7 @@ def test_with_equal_weights_both_yield_alike():
     assert flight.position[-1, 0] == pytest.approx(0.5, abs=0.02)
 
 
+@pytest.mark.medium
 def test_from_within_an_obstacle_it_leaves_at_once():
     inside = Region("inside", Sphere((0.0, 0.2, 2.0), 0.8), "out")
     flight = fly([inside])
@@ -216,6 +227,7 @@ def test_from_within_an_obstacle_it_leaves_at_once():
     assert flight.time[out] < 5.0 and clearance[out:].min() > 0.0 and reached(flight)
 
 
+@pytest.mark.medium
 def test_a_goal_that_is_covered_is_waited_for():
     cover = Region("cover", Sphere((6.0, 0.0, 2.0), 0.9), "out")
     flight = fly([cover])
@@ -223,12 +235,14 @@ def test_a_goal_that_is_covered_is_waited_for():
     assert np.abs(np.diff(flight.position[-100:], axis=0)).max() < 0.01
 
 
+@pytest.mark.medium
 def test_it_makes_way_for_what_comes_and_returns():
     comer = Region("comer", Sphere((9.0, 0.0, 2.0), 0.6), "out", velocity=(-0.15, 0.0, 0.0))
     flight = fly([comer], duration=60.0)
     assert flight.clearance(comer).min() > 0.0 and reached(flight)
 
 
+@pytest.mark.medium
 def test_it_follows_a_goal_that_moves():
     goal = Region("goal", Sphere((4.0, 0.0, 2.0), 0.5), "in", velocity=(0.1, 0.15, 0.0))
     flight = fly([], goal=goal, duration=40.0)
@@ -250,6 +264,7 @@ def test_a_box_with_one_opening_is_left_through_it():
     assert min(flight.clearance(wall).min() for wall in walls) > 0.0
 
 
+@pytest.mark.medium
 def test_restoring_force_and_current_are_found():
     flight = fly([], duration=40.0, plant={"buoyancy": 1226.25 - 12.0, "current.x": -0.2, "current.y": 0.15})
     assert reached(flight)
@@ -277,6 +292,7 @@ def test_the_feature_stays_in_view_on_the_way():
     assert angle_to(fly([], duration=40.0), feature).max() > 1.0
 
 
+@pytest.mark.medium
 def test_a_soft_view_is_lost_in_passing_alone():
     feature = (4.0, 3.0, 2.0)
     view = Region("view", Visibility(feature, (1.0, 0.0, 0.0), 0.7), "in", hard=False)
@@ -285,12 +301,14 @@ def test_a_soft_view_is_lost_in_passing_alone():
     assert np.mean(angle_to(flight, feature) < 0.7) > 0.7
 
 
+@pytest.mark.medium
 def test_a_feature_behind_is_turned_to():
     view = Region("view", Visibility((-4.0, 0.5, 2.0), (1.0, 0.0, 0.0), 0.5), "in")
     flight = fly([view], duration=40.0)
     assert angle_to(flight, (-4.0, 0.5, 2.0))[-1] < 0.5 and reached(flight)
 
 
+@pytest.mark.medium
 def test_an_orientation_region_turns_the_vehicle():
     quarter = (np.cos(np.pi / 4), 0.0, 0.0, np.sin(np.pi / 4))
     facing = Region("facing", Orientation(quarter, 0.2), "in")
@@ -298,6 +316,7 @@ def test_an_orientation_region_turns_the_vehicle():
     assert 2 * np.arccos(abs(flight.quaternion[-1] @ quarter)) < 0.2 and reached(flight)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("lost", [2, 6])
 def test_a_lost_thruster_that_is_told_is_not_used(lost):
     def tell(now, state):

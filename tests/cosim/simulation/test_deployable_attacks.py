@@ -237,6 +237,7 @@ def test_no_turn_is_seen_where_another_face_becomes_the_nearest():
         assert gradient_rate(kind, 1.0, one, other, 0.5 * one) == 0.0
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(
     "region",
     [

@@ -24,6 +24,7 @@ def run(tmp_path_factory):
     return run_scenario(load_scenario("paper", TOUR), tmp_path_factory.mktemp("tour") / "run", report=False)
 
 
+@pytest.mark.medium
 def test_the_goal_goes_on_when_the_vehicle_has_stayed_in_it(run):
     record = load_record(run.folder)
     place = np.rint(record["goal.place"]).astype(int)

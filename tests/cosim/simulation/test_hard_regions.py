@@ -198,6 +198,7 @@ def flown(tmp_path):
     return fly
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize(
     ("name", "reached"),
     [("ellipsoid", False), ("bluerov2-box-corner", False), ("wall", True), ("transit60-slab4", True)],
@@ -207,6 +208,7 @@ def test_what_once_broke_the_law_is_kept(flown, name, reached):
     assert outcome["min_clearance"] > 0.0 and bool(outcome["settled"]) == reached
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("vehicle", VEHICLES)
 @pytest.mark.parametrize("kind", ["ellipsoid", "sphere", "box", "cylinder", "cone"])
 @pytest.mark.parametrize("seeds", [range(1), pytest.param(range(1, 60), marks=pytest.mark.slow)], ids=["few", "many"])
@@ -215,6 +217,7 @@ def test_a_room_is_kept_wherever_its_goal_lies(flown, kind, vehicle, seeds):
     assert left == []
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("vehicle", VEHICLES)
 @pytest.mark.parametrize("kind", FAMILIES)
 @pytest.mark.parametrize("seeds", [range(1), pytest.param(range(1, 40), marks=pytest.mark.slow)], ids=["few", "many"])

@@ -32,6 +32,7 @@ def rows_of(scenario):
         return np.array(rows.rows), master.signals
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("scenario", [("paper", SHORT), (ALL_SHAPES, [])], ids=["paper", "all shapes"])
 def test_jacobi_is_three_parts_that_exchange_at_the_end_of_each_step(scenario):
     name, settings = scenario

@@ -77,6 +77,7 @@ def test_rate_is_that_of_v_up_to_the_sampling():
     assert coarse < 2e-3
 
 
+@pytest.mark.medium
 def test_rate_is_not_that_of_v_where_the_theory_does_not_reach():
     """A limit on the force; weights that change (d alpha/dt neglected); gradients that are not 1 (as printed)."""
     strong = ("regions.SR1.gain=1e5", "regions.SR2.gain=1e5", "time.duration=0.3")
@@ -93,6 +94,7 @@ def test_nothing_is_recorded_unless_asked_for():
         assert not [c.name for c in master.signals.columns if c.name.startswith("lyapunov")]
 
 
+@pytest.mark.medium
 def test_recording_changes_nothing_else(shipped_run):
     short = ("arbiter.engine=closed", "time.duration=1")
     without, with_v = (load_record(shipped_run("paper", *short, *more).folder) for more in ((), QUICK[1:]))

@@ -127,6 +127,7 @@ def test_every_curve_is_tried():
     assert set(CURVES) == set(KINDS) - {"singleton"}  # which jumps
 
 
+@pytest.mark.medium(fast=6)
 @pytest.mark.parametrize(
     "term", [*({kind: numbers} for kind, numbers in CURVES.items()), {"gaussian": [0.2, 0.5], "height": 0.7}], ids=str
 )

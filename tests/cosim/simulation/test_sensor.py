@@ -83,6 +83,7 @@ def same(one, other):
     return len(one) == len(other) > 0 and all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("untold", [*([key] for key in UNTOLD), UNTOLD], ids=[*UNTOLD, "all"])
 def test_what_the_law_is_not_told_leaves_its_arguments_alone(spy, untold):
     """Construction and first step have the same arguments bit for bit; the last step, in another place, has not."""
@@ -93,6 +94,7 @@ def test_what_the_law_is_not_told_leaves_its_arguments_alone(spy, untold):
     assert not np.array_equal(plain.steps[-1][0], changed.steps[-1][0])
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("told", ["regions.SR1.shape.radius=0.6", "goal.velocity=[0.1,0,0]", "sensing.seed=8"])
 def test_the_first_step_sees_what_it_is_told(spy, told):
     """Keep the test above from passing by blindness."""

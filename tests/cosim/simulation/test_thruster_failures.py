@@ -25,6 +25,7 @@ def flown(failures, *more):
     return table[:, columns[0]], table[:, columns[1]]
 
 
+@pytest.mark.medium
 def test_a_thruster_that_loses_part_of_its_force_gives_the_rest():
     asked, given = flown("[{thruster=3, time=1.0, effectiveness=0.3}]")
     left = np.array([1.0, 1.0, 0.3, 1.0, 1.0, 1.0, 1.0, 1.0])
@@ -33,6 +34,7 @@ def test_a_thruster_that_loses_part_of_its_force_gives_the_rest():
     assert np.median(given[100:900] / asked[100:900], axis=0) == pytest.approx(np.ones(8), rel=1e-3)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
 def test_a_thruster_that_is_stuck_keeps_the_force_it_was_given_last(order):
     asked, given = flown("[{thruster=5, time=1.0, stuck=true}]", f"master.order={order}")

@@ -44,6 +44,7 @@ def test_the_ways_of_a_dvl_add_up():
     assert np.sum([turned for *_, turned, _ in found], axis=0) == pytest.approx((0.0, 0.0, 1.0))
 
 
+@pytest.mark.medium
 def test_a_dvl_is_late_and_loses_what_it_is_said_to():
     late = told(DvlOptions(rate=8.0, latency=0.25))
     assert [time - stamp / 1e6 for time, stamp, *_ in late] == pytest.approx([0.25] * len(late), abs=1e-6)

@@ -220,6 +220,7 @@ def test_garbage_between_the_frames_does_nothing(serve_px4):
     assert np.array_equal(found[0], found[1]) and np.array_equal(found[0], found[2])
 
 
+@pytest.mark.medium
 def test_silence_ends_it(serve_px4):
     served = serve_px4(timeout=0.3)
     with Px4(served.address) as px4:

@@ -233,6 +233,7 @@ def test_a_second_sender_is_refused_while_the_first_is_there(serve):
     assert set(load_record(outcome.runs[0].folder)["law.pwm5"]) == {1501.0}
 
 
+@pytest.mark.medium
 def test_an_autopilot_from_another_port_takes_over_from_a_silent_one(serve, monkeypatch):
     """With the next count it goes on, as one behind a relay does; with any other it is a new one."""
     monkeypatch.setattr("cosim.sitl.server._PRESENT", 0.05)
@@ -256,6 +257,7 @@ def test_a_rate_that_changes_on_the_way_changes_no_step(serve):
     served.outcome()
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("rate", [11, 50, 400, 4000])
 def test_the_step_is_that_of_the_first_frame(serve, rate):
     served = serve("time.duration=0.5")
@@ -266,6 +268,7 @@ def test_the_step_is_that_of_the_first_frame(serve, rate):
     assert served.outcome().runs[0].summary["status"] == "completed"
 
 
+@pytest.mark.medium
 def test_the_record_is_the_same_to_the_bit_however_the_clock_on_the_wall_goes(serve):
     found = []
     for hurry in (True, False):
@@ -282,6 +285,7 @@ def test_the_record_is_the_same_to_the_bit_however_the_clock_on_the_wall_goes(se
     assert np.array_equal(*found)
 
 
+@pytest.mark.medium
 def test_the_record_is_thinned_out_and_the_summary_knows(serve):
     found = []
     for rate in (100.0, 1200.0):
@@ -298,6 +302,7 @@ def test_the_record_is_thinned_out_and_the_summary_knows(serve):
     assert full.summary["effort"] == pytest.approx(40.0 * 0.5, rel=1e-6)  # N s
 
 
+@pytest.mark.medium
 def test_silence_ends_the_run_after_the_timeout(serve):
     served = serve(timeout=0.3)
     with StandIn(served.address) as pilot:

@@ -71,6 +71,7 @@ def assert_step(slave, parts, k, motion, weights):
     np.testing.assert_allclose(read(slave, ".clearance"), clearances, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.medium
 def test_controller_is_the_python_law_over_random_inputs(controller, scenario):
     """Every shape, regions on the move, a law at every third step, an estimate that is carried on."""
     rng, parts = np.random.default_rng(4), Parts(scenario)
@@ -142,6 +143,7 @@ def test_ranges_are_kept(controller):
             controller.set({name: value})
 
 
+@pytest.mark.medium
 def test_steps_longer_than_a_period_are_refused(controller, arbiter):
     controller.initialise()
     with pytest.raises(PlantError, match=re.escape("step of 0.04 s is longer than time.control = 0.03 s")):
@@ -224,6 +226,7 @@ def test_a_restored_controller_goes_on_as_before(scenario, fmi):
         np.testing.assert_array_equal(go(motions), once)
 
 
+@pytest.mark.medium
 def test_fmpy_gives_the_same_as_our_own_stepping(scenario):
     """By name and one by one, as any importer does."""
     path = cached_fmu(controller_component(scenario), 2)

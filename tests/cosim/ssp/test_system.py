@@ -72,6 +72,7 @@ def compared(ours, theirs):
     np.testing.assert_allclose(theirs, ours[1:], rtol=0.0, atol=1e-10)
 
 
+@pytest.mark.medium
 def test_fmpy_flies_it_as_we_do(packed):
     """With every shape, regions and goal on the move, a current, a lag, and three periods."""
     scenario = load_scenario(ALL_SHAPES)

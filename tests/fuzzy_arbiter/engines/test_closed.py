@@ -60,6 +60,7 @@ def test_it_is_the_exact_centroid_on_100_000_inputs():
     assert np.abs(raw[:10_000] - swept).max() <= 8 * EPS  # both are rounded
 
 
+@pytest.mark.medium
 @settings(max_examples=examples(60), deadline=None)
 @given(st.lists(st.fractions(0, 1, max_denominator=64), min_size=1, max_size=5))
 def test_it_is_the_centroid_by_definition_in_rational_numbers(memberships):
@@ -69,6 +70,7 @@ def test_it_is_the_centroid_by_definition_in_rational_numbers(memberships):
     assert Arbiter(system=system, engine="closed")(inputs) == pytest.approx(exact, abs=4 * EPS)
 
 
+@pytest.mark.medium
 @settings(max_examples=examples(60), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(shapes(), shapes(), st.floats(0.0, 1.0))
 def test_any_pair_of_output_terms_has_its_pieces(low, high, h):
@@ -79,6 +81,7 @@ def test_any_pair_of_output_terms_has_its_pieces(low, high, h):
     assert engine.weights_of_many(np.array([[h]]))[0] == pytest.approx(engine.weights([h]), abs=EPS)
 
 
+@pytest.mark.medium
 @settings(max_examples=examples(30), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(shapes(), shapes(), st.floats(0.0, 1.0), st.sampled_from(["range", "sum", "max"]))
 def test_weights_of_any_pair_are_those_of_the_exact_engine(low, high, h, normalization):
@@ -112,6 +115,7 @@ def test_a_centroid_beyond_both_ends_is_clipped():
     assert arbiter.batch([[0.7], [1.0]]).tolist() == [[0.0], [1.0]]
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("height", [1e-2, 1e-4, 1e-6])
 def test_terms_of_very_different_areas(height):
     """Where the area is a millionth of what it was, and C(h) a million times as steep."""

@@ -30,6 +30,7 @@ from tests.fuzzy_arbiter.systems import shapes, systems
 EPS = np.finfo(float).eps
 
 
+@pytest.mark.medium
 @settings(max_examples=examples(150), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(systems(), st.data())
 def test_it_is_the_exact_centroid_of_any_system(system, data):

@@ -105,6 +105,7 @@ def random_engines(rng, points):
         return *engines, cuts[:, cuts.any(axis=0)]
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("points", [3, 10, 11, 101, 1001])
 def test_any_output_at_any_cuts_is_as_scikit_fuzzy_has_it(points):
     rng = np.random.default_rng(points)
@@ -118,6 +119,7 @@ def test_any_output_at_any_cuts_is_as_scikit_fuzzy_has_it(points):
         assert found.tolist() == [grid.centroid(0, column) for column in cuts.T.tolist()]
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("points", [3, 10, 37])
 def test_any_output_at_any_cuts_is_to_rounding_what_scikit_fuzzy_means(points):
     rng = np.random.default_rng(points)
@@ -152,6 +154,7 @@ def test_section_vi_at_any_number_of_points(high, low, points):
     assert ours == pytest.approx(grid.centroid_of_many(0, np.array([[low], [high]]))[0], abs=BAR)
 
 
+@pytest.mark.medium(fast=3)
 @pytest.mark.parametrize("points", [3, 11, 101, 1001])
 def test_section_vi_is_off_the_exact_centroid_by_a_sixth_of_the_squared_step_at_most(points):
     step = 1 / (points - 1)

@@ -55,6 +55,7 @@ def sampled(output, cuts, implications, points=500_000):
     return x, y
 
 
+@pytest.mark.medium(fast=4)
 @pytest.mark.parametrize("implication", ["min", "prod", "einstein_product", "hamacher_product"])
 @pytest.mark.parametrize("aggregation", ["max", "probor", "sum", "einstein_sum", "hamacher_sum", "bounded_sum"])
 def test_a_centroid_is_what_sampling_tends_to(implication, aggregation):
@@ -133,6 +134,7 @@ def test_on_straight_terms_it_gives_what_the_sweep_gives(drawn, data):
     assert engine.centroids(cuts)[0] == pytest.approx(float(exact), abs=1e-12)
 
 
+@pytest.mark.medium(fast=18)
 @pytest.mark.parametrize("aggregation", ["max", "probor", "sum", "drastic_sum", "nilpotent_maximum", "normalized_sum"])
 @pytest.mark.parametrize("implication", ["min", "prod", "bounded_difference", "drastic_product", "nilpotent_minimum"])
 @pytest.mark.parametrize("defuzzifier", ["centroid", "bisector", "mom", "som", "lom"])

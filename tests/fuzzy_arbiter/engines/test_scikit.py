@@ -136,6 +136,7 @@ def sizes():
     return [len(state.data) for state in STATES]
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(
     "system",
     [

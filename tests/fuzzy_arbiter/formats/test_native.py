@@ -37,6 +37,7 @@ def test_the_ends_are_exact():
     assert range_ends(weight("triangles")) == (Fraction(1, 3), Fraction(2, 3))
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("pair", PAIRS)
 @given(st.lists(st.floats(0, 1), min_size=3, max_size=3))
 def test_its_centroids_are_the_weights(pair, memberships):

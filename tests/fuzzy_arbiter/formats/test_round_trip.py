@@ -33,6 +33,7 @@ def test_richer_systems_come_back_and_give_the_same(format):
     assert Arbiter(system=again).batch(rows).tolist() == Arbiter(system=system).batch(rows).tolist()
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("format", FORMATS)
 @relaxed
 @given(systems(plain=True))
@@ -40,6 +41,7 @@ def test_plain_systems_come_back_in_every_format(format, system):
     assert reads(writes(system, format), format) == system
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("format", FORMATS)
 @relaxed
 @given(systems())
@@ -121,6 +123,7 @@ MONSTERS = (
 )
 
 
+@pytest.mark.medium(fast=41)
 @pytest.mark.parametrize("format", FORMATS)
 @pytest.mark.parametrize("text", MONSTERS)
 def test_monsters_are_refused_in_few_words(format, text):

@@ -56,6 +56,7 @@ MANUALS = [
 ]  # fmt: skip
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize(("kind", "parameters", "formula"), MANUALS)
 def test_a_curve_is_that_of_the_manual(kind, parameters, formula):
     made = curve(kind, *parameters)
@@ -74,6 +75,7 @@ def test_every_kind_is_tried():
     assert {kind for kind, _, _ in MANUALS} == set(KINDS)
 
 
+@pytest.mark.medium(fast=6)
 @pytest.mark.parametrize("kind", [kind for kind, face in KINDS.items() if face.inverse])
 @pytest.mark.parametrize("parameters", [(1.0, 3.0), (3.0, 1.0)])
 @given(share=st.floats(0.05, 0.999))

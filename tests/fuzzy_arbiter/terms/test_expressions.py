@@ -60,6 +60,7 @@ def test_what_has_no_value_is_no_number(text):
     assert math.isnan(Expression(text)({}))
 
 
+@pytest.mark.medium(fast=16)
 @pytest.mark.parametrize("name", sorted(FUNCTIONS))
 @given(data=st.data())
 def test_numbers_and_arrays_have_the_same_functions(name, data):

@@ -55,6 +55,7 @@ degrees = (
 )
 
 
+@pytest.mark.medium(fast=10)
 @pytest.mark.parametrize("name", {**T_NORMS, **S_NORMS})
 @given(degrees, degrees, degrees)
 def test_it_keeps_the_laws_of_norms(name, a, b, c):

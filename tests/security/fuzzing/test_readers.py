@@ -51,6 +51,7 @@ def tried(case: Case, kind: str, numbers: range) -> Counter[str]:
     return found
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("name", READERS)
 def test_some_changes_of_what_is_read(name, seeds):
     assert not tried(READERS[name].case(seeds), READERS[name].kind, range(FEW))
@@ -65,6 +66,7 @@ def test_many_changes_of_what_is_read(name, seeds):
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < MEMORY * 1024
 
 
+@pytest.mark.medium(fast=11)
 @pytest.mark.parametrize("name", READERS)
 def test_what_is_sound_is_taken(name, seeds):
     case = READERS[name].case(seeds)

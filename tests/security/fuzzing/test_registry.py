@@ -69,6 +69,7 @@ def parsing() -> Iterator[str]:
         yield from (f"{module}:{name}" for name in walked(tree_of(path), ""))
 
 
+@pytest.mark.medium
 def test_whoever_parses_is_fuzzed_or_reads_its_own():
     opened = {name for reader in READERS.values() for name in reader.opens}
     found = set(parsing())
@@ -76,6 +77,7 @@ def test_whoever_parses_is_fuzzed_or_reads_its_own():
     assert sorted(ITS_OWN.keys() - found) == [], "no longer parse"
 
 
+@pytest.mark.medium(fast=8)
 @pytest.mark.parametrize("name", READERS)
 def test_sound_content_goes_through_what_is_named(name, seeds):
     case, met = READERS[name].case(seeds), set()

@@ -45,6 +45,7 @@ def found(tmp_path_factory):
     return run_falsification(search(60, NEARING), tmp_path_factory.mktemp("found") / "out")
 
 
+@pytest.mark.medium
 def test_a_search_finds_worse_scenes_than_as_many_of_the_generator(found):
     s = found.summary
     assert found.flown == s["flown"] == s["random"]["flown"] == 60
@@ -71,6 +72,7 @@ def test_its_page_shows_search_and_dice_and_the_worst_moving(found):
     assert run["status"] == "completed"
 
 
+@pytest.mark.medium
 def test_its_rows_are_those_of_a_campaign_and_come_again(found, tmp_path):
     key = found.summary["worst"][0]["row"]
     again = rerun(found.folder, key, tmp_path / "run")
@@ -79,6 +81,7 @@ def test_its_rows_are_those_of_a_campaign_and_come_again(found, tmp_path):
     assert rerun(found.folder / "random", key, tmp_path / "dice").differing == {}
 
 
+@pytest.mark.medium
 def test_rows_of_a_scenario_come_again_with_the_values_that_were_found(tmp_path):
     found = run_falsification(varied(), tmp_path / "out")
     first, last = found.results.table.to_pylist()[0], found.results.table.to_pylist()[-1]
@@ -132,6 +135,7 @@ def test_rows_are_the_same_for_any_number_of_workers(tmp_path):
     assert rows(one.results) == rows(two.results)
 
 
+@pytest.mark.medium
 def test_another_search_has_a_folder_of_its_own(tmp_path):
     run_falsification(search(), tmp_path / "out")
     with pytest.raises(RunError, match=r"holds another campaign \(search.seed is 0, now 1\)"):
@@ -186,6 +190,7 @@ def test_of_rows_that_are_near_to_each_other_one_is_listed(found):
     assert len(module._worst(found.folder, found.results, np.full(60, module._REFUSED), points)) == 0
 
 
+@pytest.mark.medium(fast=13)
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -224,6 +229,7 @@ def test_without_cma_nothing_is_flown(tmp_path, capsys, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.medium
 def test_the_command_says_what_was_found(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("cosim.campaigns.scenes.conditions.Conditions.duration", 0.4)
     words = ["falsify", "hard", "--law", "pd", "--budget", "20", "--replays", "0", "--out", str(tmp_path / "out")]

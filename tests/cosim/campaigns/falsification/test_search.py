@@ -27,6 +27,7 @@ class Valley:
         return costs
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_a_search_comes_far_below_the_dice(noise):
     found, dice = Valley(noise), Valley(noise)

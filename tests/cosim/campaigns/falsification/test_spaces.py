@@ -40,6 +40,7 @@ def features(scene):
     }
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("kind", MOST_OBSTACLES)
 def test_points_drawn_evenly_are_scenes_of_the_generator(kind):
     space, rng = SceneSpace(kind), np.random.default_rng(1)
@@ -105,6 +106,7 @@ def numbers(conflict):
     }
 
 
+@pytest.mark.medium
 def test_conflicts_drawn_evenly_are_those_of_the_generator():
     space, rng = SceneSpace("conflict"), np.random.default_rng(1)
     drawn = [numbers(json.loads(space.line(rng.random(space.dimension), i))) for i in range(700)]
@@ -113,6 +115,7 @@ def test_conflicts_drawn_evenly_are_those_of_the_generator():
         assert ks_2samp([one[name] for one in drawn], [one[name] for one in made]).pvalue > 1e-3, name
 
 
+@pytest.mark.medium
 def test_a_conflict_follows_from_its_point_alone_and_can_be_flown():
     space, rng = SceneSpace("conflict"), np.random.default_rng(3)
     for i, point in enumerate([*rng.integers(0, 2, (20, space.dimension)), *rng.random((40, space.dimension))]):

@@ -34,6 +34,7 @@ def estimates(cost, budget, runs):
     return [estimate_probability(cost, DIMENSION, budget, seed) for seed in range(runs)]
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("cost", "probability"),
     [

@@ -34,6 +34,7 @@ def test_scenes_are_those_of_the_reference_to_the_last_digit(kind, capsys):
         assert json.dumps(scene) == json.dumps(reference)
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize(("kind", "first"), [(kind, first) for kind, of in DIGESTS.items() for first in of])
 def test_two_hundred_scenes_are_those_of_the_reference(kind, first, capsys):
     expected, digest = DIGESTS[kind][first], hashlib.sha256()
@@ -82,6 +83,7 @@ def test_a_file_that_cannot_be_written_is_one_line_and_leaves_nothing(tmp_path, 
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.medium
 def test_scenes_need_nothing_of_runs():
     code = (
         "import sys; from cosim.command_line.cli import main; main(['scenes', '--count', '1']); "

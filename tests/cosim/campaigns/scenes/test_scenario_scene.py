@@ -44,6 +44,7 @@ def test_scenes_are_those_of_their_seed(kind):
     assert [decode_scene(line.encode()).seed for line in one] == [7, 8, 9, 10]
 
 
+@pytest.mark.medium
 def test_priorities_follow_the_order_of_the_criteria():
     orders = set()
     for seed in range(40):
@@ -54,6 +55,7 @@ def test_priorities_follow_the_order_of_the_criteria():
     assert len(orders) > 10  # of 24
 
 
+@pytest.mark.medium
 def test_kinds_and_vehicles_are_about_as_frequent():
     kinds = collections.Counter(make_conflict(seed)["kind"] for seed in range(900))
     assert len(kinds) == 18 and min(kinds.values()) > 25 and max(kinds.values()) < 80  # 50 expected
@@ -74,6 +76,7 @@ def test_a_tour_has_goals_in_turn_on_both_sides_of_what_conflicts():
         assert np.sign(first[axis] - middle) == np.sign(then[1, axis] - middle) == -np.sign(then[0, axis] - middle)
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("kind", ["ceiling", "dock"])
 def test_faces_that_close_leave_no_place_at_the_end(kind):
     for table in made(make_conflict, kind, 5):
@@ -95,6 +98,7 @@ def test_a_squeeze_has_no_place_where_both_depths_are_kept():
         assert least.region.shape.point[2] > greatest.region.shape.point[2]
 
 
+@pytest.mark.medium
 def test_the_ways_of_sides_and_door_are_barred_by_soft_regions():
     for table in made(make_conflict, "sides", 5) + made(make_conflict, "door", 5):
         hard = [r for r in scenario_of(table).regions if r.region.hard]
@@ -102,6 +106,7 @@ def test_the_ways_of_sides_and_door_are_barred_by_soft_regions():
         assert hard and len({r.criterion for r in soft}) == 2
 
 
+@pytest.mark.medium
 def test_a_trial_is_far_from_nominal_in_what_it_tries():
     (heavy,) = made(make_trial, "net weight")
     vehicle = load_vehicle(heavy["scenario"]["vehicle"])

@@ -150,6 +150,7 @@ def spied(monkeypatch):
     return fly
 
 
+@pytest.mark.medium(fast=4)
 @pytest.mark.parametrize("change", UNTOLD.values(), ids=UNTOLD)
 def test_what_is_untold_changes_the_plant_alone(spied, change):
     before, after = SCENE, replace(SCENE, **change)

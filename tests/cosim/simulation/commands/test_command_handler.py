@@ -123,6 +123,7 @@ def test_stabilized_sticks_keep_level_and_heading_where_bare_ones_do_not(fly):
     assert helped["velocity.u"][-1] > 0.4 and not helped["command.Z"].any()  # heave is the pilot's
 
 
+@pytest.mark.medium
 def test_depth_is_kept_until_the_vertical_stick_asks_for_a_rate(fly):
     commands = {0: [SetMode("depth_hold")], 1000: [sticks(0, 0, 1.0, 0, 0, 0)], 1500: [sticks(0, 0, 0, 0, 0, 0)]}
     run = fly(commands, "time.duration=30", *OPEN)
@@ -202,6 +203,7 @@ def test_another_heading_is_kept(fly):
     assert by_wrench["attitude.yaw"][-1] == pytest.approx(1.2, abs=0.05)
 
 
+@pytest.mark.medium
 def test_an_obstacle_that_comes_is_kept_out_of(fly):
     centre = (2.5, 0.0, 3.0)
     way = [SetTarget((5.0, 0.0, 3.0), 0.4)]
@@ -291,6 +293,7 @@ def test_gains_and_limits_of_the_direct_wrench(fly):
     assert run.master.environment.regions.gains[0] == 3.0
 
 
+@pytest.mark.medium(fast=3)
 @pytest.mark.parametrize(
     ("command", "why"),
     [
