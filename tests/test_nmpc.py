@@ -57,6 +57,7 @@ def test_it_is_given_what_laws_are_given_ten_times_a_second(flown):
     assert nmpc.NmpcLaw.function.failures == 10
 
 
+@pytest.mark.medium
 def test_its_forces_hold_until_the_next_plan(flown):
     _, _, score = flown
     assert score.effort == pytest.approx(4 * 3.0 * 2.0)

@@ -104,6 +104,7 @@ def test_attitude_is_kept_against_a_righting_moment():
     assert sea.quaternion == pytest.approx(LEVEL, abs=1e-3)
 
 
+@pytest.mark.medium
 def test_weights_of_the_arbiter_change_nothing():
     taken = []
     for weight in (0.0, 1.0):

@@ -86,6 +86,7 @@ def test_the_plant_is_that_of_a_compiler(vehicle, fmi, compiled, no_compiler, tm
     assert answers[0] == answers[1]
 
 
+@pytest.mark.medium
 def test_numbers_of_an_own_vehicle_go_in(no_compiler, tmp_path):
     own = dataclasses.replace(load_vehicle("odin"), name="own", mass=130.25)
     slave = CoSimulationInstance(build_fmu(own, 3, tmp_path / "own.fmu")).start()

@@ -115,6 +115,7 @@ def test_pages_to_print_take_any_title(attacked):
     assert load_run(attacked).scenario.title == f"{ATTACK} (changed: time.duration = 0.2 s)"
 
 
+@pytest.mark.medium
 def test_the_page_within_an_fmu(tmp_path, attacked):
     vehicle = load_vehicle(attacked / "vehicle.toml")
     ours, plain = (Elements(page(v, 3)).found for v in (vehicle, load_vehicle("odin")))

@@ -37,6 +37,7 @@ def test_the_memory_is_all_that_it_keeps():
     assert ours.any(axis=1).all()
 
 
+@pytest.mark.medium
 def test_two_laws_share_nothing():
     one, other = law_for(REGIONS), law_for(REGIONS)
     alone = fly(law_for(REGIONS), Sea(noise=NOISE), steps=60)

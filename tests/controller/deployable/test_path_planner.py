@@ -167,6 +167,7 @@ def test_it_finds_a_way_round_what_lies_across():
     assert found == blocked
 
 
+@pytest.mark.medium
 def test_a_goal_that_is_partly_covered_is_entered_where_it_is_not():
     regions = pack([Region("cover", Sphere((8.4, 0.0, 2.5), 0.6), "out")])
     plan, goal = run(regions, 800)

@@ -102,6 +102,7 @@ def test_the_page_of_a_campaign_is_whole_and_says_what_the_summary_says(flown):
     assert names == {"rates", "distributions", "depends", "clearances"}
 
 
+@pytest.mark.medium
 def test_a_replay_shows_the_flight_of_the_row(flown):
     key = json.loads((flown / "summary.json").read_text())["worst"][0]["row"]
     (run,) = runs_of(flown / "worst" / str(key) / "replay.html")

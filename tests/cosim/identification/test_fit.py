@@ -76,6 +76,7 @@ def test_the_numbers_are_found_again(found):
     assert not found.resting() and not found.rejected and found.outliers == 0
 
 
+@pytest.mark.medium
 def test_the_nominal_intervals_are_those_of_the_information(found):
     """Computed anew from the rows, prior included."""
     rows = [r.jacobian for r in found.residuals] + [np.diag([1.0 / p.deviation for p in found.parameters])]

@@ -64,6 +64,7 @@ def test_every_sample_of_a_tlog_is_there(tlog):
         assert topics[quantity].rate == pytest.approx(rate, rel=0.01)
 
 
+@pytest.mark.medium
 def test_attitudes_and_positions_are_where_the_vehicles_clock_has_them(tlog):
     """At the stamps of the vehicle, the rows are what it said; a constant offset of its clock is all that is free."""
     read = messages_of(TLOG, "ATTITUDE", "LOCAL_POSITION_NED")

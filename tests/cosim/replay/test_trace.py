@@ -151,11 +151,13 @@ def test_what_is_no_number_becomes_none():
     assert nan_to_none(mixed) == {"a": [1.0, None], "b": [None, {"c": True}], "d": "nan", "e": None, "f": 7}
 
 
+@pytest.mark.medium
 def test_a_trace_is_of_the_run_as_it_came(docking):
     slower = dataclasses.replace(docking.scenario, table=docking.scenario.table | {"title": "elsewhere"})
     assert trace_of(dataclasses.replace(docking, scenario=slower)).header["title"] == "elsewhere"
 
 
+@pytest.mark.medium
 def test_the_paper_is_seen_at_its_own_instants(paper):
     """The overlap of the paper's regions lasts 48 ms of 60 s: it is in the page to the step."""
     trace = trace_of(paper)

@@ -59,6 +59,7 @@ def test_a_search_finds_worse_scenes_than_as_many_of_the_generator(found):
         assert least == [cost for _, cost in part["best"]] and least == sorted(least, reverse=True)
 
 
+@pytest.mark.medium
 def test_its_page_shows_search_and_dice_and_the_worst_moving(found):
     page = check(write_falsification_page(found.folder, 1))
     worst, dice = found.summary["worst"], found.summary["random"]["worst"]
