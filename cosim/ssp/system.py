@@ -121,7 +121,11 @@ def plant_component(scenario: Scenario) -> Component:
         The vehicle's, with other start values.
     """
     start = {name: float(value) for name, value in start_values(scenario).items()}
-    return of_vehicle(scenario.vehicle, start, scenario.time.duration, scenario.time.step)
+    for failure in scenario.failures:  # at once, before there is a connection
+        if failure.time <= 0.0 and not failure.stuck:
+            start[f"thrust_effectiveness[{failure.thruster}]"] = failure.effectiveness
+    coupled = bool(scenario.failures or scenario.outages)
+    return of_vehicle(scenario.vehicle, start, scenario.time.duration, scenario.time.step, coupled)
 
 
 def _origin(scenario: Scenario) -> dict[str, bytes]:
