@@ -31,6 +31,11 @@ class Part:
     component: Component
     connectors: tuple[str, ...]  # names of the inputs and outputs that are shown
 
+    @property
+    def parameters(self) -> str:
+        """Place of its parameter set, in the archive."""
+        return self.source.replace(".fmu", ".ssv")
+
 
 @dataclass(frozen=True)
 class Wire:
@@ -125,3 +130,5 @@ def _add_part(parent: ET.Element, part: Part, shown: Sequence[Variable]) -> None
         kind = "input" if v.role == "input" else "output"
         connector = ET.SubElement(connectors, "ssd:Connector", name=v.name, kind=kind, description=v.description)
         ET.SubElement(connector, "ssc:Real", {"unit": v.quantity.unit} if v.quantity.unit else {})
+    bindings = ET.SubElement(element, "ssd:ParameterBindings")
+    ET.SubElement(bindings, "ssd:ParameterBinding", type="application/x-ssp-parameter-set", source=part.parameters)

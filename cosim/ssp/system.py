@@ -14,6 +14,7 @@ from cosim.scenario.start_values import start_values
 from cosim.ssp.arbiter import arbiter_component
 from cosim.ssp.controller import controller_component
 from cosim.ssp.structure import Part, Wire, structure
+from cosim.ssp.variable_groups import osp_model_description
 from fuzzy_arbiter import ArbiterError
 from fuzzy_arbiter.export import to_c
 from plant_fmu import build_fmu
@@ -21,6 +22,7 @@ from plant_fmu.archive import require_place, write_archive
 from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.platforms import NATIVE
 from plant_fmu.component import Component
+from plant_fmu.contents.parameter_set import parameter_set
 from plant_fmu.variables import AXES, FORCES, VELOCITIES
 from plant_fmu.vehicle_component import of_vehicle
 
@@ -77,6 +79,12 @@ def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str =
     ]
     time = scenario.time
     members = {part.source: _fmu(part.component, fmi, platforms) for part in parts}
+    for part in parts:
+        component = part.component
+        values = [(v, v.start) for v in component.variables if v.role == "parameter"]
+        members[part.parameters] = parameter_set(part.name, f"{part.name} of {scenario.title}", values).encode()
+        groups = osp_model_description(component, part.connectors)
+        members[f"resources/{component.name}_OspModelDescription.xml"] = groups.encode()
     described = structure(scenario.name, scenario.title, parts, wires, time.duration, time.step)
     members["SystemStructure.ssd"] = described.encode()
     write_archive(out, members | _origin(scenario))
