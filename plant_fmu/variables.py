@@ -185,8 +185,8 @@ def _supply() -> Iterator[Variable]:
 # ---- what is calculated ----
 
 _THRUSTER = (
-    "thrust", "thrust_min", "thrust_max", "thrust_dead_band", "thrust_curve", "thrust_time_constant", "thrust_normalized",
-    "thrust_pulse",
+    "thrust", "thrust_min", "thrust_max", "thrust_dead_band", "thrust_curve", "thrust_time_constant",
+    "thrust_normalized", "thrust_pulse",
 )  # fmt: skip
 _WRENCH = ("wrench.X", "wrench.Y", "wrench.Z", "wrench_force_limit", "wrench_time_constant")
 _RANDOM = ("seed", "outlier_scale")

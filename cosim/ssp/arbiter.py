@@ -16,8 +16,8 @@ from plant_fmu.component import Component
 from plant_fmu.quantities import Quantity
 from plant_fmu.variables import Variable
 
-_WORDS = """To what degree each criterion asks for attention goes in, or what else the rules get; what weight the fuzzy arbiter
-gives to each comes out, by the exact form of its rules.
+_WORDS = """To what degree each criterion asks for attention goes in, or what else the rules get; what weight the
+fuzzy arbiter gives to each comes out, by the exact form of its rules.
 
 The weights are worked out in a step, from the inputs at its beginning, once in each time.arbiter counted
 from the start, and hold until the next time; before the first step they are 0."""

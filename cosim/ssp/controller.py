@@ -24,15 +24,15 @@ from plant_fmu.quantities import UNITS, Quantity
 from plant_fmu.variables import AXES, FORCES, VELOCITIES, Role, Variable, variables
 
 _WORDS = """What the vehicle does and the weights of the criteria go in; the forces of the law, and to what degree each
-criterion asks for attention, come out. A region's value g is at most 0 where it is satisfied. The functions are those of
-the Python package, translated to C.
+criterion asks for attention, come out. A region's value g is at most 0 where it is satisfied. The functions are those
+of the Python package, translated to C.
 
 Everything is worked out in a step, from the inputs at its beginning; before the first step all outputs are 0.
 The law runs once in each time.control, counted from the start, and its forces hold until it runs again;
 memberships, values and clearances are those of each step, at the pose that the arbiter decides by. While position,
-quaternion and velocity are all 0, as some masters leave them in their first step, the controller takes the initial state
-of its parameters; a quaternion of zeros alone is read as identity. Noise of what is sensed, and failures of thrusters, are
-those of the scenario; they are no parameters.
+quaternion and velocity are all 0, as some masters leave them in their first step, the controller takes the initial
+state of its parameters; a quaternion of zeros alone is read as identity. Noise of what is sensed, and failures of
+thrusters, are those of the scenario; they are no parameters.
 
 Numbers of shapes are those that the shape works with: unit vectors and rotation matrices must stay such."""
 

@@ -106,9 +106,7 @@ class Loop:
         self.allocates = self.through_thrusters and self.law.output == "wrench"
         self.state = VehicleState(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(6), np.ones(m), np.zeros(12))
         self.arbiter_state, self.expected = empty_state(), NOTHING_EXPECTED.copy()
-        self.evaluation = RegionEvaluation(
-            np.zeros(n + 1), np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(n + 1)
-        )
+        self.evaluation = RegionEvaluation(np.zeros(n + 1), np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(n + 1))
         self.signals = empty_signals(self.setup.inputs, n, len(scenario.criteria))
         self.now, self.stage, self.goal_clearance = np.zeros(1), np.zeros(1), np.zeros(1)
         self.weights, self.wrench, self.thrusts = np.zeros(n), np.zeros(6), np.zeros(m)

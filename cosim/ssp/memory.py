@@ -19,8 +19,8 @@ _TYPES = {"numbers": np.float64, "integers": np.int64, "words": np.uint64, "flag
 class Memory:
     """Places of arrays: what changes, in members of the C struct ``Model``; what does not, in constants.
 
-    An array that shares memory with another one stands in the same place. Parameters come first: they are the importer's,
-    and keep their numbers when a run begins anew.
+    An array that shares memory with another one stands in the same place. Parameters come first: the importer sets
+    them, and they keep their numbers when a run begins anew.
     """
 
     def __init__(self) -> None:
@@ -91,7 +91,7 @@ class Memory:
         """Yield the C definitions of what each member holds at first."""
         for member, arrays in self._pools.items():
             parts = [array.ravel() for array in arrays] or [np.zeros(1)]
-            numbers = np.concatenate(parts).astype(_TYPES[member])
+            numbers: np.ndarray = np.concatenate(parts).astype(_TYPES[member])
             yield array_data(numbers if numbers.size else np.zeros(1, _TYPES[member]), f"FIRST_{member.upper()}",
                              "static const")  # fmt: skip
 

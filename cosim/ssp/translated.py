@@ -1,4 +1,4 @@
-"""The C of a scenario's loop: functions translated from Python, where their arrays stand, and what of the scene is no parameter."""
+"""The C of a scenario's loop: translated functions, where their arrays stand, and what of the scene is no parameter."""
 
 from __future__ import annotations
 

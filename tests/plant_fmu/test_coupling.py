@@ -6,6 +6,7 @@ import pytest
 from cosim.logs.t200 import force_of_pulse
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.build import cached_fmu
+from plant_fmu.variables import variables
 from plant_fmu.vehicle_component import of_vehicle
 
 MOTION = ("position.x", "position.y", "position.z", "velocity.u", "velocity.v", "velocity.w", "velocity.q")
@@ -28,6 +29,16 @@ def fly(fmu, parameters=None, steps=20, **inputs):
         return np.array([plant[name] for name in MOTION])
 
 
+def test_without_them_the_table_of_variables_is_as_before():
+    """A coupled plant has the same variables in the same order, and others beside them."""
+    vehicle = load_vehicle("odin")
+    plain, coupled = variables(vehicle), variables(vehicle, coupled=True)
+    kept = {v.name for v in plain}
+    assert [v.name for v in coupled if v.name in kept] == [v.name for v in plain]
+    assert {v.role for v in coupled if v.name not in kept} == {"input", "parameter"}
+
+
+@pytest.mark.slow
 def test_off_they_change_no_bit(coupled):
     np.testing.assert_array_equal(fly(coupled), fly("odin"))
     np.testing.assert_array_equal(
@@ -35,11 +46,13 @@ def test_off_they_change_no_bit(coupled):
     )
 
 
+@pytest.mark.slow
 def test_a_current_is_that_of_the_parameters(coupled):
     got = fly(coupled, {"current.x": 0.1}, **{"current_input.x": 0.2, "current_input.z": -0.1})
     np.testing.assert_allclose(got, fly("odin", {"current.x": 0.3, "current.z": -0.1}), rtol=0.0, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_the_rate_of_a_current_is_felt_within_a_step(coupled):
     """Held at each step, its velocity alone lags by half a step; with its rate it is the straight line."""
 
@@ -58,6 +71,7 @@ def test_the_rate_of_a_current_is_felt_within_a_step(coupled):
     assert abs(drift(0.1, False) - fine) > 1e-3
 
 
+@pytest.mark.slow
 def test_a_wrench_in_the_body_frame_is_that_of_the_wrench_input(coupled):
     point, force, moment = np.array([0.3, -0.1, 0.2]), np.array([5.0, 2.0, -3.0]), np.array([0.5, 1.0, -0.7])
     total = moment + np.cross(point, force)
@@ -70,6 +84,7 @@ def test_a_wrench_in_the_body_frame_is_that_of_the_wrench_input(coupled):
     np.testing.assert_allclose(fly(coupled, **inputs), fly("odin", **wrench), rtol=0.0, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_a_force_in_the_world_frame_at_the_centre_of_buoyancy_is_buoyancy(coupled):
     """However the vehicle turns meanwhile."""
     with Plant("odin") as plant:
@@ -79,11 +94,10 @@ def test_a_force_in_the_world_frame_at_the_centre_of_buoyancy_is_buoyancy(couple
     inputs = {"external.world.force.z": -7.0} | {
         f"external.world.point.{axis}": x for axis, x in zip("xyz", r_B, strict=True)
     }
-    np.testing.assert_allclose(
-        fly(coupled, **inputs), fly("odin", {"buoyancy": buoyancy + 7.0}), rtol=0.0, atol=1e-13
-    )
+    np.testing.assert_allclose(fly(coupled, **inputs), fly("odin", {"buoyancy": buoyancy + 7.0}), rtol=0.0, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_commands_of_thrusters_in_other_units(coupled):
     with Plant("odin") as plant:
         plant.initialise()
@@ -97,6 +111,7 @@ def test_commands_of_thrusters_in_other_units(coupled):
         np.testing.assert_allclose(got, fly("odin", **{"thrust[2]": force}), rtol=0.0, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_a_failure_takes_part_of_the_force(coupled):
     got = fly(coupled, {"thrust_effectiveness[1]": 0.8}, **{"thrust[1]": 20.0, "thrust_failure[1]": 0.25})
     np.testing.assert_allclose(
@@ -104,12 +119,15 @@ def test_a_failure_takes_part_of_the_force(coupled):
     )
 
 
+@pytest.mark.slow
 def test_derivatives_by_these_inputs_are_those_of_differences(coupled):
     rng = np.random.default_rng(3)
     with Plant(coupled) as plant:
         plant.set({"position.z": 2.0, "velocity.u": 0.4, "quaternion.e1": 0.3, "quaternion.e2": -0.4})
         plant.initialise()
-        names = [n for n in plant.inputs.names if n.startswith(("current_input", "external", "thrust_nor", "thrust_fail"))]
+        names = [
+            n for n in plant.inputs.names if n.startswith(("current_input", "external", "thrust_nor", "thrust_fail"))
+        ]
         for name in names:
             plant.set({name: float(rng.uniform(0.05, 0.4))})
         for i in range(8):

@@ -69,4 +69,7 @@ def oms(path, steps, step):
 
 if __name__ == "__main__":
     _, _master, _path, _steps, _step, _out = sys.argv
-    np.save(_out, {"fmpy": fmpy, "ecos": ecos, "libcosim": libcosim, "oms": oms}[_master](Path(_path), int(_steps), float(_step)))
+    np.save(
+        _out,
+        {"fmpy": fmpy, "ecos": ecos, "libcosim": libcosim, "oms": oms}[_master](Path(_path), int(_steps), float(_step)),
+    )
