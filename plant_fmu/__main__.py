@@ -31,6 +31,7 @@ try:
     from plant_fmu.errors import PlantFmuError, one_line
     from plant_fmu.pictures import IMAGES, PICTURES, image
     from plant_fmu.vehicle import load_vehicle, shipped_vehicles
+    from plant_fmu.vehicle_component import of_vehicle
 except ModuleNotFoundError as error:  # in a checkout that is not installed
     print(_missing(error), file=sys.stderr)
     sys.exit(2)
@@ -78,6 +79,7 @@ def _parser() -> argparse.ArgumentParser:
         default=NATIVE,
         help=f"{NATIVE} for this machine (default); by the ziglang package: {ALL}, or some of {','.join(PLATFORMS)}",
     )
+    build.add_argument("--coupled", action="store_true", help="with inputs for currents, external forces and the like")
     build.add_argument("--out", type=Path, help="file to write (default: NAME.fmu here)")
 
     check = verbs.add_parser("check", help="try an FMU in every validator and importer that is installed")
@@ -207,7 +209,8 @@ def _run(options: argparse.Namespace) -> int:
         for name, text in reference_files(vehicle, reference(vehicle)).items():
             print(_write(options.out / name, text))
     else:
-        print(build_fmu(vehicle, options.fmi, options.out or Path(f"{vehicle.name}.fmu"), options.platforms))
+        what = of_vehicle(vehicle, coupled=options.coupled)
+        print(build_fmu(what, options.fmi, options.out or Path(f"{vehicle.name}.fmu"), options.platforms))
     return 0
 
 

@@ -24,6 +24,7 @@ UNITS: dict[str, dict[str, int]] = {
     "N.m": {"kg": 1, "m": 2, "s": -2},
     "N.m/s": {"kg": 1, "m": 2, "s": -3},
     "N.m/N": {"m": 1},
+    "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
     "N.s/m": {"kg": 1, "s": -1},
     "N.m.s/rad": {"kg": 1, "m": 2, "s": -1, "rad": -1},
     "N.s2/m2": {"kg": 1, "m": -1},
@@ -112,6 +113,10 @@ SAMPLE_RATE = Quantity("Hz", 0.0, 1e4)
 DELAY = Quantity("s", 0.0, 10.0)
 SCALE = Quantity("", 0.0, 1e6)
 SCALE_ERROR = Quantity("", -0.5, 0.5)
+ACCELERATION = Quantity("m/s2", -100.0, 100.0)
+SHARE = Quantity("", -1.0, 1.0)
+PULSE = Quantity("", 0.0, 1e4)  # us, which SI has no place for
+VOLTAGE = Quantity("V", 10.0, 20.0)
 SUBSTEP = Quantity("s", 1e-6, 1.0)
 FORCE_LIMIT = Quantity("N", 0.0, 1e10)  # its maximum is above the norm of any force: no limit
 

@@ -52,13 +52,15 @@ class Variable:
         return str(int(value)) if self.type == "integer" else repr(float(value))
 
 
-def variables(vehicle: Vehicle) -> list[Variable]:
+def variables(vehicle: Vehicle, coupled: bool = False) -> list[Variable]:
     """Return every variable of a vehicle's FMU; the index in this list is the value reference.
 
     Parameters
     ----------
     vehicle : Vehicle
         Gives the start values and the number of thrusters.
+    coupled : bool, optional
+        With the inputs by which other components act on the vehicle.
 
     Returns
     -------
@@ -75,11 +77,13 @@ def variables(vehicle: Vehicle) -> list[Variable]:
         Variable("time", "time", "time", q.TIME, "Simulated time"),
         *_states(vehicle),
         *_inputs(vehicle),
+        *(_coupling(vehicle) if coupled else ()),
         *_outputs(vehicle),
         *_derivatives(vehicle),
         *_parameters(vehicle),
         *_environment(vehicle),
         *_sensors(),
+        *(_supply() if coupled else ()),
         *_discrete(vehicle),
     ]
     for v in rows:
@@ -140,9 +144,50 @@ def _inputs(vehicle: Vehicle) -> Iterator[Variable]:
         yield Variable(f"wrench.{name}", "input", f"inputs.wrench[{i}]", quantity, description)
 
 
+def _coupling(vehicle: Vehicle) -> Iterator[Variable]:
+    """Yield the inputs that are off while they are 0."""
+
+    def row(name: str, member: str, quantity: Quantity, description: str) -> Variable:
+        return Variable(name, "input", f"coupling.{member}", quantity, description)
+
+    for i, where in enumerate(("north", "east", "down")):
+        description = f"Velocity of the water beside that of the parameters, {where}, world frame NED"
+        yield row(f"current_input.{AXES[i]}", f"current[{i}]", q.CURRENT, description)
+    for i, where in enumerate(("north", "east", "down")):
+        description = f"Rate of that velocity, {where}, by which it goes on within a step"
+        yield row(f"current_input_rate.{AXES[i]}", f"current_rate[{i}]", q.ACCELERATION, description)
+    for frame in ("world", "body"):
+        for kind, quantity, what in (
+            ("force", q.FORCE, "External force, {} frame {}"),
+            ("moment", q.MOMENT, "External moment, {} frame {}"),
+            ("point", q.LEVER, "Where the external force of the {} frame acts, body {}"),
+        ):
+            for i, axis in enumerate(AXES):
+                description = what.format(frame, axis)
+                yield row(f"external.{frame}.{kind}.{axis}", f"{frame}.{kind}[{i}]", quantity, description)
+    for name, quantity, what in (
+        ("normalized", q.SHARE, "Command of thruster {} as a share of its limits, beside its commanded force"),
+        ("pulse", q.PULSE, "Command of thruster {} as a pulse [us] of a T200, 1100 to 1900, 0 for none, likewise"),
+        ("failure", q.FRACTION, "Part of the force of thruster {} that is lost"),
+    ):
+        for i in range(vehicle.n_thrusters):
+            yield row(f"thrust_{name}[{i + 1}]", f"thrust_{name}[{i}]", quantity, what.format(i + 1))
+    for i, (sensor, what) in enumerate(_SENSORS):
+        description = f"Probability that a sample of {what} is lost, if that of the parameter is not greater"
+        yield row(f"{sensor}.outage", f"outage[{i}]", q.FRACTION, description)
+
+
+def _supply() -> Iterator[Variable]:
+    description = "Supply voltage of thrusters that are commanded by pulses"
+    yield Variable("supply_voltage", "parameter", "coupling.supply_voltage", q.VOLTAGE, description, 16.0)
+
+
 # ---- what is calculated ----
 
-_THRUSTER = ("thrust", "thrust_min", "thrust_max", "thrust_dead_band", "thrust_curve", "thrust_time_constant")
+_THRUSTER = (
+    "thrust", "thrust_min", "thrust_max", "thrust_dead_band", "thrust_curve", "thrust_time_constant",
+    "thrust_normalized", "thrust_pulse",
+)  # fmt: skip
 _WRENCH = ("wrench.X", "wrench.Y", "wrench.Z", "wrench_force_limit", "wrench_time_constant")
 _RANDOM = ("seed", "outlier_scale")
 _WATER = ("time", "position.z", "current*", "seed")
@@ -150,7 +195,7 @@ _BOTTOM = ("position.z", "bottom_depth")
 _MOTION = (
     "time", "position.z", "quaternion.*", "velocity.*", "actuator.*", "thrust*", "wrench*", "mass", "inertia.*",
     "r_G.*", "r_B.*", "weight", "buoyancy", "added_mass*", "linear_damping*", "quadratic_damping*", "current*", "seed",
-    "free_surface", "hull_radius", "bottom_*", "substep",
+    "free_surface", "hull_radius", "bottom_*", "substep", "external.*", "supply_voltage",
 )  # fmt: skip
 
 
@@ -177,13 +222,14 @@ def _outputs(vehicle: Vehicle) -> Iterator[Variable]:
     for i in range(vehicle.n_thrusters):
         description = f"Force that thruster {i + 1} gives now"
         depends = (
-            *_of_thruster(i, *_THRUSTER, "thrust_rate_limit", "thrust_effectiveness"),
+            *_of_thruster(i, *_THRUSTER, "thrust_rate_limit", "thrust_effectiveness", "thrust_failure"),
+            "supply_voltage",
             f"actuator.thrust[{i + 1}]",
         )
         yield output(f"thruster_force[{i + 1}]", f"thrust[{i}]", q.FORCE, description, *depends)
     for i, name in enumerate(FORCES):
         kind, quantity = ("Force", q.ALL_FORCES) if i < 3 else ("Moment", q.ALL_MOMENTS)
-        pushing = (f"thruster_matrix[{i + 1},*", "thrust[*", "thrust_*", "actuator.thrust*")
+        pushing = (f"thruster_matrix[{i + 1},*", "thrust[*", "thrust_*", "actuator.thrust*", "supply_voltage")
         description = f"{kind} of all actuators on the body {_along(i)}"
         yield output(f"actuation.{name}", f"wrench[{i}]", quantity, description, *_of_wrench(i, *pushing))
 
@@ -227,7 +273,7 @@ def _derivatives(vehicle: Vehicle) -> Iterator[Variable]:
             depends = _MOTION
         elif part.startswith("thrust"):
             i = int(part.removeprefix("thrust[").removesuffix("]")) - 1
-            depends = (*_of_thruster(i, *_THRUSTER, "thrust_rate_limit"), name)
+            depends = (*_of_thruster(i, *_THRUSTER, "thrust_rate_limit"), "supply_voltage", name)
         else:
             depends = _of_wrench(FORCES.index(part[-1]))
         member = state.member.replace("state.", "outputs.rate.", 1)
@@ -366,8 +412,9 @@ def _discrete(vehicle: Vehicle) -> Iterator[Variable]:
     for i in range(vehicle.n_thrusters):
         description = f"The command of thruster {i + 1} is beyond its limits"
         yield flag(
-            f"thrust_saturated[{i + 1}]", f"flags.thrust_cut[{i}]", description, *_of_thruster(i, *_THRUSTER[:3])
-        )
+            f"thrust_saturated[{i + 1}]", f"flags.thrust_cut[{i}]", description,
+            *_of_thruster(i, *_THRUSTER[:3], *_THRUSTER[-2:]), "supply_voltage",
+        )  # fmt: skip
     description = "The force of the wrench input is beyond its limit"
     yield flag("wrench_saturated", "flags.wrench_cut", description, *_WRENCH[:4])
     yield flag("bottom_contact", "flags.bottom_touched", "The hull touches the bottom", *_BOTTOM, "hull_radius")

@@ -16,7 +16,11 @@ from plant_fmu.vehicle import Vehicle
 
 
 def of_vehicle(
-    vehicle: Vehicle, start: Mapping[str, float] | None = None, stop_time: float = STOP_TIME, step: float = STEP
+    vehicle: Vehicle,
+    start: Mapping[str, float] | None = None,
+    stop_time: float = STOP_TIME,
+    step: float = STEP,
+    coupled: bool = False,
 ) -> Component:
     """Return the plant of a vehicle.
 
@@ -28,6 +32,8 @@ def of_vehicle(
         Start values of parameters and states, by name, over those of the vehicle.
     stop_time, step : float, optional
         Of the default experiment [s].
+    coupled : bool, optional
+        With the inputs by which other components act on the vehicle; they are off while they are 0.
 
     Returns
     -------
@@ -41,7 +47,7 @@ def of_vehicle(
     VehicleError
         If a number of the vehicle is beyond the range of its parameter.
     """
-    rows = tuple(variables(vehicle))
+    rows = tuple(variables(vehicle, coupled))
     if start is not None:
         rows = _started(rows, start)
     return Component(
@@ -49,7 +55,7 @@ def of_vehicle(
         description=f"Underwater vehicle, six degrees of freedom: {vehicle.title}",
         variables=rows,
         sources=plant_sources(),
-        contents=lambda fmi: contents(vehicle, fmi, rows if start is not None else None),
+        contents=lambda fmi: contents(vehicle, fmi, rows if start is not None or coupled else None),
         header="vehicle.h",
         constants={"N_THRUSTERS": vehicle.n_thrusters},
         stop_time=stop_time,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -34,25 +35,64 @@ def static_data(program: Program, name: str, arguments: tuple[Any, ...]) -> str:
         If an argument is of a type that C has no words for.
     """
     arrays: list[str] = []
-    values = [_value(program, f"{name}_{i}", argument, arrays) for i, argument in enumerate(arguments)]
+
+    def pointer(array: np.ndarray, path: str) -> str:
+        program.name(type_of(array))
+        if not array.size:
+            return "NULL"
+        arrays.append(array_data(array, path))
+        return path
+
+    values = [initializer(argument, pointer, f"{name}_{i}") for i, argument in enumerate(arguments)]
     return "\n".join([*arrays, f"static {name}_arguments {name}_data = {{{', '.join(values)}}};\n"])
 
 
-def _value(program: Program, path: str, value: Any, arrays: list[str]) -> str:
+def initializer(value: Any, pointer: Callable[[np.ndarray, str], str], path: str = "") -> str:
+    """Return the C initializer of an argument.
+
+    Parameters
+    ----------
+    value : number, ndarray or tuple of such
+        The argument.
+    pointer : callable
+        Gives the C expression of where an array stands, of the array and its path.
+    path : str, optional
+        Of the argument: with the names of fields, a C name for each array.
+
+    Returns
+    -------
+    str
+        Of the struct that a `Program` has for its type.
+    """
     if isinstance(value, tuple):
         keys = getattr(value, "_fields", range(len(value)))
-        items = [_value(program, f"{path}_{key}", item, arrays) for key, item in zip(keys, value, strict=True)]
+        items = [initializer(item, pointer, f"{path}_{key}") for key, item in zip(keys, value, strict=True)]
         return f"{{{', '.join(items)}}}"
-    kind = type_of(value)
     if isinstance(value, np.ndarray):
-        program.name(kind)
-        sizes = ", ".join(map(str, value.shape))
-        if not value.size:
-            return f"{{NULL, {sizes}}}"
-        numbers = ", ".join(_number(x) for x in value.ravel())
-        arrays.append(f"static {kind.item.c} {path}[] = {{{numbers}}};")  # type: ignore[union-attr]
-        return f"{{{path}, {sizes}}}"
+        return f"{{{', '.join([pointer(value, path), *map(str, value.shape)])}}}"
     return _number(value)
+
+
+def array_data(array: np.ndarray, name: str, qualifier: str = "static") -> str:
+    """Return the C definition of an array with its present numbers.
+
+    Parameters
+    ----------
+    array : ndarray
+        Not empty.
+    name : str
+        In C.
+    qualifier : str, optional
+        Before its type.
+
+    Returns
+    -------
+    str
+        One line.
+    """
+    kind = type_of(array)
+    numbers = ", ".join(_number(x) for x in array.ravel())
+    return f"{qualifier} {kind.item.c} {name}[] = {{{numbers}}};"  # type: ignore[union-attr]
 
 
 def _number(x: Any) -> str:

@@ -194,8 +194,8 @@ def fly_scenario(
     effectiveness.inputs[:] = [plant[name] for name in names] if scenario.failures else 1.0
     losses = plant.native(LOSSES, ())
     losses.inputs[:] = [plant[name] for name in LOSSES] if scenario.outages else 0.0
-    setup = _setup(scenario, n if through else 0, clock)
-    allocator = _allocator(scenario, setup) if through else _NONE
+    setup = configure_flight(scenario, n if through else 0, clock)
+    allocator = failure_stages(scenario, setup) if through else _NONE
     decisions = -(-scenario.steps // scenario.control_every)
     criteria, rules = len(scenario.criteria), scenario.rules
     rows = np.zeros((decisions, 17 + criteria + len(inputs) + law.report.size) if trace else (0, 0))
@@ -204,7 +204,23 @@ def fly_scenario(
     return metrics, setup, native, estimate, rows
 
 
-def _setup(scenario: Scenario, thrusters: int, clock: NDArray[np.int64]) -> FlightConfig:
+def configure_flight(scenario: Scenario, thrusters: int, clock: NDArray[np.int64] = _NO_CLOCK) -> FlightConfig:
+    """Return what a flight of a scenario is made of.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is flown.
+    thrusters : int
+        That carry the wrench; 0 where it acts on the body directly.
+    clock : ndarray of int, optional
+        Of `Clock`, if the law is to be timed.
+
+    Returns
+    -------
+    FlightConfig
+        Its regions are where they are at time 0.
+    """
     sensing, step = scenario.sensing, scenario.time.step
     decisions = -(-scenario.steps // scenario.control_every)
     noise = np.zeros((0, 6))
@@ -250,8 +266,21 @@ def _setup(scenario: Scenario, thrusters: int, clock: NDArray[np.int64]) -> Flig
     )
 
 
-def _allocator(scenario: Scenario, setup: FlightConfig) -> Allocator:
-    """Return a stage for each number of failures that have been reported."""
+def failure_stages(scenario: Scenario, setup: FlightConfig) -> Allocator:
+    """Return what allocation goes by, a stage for each number of failures that have been reported.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of the vehicle and its limits.
+    setup : FlightConfig
+        Of the scenario's failures.
+
+    Returns
+    -------
+    Allocator
+        The first stage is of no failure.
+    """
     vehicle, limits = scenario.vehicle, scenario.actuation.limits
     health, stages = np.ones(vehicle.n_thrusters), []
     total = setup.failed[~(setup.remaining > 0.0)]

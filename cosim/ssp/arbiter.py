@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 from cosim.scenario.scenario import Scenario
 from cosim.ssp.c_sources import c_files, under_own_names
+from cosim.ssp.controller import rule_inputs
 from cosim.ssp.documentation import contents
 from fuzzy_arbiter import System
 from fuzzy_arbiter.export import to_c
@@ -14,10 +16,10 @@ from plant_fmu.component import Component
 from plant_fmu.quantities import Quantity
 from plant_fmu.variables import Variable
 
-_WORDS = """To what degree each criterion asks for attention goes in; what weight the fuzzy arbiter gives to
-each comes out, by the closed form of its rules, which is exact.
+_WORDS = """To what degree each criterion asks for attention goes in, or what else the rules get; what weight the
+fuzzy arbiter gives to each comes out, by the exact form of its rules.
 
-The weights are worked out in a step, from the memberships at its beginning, once in each time.arbiter counted
+The weights are worked out in a step, from the inputs at its beginning, once in each time.arbiter counted
 from the start, and hold until the next time; before the first step they are 0."""
 
 _DECLARATION = re.compile(r"^int (\w+)\(const double inputs\[\d+\], double outputs\[\d+\]\);$", re.MULTILINE)
@@ -38,11 +40,7 @@ def arbiter_component(scenario: Scenario) -> Component:
     """
     rows = (
         Variable("time", "time", "time", q.TIME, "Simulated time"),
-        *(
-            Variable(f"membership.{name}", "input", f"memberships[{i}]", q.FRACTION,
-                     f"Degree to which criterion {name} asks for attention")
-            for i, name in enumerate(scenario.criterion_names)
-        ),
+        *_inputs(scenario),
         *(
             Variable(f"weight.{name}", "output", f"weights[{i}]", q.unbounded(""), f"Weight of criterion {name}")
             for i, name in enumerate(scenario.criterion_names)
@@ -56,10 +54,22 @@ def arbiter_component(scenario: Scenario) -> Component:
         variables=rows,
         sources=_sources(scenario.rules.system),
         contents=lambda fmi: contents("Arbiter", _WORDS, rows, fmi),
-        constants={"N_CRITERIA": len(scenario.criteria)},
+        constants={"N_CRITERIA": len(scenario.criteria), "N_RULE_INPUTS": len(scenario.rules.inputs)},
         stop_time=scenario.time.duration,
         step=scenario.time.step,
     )
+
+
+def _inputs(scenario: Scenario) -> Iterator[Variable]:
+    """Yield what the rules get: the memberships, or signals of a scenario's own."""
+    for i, signal in enumerate(rule_inputs(scenario)):
+        low, high = scenario.rules.system.inputs[i].universe
+        unit = signal.unit if signal.unit in q.UNITS else ""
+        quantity = Quantity(unit, min(low, 0.0), max(high, 0.0))  # 0 is what masters begin with
+        yield Variable(f"arbiter.{signal.name}", "input", f"inputs[{i}]", quantity, signal.what)
+    for i, name in enumerate(() if rule_inputs(scenario) else scenario.criterion_names):
+        what = f"Degree to which criterion {name} asks for attention"
+        yield Variable(f"membership.{name}", "input", f"inputs[{i}]", q.FRACTION, what)
 
 
 def _sources(system: System) -> dict[str, bytes]:

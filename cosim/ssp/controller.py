@@ -1,40 +1,48 @@
-"""The paper's law of a scenario, with its regions, as a component for FMUs."""
+"""What is sensed, regions and law of a scenario as a component for FMUs."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
 
-from controller.regions import Region, pack
-from controller.regions.in_c import c_sources
-from controller.regions.numbers import constraints
-from controller.regions.region_set import PackedRegions, name_of, of_attitude
+from controller import CompiledLaw, LawError
+from controller.navigation.measurements import SENSORS
+from controller.regions import Region
+from controller.regions.region_set import of_attitude
+from cosim.scenario.arbiter_rules import InputSignal
+from cosim.scenario.keys import comments, unit_of_gain
+from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
 from cosim.ssp.c_sources import c_files, under_own_names
 from cosim.ssp.documentation import contents
+from cosim.ssp.normal_tables import ziggurat
 from cosim.ssp.shape_parameters import shape_numbers
+from cosim.ssp.translated import Places, Translated, translate_loop
 from plant_fmu import quantities as q
-from plant_fmu.compiling.sources import plant_sources
 from plant_fmu.component import Component
-from plant_fmu.quantities import Quantity
-from plant_fmu.variables import AXES, FORCES, VELOCITIES, Role, Variable
+from plant_fmu.quantities import UNITS, Quantity
+from plant_fmu.variables import AXES, FORCES, VELOCITIES, Role, Variable, variables
 
-_WORDS = """A pose and the weights of the criteria go in; the body wrench of the paper's law, and to what degree
-each criterion asks for attention, come out. The law is that of Ismail and Dunnigan, equations (16) to (29); a
-region's value g is at most 0 where it is satisfied.
+_WORDS = """What the vehicle does and the weights of the criteria go in; the forces of the law, and to what degree each
+criterion asks for attention, come out. A region's value g is at most 0 where it is satisfied. The functions are those
+of the Python package, translated to C.
 
 Everything is worked out in a step, from the inputs at its beginning; before the first step all outputs are 0.
-The law runs once in each time.control, counted from the start, and its wrench holds until it runs again;
-memberships, values and clearances are those of each step. While position, quaternion and velocity are all 0, as
-some masters leave them in their first step, the controller takes the initial state of its parameters; a
-quaternion of zeros alone is read as identity.
+The law runs once in each time.control, counted from the start, and its forces hold until it runs again;
+memberships, values and clearances are those of each step, at the pose that the arbiter decides by. While position,
+quaternion and velocity are all 0, as some masters leave them in their first step, the controller takes the initial
+state of its parameters; a quaternion of zeros alone is read as identity. Noise of what is sensed, and failures of
+thrusters, are those of the scenario; they are no parameters.
 
 Numbers of shapes are those that the shape works with: unit vectors and rotation matrices must stay such."""
 
-_POSITIVE = Quantity("", 1e-9, 1e9)
+_LEAST, _MOST = 1e-9, 1e9
 _PERIOD = Quantity("s", 1e-6, 1e6)
-# units of k_p1 and sigma_p follow that of g of the goal, with its gradient
-_UNITS_BY_GOAL = {"m2": ("N/m3", "1/(m2.s)"), "m": ("N/m", "1/s"), "": ("N.m", "m2/s")}
+# of gains whose unit follows that of g of the goal, which is m2 where they are said
+_UNITS_BY_GOAL = {
+    "N/m3": {"m2": "N/m3", "m": "N/m", "": "N.m"},
+    "1/(m2.s)": {"m2": "1/(m2.s)", "m": "1/s", "": "m2/s"},
+}
 _GAIN_UNITS = {"m2": "N/m2", "m": "N/m", "": "N", "rad": "N/rad"}
 
 
@@ -44,7 +52,7 @@ def controller_component(scenario: Scenario) -> Component:
     Parameters
     ----------
     scenario : Scenario
-        Its law is the printed one; nothing of it is streamed.
+        Its law is a shipped one; nothing of it is streamed.
 
     Returns
     -------
@@ -52,20 +60,15 @@ def controller_component(scenario: Scenario) -> Component:
         Without states, for co-simulation.
     """
     regions = [scenario.goal_region, *(secondary.region for secondary in scenario.regions)]
-    criteria = [0, *scenario.criterion_places]
-    packed = pack(regions)
-    rows = tuple(_variables(scenario, regions))
+    translated = translate_loop(scenario, regions, prefixes(regions))
+    rows = tuple(_variables(scenario, regions, translated.places))
     return Component(
         name="controller",
-        description=f"Printed law of the scenario: {scenario.title}",
+        description=f"Law {scenario.law.name} of the scenario: {scenario.title}",
         variables=rows,
-        sources=_sources(_scene(regions, packed, criteria)),
+        sources=_sources(translated),
         contents=lambda fmi: contents("Controller", _WORDS, rows, fmi),
-        constants={
-            "N_REGIONS": len(scenario.regions),
-            "N_NUMBERS": packed.numbers.size,
-            "N_CRITERIA": len(scenario.criteria),
-        },
+        constants=translated.constants,
         stop_time=scenario.time.duration,
         step=scenario.time.step,
     )
@@ -94,48 +97,37 @@ def prefixes(regions: Sequence[Region]) -> list[str]:
     return found
 
 
-def _sources(scene: str) -> dict[str, bytes]:
+def _sources(translated: Translated) -> dict[str, bytes]:
+    files = c_files("cosim.ssp", "csrc/controller")
+    generated = {name: text.encode() for name, text in translated.files.items()}
     return {
-        **c_files("cosim.ssp", "csrc/controller"),
-        **under_own_names(c_sources()),
+        **files,
+        **under_own_names({"normal.c": files["normal.c"], **generated}),
         "ticks.h": c_files("cosim.ssp", "csrc")["ticks.h"],
-        "real.h": plant_sources()["real.h"],
-        "scene.h": scene.encode(),
+        "ziggurat.h": ziggurat().encode(),
     }
 
 
-def _scene(regions: Sequence[Region], packed: PackedRegions, criteria: Sequence[int]) -> str:
-    """Return ``scene.h``: what of the regions is no parameter."""
-    names = [f'"{prefix}"' for prefix in prefixes(regions)]
-    rows: dict[str, Sequence[object]] = {
-        "KINDS": [f"SHAPE_{name_of(region.shape).upper()}" for region in regions],
-        "SIGNS": packed.signs.tolist(),
-        "OFFSETS": packed.offsets.tolist(),
-        "CRITERIA": criteria,
-        "NAMES": names,
-        "CONSTRAINTS": [*_constraints(regions, packed), "{0}"],
-    }
-    lines = (f"#define REGION_{name} {{{', '.join(map(str, values))}}}" for name, values in rows.items())
-    return "\n".join(["/* Regions of the scene, the goal first: generated. */", *lines, ""])
-
-
-def _constraints(regions: Sequence[Region], packed: PackedRegions) -> Iterator[str]:
-    """Yield what must hold among the numbers of shapes, a ``Constraint`` of C each."""
-    for i, region in enumerate(regions):
-        offset = int(packed.offsets[i])
-        for what, place, other, fault in constraints(region.shape.numbers()):
-            more = offset + other if what == "above" else other
-            yield f'{{HOLDS_{what.upper()}, {i}, {offset + place}, {more}, "{fault}"}}'
-
-
-def _variables(scenario: Scenario, regions: Sequence[Region]) -> Iterator[Variable]:
+def _variables(scenario: Scenario, regions: Sequence[Region], places: Places) -> Iterator[Variable]:
     yield Variable("time", "time", "time", q.TIME, "Simulated time")
     yield from _motion("", "input", "inputs.motion", [0.0] * 13, "The vehicle's")
+    if scenario.sensing.through == "sensors":
+        yield from _samples(scenario)
     for i, name in enumerate(scenario.criterion_names):
         yield Variable(f"weight.{name}", "input", f"inputs.weights[{i}]", q.FRACTION, f"Weight of criterion {name}")
     yield from _outputs(scenario, regions)
-    yield from _parameters(scenario)
-    yield from _of_regions(regions)
+    yield from _parameters(scenario, places)
+    yield from _of_regions(regions, places)
+
+
+def _samples(scenario: Scenario) -> Iterator[Variable]:
+    """Yield an input for each of the plant's outputs of sensors."""
+    found = [v for v in variables(scenario.vehicle) if v.name.startswith("measured.")]
+    values = [v for v in found if not v.name.startswith("measured.time.")]
+    for member, rows in (("samples", values), ("sample_times", found[len(values) :])):
+        for i, v in enumerate(rows):
+            quantity = Quantity(v.quantity.unit, -1e15, 1e15)
+            yield Variable(v.name, "input", f"inputs.{member}[{i}]", quantity, v.description)
 
 
 def _motion(prefix: str, role: Role, member: str, start: Sequence[float], whose: str) -> Iterator[Variable]:
@@ -156,14 +148,27 @@ def _outputs(scenario: Scenario, regions: Sequence[Region]) -> Iterator[Variable
     def output(name: str, member: str, unit: str, description: str) -> Variable:
         return Variable(name, "output", f"outputs.{member}", q.unbounded(unit), description)
 
-    for i, name in enumerate(FORCES):
-        what = f"{'Force along' if i < 3 else 'Moment about'} body {AXES[i % 3]} that the law asks for"
-        yield output(f"wrench.{name}", f"wrench[{i}]", "N" if i < 3 else "N.m", what)
+    if law_of(scenario).output == "wrench":
+        for i, name in enumerate(FORCES):
+            what = f"{'Force along' if i < 3 else 'Moment about'} body {AXES[i % 3]} that the law asks for"
+            yield output(f"wrench.{name}", f"wrench[{i}]", "N" if i < 3 else "N.m", what)
+    if scenario.actuation.through == "thrusters":
+        for i in range(scenario.vehicle.n_thrusters):
+            yield output(f"thrust[{i + 1}]", f"thrusts[{i}]", "N", f"Commanded force of thruster {i + 1}")
+    for j in sorted({failure.thruster for failure in scenario.failures if not failure.stuck}):
+        what = f"Part of the force of thruster {j} that is lost"
+        yield output(f"thrust_failure[{j}]", f"failures[{j - 1}]", "", what)
+    for sensor in sorted({outage.sensor for outage in scenario.outages}):
+        what = "1 in an outage, in which no samples are given, else 0"
+        yield output(f"{sensor}.outage", f"outages[{SENSORS.index(sensor)}]", "", what)
     for i, name in enumerate(scenario.criterion_names):
         what = f"Degree to which criterion {name} asks for attention"
         yield output(f"membership.{name}", f"memberships[{i}]", "", what)
+    for i, signal in enumerate(rule_inputs(scenario)):
+        unit = signal.unit if signal.unit in UNITS else ""
+        yield output(f"arbiter.{signal.name}", f"rule_inputs[{i}]", unit, f"Of the arbiter's rules: {signal.what}")
     for i in range(4):
-        what = f"Estimate of phi {i + 1} in (12), with which the wrench was made"
+        what = f"Estimate of phi {i + 1} in (12), with which the forces were made"
         yield output(f"estimate.phi{i + 1}", f"estimate[{i}]", "N.m" if i else "N", what)
     for i, (region, prefix) in enumerate(zip(regions, prefixes(regions), strict=True)):
         what = f"g of {region.name}, above 0 where violated"
@@ -172,48 +177,72 @@ def _outputs(scenario: Scenario, regions: Sequence[Region]) -> Iterator[Variable
         yield output(f"{prefix}.clearance", f"clearances[{i}]", unit, f"{kind} {region.name}, below 0 where violated")
 
 
+def rule_inputs(scenario: Scenario) -> tuple[InputSignal, ...]:
+    """Return what the arbiter's rules get, none where they get the memberships as they stand."""
+    signals = scenario.rules.inputs
+    plain = [(signal.kind, signal.of) for signal in signals]
+    return () if plain == [("membership", i) for i in range(len(scenario.criteria))] else signals
+
+
 def _parameter(name: str, member: str, quantity: Quantity, description: str, start: float) -> Variable:
-    return Variable(name, "parameter", f"parameters.{member}", quantity, description, float(start))
+    return Variable(name, "parameter", member, quantity, description, float(start))
 
 
-def _parameters(scenario: Scenario) -> Iterator[Variable]:
-    of_p, of_sigma = _UNITS_BY_GOAL[scenario.goal.unit]
-    for name, unit, description, positive in (
-        ("k_p1", of_p, "Gain on the primary region (16)", True),
-        ("k_p2", "N.m", "Gain on attitude (26)", False),
-        ("k_q", "", "Gain of (22), (26), which cancels in (25) and (27)", True),
-        ("k_v1", "N.s/m", "Gain on linear velocity (26)", False),
-        ("k_v2", "N.m.s/rad", "Gain on angular velocity (26)", False),
-        ("sigma_p", of_sigma, "Share of position in the adaptation (27)", False),
-        ("sigma_a", "rad/s", "Share of attitude in the adaptation (27)", False),
-        ("gamma", "s2/kg", "Gamma = gamma I (27): the greater, the slower the adaptation", True),
-    ):
-        start = getattr(scenario.law.gains, name)
-        quantity = Quantity(unit, _POSITIVE.minimum if positive else 0.0, _POSITIVE.maximum, is_gain=True)
-        yield _parameter(f"law.gains.{name}", f"gains.{name}", quantity, description, start)
+def _parameters(scenario: Scenario, places: Places) -> Iterator[Variable]:
+    law, said = law_of(scenario), comments(scenario.law.name, scenario.vehicle)
+    for i, (name, start) in enumerate(law.gains._asdict().items()):
+        unit = unit_of_gain(law.name, name).replace(" ", ".")
+        unit = _UNITS_BY_GOAL.get(unit, {}).get(scenario.goal.unit, unit)
+        least = 0.0 if _takes(law, name, 0.0) else _LEAST
+        most = next((most for most in (_MOST, 1.0) if _takes(law, name, most)), max(float(start), least))
+        quantity = Quantity(unit if unit in UNITS else "", least, most, is_gain=True)
+        description = _without_unit(said.get(f"law.gains.{name}", "")) or f"Gain {name} of the law"
+        yield _parameter(f"law.gains.{name}", f"parameters.gains[{i}]", quantity, description, start)
     for i, start in enumerate(scenario.law.desired_quaternion):
         description = f"Attitude to be kept, as unit quaternion from body to world, part {i}"
-        yield _parameter(f"law.desired_quaternion.e{i}", f"desired[{i}]", q.QUATERNION, description, start)
+        member = f"numbers[{places.desired + i}]"
+        yield _parameter(f"law.desired_quaternion.e{i}", member, q.QUATERNION, description, start)
     description = "Width over which a membership falls from 1 to 0 outside a region [m], rad for regions of attitude"
-    yield _parameter("arbiter.ramp", "ramp", Quantity("", 0.0, 1e6), description, scenario.arbiter.ramp)
-    yield _parameter("time.control", "period", _PERIOD, "Period of the law", scenario.time.control)
+    ramp = Quantity("", 0.0, 1e6)
+    yield _parameter("arbiter.ramp", "parameters.ramp", ramp, description, scenario.arbiter.ramp)
+    yield _parameter("time.control", "parameters.period", _PERIOD, "Period of the law", scenario.time.control)
     initial = scenario.initial
     numbers = [*initial.position, *initial.quaternion, *initial.velocity]
     yield from _motion("initial.", "parameter", "parameters.start", numbers, "At the start:")
 
 
-def _of_regions(regions: Sequence[Region]) -> Iterator[Variable]:
+def _takes(law: CompiledLaw, gain: str, value: float) -> bool:
+    """Return whether a law can work with a gain."""
+    try:
+        law.validate(law.gains._replace(**{gain: value}))
+    except LawError:
+        return False
+    return True
+
+
+def _without_unit(comment: str) -> str:
+    """Return what is said of a gain in its source, as a description."""
+    words = comment.split(", ", 1)[-1]
+    return words[:1].upper() + words[1:]
+
+
+def _of_regions(regions: Sequence[Region], places: Places) -> Iterator[Variable]:
     number = 0
     for i, (region, prefix) in enumerate(zip(regions, prefixes(regions), strict=True)):
         if i:
-            quantity = Quantity(_GAIN_UNITS[region.shape.unit], 0.0, 1e9)
-            yield _parameter(f"{prefix}.gain", f"alphas[{i}]", quantity, f"Gain of {region.name}", region.gain)
+            quantity = Quantity(_GAIN_UNITS[region.shape.unit], 0.0, _MOST)
+            member = f"numbers[{places.region_gains + i - 1}]"
+            yield _parameter(f"{prefix}.gain", member, quantity, f"Gain of {region.name}", region.gain)
+        first = places.region_velocities + 3 * (i - 1) if i else places.goal_velocities
         for j, axis in enumerate(AXES):
             description = f"How fast {region.name} moves, {('north', 'east', 'down')[j]}"
             yield _parameter(
-                f"{prefix}.velocity.{axis}", f"velocities[{i}][{j}]", q.SPEED, description, region.velocity[j]
+                f"{prefix}.velocity.{axis}", f"numbers[{first + j}]", q.SPEED, description, region.velocity[j]
             )
+        first = places.region_numbers if i else places.goal_numbers
         for (name, quantity), start in zip(shape_numbers(region.shape), region.shape.packed(), strict=True):
             description = f"Of the shape of {region.name}, where it is at time 0"
-            yield _parameter(f"{prefix}.shape.{name}", f"numbers[{number}]", quantity, description, start)
+            yield _parameter(f"{prefix}.shape.{name}", f"numbers[{first + number}]", quantity, description, start)
             number += 1
+        if not i:
+            number = 0

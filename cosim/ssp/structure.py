@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import metadata
@@ -17,6 +18,7 @@ _NAMESPACES = {
     "xmlns:ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
     # up here: libcosim takes an attribute of the element below for an algorithm
     "xmlns:osp": "http://opensimulationplatform.com/SSP/OSPAnnotations",
+    "xmlns:oms": "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
 }
 
 
@@ -28,6 +30,11 @@ class Part:
     source: str  # of the FMU, in the archive
     component: Component
     connectors: tuple[str, ...]  # names of the inputs and outputs that are shown
+
+    @property
+    def parameters(self) -> str:
+        """Place of its parameter set, in the archive."""
+        return self.source.replace(".fmu", ".ssv")
 
 
 @dataclass(frozen=True)
@@ -62,7 +69,7 @@ def structure(
     """
     version = metadata.version("subreach")
     root = ET.Element(
-        "ssd:SystemStructureDescription", _NAMESPACES, version="1.0", name=name, description=description,
+        "ssd:SystemStructureDescription", _NAMESPACES, version="1.0", name=identifier(name), description=description,
         license="BSD-3-Clause", generationTool=f"subreach {version}",
     )  # fmt: skip
     system = ET.SubElement(root, "ssd:System", name="root")
@@ -80,6 +87,8 @@ def structure(
                 startElement=wire.start, startConnector=signal, endElement=wire.end, endConnector=signal,
             )  # fmt: skip
 
+    _annotate_for_omsimulator(system, step)
+
     defined = ET.SubElement(root, "ssd:Units")
     for unit, exponents in UNITS.items():
         if unit in units:
@@ -94,6 +103,22 @@ def structure(
     return xml_text(root)
 
 
+def identifier(name: str) -> str:
+    """Return a name with an underscore for all that an identifier has not, which OMSimulator wants of a system."""
+    words = re.sub(r"\W", "_", name, flags=re.ASCII)
+    return words if words and not words[0].isdigit() else f"_{words}"
+
+
+def _annotate_for_omsimulator(system: ET.Element, step: float) -> None:
+    """Say the step where OMSimulator reads it."""
+    annotation = ET.SubElement(ET.SubElement(system, "ssd:Annotations"), "ssc:Annotation", type="org.openmodelica")
+    information = ET.SubElement(ET.SubElement(annotation, "oms:Annotations"), "oms:SimulationInformation")
+    ET.SubElement(
+        information, "oms:FixedStepMaster",
+        description="oms-ma", stepSize=repr(float(step)), absoluteTolerance="0.0001", relativeTolerance="0.0001",
+    )  # fmt: skip
+
+
 def _add_part(parent: ET.Element, part: Part, shown: Sequence[Variable]) -> None:
     element = ET.SubElement(
         parent, "ssd:Component",
@@ -105,3 +130,5 @@ def _add_part(parent: ET.Element, part: Part, shown: Sequence[Variable]) -> None
         kind = "input" if v.role == "input" else "output"
         connector = ET.SubElement(connectors, "ssd:Connector", name=v.name, kind=kind, description=v.description)
         ET.SubElement(connector, "ssc:Real", {"unit": v.quantity.unit} if v.quantity.unit else {})
+    bindings = ET.SubElement(element, "ssd:ParameterBindings")
+    ET.SubElement(bindings, "ssd:ParameterBinding", type="application/x-ssp-parameter-set", source=part.parameters)

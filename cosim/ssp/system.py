@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping, Sequence
+from itertools import permutations
 from pathlib import Path
 
-from controller.errors import RegionError
-from controller.regions.in_c import require_in_c
 from cosim.errors import RunError
+from cosim.scenario.law_factory import require_builtin_law
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario
 from cosim.scenario.start_values import start_values
 from cosim.ssp.arbiter import arbiter_component
 from cosim.ssp.controller import controller_component
 from cosim.ssp.structure import Part, Wire, structure
+from cosim.ssp.variable_groups import osp_model_description
+from fuzzy_arbiter import ArbiterError
+from fuzzy_arbiter.export import to_c
 from plant_fmu import build_fmu
 from plant_fmu.archive import require_place, write_archive
 from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.platforms import NATIVE
 from plant_fmu.component import Component
+from plant_fmu.contents.parameter_set import parameter_set
 from plant_fmu.variables import AXES, FORCES, VELOCITIES
 from plant_fmu.vehicle_component import of_vehicle
 
@@ -39,7 +44,7 @@ def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str =
     Parameters
     ----------
     scenario : Scenario
-        With the paper's law, on the direct wrench, and nothing that comes from outside.
+        With a shipped law, and nothing that comes from outside.
     out : Path
         The file to write; it appears whole or not at all, with the same bytes each time.
     fmi : int
@@ -62,28 +67,52 @@ def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str =
     _require(scenario)
     out = Path(out)
     require_place(out)
-    controller, arbiter = controller_component(scenario), arbiter_component(scenario)
-    memberships, weights = (
-        tuple(f"{what}.{name}" for name in scenario.criterion_names) for what in ("membership", "weight")
-    )
-    outputs = tuple(v.name for v in controller.variables if v.role == "output")
-    parts = (
-        Part("plant", "resources/plant.fmu", plant_component(scenario), (*MOTION, *WRENCH)),
-        Part("controller", "resources/controller.fmu", controller, (*MOTION, *weights, *outputs)),
-        Part("arbiter", "resources/arbiter.fmu", arbiter, (*memberships, *weights)),
-    )
-    wires = (
-        Wire("plant", "controller", MOTION),
-        Wire("controller", "plant", WRENCH),
-        Wire("controller", "arbiter", memberships),
-        Wire("arbiter", "controller", weights),
-    )
+    components = {
+        "plant": plant_component(scenario),
+        "controller": controller_component(scenario),
+        "arbiter": arbiter_component(scenario),
+    }
+    wires = _wires(components)
+    parts = [
+        Part(name, f"resources/{name}.fmu", component, _shown(name, component, wires))
+        for name, component in components.items()
+    ]
     time = scenario.time
     members = {part.source: _fmu(part.component, fmi, platforms) for part in parts}
+    for part in parts:
+        component = part.component
+        values = [(v, v.start) for v in component.variables if v.role == "parameter"]
+        members[part.parameters] = parameter_set(part.name, f"{part.name} of {scenario.title}", values).encode()
+        groups = osp_model_description(component, part.connectors)
+        members[f"resources/{component.name}_OspModelDescription.xml"] = groups.encode()
     described = structure(scenario.name, scenario.title, parts, wires, time.duration, time.step)
     members["SystemStructure.ssd"] = described.encode()
     write_archive(out, members | _origin(scenario))
     return out
+
+
+def _wires(components: Mapping[str, Component]) -> list[Wire]:
+    """Connect every output with the input of another component that bears its name."""
+    roles = {name: {v.name: v.role for v in component.variables} for name, component in components.items()}
+    return [
+        Wire(start, end, tuple(
+            name for name, role in roles[end].items()
+            if role == "input" and roles[start].get(name) in ("state", "output")
+        ))
+        for start, end in permutations(components, 2)
+    ]  # fmt: skip
+
+
+def _shown(part: str, component: Component, wires: Sequence[Wire]) -> tuple[str, ...]:
+    """Return the names of a component's real outputs, and of its inputs that are connected.
+
+    FMPy gives inputs that are shown but not connected the number of another one.
+    """
+    connected = {name for wire in wires if wire.end == part for name in wire.names}
+    return tuple(
+        v.name for v in component.variables
+        if v.type == "real" and not v.local and (v.role in ("state", "output") or v.name in connected)
+    )  # fmt: skip
 
 
 def plant_component(scenario: Scenario) -> Component:
@@ -100,7 +129,11 @@ def plant_component(scenario: Scenario) -> Component:
         The vehicle's, with other start values.
     """
     start = {name: float(value) for name, value in start_values(scenario).items()}
-    return of_vehicle(scenario.vehicle, start, scenario.time.duration, scenario.time.step)
+    for failure in scenario.failures:  # at once, before there is a connection
+        if failure.time <= 0.0 and not failure.stuck:
+            start[f"thrust_effectiveness[{failure.thruster}]"] = failure.effectiveness
+    coupled = bool(scenario.failures or scenario.outages)
+    return of_vehicle(scenario.vehicle, start, scenario.time.duration, scenario.time.step, coupled)
 
 
 def _origin(scenario: Scenario) -> dict[str, bytes]:
@@ -122,40 +155,22 @@ def _fmu(component: Component, fmi: int, platforms: str) -> bytes:
 
 def _require(scenario: Scenario) -> None:
     """Refuse what the FMUs of a system have not."""
-    own = next((c.name for c in scenario.criteria if any(r.term or r.ramp is not None for r in c.reasons)), None)
-    streamed = [r.region.name for r in scenario.regions if r.streamed]
+    streamed = next((r.region.name for r in scenario.regions if r.streamed), "")
+    require_builtin_law(scenario)
     for good, key, received, expected in (
-        (
-            scenario.law.name == "ismail_dunnigan",
-            "law.name",
-            repr(scenario.law.name),
-            "'ismail_dunnigan': the law there is in C",
-        ),
-        (
-            scenario.actuation.through == "wrench",
-            "actuation.through",
-            repr(scenario.actuation.through),
-            "'wrench': there is no allocation in C",
-        ),
         (
             scenario.arbiter.engine in _EXACT,
             "arbiter.engine",
             repr(scenario.arbiter.engine),
             "'closed' or 'exact', such as by --set arbiter.engine=closed",
         ),
-        (scenario.arbiter.rules == "ordered", "arbiter.rules", repr(scenario.arbiter.rules), "'ordered'"),
-        (not scenario.arbiter.file, "arbiter.file", repr(scenario.arbiter.file), "none: rules get memberships alone"),
-        (own is None, f"criteria.{own}.membership", "given", "none: there is one ramp for all"),
-        (scenario.sensing.exact, "sensing", "not exact", "neither noise nor gaps"),
-        (not scenario.failures, "failures", "given", "none"),
         (not scenario.commands.enabled, "commands.enabled", "true", "false: nobody steers a system from outside"),
         (not scenario.goal_streamed, "goal.streamed", "true", "false"),
-        (not scenario.goal_then, "goal.then", "given", "none"),
-        (not streamed, f"regions.{streamed[0]}.streamed" if streamed else "", "true", "false"),
+        (not streamed, f"regions.{streamed}.streamed", "true", "false"),
     ):
         if not good:
             raise RunError(f"{key} is {received}, expected {expected} in a system of FMUs")
     try:
-        require_in_c((scenario.goal_region, *(r.region for r in scenario.regions)), "a system of FMUs")
-    except RegionError as error:
-        raise RunError(str(error)) from error
+        to_c(scenario.rules.system)
+    except ArbiterError as error:
+        raise RunError(f"arbiter.{'file' if scenario.arbiter.file else 'rules'}: {error}") from error

@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 
 from plant_fmu.component import Component
 from plant_fmu.markup import xml_text
+from plant_fmu.t200 import t200_header
 
 # a function is named after its file, at the beginning of a line; data are declared extern
 _DECLARED = re.compile(
@@ -26,7 +27,7 @@ def plant_sources() -> dict[str, bytes]:
     dict of str to bytes
         Contents by name.
     """
-    return _files("csrc")
+    return _files("csrc") | {"t200.h": t200_header().encode()}
 
 
 def c_sources(component: Component, fmi: int) -> dict[str, bytes]:

@@ -1,7 +1,11 @@
 #include "model.h"
 
+#include "coupling.h"
+
 #include <math.h>
 #include <string.h>
+
+static void evaluate_alone(Model *m);
 
 /* ---- clocks ------------------------------------------------------------------------------------------------ */
 
@@ -135,7 +139,7 @@ static void take_sample(Model *m, int sensor, unsigned long long count, const do
     held->pending[sensor] += 1.0;
 }
 
-int model_tick(Model *m)
+static int tick_alone(Model *m)
 {
     int ticked = 0, measured = 0;
     double ideal[N_MEASURED];
@@ -158,7 +162,7 @@ int model_tick(Model *m)
             tick_current(m, count);
         else {
             if (!measured) {
-                model_evaluate(m);
+                evaluate_alone(m);
                 sensors_measure(&m->plant.parameters, m->state.rigid, m->outputs.rate.rigid, m->outputs.euler[2],
                                 m->outputs.altitude, ideal);
             }
@@ -172,6 +176,19 @@ int model_tick(Model *m)
             ticked = 1;
         }
     note_next_tick(&m->held);
+    return ticked;
+}
+
+int model_tick(Model *m)
+{
+    Model coupled;
+
+    if (m->held.next_tick == INFINITY || !coupling_acts(m))
+        return tick_alone(m);
+    coupling_apply(m, &coupled);
+    const int ticked = tick_alone(&coupled);
+    m->held = coupled.held;
+    m->outputs = coupled.outputs;
     return ticked;
 }
 
@@ -202,7 +219,7 @@ static void euler_angles(const double e[4], double euler[3])
     euler[2] = upright ? atan2(R[1][0], R[0][0]) : atan2(-R[0][1], R[1][1]);
 }
 
-void model_evaluate(Model *m)
+static void evaluate_alone(Model *m)
 {
     const Parameters *p = &m->plant.parameters;
     Outputs *o = &m->outputs;
@@ -230,7 +247,20 @@ void model_evaluate(Model *m)
         o->stamp[i] = holds(m, i) ? m->held.sample_time[i] : m->held.clocks[i].period > 0.0 ? NO_SAMPLE : m->time;
 }
 
-int model_settle(Model *m)
+void model_evaluate(Model *m)
+{
+    Model coupled;
+
+    if (!coupling_acts(m)) {
+        evaluate_alone(m);
+        return;
+    }
+    coupling_apply(m, &coupled);
+    evaluate_alone(&coupled);
+    m->outputs = coupled.outputs;
+}
+
+static int settle_alone(Model *m)
 {
     const Actuators before = m->state.actuators;
     Actuators target;
@@ -241,15 +271,27 @@ int model_settle(Model *m)
     return memcmp(&before, &m->state.actuators, sizeof before) != 0;
 }
 
+int model_settle(Model *m)
+{
+    Model coupled;
+
+    if (!coupling_acts(m))
+        return settle_alone(m);
+    coupling_apply(m, &coupled);
+    const int changed = settle_alone(&coupled);
+    m->state.actuators = coupled.state.actuators;
+    return changed;
+}
+
 /* ---- stepping ---------------------------------------------------------------------------------------------- */
 
-int model_advance(Model *m, double end, double *failed)
+static int advance_alone(Model *m, double end, double *failed)
 {
     const double hair = 1e-9 * (end - m->time); /* no segment is shorter */
     Mask thrust_cut[N_THRUSTERS], wrench_cut;
     Actuators target;
 
-    model_tick(m);
+    tick_alone(m);
     actuators_target(&m->plant.parameters, &m->inputs, &target, thrust_cut, &wrench_cut);
     while (m->time < end) {
         const double tick = m->held.next_tick, until = tick < end - hair ? tick : end;
@@ -258,7 +300,21 @@ int model_advance(Model *m, double end, double *failed)
                            failed))
             return 0;
         m->time = until;
-        model_tick(m);
+        tick_alone(m);
     }
     return 1;
+}
+
+int model_advance(Model *m, double end, double *failed)
+{
+    Model coupled;
+
+    if (!coupling_acts(m))
+        return advance_alone(m, end, failed);
+    coupling_apply(m, &coupled);
+    const int done = advance_alone(&coupled, end, failed);
+    m->state = coupled.state;
+    m->held = coupled.held;
+    m->time = coupled.time;
+    return done;
 }

@@ -53,6 +53,11 @@ static void ride_current(const Plant *plant, const Drift *drift, double time, co
     environment_current(p, drift, time, rigid[2], water);
     for (int i = 0; i < 3; i++)
         water_rate[i] = drift->slope[i] + choose(rigid[2] > 0.0, p->current_shear[i] * velocity_world[2], zero);
+    if (plant->external.acts)
+        for (int i = 0; i < 3; i++) {
+            water[i] += plant->external.current_rate[i] * (time - plant->external.since);
+            water_rate[i] += plant->external.current_rate[i];
+        }
     to_body(R, water, nu_c);
     to_body(R, water_rate, nu_c_rate);
     cross(rigid + 10, nu_c, turning);
@@ -70,6 +75,20 @@ static void ride_current(const Plant *plant, const Drift *drift, double time, co
     for (int i = 0; i < 6; i++) {
         momentum[i] -= lost[i];
         wrench[i] += added[i];
+    }
+}
+
+/* Adds the wrench that other components put on the body. */
+static void push(const External *external, const Real R[3][3], Real wrench[6])
+{
+    Real force[3], moment[3], lever[3];
+
+    to_body(R, external->force, force);
+    to_body(R, external->moment, moment);
+    cross(external->point, force, lever);
+    for (int i = 0; i < 3; i++) {
+        wrench[i] += force[i] + external->wrench[i];
+        wrench[3 + i] += moment[i] + lever[i] + external->wrench[3 + i];
     }
 }
 
@@ -122,6 +141,9 @@ void plant_derivative(const Plant *plant, const Drift *drift, double time, const
         for (int i = 0; i < 3; i++)
             wrench[i] += contact[i];
     }
+
+    if (plant->external.acts)
+        push(&plant->external, (const Real(*)[3])R, wrench);
 
     multiply6(plant->derived.mass_inverse, wrench, rate + 7);
 }

@@ -122,9 +122,18 @@ typedef struct { /* the current's Gauss-Markov part between two knots: value + s
     Real deviation[3]; /* that the axis goes by; 0: it stands still */
 } Drift;
 
+typedef struct { /* what other components do to the body, beside its actuators */
+    int acts;             /* 0: nothing */
+    double since;         /* s, when the current was what the parameters say */
+    Real current_rate[3]; /* m/s2, world frame */
+    Real force[3], moment[3], point[3]; /* N, N m, world frame, at a point of the body [m], body frame */
+    Real wrench[6];       /* N, N m, body frame, about the origin */
+} External;
+
 typedef struct {
     Parameters parameters;
     Derived derived;
+    External external;
 } Plant;
 
 /* ---- constants.c: what follows from the parameters ---- */

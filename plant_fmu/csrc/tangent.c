@@ -2,8 +2,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "coupling.h"
 #include "linear.h"
-#include "model.h"
 
 /* ---- attitude ---------------------------------------------------------------------------------------------- */
 
@@ -111,6 +111,27 @@ static void mass_matrix_tangent(const Parameters *p, const Parameters *dp, doubl
     }
 }
 
+/* Of push of plant.c. */
+static void add_external_tangent(const External *x, const External *dx, const double R[3][3], const double dR[3][3],
+                                 double dwrench[6])
+{
+    double force[3], dforce[3], moment[3], turned[3], left[3], right[3];
+
+    to_body(R, x->force, force);
+    to_body(dR, x->force, turned);
+    to_body(R, dx->force, dforce);
+    for (int i = 0; i < 3; i++)
+        dforce[i] += turned[i];
+    to_body(dR, x->moment, turned);
+    to_body(R, dx->moment, moment);
+    cross(dx->point, force, left);
+    cross(x->point, dforce, right);
+    for (int i = 0; i < 3; i++) {
+        dwrench[i] += dforce[i] + dx->wrench[i];
+        dwrench[3 + i] += turned[i] + moment[i] + left[i] + right[i] + dx->wrench[3 + i];
+    }
+}
+
 /* Of plant_derivative, whose result `rate` is known. */
 static void derivative_tangent(const Model *m, const Model *seed, const double rate[N_RIGID], const double dtau[6],
                                double R[3][3], double dR[3][3], double dwater[3], double drate[N_RIGID])
@@ -141,8 +162,10 @@ static void derivative_tangent(const Model *m, const Model *seed, const double r
     for (int i = 0; i < 3; i++) {
         current[i] = dcurrent[i] = 0.0;
         for (int j = 0; j < 3; j++) {
-            const double water_rate = drift->slope[j] + p->current_shear[j] * under * rate[2];
-            const double dwater_rate = under * (dp->current_shear[j] * rate[2] + p->current_shear[j] * drate[2]);
+            const double water_rate =
+                drift->slope[j] + p->current_shear[j] * under * rate[2] + m->plant.external.current_rate[j];
+            const double dwater_rate = under * (dp->current_shear[j] * rate[2] + p->current_shear[j] * drate[2]) +
+                                       seed->plant.external.current_rate[j];
             current[i] += R[j][i] * water[j];
             dcurrent[i] += dR[j][i] * water[j] + R[j][i] * dwater[j];
             nu_c_rate[i] += R[j][i] * water_rate;
@@ -214,6 +237,10 @@ static void derivative_tangent(const Model *m, const Model *seed, const double r
                 dwrench[i] += dR[j][i] * contact[j] + R[j][i] * dcontact[j];
     }
 
+    if (m->plant.external.acts)
+        add_external_tangent(&m->plant.external, &seed->plant.external, (const double(*)[3])R, (const double(*)[3])dR,
+                             dwrench);
+
     /* M nu' = wrench */
     momentum_tangent(p, dp, rate + 7, still, da, da + 3);
     multiply6((const double(*)[6])dadded_mass, rate + 7, term);
@@ -249,7 +276,7 @@ static void measured_tangent(const Model *m, const Model *seed, int starting, co
     }
 }
 
-void model_tangent(const Model *m, const Model *seed, int starting, Model *tangent)
+static void tangent_of(const Model *m, const Model *seed, int starting, Model *tangent)
 {
     const Parameters *p = &m->plant.parameters, *dp = &seed->plant.parameters;
     Outputs *d = &tangent->outputs;
@@ -267,4 +294,13 @@ void model_tangent(const Model *m, const Model *seed, int starting, Model *tange
     measured_tangent(m, seed, starting, (const double(*)[3])R, (const double(*)[3])dR, d, d->measured);
     for (int i = 0; i < N_SENSORS; i++)
         d->stamp[i] = m->held.clocks[i].period > 0.0 && !(starting && m->held.delivered[i] > 0.0) ? 0.0 : seed->time;
+}
+
+void model_tangent(const Model *m, const Model *seed, int starting, Model *tangent)
+{
+    Model coupled, direction;
+
+    coupling_apply(m, &coupled); /* inputs that are off have derivatives too */
+    coupling_tangent(m, seed, &direction);
+    tangent_of(&coupled, &direction, starting, tangent);
 }

@@ -49,6 +49,27 @@ def libcosim(path, steps, step):
     return np.array(rows)
 
 
+def oms(path, steps, step):
+    """OMSimulator 2.1, which takes the step from the file's annotation."""
+    from OMSimulator import OMSimulator
+
+    simulator = OMSimulator()
+    simulator.setCommandLineOption("--suppressPath=true")
+    model, status = simulator.importFile(str(path))
+    assert status == 0
+    assert simulator.instantiate(model) == 0
+    assert simulator.initialize(model) == 0
+    rows = []
+    for k in range(steps):
+        assert simulator.stepUntil(model, (k + 1) * step) == 0
+        rows.append([simulator.getReal(f"{model}.root.plant.{name}")[0] for name in MOTION])
+    simulator.terminate(model)
+    return np.array(rows)
+
+
 if __name__ == "__main__":
     _, _master, _path, _steps, _step, _out = sys.argv
-    np.save(_out, {"fmpy": fmpy, "ecos": ecos, "libcosim": libcosim}[_master](Path(_path), int(_steps), float(_step)))
+    np.save(
+        _out,
+        {"fmpy": fmpy, "ecos": ecos, "libcosim": libcosim, "oms": oms}[_master](Path(_path), int(_steps), float(_step)),
+    )

@@ -1,4 +1,4 @@
-/* The fuzzy arbiter as a component behind the FMI wrappers. The weights are worked out in a step, from the memberships at
+/* The fuzzy arbiter as a component behind the FMI wrappers. The weights are worked out in a step, from the inputs at
  * its beginning; before the first they are 0. */
 #include <math.h>
 #include <string.h>
@@ -49,9 +49,9 @@ static Status advance(Instance *instance, double end)
         instance_tell(instance, LOG_WARNINGS, "the arbiter runs at t = %.9g s, %.3g s late: steps do not divide time.arbiter = %.9g s",
                       m->time, late, m->ticks.period);
     if (ticks_due(&m->ticks, m->time)) {
-        if (EVALUATE_RULES(m->memberships, weights) != 0) {
+        if (EVALUATE_RULES(m->inputs, weights) != 0) {
             m->ticks = ticks;
-            return instance_refuse(instance, "step from t = %.9g s not taken: no weights follow from these memberships",
+            return instance_refuse(instance, "step from t = %.9g s not taken: no weights follow from these inputs",
                                    m->time);
         }
         memcpy(m->weights, weights, sizeof m->weights);

@@ -1,4 +1,4 @@
-/* The arbiter: memberships in, weights out, once a period. */
+/* The arbiter: memberships or other inputs of its rules in, weights out, once a period. */
 #ifndef MODEL_H
 #define MODEL_H
 
@@ -10,7 +10,7 @@ enum { N_STATES = 0 };
 
 typedef struct {
     double period; /* s */
-    double memberships[N_CRITERIA];
+    double inputs[N_RULE_INPUTS];
     Ticks ticks;
     double weights[N_CRITERIA];
     double time;

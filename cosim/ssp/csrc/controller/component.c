@@ -1,17 +1,16 @@
-/* The printed law and its regions as a component behind the FMI wrappers. Everything is worked out in a step, from the
- * inputs at its beginning; before the first all outputs are 0. */
+/* Law, regions and what is sensed as a component behind the FMI wrappers: the stages of a step in the master's order. Everything
+ * is worked out in a step, from the inputs at its beginning; before the first all outputs are 0. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "instance.h"
-#include "regions.h"
-#include "scene.h" /* generated: what kinds of regions there are */
+#include "loop.h" /* generated: the translated functions, and the scene */
 
-static const int KINDS[N_ALL] = REGION_KINDS;
-static const double SIGNS[N_ALL] = REGION_SIGNS;
 static const int OFFSETS[N_ALL + 1] = REGION_OFFSETS;
 static const int CRITERIA[N_ALL] = REGION_CRITERIA;
 static const char *const NAMES[N_ALL] = REGION_NAMES;
+static const int RAMPS[] = RAMP_PLACES; /* of the memberships that fall over arbiter.ramp; the last is -1 */
 
 /* What must hold among the numbers of all shapes, beyond their ranges; the last has no fault. */
 typedef struct Constraint {
@@ -23,9 +22,32 @@ typedef struct Constraint {
 
 static const Constraint CONSTRAINTS[] = REGION_CONSTRAINTS;
 
-static void rewind_memory(Model *m)
+typedef struct { /* the last has no thruster */
+    double time; /* s */
+    int thruster;
+    double remaining; /* effectiveness; NaN: stuck */
+} Failure;
+
+static const Failure FAILURES[] = SCENE_FAILURES;
+
+typedef struct { /* the last is at INFINITY */
+    double time; /* s */
+    int sensor;
+    double probability; /* 1 in an outage, else 0 */
+} Outage;
+
+static const Outage OUTAGES[] = SCENE_OUTAGES;
+static const double GOAL_PLACES[][3] = SCENE_GOAL_PLACES; /* m, where the goal is next, in turn; one more than there are */
+static const double HAIR = 1e-6 * SCENE_STEP;             /* s: sums of steps may lag a little */
+
+/* ---- numbers ----------------------------------------------------------------------------------------------- */
+
+static bool is_finite(const double x[], int n)
 {
-    memset(&m->memory, 0, sizeof m->memory);
+    for (int i = 0; i < n; i++)
+        if (!isfinite(x[i]))
+            return false;
+    return true;
 }
 
 static bool is_unit(const double x[], int n)
@@ -47,24 +69,48 @@ static bool is_rotation(const double R[9])
     return true;
 }
 
-static bool holds(const Constraint *c, const double numbers[])
+/* Where the numbers of a region's shape stand: the goal's apart from all others. */
+static const double *shape_of(const Model *m, int region)
 {
+    return m->numbers + (region ? AT_REGION_NUMBERS + OFFSETS[region] : AT_GOAL_NUMBERS);
+}
+
+static bool holds(const Model *m, const Constraint *c)
+{
+    const double *numbers = shape_of(m, c->region);
+
     if (c->what == HOLDS_ABOVE)
         return numbers[c->place] > numbers[c->more];
     return c->what == HOLDS_ROTATION ? is_rotation(numbers + c->place) : is_unit(numbers + c->place, c->more);
+}
+
+/* ---- before the first step --------------------------------------------------------------------------------- */
+
+static void rewind_memory(Model *m)
+{
+    static const Normal BEGINNING = SCENE_RANDOM;
+
+    memset(&m->memory, 0, sizeof m->memory);
+    m->memory.random = BEGINNING;
+    m->memory.inside_since = -1.0;
+    control_rewind(m);
 }
 
 static Status prepare(Instance *instance)
 {
     Model *m = &instance->model;
 
-    if (!is_unit(m->parameters.desired, 4))
+    if (!is_unit(m->numbers + AT_DESIRED, 4))
         return instance_refuse(instance, "law.desired_quaternion is not of length 1");
     if (!is_unit(m->parameters.start + 3, 4))
         return instance_refuse(instance, "initial.quaternion is not of length 1");
     for (const Constraint *c = CONSTRAINTS; c->fault; c++)
-        if (!holds(c, m->parameters.numbers))
+        if (!holds(m, c))
             return instance_refuse(instance, "%s: %s", NAMES[c->region], c->fault);
+    for (const int *place = RAMPS; *place >= 0; place++)
+        m->numbers[*place] = m->parameters.ramp;
+    if (AT_PERIOD >= 0)
+        m->numbers[AT_PERIOD] = m->parameters.period;
     ticks_begin(&m->memory.control, m->parameters.period, m->time);
     return STATUS_OK;
 }
@@ -88,6 +134,8 @@ static Status fits(const Instance *instance, double step)
     return STATUS_OK;
 }
 
+/* ---- the stages of a step ---------------------------------------------------------------------------------- */
+
 /* Where the vehicle is: as the inputs say; at the start while all of them are 0, as masters leave them that have not
  * heard of the plant yet. A quaternion of zeros is read as identity. */
 static void motion_now(const Model *m, double motion[13])
@@ -104,64 +152,220 @@ static void motion_now(const Model *m, double motion[13])
         motion[3] = 1.0;
 }
 
-/* To what degree each criterion matters: that of its most pressing region. */
-static void pressing(const Model *m, double memberships[N_CRITERIA])
+/* Lets law and allocation know of the thrusters that have failed altogether. */
+static void report_failures(Model *m)
 {
-    for (int i = 0; i < N_CRITERIA; i++)
-        memberships[i] = 0.0;
-    for (int i = 1; i < N_ALL; i++)
-        memberships[CRITERIA[i]] =
-            fmax(memberships[CRITERIA[i]], regions_ramp(m->outputs.clearances[i], m->parameters.ramp));
+    for (const Failure *f; (f = &FAILURES[(int)m->memory.reported])->thruster >= 0 && f->time <= m->time + HAIR;) {
+        if (SCENE_REPORTS_FAILURES && !(f->remaining > 0.0)) {
+            m->numbers[AT_HEALTH + f->thruster] = 0.0;
+            if (m->numbers[AT_STAGE] < SCENE_STAGES - 1)
+                m->numbers[AT_STAGE] += 1.0;
+        }
+        m->memory.reported += 1.0;
+    }
 }
 
-static bool is_finite(const double x[], int n)
+/* Writes what law and arbiter are given of a true motion: with noise, held, or lost. */
+static void sense_state(Model *m, const double motion[13], bool anew)
 {
-    for (int i = 0; i < n; i++)
-        if (!isfinite(x[i]))
-            return false;
-    return true;
+    static const double DEVIATIONS[6] = SCENE_DEVIATIONS;
+    double *position = m->numbers + AT_POSITION, *velocity = m->numbers + AT_VELOCITY;
+
+    if (SCENE_NOISE && anew)
+        for (int i = 0; i < 6; i++)
+            m->memory.noise[i] = DEVIATIONS[i] * normal_draw(&m->memory.random);
+    memcpy(m->numbers + AT_QUATERNION, motion + 3, 4 * sizeof(double));
+    memcpy(velocity + 3, motion + 10, 3 * sizeof(double));
+    if (m->time >= SCENE_DEAD_FROM && m->time < SCENE_DEAD_UNTIL) {
+        if (SCENE_FROZEN && m->time > 0.0)
+            return;
+        for (int i = 0; i < 3; i++) {
+            position[i] = SCENE_FROZEN ? motion[i] : NAN;
+            velocity[i] = SCENE_FROZEN ? motion[7 + i] : NAN;
+        }
+        return;
+    }
+    for (int i = 0; i < 3; i++) {
+        position[i] = motion[i] + m->memory.noise[i];
+        velocity[i] = motion[7 + i] + m->memory.noise[3 + i];
+    }
 }
 
-static Status advance(Instance *instance, double end)
+#if SCENE_SENSORS
+/* Writes what the navigation filter makes of the samples. Inputs that are all 0 are those of a master that has not heard of
+ * the plant yet: then there are no samples. */
+static void sense_samples(Model *m)
+{
+    bool all_zero = true;
+
+    for (int i = 0; i < N_MEASURED; i++)
+        all_zero = all_zero && m->inputs.samples[i] == 0.0;
+    if (!all_zero) {
+        memcpy(m->numbers + AT_SAMPLES, m->inputs.samples, sizeof m->inputs.samples);
+        memcpy(m->numbers + AT_SAMPLE_TIMES, m->inputs.sample_times, sizeof m->inputs.sample_times);
+    }
+    control_navigate(m);
+}
+#endif
+
+static void move_regions(Model *m)
+{
+    const double *offset = GOAL_PLACES[(int)m->memory.place];
+
+    for (int j = 0; j < 3; j++)
+        m->numbers[AT_GOAL_SHIFTS + j] = m->numbers[AT_GOAL_VELOCITIES + j] * m->time + offset[j];
+    for (int i = 0; i < 3 * N_REGIONS; i++)
+        m->numbers[AT_REGION_SHIFTS + i] = m->numbers[AT_REGION_VELOCITIES + i] * m->time;
+}
+
+/* Evaluates the regions at the pose that is known, and what the arbiter's rules get, for when the step has ended. */
+static void decide(Model *m, double end)
+{
+    Outputs *out = &m->outputs;
+
+    if (!is_finite(m->numbers + AT_POSITION, 3))
+        return; /* nothing to decide by: the last memberships hold */
+    m->numbers[AT_NOW] = end;
+    control_decide(m);
+    memcpy(out->values, m->numbers + AT_VALUES, sizeof out->values);
+    memcpy(out->clearances, m->numbers + AT_CLEARANCES, sizeof out->clearances);
+    memcpy(out->memberships, m->numbers + AT_MEMBERSHIPS, sizeof out->memberships);
+    memcpy(out->rule_inputs, m->numbers + AT_RULE_INPUTS, sizeof out->rule_inputs);
+}
+
+#if SCENE_N_PLACES
+/* Lets the goal go on, from the next step on, once the vehicle has stayed in it long enough. */
+static void advance_goal(Model *m, const double motion[13])
+{
+    memcpy(m->numbers + AT_TRUE_POSITION, motion, 3 * sizeof(double));
+    memcpy(m->numbers + AT_TRUE_QUATERNION, motion + 3, 4 * sizeof(double));
+    control_find_goal(m);
+    if (!(m->numbers[AT_GOAL_CLEARANCE] >= 0.0))
+        m->memory.inside_since = -1.0;
+    else if (m->memory.inside_since < 0.0)
+        m->memory.inside_since = m->time;
+    if (m->memory.place < SCENE_N_PLACES && m->memory.inside_since >= 0.0 &&
+        m->time - m->memory.inside_since >= SCENE_STAY - HAIR) {
+        m->memory.place += 1.0;
+        m->memory.inside_since = -1.0;
+    }
+}
+#endif
+
+/* Works out the forces of the coming period; none before anything is known to steer by. */
+static void steer(Model *m)
+{
+    Outputs *out = &m->outputs;
+    const bool steers = AT_STARTED < 0 || m->numbers[AT_STARTED] > 0.0;
+
+    for (int i = 0; i < 6; i++)
+        m->numbers[AT_EXPECTED + i] = NAN;
+    if (steers) {
+        for (int i = 1; i < N_ALL; i++)
+            m->numbers[AT_WEIGHTS + i - 1] = m->inputs.weights[CRITERIA[i]];
+        memcpy(out->estimate, m->numbers + AT_ESTIMATE, sizeof out->estimate);
+        control_steer(m);
+        if (SCENE_EXPECTS && AT_LAW_EXPECTED >= 0)
+            memcpy(m->numbers + AT_EXPECTED, m->numbers + AT_LAW_EXPECTED, 6 * sizeof(double));
+    } else {
+        memset(m->numbers + AT_WRENCH, 0, 6 * sizeof(double));
+        memset(m->numbers + AT_THRUSTS, 0, N_THRUSTERS * sizeof(double));
+    }
+#if SCENE_ALLOCATES
+    control_allocate(m);
+#endif
+    memcpy(out->wrench, m->numbers + AT_WRENCH, sizeof out->wrench);
+    for (int i = 0; i < N_THRUSTERS; i++)
+        if (m->memory.stuck[i] == 0.0)
+            out->thrusts[i] = m->numbers[AT_THRUSTS + i];
+}
+
+/* Lets thrusters fail, and sensors fall out, that do so in the step which these outputs are for. */
+static void fail(Model *m, double end)
+{
+    Memory *memory = &m->memory;
+
+    for (const Failure *f; (f = &FAILURES[(int)memory->failed])->thruster >= 0 && f->time <= end + HAIR;) {
+        if (isnan(f->remaining))
+            memory->stuck[f->thruster] = 1.0;
+        else
+            m->outputs.failures[f->thruster] = 1.0 - f->remaining;
+        memory->failed += 1.0;
+    }
+    for (const Outage *o; (o = &OUTAGES[(int)memory->changed])->time <= end + HAIR;) {
+        m->outputs.outages[o->sensor] = o->probability;
+        memory->changed += 1.0;
+    }
+}
+
+static Status take_step(Instance *instance, double end)
 {
     Model *m = &instance->model;
-    const Memory memory = m->memory;
-    const Outputs outputs = m->outputs;
-    Parameters *p = &m->parameters;
-    Outputs *out = &m->outputs;
-    double motion[13], shifts[N_ALL][3], gradients[N_ALL][3], alphas[N_ALL];
-
-    motion_now(m, motion);
-    for (int i = 0; i < N_ALL; i++)
-        for (int j = 0; j < 3; j++)
-            shifts[i][j] = p->velocities[i][j] * m->time;
-    const Regions regions = {N_ALL, KINDS, SIGNS, OFFSETS, p->numbers, (const double(*)[3])shifts};
-    regions_evaluate(&regions, motion, motion + 3, out->values, gradients, out->clearances);
-    pressing(m, out->memberships);
+    double motion[13];
 
     const double late = ticks_first_late(&m->memory.control, m->time);
     if (late > 0.0)
         instance_tell(instance, LOG_WARNINGS, "the law runs at t = %.9g s, %.3g s late: steps do not divide time.control = %.9g s",
-                      m->time, late, p->period);
-    if (ticks_due(&m->memory.control, m->time)) {
-        for (int i = 1; i < N_ALL; i++)
-            alphas[i] = p->alphas[i] * m->inputs.weights[CRITERIA[i]];
-        memcpy(out->estimate, m->memory.estimate, sizeof out->estimate);
-        law_step(motion + 3, motion + 7, p->desired, out->values[0], gradients[0], N_REGIONS, out->values + 1,
-                 (const double(*)[3])(gradients + 1), alphas + 1, &p->gains, p->period, m->memory.estimate, out->wrench);
-    }
-    if (!is_finite(out->wrench, 6) || !is_finite(m->memory.estimate, 4)) {
-        m->memory = memory;
-        m->outputs = outputs;
-        return instance_refuse(instance, "step from t = %.9g s not taken: wrench or estimate is no finite number", m->time);
-    }
+                      m->time, late, m->parameters.period);
+    const bool due = ticks_due(&m->memory.control, m->time);
+
+    motion_now(m, motion);
+    report_failures(m);
+#if SCENE_SENSORS
+    m->numbers[AT_NOW] = m->time;
+    sense_samples(m);
+    (void)sense_state;
+#else
+    sense_state(m, motion, due);
+#endif
+    move_regions(m);
+    decide(m, end);
+    fail(m, end);
+    if (due)
+        steer(m);
+#if SCENE_N_PLACES
+    advance_goal(m, motion);
+#endif
+    if (!is_finite((const double *)&m->outputs, (int)(sizeof m->outputs / sizeof(double))))
+        return instance_refuse(instance, "step from t = %.9g s not taken: a force, an estimate or a value of a region is no finite number",
+                               m->time);
     m->time = end;
     return STATUS_OK;
 }
 
+static Status advance(Instance *instance, double end)
+{
+    Model *before = malloc(sizeof *before);
+
+    if (!before)
+        return instance_refuse(instance, "no memory for a step");
+    memcpy(before, &instance->model, sizeof *before);
+    const Status status = take_step(instance, end);
+    if (status != STATUS_OK)
+        memcpy(&instance->model, before, sizeof *before);
+    free(before);
+    return status;
+}
+
+/* ---- restored states --------------------------------------------------------------------------------------- */
+
+static bool counts(double count, double most)
+{
+    return count >= 0.0 && count <= most && count == floor(count);
+}
+
 static bool possible(const Model *m)
 {
-    return ticks_possible(&m->memory.control) && is_finite(m->memory.estimate, 4) &&
+    const Memory *memory = &m->memory;
+    const unsigned char *flags = (const unsigned char *)m->flags;
+
+    for (int i = 0; i < N_FLAGS; i++)
+        if (flags[i] > 1)
+            return false;
+    return ticks_possible(&memory->control) && counts(memory->reported, sizeof FAILURES / sizeof FAILURES[0] - 1) &&
+           counts(memory->failed, sizeof FAILURES / sizeof FAILURES[0] - 1) &&
+           counts(memory->changed, sizeof OUTAGES / sizeof OUTAGES[0] - 1) && counts(memory->place, SCENE_N_PLACES) &&
+           counts(m->numbers[AT_STAGE], SCENE_STAGES - 1) && is_finite(memory->noise, 6) &&
            is_finite((const double *)&m->outputs, (int)(sizeof m->outputs / sizeof(double)));
 }
 

@@ -1,40 +1,51 @@
-/* The controller: a pose and weights in; wrench, memberships and estimates out, once a step. */
+/* The controller: a pose or samples of sensors, and weights, in; forces, memberships and estimates out, once a step. */
 #ifndef MODEL_H
 #define MODEL_H
 
-#include "variables.h" /* generated: how many regions and numbers there are, and the table of variables */
+#include <stdbool.h>
+#include <stdint.h>
 
-#include "law.h"
+#include "variables.h" /* generated: how many there are of what, and the table of variables */
+
+#include "normal.h"
 #include "ticks.h"
 
 enum { N_STATES = 0 };
-enum { N_ALL = 1 + N_REGIONS }; /* the goal is the first of all regions */
+enum { N_ALL = 1 + N_REGIONS };             /* the goal is the first of all regions */
+enum { N_MEASURED = 15, N_SENSORS = 5 };    /* as the plant has them */
 
 typedef struct {
-    Gains gains;
-    double desired[4];                /* attitude to be kept */
+    double gains[N_GAINS];
     double ramp;                      /* m, rad */
     double period;                    /* s, of the law */
     double start[13];                 /* pose and velocity, for masters that begin with zeros */
-    double alphas[N_ALL];             /* gain of each region; that of the goal is not used */
-    double velocities[N_ALL][3];      /* m/s, NED */
-    double numbers[N_NUMBERS];        /* of the shapes */
-} Parameters;
+} Parameters; /* and those of regions and attitude, which stand among the numbers */
 
 typedef struct {
     double motion[13];                /* position 3, quaternion 4, velocity 6 */
+    double samples[N_MEASURED];
+    double sample_times[N_SENSORS];   /* s */
     double weights[N_CRITERIA];
 } Inputs;
 
 typedef struct {
-    double estimate[4];
     Ticks control;
+    Normal random;                    /* of the noise */
+    double noise[6];                  /* m, m/s: of position and velocity, since the last tick */
+    double reported, failed, changed; /* how many failures were told, and happened; how many changes of outages */
+    double stuck[N_THRUSTERS];        /* 1: its force stays as it is */
+    double place;                     /* of the goal, from 0 */
+    double inside_since;              /* s; negative: the vehicle is not within the goal */
 } Memory;
 
 typedef struct {
     double wrench[6];
+    double thrusts[N_THRUSTERS];      /* N */
+    double failures[N_THRUSTERS];     /* part of each thruster's force that is lost */
+    double outages[N_SENSORS];        /* probability that a sample is lost by an outage */
     double memberships[N_CRITERIA];
-    double estimate[4];               /* that the wrench was made with */
+    double rule_inputs[N_RULE_INPUTS];
+    double estimate[4];               /* that the forces were made with */
     double values[N_ALL], clearances[N_ALL];
 } Outputs;
 
@@ -43,6 +54,10 @@ typedef struct {
     Inputs inputs;
     Memory memory;
     Outputs outputs;
+    double numbers[N_NUMBERS];        /* of the translated functions: parameters first, then what they keep */
+    int64_t integers[N_INTEGERS];
+    uint64_t words[N_WORDS];
+    bool flags[N_FLAGS];
     double time;
     double stop_time; /* INFINITY if there is none */
 } Model; /* plain data: all that an FMU state holds */

@@ -1,0 +1,123 @@
+"""Where the arrays of translated functions stand in an FMU: in its model, which states copy, or as constants."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from controller.translator.program import Program
+from controller.translator.static_data import array_data, initializer
+from controller.translator.types import BOOL, DOUBLE, INT, UINT, Array, type_of
+from cosim.simulation.signals import Array as Numbers
+
+POOLS = {DOUBLE: "numbers", INT: "integers", UINT: "words", BOOL: "flags"}  # members of the model, by what they hold
+_TYPES = {"numbers": np.float64, "integers": np.int64, "words": np.uint64, "flags": np.bool_}
+
+
+class Memory:
+    """Places of arrays: what changes, in members of the C struct ``Model``; what does not, in constants.
+
+    An array that shares memory with another one stands in the same place. Parameters come first: the importer sets
+    them, and they keep their numbers when a run begins anew.
+    """
+
+    def __init__(self) -> None:
+        self._pools: dict[str, list[np.ndarray]] = {member: [] for member in POOLS.values()}
+        self._sizes = dict.fromkeys(POOLS.values(), 0)
+        self._places: dict[int, int] = {}  # of whole arrays, by their ids, which are theirs while they are kept
+        self._constants: dict[int, str] = {}
+        self._kept: list[np.ndarray] = []
+        self.definitions: list[str] = []  # C, of the constants
+
+    def keep(self, array: np.ndarray) -> int:
+        """Return the place of an array's first item in the member for its type, which it has from now on."""
+        whole = array
+        while isinstance(whole.base, np.ndarray):
+            whole = whole.base
+        if id(whole) not in self._places:
+            member = self._member(whole)
+            self._places[id(whole)] = self._sizes[member]
+            self._sizes[member] += whole.size
+            self._pools[member].append(whole)
+        between = array.ctypes.data - whole.ctypes.data if array.size else 0
+        return self._places[id(whole)] + between // array.itemsize
+
+    def fix(self, *values: Any) -> None:
+        """Let all arrays of arguments be constants, but those that have a place already."""
+        for array in (array for value in values for array in arrays_of(value)):
+            if array.size and id(array) not in self._places and id(array) not in self._constants:
+                name = f"CONSTANT_{len(self._constants)}"
+                self._constants[id(array)] = name
+                self._kept.append(array)
+                self.definitions.append(array_data(array, name, "static const"))
+
+    def call(self, program: Program, name: str, arguments: tuple[Any, ...]) -> str:
+        """Return the C function ``void control_name(Model *m)``, which calls a function of the program.
+
+        Parameters
+        ----------
+        program : Program
+            That exports the function as ``translated_name``.
+        name : str
+            Of the function.
+        arguments : tuple
+            Its arguments, or `Named` ones.
+        """
+
+        def pointer(array: np.ndarray, _: str) -> str:
+            kind = type_of(array)
+            program.name(kind)
+            assert isinstance(kind, Array)
+            if not array.size:
+                return "NULL"
+            if id(array) in self._constants:
+                return f"({kind.item.c} *){self._constants[id(array)]}"
+            return f"m->{POOLS[kind.item]} + {self.keep(array)}"
+
+        values = [a.text if isinstance(a, Named) else initializer(a, pointer) for a in arguments]
+        return (
+            f"void control_{name}(Model *m)\n{{\n    const translated_{name}_arguments arguments = {{\n"
+            + "".join(f"        {value},\n" for value in values)
+            + f"    }};\n\n    translated_{name}(&arguments);\n}}\n"
+        )
+
+    def sizes(self) -> dict[str, int]:
+        """Return how many items each member has, at least one, as ``N_NUMBERS`` and so on."""
+        return {f"N_{member.upper()}": max(size, 1) for member, size in self._sizes.items()}
+
+    def starts(self) -> Iterator[str]:
+        """Yield the C definitions of what each member holds at first."""
+        for member, arrays in self._pools.items():
+            parts = [array.ravel() for array in arrays] or [np.zeros(1)]
+            numbers: np.ndarray = np.concatenate(parts).astype(_TYPES[member])
+            yield array_data(numbers if numbers.size else np.zeros(1, _TYPES[member]), f"FIRST_{member.upper()}",
+                             "static const")  # fmt: skip
+
+    @property
+    def size(self) -> int:
+        """How many real numbers have a place."""
+        return self._sizes["numbers"]
+
+    def _member(self, array: np.ndarray) -> str:
+        kind = type_of(array)
+        assert isinstance(kind, Array)
+        return POOLS[kind.item]
+
+
+class Named:
+    """An argument that the model holds as numbers of its own, such as gains."""
+
+    def __init__(self, value: tuple[float, ...], member: str) -> None:
+        self.value = value
+        self.text = f"{{{', '.join(f'm->{member}[{i}]' for i in range(len(value)))}}}"
+
+
+def arrays_of(value: Any) -> Iterator[Numbers]:
+    """Yield all arrays in an argument."""
+    if isinstance(value, tuple):
+        for item in value:
+            yield from arrays_of(item)
+    elif isinstance(value, np.ndarray):
+        yield value

@@ -1,0 +1,247 @@
+"""The C of a scenario's loop: translated functions, where their arrays stand, and what of the scene is no parameter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller import LawError
+from controller.law import CompiledLaw
+from controller.quaternion import from_axis_angle
+from controller.regions import Region
+from controller.regions.numbers import constraints
+from controller.translator.operands import number
+from controller.translator.program import Program
+from controller.translator.types import type_of
+from cosim.scenario.law_factory import law_of
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.sensor import STREAM
+from cosim.ssp.loop import Loop
+from cosim.ssp.memory import Memory, Named, arrays_of
+from cosim.ssp.normal_tables import generator_state
+
+_AXIS = np.array([0.48, 0.6, 0.64])  # of a turn that no law begins with
+_NONE = -1  # place of what a law has not
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where arrays stand in the model's numbers; `constants` by the names that the C code has for them."""
+
+    constants: dict[str, int]
+    goal_numbers: int
+    region_numbers: int
+    region_gains: int
+    goal_velocities: int
+    region_velocities: int
+    desired: int
+
+
+@dataclass(frozen=True)
+class Translated:
+    """C files, and where what they work on stands."""
+
+    files: dict[str, str]  # by name
+    constants: dict[str, int]  # for the generated header
+    places: Places
+
+
+def translate_loop(scenario: Scenario, regions: Sequence[Region], names: Sequence[str]) -> Translated:
+    """Translate the loop of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With a shipped law.
+    regions : sequence of Region
+        Of the scenario, the goal first.
+    names : sequence of str
+        What the variables of each begin with.
+
+    Returns
+    -------
+    Translated
+        Files of one folder, with those of ``csrc/controller``.
+
+    Raises
+    ------
+    TranslationError
+        If a function is beyond what is translated.
+    """
+    loop = Loop(scenario)
+    memory = Memory()
+    places = _place(loop, memory, scenario)
+    program, declared, calls = Program(), [], []
+    for name, (function, arguments) in loop.functions.items():
+        program.export(f"translated_{name}", function, tuple(map(type_of, arguments)))
+        given = tuple(Named(a, "parameters.gains") if a is loop.law.gains else a for a in arguments)
+        calls.append(memory.call(program, name, given))
+        declared.append(f"void translated_{name}(const void *words);\nvoid control_{name}(Model *m);\n")
+    code = "\n".join([
+        '#include "model.h"\n#include "loop.h"\n',
+        program.text(),
+        *memory.definitions,
+        *memory.starts(),
+        _REWIND,
+        *calls,
+    ])  # fmt: skip
+    header = "\n".join([
+        "/* The loop of a scenario: generated. */",
+        "#ifndef LOOP_H",
+        "#define LOOP_H",
+        "",
+        '#include "model.h"',
+        "",
+        "/* Puts all but parameters to what it is at the beginning. */\nvoid control_rewind(Model *m);\n",
+        *declared,
+        *(f"#define {key} {value}" for key, value in _scene(loop, memory, scenario, regions, names).items()),
+        "",
+        "#endif",
+        "",
+    ])  # fmt: skip
+    constants = {
+        **places.constants,
+        **memory.sizes(),
+        "N_GAINS": max(len(loop.law.gains), 1),
+        "N_THRUSTERS": scenario.vehicle.n_thrusters,
+        "N_REGIONS": len(scenario.regions),
+        "N_CRITERIA": len(scenario.criteria),
+        "N_RULE_INPUTS": loop.signals.inputs.size,
+    }
+    return Translated({"loop.c": code, "loop.h": header}, constants, places)
+
+
+_REWIND = """\
+void control_rewind(Model *m)
+{
+    memcpy(m->numbers + N_PARAMETERS, FIRST_NUMBERS + N_PARAMETERS, sizeof m->numbers - N_PARAMETERS * sizeof(double));
+    memcpy(m->integers, FIRST_INTEGERS, sizeof m->integers);
+    memcpy(m->words, FIRST_WORDS, sizeof m->words);
+    memcpy(m->flags, FIRST_FLAGS, sizeof m->flags);
+}
+"""
+
+
+def _place(loop: Loop, memory: Memory, scenario: Scenario) -> Places:
+    """Give every array its place: parameters, then what changes; all else of regions, inputs and allocation stays."""
+    keep, (goal, regions), law = memory.keep, (loop.setup.goal, loop.setup.regions), loop.law
+    desired, period = _desired(law, scenario), getattr(law.memory, "period", None)
+    parameters = {
+        "goal_numbers": keep(goal.numbers),
+        "region_numbers": keep(regions.numbers),
+        "region_gains": keep(regions.gains),
+        "goal_velocities": keep(goal.velocities),
+        "region_velocities": keep(regions.velocities),
+        "desired": keep(desired),
+    }
+    size = memory.size
+    ramps, state, inputs = loop.setup.inputs.memberships.ramps, loop.state, loop.setup.inputs
+    expects = law.expected if any(law.expected is array for array in arrays_of(law.memory)) else None
+    navigates = loop.setup.through_sensors
+    constants = {
+        "N_PARAMETERS": size,
+        "AT_GOAL_NUMBERS": parameters["goal_numbers"],
+        "AT_REGION_NUMBERS": parameters["region_numbers"],
+        "AT_GOAL_VELOCITIES": parameters["goal_velocities"],
+        "AT_REGION_VELOCITIES": parameters["region_velocities"],
+        "AT_DESIRED": parameters["desired"],
+        "AT_PERIOD": _NONE if period is None else keep(period),
+        "AT_RAMPS": keep(ramps),
+        "AT_POSITION": keep(state.position),
+        "AT_QUATERNION": keep(state.quaternion),
+        "AT_VELOCITY": keep(state.velocity_body),
+        "AT_HEALTH": keep(state.thruster_health),
+        "AT_EXPECTED": keep(loop.expected),
+        "AT_LAW_EXPECTED": _NONE if expects is None else keep(expects),
+        "AT_ESTIMATE": keep(law.estimate),
+        "AT_NOW": keep(loop.now),
+        "AT_STAGE": keep(loop.stage),
+        "AT_WEIGHTS": keep(loop.weights),
+        "AT_WRENCH": keep(loop.wrench),
+        "AT_THRUSTS": keep(loop.thrusts),
+        "AT_GOAL_SHIFTS": keep(goal.shifts),
+        "AT_REGION_SHIFTS": keep(regions.shifts),
+        "AT_VALUES": keep(loop.evaluation.values),
+        "AT_CLEARANCES": keep(loop.evaluation.clearances),
+        "AT_MEMBERSHIPS": keep(loop.signals.memberships),
+        "AT_RULE_INPUTS": keep(loop.signals.inputs),
+        "AT_TRUE_POSITION": keep(loop.true_position),
+        "AT_TRUE_QUATERNION": keep(loop.true_quaternion),
+        "AT_GOAL_CLEARANCE": keep(loop.goal_clearance),
+        "AT_STARTED": keep(loop.navigation.started) if navigates else _NONE,
+        "AT_SAMPLES": keep(loop.measurements.values) if navigates else _NONE,
+        "AT_SAMPLE_TIMES": keep(loop.measurements.times) if navigates else _NONE,
+    }
+    for array in arrays_of((law.memory, state)):
+        keep(array)
+    memory.fix(goal, regions, inputs, loop.allocator)
+    return Places(constants, **parameters)
+
+
+def _desired(law: CompiledLaw, scenario: Scenario) -> np.ndarray:
+    """Return the array in a law's memory that a command to keep another attitude writes."""
+    other = law_of(scenario)
+    before = [array.copy() for array in arrays_of(other.memory)]
+    other.set_attitude(from_axis_angle(_AXIS, 2.0))
+    for old, new, own in zip(before, arrays_of(other.memory), arrays_of(law.memory), strict=True):
+        if not np.array_equal(old, new, equal_nan=old.dtype == float):
+            return own
+    raise LawError(f"law {law.name} keeps no attitude that could be another, expected one that `set_attitude` sets")
+
+
+def _scene(
+    loop: Loop, memory: Memory, scenario: Scenario, regions: Sequence[Region], names: Sequence[str]
+) -> dict[str, str]:
+    """Return what of the scene is no parameter, as macros of C."""
+    setup, sensing = loop.setup, scenario.sensing
+    follows = setup.inputs.memberships.follows
+    ramps = memory.keep(setup.inputs.memberships.ramps)
+    failures = zip(setup.failed, setup.failure_steps, setup.remaining, strict=True)
+    outages = zip(setup.outage_steps, setup.outage_sensors, setup.outage_losses, strict=True)
+    goal_places = [[0.0, 0.0, 0.0], *setup.goal_places.tolist()]
+    deviations = [sensing.position_noise] * 3 + [sensing.velocity_noise] * 3
+    upper, lower, increment, rest = generator_state(sensing.seed, STREAM)
+    return {
+        "REGION_OFFSETS": _braced([0, *setup.regions.offsets]),
+        "REGION_CRITERIA": _braced([0, *scenario.criterion_places]),
+        "REGION_NAMES": _braced(f'"{name}"' for name in names),
+        "REGION_CONSTRAINTS": _braced([*_constraints(regions), "{HOLDS_UNIT, 0, 0, 0, NULL}"]),
+        "RAMP_PLACES": _braced([*(ramps + int(i) for i in np.flatnonzero(follows)), -1]),
+        "SCENE_STEP": number(scenario.time.step),
+        "SCENE_FAILURES": _braced([
+            *(_braced([number(at * setup.step), thruster, number(left)]) for thruster, at, left in failures),
+            "{0.0, -1, 0.0}",
+        ]),
+        "SCENE_REPORTS_FAILURES": str(int(setup.tell)),
+        "SCENE_STAGES": str(len(loop.allocator.lower)),
+        "SCENE_OUTAGES": _braced([
+            *(_braced([number(at * setup.step), sensor, number(float(loss == 1.0))]) for at, sensor, loss in outages),
+            "{INFINITY, 0, 0.0}",
+        ]),
+        "SCENE_GOAL_PLACES": _braced(_braced(map(number, place)) for place in goal_places),
+        "SCENE_N_PLACES": str(len(goal_places) - 1),
+        "SCENE_STAY": number(scenario.goal_stay if math.isfinite(scenario.goal_stay) else 0.0),
+        "SCENE_RANDOM": f"{{{{UINT64_C({upper}), UINT64_C({lower})}}, {{UINT64_C({increment}), UINT64_C({rest})}}}}",
+        "SCENE_NOISE": str(int(not sensing.exact and not setup.through_sensors)),
+        "SCENE_DEVIATIONS": _braced(map(number, deviations)),
+        "SCENE_DEAD_FROM": number(setup.dead_from),
+        "SCENE_DEAD_UNTIL": number(setup.dead_until),
+        "SCENE_FROZEN": str(int(setup.frozen)),
+        "SCENE_EXPECTS": str(int(not setup.exact)),
+        "SCENE_SENSORS": str(int(setup.through_sensors)),
+        "SCENE_ALLOCATES": str(int(loop.allocates)),
+    }  # fmt: skip
+
+
+def _constraints(regions: Sequence[Region]) -> Iterator[str]:
+    """Yield what must hold among the numbers of shapes, a ``Constraint`` of C each."""
+    for i, region in enumerate(regions):
+        for what, place, other, fault in constraints(region.shape.numbers()):
+            yield f'{{HOLDS_{what.upper()}, {i}, {place}, {other}, "{fault}"}}'
+
+
+def _braced(values: object) -> str:
+    return f"{{{', '.join(map(str, values))}}}"  # type: ignore[call-overload]

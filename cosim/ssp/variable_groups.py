@@ -1,0 +1,44 @@
+"""Groups of an FMU's variables in the format of the Open Simulation Platform: ``NAME_OspModelDescription.xml``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from xml.etree import ElementTree as ET
+
+from plant_fmu.component import Component
+from plant_fmu.markup import xml_text
+
+_NAMESPACE = "https://open-simulation-platform.com/OspModelDescription/1.0.0"
+_LAST = re.compile(r"(?:\.[^.\[\]]+|\[\d+\])$")  # of a structured name
+
+
+def osp_model_description(component: Component, names: Iterable[str]) -> str:
+    """Return groups of variables that are connected as a whole, such as a position or the commands of all thrusters.
+
+    Parameters
+    ----------
+    component : Component
+        Of the FMU.
+    names : iterable of str
+        Inputs and outputs that are shown.
+
+    Returns
+    -------
+    str
+        XML text; a group has two variables or more, all inputs or all outputs.
+    """
+    shown = set(names)
+    groups: dict[tuple[str, bool], list[str]] = {}
+    for v in component.variables:
+        if v.name in shown:
+            groups.setdefault((_LAST.sub("", v.name), v.role == "input"), []).append(v.name)
+    root = ET.Element("OspModelDescription", xmlns=_NAMESPACE, version="1.0")
+    listed = ET.SubElement(root, "VariableGroups")
+    for (name, is_input), members in groups.items():
+        if len(members) > 1:
+            both = (name, not is_input) in groups
+            group = ET.SubElement(listed, "Generic", name=f"{name}.{'in' if is_input else 'out'}" if both else name)
+            for member in members:
+                ET.SubElement(group, "Variable", ref=member)
+    return xml_text(root)

@@ -1,0 +1,145 @@
+"""Inputs by which other components act on the vehicle: each does what the parameters, or the wrench, would do."""
+
+import numpy as np
+import pytest
+
+from cosim.logs.t200 import force_of_pulse
+from plant_fmu import Plant, load_vehicle
+from plant_fmu.build import cached_fmu
+from plant_fmu.variables import variables
+from plant_fmu.vehicle_component import of_vehicle
+
+MOTION = ("position.x", "position.y", "position.z", "velocity.u", "velocity.v", "velocity.w", "velocity.q")
+
+
+@pytest.fixture(scope="module")
+def coupled():
+    return cached_fmu(of_vehicle(load_vehicle("odin"), coupled=True), 3)
+
+
+def fly(fmu, parameters=None, steps=20, **inputs):
+    """Return the motion after steps of 10 ms; inputs by their names with underscores for points."""
+    with Plant(fmu) as plant:
+        plant.set({"position.z": 2.0, "velocity.u": 0.4, "velocity.q": 0.3, **(parameters or {})})
+        plant.initialise()
+        for name, value in inputs.items():
+            plant[name] = value
+        for _ in range(steps):
+            plant.step(0.01)
+        return np.array([plant[name] for name in MOTION])
+
+
+def test_without_them_the_table_of_variables_is_as_before():
+    """A coupled plant has the same variables in the same order, and others beside them."""
+    vehicle = load_vehicle("odin")
+    plain, coupled = variables(vehicle), variables(vehicle, coupled=True)
+    kept = {v.name for v in plain}
+    assert [v.name for v in coupled if v.name in kept] == [v.name for v in plain]
+    assert {v.role for v in coupled if v.name not in kept} == {"input", "parameter"}
+
+
+@pytest.mark.slow
+def test_off_they_change_no_bit(coupled):
+    np.testing.assert_array_equal(fly(coupled), fly("odin"))
+    np.testing.assert_array_equal(
+        fly(coupled, {"current.x": 0.2}, **{"thrust[1]": 9.0}), fly("odin", {"current.x": 0.2}, **{"thrust[1]": 9.0})
+    )
+
+
+@pytest.mark.slow
+def test_a_current_is_that_of_the_parameters(coupled):
+    got = fly(coupled, {"current.x": 0.1}, **{"current_input.x": 0.2, "current_input.z": -0.1})
+    np.testing.assert_allclose(got, fly("odin", {"current.x": 0.3, "current.z": -0.1}), rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.slow
+def test_the_rate_of_a_current_is_felt_within_a_step(coupled):
+    """Held at each step, its velocity alone lags by half a step; with its rate it is the straight line."""
+
+    def drift(step, with_rate):
+        with Plant(coupled) as plant:
+            plant.set({"position.z": 2.0, "substep": 0.001})
+            plant.initialise()
+            for k in range(round(1.0 / step)):
+                plant["current_input.x"] = 0.5 * k * step
+                plant["current_input_rate.x"] = 0.5 if with_rate else 0.0
+                plant.step(step)
+            return plant["position.x"]
+
+    fine = drift(0.01, True)
+    assert drift(0.1, True) == pytest.approx(fine, abs=1e-9)
+    assert abs(drift(0.1, False) - fine) > 1e-3
+
+
+@pytest.mark.slow
+def test_a_wrench_in_the_body_frame_is_that_of_the_wrench_input(coupled):
+    point, force, moment = np.array([0.3, -0.1, 0.2]), np.array([5.0, 2.0, -3.0]), np.array([0.5, 1.0, -0.7])
+    total = moment + np.cross(point, force)
+    inputs = {
+        f"external.body.{kind}.{axis}": float(value)
+        for kind, values in (("point", point), ("force", force), ("moment", moment))
+        for axis, value in zip("xyz", values, strict=True)
+    }
+    wrench = {f"wrench.{name}": float(x) for name, x in zip("XYZKMN", [*force, *total], strict=True)}
+    np.testing.assert_allclose(fly(coupled, **inputs), fly("odin", **wrench), rtol=0.0, atol=1e-14)
+
+
+@pytest.mark.slow
+def test_a_force_in_the_world_frame_at_the_centre_of_buoyancy_is_buoyancy(coupled):
+    """However the vehicle turns meanwhile."""
+    with Plant("odin") as plant:
+        plant.initialise()
+        names = [f"r_B.{axis}" for axis in "xyz"]
+        r_B, buoyancy = [plant[name] for name in names], plant["buoyancy"]
+    inputs = {"external.world.force.z": -7.0} | {
+        f"external.world.point.{axis}": x for axis, x in zip("xyz", r_B, strict=True)
+    }
+    np.testing.assert_allclose(fly(coupled, **inputs), fly("odin", {"buoyancy": buoyancy + 7.0}), rtol=0.0, atol=1e-13)
+
+
+@pytest.mark.slow
+def test_commands_of_thrusters_in_other_units(coupled):
+    with Plant("odin") as plant:
+        plant.initialise()
+        least, most = plant["thrust_min[1]"], plant["thrust_max[1]"]
+    for share, force in ((0.25, 0.25 * most), (-0.5, 0.5 * least)):
+        got = fly(coupled, **{"thrust_normalized[1]": share})
+        np.testing.assert_allclose(got, fly("odin", **{"thrust[1]": force}), rtol=0.0, atol=1e-14)
+    for pulse, voltage in ((1100.0, 16.0), (1475.0, 13.0), (1500.0, 12.0), (1731.0, 19.9), (1950.0, 20.0)):
+        force = float(force_of_pulse(np.array([pulse]), np.array([voltage]))[0])
+        got = fly(coupled, {"supply_voltage": voltage}, **{"thrust_pulse[2]": pulse})
+        np.testing.assert_allclose(got, fly("odin", **{"thrust[2]": force}), rtol=0.0, atol=1e-13)
+
+
+@pytest.mark.slow
+def test_a_failure_takes_part_of_the_force(coupled):
+    got = fly(coupled, {"thrust_effectiveness[1]": 0.8}, **{"thrust[1]": 20.0, "thrust_failure[1]": 0.25})
+    np.testing.assert_allclose(
+        got, fly("odin", {"thrust_effectiveness[1]": 0.6}, **{"thrust[1]": 20.0}), rtol=0.0, atol=1e-14
+    )
+
+
+@pytest.mark.slow
+def test_derivatives_by_these_inputs_are_those_of_differences(coupled):
+    rng = np.random.default_rng(3)
+    with Plant(coupled) as plant:
+        plant.set({"position.z": 2.0, "velocity.u": 0.4, "quaternion.e1": 0.3, "quaternion.e2": -0.4})
+        plant.initialise()
+        names = [
+            n for n in plant.inputs.names if n.startswith(("current_input", "external", "thrust_nor", "thrust_fail"))
+        ]
+        for name in names:
+            plant.set({name: float(rng.uniform(0.05, 0.4))})
+        for i in range(8):
+            plant.set({f"thrust[{i + 1}]": 5.0, f"thrust_pulse[{i + 1}]": 1610.0 + 11.0 * i})
+        names += [f"thrust_pulse[{i + 1}]" for i in range(8)]
+        unknowns = [f"der(velocity.{name})" for name in "uvwpqr"]
+        exact = plant.jacobian(unknowns, names)
+        for j, name in enumerate(names):
+            here, h = plant[name], 1e-4
+            ends = []
+            for side in (h, -h):
+                plant.set({name: here + side})
+                ends.append(np.array([plant[unknown] for unknown in unknowns]))
+            plant.set({name: here})
+            np.testing.assert_allclose(exact[:, j], (ends[0] - ends[1]) / (2.0 * h), rtol=1e-5, atol=1e-7, err_msg=name)
