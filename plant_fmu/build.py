@@ -81,7 +81,9 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: Path, platforms: str = N
     component = _component(what)
     platforms, wasm = without_wasm(platforms)
     if wasm and fmi == 2:
-        raise BuildError("platform is 'wasm', expected FMI 3.0 with it: fmi-ls-wasm is a layered standard of that alone")
+        raise BuildError(
+            "platform is 'wasm', expected FMI 3.0 with it: fmi-ls-wasm is a layered standard of that alone"
+        )
     native = platforms == NATIVE
     chosen = [native_platform()] if native else cross_platforms(platforms) if platforms else []
     key = token(component, fmi)
