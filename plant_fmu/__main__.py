@@ -23,7 +23,7 @@ try:
     from plant_fmu.archive import write_atomic
     from plant_fmu.build import FMI_VERSIONS, build_fmu
     from plant_fmu.check import Verdict, check_fmu
-    from plant_fmu.compiling.platforms import ALL, NATIVE, PLATFORMS
+    from plant_fmu.compiling.platforms import ALL, NATIVE, PLATFORMS, WASM
     from plant_fmu.contents.layered import reference_files
     from plant_fmu.contents.parameter_set import ssv
     from plant_fmu.contents.reference import reference
@@ -77,7 +77,8 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument(
         "--platforms",
         default=NATIVE,
-        help=f"{NATIVE} for this machine (default); by the ziglang package: {ALL}, or some of {','.join(PLATFORMS)}",
+        help=f"{NATIVE} for this machine (default); by the ziglang package: {ALL}, or some of {','.join(PLATFORMS)}; "
+        f"beside these {WASM}, a WebAssembly component",
     )
     build.add_argument("--coupled", action="store_true", help="with inputs for currents, external forces and the like")
     build.add_argument("--out", type=Path, help="file to write (default: NAME.fmu here)")

@@ -18,9 +18,10 @@ import fmpy
 import platformdirs
 
 from plant_fmu.archive import require_place, write_archive
+from plant_fmu.compiling import webassembly
 from plant_fmu.compiling.compiler import FLAGS, cross_compiler, find_compiler
 from plant_fmu.compiling.libraries import compiled_libraries, digest
-from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
+from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform, without_wasm
 from plant_fmu.compiling.prebuilt import prebuilt_files, prebuilt_libraries
 from plant_fmu.compiling.sources import build_description, c_sources, header
 from plant_fmu.compiling.universal import universal_library
@@ -55,7 +56,8 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: Path, platforms: str = N
     platforms : str
         ``native`` for this machine; ``all``, or FMI 3.0's names with commas between them, such as
         ``x86_64-linux,x86_64-windows``. Libraries that come with the package are taken where they fit. Else they are
-        compiled, for this machine by whatever compiler is here, for others by that of the ziglang package.
+        compiled, for this machine by whatever compiler is here, for others by that of the ziglang package. ``wasm``,
+        alone or after a comma, adds a WebAssembly component to an FMU of FMI 3.0.
 
     Returns
     -------
@@ -77,15 +79,21 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: Path, platforms: str = N
     require_version(fmi)
     out = Path(out)
     component = _component(what)
+    platforms, wasm = without_wasm(platforms)
+    if wasm and fmi == 2:
+        raise BuildError(
+            "platform is 'wasm', expected FMI 3.0 with it: fmi-ls-wasm is a layered standard of that alone"
+        )
     native = platforms == NATIVE
-    chosen = [native_platform()] if native else cross_platforms(platforms)
+    chosen = [native_platform()] if native else cross_platforms(platforms) if platforms else []
     key = token(component, fmi)
     libraries = prebuilt_libraries(component, key, fmi, chosen)
     if libraries is None:
         compilers = [(platform, find_compiler() if native else cross_compiler(platform)) for platform in chosen]
         require_place(out)
         libraries = compiled_libraries(component, key, fmi, compilers)
-    write_archive(out, neutral_members(component, fmi) | _binaries(component, fmi, libraries))
+    more = webassembly.members(component, key) if wasm else {}
+    write_archive(out, neutral_members(component, fmi) | _binaries(component, fmi, libraries) | more)
     return out
 
 

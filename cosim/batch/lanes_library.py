@@ -37,7 +37,7 @@ _WIDTH = """#ifdef __AVX512F__
 #define LANES 4
 #endif
 """
-_OF_PLANT = ("plant.c", "actuators.c", "environment.c")  # what a step of it needs
+_OF_PLANT = ("plant.c", "actuators.c", "environment.c", "elementary.c")  # what a step of it needs
 
 
 @functools.cache

@@ -126,14 +126,25 @@ def compile_library(
                 [*compiler, *options, "-c", str(source), "-o", str(made)]
                 for source, made in zip(sources, objects, strict=True)
             ]
-            list(pool.map(_run, commands))
-        _run([*compiler, *FLAGS, *link, *map(str, objects), "-o", str(library), "-lm"])
+            list(pool.map(run_compiler, commands))
+        run_compiler([*compiler, *FLAGS, *link, *map(str, objects), "-o", str(library), "-lm"])
     if not library.is_file():
         raise BuildError(f"C compiler {shlex.join(compiler)} failed: it wrote no library, and no word")
 
 
-def _run(command: Sequence[str]) -> None:
-    """Run a compiler; raise its first complaint if it fails."""
+def run_compiler(command: Sequence[str]) -> None:
+    """Run a compiler, or another tool of a build.
+
+    Parameters
+    ----------
+    command : sequence of str
+        The command and its arguments.
+
+    Raises
+    ------
+    BuildError
+        If it fails; its first complaint is in the message.
+    """
     log.debug("%s", shlex.join(command))
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603

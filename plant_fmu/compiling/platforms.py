@@ -9,6 +9,7 @@ from plant_fmu.errors import BuildError
 
 NATIVE = "native"
 ALL = "all"
+WASM = "wasm"  # no platform of a library: a component of fmi-ls-wasm
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,25 @@ def native_platform() -> Platform:
     return replace(here, fmi2_names=tuple(dict.fromkeys((_NATIVE_FMI2[system], *here.fmi2_names))))
 
 
+def without_wasm(text: str) -> tuple[str, bool]:
+    """Return what a text of platforms names beside WebAssembly.
+
+    Parameters
+    ----------
+    text : str
+        As `plant_fmu.build_fmu` takes it.
+
+    Returns
+    -------
+    (str, bool)
+        The same without ``wasm``, empty where nothing is left; and whether it was there.
+    """
+    names = [name.strip() for name in text.split(",")]
+    if WASM not in names:
+        return text, False
+    return ",".join(name for name in names if name != WASM), True
+
+
 def cross_platforms(text: str) -> list[Platform]:
     """Return the platforms that a text names.
 
@@ -96,5 +116,5 @@ def cross_platforms(text: str) -> list[Platform]:
     for name in names:
         if name not in PLATFORMS:
             known = ", ".join(PLATFORMS)
-            raise BuildError(f"platform is {name!r}, expected {NATIVE} or {ALL} alone, or some of {known}")
+            raise BuildError(f"platform is {name!r}, expected {NATIVE}, {ALL} or some of {known}; beside these {WASM}")
     return [PLATFORMS[name] for name in PLATFORMS if name in names]

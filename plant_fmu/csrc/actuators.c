@@ -1,6 +1,7 @@
 /* What stands between commands and the body: limits, the thrusters' curves, lag, rate limits, and where forces act. */
 #include <string.h>
 
+#include "elementary.h"
 #include "linear.h"
 #include "plant.h"
 

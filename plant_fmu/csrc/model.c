@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "elementary.h"
+
 static void evaluate_alone(Model *m);
 
 /* ---- clocks ------------------------------------------------------------------------------------------------ */
@@ -87,7 +89,7 @@ static void tick_current(Model *m, unsigned long long count)
     const Parameters *p = &m->plant.parameters;
     Drift *drift = &m->held.drift;
     const double period = m->held.clocks[CURRENT_CLOCK].period, ratio = period / p->current_correlation_time;
-    const double kept = exp(-ratio), fresh = sqrt(-expm1(-2.0 * ratio));
+    const double kept = 1.0 + elementary_expm1(-ratio), fresh = sqrt(-elementary_expm1(-2.0 * ratio));
 
     hold_current(m);
     for (int i = 0; i < 3; i++) {
@@ -211,12 +213,12 @@ static void euler_angles(const double e[4], double euler[3])
     double R[3][3];
 
     plant_rotation(e, R);
-    const double cosine = hypot(R[2][1], R[2][2]);
+    const double cosine = elementary_hypot(R[2][1], R[2][2]);
     const int upright = cosine > UPRIGHT; /* else roll and yaw are one, and all is called yaw */
 
-    euler[0] = upright ? atan2(R[2][1], R[2][2]) : 0.0;
-    euler[1] = atan2(-R[2][0], cosine);
-    euler[2] = upright ? atan2(R[1][0], R[0][0]) : atan2(-R[0][1], R[1][1]);
+    euler[0] = upright ? elementary_atan2(R[2][1], R[2][2]) : 0.0;
+    euler[1] = elementary_atan2(-R[2][0], cosine);
+    euler[2] = upright ? elementary_atan2(R[1][0], R[0][0]) : elementary_atan2(-R[0][1], R[1][1]);
 }
 
 static void evaluate_alone(Model *m)

@@ -1,6 +1,6 @@
 /* Random numbers without a state: a keyed hash of where in which stream the number stands. A run repeats whatever the
  * steps, a saved state needs no generator, and streams do not disturb each other. */
-#include "plant.h"
+#include "elementary.h"
 
 #include <math.h>
 #include <stdint.h>
@@ -52,5 +52,5 @@ double random_normal(int seed, unsigned stream, unsigned long long count)
     /* the first in (0, 1] */
     const double u = ((double)(c[0] >> 5) * 67108864.0 + (double)(c[1] >> 6) + 1.0) / 9007199254740992.0;
     const double v = uniform(c[2], c[3]);
-    return sqrt(-2.0 * log(u)) * cos(6.283185307179586 * v); /* Box-Muller */
+    return sqrt(-2.0 * elementary_log(u)) * elementary_cos_turns(v); /* Box-Muller */
 }

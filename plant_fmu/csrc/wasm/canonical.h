@@ -1,0 +1,109 @@
+/* The Component Model's canonical ABI, as far as the draft fmi-ls-wasm needs it: memory that a call brings or returns,
+ * and the place of a result<..., status>. An instance runs one call at a time, so one place is enough. */
+#ifndef CANONICAL_H
+#define CANONICAL_H
+
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "instance.h" /* names the functions, before */
+#include "fmi3Functions.h"
+
+/* An instance as the importer holds it. */
+typedef struct {
+    fmi3Instance fmu;
+    char *name; /* which goes with each message */
+} Handle;
+
+typedef struct {
+    const char *bytes; /* without a NUL */
+    size_t n;
+} Text;
+
+typedef struct {
+    union {
+        unsigned char bytes[24];
+        size_t words[6];
+        double numbers[3];
+        unsigned long long integers[3];
+    } at;
+} Result;
+
+static Result result;
+
+/* ---- memory: a call's arguments and results, until it has returned ------------------------------------------- */
+
+typedef struct Block {
+    struct Block *next;
+    double align; /* what follows */
+} Block;
+
+static Block *blocks;
+
+static void *kept(size_t size)
+{
+    Block *block = malloc(sizeof *block + size);
+
+    if (!block)
+        __builtin_trap();
+    block->next = blocks;
+    blocks = block;
+    return block + 1;
+}
+
+static void release(void)
+{
+    while (blocks) {
+        Block *next = blocks->next;
+        free(blocks);
+        blocks = next;
+    }
+}
+
+static const char *terminated(Text text)
+{
+    char *copy = kept(text.n + 1);
+
+    memcpy(copy, text.bytes, text.n);
+    copy[text.n] = '\0';
+    return copy;
+}
+
+/* ---- results ----------------------------------------------------------------------------------------------- */
+
+static bool fails(fmi3Status status)
+{
+    return status != fmi3OK && status != fmi3Warning;
+}
+
+static int done(fmi3Status status)
+{
+    release();
+    return (int)status;
+}
+
+static Result *success(void)
+{
+    result.at.bytes[0] = 0;
+    return &result;
+}
+
+/* `place` is that of what a success would hold. */
+static Result *failure(fmi3Status status, int place)
+{
+    result.at.bytes[0] = 1;
+    result.at.bytes[place] = (unsigned char)status;
+    return &result;
+}
+
+static Result *list(fmi3Status status, void *values, size_t n)
+{
+    if (fails(status))
+        return failure(status, 4);
+    result.at.words[1] = (size_t)values;
+    result.at.words[2] = n;
+    return success();
+}
+
+#endif

@@ -1,0 +1,83 @@
+"""An importer of fmi-ls-wasm with wasmtime, and one of the module alone: neither shares code with what is built."""
+
+import struct
+
+import wasmtime
+from wasmtime import component as model
+
+PACKAGE = "fmi:fmi3/{}@3.0.0"
+
+
+class RefusedError(Exception):
+    """A status that is no success."""
+
+
+class ComponentInstance:
+    """An instance behind one interface, `co-simulation` or `model-exchange`; `said` collects what it logs."""
+
+    def __init__(self, data, interface, token, name="test", logging_on=False):
+        self.said = []
+        engine = wasmtime.Engine()
+        self.store = wasmtime.Store(engine)
+        component = model.Component(engine, data)
+        linker = model.Linker(engine)
+        with linker.root() as root, root.add_instance(PACKAGE.format("callbacks")) as callbacks:
+            callbacks.add_func("log-message", lambda _, *said: self.said.append(said))
+            for other in ("clock-update", "lock-preemption", "unlock-preemption"):
+                callbacks.add_func(other, lambda _: None)
+        self.instance = linker.instantiate(self.store, component)
+        self.interface, self.functions = interface, {}
+        text = (name, token, "", False, logging_on)
+        more = (False, False, []) if interface == "co-simulation" else ()
+        self.resource = self._function(f"[static]{interface}-instance.instantiate-{interface}")(
+            self.store, *text, *more
+        )
+
+    def _function(self, name, interface=None):
+        key = (name, interface or self.interface)
+        if key not in self.functions:
+            within = self.instance.get_export_index(self.store, PACKAGE.format(key[1]))
+            self.functions[key] = self.instance.get_func(
+                self.store, self.instance.get_export_index(self.store, name, within)
+            )
+        return self.functions[key]
+
+    def version(self):
+        return self._function("get-version", "common")(self.store)
+
+    def call(self, method, *arguments):
+        """Return what a method returns; raise RefusedError with the status where that is no success."""
+        found = self._function(f"[method]{self.interface}-instance.{method}")(self.store, self.resource, *arguments)
+        if isinstance(found, str) and found not in ("ok", "warning"):
+            raise RefusedError(found)
+        if isinstance(found, model.Variant):
+            if found.tag == "err":
+                raise RefusedError(found.payload)
+            return found.payload
+        return found
+
+    def drop(self):
+        self.resource.drop(self.store)
+
+
+class Module:
+    """The module alone, called as a page calls it: numbers, and addresses in its memory."""
+
+    def __init__(self, data):
+        engine = wasmtime.Engine()
+        self.store = wasmtime.Store(engine)
+        module = wasmtime.Module(engine, data)
+        assert module.imports == []
+        self.exports = wasmtime.Instance(self.store, module, []).exports(self.store)
+        self.call("_initialize")
+
+    def call(self, name, *arguments):
+        return self.exports[name](self.store, *arguments)
+
+    def put(self, data):
+        address = self.call("malloc", len(data))
+        self.exports["memory"].write(self.store, data, address)
+        return address
+
+    def doubles(self, address, n):
+        return struct.unpack(f"<{n}d", self.exports["memory"].read(self.store, address, address + 8 * n))
