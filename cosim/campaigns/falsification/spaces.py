@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from cosim.campaigns.scenes.conflicts import draw_conflict
+from cosim.campaigns.scenes.conflicts import CONFLICTS, draw_conflict
 from cosim.campaigns.scenes.generator import MOST_OBSTACLES, draw_scene
 
-FAMILIES = (*MOST_OBSTACLES, "conflict")
+FAMILIES = (*MOST_OBSTACLES, *CONFLICTS)
 _CONFLICTS = 64  # that are drawn to see how many numbers one has
 _OF_AN_OBSTACLE = 5  # coordinates: radius, place along the way, three of the distance from it
 
@@ -92,7 +92,7 @@ class SceneSpace:
         else:
             several = [Shares(np.empty(0), rng) for _ in range(_CONFLICTS)]
             for shares in several:
-                draw_conflict(shares, 0)
+                draw_conflict(shares, 0, family)
         self._others = max(shares.drawn for shares in several)
         self.dimension = self._others + _OF_AN_OBSTACLE * MOST_OBSTACLES.get(family, 0)
 
@@ -118,5 +118,5 @@ class SceneSpace:
             drawn = [Shares(shares, rest, self._limit) for shares in obstacles]
             scene = draw_scene(others, drawn, seed, self.family)
         else:
-            scene = draw_conflict(others, seed)
+            scene = draw_conflict(others, seed, self.family)
         return json.dumps(scene).encode() + b"\n"

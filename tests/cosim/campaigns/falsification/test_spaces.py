@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import ks_2samp
 
 from cosim.campaigns.falsification.spaces import SceneSpace, Shares
-from cosim.campaigns.scenes.conflicts import make_conflict
+from cosim.campaigns.scenes.conflicts import CONFLICTS, make_conflict
 from cosim.campaigns.scenes.generator import MOST_OBSTACLES, make_scene
 from cosim.campaigns.scenes.scene_file import decode_scene
 
@@ -105,16 +105,18 @@ def numbers(conflict):
     }
 
 
-def test_conflicts_drawn_evenly_are_those_of_the_generator():
-    space, rng = SceneSpace("conflict"), np.random.default_rng(1)
+@pytest.mark.parametrize("family", CONFLICTS)
+def test_conflicts_drawn_evenly_are_those_of_the_generator(family):
+    space, rng = SceneSpace(family), np.random.default_rng(1)
     drawn = [numbers(json.loads(space.line(rng.random(space.dimension), i))) for i in range(700)]
-    made = [numbers(make_conflict(i)) for i in range(700)]
+    made = [numbers(make_conflict(i, family)) for i in range(700)]
     for name in drawn[0]:
         assert ks_2samp([one[name] for one in drawn], [one[name] for one in made]).pvalue > 1e-3, name
 
 
-def test_a_conflict_follows_from_its_point_alone_and_can_be_flown():
-    space, rng = SceneSpace("conflict"), np.random.default_rng(3)
+@pytest.mark.parametrize("family", CONFLICTS)
+def test_a_conflict_follows_from_its_point_alone_and_can_be_flown(family):
+    space, rng = SceneSpace(family), np.random.default_rng(3)
     for i, point in enumerate([*rng.integers(0, 2, (20, space.dimension)), *rng.random((40, space.dimension))]):
         one, other = (json.loads(space.line(point.astype(float), seed)) for seed in (i, i + 100))
         del one["scenario"]["title"], other["scenario"]["title"]
