@@ -33,7 +33,7 @@ def add_verb(verbs: Any) -> None:
     )  # fmt: skip
     falsify.add_argument(
         "what", metavar="FAMILY|SCENARIO",
-        help="plain, hard or conflict, as cosim scenes makes them; or a shipped name or TOML file, before --vary",
+        help="plain, hard, conflict or tour, as cosim scenes makes them; or a shipped name or TOML file, before --vary",
     )  # fmt: skip
     falsify.add_argument("--law", help="such as pd; of a scenario, in the place of its own")
     falsify.add_argument(

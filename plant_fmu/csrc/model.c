@@ -1,11 +1,10 @@
 #include "model.h"
 
 #include "coupling.h"
+#include "elementary.h"
 
 #include <math.h>
 #include <string.h>
-
-#include "elementary.h"
 
 static void evaluate_alone(Model *m);
 

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from cosim.campaigns.scenes.conflicts import draw_conflict
+from cosim.campaigns.scenes.conflicts import CONFLICTS, draw_conflict
 from cosim.campaigns.scenes.generator import MOST_OBSTACLES, draw_scene
 
-FAMILIES = (*MOST_OBSTACLES, "conflict")
+FAMILIES = (*MOST_OBSTACLES, *CONFLICTS)
+_CHANCES = 2**31  # seeds of noise
 _CONFLICTS = 64  # that are drawn to see how many numbers one has
 _OF_AN_OBSTACLE = 5  # coordinates: radius, place along the way, three of the distance from it
 
@@ -73,17 +74,19 @@ class SceneSpace:
 
     Points that are drawn evenly give scenes with the generator's own distribution: a coordinate is the share of the
     distribution of one number. An obstacle that leaves too little room around start or goal is drawn again, as by the
-    generator, from the scene's seed.
+    generator.
 
     Parameters
     ----------
     family : str
         One of `FAMILIES`.
-    limit : float
-        Greatest distance of a normal number from its mean [standard deviations].
+    limit : float, optional
+        Greatest distance of a normal number from its mean [standard deviations]. Noise, and obstacles that are drawn
+        again, then follow from the scene's seed. Without a limit they follow from the last coordinate, so that a
+        flight follows from its point alone, and near points mostly have near outcomes.
     """
 
-    def __init__(self, family: str, limit: float = np.inf) -> None:
+    def __init__(self, family: str, limit: float | None = None) -> None:
         self.family, self._limit = family, limit
         rng = np.random.default_rng(0)
         if family in MOST_OBSTACLES:
@@ -92,9 +95,10 @@ class SceneSpace:
         else:
             several = [Shares(np.empty(0), rng) for _ in range(_CONFLICTS)]
             for shares in several:
-                draw_conflict(shares, 0)
+                draw_conflict(shares, 0, family)
         self._others = max(shares.drawn for shares in several)
-        self.dimension = self._others + _OF_AN_OBSTACLE * MOST_OBSTACLES.get(family, 0)
+        self._of_obstacles = _OF_AN_OBSTACLE * MOST_OBSTACLES.get(family, 0)
+        self.dimension = self._others + self._of_obstacles + (limit is None)
 
     def line(self, point: Point, seed: int) -> bytes:
         """Return the scene at a point as a line of JSON.
@@ -104,19 +108,27 @@ class SceneSpace:
         point : ndarray, shape (dimension,)
             From 0 to 1.
         seed : int
-            The scene's own: of its noise, and of obstacles that are drawn again.
+            The scene's own.
 
         Returns
         -------
         bytes
             As `cosim.campaigns.scenes.scene_file.decode_scene` reads it.
         """
-        rest = np.random.default_rng([seed, 2])
-        others = Shares(point[: self._others], rest, self._limit)
-        obstacles = point[self._others :].reshape(-1, _OF_AN_OBSTACLE)
+        chance = seed if self._limit is not None else int(point[-1] * _CHANCES)
+        limit = np.inf if self._limit is None else self._limit
+        rest = np.random.default_rng([chance, 2])
+        others = Shares(point[: self._others], rest, limit)
         if self.family in MOST_OBSTACLES:
-            drawn = [Shares(shares, rest, self._limit) for shares in obstacles]
+            obstacles = point[self._others : self._others + self._of_obstacles].reshape(-1, _OF_AN_OBSTACLE)
+            # of each obstacle its own: whether another one is drawn again changes nothing
+            again = [rest if self._limit else np.random.default_rng([chance, 2, i]) for i in range(len(obstacles))]
+            drawn = [Shares(shares, of, limit) for shares, of in zip(obstacles, again, strict=True)]
             scene = draw_scene(others, drawn, seed, self.family)
+            if self._limit is None:
+                scene["noise"]["seed"] = chance
         else:
-            scene = draw_conflict(others, seed)
+            scene = draw_conflict(others, seed, self.family)
+            if self._limit is None:
+                scene["scenario"]["sensing"]["seed"] = chance
         return json.dumps(scene).encode() + b"\n"

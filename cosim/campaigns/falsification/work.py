@@ -101,7 +101,7 @@ class SceneSearch:
     def __init__(self, family: str, task: SceneTask, settings: SearchSettings) -> None:
         if family not in FAMILIES:
             raise RunError(f"family {family!r} is unknown; {hint(family, FAMILIES)}")
-        self._space = SceneSpace(family, np.inf if settings.rare_event else _LIMIT)
+        self._space = SceneSpace(family, None if settings.rare_event else _LIMIT)
         self.dimension, self.horizon = self._space.dimension, task.conditions.duration
         self.family, self.name, self.task, self.settings = family, task.law, task, settings
         self.title = f"The {task.law} law on {family} scenes"

@@ -89,7 +89,10 @@ def _changes(scene: ScenarioScene, conditions: Conditions) -> dict[str, Any]:
 
 def _sensing(scene: Scene, conditions: Conditions) -> dict[str, Any]:
     """Return what the law is given: through sensors, their noise is that of data sheets, not of the scene."""
-    sensing: dict[str, Any] = {"through": conditions.sensing, "seed": scene.seed}
+    sensing: dict[str, Any] = {
+        "through": conditions.sensing,
+        "seed": scene.seed if scene.noise.seed is None else scene.noise.seed,
+    }
     if conditions.sensing == "state":
         sensing |= {"position_noise": scene.noise.position, "velocity_noise": scene.noise.velocity}
     return sensing

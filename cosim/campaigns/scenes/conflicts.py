@@ -9,7 +9,7 @@ one of the next criterion. The generator does not know how any law fares in its 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,39 +27,25 @@ _CURRENT = 0.4  # m/s, greatest
 _CRITERIA = ("obstacle", "shape", "depth", "visibility")
 
 
-def make_conflict(seed: int) -> Table:
+def make_conflict(seed: int, family: str = "conflict") -> Table:
     """Make the conflict of a seed.
 
     Parameters
     ----------
     seed : int
         0 or above.
+    family : {"conflict", "tour"}
+        A tour is a conflict with goals in turn.
 
     Returns
     -------
     dict
         Its seed, its kind, which names the vehicle as well, and the table of the scenario, without a law.
     """
-    return draw_conflict(np.random.default_rng([20261124, seed]), seed)
+    return draw_conflict(np.random.default_rng([CONFLICTS[family].stream, seed]), seed, family)
 
 
-def make_tour(seed: int) -> Table:
-    """Make the tour of a seed: a conflict with goals in turn.
-
-    Parameters
-    ----------
-    seed : int
-        0 or above.
-
-    Returns
-    -------
-    dict
-        As `make_conflict` does.
-    """
-    return _draw(np.random.default_rng([20261125, seed]), seed, _TOURS, "Tour", 120.0)
-
-
-def draw_conflict(rng: Any, seed: int) -> Table:
+def draw_conflict(rng: Any, seed: int, family: str = "conflict") -> Table:
     """Make a conflict of random numbers.
 
     Parameters
@@ -68,16 +54,15 @@ def draw_conflict(rng: Any, seed: int) -> Table:
         What it is drawn from, or what stands for one.
     seed : int
         The scene's own, 0 or above.
+    family : {"conflict", "tour"}
+        As for `make_conflict`.
 
     Returns
     -------
     dict
         As `make_conflict` does.
     """
-    return _draw(rng, seed, _KINDS, "Conflict", 60.0)
-
-
-def _draw(rng: Any, seed: int, kinds: Kinds, family: str, duration: float) -> Table:
+    _, kinds, duration = CONFLICTS[family]
     vehicle = load_vehicle(list(_LAGS)[int(rng.integers(len(_LAGS)))])
     kind = list(kinds)[int(rng.integers(len(kinds)))]
     order = rng.permutation(len(_CRITERIA)).tolist()  # place of each criterion
@@ -89,7 +74,7 @@ def _draw(rng: Any, seed: int, kinds: Kinds, family: str, duration: float) -> Ta
         place = order[_CRITERIA.index(region["criterion"])]
         region |= {"gain": 100.0 * _scale(vehicle), "priority": _PRIORITY ** (len(_CRITERIA) - 1 - place)}
     table = {
-        "title": f"{family} {seed}: {kind}, {vehicle.name}",
+        "title": f"{family.capitalize()} {seed}: {kind}, {vehicle.name}",
         "vehicle": vehicle.name,
         "time": {"duration": duration, "step": 0.01, "control": 0.02, "arbiter": 0.02},
         "plant": {
@@ -268,7 +253,34 @@ def _depths_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
     return _in_turn(goal, (rng.uniform(0.0, 4.0), rng.uniform(-2.0, 2.0), shallow), (x, y, deep)), regions
 
 
-_TOURS: Kinds = {"sides in turn": _sides_in_turn, "depths in turn": _depths_in_turn}
+def _views_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
+    """Make places from which a structure is looked at in turn, with a pillar between them.
+
+    Who passes the pillar outside loses the view, who passes it inside comes too near to the structure. A greatest
+    depth excludes the deeper places.
+    """
+    x, y, z = 4.0, 4.0, 4.2  # of the structure
+    off, pillar, radius = rng.uniform(1.7, 2.2), rng.uniform(1.8, 2.2), rng.uniform(0.5, 0.9)
+    angles = rng.uniform(0.7, 1.0, 3) * [-1.0, 1.0, -1.0]  # rad, about the structure, from east
+    places = [(x + off * np.sin(a), y - off * np.cos(a), z + rng.uniform(-0.6, 0.4)) for a in angles]
+    standing = {"type": "cylinder", "start": [x, y - pillar, 0.0], "end": [x, y - pillar, 12.0], "radius": radius}
+    cone = {"type": "cone", "feature": [x, y, z], "axis": [0.0, -1.0, 0.0], "half_angle": 1.2, "range": 2.6}
+    return _in_turn(_sphere(*places[0], 0.4), *places[1:]), [
+        _region("pillar", "obstacle", "out", True, standing),
+        _region("structure", "shape", "out", False, _sphere(x, y, z, rng.uniform(1.2, 1.6))),
+        _region("greatest depth", "depth", "in", False, _beyond(2, z + rng.uniform(-0.3, 0.1))),
+        _region("view", "visibility", "in", False, cone),
+    ]
+
+
+class _Family(NamedTuple):
+    """How the conflicts of a family are made."""
+
+    stream: int  # of random numbers
+    kinds: Kinds
+    duration: float  # s
+
+
 _KINDS: Kinds = {
     "ceiling": _ceiling,
     "dock": _dock,
@@ -277,3 +289,9 @@ _KINDS: Kinds = {
     "squeeze": _squeeze,
     "view": _view,
 }
+_TOURS: Kinds = {
+    "sides in turn": _sides_in_turn,
+    "depths in turn": _depths_in_turn,
+    "views in turn": _views_in_turn,
+}
+CONFLICTS = {"conflict": _Family(20261124, _KINDS, 60.0), "tour": _Family(20261125, _TOURS, 120.0)}

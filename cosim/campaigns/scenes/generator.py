@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.campaigns.scenes.conflicts import make_conflict, make_tour
+from cosim.campaigns.scenes.conflicts import make_conflict
 from cosim.campaigns.scenes.trials import make_trial
 
 MOST_OBSTACLES = {"plain": 6, "hard": 14}
@@ -140,6 +140,6 @@ MAKERS: dict[str, Callable[[int], dict[str, Any]]] = {
     "plain": make_scene,
     "hard": functools.partial(make_scene, kind="hard"),
     "conflict": make_conflict,
-    "tour": make_tour,
+    "tour": functools.partial(make_conflict, family="tour"),
     "trial": make_trial,
 }

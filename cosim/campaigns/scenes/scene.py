@@ -38,6 +38,7 @@ class Noise:
 
     position: float = 0.0  # m
     velocity: float = 0.0  # m/s
+    seed: int | None = None  # None: the scene's
 
 
 @dataclass(frozen=True)
@@ -152,6 +153,9 @@ def check_scene(scene: Scene) -> None:
         _require_moderate(f"obstacles.{i}.velocity", obstacle.velocity)
     for key in ("position", "velocity"):
         _require(0.0 <= getattr(noise, key) <= GREATEST, f"noise.{key}", getattr(noise, key), "0 or above")
+    _require(
+        noise.seed is None or 0 <= noise.seed < 2**63, "noise.seed", noise.seed, "a whole number from 0 to 2^63 - 1"
+    )
     if failure:
         _require(failure.index >= 1, "failed_thruster.index", failure.index, "a number from 1")
         _require(failure.time >= 0.0, "failed_thruster.time", failure.time, "0 s or above")

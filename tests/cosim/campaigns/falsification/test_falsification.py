@@ -206,7 +206,7 @@ def test_of_rows_that_are_near_to_each_other_one_is_listed(found):
         ("plain --law pd --set k=1", "--set k: the law pd has no such gain"),
         ("plain --law pd --vary limit.force=1:2", "--vary: expected none with the family plain"),
         ("plian --law pd", "plian"),
-        ("scenes.jsonl --law pd", "is a file of scenes, expected a family (plain, hard, conflict) or a scenario"),
+        ("scenes.jsonl --law pd", "is a file of scenes, expected a family (plain, hard, conflict, tour) or a scenario"),
         ("docking", "nothing varies, expected at least one key"),
         ("docking --vary initial.positon.1=1:2", "initial.positon"),
         ("docking --vary initial.position.1=2:1", "expected the lower end first"),

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from scipy.stats import ks_2samp
 
+from controller import LAWS
 from cosim.campaigns.falsification.spaces import SceneSpace, Shares
-from cosim.campaigns.scenes.conflicts import make_conflict
+from cosim.campaigns.scenes.as_scenario import scene_scenario
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.conflicts import CONFLICTS, make_conflict
 from cosim.campaigns.scenes.generator import MOST_OBSTACLES, make_scene
 from cosim.campaigns.scenes.scene_file import decode_scene
 
@@ -73,6 +76,34 @@ def test_no_point_leaves_the_family(kind):
         assert not hard or (1 <= scene.failed_thruster.index <= 8 and 5.0 <= scene.failed_thruster.time <= 30.0)
 
 
+def test_without_a_limit_a_flight_follows_from_its_point_alone():
+    space, rng = SceneSpace("hard"), np.random.default_rng(4)
+    for point in rng.random((20, space.dimension)):
+        one, other = (json.loads(space.line(point, seed)) for seed in (1, 2))
+        assert one | {"seed": 2} == other and one["noise"]["seed"] == int(point[-1] * 2**31)
+
+
+def test_an_obstacle_that_is_drawn_again_changes_no_other_one():
+    space, rng, changed = SceneSpace("hard"), np.random.default_rng(5), 0
+    for point in rng.random((60, space.dimension)):
+        other = point.copy()
+        other[-6:-1] = 0.5  # numbers of the last obstacle
+        other[-11:-6] = [1.0, 0.0, 0.5, 0.5, 0.5]  # of the one before: too near to the start
+        one, two = (json.loads(space.line(p, 0))["obstacles"] for p in (point, other))
+        assert one[:-2] == two[:-2]
+        changed += one != two
+    assert changed > 0
+
+
+def test_the_noise_of_a_flight_is_that_of_its_own_seed():
+    line = json.loads(SceneSpace("hard").line(np.full(SceneSpace("hard").dimension, 0.4), 3))
+    sensing = scene_scenario(decode_scene(json.dumps(line).encode()), "pd", LAWS["pd"].gains_type(), Conditions())
+    assert sensing.sensing.seed == int(0.4 * 2**31)
+    del line["noise"]["seed"]
+    sensing = scene_scenario(decode_scene(json.dumps(line).encode()), "pd", LAWS["pd"].gains_type(), Conditions())
+    assert sensing.sensing.seed == 3
+
+
 def test_near_points_are_near_scenes():
     space = SceneSpace("hard", 3.0)
     point = np.full(space.dimension, 0.45)
@@ -107,21 +138,22 @@ def numbers(conflict):
 
 
 @pytest.mark.medium
-def test_conflicts_drawn_evenly_are_those_of_the_generator():
-    space, rng = SceneSpace("conflict"), np.random.default_rng(1)
+@pytest.mark.parametrize("family", CONFLICTS)
+def test_conflicts_drawn_evenly_are_those_of_the_generator(family):
+    space, rng = SceneSpace(family), np.random.default_rng(1)
     drawn = [numbers(json.loads(space.line(rng.random(space.dimension), i))) for i in range(700)]
-    made = [numbers(make_conflict(i)) for i in range(700)]
+    made = [numbers(make_conflict(i, family)) for i in range(700)]
     for name in drawn[0]:
         assert ks_2samp([one[name] for one in drawn], [one[name] for one in made]).pvalue > 1e-3, name
 
 
 @pytest.mark.medium
-def test_a_conflict_follows_from_its_point_alone_and_can_be_flown():
-    space, rng = SceneSpace("conflict"), np.random.default_rng(3)
+@pytest.mark.parametrize("family", CONFLICTS)
+def test_a_conflict_follows_from_its_point_alone_and_can_be_flown(family):
+    space, rng = SceneSpace(family), np.random.default_rng(3)
     for i, point in enumerate([*rng.integers(0, 2, (20, space.dimension)), *rng.random((40, space.dimension))]):
         one, other = (json.loads(space.line(point.astype(float), seed)) for seed in (i, i + 100))
         del one["scenario"]["title"], other["scenario"]["title"]
-        one["scenario"]["sensing"]["seed"] = other["scenario"]["sensing"]["seed"]
         assert one["seed"] == i and one["scenario"] == other["scenario"] and one["kind"] == other["kind"]
         assert scene_at(space, point.astype(float), i).seed == i
 

@@ -10,7 +10,7 @@ from controller import LAWS
 from controller.regions.region_set import clearance_at, pack
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.conflicts import make_conflict, make_tour
+from cosim.campaigns.scenes.conflicts import make_conflict
 from cosim.campaigns.scenes.flyer import SceneFlyer
 from cosim.campaigns.scenes.generator import generate_scenes
 from cosim.campaigns.scenes.kinds import kind_of
@@ -64,15 +64,14 @@ def test_kinds_and_vehicles_are_about_as_frequent():
 
 
 def test_a_tour_has_goals_in_turn_on_both_sides_of_what_conflicts():
-    kinds = collections.Counter(make_tour(seed)["kind"] for seed in range(300))
-    assert len(kinds) == 6 and min(kinds.values()) > 25  # 50 expected
+    kinds = collections.Counter(make_conflict(seed, "tour")["kind"] for seed in range(300))
+    assert len(kinds) == 9 and min(kinds.values()) > 15  # 33 expected
     for seed in range(20):
-        scenario = scenario_of(make_tour(seed))
+        scenario = scenario_of(make_conflict(seed, "tour"))
         first, then = np.array(scenario.goal.centre), np.array(scenario.goal_then)
         assert then.shape == (2, 3) and scenario.goal_stay == 3.0
-        axis, middle = (
-            (0, 5.0) if scenario.title.startswith(f"Tour {seed}: sides") else (2, 0.5 * (first[2] + then[0, 2]))
-        )
+        kind = scenario.title.removeprefix(f"Tour {seed}: ").split()[0]
+        axis, middle = {"sides": (0, 5.0), "views": (0, 4.0), "depths": (2, 0.5 * (first[2] + then[0, 2]))}[kind]
         assert np.sign(first[axis] - middle) == np.sign(then[1, axis] - middle) == -np.sign(then[0, axis] - middle)
 
 
