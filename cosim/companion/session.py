@@ -125,8 +125,9 @@ class AutopilotSession:
         if state != before:
             self._held_at = now
             self._tell(state)
+            self._lead.restart()
         self._ask(now)
-        self._act(state, now, wrench)
+        self._act(state, now, wrench, until - due)
         while True:
             self._listen(max(0.0, until - self._link.clock()))
             if self._link.clock() >= until - _ROUNDING:
@@ -215,28 +216,28 @@ class AutopilotSession:
             for message_id, rate in RATES.items():
                 self._command(m.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate)
 
-    def _act(self, state: State, now: float, wrench: Array) -> None:
+    def _act(self, state: State, now: float, wrench: Array, period: float) -> None:
         self.sticks[:], self.velocity[:] = 0.0, 0.0
         if state == "disarmed" and self._options.arm and self._due("arm", 1.0, now):
             self._command(self._mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         elif state == "engaging":
             self.supervisor.asked_for_mode(now)
             self._send_mode(STEERED_IN[self._options.steer_by], now)
-            self._link.send(self._output(np.zeros(6), still=True))
+            self._link.send(self._output(np.zeros(6), period, still=True))
         elif state == "steering":
-            self._link.send(self._output(wrench))
+            self._link.send(self._output(wrench, period))
         elif state == "dry_run":
-            self._output(wrench)
+            self._output(wrench, period)
         elif state == "held" and self.reported.system is not None:
             self._hold(now)
 
-    def _output(self, wrench: Array, still: bool = False) -> Any:
+    def _output(self, wrench: Array, period: float, still: bool = False) -> Any:
         """Return the message that asks for a wrench, and note what is in it."""
         m, system = self._mavlink, self.reported.system or 0
         if self._options.steer_by == "velocity":
             turn = 0.0 if self.profile.name == "ardusub" else None
             if not still:
-                self.velocity[:] = self._lead.velocity(wrench, self.reported)
+                self.velocity[:] = self._lead.velocity(wrench, self.reported, period)
                 turn = None if turn is None else self._lead.yaw_rate(wrench, self.reported)
             return velocity_target(m, system, self.velocity, turn)
         all_axes = self._options.steer_by == "wrench"

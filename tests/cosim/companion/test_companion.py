@@ -208,6 +208,19 @@ def test_drift_widens_the_margins_before_it_holds(tmp_path, monkeypatch):
     assert doubts[0] == 0.0 and SPREADS * doubts[-1] == pytest.approx(0.3, abs=0.1)
 
 
+def test_a_reckoned_position_widens_the_margins_by_a_part_of_the_way(tmp_path, monkeypatch):
+    doubts, doubt = [], RegionEnvironment.doubt_positions
+    monkeypatch.setattr(RegionEnvironment, "doubt_positions", lambda self, by: (doubts.append(by), doubt(self, by)))
+    link = StandIn(profile="generic", shift=SHIFT)
+    link.tamper["EKF_STATUS_REPORT"] = link.tamper["ESTIMATOR_STATUS"] = lambda m: setattr(m, "flags", 8)
+    flight = Flight(tmp_path, 6.0, link=link, reckoning_error=0.05)
+    table = flight.run.table()
+    way = np.array([table[f"position.{a}"].to_numpy() for a in "xy"])
+    moved = np.linalg.norm(np.diff(way, axis=1), axis=0).sum()
+    assert flight.status == "completed" and moved > 0.5
+    assert SPREADS * doubts[-1] == pytest.approx(0.05 * moved, rel=0.1)
+
+
 def test_sticks_that_the_autopilot_would_not_take_are_not_sent(tmp_path):
     link = StandIn(profile="ardusub", shift=SHIFT)
     told = mavlink.MAVLink_param_value_message(b"SYSID_MYGCS", 250.0, 9, 1, 0)
