@@ -126,6 +126,8 @@ class AutopilotSession:
             self._held_at = now
             self._tell(state)
             self._lead.restart()
+            if (before, state) == ("steering", "pilot") and self._options.steer_by != "velocity":
+                self._release_sticks()  # once: an ArduSub keeps the last ones for seconds
         self._ask(now)
         self._act(state, now, wrench, until - due)
         while True:
@@ -248,11 +250,14 @@ class AutopilotSession:
             self.sticks[5] = self._scale.yaw_rate_stick(float(wrench[5]), rate)
         return manual_control(m, system, self.profile, self.sticks, all_axes)
 
+    def _release_sticks(self) -> None:
+        self._link.send(neutral(self._mavlink, self.reported.system or 0, self.profile))
+
     def _hold(self, now: float) -> None:
         """Release the sticks, and ask for the hold mode, or where that is refused for the depth to be held."""
         if self.reported.mode == self.profile.numbers["hold"]:
             return
-        self._link.send(neutral(self._mavlink, self.reported.system or 0, self.profile))
+        self._release_sticks()
         refused = now - self._held_at > _FALLBACK
         if not (refused and self.reported.mode == self.profile.numbers["depth_hold"]):
             self._send_mode("depth_hold" if refused else "hold", now)

@@ -260,6 +260,8 @@ def test_a_pilot_wins_within_a_second_and_is_left_alone(tmp_path, reason):
     assert flight.status == f"pilot: {reason}" and EVENT < since <= EVENT + 1.0
     assert not flight.sent_after(since, *STICKS)
     assert not [m for m in flight.sent_after(since, "COMMAND_LONG") if m.command == 176]
+    last = [m for _, m in link.sent if m.get_type() == "MANUAL_CONTROL"][-1]
+    assert (last.x, last.y, last.z, last.r) == (0, 0, 0, 0)
 
 
 def test_who_took_over_can_resume(tmp_path):
