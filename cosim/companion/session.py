@@ -89,7 +89,7 @@ class AutopilotSession:
         self._law_works = False  # as the master was commanded last
         self._sent_at: dict[str, float] = {}
         self._held_at = 0.0
-        self._said = ""
+        self._rivals: set[int] = set()  # components of other stations with our system id
 
     def clock(self) -> float:
         """Return the link's time [s]."""
@@ -287,10 +287,24 @@ class AutopilotSession:
         if message.get_type() == "COMMAND_LONG":
             self._commanded(system, component, message)
             return
+        if message.get_type() == "HEARTBEAT" and system == self.identity[0]:
+            self._warn_of_rival(component)
         if message.get_type() == "PARAM_VALUE" and (system, component) == (self.reported.system, 1):
             self.failsafes.take(message)
         self.reported.take(system, component, message, at)
         self.alignment.update(self.reported, at)
+
+    def _warn_of_rival(self, component: int) -> None:
+        """Warn once of another station that shares our system id: an ArduSub takes its sticks as it takes ours."""
+        system, ours = self.identity
+        if component != ours and component not in self._rivals:
+            self._rivals.add(component)
+            log.warning(
+                "component %d has the companion's system id %d: its sticks compete; give it another", component, system
+            )
+            m = self._mavlink
+            text = f"Companion: component {component} shares system id {system}"
+            self._link.send(m.MAVLink_statustext_message(m.MAV_SEVERITY_WARNING, text[:50].encode()))
 
     def _commanded(self, system: int, component: int, message: Any) -> None:
         """Follow DO_PAUSE_CONTINUE to ourselves: 0 takes over, 1 resumes."""

@@ -264,6 +264,17 @@ def test_a_pilot_wins_within_a_second_and_is_left_alone(tmp_path, reason):
     assert (last.x, last.y, last.z, last.r) == (0, 0, 0, 0)
 
 
+def test_a_station_with_the_same_system_id_is_warned_of_once(tmp_path, caplog):
+    link = StandIn(profile="generic", shift=SHIFT)
+    beat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+    told = [lambda: link.hear(beat), lambda: link.hear(beat), lambda: link.hear(beat, 250)]
+    flight = Flight(tmp_path, 4.0, link=link, events=told)
+    assert flight.status == "completed"
+    assert [r.getMessage() for r in caplog.records if "compete" in r.getMessage()] == [
+        "component 190 has the companion's system id 255: its sticks compete; give it another"
+    ]
+
+
 def test_who_took_over_can_resume(tmp_path):
     link = StandIn(profile="generic", shift=SHIFT)
     ours = {"system": IDENTITY[0], "component": IDENTITY[1]}
