@@ -113,9 +113,9 @@ def test_an_idle_autopilot_is_lowered_from_the_surface_and_starts_where_the_scen
 def test_a_lowered_vehicle_feels_what_its_depths_say():
     """Speed and acceleration against differences of the depth; rolled on its side, the IMU has them along y."""
     lowering, h = motion.Lowering(4.0), 1e-4
-    for time in np.linspace(4.2, 9.8, 9):
-        before, now, after = (lowering.at(time + by)[0] for by in (-h, 0.0, h))
-        assert lowering.at(time)[1:] == pytest.approx(
+    for at in np.linspace(4.2, 9.8, 9):
+        before, now, after = (lowering.at(at + by)[0] for by in (-h, 0.0, h))
+        assert lowering.at(at)[1:] == pytest.approx(
             [(after - before) / (2 * h), (after - 2 * now + before) / h**2], abs=1e-5
         )
     half, zero = 0.5**0.5, (0.0, 0.0, 0.0)
