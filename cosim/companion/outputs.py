@@ -28,7 +28,7 @@ _LOCAL_NED = 1
 _MOSTLY = 0.6  # of the greatest part that a thruster has in an axis, from which on it works for that axis
 _YAW_LAG = 0.3  # s, of an autopilot's rate loop
 FASTEST = 0.5  # m/s, of the law that steers by velocity: a loop that it asks through brakes later than thrusters do
-_FASTEST_ASKED, _FASTEST_TURN = 0.8, 0.6  # m/s, rad/s, that are asked for
+_FASTEST_ASKED, _FASTEST_TURN = 1.2, 0.6  # m/s, rad/s, that are asked for
 _OBSERVED = 1.5  # rad/s, of both poles of the observer of what a velocity loop does beside its lag
 _NEUTRAL: Array = np.zeros(6)
 
@@ -152,14 +152,14 @@ class VelocityLead:
     ----------
     vehicle : Vehicle
         Whose model counts.
-    lag : float
-        Of the autopilot's velocity loop [s].
+    lag, vertical_lag : float
+        Of the autopilot's velocity loop [s], horizontally and vertically.
     """
 
-    def __init__(self, vehicle: Vehicle, lag: float) -> None:
+    def __init__(self, vehicle: Vehicle, lag: float, vertical_lag: float) -> None:
         self._mass: Array = vehicle.mass + np.diag(vehicle.added_mass)[:3]
         self._linear, self._quadratic = vehicle.linear_damping[:3], vehicle.quadratic_damping[:3]
-        self._lag = lag
+        self._lag: Array = np.array([lag, lag, vertical_lag])
         self._yaw_inertia = float(vehicle.inertia[2, 2] + vehicle.added_mass[5, 5])
         self._asked: Array | None = None  # last [m/s, NED]
         self._expected: Array = np.zeros(3)  # velocity as the observer has it
@@ -175,7 +175,7 @@ class VelocityLead:
         return min(max(asked, -_FASTEST_TURN), _FASTEST_TURN) if math.isfinite(asked) else 0.0
 
     def velocity(self, wrench: Array, state: ReportedState, period: float) -> Array:
-        """Return the velocity [m/s, NED], shape (3,), of at most 0.8 m/s.
+        """Return the velocity [m/s, NED], shape (3,), of at most 1.2 m/s.
 
         Parameters
         ----------

@@ -76,7 +76,7 @@ class AutopilotSession:
         self._mavlink: Any = dialect()
         self.profile = PROFILES[options.profile]
         self._scale = scale_of(vehicle, self.profile, options.pilot_gain)
-        self._lead = VelocityLead(vehicle, options.velocity_lag)
+        self._lead = VelocityLead(vehicle, options.velocity_lag, options.vertical_lag)
         self._mode = self.profile.numbers[STEERED_IN[options.steer_by]]
         self.reported = ReportedState(link.identity)
         self.alignment = FrameAlignment(options.origin)
