@@ -65,8 +65,16 @@ def add_verb(verbs: Any) -> None:
         help="part of the greatest wrench that full sticks give: ArduSub's JS_GAIN_DEFAULT (default: 0.5)",
     )  # fmt: skip
     verb.add_argument(
-        "--velocity-lag", type=number(0.01, 10.0), default=0.5, metavar="S",
-        help="of the autopilot's velocity loop (default: 0.5)",
+        "--velocity-lag", type=number(0.01, 10.0), default=3.0, metavar="S",
+        help="of the autopilot's velocity loop, horizontally (default: 3)",
+    )  # fmt: skip
+    verb.add_argument(
+        "--vertical-lag", type=number(0.01, 10.0), default=0.5, metavar="S",
+        help="of the autopilot's velocity loop, vertically (default: 0.5)",
+    )  # fmt: skip
+    verb.add_argument(
+        "--reckoning-error", type=number(0.0, 1.0), default=0.03, metavar="PART",
+        help="part of the way by which the autopilot's position may be off while it has no fix (default: 0.03)",
     )  # fmt: skip
     verb.add_argument(
         "--least-battery", type=number(0.0, 100.0), default=0.0, metavar="PERCENT",
@@ -106,7 +114,7 @@ def companion(options: argparse.Namespace) -> int:
     scene = SceneOrigin(options.scene_origin, options.surveyed_origin, options.surface_pressure, options.water_density)
     chosen = CompanionOptions(
         options.profile, options.steer_by, scene, options.dry_run, options.arm, options.pilot_gain,
-        options.velocity_lag, options.least_battery, options.timeout,
+        options.velocity_lag, options.vertical_lag, options.reckoning_error, options.least_battery, options.timeout,
     )  # fmt: skip
     scenario = load_scenario(options.scenario, options.overrides)
     key = read_key(options.signing_key) if options.signing_key else None

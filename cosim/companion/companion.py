@@ -12,7 +12,7 @@ from controller.laws.deployable.gains import SPREADS
 from controller.regions.region_set import of_attitude
 from cosim.companion.link import AutopilotLink
 from cosim.companion.options import CompanionOptions
-from cosim.companion.outputs import SteerBy
+from cosim.companion.outputs import FASTEST, SteerBy
 from cosim.companion.remote_vehicle import RemoteVehicle
 from cosim.companion.safety import State
 from cosim.companion.session import AutopilotSession
@@ -66,7 +66,9 @@ def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks") -> Scena
     period = scenario.time.control
     arbiter = max(1, round(scenario.time.arbiter / period)) * period
     duration = max(1, round(scenario.time.duration / period)) * period
-    gains = _NOT_ESTIMATED if steer_by == "velocity" else _NOT_ISOLATED
+    gains: dict[str, float] = _NOT_ISOLATED
+    if steer_by == "velocity":
+        gains = _NOT_ESTIMATED | {"law.gains.speed": min(getattr(scenario.law.gains, "speed", FASTEST), FASTEST)}
     return scenario.replace(
         (gains if scenario.law.name == "deployable" else {})
         | {
@@ -207,8 +209,7 @@ class Companion:
             for k in range(self.scenario.steps + 1):
                 master.step(k, session)
                 recorder.observe(k, master.row)
-                drift = session.alignment.drift
-                master.environment.doubt_positions(drift / SPREADS if drift > _STEADY else 0.0)
+                master.environment.doubt_positions(self._doubt() / SPREADS)
                 violated = clearances[self._hard]
                 session.outside = float(max(0.0, -np.nanmin(violated))) if np.isfinite(violated).any() else 0.0
                 self._report(on_state)
@@ -216,6 +217,12 @@ class Companion:
             return "interrupted"
         state, reason = session.supervisor.state, session.supervisor.reason
         return "completed" if session.supervisor.is_steering else f"{state}: {reason}"
+
+    def _doubt(self) -> float:
+        """Return by how much the position may be off [m]: as its sources have come apart, and as it was reckoned."""
+        alignment = self.session.alignment
+        drift = alignment.drift if alignment.drift > _STEADY else 0.0
+        return drift + self._options.reckoning_error * alignment.reckoned
 
     def _report(self, on_state: Callable[[State, str], None] | None) -> None:
         """Call `on_state` where the state, or what it waits for, has changed."""

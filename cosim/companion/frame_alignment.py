@@ -57,6 +57,8 @@ class FrameAlignment:
         Of the autopilot's local origin in the scene [m, NED]; None until it is known.
     jump : float
         Greatest leap of the position since the frame is known [m], beyond what the velocity explains.
+    reckoned : float
+        Horizontal way since the frame is known [m], where the autopilot says that it has no fix of its position.
     """
 
     def __init__(self, origin: SceneOrigin) -> None:
@@ -64,7 +66,7 @@ class FrameAlignment:
         self._frame = None if origin.geodetic is None else LocalFrame(*origin.geodetic)
         self._samples: deque[Array] = deque(maxlen=_SAMPLES)
         self.offset: Array | None = None if origin.surveyed is None else np.array(origin.surveyed, dtype=float)
-        self.jump = 0.0
+        self.jump = self.reckoned = 0.0
         self._reference: Array | None = None  # of the sample that the offset is compared with later
         self._drift: Array = np.zeros(3)
         self._taken = 0, 0  # positions and samples, as the autopilot's messages are counted
@@ -124,7 +126,7 @@ class FrameAlignment:
             return
         self.offset = self._reference = None
         self._samples.clear()
-        self.jump, self._drift, self._before = 0.0, np.zeros(3), None
+        self.jump, self.reckoned, self._drift, self._before = 0.0, 0.0, np.zeros(3), None
 
     def _sample(self, state: ReportedState) -> Array | None:
         """Return the offset as the second sources have it now; NaN where one says nothing, None where none does."""
@@ -143,6 +145,7 @@ class FrameAlignment:
             return
         position, velocity, at, resets = before
         explained = 0.5 * (velocity + state.velocity) * (now - at)
+        self.reckoned += float(np.linalg.norm((state.position - position)[:2])) if state.is_reckoned else 0.0
         leap = float(np.linalg.norm(state.position - position - np.nan_to_num(explained)))
         if leap > _JUMP or resets != state.resets:
             self.jump = max(self.jump, leap)

@@ -27,7 +27,9 @@ _VELOCITY_ONLY, _YAW_RATE_IGNORED = 0b010111000111, 1 << 11  # type_mask
 _LOCAL_NED = 1
 _MOSTLY = 0.6  # of the greatest part that a thruster has in an axis, from which on it works for that axis
 _YAW_LAG = 0.3  # s, of an autopilot's rate loop
-_FASTEST, _FASTEST_TURN = 0.5, 0.6  # m/s, rad/s, that are asked for
+FASTEST = 0.5  # m/s, of the law that steers by velocity: a loop that it asks through brakes later than thrusters do
+_FASTEST_ASKED, _FASTEST_TURN = 1.2, 0.6  # m/s, rad/s, that are asked for
+_OBSERVED = 1.5  # rad/s, of both poles of the observer of what a velocity loop does beside its lag
 _NEUTRAL: Array = np.zeros(6)
 
 
@@ -140,40 +142,72 @@ def neutral(mavlink: Any, system: int, profile: Profile) -> Any:
 
 
 class VelocityLead:
-    """Turns a wrench into the velocity that an inner loop of a known lag is to be asked for.
+    """Turns a wrench into the velocity that an inner loop is to be asked for.
 
-    A first-order loop accelerates by (asked - v) / lag. So v + lag a asks for the acceleration a that the wrench would
-    give the vehicle, by its mass, added mass and damping.
+    A first-order loop accelerates by (asked - v) / lag + d. So v + lag (a - d) asks for the acceleration a that the
+    wrench would give the vehicle, by its mass, added mass and damping. A Luenberger observer finds d, of which current,
+    drag and a loop without integral action are parts, from what was asked for and what the velocity did.
 
     Parameters
     ----------
     vehicle : Vehicle
         Whose model counts.
-    lag : float
-        Of the autopilot's velocity loop [s].
+    lag, vertical_lag : float
+        Of the autopilot's velocity loop [s], horizontally and vertically.
     """
 
-    def __init__(self, vehicle: Vehicle, lag: float) -> None:
+    def __init__(self, vehicle: Vehicle, lag: float, vertical_lag: float) -> None:
         self._mass: Array = vehicle.mass + np.diag(vehicle.added_mass)[:3]
         self._linear, self._quadratic = vehicle.linear_damping[:3], vehicle.quadratic_damping[:3]
-        self._lag = lag
+        self._lag: Array = np.array([lag, lag, vertical_lag])
         self._yaw_inertia = float(vehicle.inertia[2, 2] + vehicle.added_mass[5, 5])
+        self._asked: Array | None = None  # last [m/s, NED]
+        self._expected: Array = np.zeros(3)  # velocity as the observer has it
+        self._beside: Array = np.zeros(3)  # d [m/s2]
+
+    def restart(self) -> None:
+        """Forget what the loop does: something else steers."""
+        self._asked, self._beside = None, np.zeros(3)
 
     def yaw_rate(self, wrench: Array, state: ReportedState) -> float:
         """Return the rate of yaw [rad/s], of at most 0.6 rad/s, by which a rate loop turns as the wrench would."""
         asked = float(state.rates[2]) + _YAW_LAG * float(wrench[5]) / self._yaw_inertia
         return min(max(asked, -_FASTEST_TURN), _FASTEST_TURN) if math.isfinite(asked) else 0.0
 
-    def velocity(self, wrench: Array, state: ReportedState) -> Array:
-        """Return the velocity [m/s, NED], shape (3,), of at most 0.5 m/s."""
+    def velocity(self, wrench: Array, state: ReportedState, period: float) -> Array:
+        """Return the velocity [m/s, NED], shape (3,), of at most 1.2 m/s.
+
+        Parameters
+        ----------
+        wrench : ndarray, shape (6,)
+            [N, N m], body frame; what is not finite asks for nothing.
+        state : ReportedState
+            Of the vehicle now.
+        period : float
+            Since the last call [s].
+        """
         speed = state.velocity_body[:3]
         force = np.where(np.isfinite(wrench[:3]), wrench[:3], 0.0)
         drag = (self._linear + self._quadratic * np.abs(speed)) * speed
-        asked: Array = rotation_matrix(state.quaternion) @ (speed + self._lag * (force - drag) / self._mass)
+        wanted = rotation_matrix(state.quaternion) @ ((force - drag) / self._mass)
+        self._observe(state.velocity, period)
+        asked: Array = state.velocity + self._lag * (wanted - self._beside)
         length = float(np.linalg.norm(asked))
         if not math.isfinite(length):
+            self.restart()
             return np.zeros(3)
-        return asked * min(1.0, _FASTEST / length) if length > 0.0 else asked
+        self._asked = asked * min(1.0, _FASTEST_ASKED / length) if length > 0.0 else asked
+        return self._asked
+
+    def _observe(self, velocity: Array, period: float) -> None:
+        if self._asked is None:
+            self._expected = velocity.copy()
+            return
+        error = velocity - self._expected
+        acceleration = (self._asked - self._expected) / self._lag + self._beside
+        self._expected = self._expected + period * (acceleration + 2.0 * _OBSERVED * error)
+        most = _FASTEST_ASKED / self._lag
+        self._beside = np.clip(self._beside + period * _OBSERVED**2 * error, -most, most)
 
 
 def velocity_target(mavlink: Any, system: int, velocity: Array, yaw_rate: float | None) -> Any:

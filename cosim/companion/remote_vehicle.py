@@ -25,6 +25,7 @@ _REPORTED = (  # at the beginning of a step
     *(Channel(f"autopilot.position.{a}", "m", "Position in the autopilot's own frame") for a in "xyz"),
     *(Channel(f"autopilot.velocity.{a}", "m/s", "Velocity in the autopilot's own frame, NED") for a in "xyz"),
     Channel("autopilot.drift", "m", "By which local position and globe or pressure have come apart"),
+    Channel("autopilot.reckoned", "m", "Horizontal way since the frame is known, without a fix of the position"),
 )
 _SENT = (  # in the step
     Channel("companion.state", "", f"Of the companion: {', '.join(f'{i} {state}' for i, state in enumerate(STATES))}"),
@@ -126,7 +127,10 @@ class RemoteVehicle:
         reason = _NAMES.index(supervisor.reason) + 1 if supervisor.reason in _NAMES else 0
         state = float(STATES.index(supervisor.state))
         at = reported.age(session.clock()), reported.mode, reported.is_armed
-        self._write("autopilot.age", (*at, *reported.position, *reported.velocity, session.alignment.drift))
+        self._write(
+            "autopilot.age",
+            (*at, *reported.position, *reported.velocity, session.alignment.drift, session.alignment.reckoned),
+        )
         self._write("companion.state", (state, reason, session.lateness, reported.sync.round_trip))
         self._write("stick.X", (*session.sticks, *session.velocity))
 

@@ -17,7 +17,7 @@ MEANINGS: dict[State, str] = {
     "dry_run": "the law is computed and recorded, and nothing is sent",
     "steering": "sticks or velocities are sent at each step",
     "held": "sticks are released and the hold mode is asked for, until somebody resumes",
-    "pilot": "somebody else steers; nothing is sent, until somebody resumes",
+    "pilot": "somebody else steers; sticks are released once, and nothing is sent until somebody resumes",
 }
 
 

@@ -76,7 +76,7 @@ class AutopilotSession:
         self._mavlink: Any = dialect()
         self.profile = PROFILES[options.profile]
         self._scale = scale_of(vehicle, self.profile, options.pilot_gain)
-        self._lead = VelocityLead(vehicle, options.velocity_lag)
+        self._lead = VelocityLead(vehicle, options.velocity_lag, options.vertical_lag)
         self._mode = self.profile.numbers[STEERED_IN[options.steer_by]]
         self.reported = ReportedState(link.identity)
         self.alignment = FrameAlignment(options.origin)
@@ -89,7 +89,7 @@ class AutopilotSession:
         self._law_works = False  # as the master was commanded last
         self._sent_at: dict[str, float] = {}
         self._held_at = 0.0
-        self._said = ""
+        self._rivals: set[int] = set()  # components of other stations with our system id
 
     def clock(self) -> float:
         """Return the link's time [s]."""
@@ -125,8 +125,11 @@ class AutopilotSession:
         if state != before:
             self._held_at = now
             self._tell(state)
+            self._lead.restart()
+            if (before, state) == ("steering", "pilot") and self._options.steer_by != "velocity":
+                self._release_sticks()  # once: an ArduSub keeps the last ones for seconds
         self._ask(now)
-        self._act(state, now, wrench)
+        self._act(state, now, wrench, until - due)
         while True:
             self._listen(max(0.0, until - self._link.clock()))
             if self._link.clock() >= until - _ROUNDING:
@@ -215,28 +218,28 @@ class AutopilotSession:
             for message_id, rate in RATES.items():
                 self._command(m.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate)
 
-    def _act(self, state: State, now: float, wrench: Array) -> None:
+    def _act(self, state: State, now: float, wrench: Array, period: float) -> None:
         self.sticks[:], self.velocity[:] = 0.0, 0.0
         if state == "disarmed" and self._options.arm and self._due("arm", 1.0, now):
             self._command(self._mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         elif state == "engaging":
             self.supervisor.asked_for_mode(now)
             self._send_mode(STEERED_IN[self._options.steer_by], now)
-            self._link.send(self._output(np.zeros(6), still=True))
+            self._link.send(self._output(np.zeros(6), period, still=True))
         elif state == "steering":
-            self._link.send(self._output(wrench))
+            self._link.send(self._output(wrench, period))
         elif state == "dry_run":
-            self._output(wrench)
+            self._output(wrench, period)
         elif state == "held" and self.reported.system is not None:
             self._hold(now)
 
-    def _output(self, wrench: Array, still: bool = False) -> Any:
+    def _output(self, wrench: Array, period: float, still: bool = False) -> Any:
         """Return the message that asks for a wrench, and note what is in it."""
         m, system = self._mavlink, self.reported.system or 0
         if self._options.steer_by == "velocity":
             turn = 0.0 if self.profile.name == "ardusub" else None
             if not still:
-                self.velocity[:] = self._lead.velocity(wrench, self.reported)
+                self.velocity[:] = self._lead.velocity(wrench, self.reported, period)
                 turn = None if turn is None else self._lead.yaw_rate(wrench, self.reported)
             return velocity_target(m, system, self.velocity, turn)
         all_axes = self._options.steer_by == "wrench"
@@ -247,11 +250,14 @@ class AutopilotSession:
             self.sticks[5] = self._scale.yaw_rate_stick(float(wrench[5]), rate)
         return manual_control(m, system, self.profile, self.sticks, all_axes)
 
+    def _release_sticks(self) -> None:
+        self._link.send(neutral(self._mavlink, self.reported.system or 0, self.profile))
+
     def _hold(self, now: float) -> None:
         """Release the sticks, and ask for the hold mode, or where that is refused for the depth to be held."""
         if self.reported.mode == self.profile.numbers["hold"]:
             return
-        self._link.send(neutral(self._mavlink, self.reported.system or 0, self.profile))
+        self._release_sticks()
         refused = now - self._held_at > _FALLBACK
         if not (refused and self.reported.mode == self.profile.numbers["depth_hold"]):
             self._send_mode("depth_hold" if refused else "hold", now)
@@ -281,10 +287,24 @@ class AutopilotSession:
         if message.get_type() == "COMMAND_LONG":
             self._commanded(system, component, message)
             return
+        if message.get_type() == "HEARTBEAT" and system == self.identity[0]:
+            self._warn_of_rival(component)
         if message.get_type() == "PARAM_VALUE" and (system, component) == (self.reported.system, 1):
             self.failsafes.take(message)
         self.reported.take(system, component, message, at)
         self.alignment.update(self.reported, at)
+
+    def _warn_of_rival(self, component: int) -> None:
+        """Warn once of another station that shares our system id: an ArduSub takes its sticks as it takes ours."""
+        system, ours = self.identity
+        if component != ours and component not in self._rivals:
+            self._rivals.add(component)
+            log.warning(
+                "component %d has the companion's system id %d: its sticks compete; give it another", component, system
+            )
+            m = self._mavlink
+            text = f"Companion: component {component} shares system id {system}"
+            self._link.send(m.MAVLink_statustext_message(m.MAV_SEVERITY_WARNING, text[:50].encode()))
 
     def _commanded(self, system: int, component: int, message: Any) -> None:
         """Follow DO_PAUSE_CONTINUE to ourselves: 0 takes over, 1 resumes."""

@@ -23,9 +23,12 @@ RATES = {  # Hz that are asked for, by message id
     29: 10.0,  # SCALED_PRESSURE
     137: 10.0,  # SCALED_PRESSURE2
     132: 5.0,  # DISTANCE_SENSOR
+    193: 2.0,  # EKF_STATUS_REPORT, ArduPilot's
+    230: 2.0,  # ESTIMATOR_STATUS, PX4's
 }
 _ARMED, _CRITICAL = 128, 5  # of base_mode; MAV_STATE from which on a failsafe acts
 _LOCAL_NED, _BODY_FRD = 1, 12
+_RELATIVE, _ABSOLUTE = 8, 16  # flags of an estimate: of its horizontal position
 _DOWNWARDS = 25  # MAV_SENSOR_ROTATION_PITCH_270
 _DEFLECTED, _INVALID = 50, 0x7FFF  # of a stick's 1000; of no stick
 _RESTS_IN_THE_MIDDLE = (3, 12)  # MAV_AUTOPILOT: ArduPilot and PX4
@@ -55,6 +58,8 @@ class ReportedState:
         Latitude and longitude [deg] and altitude above home [m].
     pressure : float
         Outside [hPa]; NaN where none is reported.
+    is_reckoned : bool
+        The autopilot says that it has no fix of its horizontal position, and reckons it from velocities.
     heard_at, beaten_at, pilot_at : float
         Our time [s] at which anything came, a heartbeat, and sticks of somebody else.
     sync : ClockSync
@@ -73,7 +78,7 @@ class ReportedState:
         self.global_position: tuple[float, float, float] | None = None
         self.pressure = self.altitude = self.battery = math.nan
         self.pulses: tuple[int, ...] = ()
-        self.is_leaking = False
+        self.is_leaking = self.is_reckoned = False
         self.resets = 0  # of the autopilot's estimate, as it counts them
         self.heard_at = self.beaten_at = self.pilot_at = -math.inf
         self.came: Counter[str] = Counter()  # messages, by name
@@ -93,6 +98,8 @@ class ReportedState:
             "DISTANCE_SENSOR": self._distance,
             "SERVO_OUTPUT_RAW": self._servos,
             "SYS_STATUS": self._status,
+            "EKF_STATUS_REPORT": self._estimator,
+            "ESTIMATOR_STATUS": self._estimator,
             "STATUSTEXT": self._text,
             "COMMAND_ACK": self._acknowledge,
             "TIMESYNC": lambda m, now: self.sync.take(m.tc1, m.ts1, now),
@@ -182,6 +189,9 @@ class ReportedState:
 
     def _status(self, m: Any, now: float) -> None:
         self.battery = float(m.battery_remaining) if m.battery_remaining >= 0 else math.nan
+
+    def _estimator(self, m: Any, now: float) -> None:
+        self.is_reckoned = bool(m.flags & _RELATIVE) and not m.flags & _ABSOLUTE
 
     def _text(self, m: Any, now: float) -> None:
         self.texts.append(m.text)

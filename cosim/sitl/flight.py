@@ -14,7 +14,7 @@ from cosim.run.run_folder import claim, conclude
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.master import Master
 from cosim.sitl.law import AutopilotLaw
-from cosim.sitl.motion import Motion, MotionReader, at_rest
+from cosim.sitl.motion import Lowering, Motion, MotionReader, carried
 
 
 class Flight:
@@ -38,7 +38,7 @@ class Flight:
     steps : int
         That were made.
     waited : int
-        Frames of the autopilot before them, in which the vehicle was held where it starts.
+        Frames of the autopilot before them, in which the vehicle was lowered to where it starts, and held there.
 
     Raises
     ------
@@ -67,6 +67,7 @@ class Flight:
         self._started = time.perf_counter()
         self._wall_time: float | None = None
         self.steps = self.waited = 0
+        self._lowering = Lowering(scenario.initial.position[2])
 
     @property
     def done(self) -> bool:
@@ -93,10 +94,15 @@ class Flight:
         self.steps += 1
         return self.motion()
 
+    @property
+    def can_start(self) -> bool:
+        """Whether the vehicle is where the scenario starts: lowered there, or never seen elsewhere."""
+        return self.waited == 0 or self._lowering.is_over(self.waited * self.scenario.time.step)
+
     def wait(self) -> Motion:
-        """Let a frame go by with the vehicle held where it starts; only the autopilot's time goes on."""
+        """Let a frame go by with the vehicle lowered from the surface to where it starts, and held there."""
         self.waited += 1
-        return at_rest(self.motion())
+        return carried(self.motion(), *self._lowering.at(self.waited * self.scenario.time.step))
 
     def motion(self) -> Motion:
         """Return the vehicle's motion as it is now, by the autopilot's time."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,8 @@ _NAMES = (
     *(f"measured.velocity.{name}" for name in "uvw"),
 )
 _GRAVITY = 9.81  # m/s2, as ArduPilot and PX4 have it, near enough
+_AT_THE_SURFACE = 4.0  # s, in which an autopilot calibrates its sensors
+_LOWERING, _LONGEST = 1.0, 6.0  # m/s at the most, unless it took longer than so many seconds
 
 
 class Motion(NamedTuple):
@@ -68,6 +71,64 @@ class MotionReader:
 
 def at_rest(motion: Motion) -> Motion:
     """Return the motion of a vehicle that is held where it is: the IMU feels gravity alone."""
-    fx, fy, fz = (rotation_matrix(np.array(motion.quaternion)).T @ np.array([0.0, 0.0, -_GRAVITY])).tolist()
-    still = (0.0, 0.0, 0.0)
-    return motion._replace(gyro=still, specific_force=(fx, fy, fz), velocity_ned=still, dvl=still)
+    return carried(motion, motion.position_ned[2], 0.0, 0.0)
+
+
+def carried(motion: Motion, depth: float, speed: float, acceleration: float) -> Motion:
+    """Return the motion of a vehicle that is carried down at the place and the attitude of another motion.
+
+    Parameters
+    ----------
+    motion : Motion
+        Whose place and attitude count.
+    depth, speed, acceleration : float
+        Of the vehicle [m, m/s, m/s2], downwards.
+
+    Returns
+    -------
+    Motion
+        The IMU feels gravity and the acceleration, and the DVL measures the speed.
+    """
+    to_body = rotation_matrix(np.array(motion.quaternion)).T
+    fx, fy, fz = (to_body @ np.array([0.0, 0.0, acceleration - _GRAVITY])).tolist()
+    u, v, w = (to_body @ np.array([0.0, 0.0, speed])).tolist()
+    x, y, z = motion.position_ned
+    return motion._replace(
+        gyro=(0.0, 0.0, 0.0), specific_force=(fx, fy, fz), position_ned=(x, y, depth), velocity_ned=(0.0, 0.0, speed),
+        altitude=None if motion.altitude is None else motion.altitude + z - depth, dvl=(u, v, w),
+    )  # fmt: skip
+
+
+class Lowering:
+    """How a vehicle comes from the surface, where it is switched on, to the depth at which a scenario starts.
+
+    An ArduSub calibrates its depth sensor when it is switched on, and again whenever it comes above that depth.
+
+    Parameters
+    ----------
+    depth : float
+        At the end [m]; what is at the surface already is not moved.
+
+    Examples
+    --------
+    >>> from cosim.sitl.motion import Lowering
+    >>> lowering = Lowering(3.0)
+    >>> lowering.at(1.0), lowering.at(60.0), lowering.is_over(60.0)
+    ((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), True)
+    """
+
+    def __init__(self, depth: float) -> None:
+        self._depth = max(0.0, depth)
+        self._duration = min(0.5 * math.pi * self._depth / _LOWERING, _LONGEST)
+
+    def at(self, time: float) -> Three:
+        """Return depth, speed and acceleration [m, m/s, m/s2] so many seconds after the vehicle was switched on."""
+        if self.is_over(time) or time <= _AT_THE_SURFACE:
+            return (self._depth if self.is_over(time) else 0.0), 0.0, 0.0
+        rate = math.pi / self._duration
+        phase, half = rate * (time - _AT_THE_SURFACE), 0.5 * self._depth
+        return half * (1.0 - math.cos(phase)), half * rate * math.sin(phase), half * rate**2 * math.cos(phase)
+
+    def is_over(self, time: float) -> bool:
+        """Return whether it is where it starts then."""
+        return self._depth == 0.0 or time >= _AT_THE_SURFACE + self._duration

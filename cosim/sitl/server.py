@@ -166,7 +166,7 @@ class JsonServer:
         assert flight is not None
         law = self._flights.law
         law.take(packet.pwm)
-        if flight.steps or law.is_driving:
+        if flight.steps or (law.is_driving and flight.can_start):
             motion = flight.step()
             self.counts.steps += 1
         else:  # it starts, or is not armed yet

@@ -217,6 +217,19 @@ def test_drift_widens_the_margins_before_it_holds(tmp_path, monkeypatch):
     assert doubts[0] == 0.0 and SPREADS * doubts[-1] == pytest.approx(0.3, abs=0.1)
 
 
+def test_a_reckoned_position_widens_the_margins_by_a_part_of_the_way(tmp_path, monkeypatch):
+    doubts, doubt = [], RegionEnvironment.doubt_positions
+    monkeypatch.setattr(RegionEnvironment, "doubt_positions", lambda self, by: (doubts.append(by), doubt(self, by)))
+    link = StandIn(profile="generic", shift=SHIFT)
+    link.tamper["EKF_STATUS_REPORT"] = link.tamper["ESTIMATOR_STATUS"] = lambda m: setattr(m, "flags", 8)
+    flight = Flight(tmp_path, 6.0, link=link, reckoning_error=0.05)
+    table = flight.run.table()
+    way = np.array([table[f"position.{a}"].to_numpy() for a in "xy"])
+    moved = np.linalg.norm(np.diff(way, axis=1), axis=0).sum()
+    assert flight.status == "completed" and moved > 0.5
+    assert SPREADS * doubts[-1] == pytest.approx(0.05 * moved, rel=0.1)
+
+
 def test_sticks_that_the_autopilot_would_not_take_are_not_sent(tmp_path):
     link = StandIn(profile="ardusub", shift=SHIFT)
     told = mavlink.MAVLink_param_value_message(b"SYSID_MYGCS", 250.0, 9, 1, 0)
@@ -258,6 +271,19 @@ def test_a_pilot_wins_within_a_second_and_is_left_alone(tmp_path, reason):
     assert flight.status == f"pilot: {reason}" and EVENT < since <= EVENT + 1.0
     assert not flight.sent_after(since, *STICKS)
     assert not [m for m in flight.sent_after(since, "COMMAND_LONG") if m.command == 176]
+    last = [m for _, m in link.sent if m.get_type() == "MANUAL_CONTROL"][-1]
+    assert (last.x, last.y, last.z, last.r) == (0, 0, 0, 0)
+
+
+def test_a_station_with_the_same_system_id_is_warned_of_once(tmp_path, caplog):
+    link = StandIn(profile="generic", shift=SHIFT)
+    beat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+    told = [lambda: link.hear(beat), lambda: link.hear(beat), lambda: link.hear(beat, 250)]
+    flight = Flight(tmp_path, 4.0, link=link, events=told)
+    assert flight.status == "completed"
+    assert [r.getMessage() for r in caplog.records if "compete" in r.getMessage()] == [
+        "component 190 has the companion's system id 255: its sticks compete; give it another"
+    ]
 
 
 @pytest.mark.medium

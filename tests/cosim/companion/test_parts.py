@@ -137,18 +137,47 @@ def test_sticks_give_the_wrench_that_they_were_made_for(profile):
 
 
 def test_a_velocity_leads_by_the_acceleration_that_the_wrench_gives():
-    lead, state = VelocityLead(HEAVY, lag=0.5), reported((0.0, 0.0, 0.0))
-    asked = lead.velocity(np.array([10.0, 0.0, 0.0, 0.0, 0.0, 0.0]), state)
+    def asked_for(force, speed):
+        state = reported((0.0, 0.0, 0.0))
+        state.velocity[:] = speed, 0.0, 0.0
+        return VelocityLead(HEAVY, 0.5, 0.25).velocity(np.array([force, 0.0, 0.0, 0.0, 0.0, 0.0]), state, 0.02)
+
+    asked = asked_for(10.0, 0.0)
     assert asked == pytest.approx([0.5 * 10.0 / (13.5 + 6.36), 0.0, 0.0])  # mass and added mass of the source
-    steady = 0.3
-    state.velocity[:] = steady, 0.0, 0.0
-    drag = 13.7 * steady + 141.0 * steady**2
-    assert lead.velocity(np.array([drag, 0, 0, 0, 0, 0]), state) == pytest.approx([steady, 0.0, 0.0])
-    assert np.linalg.norm(lead.velocity(np.full(6, 1e5), state)) == pytest.approx(0.5)
+    assert asked_for(13.7 * 0.3 + 141.0 * 0.3**2, 0.3) == pytest.approx([0.3, 0.0, 0.0])
+    assert asked_for(1e5, 0.0) == pytest.approx([1.2, 0.0, 0.0])
     message = velocity_target(mavlink, 1, asked, 0.25)
     assert message.type_mask == 0b010111000111 and message.yaw_rate == 0.25
     assert velocity_target(mavlink, 1, asked, None).type_mask == 0b110111000111
     assert message.coordinate_frame == mavlink.MAV_FRAME_LOCAL_NED
+
+
+@pytest.mark.parametrize(("gain", "lag", "push"), [(1.0, 3.0, 0.0), (0.41, 1.55, -0.05), (0.65, 0.8, 0.06)])
+def test_a_velocity_loop_of_another_gain_and_lag_does_what_the_wrench_asks_for(gain, lag, push):
+    """A speed is kept through a loop that is not the assumed one, with a current; without the observer it is not."""
+    lead, state, period, wanted = VelocityLead(HEAVY, 3.0, 0.5), reported((0.0, 0.0, 0.0)), 0.02, 0.25
+    for _ in range(1500):
+        speed = state.velocity[0]
+        drag = 13.7 * speed + 141.0 * speed * abs(speed)
+        force = drag + 19.86 * 0.8 * (wanted - speed)
+        asked = lead.velocity(np.array([force, 0.0, 0.0, 0.0, 0.0, 0.0]), state, period)[0]
+        state.velocity[0] += period * ((gain * asked - speed) / lag + push)
+    assert state.velocity[0] == pytest.approx(wanted, abs=0.005)
+
+
+def test_a_way_without_a_fix_is_reckoned():
+    """Of 3 m north and 4 m down the horizontal part, and only while the estimate says that it is relative."""
+    relative, absolute = 8, 24  # flags of EKF_STATUS_REPORT and ESTIMATOR_STATUS
+    alignment, state = FrameAlignment(SceneOrigin(surveyed=SHIFT)), ReportedState((255, 191))
+    for k, (north, flags) in enumerate(
+        [(0.0, absolute), (1.0, absolute), (2.0, relative), (4.0, relative), (9.0, absolute)]
+    ):
+        reported((north, 0.0, 4.0 * north / 3.0), heard=k * 0.02, state=state)
+        state.take(1, 1, mavlink.MAVLink_ekf_status_report_message(flags, *[0.0] * 5), k * 0.02)
+        alignment.update(state, k * 0.02)
+    assert alignment.reckoned == pytest.approx(3.0)
+    state.take(1, 1, mavlink.MAVLink_estimator_status_message(0, relative, *[0.0] * 8), 1.0)
+    assert state.is_reckoned
 
 
 # ---- who may steer ----

@@ -57,8 +57,9 @@ def test_the_estimate_is_in_the_record_and_arming_lets_go(tmp_path):
     m, port = dialect(), free_port()
     link = AutopilotLink(parse_endpoint(f"udpin:127.0.0.1:{port}"), DvlOptions(rate=100.0, latency=0.0))
     options = FlightOptions(
-        "sitl", (f"time.duration={STEPS / 1200}",), "bluerov2_heavy", tmp_path / "run", 2000.0, report=False
-    )
+        "sitl", (f"time.duration={STEPS / 1200}", "initial.position=[0,0,0]"), "bluerov2_heavy", tmp_path / "run",
+        2000.0, report=False,
+    )  # fmt: skip
     flights = Flights(options, "ardupilot", lambda vehicle: law_of_pwm(vehicle, link))
     served = Served(JsonServer(flights, ("127.0.0.1", 0), 60.0))
     served.start()

@@ -11,6 +11,7 @@ import pytest
 from cosim.errors import RunError
 from cosim.results.record import load_record
 from cosim.simulation.master import Master
+from cosim.sitl import motion
 from cosim.sitl.flights import RESTARTED, FlightOptions, Flights
 from cosim.sitl.law import law_of_pwm
 from cosim.sitl.lockstep import Lockstep
@@ -81,17 +82,49 @@ def test_at_rest_the_imu_feels_gravity_alone_and_the_bottom_is_below(serve):
 def test_it_is_held_where_it_starts_until_a_thruster_is_driven(serve):
     """Rolled over and 1 N light it would move; time and the record's time begin apart."""
     half = 0.5**0.5
-    served = serve("time.duration=0.1", f"initial.quaternion=[{half},{half},0,0]", "initial.position=[1,2,3]")
+    served = serve("time.duration=0.1", f"initial.quaternion=[{half},{half},0,0]", "initial.position=[1,2,0]")
     with StandIn(served.address) as pilot:
         waited = [pilot.fly(pwm) for pwm in 100 * (DISARMED, (0,) * 8)]
         flown = [pilot.fly(NEUTRAL) for _ in range(120)]
     assert [s["timestamp"] for s in waited + flown] == pytest.approx([(k + 1) * DT for k in range(320)], abs=1e-12)
-    assert all(s["position"] == (1.0, 2.0, 3.0) and not any(s["velocity"] + s["gyro"]) for s in waited)
+    assert all(s["position"] == (1.0, 2.0, 0.0) and not any(s["velocity"] + s["gyro"]) for s in waited)
     assert waited[0]["accel_body"] == pytest.approx((0.0, -9.81, 0.0), abs=1e-9)
     assert any(flown[-1]["velocity"])
     outcome = served.outcome()
     assert (outcome.counts.waited, outcome.counts.steps) == (200, 120)
     assert load_record(outcome.runs[0].folder)["time"][-1] == pytest.approx(0.1)
+
+
+def test_an_idle_autopilot_is_lowered_from_the_surface_and_starts_where_the_scenario_does(serve, monkeypatch):
+    """Here within 0.06 s; what drives a thruster before the vehicle is there waits for it."""
+    monkeypatch.setattr(motion, "_AT_THE_SURFACE", 0.02)
+    monkeypatch.setattr(motion, "_LONGEST", 0.04)
+    served = serve("time.duration=0.02", "initial.position=[1,2,3]")
+    with StandIn(served.address) as pilot:
+        said = [pilot.fly(pwm) for pwm in 36 * (DISARMED,) + 60 * (NEUTRAL,)]
+    outcome = served.outcome()
+    depth = np.array([s["position"][2] for s in said])
+    assert not depth[:24].any() and depth[71] == pytest.approx(3.0) and depth[-1] == pytest.approx(3.0, abs=1e-3)
+    assert all(np.diff(depth[:72]) >= 0.0)
+    assert all(s["position"][:2] == (1.0, 2.0) for s in said[:72])
+    assert (outcome.counts.waited, outcome.counts.steps) == (72, 24)
+
+
+def test_a_lowered_vehicle_feels_what_its_depths_say():
+    """Speed and acceleration against differences of the depth; rolled on its side, the IMU has them along y."""
+    lowering, h = motion.Lowering(4.0), 1e-4
+    for at in np.linspace(4.2, 9.8, 9):
+        before, now, after = (lowering.at(at + by)[0] for by in (-h, 0.0, h))
+        assert lowering.at(at)[1:] == pytest.approx(
+            [(after - before) / (2 * h), (after - 2 * now + before) / h**2], abs=1e-5
+        )
+    half, zero = 0.5**0.5, (0.0, 0.0, 0.0)
+    on_its_side = motion.Motion(0.0, zero, zero, (1.0, 2.0, 4.0), zero, zero, (half, half, 0.0, 0.0), 6.0, zero)
+    carried = motion.carried(on_its_side, 3.0, 0.5, 0.2)
+    assert carried.specific_force == pytest.approx((0.0, 0.2 - 9.81, 0.0)) and carried.dvl == pytest.approx(
+        (0.0, 0.5, 0.0)
+    )
+    assert (carried.position_ned, carried.velocity_ned, carried.altitude) == ((1.0, 2.0, 3.0), (0.0, 0.0, 0.5), 7.0)
 
 
 def test_velocity_is_told_north_east_down(serve):
