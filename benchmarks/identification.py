@@ -258,7 +258,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("vehicles", type=int)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--duration", type=float, default=310.0, help="of each run [s]")
+    parser.add_argument("--duration", type=float, default=300.0, help="of each run [s]")
     parser.add_argument("--noise", type=float, default=1.0, help="factor of all noise")
     parser.add_argument("--nuisance", choices=tuple(ESTIMATED), nargs="+", default=["none"])
     parser.add_argument("--unknown", action="store_true", help="nuisances are not estimated")

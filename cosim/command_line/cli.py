@@ -18,6 +18,7 @@ from cosim.command_line import (
     campaigns,
     companion,
     completion,
+    excite,
     export,
     falsify,
     identify,
@@ -124,6 +125,7 @@ def _parser() -> argparse.ArgumentParser:
     campaigns.add_verbs(verbs)
     sweep.add_verbs(verbs)
     falsify.add_verb(verbs)
+    excite.add_verb(verbs)
     identify.add_verb(verbs)
     mavlink.add_verbs(verbs)
     sitl.add_verbs(verbs)
@@ -273,6 +275,7 @@ _VERBS = {
     "sweep": sweep.sweep,
     "rerun": sweep.rerun,
     "falsify": falsify.falsify,
+    "excite": excite.excite,
     "identify": identify.identify,
     "listen": mavlink.listen,
     "stream": mavlink.stream,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +27,7 @@ from plant_fmu.vehicle import Vehicle, load_vehicle
 Array = NDArray[np.float64]
 
 RETURN = 10.0  # s, between two segments: the law brings the vehicle back to the center of the box
+BEGIN = 2.0  # s, before the first one
 _SETTLE = 1.0  # s, before a segment that is tried: windows begin after that time
 _STICKS = round(PERIOD / ROW)  # rows of the record to a stick value
 _USED = 0.7  # part of the box that a segment may use with the numbers as they are known before
@@ -35,6 +35,7 @@ _FASTEST = 2.0  # rad/s
 _STEEPEST = math.sin(math.radians(55.0))
 _SMALLER = 0.7  # part of the sticks, each time a segment leaves the limits
 _TRIES = 7
+_OTHERS, _CURRENT = 4, 0.1  # vehicles that the schedule is tried on beside; m/s
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,7 @@ class Design:
     parameters: tuple[Parameter, ...]
     deviations: Array  # (p,) standard, expected of the numbers
     rehearsal: Rehearsal
+    excursions: tuple[float, ...]  # parts of half the box, of other vehicles in a current
 
     def vehicle_part(self) -> list[int]:
         """Return the places of the vehicle's own numbers."""
@@ -109,9 +111,9 @@ def _design(
     nuisance: Sequence[str], seed: int, progress: Callable[[float], None],
 ) -> Design:  # fmt: skip
     vehicle = load_vehicle(start)
-    count = math.floor((duration - RETURN) / (SECONDS + RETURN))
+    count = math.floor((duration - BEGIN + RETURN) / (SECONDS + RETURN))
     if count < 1:
-        raise IdentificationError(f"--time {duration:g}: is too short, expected {SECONDS + 2 * RETURN:g} s or more")
+        raise IdentificationError(f"--time {duration:g}: is too short, expected {BEGIN + SECONDS:g} s or more")
     top = depth - 0.5 * box[2]
     if top < vehicle.hull_radius:
         raise IdentificationError(
@@ -141,23 +143,52 @@ def _design(
     order = _choose(found, parameters, count)
     segments = tuple(kept[i] for i in order)
     commands = tuple(schedule(segments))
-    whole = load(scenario_text(start, depth, RETURN + count * (SECONDS + RETURN), "excite"), start)
+    whole = load(scenario_text(start, depth, BEGIN + count * (SECONDS + RETURN) - RETURN, "excite"), start)
     rehearsal = rehearse(whole, commands)
     matrix = information([rehearsal.log()], vehicle, parameters)
     if matrix is None:
         raise IdentificationError("the schedule leaves no window that can be predicted")
     covariance = np.linalg.inv(matrix + _prior(parameters))
+    others = draw_others(whole, parameters, np.random.default_rng([seed, 1]))
+    excursions = tuple(farthest(rehearse(other, commands), whole, box) for other in others)
     progress(1.0)
     return Design(
         start, vehicle, box, depth, whole.time.duration, segments, len(tried), len(tried) - len(kept), commands,
-        tuple(parameters), np.sqrt(np.diag(covariance)), rehearsal,
+        tuple(parameters), np.sqrt(np.diag(covariance)), rehearsal, excursions,
     )  # fmt: skip
 
 
+def draw_others(scenario: Scenario, parameters: Sequence[Parameter], rng: np.random.Generator) -> list[Scenario]:
+    """Return scenarios of vehicles as they may be, each in a current.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of the vehicle as it is known.
+    parameters : sequence of Parameter
+        What is free. Damping and the diagonal of the added mass are drawn from half to one and a half times.
+    rng : Generator
+        Of the draws.
+    """
+    found = []
+    for _ in range(_OTHERS):
+        parts = {p.plant: p.start * rng.uniform(0.5, 1.5) for p in parameters if _is_uncertain(p)}
+        angle = rng.uniform(0.0, 2.0 * math.pi)
+        current = [_CURRENT * math.cos(angle), _CURRENT * math.sin(angle), 0.0]
+        found.append(scenario.replace({"plant.current": current, "plant.parameters": parts}))
+    return found
+
+
+def farthest(flown: Rehearsal, scenario: Scenario, box: tuple[float, float, float]) -> float:
+    """Return how far from the center a run goes, in parts of half the box: above 1 it leaves it."""
+    away = np.abs(flown.states[:, :3] - np.array(scenario.initial.position)) / (0.5 * np.array(box))
+    return float(away.max())
+
+
 def schedule(segments: Sequence[Segment]) -> list[tuple[int, Command]]:
-    """Return the commands of segments with returns before, between and after them, each with its step."""
+    """Return the commands of segments with returns between them, each with its step."""
     commands: list[tuple[int, Command]] = []
-    step = round(RETURN / ROW)
+    step = round(BEGIN / ROW)
     for segment in segments:
         commands.append((step, SetMode(segment.mode)))
         commands += _stick_commands(segment, step)
@@ -208,8 +239,7 @@ def _within(segment: Segment, trial: Scenario, box: tuple[float, float, float]) 
         made = Segment(segment.title, segment.mode, segment.sticks * np.repeat([push, turn], 3))
         rehearsal = rehearse(trial, [*begin, *_stick_commands(made, settle)])
         state = rehearsal.states
-        e0, e1, e2, e3 = state[:, 3:7].T
-        down = 1.0 - 2.0 * (np.square(e1) + np.square(e2))  # cosine of the tilt
+        down = 1.0 - 2.0 * np.square(state[:, 4:6]).sum(axis=1)  # cosine of the tilt
         far = bool((np.abs(state[:, :3] - center) > sizes).any())
         wild = np.abs(state[:, 10:]).max() > _FASTEST or down.min() < math.sqrt(1.0 - _STEEPEST**2)
         if not far and not wild:
@@ -240,6 +270,13 @@ def _choose(found: Sequence[Array], parameters: Sequence[Parameter], count: int)
         order[place] = max(range(len(found)), key=lambda i: gain(without + matrices[i]))
         total = without + matrices[order[place]]
     return order
+
+
+def _is_uncertain(p: Parameter) -> bool:
+    if p.name.startswith("hydrodynamics.added_mass."):
+        row, column = p.name.split(".")[2:]
+        return row == column
+    return "damping" in p.name
 
 
 def _prior(parameters: Sequence[Parameter]) -> Array:

@@ -10,7 +10,7 @@ from cosim.scenario.scenario import Scenario, load_scenario
 
 ROW = 0.05  # s, of the record, the law and the sticks
 
-_TEXT = """# Stick inputs for identification, made by cosim excite. The law brings the vehicle back to the goal between segments.
+_TEXT = """# Stick inputs for identification, made by cosim excite. The law brings the vehicle back between segments.
 title = "Excitation of {name}"
 vehicle = {vehicle}
 
