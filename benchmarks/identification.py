@@ -5,7 +5,7 @@ Each is a BlueROV2 Heavy with other damping, added mass (all 21 elements), buoya
 current. It gets the sticks of ``cosim excite`` in a box of 10 m, which know the shipped numbers alone. Sensors are
 white: DVL 5 mm/s at 6.7 Hz, gyro 2 mrad/s with biases, attitude 5 mrad and depth 3 mm at 20 Hz. The search starts from
 the shipped numbers. A nuisance is one of: ``force``, random of 0.2 to 0.5 N that changes within 5 to 10 s; ``bias`` of
-the gyro, up to 20 mrad/s; ``scale`` of the DVL, 1 %; ``thrusters`` that give 90 to 110 %; ``asymmetric``, those and less
+the gyro, up to 20 mrad/s; ``scale`` of the DVL, 1 %; ``thrusters`` that give 90 to 110 %; ``asymmetric``, and less
 force backward; ``delay`` of all sensors, 0.2 s. It is estimated, where the identification has a number for it, or not.
 """
 
@@ -245,7 +245,7 @@ def measure(
         "coverage": round(float(np.mean(covered)), 3), "nominal coverage": round(float(np.mean(nominal)), 3),
         "median half interval, in deviations of the prior": float(f"{np.median(half):.2g}"),
         "farthest from the center [m]": round(max(farthest), 2),
-        "warned in the last": [sentence for sentence in warnings(last[2], [last[0]]) if sentence.startswith("The model")],
+        "warned in the last": [said for said in warnings(last[2], [last[0]]) if said.startswith("The model")],
     }, last  # fmt: skip
 
 

@@ -135,7 +135,12 @@ def _fit(
             if problem.residuals.holds_starts:  # residuals are those of wrong starts: numbers stay near their priors
                 precision = _HELD
                 problem.residuals.weights = [np.full(len(w), _FAR) for w in problem.residuals.weights]
-            values = problem.solve(values, tick, precision)
+            try:
+                values = problem.solve(values, tick, precision)
+            except IdentificationError:
+                if not found:
+                    raise
+                return found[0]  # long windows have no motion from there
             done = begun + _EVALUATIONS
             if turn < rounds - 1:
                 problem.reweigh()

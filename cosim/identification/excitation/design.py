@@ -199,7 +199,7 @@ def schedule(segments: Sequence[Segment]) -> list[tuple[int, Command]]:
 
 
 def information(logs: Sequence[Log], vehicle: Vehicle, parameters: Sequence[Parameter]) -> Array | None:
-    """Return the information of runs on the free numbers, shape (p, p), without the prior; None if nothing is predicted.
+    """Return the information of runs on the free numbers, shape (p, p), without the prior; None without windows.
 
     Parameters
     ----------

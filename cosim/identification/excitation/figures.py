@@ -9,8 +9,8 @@ from cosim.identification.excitation.segments import SECONDS
 from cosim.report.figures.style import BLACK, NamedFigure
 
 _CAPTION = (
-    "The rehearsal: where the vehicle goes, with the numbers as they are known before. Grey: segments; between them the "
-    "law brings it back. Dotted: sides of the box."
+    "The rehearsal: where the vehicle goes, with the numbers as they are known before. Grey: segments; between them "
+    "the law brings it back. Dotted: sides of the box."
 )
 
 

@@ -125,9 +125,9 @@ def _page(done: Design, out: Path) -> Page:
         f"cosim identify runs/{out.name} --vehicle {done.start} --out mine.toml"
     )
     page.paragraph(
-        f"{STICKS} holds the same for a pilot or a script: stick values from −1 to 1 at {1 / PERIOD:g} Hz, at full pilot "
-        "gain. manual, stabilize and depth_hold are ArduSub's MANUAL, STABILIZE and ALT_HOLD; return means back to the "
-        f"center of the box at {done.depth:g} m, by hand or by a mode that holds position.",
+        f"{STICKS} holds the same for a pilot or a script: stick values from −1 to 1 at {1 / PERIOD:g} Hz, at full "
+        "pilot gain. manual, stabilize and depth_hold are ArduSub's MANUAL, STABILIZE and ALT_HOLD; return means back "
+        f"to the center of the box at {done.depth:g} m, by hand or by a mode that holds position.",
         faint=True,
     )
     with tempfile.TemporaryDirectory(prefix="excite-") as scratch, mpl.rc_context(STYLE):
@@ -152,8 +152,8 @@ def _page(done: Design, out: Path) -> Page:
     )
     noise = ", ".join(f"{name.replace('_', ' ')} {size:g}" for name, size in NOISE.items())
     page.paragraph(
-        f"By the exact sensitivities of the identification in windows of {STAGES[0]:g} s, about the numbers as they are "
-        f"known before, with white noise of {noise} (SI units; velocities at 6.7 Hz, the rest at {1 / ROW:g} Hz). "
+        f"By the exact sensitivities of the identification in windows of {STAGES[0]:g} s, about the numbers as they "
+        f"are known before, with white noise of {noise} (SI units; velocities at 6.7 Hz, the rest at {1 / ROW:g} Hz). "
         "Disturbances and a wrong model make intervals wider: those of cosim identify count.",
         faint=True,
     )
