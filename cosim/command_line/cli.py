@@ -18,7 +18,6 @@ from cosim.command_line import (
     campaigns,
     companion,
     completion,
-    excite,
     export,
     falsify,
     identify,
@@ -125,8 +124,7 @@ def _parser() -> argparse.ArgumentParser:
     campaigns.add_verbs(verbs)
     sweep.add_verbs(verbs)
     falsify.add_verb(verbs)
-    excite.add_verb(verbs)
-    identify.add_verb(verbs)
+    identify.add_verbs(verbs)
     mavlink.add_verbs(verbs)
     sitl.add_verbs(verbs)
     companion.add_verb(verbs)
@@ -275,7 +273,7 @@ _VERBS = {
     "sweep": sweep.sweep,
     "rerun": sweep.rerun,
     "falsify": falsify.falsify,
-    "excite": excite.excite,
+    "excite": identify.excite,
     "identify": identify.identify,
     "listen": mavlink.listen,
     "stream": mavlink.stream,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,8 +107,14 @@ def fit(
     IdentificationError
         If no window is left, or the start predicts no motion.
     """
-    with threadpool_limits(1):  # the matrices are small: further threads would wait for each other most of the time
+    with single_thread():
         return _fit(logs, vehicle, tuple(parameters), progress)
+
+
+def single_thread() -> AbstractContextManager[object]:
+    """Keep linear algebra to one thread: the matrices are small, and further threads would mostly wait."""
+    limited: AbstractContextManager[object] = threadpool_limits(1)
+    return limited
 
 
 def _fit(

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from cosim.errors import IdentificationError
 from cosim.identification.excitation.rehearsal import Rehearsal, rehearse
 from cosim.identification.excitation.scenario_text import ROW, load, scenario_text
 from cosim.identification.excitation.segments import PERIOD, SECONDS, Segment, candidates
-from cosim.identification.fit import STAGES
+from cosim.identification.fit import STAGES, single_thread
 from cosim.identification.log import Log
 from cosim.identification.parameters import DEFAULT_FREE, DEFAULT_NUISANCES, Parameter, free_parameters, nuisances
 from cosim.identification.residuals import Residuals
@@ -102,7 +101,7 @@ def design(
     IdentificationError
         If the time or the box is too small for any segment.
     """
-    with threadpool_limits(1):
+    with single_thread():
         return _design(start, box, depth, duration, free, nuisance, seed, progress)
 
 
@@ -223,10 +222,7 @@ def information(logs: Sequence[Log], vehicle: Vehicle, parameters: Sequence[Para
 
 
 def _stick_commands(segment: Segment, step: int) -> list[tuple[int, Command]]:
-    return [
-        (step + k * _STICKS, ManualControl(tuple(sticks)))  # type: ignore[arg-type]
-        for k, sticks in enumerate(segment.sticks.tolist())
-    ]
+    return [(step + k * _STICKS, ManualControl(tuple(sticks))) for k, sticks in enumerate(segment.sticks.tolist())]
 
 
 def _within(segment: Segment, trial: Scenario, box: tuple[float, float, float]) -> tuple[Segment, Rehearsal] | None:

@@ -93,4 +93,4 @@ def rehearse(
             master.step(k, source)
             rows.append(master.row[kept])
     found: Array = np.array(rows)
-    return Rehearsal(scenario.time.step * np.arange(len(found)), found[:, :13], found[:, 13:])
+    return Rehearsal(scenario.time.step * np.arange(len(found), dtype=np.float64), found[:, :13], found[:, 13:])

@@ -40,7 +40,7 @@ class Segment:
         return Segment(self.title, self.mode, part * self.sticks)
 
 
-def candidates(axes: Array, rng: np.random.Generator, draws: int) -> Iterator[Segment]:
+def candidates(axes: NDArray[np.bool_], rng: np.random.Generator, draws: int) -> Iterator[Segment]:
     """Yield multisines and steps on all groups of axes, in each stick mode.
 
     Parameters
