@@ -1,9 +1,12 @@
 """Identification of vehicles whose numbers are known: errors, coverage of the 95 % intervals, and times.
 
-``python -m benchmarks.identification N [--seed K] [--duration S] [--noise F]``. Each is a BlueROV2 Heavy with
-other damping, added mass (all 21 elements), buoyancy, its center and thruster lag, in a current. The FMU moves it
-by multisines on all axes about a station that it keeps; sensors are white: DVL 5 mm/s at 6.7 Hz, gyro 2 mrad/s with
-biases, attitude 5 mrad and depth 3 mm at 20 Hz. The search starts from the shipped numbers.
+``python -m benchmarks.identification N [--seed K] [--duration S] [--noise F] [--nuisance NAME [--unknown]] [--dive]``.
+Each is a BlueROV2 Heavy with other damping, added mass (all 21 elements), buoyancy, its center and thruster lag, in a
+current. It gets the sticks of ``cosim excite`` in a box of 10 m, which know the shipped numbers alone. Sensors are
+white: DVL 5 mm/s at 6.7 Hz, gyro 2 mrad/s with biases, attitude 5 mrad and depth 3 mm at 20 Hz. The search starts from
+the shipped numbers. A nuisance is one of: ``force``, random of 0.2 to 0.5 N that changes within 5 to 10 s; ``bias`` of
+the gyro, up to 20 mrad/s; ``scale`` of the DVL, 1 %; ``thrusters`` that give 90 to 110 %; ``asymmetric``, and less
+force backward; ``delay`` of all sensors, 0.2 s. It is estimated, where the identification has a number for it, or not.
 """
 
 from __future__ import annotations
@@ -15,8 +18,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
-from controller.quaternion import from_axis_angle, multiply, rotation_matrix
+from controller.quaternion import from_axis_angle, multiply
+from cosim.identification.excitation.design import design
+from cosim.identification.excitation.rehearsal import DVL_PERIOD, NOISE, rehearse
+from cosim.identification.excitation.scenario_text import ROW, load, scenario_text
+from cosim.identification.findings import warnings
 from cosim.identification.fit import Fit, fit, integration_step
 from cosim.identification.log import Log, make_topic
 from cosim.identification.parameters import (
@@ -28,20 +36,19 @@ from cosim.identification.parameters import (
 )
 from cosim.identification.residuals import Residuals
 from cosim.identification.windows import cut_windows
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.commands.commands import Command, ManualControl, SetMode
 from plant_fmu import Plant, Vehicle, load_vehicle
 
 Array = NDArray[np.float64]
 
-PERIOD = 0.05  # s, of the commands
-_FREQUENCIES = np.array([0.05, 0.09, 0.14, 0.21, 0.3, 0.41])  # Hz
-_FORCE = np.array([22.0, 22.0, 22.0, 1.5, 1.5, 2.0])  # N, N m
-_STATION = (30.0, 25.0)  # N/m, N s/m, of what brings it back
-_LEVEL = (6.0, 1.5)  # N m/rad, N m s/rad
-_NAMES = (
-    *(f"position.{axis}" for axis in "xyz"), *(f"quaternion.e{i}" for i in range(4)),
-    *(f"velocity.{name}" for name in "uvwpqr"),
-)  # fmt: skip
-_DEPTH = 5.0  # m
+VEHICLE, DEPTH, BOX = "bluerov2_heavy", 5.0, (10.0, 10.0, 4.0)  # m: depth of the box's center, and its sizes
+# what is freed beside the default, and which nuisances are estimated
+ESTIMATED: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "none": ((), DEFAULT_NUISANCES), "force": ((), DEFAULT_NUISANCES), "bias": ((), DEFAULT_NUISANCES),
+    "scale": ((), (*DEFAULT_NUISANCES, "scale")), "thrusters": (("thrusters.matrix",), DEFAULT_NUISANCES),
+    "asymmetric": (("thrusters.matrix",), DEFAULT_NUISANCES), "delay": ((), (*DEFAULT_NUISANCES, "delay")),
+}  # fmt: skip
 
 
 def draw_truth(parameters: list[Parameter], vehicle: Vehicle, rng: np.random.Generator) -> Array:
@@ -65,32 +72,65 @@ def draw_truth(parameters: list[Parameter], vehicle: Vehicle, rng: np.random.Gen
     return np.array(values)
 
 
-def simulate(vehicle: Vehicle, truth: dict[str, float], duration: float, noise: float, rng: np.random.Generator) -> Log:
-    """Return the log of a vehicle whose FMU has true numbers, and how far it went."""
-    times: Any = PERIOD * np.arange(int(duration / PERIOD))
-    phases = rng.uniform(0.0, 2.0 * np.pi, (6, len(_FREQUENCIES)))
-    spread = 1.0 + 0.06 * np.arange(6)[:, None]
-    waves = np.sin(2.0 * np.pi * spread[..., None] * _FREQUENCIES[:, None] * times + phases[..., None]).sum(axis=1)
-    wanted = _FORCE[:, None] * waves / np.sqrt(0.5 * len(_FREQUENCIES)) / 1.5
-    inverse, states, thrust = np.linalg.pinv(vehicle.thruster_matrix), [], []
-    with Plant(vehicle) as plant:
-        plant.set(truth | {"position.z": _DEPTH})
-        plant.initialise()
-        for k in range(len(times)):
-            state = np.array([plant[name] for name in _NAMES])
-            R = rotation_matrix(state[3:7])
-            wrench = wanted[:, k].copy()
-            wrench[:3] -= R.T @ (_STATION[0] * (state[:3] - [0.0, 0.0, _DEPTH])) * [0.15, 0.15, 1.0]
-            wrench[:3] -= _STATION[1] * state[7:10] * [0.2, 0.2, 0.6]
-            wrench[3:] -= (
-                _LEVEL[0] * 2.0 * np.sign(state[3]) * state[4:7] * [0.3, 0.3, 1.0] + _LEVEL[1] * state[10:13] * 0.3
-            )
-            forces = np.clip(inverse @ wrench, vehicle.thrust_min, vehicle.thrust_max)
-            plant.set({f"thrust[{i + 1}]": float(x) for i, x in enumerate(forces)})
-            states.append(state)
-            thrust.append(forces)
-            plant.step(PERIOD)
-    moved: Array = np.array(states, np.float64)
+class Disturbed:
+    """A plant with what no model of it has: a random force, and thrusters that give other forces than they should.
+
+    Parameters
+    ----------
+    plant : Plant
+        The vehicle.
+    force : ndarray, shape (steps, 6)
+        Added to the wrench of each step [N, N m].
+    forward, backward : ndarray, shape (thrusters,)
+        Factors of positive and of negative forces.
+    """
+
+    def __init__(self, plant: Plant, force: Array, forward: Array, backward: Array) -> None:
+        self._plant, self._force, self._factors, self._k = plant, force, (forward, backward), 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._plant, name)
+
+    def step(self, step: float) -> None:
+        """Go on under the disturbed inputs."""
+        values, n = self._plant.inputs.values, len(self._factors[0])
+        values[:n] *= np.where(values[:n] < 0.0, self._factors[1], self._factors[0])
+        values[n:] += self._force[min(self._k, len(self._force) - 1)]
+        self._k += 1
+        self._plant.step(step)
+
+
+def random_force(steps: int, rng: np.random.Generator) -> Array:
+    """Return a force of 0.2 to 0.5 N in each direction that changes within 5 to 10 s, shape (steps, 6)."""
+    found = np.zeros((steps, 6))
+    keep = np.exp(-ROW / rng.uniform(5.0, 10.0))
+    size = rng.uniform(0.2, 0.5)
+    for axis in range(3):
+        found[:, axis] = lfilter(
+            [size * np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(steps), zi=[size * rng.standard_normal()]
+        )[0]
+    return found
+
+
+def dive(duration: float) -> list[tuple[int, Command]]:
+    """Return the sticks of an ordinary dive: ahead at a steady speed, some turns, a change of depth."""
+    commands: list[tuple[int, Command]] = [(0, SetMode("depth_hold"))]
+    for k in range(0, int(duration / ROW), 2):
+        time = k * ROW
+        ahead, turn = (0.3, 0.0) if time % 40.0 < 30.0 else (0.1, 0.05)
+        down = 0.3 if 60.0 < time < 70.0 else -0.3 if 200.0 < time < 210.0 else 0.0
+        commands.append((k, ManualControl((ahead, 0.0, down, 0.0, 0.0, turn))))
+    return commands
+
+
+def fly(scenario: Scenario, commands: Any, nuisance: str, noise: float, rng: np.random.Generator) -> tuple[Log, float]:
+    """Return the log of a run, and how far it went from the center of its box [m]."""
+    n, steps = scenario.vehicle.n_thrusters, scenario.steps + 1
+    force = random_force(steps, rng) if nuisance == "force" else np.zeros((1, 6))
+    forward = rng.uniform(0.9, 1.1, n) if nuisance in ("thrusters", "asymmetric") else np.ones(n)
+    backward = forward * rng.uniform(0.85, 0.95) if nuisance == "asymmetric" else forward
+    flown = rehearse(scenario, commands, Disturbed(Plant(scenario.vehicle), force, forward, backward))
+    states, times = flown.states, flown.times
 
     def noisy(values: Array, deviation: float) -> Array:
         found: Array = values + deviation * noise * rng.standard_normal(values.shape)
@@ -98,18 +138,20 @@ def simulate(vehicle: Vehicle, truth: dict[str, float], duration: float, noise: 
 
     turned: Array = np.array([
         multiply(q, from_axis_angle(a / np.linalg.norm(a), float(np.linalg.norm(a))))
-        for q, a in zip(moved[:, 3:7], noisy(np.zeros((len(moved), 3)), 0.005), strict=True)
+        for q, a in zip(states[:, 3:7], noisy(np.zeros((len(states), 3)), NOISE["attitude"]), strict=True)
     ], np.float64)  # fmt: skip
-    bias: Any = rng.uniform(-0.003, 0.003, 3)
-    dvl = slice(None, None, 3)
-    topics = (
-        make_topic("velocity", times[dvl], noisy(moved[dvl, 7:10], 0.005), 0.005 * noise),
-        make_topic("angular_velocity", times, noisy(moved[:, 10:] + bias, 0.002), 0.002 * noise),
-        make_topic("depth", times, noisy(moved[:, 2:3], 0.003), 0.003 * noise),
-        make_topic("attitude", times, turned, 0.005 * noise),
-    )
-    commands: Any = np.array(thrust)
-    return Log("simulated", times, commands, np.zeros((len(times), 6)), topics)
+    bias: Any = rng.uniform(-1.0, 1.0, 3) * (0.02 if nuisance == "bias" else 0.003)
+    scale = 1.01 if nuisance == "scale" else 1.0
+    late = 0.2 if nuisance == "delay" else 0.0
+    dvl = slice(None, None, round(DVL_PERIOD / ROW))
+    values = {
+        "velocity": (times[dvl], noisy(scale * states[dvl, 7:10], NOISE["velocity"])),
+        "angular_velocity": (times, noisy(states[:, 10:] + bias, NOISE["angular_velocity"])),
+        "depth": (times, noisy(states[:, 2:3], NOISE["depth"])), "attitude": (times, turned),
+    }  # fmt: skip
+    topics = tuple(make_topic(name, t + late, x, NOISE[name] * noise) for name, (t, x) in values.items())
+    gone = np.abs(states[:, :3] - scenario.initial.position).max()
+    return Log("simulated", times, flown.thrust, np.zeros((len(times), 6)), topics), float(gone)
 
 
 def relative_errors(parameters: list[Parameter], truth: Array, found: Array) -> dict[str, list[float]]:
@@ -153,47 +195,89 @@ def jacobian_times(log: Log, vehicle: Vehicle, parameters: list[Parameter], done
     return exact, time.process_time() - started
 
 
+def measure(
+    nuisance: str, estimated: bool, seeds: range, text: str, commands: Any, noise: float
+) -> tuple[dict[str, Any], tuple[Log, list[Parameter], Fit]]:
+    """Print a line for each vehicle; return one of all, and what came of the last vehicle."""
+    vehicle = load_vehicle(VEHICLE)
+    free, beside = ESTIMATED[nuisance if estimated else "none"]
+    truths = free_parameters(vehicle, DEFAULT_FREE)
+    groups: dict[str, list[float]] = {}
+    covered: list[bool] = []
+    nominal: list[bool] = []
+    half: list[float] = []
+    farthest: list[float] = []
+    last: Any = None
+    for seed in seeds:
+        rng = np.random.default_rng([seed, 27])
+        truth = draw_truth(truths, vehicle, rng)
+        current = [*rng.uniform(-0.15, 0.15, 2).tolist(), 0.0]
+        over = {p.plant: float(x) for p, x in zip(truths, truth, strict=True) if p.plant}
+        lag = float(truth[[p.kind for p in truths].index("lag")])
+        over |= {f"thrust_time_constant[{i + 1}]": lag for i in range(vehicle.n_thrusters)}
+        scenario = load(text, VEHICLE).replace({"plant.current": current, "plant.parameters": over})
+        log, gone = fly(scenario, commands, nuisance, noise, rng)
+        parameters = [*truths, *free_parameters(vehicle, free), *nuisances(beside, [log])]
+        wall, process = time.perf_counter(), time.process_time()
+        done = fit([log], vehicle, parameters)
+        wall, process = time.perf_counter() - wall, time.process_time() - process
+        n = len(truths)
+        off = np.abs(done.values[:n] - truth)
+        deviations = done.intervals.factor * done.intervals.deviations[:n]
+        inside = off <= deviations
+        covered += inside.tolist()
+        nominal += (off <= 1.96 * done.intervals.nominal[:n]).tolist()
+        half += (deviations / np.array([p.deviation for p in truths])).tolist()
+        farthest.append(gone)
+        errors = relative_errors(truths, truth, done.values[:n])
+        for name, values in errors.items():
+            groups.setdefault(name, []).extend(values)
+        line = {
+            "nuisance": nuisance, "estimated": estimated, "seed": seed, "chi2": round(done.intervals.chi2, 3),
+            "covered": f"{inside.sum()} of {inside.size}", "window [s]": round(done.windows[0].steps * done.step, 3),
+            "rejected": done.rejected.total(), "farthest [m]": round(gone, 2), "wall": round(wall, 1),
+            "process": round(process, 1), "median errors": _medians(errors),
+        }  # fmt: skip
+        print(json.dumps(line), flush=True)
+        last = log, parameters, done
+    return {
+        "nuisance": nuisance, "estimated": estimated, "vehicles": len(farthest), "median errors": _medians(groups),
+        "coverage": round(float(np.mean(covered)), 3), "nominal coverage": round(float(np.mean(nominal)), 3),
+        "median half interval, in deviations of the prior": float(f"{np.median(half):.2g}"),
+        "farthest from the center [m]": round(max(farthest), 2),
+        "warned in the last": [said for said in warnings(last[2], [last[0]]) if said.startswith("The model")],
+    }, last  # fmt: skip
+
+
+def _medians(groups: dict[str, list[float]]) -> dict[str, float]:
+    return {name: float(f"{np.median(x):.2g}") for name, x in groups.items()}
+
+
 def main() -> None:
-    """Print one JSON line for each vehicle, and one of all."""
+    """Print one JSON line for each vehicle, and one of all with each nuisance."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("vehicles", type=int)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--duration", type=float, default=300.0, help="of each run [s]")
     parser.add_argument("--noise", type=float, default=1.0, help="factor of all noise")
+    parser.add_argument("--nuisance", choices=tuple(ESTIMATED), nargs="+", default=["none"])
+    parser.add_argument("--unknown", action="store_true", help="nuisances are not estimated")
+    parser.add_argument("--dive", action="store_true", help="an ordinary dive in the place of cosim excite")
     options = parser.parse_args()
-    vehicle, start = load_vehicle("bluerov2_heavy"), free_parameters(load_vehicle("bluerov2_heavy"), DEFAULT_FREE)
-    groups: dict[str, list[float]] = {}
-    covered: list[bool] = []
-    nominal: list[bool] = []
-    for seed in range(options.seed, options.seed + options.vehicles):
-        rng = np.random.default_rng([seed, 27])
-        truth = draw_truth(start, vehicle, rng)
-        current = dict(zip(("current.x", "current.y"), rng.uniform(-0.15, 0.15, 2).tolist(), strict=True))
-        plant = {p.plant: float(x) for p, x in zip(start, truth, strict=True) if p.plant}
-        lag = float(truth[[p.kind for p in start].index("lag")])
-        lags = {f"thrust_time_constant[{i + 1}]": lag for i in range(vehicle.n_thrusters)}
-        log = simulate(vehicle, plant | current | lags, options.duration, options.noise, rng)
-        parameters = [*start, *nuisances(DEFAULT_NUISANCES, [log])]
-        wall, process = time.perf_counter(), time.process_time()
-        done = fit([log], vehicle, parameters)
-        wall, process = time.perf_counter() - wall, time.process_time() - process
-        off = np.abs(done.values[: len(start)] - truth)
-        inside = off <= done.intervals.factor * done.intervals.deviations[: len(start)]
-        covered += inside.tolist()
-        nominal += (off <= 1.96 * done.intervals.nominal[: len(start)]).tolist()
-        for name, errors in relative_errors(start, truth, done.values[: len(start)]).items():
-            groups.setdefault(name, []).extend(errors)
-        line = {
-            "seed": seed, "chi2": round(done.intervals.chi2, 3), "covered": f"{inside.sum()} of {inside.size}",
-            "rejected": done.rejected.total(), "wall": round(wall, 1), "process": round(process, 1),
-        }  # fmt: skip
-        print(json.dumps(line), flush=True)
-    exact, differences = jacobian_times(log, vehicle, parameters, done)
-    print(json.dumps({
-        "median errors": {name: float(f"{np.median(x):.2g}") for name, x in groups.items()},
-        "coverage": round(float(np.mean(covered)), 3), "nominal coverage": round(float(np.mean(nominal)), 3),
-        "exact Jacobian [s]": round(exact, 2), "by differences [s]": round(differences, 2),
-    }))  # fmt: skip
+    started = time.perf_counter()
+    plan = None if options.dive else design(VEHICLE, BOX, DEPTH, options.duration)
+    commands = dive(options.duration) if plan is None else plan.commands
+    duration = options.duration if plan is None else plan.duration
+    print(json.dumps({"design [s]": round(time.perf_counter() - started, 1), "duration [s]": duration}), flush=True)
+    text = scenario_text(VEHICLE, DEPTH, duration, VEHICLE)
+    seeds = range(options.seed, options.seed + options.vehicles)
+    for nuisance in options.nuisance:
+        total, (log, parameters, done) = measure(
+            nuisance, not options.unknown, seeds, text, commands, options.noise
+        )  # fmt: skip
+        print(json.dumps(total), flush=True)
+    exact, differences = jacobian_times(log, load_vehicle(VEHICLE), parameters, done)
+    print(json.dumps({"exact Jacobian [s]": round(exact, 2), "by differences [s]": round(differences, 2)}))
 
 
 if __name__ == "__main__":

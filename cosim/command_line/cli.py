@@ -124,7 +124,7 @@ def _parser() -> argparse.ArgumentParser:
     campaigns.add_verbs(verbs)
     sweep.add_verbs(verbs)
     falsify.add_verb(verbs)
-    identify.add_verb(verbs)
+    identify.add_verbs(verbs)
     mavlink.add_verbs(verbs)
     sitl.add_verbs(verbs)
     companion.add_verb(verbs)
@@ -273,6 +273,7 @@ _VERBS = {
     "sweep": sweep.sweep,
     "rerun": sweep.rerun,
     "falsify": falsify.falsify,
+    "excite": identify.excite,
     "identify": identify.identify,
     "listen": mavlink.listen,
     "stream": mavlink.stream,

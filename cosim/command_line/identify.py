@@ -1,4 +1,4 @@
-"""``cosim identify``."""
+"""``cosim excite`` and ``cosim identify``: what to drive, and what its runs say."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from cosim.command_line.numbers import number, whole
 from cosim.command_line.results import say
 
 _EPILOG = """examples:
@@ -14,15 +15,23 @@ _EPILOG = """examples:
       --free hydrodynamics.quadratic_damping hydrostatics.buoyancy --nuisance current force bias
 """
 
+_EXCITE_EPILOG = """examples:
+  cosim excite --vehicle bluerov2_heavy --out pool
+  cosim excite --vehicle mine.toml --box 5 4 2 --depth 1.5 --time 600 --out pool
+  cosim run pool/excite.toml --replay-commands pool/commands.jsonl --out runs/pool
+  cosim identify runs/pool --vehicle bluerov2_heavy --out mine.toml
+"""
 
-def add_verb(verbs: Any) -> None:
-    """Add the verb to the parser.
+
+def add_verbs(verbs: Any) -> None:
+    """Add the verbs to the parser.
 
     Parameters
     ----------
     verbs : argparse subparsers
         Of the command.
     """
+    _add_excite(verbs)
     identify = verbs.add_parser(
         "identify", help="find a vehicle's parameters from recorded runs",
         epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -46,6 +55,48 @@ def add_verb(verbs: Any) -> None:
     identify.add_argument(
         "--out", type=Path, required=True, metavar="FILE.toml", help="the vehicle; its page beside it"
     )
+
+
+def _add_excite(verbs: Any) -> None:
+    excite = verbs.add_parser(
+        "excite", help="choose stick inputs that make a vehicle's parameters identifiable",
+        epilog=_EXCITE_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    excite.add_argument("--vehicle", required=True, help="a shipped vehicle or TOML file: the numbers known before")
+    length = number(0.1, 1000.0)
+    excite.add_argument(
+        "--box", nargs=3, type=length, default=(10.0, 10.0, 4.0), metavar=("NORTH", "EAST", "DOWN"),
+        help="sizes of the water that may be used [m] (default: 10 10 4)",
+    )  # fmt: skip
+    excite.add_argument("--depth", type=length, default=3.0, help="of the box's center [m] (default: 3)")
+    excite.add_argument("--time", type=number(1.0, 36000.0), default=300.0, help="of the whole [s] (default: 300)")
+    excite.add_argument("--free", nargs="+", metavar="KEY", help="what is to be identified, as for cosim identify")
+    excite.add_argument("--nuisance", nargs="*", metavar="NAME", help="what is estimated beside, as for cosim identify")
+    excite.add_argument("--seed", type=whole(0, 2**31), default=0, help="of the candidates (default: 0)")
+    excite.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="a new folder: scenario, commands, sticks.csv, page"
+    )
+
+
+def excite(options: argparse.Namespace) -> int:
+    """Run ``cosim excite``."""
+    from cosim.identification.excitation import folder
+    from cosim.identification.excitation.design import design
+    from cosim.identification.parameters import DEFAULT_FREE, DEFAULT_NUISANCES
+    from cosim.run.progress import ProgressBar
+
+    folder.require_empty(options.out)
+    bar_format = "{desc} {percentage:3.0f}%|{bar}| [{elapsed}]"
+    with ProgressBar(not options.quiet, bar_format, total=1.0, desc="excite") as bar:
+        done = design(
+            options.vehicle, tuple(options.box), options.depth, options.time,
+            DEFAULT_FREE if options.free is None else options.free,
+            DEFAULT_NUISANCES if options.nuisance is None else options.nuisance, options.seed, bar.update_to,
+        )  # fmt: skip
+    page = folder.write_folder(done, options.out)
+    say(options, folder.verdict(done), *folder.warnings(done), str(page))
+    print(options.out)
+    return 0
 
 
 def identify(options: argparse.Namespace) -> int:

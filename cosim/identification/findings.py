@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from cosim.errors import IdentificationError
 from cosim.identification.fit import STAGES, Fit
 from cosim.identification.intervals import DISAGREES
 from cosim.identification.log import UNITS, Log
@@ -13,6 +14,7 @@ from cosim.identification.log import UNITS, Log
 _LOST = 10.0  # chi2 by degrees of freedom, above which nothing was identified
 _ALIKE = 0.95  # correlation, beyond which runs do not separate two numbers
 _LISTED = 6
+_APART = 0.9  # correlation of a delay and the lag, beyond which they are not told apart
 _NEEDS = {  # motions that tell the numbers of a key apart
     "hydrodynamics.added_mass": "quick changes of speed along and about the axis: steps of full stick, a second each",
     "hydrodynamics.linear_damping": "slow and fast motion along the axis, each held for some seconds",
@@ -88,6 +90,31 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
     missing = {"velocity", "angular_velocity", "depth"} - {topic.name for log in logs for topic in log.topics}
     for name in sorted(missing):
         yield f"There are no samples of {name.replace('_', ' ')} in these runs."
+
+
+def require_apart(fit: Fit) -> None:
+    """Refuse a fit of a delay and the thrusters' lag that the runs do not separate.
+
+    Parameters
+    ----------
+    fit : Fit
+        What came of it.
+
+    Raises
+    ------
+    IdentificationError
+        If the correlation of the lag with a delay is above 0.9.
+    """
+    of_kind = {kind: [i for i, p in enumerate(fit.parameters) if p.kind == kind] for kind in ("lag", "delay")}
+    for lag in of_kind["lag"]:
+        for delay in of_kind["delay"]:
+            size = abs(float(fit.intervals.correlation[lag, delay]))
+            if size > _APART:
+                raise IdentificationError(
+                    f"{fit.parameters[lag].name} and the {fit.parameters[delay].name} are not told apart by these runs "
+                    f"(correlation {size:.2f}), expected one of the two: --free without the time constant, or "
+                    "--nuisance without delay"
+                )
 
 
 def advice(fit: Fit) -> Iterator[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,8 +107,14 @@ def fit(
     IdentificationError
         If no window is left, or the start predicts no motion.
     """
-    with threadpool_limits(1):  # the matrices are small: further threads would wait for each other most of the time
+    with single_thread():
         return _fit(logs, vehicle, tuple(parameters), progress)
+
+
+def single_thread() -> AbstractContextManager[object]:
+    """Keep linear algebra to one thread: the matrices are small, and further threads would mostly wait."""
+    limited: AbstractContextManager[object] = threadpool_limits(1)
+    return limited
 
 
 def _fit(
@@ -135,7 +142,12 @@ def _fit(
             if problem.residuals.holds_starts:  # residuals are those of wrong starts: numbers stay near their priors
                 precision = _HELD
                 problem.residuals.weights = [np.full(len(w), _FAR) for w in problem.residuals.weights]
-            values = problem.solve(values, tick, precision)
+            try:
+                values = problem.solve(values, tick, precision)
+            except IdentificationError:
+                if not found:
+                    raise
+                return found[0]  # long windows have no motion from there
             done = begun + _EVALUATIONS
             if turn < rounds - 1:
                 problem.reweigh()

@@ -64,7 +64,7 @@ def identify(
     RunError, VehicleError, TableError
         If a run or the vehicle cannot be read.
     IdentificationError
-        If the runs do not have what it needs.
+        If the runs do not have what it needs, or do not separate a delay from the thrusters' lag.
 
     Examples
     --------
@@ -83,6 +83,7 @@ def identify(
     logs, others = (tuple(load_log(run, vehicle) for run in folders) for folders in (runs, held_out))
     parameters += nuisances(nuisance, logs)
     found = fit(logs, vehicle, parameters, progress)
+    findings.require_apart(found)
     predictions = validate(others or logs, vehicle, parameters, found.values, found.step)
     return Identification(start, vehicle, logs, others, found, tuple(predictions))
 

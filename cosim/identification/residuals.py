@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cosim.errors import IdentificationError
 from cosim.identification import measurements
 from cosim.identification.actuation import Actuation, CommandedForces
 from cosim.identification.log import Log, Topic
@@ -235,8 +236,13 @@ class Residuals:
             state = self._moved(known.state, known.slope @ (values - known.values))
         weight, best, base, step = self.weights[i], np.inf, state, np.zeros(len(self._starts))
         for _ in range(_MOST_SOLVES):
-            residual, by_start, _ = self.raw(i, settings, state, full=False)
-            cost = float(np.sum(np.square(weight * residual)))
+            try:
+                residual, by_start, _ = self.raw(i, settings, state, full=False)
+                cost = float(np.sum(np.square(weight * residual)))
+            except IdentificationError:  # no motion from there
+                if best == np.inf:
+                    raise
+                cost = np.inf
             if cost > best + 1.0:  # too far
                 step = 0.5 * step
                 state = self._moved(base, step)

@@ -1,0 +1,279 @@
+"""The choice of segments: greedy, by the information that each adds on the free numbers, within limits of space."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.errors import IdentificationError
+from cosim.identification.excitation.rehearsal import Rehearsal, rehearse
+from cosim.identification.excitation.scenario_text import ROW, load, scenario_text
+from cosim.identification.excitation.segments import PERIOD, SECONDS, Segment, candidates
+from cosim.identification.fit import STAGES, single_thread
+from cosim.identification.log import Log
+from cosim.identification.parameters import DEFAULT_FREE, DEFAULT_NUISANCES, Parameter, free_parameters, nuisances
+from cosim.identification.residuals import Residuals
+from cosim.identification.windows import cut_windows
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.commands.command_handler import greatest_wrench
+from cosim.simulation.commands.commands import Command, ManualControl, SetMode
+from plant_fmu.vehicle import Vehicle, load_vehicle
+
+Array = NDArray[np.float64]
+
+RETURN = 10.0  # s, between two segments: the law brings the vehicle back to the center of the box
+BEGIN = 2.0  # s, before the first one
+_SETTLE = 1.0  # s, before a segment that is tried: windows begin after that time
+_STICKS = round(PERIOD / ROW)  # rows of the record to a stick value
+_USED = 0.7  # part of the box that a segment may use with the numbers as they are known before
+_FASTEST = 2.0  # rad/s
+_STEEPEST = math.sin(math.radians(55.0))
+_SMALLER = 0.7  # part of the sticks, each time a segment leaves the limits
+_TRIES = 7
+_OTHERS, _CURRENT = 4, 0.1  # vehicles that the schedule is tried on beside; m/s
+
+
+@dataclass(frozen=True)
+class Design:
+    """A schedule, and what is to be expected of it."""
+
+    start: str  # the shipped vehicle or file
+    vehicle: Vehicle
+    box: tuple[float, float, float]  # m: north, east, down
+    depth: float  # m, of its center
+    duration: float  # s
+    segments: tuple[Segment, ...]
+    tried: int  # candidates
+    left_out: int  # candidates that leave the limits however small
+    commands: tuple[tuple[int, Command], ...]
+    parameters: tuple[Parameter, ...]
+    deviations: Array  # (p,) standard, expected of the numbers
+    rehearsal: Rehearsal
+    excursions: tuple[float, ...]  # parts of half the box, of other vehicles in a current
+
+    def vehicle_part(self) -> list[int]:
+        """Return the places of the vehicle's own numbers."""
+        return [i for i, p in enumerate(self.parameters) if not p.is_nuisance]
+
+
+def design(
+    start: str,
+    box: tuple[float, float, float],
+    depth: float,
+    duration: float,
+    free: Sequence[str] = DEFAULT_FREE,
+    nuisance: Sequence[str] = DEFAULT_NUISANCES,
+    seed: int = 0,
+    progress: Callable[[float], None] = lambda part: None,
+) -> Design:
+    """Choose stick inputs under which the free numbers are known best.
+
+    Parameters
+    ----------
+    start : str
+        A shipped vehicle, or a vehicle's file.
+    box : tuple of float
+        Sizes of the box north, east and down, about the start [m].
+    depth : float
+        Of its center [m].
+    duration : float
+        Of the whole [s].
+    free, nuisance : sequence of str
+        As `cosim.identification.parameters` takes them.
+    seed : int
+        Of the candidates.
+    progress : callable
+        Gets what part of the work is done, 0 to 1.
+
+    Returns
+    -------
+    Design
+        With the rehearsal of the whole.
+
+    Raises
+    ------
+    VehicleError, ScenarioError
+        If the vehicle cannot be loaded, or the box is none.
+    IdentificationError
+        If the time or the box is too small for any segment.
+    """
+    with single_thread():
+        return _design(start, box, depth, duration, free, nuisance, seed, progress)
+
+
+def _design(
+    start: str, box: tuple[float, float, float], depth: float, duration: float, free: Sequence[str],
+    nuisance: Sequence[str], seed: int, progress: Callable[[float], None],
+) -> Design:  # fmt: skip
+    vehicle = load_vehicle(start)
+    count = math.floor((duration - BEGIN + RETURN) / (SECONDS + RETURN))
+    if count < 1:
+        raise IdentificationError(f"--time {duration:g}: is too short, expected {BEGIN + SECONDS:g} s or more")
+    top = depth - 0.5 * box[2]
+    if top < vehicle.hull_radius:
+        raise IdentificationError(
+            f"--depth {depth:g}: the box of {box[2]:g} m leaves the water, expected "
+            f"{0.5 * box[2] + vehicle.hull_radius:g} m or more"
+        )
+    trial = load(scenario_text(start, depth, _SETTLE + SECONDS, "trial"), start)
+    reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+    tried = list(candidates(reach > 0.0, np.random.default_rng(seed), 1))
+    kept: list[Segment] = []
+    found: list[Array] = []
+    parameters: list[Parameter] = []
+    for i, segment in enumerate(tried):
+        progress(i / (len(tried) + count))
+        fitting = _within(segment, trial, box)
+        if fitting is None:
+            continue
+        made, rehearsal = fitting
+        log = rehearsal.log()
+        parameters = parameters or free_parameters(vehicle, free) + nuisances(nuisance, [log])
+        matrix = information([log], vehicle, parameters)
+        if matrix is not None:
+            kept.append(made)
+            found.append(matrix)
+    if not kept:
+        raise IdentificationError(f"--box {box[0]:g} {box[1]:g} {box[2]:g}: is too small for any segment")
+    order = _choose(found, parameters, count)
+    segments = tuple(kept[i] for i in order)
+    commands = tuple(schedule(segments))
+    whole = load(scenario_text(start, depth, BEGIN + count * (SECONDS + RETURN) - RETURN, "excite"), start)
+    rehearsal = rehearse(whole, commands)
+    matrix = information([rehearsal.log()], vehicle, parameters)
+    if matrix is None:
+        raise IdentificationError("the schedule leaves no window that can be predicted")
+    covariance = np.linalg.inv(matrix + _prior(parameters))
+    others = draw_others(whole, parameters, np.random.default_rng([seed, 1]))
+    excursions = tuple(farthest(rehearse(other, commands), whole, box) for other in others)
+    progress(1.0)
+    return Design(
+        start, vehicle, box, depth, whole.time.duration, segments, len(tried), len(tried) - len(kept), commands,
+        tuple(parameters), np.sqrt(np.diag(covariance)), rehearsal, excursions,
+    )  # fmt: skip
+
+
+def draw_others(scenario: Scenario, parameters: Sequence[Parameter], rng: np.random.Generator) -> list[Scenario]:
+    """Return scenarios of vehicles as they may be, each in a current.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of the vehicle as it is known.
+    parameters : sequence of Parameter
+        What is free. Damping and the diagonal of the added mass are drawn from half to one and a half times.
+    rng : Generator
+        Of the draws.
+    """
+    found = []
+    for _ in range(_OTHERS):
+        parts = {p.plant: p.start * rng.uniform(0.5, 1.5) for p in parameters if _is_uncertain(p)}
+        angle = rng.uniform(0.0, 2.0 * math.pi)
+        current = [_CURRENT * math.cos(angle), _CURRENT * math.sin(angle), 0.0]
+        found.append(scenario.replace({"plant.current": current, "plant.parameters": parts}))
+    return found
+
+
+def farthest(flown: Rehearsal, scenario: Scenario, box: tuple[float, float, float]) -> float:
+    """Return how far from the center a run goes, in parts of half the box: above 1 it leaves it."""
+    away = np.abs(flown.states[:, :3] - np.array(scenario.initial.position)) / (0.5 * np.array(box))
+    return float(away.max())
+
+
+def schedule(segments: Sequence[Segment]) -> list[tuple[int, Command]]:
+    """Return the commands of segments with returns between them, each with its step."""
+    commands: list[tuple[int, Command]] = []
+    step = round(BEGIN / ROW)
+    for segment in segments:
+        commands.append((step, SetMode(segment.mode)))
+        commands += _stick_commands(segment, step)
+        step += len(segment.sticks) * _STICKS
+        commands.append((step, SetMode("reach")))
+        step += round(RETURN / ROW)
+    return commands
+
+
+def information(logs: Sequence[Log], vehicle: Vehicle, parameters: Sequence[Parameter]) -> Array | None:
+    """Return the information of runs on the free numbers, shape (p, p), without the prior; None without windows.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        The runs.
+    vehicle : Vehicle
+        Whose numbers they are made with.
+    parameters : sequence of Parameter
+        What is free; each window's start is eliminated.
+    """
+    windows, _ = cut_windows(logs, vehicle, ROW, STAGES[0])
+    if not windows:
+        return None
+    residuals = Residuals(logs, vehicle, parameters, windows, ROW)
+    values = np.array([p.start for p in parameters])
+    settings, total = residuals.settings(values), np.zeros((len(values), len(values)))
+    for i in range(len(windows)):
+        jacobian = residuals.reduced(i, settings, values).jacobian
+        total += jacobian.T @ jacobian
+    return total
+
+
+def _stick_commands(segment: Segment, step: int) -> list[tuple[int, Command]]:
+    return [(step + k * _STICKS, ManualControl(tuple(sticks))) for k, sticks in enumerate(segment.sticks.tolist())]
+
+
+def _within(segment: Segment, trial: Scenario, box: tuple[float, float, float]) -> tuple[Segment, Rehearsal] | None:
+    """Return the segment, made so small that it stays within the limits, and what it does; None where none does."""
+    settle = round(_SETTLE / ROW)
+    begin: list[tuple[int, Command]] = [(0, SetMode(segment.mode))]
+    center, sizes = np.array(trial.initial.position), _USED * 0.5 * np.array(box)
+    push, turn = 1.0, 1.0
+    for _ in range(_TRIES):
+        made = Segment(segment.title, segment.mode, segment.sticks * np.repeat([push, turn], 3))
+        rehearsal = rehearse(trial, [*begin, *_stick_commands(made, settle)])
+        state = rehearsal.states
+        down = 1.0 - 2.0 * np.square(state[:, 4:6]).sum(axis=1)  # cosine of the tilt
+        far = bool((np.abs(state[:, :3] - center) > sizes).any())
+        wild = np.abs(state[:, 10:]).max() > _FASTEST or down.min() < math.sqrt(1.0 - _STEEPEST**2)
+        if not far and not wild:
+            return made, rehearsal
+        push, turn = push * (_SMALLER if far else 1.0), turn * (_SMALLER if wild else 1.0)
+    return None
+
+
+def _choose(found: Sequence[Array], parameters: Sequence[Parameter], count: int) -> list[int]:
+    """Return which candidates are taken: greedy, then exchanged one by one while that adds information."""
+    free = [i for i, p in enumerate(parameters) if not p.is_nuisance]
+    scale = np.array([p.deviation for p in parameters])
+    matrices = [matrix * np.outer(scale, scale) for matrix in found]
+    total = np.eye(len(scale))
+
+    def gain(matrix: Array) -> float:
+        """Return the information on the free numbers alone: the nuisances are unknown too."""
+        covariance = np.linalg.inv(matrix)[np.ix_(free, free)]
+        return -float(np.linalg.slogdet(covariance)[1])
+
+    order: list[int] = []
+    for _ in range(count):
+        best = max(range(len(found)), key=lambda i: gain(total + matrices[i]))
+        order.append(best)
+        total = total + matrices[best]
+    for place in range(count):
+        without = total - matrices[order[place]]
+        order[place] = max(range(len(found)), key=lambda i: gain(without + matrices[i]))
+        total = without + matrices[order[place]]
+    return order
+
+
+def _is_uncertain(p: Parameter) -> bool:
+    if p.name.startswith("hydrodynamics.added_mass."):
+        row, column = p.name.split(".")[2:]
+        return row == column
+    return "damping" in p.name
+
+
+def _prior(parameters: Sequence[Parameter]) -> Array:
+    return np.diag([p.deviation**-2.0 for p in parameters])

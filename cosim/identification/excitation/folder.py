@@ -1,0 +1,168 @@
+"""The folder of a design: scenario, commands, stick values and the page."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.errors import IdentificationError
+from cosim.identification.excitation.design import BEGIN, RETURN, Design
+from cosim.identification.excitation.rehearsal import NOISE
+from cosim.identification.excitation.scenario_text import ROW, scenario_text
+from cosim.identification.excitation.segments import PERIOD, SECONDS
+from cosim.identification.fit import STAGES
+from cosim.io.atomic_file import write_atomic
+from cosim.report.web_page import Html, Page, inline_figure, number
+from cosim.scenario.scenario import VEHICLE_COPY
+
+SCENARIO, COMMANDS, STICKS, PAGE = "excite.toml", "commands.jsonl", "sticks.csv", "excite.html"
+_AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+_NORMAL = 1.96  # standard deviations: half of a 95 % interval
+_LEAST_KNOWN = 0.1  # of the prior's deviation: above it, a number is called hardly identifiable
+
+
+def verdict(done: Design) -> str:
+    """Return the one sentence that says what is to be expected."""
+    part = _of_prior(done)
+    weak = [done.parameters[i].name for i in done.vehicle_part() if part[i] > _LEAST_KNOWN]
+    text = f"{len(done.segments)} segments of {SECONDS:g} s were chosen among {done.tried}, {done.duration:g} s in all"
+    if weak:
+        return f"{text}; they hardly determine {', '.join(weak)}."
+    return f"{text}; they determine all {len(done.vehicle_part())} free numbers of the vehicle."
+
+
+def warnings(done: Design) -> Iterator[str]:
+    """Yield what a user must know before the sticks are played."""
+    worst = max(done.excursions)
+    leaves = sum(x > 1.0 for x in done.excursions)
+    said = f"{leaves} leave the box" if leaves else "none leaves the box"
+    yield (
+        f"Of {len(done.excursions)} other vehicles, with half to one and a half times the damping and added mass and "
+        f"in a current of 0.1 m/s, {said}: the farthest goes {100 * worst:.0f} % of the way to a side."
+    )
+
+
+def write_folder(done: Design, out: Path) -> Path:
+    """Write the folder.
+
+    Parameters
+    ----------
+    done : Design
+        What was chosen.
+    out : Path
+        A new folder, or an empty one.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    IdentificationError
+        If it cannot be written.
+    """
+    own = done.start.endswith(".toml")
+    vehicle = VEHICLE_COPY if own else done.start
+    files = {
+        SCENARIO: scenario_text(vehicle, done.depth, done.duration, done.vehicle.name).encode(),
+        COMMANDS: b"".join(msgspec.json.encode({"step": k, "command": c}) + b"\n" for k, c in done.commands),
+        STICKS: "".join(f"{line}\n" for line in _stick_lines(done)).encode(),
+        PAGE: _page(done, out).html().encode(),
+    }
+    try:
+        if own:
+            files[VEHICLE_COPY] = Path(done.start).read_bytes()
+        out.mkdir(parents=True, exist_ok=True)
+        for name, content in files.items():
+            write_atomic(out / name, content)
+    except OSError as error:
+        raise IdentificationError(f"{out}: {error.strerror or error}") from error
+    return out / PAGE
+
+
+def require_empty(out: Path) -> None:
+    """Raise IdentificationError unless a folder is new or empty."""
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise IdentificationError(f"--out {out}: is not empty, expected a new folder")
+
+
+def _stick_lines(done: Design) -> Iterator[str]:
+    yield "time_s,mode," + ",".join(_AXES)
+    time, rest = BEGIN, ",".join("0" for _ in _AXES)
+    yield f"0,return,{rest}"
+    for k, segment in enumerate(done.segments):
+        if k:
+            yield f"{time:.1f},return,{rest}"
+            time += RETURN
+        for sticks in segment.sticks:
+            yield f"{time:.1f},{segment.mode}," + ",".join(f"{x:.4g}" for x in sticks)
+            time += PERIOD
+    yield f"{time:.1f},return,{rest}"
+
+
+def _of_prior(done: Design) -> NDArray[np.float64]:
+    return np.array([d / p.deviation for d, p in zip(done.deviations, done.parameters, strict=True)])
+
+
+def _page(done: Design, out: Path) -> Page:
+    import matplotlib as mpl
+
+    from cosim.identification.excitation.figures import figure_of
+    from cosim.report.figures.style import STYLE
+
+    page = Page(f"Stick inputs for {done.vehicle.title}")
+    page.verdict(verdict(done))
+    for text in warnings(done):
+        page.paragraph(text)
+    page.block(
+        f"cosim run {out}/{SCENARIO} --replay-commands {out}/{COMMANDS} --out runs/{out.name}\n"
+        f"cosim identify runs/{out.name} --vehicle {done.start} --out mine.toml"
+    )
+    page.paragraph(
+        f"{STICKS} holds the same for a pilot or a script: stick values from −1 to 1 at {1 / PERIOD:g} Hz, at full "
+        "pilot gain. manual, stabilize and depth_hold are ArduSub's MANUAL, STABILIZE and ALT_HOLD; return means back "
+        f"to the center of the box at {done.depth:g} m, by hand or by a mode that holds position.",
+        faint=True,
+    )
+    with tempfile.TemporaryDirectory(prefix="excite-") as scratch, mpl.rc_context(STYLE):
+        page.add(inline_figure(figure_of(done), Path(scratch)))
+    page.heading("The segments")
+    page.table(
+        ("Begin [s]", "Input", "Mode", "Greatest stick, X Y Z K M N"),
+        [
+            (f"{BEGIN + k * (SECONDS + RETURN):g}", s.title, s.mode,
+             ", ".join(f"{x:.2f}" for x in np.abs(s.sticks).max(axis=0)))
+            for k, s in enumerate(done.segments)
+        ],
+    )  # fmt: skip
+    page.paragraph(
+        "Chosen one by one, each as the candidate that adds most information on the free numbers (the determinant of "
+        "their covariance, nuisances included), and then exchanged for better ones.",
+        faint=True,
+    )
+    page.heading("What to expect")
+    page.table(
+        ("Number", "Known before", "± 95 % before", "± 95 % expected", "Unit", "Part of the number"), _rows(done)
+    )
+    noise = ", ".join(f"{name.replace('_', ' ')} {size:g}" for name, size in NOISE.items())
+    page.paragraph(
+        f"By the exact sensitivities of the identification in windows of {STAGES[0]:g} s, about the numbers as they "
+        f"are known before, with white noise of {noise} (SI units; velocities at 6.7 Hz, the rest at {1 / ROW:g} Hz). "
+        "Disturbances and a wrong model make intervals wider: those of cosim identify count.",
+        faint=True,
+    )
+    return page
+
+
+def _rows(done: Design) -> Iterator[tuple[str | Html, ...]]:
+    for i in done.vehicle_part():
+        p = done.parameters[i]
+        half = _NORMAL * float(done.deviations[i])
+        part = f"{100 * half / abs(p.start):.2g} %" if p.start else "–"
+        yield p.name, number(p.start), number(_NORMAL * p.deviation, 2), number(half, 2), p.unit, part

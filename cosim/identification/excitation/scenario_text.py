@@ -1,0 +1,72 @@
+"""The scenario in which a schedule of stick inputs is flown."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+
+from cosim.scenario.scenario import Scenario, load_scenario
+
+ROW = 0.05  # s, of the record, the law and the sticks
+
+_TEXT = """# Stick inputs for identification, made by cosim excite. The law brings the vehicle back between segments.
+title = "Excitation of {name}"
+vehicle = {vehicle}
+
+[time]
+duration = {duration:g}      # s
+step = {row:g}
+
+[initial]
+position = [0.0, 0.0, {depth:g}]  # m: the center of the box
+
+[goal]
+type = "sphere"
+centre = [0.0, 0.0, {depth:g}]
+radius = 0.3
+
+[law]
+name = "deployable"
+
+[actuation]
+through = "thrusters"
+
+[commands]
+enabled = true
+pilot_gain = 1.0        # sticks are parts of the greatest wrench
+"""
+
+
+def scenario_text(vehicle: str, depth: float, duration: float, name: str) -> str:
+    """Return the text of the scenario.
+
+    Parameters
+    ----------
+    vehicle : str
+        A shipped one, or a file relative to the scenario's folder.
+    depth : float
+        Of the center [m].
+    duration : float
+        [s].
+    name : str
+        What the title names.
+    """
+    return _TEXT.format(name=name, vehicle=json.dumps(vehicle), duration=duration, depth=depth, row=ROW)
+
+
+def load(text: str, vehicle: str) -> Scenario:
+    """Return the scenario that a text makes, from no folder that stays.
+
+    Parameters
+    ----------
+    text : str
+        As `scenario_text` has it.
+    vehicle : str
+        The vehicle in it.
+    """
+    path = str(Path(vehicle).resolve()) if vehicle.endswith(".toml") else vehicle
+    with tempfile.TemporaryDirectory(prefix="excite-") as folder:
+        file = Path(folder) / "excite.toml"
+        file.write_text(text.replace(json.dumps(vehicle), json.dumps(path), 1))
+        return load_scenario(file)

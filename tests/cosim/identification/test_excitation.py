@@ -1,0 +1,127 @@
+"""Stick inputs for identification: what they are made of, and that runs of them determine what was promised."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from cosim.command_line.cli import main
+from cosim.identification.excitation import design as designing
+from cosim.identification.excitation.design import BEGIN, RETURN, information, schedule
+from cosim.identification.excitation.rehearsal import rehearse
+from cosim.identification.excitation.scenario_text import ROW, load, scenario_text
+from cosim.identification.excitation.segments import PERIOD, SECONDS, Segment, candidates
+from cosim.identification.parameters import free_parameters
+from cosim.simulation.commands.commands import SetMode, validate_command
+from plant_fmu import load_vehicle
+
+FREE = ("hydrodynamics.quadratic_damping.1", "hydrodynamics.added_mass.1.1", "hydrostatics.buoyancy")
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    return load_vehicle("bluerov2_heavy")
+
+
+def tried(axes=(True,) * 6, seed=0):
+    return list(candidates(np.array(axes), np.random.default_rng(seed), 1))
+
+
+def test_sticks_are_within_their_way_and_have_no_mean():
+    for segment in tried():
+        assert segment.sticks.shape == (round(SECONDS / PERIOD), 6)
+        assert np.abs(segment.sticks).max() <= 1.0
+        assert segment.sticks.mean(axis=0) == pytest.approx(np.zeros(6), abs=1e-12)
+
+
+def test_axes_that_no_thruster_moves_are_left_alone():
+    axes = (True, False, True, False, False, True)
+    assert all(not segment.sticks[:, [1, 3, 4]].any() for segment in tried(axes))
+
+
+def test_a_schedule_returns_between_segments_and_holds_commands_that_can_be():
+    segments = [s for s in tried() if s.mode == "stabilize"][:2]
+    commands = schedule(segments)
+    for _, command in commands:
+        validate_command(command)
+    modes = [(k * ROW, command.mode) for k, command in commands if isinstance(command, SetMode)]
+    again = BEGIN + SECONDS + RETURN
+    expected = [(BEGIN, "stabilize"), (BEGIN + SECONDS, "reach"), (again, "stabilize"), (again + SECONDS, "reach")]
+    assert [mode for _, mode in modes] == [mode for _, mode in expected]
+    assert [time for time, _ in modes] == pytest.approx([time for time, _ in expected])
+
+
+def rehearsed(segment, duration=BEGIN + SECONDS):
+    return rehearse(load(scenario_text("bluerov2_heavy", 4.0, duration, "test"), "bluerov2_heavy"), schedule([segment]))
+
+
+@pytest.mark.slow  # compiles the prediction
+def test_surge_tells_its_damping_and_rest_does_not(vehicle):
+    steps = next(s for s in tried() if s.mode == "depth_hold" and s.title.startswith("surge: steps"))
+    parameters = free_parameters(vehicle, FREE)
+    rest = Segment("rest", "depth_hold", 0.0 * steps.sticks)
+    moved, still = (information([rehearsed(s).log()], vehicle, parameters) for s in (steps, rest))
+    scale = np.array([p.deviation for p in parameters[:2]])
+    assert moved[1, 1] > 0.0
+    assert (np.diag(moved)[:2] * scale**2 > 1e3 * np.diag(still)[:2] * scale**2).all()
+
+
+def test_the_choice_takes_what_is_not_known_yet(vehicle):
+    """Two of three candidates are alike: the third is taken second."""
+    parameters = free_parameters(vehicle, FREE)[:2]
+    scale = np.array([p.deviation for p in parameters])
+    first, second = np.diag([100.0, 0.0]), np.diag([0.0, 80.0])
+    found = [m / np.outer(scale, scale) for m in (first, 0.99 * first, second)]
+    assert sorted(designing._choose(found, parameters, 2)) == [0, 2]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--time", "10"], "--time 10: is too short, expected 22 s or more"),
+        (["--depth", "1"], "--depth 1: the box of 4 m leaves the water"),
+    ],
+)
+def test_limits_that_cannot_be_are_named(arguments, said, tmp_path, capsys):
+    assert main(["excite", "--vehicle", "bluerov2_heavy", "--out", str(tmp_path / "pool"), *arguments]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "pool").exists()
+
+
+def test_a_folder_that_holds_something_is_kept(tmp_path, capsys):
+    (tmp_path / "mine").write_text("")
+    assert main(["excite", "--vehicle", "bluerov2_heavy", "--out", str(tmp_path)]) == 2
+    assert "is not empty" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_excite_run_identify(tmp_path, monkeypatch, capsys):
+    """The run of another plant than the one that the sticks were chosen for becomes the numbers of that plant."""
+    monkeypatch.setattr(designing, "candidates", lambda axes, rng, draws: tried()[10:60:4])
+    pool, run, mine = tmp_path / "pool", tmp_path / "run", tmp_path / "mine.toml"
+    box = ["--box", "8", "8", "4", "--depth", "4"]
+    start = ["--vehicle", "bluerov2_heavy"]
+    assert main(["excite", *start, *box, "--time", "55", "--free", *FREE, "--out", str(pool)]) == 0
+    assert "they determine all 3 free numbers" in capsys.readouterr().out
+    page = (pool / "excite.html").read_text()
+    assert "What to expect" in page and "<svg" in page
+
+    with (pool / "sticks.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    times = [float(row["time_s"]) for row in rows]
+    assert times == sorted(times) and {row["mode"] for row in rows} <= {"return", "manual", "stabilize", "depth_hold"}
+    log = [json.loads(line)["command"] for line in (pool / "commands.jsonl").read_text().splitlines()]
+    wrenches = [command["wrench"] for command in log if command["command"] == "manual_control"]
+    played = [[float(row[a]) for a in ("surge", "sway", "heave", "roll", "pitch", "yaw")]
+              for row in rows if row["mode"] != "return"]  # fmt: skip
+    assert np.array(played) == pytest.approx(np.array(wrenches), abs=1e-4)
+
+    truth = ["--set", "plant.parameters.buoyancy=130.5", "--set", "plant.parameters.quadratic_damping[1]=100.0"]
+    replay = ["--replay-commands", str(pool / "commands.jsonl"), "--no-report", "--out", str(run), "-q"]
+    assert main(["run", str(pool / "excite.toml"), *replay, *truth]) == 0
+    assert main(["identify", str(run), *start, "--free", *FREE, "--out", str(mine)]) == 0
+    found = load_vehicle(mine)
+    assert found.quadratic_damping[0] == pytest.approx(100.0, rel=0.01)
+    assert found.added_mass[0, 0] == pytest.approx(load_vehicle("bluerov2_heavy").added_mass[0, 0], rel=0.02)
+    assert found.buoyancy == pytest.approx(130.5, abs=0.02)
