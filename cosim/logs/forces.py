@@ -9,12 +9,12 @@ from typing import Literal
 import numpy as np
 
 from cosim.errors import ImportLogError
-from cosim.logs.t200 import VOLTAGES, force_of_pulse
 from cosim.logs.topics import Topic
 from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 from plant_fmu.autopilot import Autopilot, effort_of_pulse
+from plant_fmu.t200 import VOLTAGES, force_of_pulse
 
 CURVES = ("linear", "quadratic", "t200")
 PILOT_GAIN = 0.5  # part of the greatest wrench that full sticks give, as ArduSub has it at the start

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cosim.logs.t200 import force_of_pulse
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.build import cached_fmu
+from plant_fmu.t200 import force_of_pulse
 from plant_fmu.variables import variables
 from plant_fmu.vehicle_component import of_vehicle
 

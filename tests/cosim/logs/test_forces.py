@@ -5,10 +5,10 @@ import pytest
 
 from cosim.errors import ImportLogError
 from cosim.logs.forces import channels_of, commands_of
-from cosim.logs.t200 import force_of_pulse
 from cosim.logs.topics import Topic
 from plant_fmu import load_vehicle
 from plant_fmu.autopilot import effort_of_pulse
+from plant_fmu.t200 import force_of_pulse
 
 HEAVY = load_vehicle("bluerov2_heavy")
 
