@@ -65,8 +65,8 @@ def add_verb(verbs: Any) -> None:
         help="part of the greatest wrench that full sticks give: ArduSub's JS_GAIN_DEFAULT (default: 0.5)",
     )  # fmt: skip
     verb.add_argument(
-        "--velocity-lag", type=number(0.01, 10.0), default=3.0, metavar="S",
-        help="of the autopilot's velocity loop, horizontally (default: 3)",
+        "--velocity-lag", type=number(0.01, 10.0), default=2.0, metavar="S",
+        help="of the autopilot's velocity loop, horizontally (default: 2)",
     )  # fmt: skip
     verb.add_argument(
         "--vertical-lag", type=number(0.01, 10.0), default=0.5, metavar="S",

@@ -26,7 +26,7 @@ class CompanionOptions:
     dry_run: bool = False  # compute and record, and send nothing
     arm: bool = False  # arm the vehicle; otherwise that is the pilot's
     pilot_gain: float = 0.5  # part of the greatest wrench that full sticks give; ArduSub's JS_GAIN_DEFAULT
-    velocity_lag: float = 3.0  # s, of the autopilot's velocity loop, horizontally
+    velocity_lag: float = 2.0  # s, of the autopilot's velocity loop, horizontally
     vertical_lag: float = 0.5  # s, likewise
     reckoning_error: float = 0.03  # part of the way by which a position without a fix may be off
     least_battery: float = 0.0  # percent, below which it is held

@@ -28,7 +28,7 @@ _LOCAL_NED = 1
 _MOSTLY = 0.6  # of the greatest part that a thruster has in an axis, from which on it works for that axis
 _YAW_LAG = 0.3  # s, of an autopilot's rate loop
 FASTEST = 0.5  # m/s, of the law that steers by velocity: a loop that it asks through brakes later than thrusters do
-_FASTEST_ASKED, _FASTEST_TURN = 1.2, 0.6  # m/s, rad/s, that are asked for
+_FASTEST_ASKED, _FASTEST_TURN = 0.8, 0.6  # m/s, rad/s, that are asked for
 _OBSERVED = 1.5  # rad/s, of both poles of the observer of what a velocity loop does beside its lag
 _NEUTRAL: Array = np.zeros(6)
 
@@ -175,7 +175,7 @@ class VelocityLead:
         return min(max(asked, -_FASTEST_TURN), _FASTEST_TURN) if math.isfinite(asked) else 0.0
 
     def velocity(self, wrench: Array, state: ReportedState, period: float) -> Array:
-        """Return the velocity [m/s, NED], shape (3,), of at most 1.2 m/s.
+        """Return the velocity [m/s, NED], shape (3,), of at most 0.8 m/s.
 
         Parameters
         ----------
