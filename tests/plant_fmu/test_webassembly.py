@@ -271,10 +271,17 @@ def test_interfaces_are_the_drafts():
 
 @pytest.mark.parametrize(
     ("text", "rest", "wasm"),
-    [("native", "native", False), ("wasm", "", True), ("native, wasm", "native", True), ("wasm,all", "all", True)],
+    [("native", "native", False), ("wasm", None, True), ("native, wasm", "native", True), ("wasm,all", "all", True)],
 )
 def test_wasm_stands_beside_the_platforms(text, rest, wasm):
     assert without_wasm(text) == (rest, wasm)
+
+
+@pytest.mark.parametrize("text", ["wasm,amiga", "wasm,", "wasm,native,x86_64-linux"])
+def test_wrong_names_beside_it_are_refused(tmp_path, capsys, text):
+    assert main(["build", "--vehicle", "odin", "--platforms", text, "--out", str(tmp_path / "x.fmu")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_fmi_2_has_no_such_standard(tmp_path, capsys):
