@@ -79,13 +79,13 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: Path, platforms: str = N
     require_version(fmi)
     out = Path(out)
     component = _component(what)
-    platforms, wasm = without_wasm(platforms)
+    libraries_for, wasm = without_wasm(platforms)
     if wasm and fmi == 2:
         raise BuildError(
             "platform is 'wasm', expected FMI 3.0 with it: fmi-ls-wasm is a layered standard of that alone"
         )
-    native = platforms == NATIVE
-    chosen = [native_platform()] if native else cross_platforms(platforms) if platforms else []
+    native = libraries_for == NATIVE
+    chosen = [native_platform()] if native else [] if libraries_for is None else cross_platforms(libraries_for)
     key = token(component, fmi)
     libraries = prebuilt_libraries(component, key, fmi, chosen)
     if libraries is None:

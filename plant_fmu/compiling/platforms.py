@@ -73,7 +73,7 @@ def native_platform() -> Platform:
     return replace(here, fmi2_names=tuple(dict.fromkeys((_NATIVE_FMI2[system], *here.fmi2_names))))
 
 
-def without_wasm(text: str) -> tuple[str, bool]:
+def without_wasm(text: str) -> tuple[str | None, bool]:
     """Return what a text of platforms names beside WebAssembly.
 
     Parameters
@@ -83,13 +83,14 @@ def without_wasm(text: str) -> tuple[str, bool]:
 
     Returns
     -------
-    (str, bool)
-        The same without ``wasm``, empty where nothing is left; and whether it was there.
+    (str or None, bool)
+        The same without ``wasm``, None where it stands alone; and whether it was there.
     """
     names = [name.strip() for name in text.split(",")]
     if WASM not in names:
         return text, False
-    return ",".join(name for name in names if name != WASM), True
+    others = [name for name in names if name != WASM]
+    return ",".join(others) if others else None, True
 
 
 def cross_platforms(text: str) -> list[Platform]:

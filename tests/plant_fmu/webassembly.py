@@ -5,6 +5,7 @@ import struct
 import wasmtime
 from wasmtime import component as model
 
+MEMORY = 24 << 20  # bytes that an instance may have; it begins with 16 MiB
 PACKAGE = "fmi:fmi3/{}@3.0.0"
 
 
@@ -19,6 +20,7 @@ class ComponentInstance:
         self.said = []
         engine = wasmtime.Engine()
         self.store = wasmtime.Store(engine)
+        self.store.set_limits(memory_size=MEMORY)
         component = model.Component(engine, data)
         linker = model.Linker(engine)
         with linker.root() as root, root.add_instance(PACKAGE.format("callbacks")) as callbacks:
