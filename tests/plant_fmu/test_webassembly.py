@@ -27,7 +27,7 @@ from plant_fmu.errors import BuildError
 from plant_fmu.vehicle_component import of_vehicle
 from tests.plant_fmu.conftest import CoSimulationInstance
 
-pytestmark = pytest.mark.timeout(1800)  # the first build compiles a C library too
+pytestmark = pytest.mark.timeout(900)  # the first build compiles a C library too
 
 HERE = Path(__file__).parent
 LS = "{http://fmi-standard.org/fmi-ls-manifest}"
