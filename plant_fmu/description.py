@@ -213,8 +213,10 @@ def documentation(vehicle: Vehicle) -> str:
     Returns
     -------
     str
-        A table for each role.
+        A table for each role, and one of what a coupled plant has beside them.
     """
+    rows = variables(vehicle)
+    plain = {v.name for v in rows}
     titles = {
         "input": "Inputs",
         "state": "States (outputs; start values may be set before initialisation ends)",
@@ -223,7 +225,10 @@ def documentation(vehicle: Vehicle) -> str:
         "parameter": "Parameters (tunable)",
     }
     lines = [f"# Variables of the `{vehicle.name}` FMU", "", vehicle.title + ".", "", vehicle.source]
-    for role, title in titles.items():
+    tables = [(title, [v for v in rows if v.role == role]) for role, title in titles.items()]
+    beside = [v for v in variables(vehicle, coupled=True) if v.name not in plain]
+    tables.append(("Further inputs and parameters of a coupled plant", beside))
+    for title, shown in tables:
         lines += [
             "",
             f"## {title}",
@@ -231,12 +236,11 @@ def documentation(vehicle: Vehicle) -> str:
             "| name | unit | start | min | max | description |",
             "|---|---|---|---|---|---|",
         ]
-        for v in variables(vehicle):
-            if v.role == role:
-                q = v.quantity
-                start = f"{v.start:g}" if v.type == "real" else v.text(v.start)
-                if role in ("output", "derivative"):
-                    start = ""
-                least, most = (f"{q.minimum:g}", f"{q.maximum:g}") if q.bounded and v.type != "boolean" else ("", "")
-                lines.append(f"| `{v.name}` | {q.unit} | {start} | {least} | {most} | {v.description} |")
+        for v in shown:
+            q = v.quantity
+            start = f"{v.start:g}" if v.type == "real" else v.text(v.start)
+            if v.role in ("output", "derivative"):
+                start = ""
+            least, most = (f"{q.minimum:g}", f"{q.maximum:g}") if q.bounded and v.type != "boolean" else ("", "")
+            lines.append(f"| `{v.name}` | {q.unit} | {start} | {least} | {most} | {v.description} |")
     return "\n".join([*lines, ""])

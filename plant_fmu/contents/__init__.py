@@ -1,6 +1,6 @@
 """What an FMU holds beside its description, binaries and sources: page, licences, icon, terminals, references.
 
-Imports: nothing.
+Imports: variables.
 """
 
 from __future__ import annotations

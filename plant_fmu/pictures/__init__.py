@@ -2,7 +2,7 @@
 
 Every function returns a new figure; none shows or saves anything. Matplotlib is needed only when one is called.
 
-Imports: nothing.
+Imports: variables.
 """
 
 from plant_fmu.pictures.files import IMAGES, image

@@ -1,11 +1,27 @@
 """Masters of SSP that we did not write, each run in a process of its own: ``python -m tests.cosim.ssp.masters``."""
 
+import importlib.util
+import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from cosim.ssp.system import MOTION
+
+ROOT = Path(__file__).parents[3]
+COMES_IN = {"ecos": "ecospy", "libcosim": "libcosimpy", "oms": "OMSimulator"}
+
+
+def in_master(master, path, steps, step, out):
+    """Return what a master makes of a system, in a process of its own."""
+    if master in COMES_IN and importlib.util.find_spec(COMES_IN[master]) is None:
+        pytest.skip(f"{COMES_IN[master]} is not installed")
+    command = [sys.executable, "-m", "tests.cosim.ssp.masters", master, path, steps, step, out]
+    done = subprocess.run([*map(str, command)], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-300:] + done.stderr[-300:]
+    return np.load(out)
 
 
 def fmpy(path, steps, step):

@@ -1,11 +1,9 @@
 """A scenario as a system of FMUs: the same flight in masters that we did not write as in Jacobi's order here."""
 
-import importlib.util
 import io
 import re
 import shlex
 import subprocess
-import sys
 import zipfile
 from importlib import resources
 from pathlib import Path
@@ -28,12 +26,12 @@ from plant_fmu.compiling.compiler import find_compiler
 from plant_fmu.running.co_simulation_instance import CoSimulationInstance
 from tests.cosim.scenario.test_criteria import RULES, SCENARIO
 from tests.cosim.ssp.masters import fmpy as run_in_fmpy
+from tests.cosim.ssp.masters import in_master
 
 ROOT = Path(__file__).parents[3]
 ALL_SHAPES = Path(__file__).parent / "all-shapes.toml"
 CLOSED = "arbiter.engine=closed"
 TEN_MS = [CLOSED, "time.step=0.01", "time.control=0.01", "time.arbiter=0.01"]
-COMES_IN = {"ecos": "ecospy", "libcosim": "libcosimpy", "oms": "OMSimulator"}
 
 
 @pytest.fixture(scope="module")
@@ -107,17 +105,7 @@ def test_masters_fly_the_paper_as_we_do(master, name, fmi, tmp_path):
     settings = [*TEN_MS, "time.duration=30.0"]
     scenario = load_scenario(name, settings)
     path = package_system(scenario, tmp_path / "s.ssp", fmi)
-    compared(jacobi(name, settings), in_master(master, path, scenario, tmp_path / "rows.npy"))
-
-
-def in_master(master, path, scenario, out):
-    """Return what a master makes of a system, in a process of its own."""
-    if master in COMES_IN and importlib.util.find_spec(COMES_IN[master]) is None:
-        pytest.skip(f"{COMES_IN[master]} is not installed")
-    command = [sys.executable, "-m", "tests.cosim.ssp.masters", master, path, scenario.steps, scenario.time.step, out]
-    done = subprocess.run([*map(str, command)], cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout[-300:] + done.stderr[-300:]
-    return np.load(out)
+    compared(jacobi(name, settings), in_master(master, path, scenario.steps, scenario.time.step, tmp_path / "rows.npy"))
 
 
 @pytest.mark.slow
@@ -128,7 +116,7 @@ def test_masters_fly_shipped_scenarios_as_we_do(name, master, fmi, tmp_path):
     settings = ["time.duration=20.0"]
     scenario = load_scenario(name, settings)
     path = package_system(scenario, tmp_path / "s.ssp", fmi)
-    compared(jacobi(name, settings), in_master(master, path, scenario, tmp_path / "rows.npy"))
+    compared(jacobi(name, settings), in_master(master, path, scenario.steps, scenario.time.step, tmp_path / "rows.npy"))
 
 
 @pytest.mark.slow

@@ -3,53 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 from plant_fmu import quantities as q
 from plant_fmu.errors import VehicleError
 from plant_fmu.quantities import Quantity
+from plant_fmu.variables.coupling import coupling_inputs, coupling_parameters
+from plant_fmu.variables.variable import AXES, FORCES, SENSORS, VELOCITIES, Variable
 from plant_fmu.vehicle import Vehicle
-
-Role = Literal["time", "state", "input", "output", "derivative", "parameter"]
-Type = Literal["real", "integer", "boolean"]
-
-AXES = "xyz"
-VELOCITIES = "uvwpqr"
-FORCES = "XYZKMN"
-_SENSORS = (
-    ("depth_sensor", "the pressure sensor"),
-    ("dvl", "the DVL"),
-    ("imu", "the IMU"),
-    ("compass", "the compass"),
-    ("usbl", "the USBL"),
-)
-
-
-@dataclass(frozen=True)
-class Variable:
-    """One scalar variable of the FMU."""
-
-    name: str  # structured name, such as ``thrust[1]``
-    role: Role
-    member: str  # where it lives in the C struct Model
-    quantity: Quantity
-    description: str
-    start: float = 0.0
-    depends: tuple[str, ...] = ()  # names, or beginnings followed by *, of what a calculated variable follows from
-    type: Type = "real"
-    local: bool = False  # a state that is no output
-
-    @property
-    def nominal(self) -> float:
-        """A typical magnitude: that of the start value for a parameter, else that of the quantity."""
-        return (abs(self.start) if self.role == "parameter" else 0.0) or self.quantity.nominal
-
-    def text(self, value: float) -> str:
-        """Write a value of this variable as XML has it; a real number reads back to the same bits."""
-        if self.type == "boolean":
-            return "true" if value else "false"
-        return str(int(value)) if self.type == "integer" else repr(float(value))
 
 
 def variables(vehicle: Vehicle, coupled: bool = False) -> list[Variable]:
@@ -77,13 +38,13 @@ def variables(vehicle: Vehicle, coupled: bool = False) -> list[Variable]:
         Variable("time", "time", "time", q.TIME, "Simulated time"),
         *_states(vehicle),
         *_inputs(vehicle),
-        *(_coupling(vehicle) if coupled else ()),
+        *(coupling_inputs(vehicle) if coupled else ()),
         *_outputs(vehicle),
         *_derivatives(vehicle),
         *_parameters(vehicle),
         *_environment(vehicle),
         *_sensors(),
-        *(_supply() if coupled else ()),
+        *(coupling_parameters() if coupled else ()),
         *_discrete(vehicle),
     ]
     for v in rows:
@@ -142,44 +103,6 @@ def _inputs(vehicle: Vehicle) -> Iterator[Variable]:
         kind, quantity = ("force", q.FORCE) if i < 3 else ("moment", q.MOMENT)
         description = f"Commanded {kind} on the body {_along(i)}, beside the thrusters"
         yield Variable(f"wrench.{name}", "input", f"inputs.wrench[{i}]", quantity, description)
-
-
-def _coupling(vehicle: Vehicle) -> Iterator[Variable]:
-    """Yield the inputs that are off while they are 0."""
-
-    def row(name: str, member: str, quantity: Quantity, description: str) -> Variable:
-        return Variable(name, "input", f"coupling.{member}", quantity, description)
-
-    for i, where in enumerate(("north", "east", "down")):
-        description = f"Velocity of the water beside that of the parameters, {where}, world frame NED"
-        yield row(f"current_input.{AXES[i]}", f"current[{i}]", q.CURRENT, description)
-    for i, where in enumerate(("north", "east", "down")):
-        description = f"Rate of that velocity, {where}, by which it goes on within a step"
-        yield row(f"current_input_rate.{AXES[i]}", f"current_rate[{i}]", q.ACCELERATION, description)
-    for frame in ("world", "body"):
-        for kind, quantity, what in (
-            ("force", q.FORCE, "External force, {} frame {}"),
-            ("moment", q.MOMENT, "External moment, {} frame {}"),
-            ("point", q.LEVER, "Where the external force of the {} frame acts, body {}"),
-        ):
-            for i, axis in enumerate(AXES):
-                description = what.format(frame, axis)
-                yield row(f"external.{frame}.{kind}.{axis}", f"{frame}.{kind}[{i}]", quantity, description)
-    for name, quantity, what in (
-        ("normalized", q.SHARE, "Command of thruster {} as a share of its limits, beside its commanded force"),
-        ("pulse", q.PULSE, "Command of thruster {} as a pulse [us] of a T200, 1100 to 1900, 0 for none, likewise"),
-        ("failure", q.FRACTION, "Part of the force of thruster {} that is lost"),
-    ):
-        for i in range(vehicle.n_thrusters):
-            yield row(f"thrust_{name}[{i + 1}]", f"thrust_{name}[{i}]", quantity, what.format(i + 1))
-    for i, (sensor, what) in enumerate(_SENSORS):
-        description = f"Probability that a sample of {what} is lost, if that of the parameter is not greater"
-        yield row(f"{sensor}.outage", f"outage[{i}]", q.FRACTION, description)
-
-
-def _supply() -> Iterator[Variable]:
-    description = "Supply voltage of thrusters that are commanded by pulses"
-    yield Variable("supply_voltage", "parameter", "coupling.supply_voltage", q.VOLTAGE, description, 16.0)
 
 
 # ---- what is calculated ----
@@ -255,7 +178,7 @@ def _measured(output: Callable[..., Variable]) -> Iterator[Variable]:
     yield measured("heading", "rad", "Compass heading, that of yaw", "compass", "quaternion.*")
     for i, where in enumerate(("north", "east", "down")):
         yield measured(f"position.{AXES[i]}", "m", f"USBL's position, {where}", "usbl", f"position.{AXES[i]}")
-    for i, (sensor, what) in enumerate(_SENSORS):
+    for i, (sensor, what) in enumerate(SENSORS):
         description = f"Time at which {what} took the sample that it gives; -1e12 before the first"
         yield output(f"measured.time.{sensor}", f"stamp[{i}]", q.unbounded("s"), description, f"{sensor}.rate", "time")
 
@@ -370,7 +293,7 @@ def _environment(vehicle: Vehicle) -> Iterator[Variable]:
 
 
 def _sensors() -> Iterator[Variable]:
-    for i, (sensor, what) in enumerate(_SENSORS):
+    for i, (sensor, what) in enumerate(SENSORS):
         description = f"Samples a second of {what}; 0: continuous, without noise"
         yield _parameter(f"{sensor}.rate", f"sensor_rate[{i}]", q.SAMPLE_RATE, description)
         yield _parameter(f"{sensor}.delay", f"delay[{i}]", q.DELAY, "Time from a sample to its delivery")
