@@ -130,5 +130,5 @@ class Lowering:
         return half * (1.0 - math.cos(phase)), half * rate * math.sin(phase), half * rate**2 * math.cos(phase)
 
     def is_over(self, time: float) -> bool:
-        """Return whether it is where it starts then."""
+        """Return whether it is where it starts, at a time [s]."""
         return self._depth == 0.0 or time >= _AT_THE_SURFACE + self._duration
