@@ -148,7 +148,8 @@ def test_a_rate_is_estimated_from_the_flights_and_shown_level_by_level(tmp_path)
     found = run_falsification(search(200, Conditions(duration=8.0), rare_event=True), tmp_path / "out")
     estimate = found.summary["estimate"]
     assert 100 < found.flown == len(found.results) <= 200
-    assert 0.0 <= estimate["low"] <= estimate["probability"] < estimate["high"] < 1.0
+    # so few flights may leave copies of one alone, which bound nothing from above
+    assert 0.0 <= estimate["low"] <= estimate["probability"] < estimate["high"] <= 1.0
     assert found.summary["random"] is None and not (tmp_path / "out" / "random").exists()
     page = check(write_falsification_page(tmp_path / "out", 0))
     assert sum(row[1].count("e-") == 1 for row in page.rows if len(row) == 2) >= len(estimate["levels"]) - 1
