@@ -253,7 +253,7 @@ def test_a_storm_of_signals_loses_and_doubles_nothing(tmp_path):
     def again(_, frame):
         signal.setitimer(signal.ITIMER_REAL, storm.uniform(1e-5, 2e-3))
         within = [f.f_code for f, _ in traceback.walk_stack(frame)]
-        if "__del__" in {code.co_name for code in within}:  # which swallows it
+        if {"__del__", "gc_callback"} & {code.co_name for code in within}:  # which swallow it; one is Hypothesis's
             return
         if recorder_module.__file__ in {code.co_filename for code in within}:
             raise KeyboardInterrupt
