@@ -14,7 +14,7 @@ from cosim.identification.log import UNITS, Log
 _LOST = 10.0  # chi2 by degrees of freedom, above which nothing was identified
 _ALIKE = 0.95  # correlation, beyond which runs do not separate two numbers
 _LISTED = 6
-_APART = 0.9  # correlation of a delay and the lag, beyond which they are not told apart
+_APART = 0.9  # correlation of a delay and the lag, beyond which runs do not separate them
 _NEEDS = {  # motions that tell the numbers of a key apart
     "hydrodynamics.added_mass": "quick changes of speed along and about the axis: steps of full stick, a second each",
     "hydrodynamics.linear_damping": "slow and fast motion along the axis, each held for some seconds",
@@ -111,7 +111,7 @@ def require_apart(fit: Fit) -> None:
             size = abs(float(fit.intervals.correlation[lag, delay]))
             if size > _APART:
                 raise IdentificationError(
-                    f"{fit.parameters[lag].name} and the {fit.parameters[delay].name} are not told apart by these runs "
+                    f"{fit.parameters[lag].name} and the {fit.parameters[delay].name} are not separated by these runs "
                     f"(correlation {size:.2f}), expected one of the two: --free without the time constant, or "
                     "--nuisance without delay"
                 )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from cosim.identification.log import Log, make_topic
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.commands import Command
+from cosim.simulation.commands.sources import ScheduledCommands
 from cosim.simulation.master import Master
 from cosim.simulation.stepped_plant import SteppedPlant
 
@@ -46,20 +47,6 @@ class Rehearsal:
         return Log("rehearsal", self.times, self.thrust, np.zeros((len(self.times), 6)), topics)
 
 
-class _Schedule:
-    """Commands by step, as a source of them."""
-
-    exhausted = False
-
-    def __init__(self, commands: Sequence[tuple[int, Command]]) -> None:
-        self._by_step: dict[int, list[Command]] = {}
-        for step, command in commands:
-            self._by_step.setdefault(step, []).append(command)
-
-    def take(self, k: int) -> Sequence[Command]:
-        return self._by_step.get(k, ())
-
-
 def rehearse(
     scenario: Scenario, commands: Sequence[tuple[int, Command]], plant: SteppedPlant | None = None
 ) -> Rehearsal:
@@ -70,7 +57,7 @@ def rehearse(
     scenario : Scenario
         Its commands are enabled.
     commands : sequence of (int, Command)
-        Each with its step.
+        Each with its step, in the order of the steps.
     plant : SteppedPlant, optional
         What moves; default: the FMU of the scenario's vehicle.
 
@@ -84,7 +71,7 @@ def rehearse(
     PlantError
         If the FMU fails.
     """
-    source, rows = _Schedule(commands), []
+    source, rows = ScheduledCommands(commands), []
     with Master(scenario, plant=plant) as master:
         columns = [column.name for column in master.signals.columns]
         thrust = [f"thrust[{i + 1}]" for i in range(scenario.vehicle.n_thrusters)]

@@ -138,7 +138,32 @@ def read_log(file: Path) -> list[tuple[int, Command]]:
     return sorted(entries, key=lambda entry: entry[0])
 
 
-class ReplayedCommands:
+class ScheduledCommands:
+    """Commands that are known beforehand.
+
+    Parameters
+    ----------
+    entries : iterable of (int, Command)
+        Each with the step that takes it, in the order of the steps.
+    """
+
+    def __init__(self, entries: Iterable[tuple[int, Command]]) -> None:
+        self._entries = deque(entries)
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether no command is left."""
+        return not self._entries
+
+    def take(self, k: int) -> Sequence[Command]:
+        """Return the commands of step `k`, and of earlier ones that were not taken."""
+        taken = []
+        while self._entries and self._entries[0][0] <= k:
+            taken.append(self._entries.popleft()[1])
+        return taken
+
+
+class ReplayedCommands(ScheduledCommands):
     """The commands of an earlier run, at the steps at which that run took them.
 
     Parameters
@@ -153,19 +178,7 @@ class ReplayedCommands:
     """
 
     def __init__(self, file: Path) -> None:
-        self._entries = deque(read_log(file))
-
-    @property
-    def exhausted(self) -> bool:
-        """Whether no command is left."""
-        return not self._entries
-
-    def take(self, k: int) -> Sequence[Command]:
-        """Return the commands of step `k`, and of earlier ones that were not taken."""
-        taken = []
-        while self._entries and self._entries[0][0] <= k:
-            taken.append(self._entries.popleft()[1])
-        return taken
+        super().__init__(read_log(file))
 
 
 class LoggedCommands:
