@@ -148,11 +148,11 @@ def _outputs(scenario: Scenario, regions: Sequence[Region]) -> Iterator[Variable
     def output(name: str, member: str, unit: str, description: str) -> Variable:
         return Variable(name, "output", f"outputs.{member}", q.unbounded(unit), description)
 
-    if law_of(scenario).output == "wrench":
+    if scenario.actuation.through != "thrusters":  # else it would act beside the thrusters' forces
         for i, name in enumerate(FORCES):
             what = f"{'Force along' if i < 3 else 'Moment about'} body {AXES[i % 3]} that the law asks for"
             yield output(f"wrench.{name}", f"wrench[{i}]", "N" if i < 3 else "N.m", what)
-    if scenario.actuation.through == "thrusters":
+    else:
         for i in range(scenario.vehicle.n_thrusters):
             yield output(f"thrust[{i + 1}]", f"thrusts[{i}]", "N", f"Commanded force of thruster {i + 1}")
     for j in sorted({failure.thruster for failure in scenario.failures if not failure.stuck}):

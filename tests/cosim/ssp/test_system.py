@@ -126,18 +126,9 @@ def test_masters_fly_shipped_scenarios_as_we_do(name, master, fmi, tmp_path):
         ("paper", [*TEN_MS, "law.name='antonelli'"]),
         ("paper", [*TEN_MS, "law.name='sun_cheah'"]),
         ("paper", [*TEN_MS, "law.name='unarbitrated'", "actuation.through='thrusters'"]),
-        # its yaw swings up, and with it what is rounded
-        (
-            "docking",
-            [
-                "law.name='pd'",
-                "sensing.dead_from=0.5",
-                "sensing.dead_for=0.3",
-                "sensing.frozen=true",
-                "time.duration=1.0",
-            ],
-        ),
-        ("docking", ["law.name='pid_cbf'"]),
+        ("docking", ["law.name='pd'", "sensing.dead_from=0.5", "sensing.dead_for=0.3", "sensing.frozen=true"]),
+        # its yaw swings up, and with it what is rounded: by 9 % a step, above 1e-10 after 1.2 s
+        ("docking", ["law.name='pid_cbf'", "time.duration=1.0"]),
         ("docking", ["sensing.dead_from=0.5", "sensing.dead_for=0.3"]),
         ("docking", ["goal.then=[[6.5, -3.0, 3.0]]", "goal.stay=0.2", "goal.centre=[6.8, -3.0, 3.0]"]),
     ],

@@ -272,10 +272,9 @@ static void steer(Model *m)
         memset(m->numbers + AT_THRUSTS, 0, N_THRUSTERS * sizeof(double));
     }
 #if SCENE_ALLOCATES
-    control_allocate(m); /* the thrusters' forces alone reach the plant */
-#else
-    memcpy(out->wrench, m->numbers + AT_WRENCH, sizeof out->wrench);
+    control_allocate(m);
 #endif
+    memcpy(out->wrench, m->numbers + AT_WRENCH, sizeof out->wrench);
     for (int i = 0; i < N_THRUSTERS; i++)
         if (m->memory.stuck[i] == 0.0)
             out->thrusts[i] = m->numbers[AT_THRUSTS + i];
