@@ -13,7 +13,7 @@ from cosim.campaigns.scenes.conflicts import CONFLICTS, draw_conflict
 from cosim.campaigns.scenes.generator import MOST_OBSTACLES, draw_scene
 
 FAMILIES = (*MOST_OBSTACLES, *CONFLICTS)
-_CHANCES = 2**31  # seeds of noise
+_CHANCES = 2**31  # seeds, of noise and of obstacles that are drawn again
 _CONFLICTS = 64  # that are drawn to see how many numbers one has
 _OF_AN_OBSTACLE = 5  # coordinates: radius, place along the way, three of the distance from it
 
@@ -87,7 +87,8 @@ class SceneSpace:
     """
 
     def __init__(self, family: str, limit: float | None = None) -> None:
-        self.family, self._limit = family, limit
+        self.family, self._limit = family, np.inf if limit is None else limit
+        self._chance_in_point = limit is None
         rng = np.random.default_rng(0)
         if family in MOST_OBSTACLES:
             several = [Shares(np.empty(0), rng)]
@@ -98,7 +99,7 @@ class SceneSpace:
                 draw_conflict(shares, 0, family)
         self._others = max(shares.drawn for shares in several)
         self._of_obstacles = _OF_AN_OBSTACLE * MOST_OBSTACLES.get(family, 0)
-        self.dimension = self._others + self._of_obstacles + (limit is None)
+        self.dimension = self._others + self._of_obstacles + self._chance_in_point
 
     def line(self, point: Point, seed: int) -> bytes:
         """Return the scene at a point as a line of JSON.
@@ -115,20 +116,21 @@ class SceneSpace:
         bytes
             As `cosim.campaigns.scenes.scene_file.decode_scene` reads it.
         """
-        chance = seed if self._limit is not None else int(point[-1] * _CHANCES)
-        limit = np.inf if self._limit is None else self._limit
+        chance = int(point[-1] * _CHANCES) if self._chance_in_point else seed
         rest = np.random.default_rng([chance, 2])
-        others = Shares(point[: self._others], rest, limit)
+        others = Shares(point[: self._others], rest, self._limit)
         if self.family in MOST_OBSTACLES:
             obstacles = point[self._others : self._others + self._of_obstacles].reshape(-1, _OF_AN_OBSTACLE)
             # of each obstacle its own: whether another one is drawn again changes nothing
-            again = [rest if self._limit else np.random.default_rng([chance, 2, i]) for i in range(len(obstacles))]
-            drawn = [Shares(shares, of, limit) for shares, of in zip(obstacles, again, strict=True)]
+            again = [
+                np.random.default_rng([chance, 2, i]) if self._chance_in_point else rest for i in range(len(obstacles))
+            ]
+            drawn = [Shares(shares, of, self._limit) for shares, of in zip(obstacles, again, strict=True)]
             scene = draw_scene(others, drawn, seed, self.family)
-            if self._limit is None:
+            if self._chance_in_point:
                 scene["noise"]["seed"] = chance
         else:
             scene = draw_conflict(others, seed, self.family)
-            if self._limit is None:
+            if self._chance_in_point:
                 scene["scenario"]["sensing"]["seed"] = chance
         return json.dumps(scene).encode() + b"\n"
