@@ -1,12 +1,13 @@
 """Numbers of a vehicle found again from samples of its FMU, with noise that is known."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from cosim.errors import IdentificationError
-from cosim.identification.findings import warnings
+from cosim.identification.findings import require_apart, warnings
 from cosim.identification.fit import fit, integration_step
 from cosim.identification.log import Log, make_topic
 from cosim.identification.parameters import DEFAULT_FREE, free_parameters, nuisances, with_values
@@ -185,3 +186,20 @@ def test_noise_is_estimated_from_fourth_differences():
     smooth = np.stack([np.sin(0.5 * times)] * 3, axis=1)
     topic = make_topic("velocity", times, smooth + 0.02 * rng.standard_normal(smooth.shape))
     assert topic.noise == pytest.approx(np.full(3, 0.02), rel=0.15)
+
+
+@pytest.mark.parametrize(("correlation", "refused"), [(0.89, False), (-0.89, False), (0.91, True), (-0.91, True)])
+def test_a_delay_and_a_lag_that_runs_do_not_separate_are_refused_by_name(vehicle, log, correlation, refused):
+    keys = ("thrusters.time_constant",)
+    parameters = [*free_parameters(vehicle, keys), *nuisances(("delay",), [log])]
+    lag = next(i for i, p in enumerate(parameters) if p.kind == "lag")
+    delay = next(i for i, p in enumerate(parameters) if p.kind == "delay")
+    matrix = np.eye(len(parameters))
+    matrix[lag, delay] = matrix[delay, lag] = correlation
+    found = SimpleNamespace(parameters=parameters, intervals=SimpleNamespace(correlation=matrix))
+    if not refused:
+        require_apart(found)
+        return
+    with pytest.raises(IdentificationError, match=r"are not separated by these runs \(correlation 0\.91\)") as error:
+        require_apart(found)
+    assert parameters[lag].name in str(error.value) and parameters[delay].name in str(error.value)
