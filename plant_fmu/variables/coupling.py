@@ -33,7 +33,7 @@ def coupling_inputs(vehicle: Vehicle) -> Iterator[Variable]:
                 yield row(f"external.{frame}.{kind}.{axis}", f"{frame}.{kind}[{i}]", quantity, description)
     for name, quantity, what in (
         ("normalized", q.SHARE, "Command of thruster {} as a share of its limits, beside its commanded force"),
-        ("pulse", q.PULSE, "Command of thruster {} as a pulse [us] of a T200, 1100 to 1900, 0 for none, likewise"),
+        ("pulse", q.PULSE, "Command of thruster {} as a pulse of a T200 [us], beside its commanded force; 0: none"),
         ("failure", q.FRACTION, "Part of the force of thruster {} that is lost"),
     ):
         for i in range(vehicle.n_thrusters):
