@@ -113,6 +113,7 @@ def test_a_law_that_has_no_ranges_is_refused(capsys):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)  # 600 flights by each law
 def test_the_documents_table_is_what_the_default_gains_come_to(capsys):
     main(["baselines", "--draws", "0", "--workers", "1"])
     printed = re.findall(
