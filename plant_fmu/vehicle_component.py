@@ -57,7 +57,7 @@ def of_vehicle(
         sources=plant_sources(),
         contents=lambda fmi: contents(vehicle, fmi, rows if start is not None or coupled else None),
         header="vehicle.h",
-        constants={"N_THRUSTERS": vehicle.n_thrusters},
+        constants={"N_THRUSTERS": vehicle.n_thrusters, "COUPLED": int(coupled)},
         stop_time=stop_time,
         step=step,
     )

@@ -26,6 +26,7 @@ FLAGS = (
     "-std=c99", "-O3", "-fno-math-errno", "-g0", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared",
     "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX",
 )  # fmt: skip
+_BESIDE_STEPS = ("constants.c", "forces_tangent.c", "tangent.c")  # not in a step: unrolled they are but larger
 _WARNINGS = ("-Wall", "-Wextra", "-Wpedantic")
 _ZIGLANG = "ziglang>=0.13"  # which is a C compiler too
 
@@ -123,13 +124,17 @@ def compile_library(
         objects = [Path(scratch) / f"{source.stem}.o" for source in sources]
         with ThreadPoolExecutor(os.cpu_count()) as pool:  # a process each: they take turns if there is but one core
             commands = [
-                [*compiler, *options, "-c", str(source), "-o", str(made)]
+                [*compiler, *options, *_compact(source), "-c", str(source), "-o", str(made)]
                 for source, made in zip(sources, objects, strict=True)
             ]
             list(pool.map(run_compiler, commands))
         run_compiler([*compiler, *FLAGS, *link, *map(str, objects), "-o", str(library), "-lm"])
     if not library.is_file():
         raise BuildError(f"C compiler {shlex.join(compiler)} failed: it wrote no library, and no word")
+
+
+def _compact(source: Path) -> tuple[str, ...]:
+    return ("-fno-unroll-loops",) if source.name in _BESIDE_STEPS else ()
 
 
 def run_compiler(command: Sequence[str]) -> None:

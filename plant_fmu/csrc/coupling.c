@@ -33,6 +33,8 @@ bool coupling_acts(const Model *m)
 {
     const double *numbers = (const double *)&m->coupling;
 
+    if (!COUPLED)
+        return false;
     for (size_t i = 1; i < sizeof m->coupling / sizeof(double); i++) /* the first is the voltage, which does nothing alone */
         if (numbers[i] != 0.0)
             return true;
@@ -61,6 +63,8 @@ void coupling_apply(const Model *m, Model *out)
     double of_pulse, of_voltage;
 
     *out = *m;
+    if (!COUPLED)
+        return;
     for (int i = 0; i < 3; i++) {
         p->current[i] += c->current[i];
         out->plant.external.current_rate[i] = c->current_rate[i];
@@ -88,6 +92,8 @@ void coupling_tangent(const Model *m, const Model *seed, Model *out)
     double left[3], right[3], of_pulse, of_voltage;
 
     *out = *seed;
+    if (!COUPLED)
+        return;
     memset(external, 0, sizeof *external);
     for (int i = 0; i < 3; i++) {
         out->plant.parameters.current[i] += dc->current[i];

@@ -1,4 +1,5 @@
-/* What other components do to the vehicle: inputs that are off while they are 0. */
+/* What other components do to the vehicle: inputs that are off while they are 0. A plant that is not COUPLED has none of
+ * them, and nothing of this in its library. */
 #ifndef COUPLING_H
 #define COUPLING_H
 

@@ -184,7 +184,7 @@ int model_tick(Model *m)
 {
     Model coupled;
 
-    if (m->held.next_tick == INFINITY || !coupling_acts(m))
+    if (m->held.next_tick == INFINITY || !COUPLED || !coupling_acts(m))
         return tick_alone(m);
     coupling_apply(m, &coupled);
     const int ticked = tick_alone(&coupled);
@@ -252,7 +252,7 @@ void model_evaluate(Model *m)
 {
     Model coupled;
 
-    if (!coupling_acts(m)) {
+    if (!COUPLED || !coupling_acts(m)) {
         evaluate_alone(m);
         return;
     }
@@ -276,7 +276,7 @@ int model_settle(Model *m)
 {
     Model coupled;
 
-    if (!coupling_acts(m))
+    if (!COUPLED || !coupling_acts(m))
         return settle_alone(m);
     coupling_apply(m, &coupled);
     const int changed = settle_alone(&coupled);
@@ -310,7 +310,7 @@ int model_advance(Model *m, double end, double *failed)
 {
     Model coupled;
 
-    if (!coupling_acts(m))
+    if (!COUPLED || !coupling_acts(m))
         return advance_alone(m, end, failed);
     coupling_apply(m, &coupled);
     const int done = advance_alone(&coupled, end, failed);

@@ -300,6 +300,10 @@ void model_tangent(const Model *m, const Model *seed, int starting, Model *tange
 {
     Model coupled, direction;
 
+    if (!COUPLED) {
+        tangent_of(m, seed, starting, tangent);
+        return;
+    }
     coupling_apply(m, &coupled); /* inputs that are off have derivatives too */
     coupling_tangent(m, seed, &direction);
     tangent_of(&coupled, &direction, starting, tangent);
