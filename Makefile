@@ -71,7 +71,7 @@ dist: $(VENV)/extras
 	build/twine/bin/twine check --strict dist/*
 
 packaging: $(VENV)/extras
-	$(BIN)/python -m pytest -q --slow tests/packaging
+	$(BIN)/python -m pytest -q --slow --numprocesses=2 tests/packaging
 
 tour: $(VENV)/extras
 	$(BIN)/python -m tests.docs.tour
