@@ -1,1 +1,1 @@
-"""Benchmarks: what things cost, as figures and ratios. They assert nothing."""
+"""Benchmarks: times and ratios. They assert nothing."""

@@ -93,7 +93,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run what is named on the command line.
+    """Run the verb of the command line.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _figures(parser: argparse.ArgumentParser, options: argparse.Namespace) -> dict[str, Any]:
-    """Take times, print them, and return them as plain values."""
+    """Measure times, print them, and return them as plain values."""
     if options.repeats < 1:
         parser.error("expected 1 or more repeats")
     machine = description(options.repeats)
@@ -135,7 +135,7 @@ def _figures(parser: argparse.ArgumentParser, options: argparse.Namespace) -> di
         if unknown := set(options.subjects) - set(chosen.SUBJECTS):
             parser.error(f"subject is {sorted(unknown)[0]!r}, expected one of {', '.join(chosen.SUBJECTS)}")
         where = {"environment": Environment(options.peers_python)} if chosen is everything else {}
-        machine += [f"peers: {environment.told()}" for environment in where.values()]
+        machine += [f"peers: {environment.summary()}" for environment in where.values()]
         tables = chosen.measure(options.subjects or list(chosen.SUBJECTS), options.budget, options.repeats, **where)
     else:
         chosen = BENCHMARKS[options.name]

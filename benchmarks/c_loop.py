@@ -1,4 +1,4 @@
-"""The loop of loop.c over an FMU of our own: the least that a master can cost."""
+"""The loop of loop.c over the plant's FMU: the least time that a master can take."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from plant_fmu.compiling.platforms import native_platform
 
 
 class _Slave(ctypes.Structure):
-    """As in loop.c."""
+    """The structure of the same name in loop.c."""
 
     _fields_ = (
         *((name, ctypes.c_void_p) for name in ("instance", "set_reals", "do_step", "get_reals", "get_flags")),
@@ -95,9 +95,9 @@ def c_loop(
     start : dict from str to float
         Start values.
     step : float
-        Of communication [s].
+        Communication step [s].
     step_only : bool
-        Whether no inputs are set and no outputs read.
+        True to set no inputs and read no outputs.
     """
     with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch, _instance(path) as opened:
         loop = _compile(Path(scratch))

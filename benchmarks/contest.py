@@ -1,4 +1,4 @@
-"""Ours and peers that take turns at one thing, each of which may be missing without harm to the others."""
+"""A comparison of this project with peers in turns; a missing contestant does not stop the others."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from benchmarks.machine import pinned
 from benchmarks.table import Row, Table
 from benchmarks.timing import Contestant, NotMeasuredError, Timing, take_turns
 
-Entry = Callable[[ExitStack], Contestant]  # makes a contestant; what it opens goes on the stack
+Entry = Callable[[ExitStack], Contestant]  # makes a contestant; the stack closes the resources that it opens
 
 
 @dataclass(frozen=True)
 class Contest:
-    """What is timed together.
+    """Contestants that are timed together.
 
     Attributes
     ----------
     title : str
-        What an item is.
+        Description of an item.
     ours, peers : mapping from str to Entry
-        By the names that they have in the table.
+        Entries by their names in the table.
     pairs : tuple of (str, str), optional
-        Which of ours stands against which peer, "" for none; default: each against each.
+        Pairs of this project's entry and a peer, "" for none; default: each with each.
     count, repeats : int, optional
-        Items a repeat, and the most repeats, where the items are long.
+        Items a repeat, and the greatest number of repeats, where the items are long.
     pinned : bool
-        Whether all stay on one processor; not where an item is the work of several processes.
+        True to keep all on one processor; not where an item is the work of several processes.
     """
 
     title: str
@@ -40,7 +40,7 @@ class Contest:
     pinned: bool = True
 
     def measure(self, budget: float, repeats: int) -> Table:
-        """Time all, and return a row for each pair: how many times as long as ours a peer takes."""
+        """Time all contestants, and return a row for each pair: the ratio of a peer's time to this project's."""
         with pinned() if self.pinned else nullcontext(), ExitStack() as stack:
             contestants = {name: entered(entry, stack) for name, entry in (self.ours | self.peers).items()}
             few = min(repeats, self.repeats or repeats)
@@ -60,10 +60,10 @@ def _row(our: str, peer: str, timings: Mapping[str, Timing | str]) -> Row:
 
 
 def entered(entry: Entry, stack: ExitStack) -> Contestant | str:
-    """Return the contestant that an entry makes, or why it makes none."""
+    """Return the contestant that an entry makes, or the reason why it makes none."""
     try:
         return entry(stack)
     except NotMeasuredError as why:
         return str(why)
-    except Exception as error:  # noqa: BLE001 -- one that cannot begin leaves the rest alone
+    except Exception as error:  # noqa: BLE001 -- a contestant that cannot start does not stop the others
         return " ".join(f"{type(error).__name__}: {error}".split())

@@ -1,4 +1,4 @@
-"""All that has a peer, in one table."""
+"""All contests with peers, in one table."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ SUBJECTS: dict[str, Callable[[Environment], Iterator[Contest]]] = {
 
 
 def measure(subjects: list[str], budget: float, repeats: int, environment: Environment) -> list[Table]:
-    """Hold the contests.
+    """Run the contests.
 
     Parameters
     ----------
     subjects : list of str
-        Of `SUBJECTS`.
+        Subjects, of `SUBJECTS`.
     budget : float
-        Of a repeat of each contestant [s].
+        Time of a repeat of each contestant [s].
     repeats : int
-        How often each has its turn.
+        Number of repeats.
     environment : Environment
-        Where the peers are.
+        Environment of the peers.
 
     Returns
     -------

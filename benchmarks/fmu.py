@@ -1,4 +1,4 @@
-"""What a step of the odin FMU costs: in a C loop, in this project's and FMPy's Python, and as a pythonfmu export."""
+"""Time of a step of the odin FMU: in a C loop, in this project's and FMPy's Python, and as a pythonfmu export."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ STEPS = 20_000
 RATIO = "how many times as long as the loop in C"
 STEP = 0.01  # s
 INPUTS = {"thrust[1]": 3.0, "thrust[6]": -2.0, "wrench.Y": 1.0}  # N
-_SLOWER = 50  # how many times fewer steps of what takes that much longer
+_SLOWER = 50  # divisor of the steps of slower contestants
 
 
 def measure(steps: int, repeats: int) -> list[Row]:
-    """Time the ways to step one FMU; each sets all inputs and reads all outputs, but for those that step alone.
+    """Time the ways to step one FMU; each sets all inputs and reads all outputs, unless it only steps.
 
     Parameters
     ----------
@@ -87,12 +87,12 @@ def export_numpy_plant(folder: Path) -> Path | None:
     Parameters
     ----------
     folder : Path
-        Where the FMU is written.
+        Folder for the FMU.
 
     Returns
     -------
     Path, optional
-        The FMU, or None where pythonfmu is not installed.
+        The FMU; None if pythonfmu is not installed.
     """
     if importlib.util.find_spec("pythonfmu") is None:
         return None

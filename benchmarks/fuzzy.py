@@ -1,4 +1,4 @@
-"""What a decision of the arbiter costs, beside scikit-fuzzy and other libraries on the same rules."""
+"""Time of a decision of the arbiter, and of scikit-fuzzy and other libraries on the same rules."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from fuzzy_arbiter import SECTION_VI, Arbiter, Criterion, Output, System, Variab
 STEPS = 20_000
 RATIO = "how many times as long as scikit-fuzzy as its examples use it"
 POINTS = 101
-# a Python that has pyfuzzylite or simpful, if neither this one nor the peers' environment has; pyfuzzylite wants a
+# a Python that has pyfuzzylite or simpful, if neither this one nor the peers' environment has; pyfuzzylite needs a
 # NumPy before 2
 OTHER_PYTHON = "FUZZY_LIBRARIES_PYTHON"
 _MODULES = {"pyfuzzylite": "fuzzylite", "simpful": "simpful"}
 _ROWS = 5  # of a batch, for each step
-_SLOWER = 50  # how many times fewer calls of what takes that much longer
+_SLOWER = 50  # divisor of the calls of slower contestants
 
 
 def measure(steps: int, repeats: int) -> list[Row]:
@@ -94,7 +94,7 @@ def interpreter(library: str) -> str | None:
 
 
 def ask(python: str, **request: Any) -> dict[str, Any]:
-    """Return what `benchmarks.peers.fuzzy_libraries` answers in another process."""
+    """Send a request to `benchmarks.peers.fuzzy_libraries` in another process, and return the answer."""
     script = Path(__file__).parent / "peers" / "fuzzy_libraries.py"
     done = subprocess.run([python, str(script)], input=json.dumps(request), capture_output=True, text=True, check=True)
     answer: dict[str, Any] = json.loads(done.stdout)
@@ -120,7 +120,7 @@ def _other_batch(system: str, rows: int, repeats: int) -> Timing | str:
 
 
 def _general() -> Arbiter:
-    """Return the paper's rules with one that counts less, of which there is no closed form."""
+    """Return the paper's rules with one of lower weight, for which there is no closed form."""
     system = Arbiter().system
     return Arbiter(system=replace(system, rules=(*system.rules[:-1], replace(system.rules[-1], weight=0.9))))
 

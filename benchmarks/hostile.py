@@ -10,7 +10,7 @@ from typing import Any
 
 from cosim.mavlink.wire.dialect import dialect
 
-_PREPARED = 4096  # of which a flood sends one after the other: making them takes longer than sending them
+_PREPARED = 4096  # datagrams that a flood repeats: making them takes longer than sending them
 
 
 def hostile_datagrams(count: int, seed: int) -> Iterator[bytes]:
@@ -19,14 +19,14 @@ def hostile_datagrams(count: int, seed: int) -> Iterator[bytes]:
     Parameters
     ----------
     count : int
-        How many.
+        Number of datagrams.
     seed : int
-        Of what is random in them.
+        Seed of the random numbers.
 
     Yields
     ------
     bytes
-        A datagram. One in five is a good request for all parameters, from a sender of its own each.
+        A datagram. One in five is a valid request for all parameters, each from another sender.
     """
     rng, mavlink = random.Random(seed), dialect()
     codec = mavlink.MAVLink(None, 255, 190)
@@ -64,7 +64,7 @@ def _good_messages(mavlink: Any, rng: random.Random) -> list[Any]:
 
 
 def flood(port: int, count: int, seed: int) -> None:
-    """Send hostile datagrams to a port of this machine, as fast as they go."""
+    """Send hostile datagrams to a port of this machine, as fast as possible."""
     prepared = list(hostile_datagrams(min(count, _PREPARED), seed))
     print("ready", flush=True)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:

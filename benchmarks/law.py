@@ -1,4 +1,4 @@
-"""What one compiled control step of each law costs, with few and many obstacles."""
+"""Time of one compiled control step of each law, with few and many obstacles."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class _Track(NamedTuple):
 
 
 def _steps(track: _Track, law: int, words: int, room: Any, clock: Any, times: Any) -> None:
-    """Take a law's steps along its way, and write what each took [s]; `law` is called with its `words` by address."""
+    """Run a law's steps along its path, and write the time of each [s]; `law` is called with its `words` by address."""
     state = track.state
     for k in range(track.places.shape[0]):
         for axis in range(3):
@@ -57,7 +57,7 @@ def _steps(track: _Track, law: int, words: int, room: Any, clock: Any, times: An
         call_c(law, (POINTER,), words)
         times[k, 0] = seconds(clock, room) - before
         before = seconds(clock, room)
-        times[k, 1] = seconds(clock, room) - before  # what reading the clock takes
+        times[k, 1] = seconds(clock, room) - before  # time to read the clock
 
 
 class LawSteps:
@@ -68,7 +68,7 @@ class LawSteps:
     law : str
         One of those in `controller.LAWS`.
     obstacles : int
-        How many stand in the way.
+        Number of obstacles on the path.
     """
 
     def __init__(self, law: str, obstacles: int) -> None:
@@ -77,11 +77,11 @@ class LawSteps:
         self.each(1)  # compiles
 
     def seconds(self, count: int) -> float:
-        """Take `count` steps, and return the sum of what each took [s]."""
+        """Run `count` steps, and return the sum of their times [s]."""
         return float(self.each(count).sum())
 
     def each(self, count: int) -> NDArray[np.float64]:
-        """Take `count` steps from a new start, and return what each took [s]."""
+        """Run `count` steps from a new start, and return the time of each [s]."""
         vehicle, (goal, regions), kind = self._vehicle, self._scenery, self._kind
         gains, n, m = kind.gains_type(), regions.kinds.size, vehicle.thruster_matrix.shape[1]
         forces, level = np.zeros(m if kind.output == "thrusters" else 6), np.array([1.0, 0.0, 0.0, 0.0])
@@ -99,7 +99,7 @@ class LawSteps:
 
 
 def _process_clock() -> Any:
-    """Return the numbers of a clock that stands still while others have the processor, where there is one."""
+    """Return the numbers of a clock that stops while other processes run; without one, of the usual clock."""
     clock = Clock().numbers
     if hasattr(time, "CLOCK_PROCESS_CPUTIME_ID") and clock[1] >= 0:
         clock[1] = time.CLOCK_PROCESS_CPUTIME_ID
@@ -112,7 +112,7 @@ def measure(steps: int, repeats: int) -> list[Row]:
     Parameters
     ----------
     steps, repeats : int
-        Steps a repeat, and repeats: each starts the law anew.
+        Steps a repeat, and repeats: each restarts the law.
 
     Returns
     -------

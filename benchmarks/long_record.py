@@ -1,4 +1,4 @@
-"""How much memory the verbs take for a run of many rows: each in a process of its own, by its peak."""
+"""Peak memory of the verbs for a run of many rows, each in a process of its own."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ WORK = {
 
 @dataclass(frozen=True)
 class Taken:
-    """What a piece of work took, or why it was not done."""
+    """Time and memory of a verb, or the reason why it was not run."""
 
     peak: float  # MB of memory, the whole process
     seconds: float
@@ -45,16 +45,16 @@ class Taken:
 
 
 def write_long_run(folder: Path, rows: int, scenario: str = SCENARIO) -> None:
-    """Write the folder of a run of so many rows: those of a short run again and again, at times that go on.
+    """Write the folder of a run of so many rows: those of a short run repeated, with increasing times.
 
     Parameters
     ----------
     folder : Path
-        A folder that does not exist.
+        Folder to make; it must not exist.
     rows : int
-        Of the record.
+        Rows of the record.
     scenario : str
-        Which scenario's.
+        Scenario of the rows.
     """
     step = load_scenario(scenario).time.step
     lasting = [f"time.duration={(rows - 1) * step!r}", "arbiter.engine=closed"]
@@ -72,23 +72,23 @@ def write_long_run(folder: Path, rows: int, scenario: str = SCENARIO) -> None:
         recorder.observe(k, row)
     recorder.close()
     (folder / SCENARIO_FILE).write_text(whole.toml(), encoding="utf-8")
-    told = {"status": "completed", "wall_time": None, "law": whole.law.name, "scenario": whole.name}
-    (folder / SUMMARY).write_text(json.dumps(told), encoding="utf-8")
+    summary = {"status": "completed", "wall_time": None, "law": whole.law.name, "scenario": whole.name}
+    (folder / SUMMARY).write_text(json.dumps(summary), encoding="utf-8")
 
 
 def print_table(rows: Sequence[int], work: Sequence[str], scenario: str, folder: Path | None) -> None:
-    """Measure some work on runs of so many rows each, and print a line for each piece of it.
+    """Measure verbs on runs of so many rows each, and print a line for each.
 
     Parameters
     ----------
     rows : sequence of int
-        Of the runs.
+        Rows of the runs.
     work : sequence of str
-        Of `WORK`.
+        Verbs, of `WORK`.
     scenario : str
-        Whose rows are repeated.
+        Scenario whose rows are repeated.
     folder : Path or None
-        Where the runs are written, and what is made of them; None for the folder of temporary files.
+        Folder of the runs and the verbs' output; None for the folder of temporary files.
     """
     found = []
     for n in rows:
@@ -114,7 +114,7 @@ def _of(name: str, run: Path, scratch: Path) -> Taken:
 
 
 def _taken(*arguments: object) -> Taken:
-    """Do a piece of work in another process."""
+    """Run a verb in another process."""
     print(*arguments, file=sys.stderr, flush=True)
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks.long_record", *map(str, arguments)], stdout=subprocess.PIPE, check=True
@@ -123,19 +123,19 @@ def _taken(*arguments: object) -> Taken:
 
 
 def _peak() -> float:
-    """Return the greatest memory that this process has had [MB]."""
+    """Return the peak memory of this process [MB]."""
     try:
         lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
         return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM:")) * 1024 / 1e6
     except (OSError, StopIteration):
-        import resource  # not on Windows; of a process of Linux it tells what its parent had, too
+        import resource  # not on Windows; on Linux its peak includes that of the parent process
 
         most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         return most / 1e6 if sys.platform == "darwin" else most * 1024 / 1e6
 
 
 def _child(verb: str, run: str, *flags: str) -> None:
-    """Do a piece of work in this process, and print what it took."""
+    """Run a verb in this process, and print its time and memory."""
     from cosim.command_line.cli import main
     from cosim.results.run_result import load_run
 

@@ -1,4 +1,4 @@
-"""The machine that figures are of, and how calm it is."""
+"""The machine of the figures, and its load."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
 
-CALM = 0.6  # load average above which figures are not to be trusted
+CALM = 0.6  # load average above which figures are not reliable
 _PACKAGES = ("numpy", "fmpy", "scikit-fuzzy", "pymavlink")
 
 
 def processor() -> str:
-    """Return the processor's name, as far as the system tells, and how many of them there are."""
+    """Return the processor's name, as far as the system reports it, and the number of processors."""
     name = platform.processor() or platform.machine()
     with contextlib.suppress(OSError):
         lines = Path("/proc/cpuinfo").read_text().splitlines()
-        told = dict(line.split(":", 1) for line in lines if ":" in line)
-        found = {key.strip(): value.strip() for key, value in told.items()}
+        entries = dict(line.split(":", 1) for line in lines if ":" in line)
+        found = {key.strip(): value.strip() for key, value in entries.items()}
         name = found.get("model name", name)
         if "cpu family" in found:
             name += f" (family {found['cpu family']}, model {found['model']})"
@@ -27,7 +27,7 @@ def processor() -> str:
 
 
 def load() -> float:
-    """Return the load average over the last minute, nan where the system does not tell."""
+    """Return the load average over the last minute; NaN where the system does not report it."""
     try:
         return os.getloadavg()[0]
     except (AttributeError, OSError):
@@ -35,7 +35,7 @@ def load() -> float:
 
 
 def versions() -> str:
-    """Return the versions of Python, and of what ours is made with."""
+    """Return the versions of Python and of the packages that this project uses."""
     found = [f"Python {platform.python_version()}"]
     for package in _PACKAGES:
         with contextlib.suppress(metadata.PackageNotFoundError):
@@ -44,7 +44,7 @@ def versions() -> str:
 
 
 def description(repeats: int) -> list[str]:
-    """Return what stands above a table, a line each."""
+    """Return the heading of a table: processor, versions, repeats and load, a line each."""
     now = load()
     lines = [processor(), versions(), f"{repeats} repeats; load {now:.2f} before"]
     if now > CALM:
@@ -54,7 +54,7 @@ def description(repeats: int) -> list[str]:
 
 @contextlib.contextmanager
 def pinned() -> Iterator[None]:
-    """Keep this process, and those that it starts, on one processor meanwhile, where the system can."""
+    """Keep this process, and those that it starts, on one processor in this block, where the system can."""
     if not hasattr(os, "sched_setaffinity"):
         yield
         return

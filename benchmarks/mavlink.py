@@ -1,4 +1,4 @@
-"""What MAVLink costs: a message, a step beside traffic and under a flood, a connection, a frame of an autopilot."""
+"""Times of MAVLink: a message, a step beside traffic and under a flood, a connection, a frame of an autopilot."""
 
 from __future__ import annotations
 
@@ -43,16 +43,16 @@ _SENT = (0, 1, 2, 24, 29, 30, 31, 32, 33, 36, 42, 62, 65, 74, 85, 137, 245)  # i
 _ROUNDS = 50  # /s of the wall clock
 _MESSAGES = _ROUNDS * len(_SENT)
 _SOURCE = (1, 1)
-_PACE = 1000.0  # steps/s, of the paced runs: those of the scenario, in real time
+_PACE = 1000.0  # steps/s, of the runs in real time: those of the scenario
 
 
 class Seventeen:
-    """A vehicle that sends seventeen of its messages at 50 Hz of the wall clock, however fast the run goes.
+    """A vehicle that sends seventeen of its messages at 50 Hz of the wall clock, independent of the run's speed.
 
     Parameters
     ----------
     master : Master
-        Of the run that it shows.
+        Master of the run.
     """
 
     def __init__(self, master: Master) -> None:
@@ -63,11 +63,11 @@ class Seventeen:
         self.busy = 0.0
 
     def attach(self, link: MessageSink) -> None:
-        """Begin to send on a link."""
+        """Start to send on a link."""
         self._context.links.append(link)
 
     def observe(self, row: Array) -> None:
-        """Keep the row, to be shown."""
+        """Store the row for the next messages."""
         self._row = row
 
     def receive(self, link: MessageSink, message: Any, now: float) -> None:
@@ -75,7 +75,7 @@ class Seventeen:
         self._send(_SENT[0])
 
     def tick(self, now: float) -> None:
-        """Send what is due."""
+        """Send the messages that are due."""
         while self._row is not None and self._rounds < (now - self._began) * _ROUNDS:
             self._rounds += 1
             self._context.look(self._row)
@@ -87,7 +87,7 @@ class Seventeen:
             self._context.send(message)
 
     def close(self, now: float) -> None:
-        """Note how much of a processor the thread took."""
+        """Store the processor time of the thread."""
         self.busy = time.thread_time() / (now - self._began)
 
 
@@ -134,7 +134,7 @@ def _messages(calls: int, repeats: int) -> list[Row]:
             "message: encode and send ODOMETRY": lambda: plain.send(odometry),
         }
         gate = Gate(Counts(), _SOURCE)
-        frames = {"heeded": attitude.pack(mavlink.MAVLink(None, 255, 190)), "random": next(hostile_datagrams(1, 0))}
+        frames = {"accepted": attitude.pack(mavlink.MAVLink(None, 255, 190)), "random": next(hostile_datagrams(1, 0))}
         for name, frame in frames.items():
             works[f"message: check and decode, {name}"] = lambda frame=frame: list(gate.datagram(frame))
         for name, work in works.items():
@@ -148,7 +148,7 @@ def _messages(calls: int, repeats: int) -> list[Row]:
 
 
 def _beside_traffic(steps: int, repeats: int) -> list[Row]:
-    """Time stretches of one run at full speed, in turn without and with a link, so that both see the same noise."""
+    """Time stretches of one run at full speed, in turn without and with a link, so that both have the same noise."""
     alone, beside, busy = [], [], []
     with _endless() as master, _sink() as port:
         k = 0
@@ -199,8 +199,8 @@ def _connecting(repeats: int) -> list[Row]:
         for _ in range(repeats):
             with own_vehicle(profile) as link:
                 found.append(qgc_connect(Client(link)))
-        told = f"QGroundControl connects, {profile}, with {max(one.retries for one in found)} retries at the most"
-        rows.append(Row(told, Timing(tuple(one.seconds for one in found))))
+        name = f"QGroundControl connects, {profile}, with {max(one.retries for one in found)} retries at the most"
+        rows.append(Row(name, Timing(tuple(one.seconds for one in found))))
     return rows
 
 
@@ -213,7 +213,7 @@ def _in_lockstep(steps: int, repeats: int) -> list[Row]:
 
 
 def _under_flood(datagrams: int, steps: int, repeats: int) -> list[Row]:
-    """Time each step, from when it was due to when it was done, of paced runs and of runs at full speed."""
+    """Time each step, from its due time to its end, of runs in real time and of runs at full speed."""
     rows: list[Row] = []
     grown, looked, errors = 0.0, [], 0
     for pace, name in ((_PACE, f"step at {_PACE:.0f}/s"), (None, "step at full speed")):
@@ -227,22 +227,22 @@ def _under_flood(datagrams: int, steps: int, repeats: int) -> list[Row]:
                 errors += failures
                 if case == "flood":
                     grown = max(grown, _resident() - before if repeat else 0.0)  # the first one fills caches
-                    looked.append(_came(link.counts) / datagrams)
+                    looked.append(_total_count(link.counts) / datagrams)
         timings: dict[str, Timing | str] = {}
         for case, all_times in found.items():
             for quantile, word in ((0.5, "median"), (0.999, "99.9th percentile")):
                 of_each = tuple(float(np.quantile(times, quantile)) for times in all_times)
                 timings[f"{name}, {case}: {word}"] = Timing(of_each)
         rows += compared(timings)
-    told = f"{datagrams} datagrams each, {statistics.median(looked):.1%} looked at, {errors} errors, "
-    rows.append(Row("floods", f"{told}{grown / 1e6:+.1f} MB of memory"))
+    summary = f"{datagrams} datagrams each, {statistics.median(looked):.1%} looked at, {errors} errors, "
+    rows.append(Row("floods", f"{summary}{grown / 1e6:+.1f} MB of memory"))
     return rows
 
 
 def _flooded(datagrams: int, steps: int, pace: float | None, seed: int, *, at_us: bool) -> tuple[Array, Link, int]:
     """Step beside a link for as long as a flood takes, if there is one, or for so many steps.
 
-    A flood that is not at us goes to a port that nobody reads: it takes the same time of the machine, none of ours.
+    With `at_us` false the flood goes to a port without a reader: it costs the machine the same time, the link none.
 
     Returns
     -------
@@ -255,7 +255,7 @@ def _flooded(datagrams: int, steps: int, pace: float | None, seed: int, *, at_us
     with (
         _endless() as master,
         _sink() as sink,
-        _attacker(channel.port if at_us else sink, datagrams, seed) as goes_on,
+        _attacker(channel.port if at_us else sink, datagrams, seed) as is_running,
     ):
         links = LinkThread(Seventeen(master), [link], master.scenario.time.step)
         links.start()
@@ -269,7 +269,7 @@ def _flooded(datagrams: int, steps: int, pace: float | None, seed: int, *, at_us
             master.step(k)
             links.observe(k, master.signals.row)
             times.append(time.perf_counter() - due)
-            if not goes_on(k, steps):
+            if not is_running(k, steps):
                 break
         links.close()
     return np.array(times[1:]), link, sum(links.failures.values())
@@ -277,7 +277,7 @@ def _flooded(datagrams: int, steps: int, pace: float | None, seed: int, *, at_us
 
 @contextlib.contextmanager
 def _attacker(port: int, datagrams: int, seed: int) -> Iterator[Callable[[int, int], bool]]:
-    """Yield whether to go on after a step: while another process floods a port, or, if none does, for so many steps."""
+    """Yield a predicate on step and count: True while another process floods a port, else for so many steps."""
     if not datagrams:
         yield lambda k, steps: k < steps
         return
@@ -288,12 +288,12 @@ def _attacker(port: int, datagrams: int, seed: int) -> Iterator[Callable[[int, i
         yield lambda k, steps: (k + 1) % 16 > 0 or process.poll() is None  # some steps in any case
 
 
-def _came(counts: Counts) -> int:
+def _total_count(counts: Counts) -> int:
     return sum(getattr(counts, name) for name in counts.__slots__)
 
 
 def _resident() -> float:
-    """Return the memory of this process [bytes], 0 where the system does not tell."""
+    """Return the memory of this process [bytes]; 0 where the system does not report it."""
     try:
         pages = int(Path("/proc/self/statm").read_text().split()[1])
     except OSError:
@@ -307,7 +307,7 @@ def _link(port: int, signer: Signer | None = None) -> Link:
 
 @contextlib.contextmanager
 def _sink() -> Iterator[int]:
-    """Yield a port whose datagrams nobody reads."""
+    """Yield a port whose datagrams have no reader."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sink:
         sink.bind(("127.0.0.1", 0))
         yield sink.getsockname()[1]

@@ -1,4 +1,4 @@
-"""Consistency of the navigation filter on hard scenes: whether its errors are as large as it says.
+"""Consistency of the navigation filter on hard scenes: the ratio of its errors to its own standard deviations.
 
 ``python -m benchmarks.navigation N [--seed K] [--duration S]``. The normalized estimation error squared (NEES) of all
 18 errors is averaged over the flights at some times, that of the innovations (NIS) over all samples of a sensor; both
@@ -29,7 +29,7 @@ from cosim.simulation.master import Master
 
 Array = NDArray[np.float64]
 
-TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0)  # s, at which errors are looked at
+TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0)  # s, at which errors are evaluated
 _FROM = 5.0  # s, from which on innovations count
 _CONSTANT = (
     *(f"imu.angular_velocity_bias.{axis}" for axis in "pqr"), *(f"imu.acceleration_bias.{axis}" for axis in "xyz"),
@@ -70,7 +70,7 @@ def flight(seed: int, duration: float) -> tuple[Array, Array]:
 
 
 def rows(count: int, seed: int, duration: float) -> Iterator[dict[str, float | str]]:
-    """Yield what came of the flights, a row for each time and each sensor."""
+    """Yield the results of the flights, a row for each time and each sensor."""
     flown = [flight(k, duration) for k in range(seed, seed + count)]
     errors, innovations = np.array([nees for nees, _ in flown]), sum(sums for _, sums in flown)
     for i, time in enumerate(TIMES):

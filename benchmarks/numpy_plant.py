@@ -1,4 +1,4 @@
-"""The plant of the odin vehicle once more, in NumPy, for an FMU of pythonfmu: what the C core is measured against."""
+"""The plant of the odin vehicle in NumPy, for an FMU of pythonfmu, with which the C core is compared."""
 
 import numpy as np
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
@@ -15,7 +15,7 @@ SUBSTEP = 0.005  # s, as in the FMU
 
 
 class NumpyPlant(Fmi2Slave):
-    """`Body` behind FMI, without current and lag, which odin has none of."""
+    """`Body` as an FMU, without current and lag, which odin does not have."""
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)

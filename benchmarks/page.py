@@ -19,7 +19,7 @@ _PART = "<!-- figures: {} -->\n{}<!-- end of figures -->"
 
 
 class PageError(Exception):
-    """Says why the page cannot be written."""
+    """Raised if the page cannot be written."""
 
 
 def rewrite(text: str, figures: list[dict[str, Any]]) -> str:
@@ -30,12 +30,12 @@ def rewrite(text: str, figures: list[dict[str, Any]]) -> str:
     text : str
         The page, with the marks of each part.
     figures : list of dict
-        As `benchmarks.table.as_json` has them.
+        Figures as of `benchmarks.table.as_json`.
 
     Returns
     -------
     str
-        The page, in which all else is as it was.
+        The page; only the tables are new.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def rewrite(text: str, figures: list[dict[str, Any]]) -> str:
 
 
 def read_figures(path: Path) -> dict[str, Any]:
-    """Return what ``--json`` wrote; PageError where it is nothing of the sort."""
+    """Read a file that ``--json`` wrote; raise PageError for another file."""
     try:
         figures: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         figures["verb"], figures["tables"]
@@ -81,7 +81,7 @@ def _duels(rows: list[dict[str, Any]]) -> Iterator[str]:
     for row in rows:
         between = "–".join(map(rounded, row["range"])) if row["range"] else ""
         theirs = _median(row["seconds_against"]) if row["against"] else ""
-        yield _row(_ratio(row), between, row["name"], _median(row["seconds"]), _told(row, row["against"]), theirs)
+        yield _row(_ratio(row), between, row["name"], _median(row["seconds"]), _with_note(row, row["against"]), theirs)
 
 
 def _plain(rows: list[dict[str, Any]]) -> Iterator[str]:
@@ -89,7 +89,7 @@ def _plain(rows: list[dict[str, Any]]) -> Iterator[str]:
     yield "|--:|--:|--:|---|"
     for row in rows:
         spread = "–".join(map(figure, (min(row["seconds"]), max(row["seconds"])))) if row["seconds"] else ""
-        yield _row(_ratio(row), _median(row["seconds"]), spread, _told(row, row["name"]))
+        yield _row(_ratio(row), _median(row["seconds"]), spread, _with_note(row, row["name"]))
 
 
 def _row(*cells: str) -> str:
@@ -104,5 +104,5 @@ def _median(seconds: list[float]) -> str:
     return figure(Timing(tuple(seconds)).median) if seconds else "–"
 
 
-def _told(row: dict[str, Any], name: str) -> str:
+def _with_note(row: dict[str, Any], name: str) -> str:
     return f"{name} ({row['note']})" if row["note"] else name

@@ -1,4 +1,4 @@
-"""The environment of the peers: virtual ones of their own, beside the product's, made once."""
+"""The environment of the peers: their own virtual environments, made once."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _TIMEOUT = 900.0  # s
 
 @dataclass(frozen=True)
 class Peer:
-    """What has to be installed for a peer.
+    """The requirements of a peer.
 
     Attributes
     ----------
     name : str
-        Of the distribution on PyPI.
+        Name of the distribution on PyPI.
     more : tuple of str
-        What else it needs, and does not say so.
+        Further requirements, which the distribution does not declare.
     environment : str
         The virtual environment that it is in; most share one.
     """
@@ -59,22 +59,22 @@ PEERS = {
 
 
 def folder() -> Path:
-    """Return where the environments are."""
+    """Return the folder of the virtual environments."""
     return Path(platformdirs.user_cache_dir("subreach")) / FOLDER
 
 
 def install(again: bool = False) -> dict[str, str]:
-    """Install each peer that was not tried before, one by one.
+    """Install each peer for which that was not tried before, one by one.
 
     Parameters
     ----------
     again : bool
-        Whether to try those again that could not be installed.
+        True to try failed installations again.
 
     Returns
     -------
     dict from str to str
-        Of each peer its version, or, after "not installed: ", why it has none.
+        Version of each peer, or the reason after "not installed: ".
     """
     state = {name: version for name, version in _state().items() if name in PEERS}
     for peer in PEERS.values():
@@ -88,7 +88,7 @@ def install(again: bool = False) -> dict[str, str]:
 
 
 def installed_python(name: str) -> str | None:
-    """Return the Python of an environment that has a peer already, None if there is none."""
+    """Return the Python of an environment in which a peer is installed; None if there is none."""
     version = _state().get(name, "not installed")
     return None if version.startswith("not installed") else str(_python_in(folder() / PEERS[name].environment))
 
@@ -129,12 +129,12 @@ def _version(python: str, name: str) -> str:
 
 
 class Environment:
-    """Where peers are found.
+    """Find the Python interpreters of peers.
 
     Parameters
     ----------
     python : str, optional
-        A Python that has them, or some of them; default: the benchmarks' own environments, made where they are not.
+        A Python with the peers, or some of them; default: the benchmarks' own environments, made if missing.
     """
 
     def __init__(self, python: str | None = None) -> None:
@@ -142,19 +142,19 @@ class Environment:
         self._state = {} if python else install()
 
     def python(self, name: str) -> str:
-        """Return the Python that has a peer; NotMeasuredError says why there is none."""
+        """Return the Python with a peer; raise NotMeasuredError with the reason if there is none."""
         version = self.version(name)
         if version.startswith("not installed"):
             raise NotMeasuredError(version)
         return self._python or str(_python_in(folder() / PEERS[name].environment))
 
     def version(self, name: str) -> str:
-        """Return the version of a peer, or why it has none."""
+        """Return the version of a peer, or the reason why it has none."""
         if name not in self._state:
             self._state[name] = _version(self._python or sys.executable, name)
         return self._state[name]
 
-    def told(self) -> str:
-        """Return the versions of the peers that are there."""
+    def summary(self) -> str:
+        """Format the versions of the installed peers."""
         found = {name: self.version(name) for name in PEERS}
         return ", ".join(f"{name} {version}" for name, version in found.items() if not version.startswith("not"))

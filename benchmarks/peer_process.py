@@ -15,7 +15,7 @@ from benchmarks.peer_environment import Environment
 from benchmarks.timing import NotMeasuredError
 
 _SERVE = Path(__file__).parent / "peers" / "serve.py"
-_TAIL = 300  # characters of what it said last
+_TAIL = 300  # last characters of its output
 
 
 class PeerProcess:
@@ -24,33 +24,33 @@ class PeerProcess:
     Parameters
     ----------
     process : Popen
-        That runs ``serve.py``.
+        Process of ``serve.py``.
     said : Path
-        Where its error output goes.
+        File of its error output.
     """
 
     def __init__(self, process: subprocess.Popen[str], said: Path) -> None:
         self._process, self._said = process, said
 
     def seconds(self, count: int) -> float:
-        """Do `count` items, and return what they took [s]."""
+        """Run `count` items, and return their time [s]."""
         return self.ask(str(count))
 
     def ask(self, line: str) -> float:
-        """Send a line, and return the seconds of the answer; NotMeasuredError has what the peer says else."""
+        """Send a line, and return the seconds of the answer; raise NotMeasuredError with the peer's error."""
         return float(self.exchange(line)["seconds"])
 
     def exchange(self, line: str) -> dict[str, Any]:
-        """Send a line, and return the answer; NotMeasuredError has what the peer says else."""
+        """Send a line, and return the answer; raise NotMeasuredError with the peer's error."""
         process = self._process
         assert process.stdin is not None and process.stdout is not None
         with contextlib.suppress(BrokenPipeError):
             process.stdin.write(line + "\n")
             process.stdin.flush()
-        told = process.stdout.readline()
-        if not told:
+        line_received = process.stdout.readline()
+        if not line_received:
             raise NotMeasuredError(f"ended with code {process.wait()}: {self._said.read_text()[-_TAIL:].strip()}")
-        answer: dict[str, Any] = json.loads(told)
+        answer: dict[str, Any] = json.loads(line_received)
         if "error" in answer:
             raise NotMeasuredError(" ".join(answer["error"].split())[:_TAIL])
         return answer
@@ -65,25 +65,25 @@ def peer(
     Parameters
     ----------
     environment : Environment
-        Where it is installed.
+        Environment in which it is installed.
     package : str
-        The distribution that it needs.
+        Distribution that it needs.
     module, function : str
-        In `benchmarks.peers`.
+        Function in a module of `benchmarks.peers`.
     setup : dict
         Plain values for the function.
 
     Raises
     ------
     NotMeasuredError
-        If it is not installed, or cannot begin.
+        If it is not installed, or cannot start.
     """
     python = environment.python(package)
     with tempfile.TemporaryDirectory(prefix="peer-", ignore_cleanup_errors=True) as scratch:
         said = Path(scratch) / "said"
-        # nothing of ours is on its path, and nothing of the user's
+        # no folder of this project or of the user is on its path
         apart = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
-        apart |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), scratch)  # what it leaves behind goes too
+        apart |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), scratch)  # its temporary files are removed too
         with said.open("w") as errors:
             process = subprocess.Popen(
                 [python, str(_SERVE), module, function],

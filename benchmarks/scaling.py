@@ -1,4 +1,4 @@
-"""How cost grows with obstacles, horizon, vehicles and workers."""
+"""Growth of the cost with obstacles, horizon, vehicles and workers."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ class Curve:
     Attributes
     ----------
     title : str
-        What an item is.
+        Description of an item.
     of : str
-        What there are more and more of; one of them.
+        Name of one unit of the size.
     entries : mapping from float to Entry
         By size.
     count : int, optional
@@ -50,7 +50,7 @@ class Curve:
     count: int | None = None
 
     def measure(self, budget: float, repeats: int) -> Table:
-        """Time all sizes in turn, on one processor; the law of growth stands below."""
+        """Time all sizes in turn, on one processor; the law of growth is in the notes."""
         with pinned(), ExitStack() as stack:
             contestants = [entered(entry, stack) for entry in self.entries.values()]
             found = take_turns(contestants, budget, repeats, self.count)
@@ -62,7 +62,7 @@ class Curve:
         return f"{size:g} {self.of}{'s' if size != 1 else ''}"
 
     def _laws(self, found: list[Timing | str]) -> tuple[str, ...]:
-        """Return what the costs follow: a power of the sizes, and, where they rise, a fixed part and one for each."""
+        """Return the laws of growth: the exponent of a power of the sizes, and the two coefficients of a line."""
         sizes = [size for size, one in zip(self.entries, found, strict=True) if isinstance(one, Timing)]
         costs = [one.median for one in found if isinstance(one, Timing)]
         if len(sizes) < 2:
@@ -76,17 +76,17 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Crews:
-    """Costs of one sweep by several crews.
+class SweepComparison:
+    """Costs of one sweep by several kinds of workers.
 
     Attributes
     ----------
     title : str
-        What an item is.
+        Description of an item.
     entries : mapping from str to Entry
-        By crew, that of one worker first.
+        Entries by name, that of one worker first.
     rows : int
-        Of the sweep.
+        Rows of the sweep.
     """
 
     title: str
@@ -94,13 +94,13 @@ class Crews:
     rows: int
 
     def measure(self, budget: float, repeats: int) -> Table:
-        """Time all crews in turn, on all processors; how much faster they are than the first stands below."""
+        """Time all entries in turn, on all processors; the speedups over the first are in the notes."""
         with ExitStack() as stack:
             contestants = [entered(entry, stack) for entry in self.entries.values()]
             found = take_turns(contestants, budget, min(repeats, _SWEEPS), self.rows)
         first, *others = compared(dict(zip(self.entries, found, strict=True)))
-        told = tuple(f"{row.name}: {1.0 / row.ratio:.2f} times as fast as {first.name}" for row in others if row.ratio)
-        return Table(self.title, (first, *others), told)
+        notes = tuple(f"{row.name}: {1.0 / row.ratio:.2f} times as fast as {first.name}" for row in others if row.ratio)
+        return Table(self.title, (first, *others), notes)
 
 
 def measure(subjects: list[str], budget: float, repeats: int) -> list[Table]:
@@ -109,11 +109,11 @@ def measure(subjects: list[str], budget: float, repeats: int) -> list[Table]:
     Parameters
     ----------
     subjects : list of str
-        Of `SUBJECTS`.
+        Subjects, of `SUBJECTS`.
     budget : float
-        Of a repeat of each size [s].
+        Time of a repeat of each size [s].
     repeats : int
-        How often each has its turn.
+        Number of repeats.
 
     Returns
     -------
@@ -155,22 +155,22 @@ def vehicles() -> Iterator[Curve]:
         yield Curve(f"A batch of runs of {RUN:g} s, {_named(engine)}", "vehicle", entries)
 
 
-def workers() -> Iterator[Crews]:
-    """Yield what a sweep takes with one and two workers, processes or in Dask."""
+def workers() -> Iterator[SweepComparison]:
+    """Yield the sweeps with one and two workers, in processes or in Dask."""
     for engine, rows in ROWS.items():
         entries = {
-            f"{n} {worker}": sweep(crew, n, engine)
-            for crew, n, worker in (
+            f"{n} {worker}": sweep(pool, n, engine)
+            for pool, n, worker in (
                 ("processes", 1, "process"),
                 ("processes", 2, "processes"),
                 ("Dask", 1, "in Dask"),
                 ("Dask", 2, "in Dask"),
             )
         }
-        yield Crews(f"A run of {RUN:g} s in a sweep of {rows}, {_named(engine)}", entries, rows)
+        yield SweepComparison(f"A run of {RUN:g} s in a sweep of {rows}, {_named(engine)}", entries, rows)
 
 
-SUBJECTS: dict[str, Callable[[], Iterator[Curve] | Iterator[Crews]]] = {
+SUBJECTS: dict[str, Callable[[], Iterator[Curve] | Iterator[SweepComparison]]] = {
     "obstacles": obstacles,
     "horizon": horizon,
     "vehicles": vehicles,
@@ -183,7 +183,7 @@ def _named(engine: str) -> str:
 
 
 def _with_obstacles(n: int) -> tuple[str, ...]:
-    """Return the changes that put so many balls of the criterion "obstacle" beside the way, in place of the regions."""
+    """Return the changes that put so many balls of the criterion "obstacle" beside the path, and remove the regions."""
     balls = []
     for i in range(n):
         centre = [8.0 * (i + 1) / (n + 1), 3.0 if i % 2 else -3.0, 3.0]

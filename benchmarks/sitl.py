@@ -1,4 +1,4 @@
-"""What a frame of an autopilot in lockstep costs, over loopback, against a stand-in in a process of its own."""
+"""Time of a frame of an autopilot in lockstep, over loopback, against a stand-in in a process of its own."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RATIO = "how many times as long as the plant's step"
 
 
 def measure(steps: int, repeats: int) -> list[Row]:
-    """Time the parts of a frame, and whole frames as the stand-in sees them.
+    """Time the parts of a frame, and whole frames by the stand-in's clock.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def measure(steps: int, repeats: int) -> list[Row]:
 
 
 def lockstep(steps: int, repeats: int, record_rate: float = 100.0) -> Timing:
-    """Time whole flights: the server here, the stand-in in another process, which takes the time.
+    """Time whole flights: the server in this process, the stand-in in another one, which measures the time.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def lockstep(steps: int, repeats: int, record_rate: float = 100.0) -> Timing:
     Returns
     -------
     Timing
-        Of a frame.
+        Time of a frame.
     """
     found = []
     overrides = (f"time.step={1.0 / RATE!r}", f"time.duration={(WARMING + steps) / RATE!r}")

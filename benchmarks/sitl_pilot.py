@@ -1,4 +1,4 @@
-"""A stand-in for ArduPilot, as a process: sends frames, each when the one before is answered, and prints the time."""
+"""A stand-in for ArduPilot, as a process: sends each frame after the answer to the last, and prints the time."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import struct
 import sys
 import time
 
-RATE = 1200  # Hz, as ArduPilot asks for by itself
-WARMING = 100  # frames before the time is taken
+RATE = 1200  # Hz, ArduPilot's default
+WARMING = 100  # frames before the timing starts
 HEAD = struct.Struct("<HHI")
 MAGIC = 18458
 PULSES = struct.pack("<16H", *[1500] * 4, *[1700] * 4, *[0] * 8)
 
 
 def main(port: int, frames: int) -> None:
-    """Fly against a port of this machine, and print what the frames took [s]."""
+    """Fly with a port of this machine, and print the time of the frames [s]."""
     started = time.perf_counter()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
         link.connect(("127.0.0.1", port))

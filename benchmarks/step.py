@@ -1,4 +1,4 @@
-"""What a step of the paper's scenario costs, part by part."""
+"""Time of a step of the paper's scenario, part by part."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cosim.simulation.signals import Array
 
 STEPS = 20_000
 RATIO = "how many times as long as the plant's step"
-_SLOWER = 50  # how many times fewer calls of what takes that much longer
+_SLOWER = 50  # divisor of the calls of slower parts
 
 
 def measure(steps: int, repeats: int) -> list[Row]:

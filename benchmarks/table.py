@@ -1,4 +1,4 @@
-"""Printing times in one table, ratios first, and writing them as JSON."""
+"""Print times in one table, ratios first, and write them as JSON."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ _UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 
 @dataclass(frozen=True)
 class Row:
-    """A line of a table: what was timed, or why it was not, and what it is compared with.
+    """A line of a table: a timing, or the reason why there is none, and the base of its ratio.
 
     Attributes
     ----------
     name, timing : str, Timing or str
-        What was timed; a word where it was not.
+        Name and timing of the row; a text where it was not timed.
     base, base_timing : str, Timing or str, optional
-        What it is compared with; none: there is no ratio.
+        Name and timing of the base; without them there is no ratio.
     duel : bool
-        Whether the base is a peer that took turns with it. Then the ratio says how many times as long the peer takes,
-        and each repeat has one of its own, so that they have a range. Else it says how many times as long as the base
-        this one takes.
+        True if the base is a peer that took turns with it. Then the ratio is the peer's time over this one's,
+        and each repeat has one of its own, so that they have a range. Else it is this one's time over the
+        base's.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Row:
 
     @property
     def ratio(self) -> float | None:
-        """Of the medians."""
+        """Ratio of the medians."""
         if isinstance(self.timing, str) or isinstance(self.base_timing, str):
             return None
         ratio = self.timing.median / self.base_timing.median
@@ -56,13 +56,13 @@ class Row:
 class Table:
     """Rows under a heading."""
 
-    title: str  # what an item is
+    title: str  # description of an item
     rows: tuple[Row, ...]
     notes: tuple[str, ...] = ()  # below it
 
 
 def compared(timings: dict[str, Timing | str], base: str | None = None) -> list[Row]:
-    """Return rows that are compared with one among them, by default the first."""
+    """Return rows with ratios to one among them, by default the first."""
     base = base or next(iter(timings))
     return [Row(name, timing, base, timings[base]) for name, timing in timings.items()]
 
@@ -82,17 +82,17 @@ _HEADINGS = ("ratio", "range", "median", "least–most", "what", "against", "its
 
 
 def cells(row: Row) -> tuple[str, ...]:
-    """Return a row as text, a cell for each of the headings; the times of the base stand in a row of its own already.
+    """Format a row, a cell for each of the headings; the times of the base are already in a row of its own.
 
     Parameters
     ----------
     row : Row
-        Any.
+        Row of a table.
 
     Returns
     -------
     tuple of str
-        "" where there is nothing to say.
+        Cells; "" without content.
     """
     ratio = f"{rounded(row.ratio)}x" if row.ratio is not None else ""
     between = "–".join(map(rounded, row.range)) if row.range is not None else ""
@@ -108,22 +108,22 @@ def _times(timing: Timing | str) -> tuple[str, str]:
 
 
 def words(row: Row) -> str:
-    """Return why a row has no figures, if it has none."""
+    """Return the reason why a row has no figures; "" if it has some."""
     timings = (row.timing, row.base_timing) if row.duel else (row.timing,)
     return "; ".join(word for word in timings if isinstance(word, str))
 
 
 def print_tables(tables: Sequence[Table], ratio: str, machine: Sequence[str]) -> None:
-    """Print tables in the same columns, below what machine they are of.
+    """Print tables in the same columns, below a heading on the machine.
 
     Parameters
     ----------
     tables : sequence of Table
-        One below the other, in the same columns.
+        Tables in their order.
     ratio : str
-        What the ratio says.
+        Meaning of the ratio.
     machine : sequence of str
-        From `machine.description`, before the first time was taken.
+        Lines of `machine.description`, from before the first timing.
     """
     for line in machine:
         print(line)
@@ -142,7 +142,7 @@ def print_tables(tables: Sequence[Table], ratio: str, machine: Sequence[str]) ->
 
 
 def _shown(table: Table) -> list[tuple[str, ...]]:
-    """Return the cells of a table; one base for all is not repeated."""
+    """Return the cells of a table; a base of all rows is not repeated."""
     found = [cells(row) for row in table.rows]
     if len({row.base for row in table.rows if row.base}) > 1 or any(row.duel for row in table.rows):
         return found
@@ -161,7 +161,7 @@ def _line(texts: Sequence[str], widths: Sequence[int]) -> str:
 
 
 def as_json(verb: str, tables: Sequence[Table], ratio: str, machine: Sequence[str]) -> dict[str, Any]:
-    """Return the tables of a verb as plain values, with all samples [s]."""
+    """Convert the tables of a verb to plain values, with all samples [s]."""
     return {
         "verb": verb,
         "machine": list(machine),
@@ -194,7 +194,7 @@ def _samples(timing: Timing | str) -> list[float]:
 
 
 def write_json(path: Path, values: dict[str, Any]) -> None:
-    """Write values as JSON, whole or not at all."""
+    """Write values as JSON, atomically."""
     scratch = path.with_name(f".{path.name}")
     scratch.write_text(json.dumps(values, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     scratch.replace(path)

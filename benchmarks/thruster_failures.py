@@ -1,4 +1,4 @@
-"""Flights of the deployable law whose thrusters fail, or do not: what it isolates, and when.
+"""Flights of the deployable law with thruster failures, or without: the isolated thrusters, and the delays.
 
 ``python -m benchmarks.thruster_failures VEHICLE CASE N [--lag S] [--seed K]``; the law is not given the lag. With
 ``--sensors`` it navigates by sensors, with ``--lost dvl`` without one of them for 30 s, with ``--slow`` at 1 Hz.
@@ -77,7 +77,7 @@ def scene(vehicle: Vehicle, case: str, seed: int, lag: float | None, weight: flo
 
 
 def through_sensors(table: dict[str, Any], lost: list[str], slow: bool) -> dict[str, Any]:
-    """Return what is other in a scenario that navigates by sensors, without some of them from 6 s on for 30 s."""
+    """Return the changes for a scenario that navigates by sensors, some of them lost from 6 s on for 30 s."""
     rates = {"dvl.rate": 1.0, "usbl.rate": 1.0} if slow else {}
     return {
         "sensing": {"through": "sensors", "seed": table["sensing"]["seed"]},
@@ -88,7 +88,7 @@ def through_sensors(table: dict[str, Any], lost: list[str], slow: bool) -> dict[
 
 
 def since_it_matters(trace: NDArray[np.float64], failure: Failure, limit: float) -> float:
-    """Return when [s] a thruster first lacks a tenth of its limit [N], in the mean over half a second; inf if never."""
+    """Return the time [s] from which a thruster lacks a tenth of its limit [N], averaged over 0.5 s; inf if never."""
     j = failure.thruster - 1
     times, commands = trace[:, 0], trace[:, _INPUTS + j]
     after = times >= failure.time
@@ -102,7 +102,7 @@ def since_it_matters(trace: NDArray[np.float64], failure: Failure, limit: float)
 
 
 def main() -> None:
-    """Fly, and print what came of it."""
+    """Run the flights, and print the results."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("vehicle")
     parser.add_argument("case", choices=CASES)

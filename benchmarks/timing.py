@@ -1,4 +1,4 @@
-"""Taking times: of calls, of batches, and of contestants that take turns."""
+"""Measure times: of calls, of batches, and of contestants that take turns."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _MOST = 10**9  # items a batch
 
 
 class NotMeasuredError(Exception):
-    """Says why something could not be timed."""
+    """Raised for a contestant that could not be timed; the text is the reason."""
 
 
 @dataclass(frozen=True)
@@ -38,10 +38,10 @@ class Timing:
 
 
 class Contestant(Protocol):
-    """What can be timed in turn with others, in this process or another one."""
+    """Work that can be timed in turn with others, in this process or another one."""
 
     def seconds(self, count: int) -> float:
-        """Do `count` items, and return what they took [s]; NotMeasuredError says why it cannot."""
+        """Run `count` items, and return their time [s]; raise NotMeasuredError with the reason for a failure."""
         ...
 
 
@@ -51,21 +51,21 @@ class Own:
     Parameters
     ----------
     work : callable
-        Does as many items as it is told.
+        Does the given number of items.
     """
 
     def __init__(self, work: Callable[[int], object]) -> None:
         self._work = work
 
     def seconds(self, count: int) -> float:
-        """Do `count` items, and return what they took [s]."""
+        """Run `count` items, and return their time [s]."""
         before = time.perf_counter()
         self._work(count)
         return time.perf_counter() - before
 
 
 def each(work: Callable[[], object]) -> Callable[[int], None]:
-    """Return a function that does an item so many times, of one that does it once."""
+    """Return a function that calls `work` a given number of times."""
 
     def batch(count: int) -> None:
         for _ in range(count):
@@ -75,7 +75,7 @@ def each(work: Callable[[], object]) -> Callable[[int], None]:
 
 
 def timed(contestant: Contestant, count: int, repeats: int) -> Timing:
-    """Time so many items a repeat; one more repeat goes before, to compile and to warm the caches."""
+    """Time so many items a repeat, after one more repeat that compiles and warms the caches."""
     contestant.seconds(count)
     return Timing(tuple(contestant.seconds(count) / count for _ in range(repeats)))
 
@@ -93,23 +93,23 @@ def time_calls(work: Callable[[], object], calls: int, repeats: int) -> Timing:
 def take_turns(
     contestants: Sequence[Contestant | str], budget: float, repeats: int, count: int | None = None
 ) -> list[Timing | str]:
-    """Time contestants in turn, so that what else the machine does meets all of them alike.
+    """Time contestants in turn, so that other load of the machine affects all of them alike.
 
     Parameters
     ----------
     contestants : sequence of Contestant or str
-        Where a word stands in place of one, it is returned.
+        Contestants; a text in place of one is returned unchanged.
     budget : float
-        What a repeat shall take [s], at least: the items of each contestant are counted for that.
+        Least time of a repeat [s]; it determines the number of items of each contestant.
     repeats : int
-        How often each has its turn.
+        Number of repeats.
     count : int, optional
-        Items a repeat, in place of the budget; then nothing goes before to warm up.
+        Items a repeat, in place of the budget; then there is no warm-up.
 
     Returns
     -------
     list of Timing or str
-        In their order; a word where one failed on the way.
+        Timings in the order of the contestants; a text where one failed.
     """
     found: list[list[float] | str] = [[] if not isinstance(one, str) else one for one in contestants]
     counts = [0] * len(contestants)
@@ -128,11 +128,11 @@ def take_turns(
 
 
 def count_for(contestant: Contestant, budget: float) -> int:
-    """Return how many items take a contestant so many seconds; it is warm then."""
+    """Return the number of items that take a contestant at least `budget` [s]; it is warm afterwards."""
     contestant.seconds(1)
     count = 1
     while (taken := contestant.seconds(count)) < budget and count < _MOST:
-        # what is fast is mostly overhead at first, so go up in helpings
+        # a fast item is mostly overhead at first, so increase the count in steps
         count = min(max(2 * count, int(1.1 * count * budget / max(taken, 1e-9))), 100 * count, _MOST)
     return count
 

@@ -1,4 +1,4 @@
-"""A vehicle's numbers as plain values, for peers that know nothing of its file."""
+"""A vehicle's numbers as plain values, for peers that cannot read its file."""
 
 from __future__ import annotations
 
@@ -15,6 +15,6 @@ _NAMES = (
 
 
 def vehicle_numbers(name: str) -> dict[str, Any]:
-    """Return the numbers of a shipped vehicle, in SI units, as JSON can have them."""
+    """Return the numbers of a shipped vehicle, in SI units, as values for JSON."""
     vehicle = load_vehicle(name)
     return {key: np.asarray(getattr(vehicle, key), dtype=float).tolist() for key in _NAMES}

@@ -1,4 +1,4 @@
-"""What the page of a run costs to write and to open, and how smoothly it plays in a browser without a graphics card."""
+"""Times to write and to open the page of a run, and its frame rate in a browser without a graphics card."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from cosim.scenario.scenario import load_scenario
 STEPS = 120_000
 RATIO = "how many times as long as a frame may take at 30 frames a second"
 
-_SCENARIO = "pipe-inspection"  # which moves to the end, a region with it
+_SCENARIO = "pipe-inspection"  # which moves to the end, with a moving region
 _STEP = 0.01  # s
 _OTHERS = (3_000, 6_000)  # steps: half a minute and a minute
 _SPEEDS = (1.0, 5.0, 20.0)
@@ -30,7 +30,7 @@ _SMOOTH = Timing((1.0 / 30.0,))
 _PATIENCE = 120.0  # s
 _NO_BROWSER = "needs chromium, chromedriver and selenium"
 
-# what is painted while the page plays: when [ms], and what each part of it took
+# timestamp [ms] of each painted frame while the page plays, and the time of each part of it
 _PLAY = """
 const [speed, seconds, done] = arguments;
 const { page, player } = window.subreach;
@@ -62,7 +62,7 @@ def measure(steps: int, repeats: int) -> list[Row]:
     Parameters
     ----------
     steps : int
-        Of the long run.
+        Steps of the long run.
     repeats : int
         Times that a page is written and opened, and seconds that it plays at each speed.
 
@@ -96,7 +96,7 @@ def _page(folder: Path, steps: int, repeats: int) -> tuple[Path, Timing]:
 
 @contextlib.contextmanager
 def _browser(folder: Path) -> Iterator[Any]:
-    """Give a Chromium that renders in software, None where there is none."""
+    """Yield a Chromium that renders in software; None if there is none."""
     chromium, chromedriver = shutil.which("chromium"), shutil.which("chromedriver")
     if not (chromium and chromedriver and importlib.util.find_spec("selenium")):
         yield None
@@ -123,7 +123,7 @@ def _browser(folder: Path) -> Iterator[Any]:
 
 
 def _opened(browser: Any, page: Path, repeats: int) -> Timing:
-    """Time a page from its address to the first picture."""
+    """Time a page from the request of its address to the first picture."""
     from selenium.webdriver.support.ui import WebDriverWait
 
     times = []
@@ -138,7 +138,7 @@ def _opened(browser: Any, page: Path, repeats: int) -> Timing:
 
 
 def _played(browser: Any, speed: float, seconds: int) -> list[Row]:
-    """Play the page that is open; a sample is a second, least and most are its best and its worst one."""
+    """Play the open page; a sample is a second, least and most are its best and its worst one."""
     name = f"played at {speed:g}x"
     if not browser:
         return [Row(name, _NO_BROWSER)]
@@ -148,8 +148,8 @@ def _played(browser: Any, speed: float, seconds: int) -> list[Row]:
     counts = sorted(len(frames) for frames in of_second)
     if not counts[0]:
         return [Row(name, "a second went by without a frame")]
-    told = f"{name}: {counts[len(counts) // 2]} frames/s, in the worst second {counts[0]}"
-    rows = [Row(told, Timing(tuple(1.0 / count for count in counts)), "frame at 30/s", _SMOOTH)]
+    summary = f"{name}: {counts[len(counts) // 2]} frames/s, in the worst second {counts[0]}"
+    rows = [Row(summary, Timing(tuple(1.0 / count for count in counts)), "frame at 30/s", _SMOOTH)]
     for part in ("frame", "scene", "charts"):
         means = [_mean([taken[part][i] for i in frames if i < len(taken[part])]) / 1e3 for frames in of_second]
         what = "all of a frame" if part == "frame" else f"of that, {part}"

@@ -1,4 +1,4 @@
-"""From a body wrench to thruster forces within their limits."""
+"""Allocate a body wrench to thruster forces within their limits."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from controller.errors import LawError
 
 Array = NDArray[np.float64]
 
-_ROUNDING = 1e-12  # of the greatest force: what is smaller asks for nothing
+_ROUNDING = 1e-12  # of the greatest force: a smaller force counts as 0
 
 
 def _greatest(forces: Array) -> float:
-    """Return the greatest magnitude [N]; NaN if there is one."""
+    """Return the greatest magnitude [N]; NaN if a force is NaN."""
     greatest = 0.0
     for i in range(forces.size):
         if not abs(forces[i]) <= greatest:
@@ -26,9 +26,9 @@ def _greatest(forces: Array) -> float:
 
 
 def clip_each(forces: Array, lower: Array, upper: Array) -> bool:
-    """Cut thruster forces [N], shape (n,), in place, each at its own limits, and return whether any was beyond them.
+    """Clip thruster forces [N], shape (n,), in place, each at its own limits; return True if any was beyond them.
 
-    The wrench may turn.
+    The direction of the wrench may change.
     """
     cut, negligible = False, _ROUNDING * _greatest(forces)
     for i in range(forces.size):
@@ -39,7 +39,7 @@ def clip_each(forces: Array, lower: Array, upper: Array) -> bool:
 
 
 def keep_direction(forces: Array, lower: Array, upper: Array) -> bool:
-    """Scale thruster forces [N], shape (n,), in place until all are within limits, and return whether any was beyond.
+    """Scale thruster forces [N], shape (n,), in place until all are within limits; return True if any was beyond.
 
     The wrench keeps its direction.
     """
@@ -51,7 +51,7 @@ def keep_direction(forces: Array, lower: Array, upper: Array) -> bool:
             scale = min(scale, lower[i] / forces[i])
     for i in range(forces.size):
         forces[i] *= scale
-    clip_each(forces, lower, upper)  # of the last bit
+    clip_each(forces, lower, upper)  # for rounding in the last bit
     return scale < 1.0
 
 
@@ -65,7 +65,7 @@ def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: A
     lower, upper : ndarray, shape (n,)
         Limits of each thruster [N].
     direction : bool
-        Scale all forces together, or cut each on its own.
+        True to scale all forces together, False to clip each on its own.
     tau : ndarray, shape (6,)
         Wrench [N, N m], body frame.
     forces : ndarray, shape (n,)
@@ -74,7 +74,7 @@ def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: A
     Returns
     -------
     bool
-        Whether the limits cut the wrench.
+        True if the limits cut the wrench.
     """
     for i in range(forces.size):
         forces[i] = 0.0
@@ -86,8 +86,8 @@ def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: A
 class Allocation:
     """Thruster allocation by the pseudo-inverse, the least forces that give a wrench.
 
-    Thrusters whose limits are both 0 are left out. Limits bound what the pseudo-inverse asks; forces are not shared out
-    anew among thrusters with room, so that one-sided thrusters (a limit of 0) stop whatever needs their other side.
+    Thrusters whose limits are both 0 are left out. Forces of the pseudo-inverse are cut to the limits, and not
+    reallocated, so that one-sided thrusters (a limit of 0) stop every wrench that needs their other side.
 
     Parameters
     ----------
@@ -96,12 +96,12 @@ class Allocation:
     lower, upper : ndarray, shape (n,)
         Limits of each thruster [N]; 0 must lie within them.
     limits : {"direction", "per-thruster"}
-        How forces beyond the limits are brought within.
+        Way to bring forces within the limits.
 
     Attributes
     ----------
     arguments : tuple
-        What `allocate` is given first: inverse, lower and upper limits, whether direction is kept.
+        First arguments of `allocate`: inverse, lower and upper limits, True if direction is kept.
 
     Raises
     ------
@@ -138,6 +138,6 @@ class Allocation:
         Returns
         -------
         bool
-            Whether the limits cut the wrench.
+            True if the limits cut the wrench.
         """
         return bool(allocate(*self.arguments, tau, forces))

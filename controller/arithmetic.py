@@ -1,7 +1,7 @@
 """Arithmetic whose bits are the same in Python and in C, whatever the C library.
 
-Only +, -, *, / and square roots round alike everywhere. Powers, angles and their cosines are made of these here, for
-laws and shapes: the functions of C libraries, and of Python, differ in their last bits.
+Only +, -, *, / and square roots round alike everywhere. Powers, angles and their cosines are computed from these here,
+for laws and shapes: the functions of C libraries, and of Python, differ in their last bits.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def nearest_integer(x: float) -> int:
 
 
 def cosine(x: float) -> float:
-    """Return cos x, within 2e-16, of an angle below 1e6 [rad]: Taylor's series of what is left of quarter turns."""
+    """Return cos x, within 2e-16, of an angle below 1e6 [rad]: Taylor's series of the rest after quarter turns."""
     turns = nearest_integer(x / _QUARTER)
     r = (x - turns * _SHORT_QUARTER) - turns * _REST_OF_QUARTER
     s, cos_r, sin_r = r * r, 1.0, 1.0
@@ -65,7 +65,7 @@ def exponential(x: float) -> float:
 def arctangent(y: float, x: float) -> float:
     """Return the angle of the point (x, y) [rad], within 5e-16 of itself; 0 of (0, 0), and NaN of NaN.
 
-    The tangent is told from the nearest of 0, 1/4 .. 1, and Taylor's series gives what is left.
+    The tangent's distance from the nearest of 0, 1/4 .. 1 goes into Taylor's series.
     """
     if math.isnan(x) or math.isnan(y):
         return math.nan

@@ -1,11 +1,11 @@
-"""What can go wrong when a controller is set up."""
+"""Errors of the package, and the format of their messages."""
 
 import os
 import re
 
 MAX_QUOTED = 80  # characters that a message quotes at a time
-MAX_WORDS = 280  # characters of a message, beside
-MAX_WHERE = 250  # those of the file before it
+MAX_WORDS = 280  # characters of the rest of a message
+MAX_WHERE = 250  # characters of the file's name before it
 
 _SEP = re.escape(f"/{os.sep}")  # paths are kept whole
 _QUOTED = re.compile(
@@ -23,15 +23,15 @@ class ControllerError(Exception):
 
 
 class RegionError(ControllerError):
-    """A region that cannot be: a radius below zero, a polygon with two corners."""
+    """Raised for an invalid region: a radius below zero, a polygon with two corners."""
 
 
 class LawError(ControllerError):
-    """Gains or limits that cannot be."""
+    """Raised for invalid gains or limits."""
 
 
 def one_line(said: object) -> str:
-    """Return what is said as one printable line, with the middle cut out of what is quoted at length.
+    """Format a message as one printable line, and cut the middle out of long quotations.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def one_line(said: object) -> str:
     Returns
     -------
     str
-        The file before the first colon as a whole, unless it is absurdly long.
+        The line; a file's name before the first colon is kept, unless it is very long.
     """
     line = _QUOTED.sub(lambda quoted: _cut(quoted[0], MAX_QUOTED), printable(said))
     where, colon, what = line.partition(": ")
@@ -51,17 +51,17 @@ def one_line(said: object) -> str:
 
 
 def printable(said: object) -> str:
-    """Return what is said as one line that a terminal only shows.
+    """Format a message as one line without control characters.
 
     Parameters
     ----------
     said : object
-        Anything.
+        Message.
 
     Returns
     -------
     str
-        What is not printable, such as the escape of a terminal's orders, is as Python writes it.
+        The line; characters that are not printable, such as terminal escapes, are written as Python escapes.
     """
     line = " ".join(str(said).splitlines())
     return line if line.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
@@ -73,8 +73,8 @@ def _cut(text: str, most: int) -> str:
 
 
 class TranslationError(ControllerError):
-    """Python that is not translated to C; the message names file and line."""
+    """Raised for Python that is not translated to C; the message names file and line."""
 
 
 class CompilationError(ControllerError):
-    """There is no C compiler where one is needed, or it fails."""
+    """Raised where a C compiler is needed, but missing, or where it fails."""

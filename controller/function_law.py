@@ -1,4 +1,4 @@
-"""A law of one's own as a plain function: what is measured and how the regions stand in, forces out."""
+"""A custom law as a plain function: measured state and region values in, forces out."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from controller.law import Array, Diagnostic, Output, VehicleState
 from controller.regions.region_set import PackedRegions
 
 _REAL = "biufO"  # kinds of NumPy's types; O is of whole numbers too long for its own
-_LONGEST = 200  # characters, that a message shows of what came
+_LONGEST = 200  # characters of a value in a message
 
 
 class RegionsSeen(NamedTuple):
-    """Regions as they stand at the pose that the law is told; row i is of region i, in the order of the scenario.
+    """Regions evaluated at the measured pose; row i is of region i, in the order of the scenario.
 
     Examples
     --------
@@ -44,22 +44,22 @@ LawFunction = Callable[[VehicleState, RegionsSeen, RegionsSeen, Array], ArrayLik
 
 
 class FunctionLaw:
-    """A law that is a function of one's own; `Law` is the protocol that it fulfils.
+    """A law that is a custom function; it fulfils the protocol `Law`.
 
     Parameters
     ----------
     function : callable
-        ``function(state, goal, regions, weights)``, called once every control period. `goal` holds one row, `regions`
-        one for each secondary region, `weights`, shape (n,), what the arbiter gives each of these in [0, 1]. All are
-        copies. It returns the forces of the coming period. What it keeps between calls is its own affair: an object
+        ``function(state, goal, regions, weights)``, called once every control period. `goal` has one row, `regions`
+        one for each secondary region; `weights`, shape (n,), are those of the arbiter in [0, 1]. All are
+        copies. It returns the forces of the coming period. It may keep a state between calls: an object
         with a method ``__call__`` will do.
     output : {"wrench", "thrusters"}
-        What it returns: a wrench, shape (6,) [N, N m], body frame, or the thruster forces, shape (m,) [N].
+        Kind of the forces: a wrench, shape (6,) [N, N m], body frame, or the thruster forces, shape (m,) [N].
 
     Attributes
     ----------
     name : str
-        Where the function is from, such as ``my_laws:steer``.
+        Module and name of the function, such as ``my_laws:steer``.
 
     Raises
     ------
@@ -88,30 +88,30 @@ class FunctionLaw:
 
     @property
     def estimate(self) -> Array:
-        """Nothing, shape (4,): what a function estimates it keeps to itself."""
+        """Zeros, shape (4,): a function reports no estimate."""
         return np.zeros(4)
 
     @property
     def report(self) -> Array:
-        """Nothing, shape (0,)."""
+        """Empty, shape (0,): a function reports no diagnostics."""
         return np.zeros(0)
 
     def step(
         self, state: VehicleState, goal: PackedRegions, regions: PackedRegions, weights: Array, forces: Array
     ) -> None:
-        """Ask the function, and write what it returns.
+        """Call the function, and write its forces.
 
         Parameters
         ----------
         state, goal, regions, weights
             As of `Law.step`.
         forces : ndarray, shape (6,) or (n_thrusters,)
-            What it writes to [N, N m], as of `Law.step`.
+            Receives the forces [N, N m], as of `Law.step`.
 
         Raises
         ------
         LawError
-            If it returns anything but finite numbers of the right shape.
+            If the function returns anything but finite numbers of the right shape.
         """
         given = VehicleState(*(part.copy() for part in state))
         received = self._function(given, _seen(goal, given), _seen(regions, given), weights.copy())
@@ -125,7 +125,7 @@ class FunctionLaw:
 
 
 def _real_numbers(received: object) -> Array:
-    """Return what came as an array, empty where it is not of real numbers: neither complex ones nor texts will do."""
+    """Return a value as an array of floats; empty where it is not an array of real numbers."""
     try:
         array = np.asarray(received)
         return array.astype(float) if array.dtype.kind in _REAL else np.empty(0)
@@ -134,13 +134,13 @@ def _real_numbers(received: object) -> Array:
 
 
 def _shown(received: object) -> str:
-    """Return what came in one line, cut where it is long."""
+    """Format a value as one line, cut where it is long."""
     text = " ".join(repr(received).split())
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
 def qualified_name(law: object) -> str:
-    """Return where a function, or an object's class, is from.
+    """Return module and name of a function, or of an object's class.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""What every law is given and gives: state, regions and weights in; a body wrench or thruster forces out.
+"""The interface of every law: state, regions and weights in; a body wrench or thruster forces out.
 
-A law's mathematics is one compiled function ``step(state, goal, regions, weights, gains, memory, forces)``. All that it
-keeps between steps stands in its `memory`, a named tuple of arrays, so that the same function serves the readable
+A law's mathematics is one compiled function ``step(state, goal, regions, weights, gains, memory, forces)``. Its state
+between steps is its `memory`, a named tuple of arrays, so that the same function serves the readable
 master, which calls `CompiledLaw.step`, and compiled loops, which call the function itself.
 """
 
@@ -32,7 +32,7 @@ NOTHING_EXPECTED.flags.writeable = False
 
 
 class VehicleState(NamedTuple):
-    """What is measured of the vehicle.
+    """The measured state of the vehicle.
 
     Examples
     --------
@@ -46,13 +46,13 @@ class VehicleState(NamedTuple):
     position: Array  # (3,) m, NED
     quaternion: Array  # (4,) from body to world
     velocity_body: Array  # (6,) over ground, m/s, rad/s
-    thruster_health: Array  # (m,) 1 working as far as one is told, 0 known to give nothing
+    thruster_health: Array  # (m,) 1 working, or not reported as failed; 0 reported to give no force
     deviation: Array = _AS_THE_GAINS_SAY  # (12,) standard deviations of position [m], velocity [m/s], attitude [rad],
     # world axes, and rates [rad/s], body, of an estimate; 0: a measurement, whose noise is that of the law's gains
 
 
 class VehicleModel(NamedTuple):
-    """What a law may know of a vehicle: neither weight nor buoyancy, nor their centres, nor the current.
+    """The numbers of a vehicle that a law may use: no weight, buoyancy, nor their centres, nor the current.
 
     Examples
     --------
@@ -91,11 +91,11 @@ class Law(Protocol):
     (4,)
     """
 
-    diagnostics: tuple[Diagnostic, ...]  # what the numbers of `report` are
+    diagnostics: tuple[Diagnostic, ...]  # description of the numbers in `report`
 
     @property
     def output(self) -> Output:
-        """What `step` writes."""
+        """Kind of the forces that `step` writes."""
         ...
 
     @property
@@ -105,7 +105,7 @@ class Law(Protocol):
 
     @property
     def report(self) -> Array:
-        """What the last step has to say, shape (len(diagnostics),)."""
+        """Diagnostics of the last step, shape (len(diagnostics),)."""
         ...
 
     def step(
@@ -113,7 +113,7 @@ class Law(Protocol):
     ) -> None:
         """Write the wrench, shape (6,) [N, N m], or the thruster forces, shape (m,) [N], of the coming period.
 
-        Of `state`, `goal`, `regions`, `weights` and `forces` see `CompiledLaw.step`.
+        For `state`, `goal`, `regions`, `weights` and `forces` see `CompiledLaw.step`.
         """
         ...
 
@@ -124,11 +124,11 @@ class CompiledLaw:
     Attributes
     ----------
     gains : NamedTuple
-        Numbers that stay.
+        Constant numbers of the law.
     memory : NamedTuple of ndarray
-        What it keeps between steps; has at least ``estimate`` and ``report``.
+        State between steps; it has at least ``estimate`` and ``report``.
     n_regions, n_forces : int
-        How many secondary regions it is made for, and how many numbers it gives.
+        Number of secondary regions, and of forces.
 
     Examples
     --------
@@ -159,51 +159,51 @@ class CompiledLaw:
         Parameters
         ----------
         vehicle : VehicleModel
-            What it may know of the vehicle.
+            Known numbers of the vehicle.
         gains : NamedTuple
-            Of `gains_type`.
+            Gains of `gains_type`.
         desired_quaternion : array_like, shape (4,)
             Attitude to be kept, from body to world.
         period : float
             Control period [s].
         n_regions : int
-            How many secondary regions it will be given.
+            Number of secondary regions.
 
         Returns
         -------
         CompiledLaw
-            With a memory of its own.
+            The law, with a memory of its own.
 
         Raises
         ------
         LawError
-            If gains, attitude or period cannot be.
+            If gains, attitude or period are invalid.
         """
         raise NotImplementedError
 
     @classmethod
     def validate(cls, gains: G) -> G:
-        """Return gains if the law can work with them.
+        """Validate gains, and return them.
 
         Parameters
         ----------
         gains : NamedTuple
-            Of `gains_type`.
+            Gains of `gains_type`.
 
         Returns
         -------
         NamedTuple
-            The same.
+            The same gains.
 
         Raises
         ------
         LawError
-            If it cannot.
+            If the law cannot work with them.
         """
         raise NotImplementedError
 
     def set_attitude(self, quaternion: Array) -> None:
-        """Keep another attitude from the next step on.
+        """Set the desired attitude from the next step on.
 
         Parameters
         ----------
@@ -225,7 +225,7 @@ class CompiledLaw:
 
     @property
     def report(self) -> Array:
-        """What the last step has to say, shape (len(diagnostics),)."""
+        """Diagnostics of the last step, shape (len(diagnostics),)."""
         report: Array = self.memory.report
         return report
 
@@ -237,30 +237,30 @@ class CompiledLaw:
     def step(
         self, state: VehicleState, goal: PackedRegions, regions: PackedRegions, weights: Array, forces: Array
     ) -> None:
-        """Write the forces of the coming control period, and carry the memory over it.
+        """Write the forces of the coming control period, and update the memory.
 
         Parameters
         ----------
         state : VehicleState
-            As measured now.
+            Measured state.
         goal : PackedRegions
             The primary region alone.
         regions : PackedRegions
             The n secondary regions.
         weights : ndarray, shape (n,)
-            Of each secondary region, from the arbiter, in [0, 1].
+            Weight of each secondary region, from the arbiter, in [0, 1].
         forces : ndarray, shape (6,) or (m,)
-            Receives the wrench [N, N m], body frame, or the thruster forces [N], as `output` says.
+            Receives the wrench [N, N m], body frame, or the thruster forces [N]; `output` states which.
         """
         if state is not self._state and not all(part.flags.c_contiguous for part in state):
-            state = VehicleState(*(part.copy() for part in state))  # the numbers in C stand side by side
+            state = VehicleState(*(part.copy() for part in state))  # C needs contiguous arrays
         self._state = state
         self._step(state, goal, regions, weights, self.gains, self.memory, forces)
 
     def bound(
         self, state: VehicleState, goal: PackedRegions, regions: PackedRegions, weights: Array, forces: Array
     ) -> BoundCall:
-        """Return its step with these arguments, those of `step`, to be called by whoever calls C."""
+        """Return the step with these arguments, those of `step`, as a call that C code can make."""
         return BoundCall(type(self).function, (state, goal, regions, weights, self.gains, self.memory, forces))
 
     @functools.cached_property
@@ -269,23 +269,23 @@ class CompiledLaw:
 
 
 class WrenchLaw(CompiledLaw):
-    """A law that gives a wrench, and wants to know nothing of the vehicle.
+    """A law that gives a wrench, and uses no numbers of the vehicle.
 
     Parameters
     ----------
     gains : NamedTuple
-        Of `gains_type`.
+        Gains of `gains_type`.
     desired_quaternion : array_like, shape (4,)
         Attitude to be kept, from body to world.
     period : float
         Control period [s].
     n_regions : int
-        How many secondary regions it will be given.
+        Number of secondary regions.
 
     Raises
     ------
     LawError
-        If gains, attitude or period cannot be.
+        If gains, attitude or period are invalid.
     """
 
     output: ClassVar[Output] = "wrench"
@@ -296,12 +296,12 @@ class WrenchLaw(CompiledLaw):
     def for_vehicle(
         cls, vehicle: VehicleModel, gains: Any, desired_quaternion: Array, period: float, n_regions: int
     ) -> WrenchLaw:
-        """Return the law, as `CompiledLaw.for_vehicle`; of the vehicle it uses nothing."""
+        """Return the law, as `CompiledLaw.for_vehicle`; the vehicle is not used."""
         return cls(gains, desired_quaternion, period, n_regions)
 
     @classmethod
     def validate(cls, gains: G) -> G:
-        """Return gains if the law can work with them."""
+        """Validate gains, and return them."""
         return validate_gains(gains, cls.above_zero)
 
     def __init__(self, gains: Any, desired_quaternion: Array, period: float, n_regions: int) -> None:
@@ -311,7 +311,7 @@ class WrenchLaw(CompiledLaw):
 
 
 def validate_period(period: float) -> float:
-    """Return a control period [s] if it can be one.
+    """Validate a control period [s], and return it.
 
     Parameters
     ----------
@@ -334,7 +334,7 @@ def validate_period(period: float) -> float:
 
 
 def validate_quaternion(quaternion: Array) -> Array:
-    """Return a desired attitude as an array of its own, shape (4,).
+    """Validate a desired attitude, and return it as an array of its own, shape (4,).
 
     Parameters
     ----------
@@ -344,7 +344,7 @@ def validate_quaternion(quaternion: Array) -> Array:
     Returns
     -------
     ndarray, shape (4,)
-        The same.
+        The same quaternion.
 
     Raises
     ------
@@ -358,24 +358,24 @@ def validate_quaternion(quaternion: Array) -> Array:
 
 
 def validate_gains(gains: G, above_zero: Container[str]) -> G:
-    """Return the gains if a law can work with them.
+    """Validate gains, and return them.
 
     Parameters
     ----------
     gains : NamedTuple of float
-        To be checked.
+        Gains to validate.
     above_zero : container of str
-        Names of those that must not be 0.
+        Names of gains that must not be 0.
 
     Returns
     -------
     NamedTuple of float
-        The same.
+        The same gains.
 
     Raises
     ------
     LawError
-        If one is negative or not finite, or one that divides is zero.
+        If a gain is negative or not finite, or 0 although it divides.
     """
     for name, value in zip(type(gains)._fields, gains, strict=True):  # type: ignore[attr-defined]
         positive = name in above_zero

@@ -1,4 +1,4 @@
-"""A law as a C file: its step, and what it begins with."""
+"""Export a law as a C file: its step function, and its data at the start."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def translate_law(law: CompiledLaw, goal: PackedRegions, regions: PackedRegions,
     Parameters
     ----------
     law : CompiledLaw
-        With its gains, and its memory as it is now.
+        Law with its gains, and its memory as it is now.
     goal : PackedRegions
         The goal region alone.
     regions : PackedRegions
         The secondary regions, as many as the law was made for.
     name : str, optional
-        Of the function ``void name(const void *)`` and of ``name_data``, its arguments in static memory: before each
-        call write what is measured into them, and read the forces from the last one after it.
+        Name of the function ``void name(const void *)``; ``name_data`` are its arguments in static memory: before each
+        call write the measurements into them, and read the forces from the last one after it.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def translate_law(law: CompiledLaw, goal: PackedRegions, regions: PackedRegions,
     Raises
     ------
     LawError
-        If it is a law of one's own in plain Python, or made for another number of regions.
+        If it is a custom law in plain Python, or made for another number of regions.
     TranslationError
         If the law is written in Python that is not translated; with file and line.
 

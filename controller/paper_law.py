@@ -1,7 +1,7 @@
-"""The law as printed: equations (16)-(29), faithful to the letter where it can be read, as resolved where it cannot.
+"""The paper's law: equations (16)-(29), to the letter where it can be read, as resolved where it cannot.
 
-It knows no thrusters and no limits. With the paper's gains it asks for tens of kilonewtons far from the goal; under a
-limit its adaptation (27) winds up. It is here to be studied, not to be put on a vehicle.
+It has no thrusters and no limits. With the paper's gains it commands tens of kilonewtons far from the goal; under a
+limit its adaptation (27) winds up. It is here for study, not for use on a vehicle.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Gains(NamedTuple):
 def positive_part(value: float) -> float:
     """Return max(0, g) of a `value` g, as in (16), (17), (20) and (22).
 
-    NaN stays NaN, lest a lost measurement looked like safety.
+    NaN stays NaN, so that a lost measurement does not look like safety.
     """
     return 0.0 if value <= 0.0 else value
 
@@ -99,7 +99,7 @@ def secondary_error(values: Array, gradients: Array, betas: Array) -> Array:
 
 
 def in_body(R: Rows, x: Vector3) -> Vector3:
-    """Return R^T x, a world vector seen from the body."""
+    """Return R^T x, a world vector in body axes."""
     return (
         R[0][0] * x[0] + R[1][0] * x[1] + R[2][0] * x[2],
         R[0][1] * x[0] + R[1][1] * x[1] + R[2][1] * x[2],
@@ -118,7 +118,7 @@ def apply(
     estimate: Array,
     tau: Array,
 ) -> None:
-    """Write tau: (25) with (26), (29); then carry the estimate over a period: (27) with (28).
+    """Write tau: (25) with (26), (29); then update the estimate over a period: (27) with (28).
 
     Parameters
     ----------
@@ -127,15 +127,15 @@ def apply(
     e_att : three numbers
         Vector part of the error quaternion (23).
     R : three rows
-        From body to world.
+        Rotation matrix from body to world.
     velocity_body : ndarray, shape (6,)
         nu [m/s, rad/s].
     gains : Gains
         K_0 = diag(k_p1 R^T, k_p2 I), K_s = [k_q R^T; 0], K_v = diag(k_v1 I, k_v2 I) (26).
     period : float
-        For how long the wrench is held [s]; (27) is integrated over it by Euler's rule.
+        Time for which the wrench is held [s]; (27) is integrated over it by Euler's rule.
     estimate : ndarray, shape (4,)
-        phi-hat [N, N m], updated in place after it was used.
+        phi-hat [N, N m], updated in place after its use.
     tau : ndarray, shape (6,)
         Receives the wrench [N, N m], body frame.
     """
@@ -181,12 +181,12 @@ def step(
     estimate: Array,
     tau: Array,
 ) -> None:
-    """Compute the wrench of one control period, then carry the estimate over it.
+    """Compute the wrench of one control period, then update the estimate over it.
 
     Parameters
     ----------
     quaternion, desired_quaternion : ndarray, shape (4,)
-        Attitude from body to world, as it is and as it shall be.
+        Actual and desired attitude, from body to world.
     velocity_body : ndarray, shape (6,)
         nu [m/s, rad/s].
     goal_value : float
@@ -198,11 +198,11 @@ def step(
     alphas : ndarray, shape (n,)
         Gain of each region (section VII) times its weight from the arbiter (section VI).
     gains : Gains
-        The law's own.
+        Gains of the law.
     period : float
-        For how long the wrench is held [s]; (27) is integrated over it by Euler's rule.
+        Time for which the wrench is held [s]; (27) is integrated over it by Euler's rule.
     estimate : ndarray, shape (4,)
-        phi-hat, updated in place after it was used.
+        phi-hat, updated in place after its use.
     tau : ndarray, shape (6,)
         Receives the wrench [N, N m], body frame.
     """

@@ -1,9 +1,9 @@
-"""What the laws for comparison share: a bounded pull to the goal region, the push of all other regions, and damping.
+"""Common parts of the laws for comparison: a bounded pull to the goal, the push of all other regions, and damping.
 
-Their sources know no obstacles. Here each gets what its kind admits, the potential force (22) of every secondary
+Their sources have no obstacles. Here each gets the potential force (22) of every secondary
 region, with all weights on, for none of the sources has an arbiter. A region is grown by a `reach`, so that it pushes
 before the vehicle is at its surface, and g is the signed distance to the grown region, whose gradient has the length
-1 that (19) wants.
+1, as (19) requires.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 
 
 class Field(NamedTuple):
-    """Where regions are evaluated, and what comes of it."""
+    """Work arrays for the evaluation of regions, and the results."""
 
     goal_value: Array  # (1,)
     goal_gradient: Array  # (1, 3)
@@ -57,12 +57,12 @@ def field_of(n_regions: int) -> Field:
 def evaluate_field(
     state: VehicleState, goal: PackedRegions, regions: PackedRegions, repulsion: float, reach: float, field: Field
 ) -> None:
-    """Evaluate all regions at a pose, and sum up the push of those of places.
+    """Evaluate all regions at a pose, and sum up the push of those that depend on position alone.
 
     Parameters
     ----------
     state : VehicleState
-        As measured.
+        Measured state.
     goal, regions : PackedRegions
         The primary region, and the n secondary ones.
     repulsion : float
@@ -93,15 +93,15 @@ def along(gradient: Array, length: float, total: Array) -> None:
 
 
 def set_point_error(field: Field, inset: float, most: float) -> None:
-    """Write into `field.error` how far the vehicle is from its set point [m, NED], cut at a length.
+    """Write the vector from the set point to the vehicle [m, NED] into `field.error`, shortened to a length.
 
     The set point is the nearest point whose clearance within the goal region is `inset`: the centre of a sphere of that
-    radius. No region's deepest point is asked for, so that every shape can be a goal.
+    radius. No region's deepest point is needed, so that every shape can be a goal.
 
     Parameters
     ----------
     field : Field
-        Evaluated.
+        Evaluated regions; its `error` is written.
     inset : float
         [m], at most the greatest clearance that the goal region has.
     most : float
@@ -121,7 +121,7 @@ def shorten(vector: Array, most: float) -> None:
 
 
 def add_turned(R: Array, force: Array, factor: float, wrench: Array) -> None:
-    """Add `factor` times R^T `force`, a force of the world [N], shape (3,), to a body wrench, shape (6,) [N, N m]."""
+    """Add `factor` times R^T `force` to a body wrench, shape (6,) [N, N m]; the force, shape (3,) [N], is in NED."""
     for i in range(3):
         wrench[i] += factor * (R[0, i] * force[0] + R[1, i] * force[1] + R[2, i] * force[2])
 
@@ -134,9 +134,9 @@ def damp(velocity_body: Array, attitude_error: Vector3, k_p2: float, k_v1: float
 
 
 def keep_within(estimate: Array, first: int, last: int, bound: float) -> None:
-    """Cut the numbers from `first` up to, not including, `last` of an estimate at -`bound` and `bound`; NaN stays.
+    """Clip the numbers from `first` up to, not including, `last` of an estimate to +-`bound`; NaN stays.
 
-    This projection keeps an estimate from winding up while something holds the vehicle back.
+    This projection prevents windup of the estimate while an obstacle holds the vehicle back.
     """
     for i in range(first, last):
         if abs(estimate[i]) > bound:

@@ -4,7 +4,7 @@
     subject to  a_i^T u + s_i >= b_i,   lower <= u <= upper
 
 Slack s_i of a barrier costs rho_i, so there is always exactly one solution. Its dual has a multiplier
-for each barrier and each limit and asks only that they be >= 0,
+for each barrier and each limit, and only the constraint y >= 0,
 
     minimise    1/2 y^T G y - d^T y,   y >= 0,   G = A H^-1 A^T + diag(1 / rho),   d = b - A u0,
 
@@ -32,7 +32,7 @@ from controller.linear_algebra import copy
 Array = NDArray[np.float64]
 
 _TOLERANCE = 1e-11  # of the greatest violation at the start, below which a row counts as kept
-_DEPENDENT = 1e-12  # of a row's own G_ii: where less is left of it beside the other rows, it depends on them
+_DEPENDENT = 1e-12  # of a row's own G_ii: a row with a smaller rest beside the other rows depends on them
 _STEPS_A_ROW = 3
 _HALF = 2.0**27 + 1.0  # splits the 53 bits of a number into two exact halves
 _FREE, _PASSIVE, _ASIDE, _NOTHING = 0, 1, 2, 3  # state of a row: may be added, is passive, is set aside, moves no force
@@ -93,12 +93,12 @@ def empty_workspace(barriers: int, thrusters: int) -> Workspace:
 
 
 def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: Array, forces: Array) -> int:
-    """Solve the program whose first `barriers` rows, right sides and prices stand in `work`, with u0 in `nominal`.
+    """Solve the program with `barriers` rows, right sides and prices in `work`, and with u0 in `nominal`.
 
     Parameters
     ----------
     work : Workspace
-        Holds the program, and afterwards the multipliers of the solution. A barrier with a number that is not finite is
+        Program, and afterwards the multipliers of the solution. A barrier with a number that is not finite is
         left out; a nominal force that is not finite becomes 0.
     barriers : int
         Number of rows in use.
@@ -159,7 +159,7 @@ def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: A
 
 
 def _clip_to_limits(work: Workspace, lower: Array, upper: Array, forces: Array) -> bool:
-    """Clip the forces to their limits; return False if any was not finite, which its nominal force then replaces."""
+    """Clip the forces to their limits; replace each that is not finite by its nominal one, and return False then."""
     finite = True
     for j in range(forces.size):
         if not np.isfinite(forces[j]):

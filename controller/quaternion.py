@@ -121,7 +121,7 @@ def error_parts(desired: Array, actual: Array) -> Vector4:
 def error(desired: Array, actual: Array) -> Array:
     """Return the error quaternion desired^-1 * actual, shape (4,), of the shortest rotation (scalar part >= 0): (23).
 
-    In body coordinates, so that it moves with the body rates as (24) says.
+    In body coordinates, so that it moves with the body rates by (24).
     """
     e = np.empty(4)
     e[0], e[1], e[2], e[3] = error_parts(desired, actual)

@@ -1,4 +1,4 @@
-"""Weight and buoyancy, linear in what the controller does not know: g(eta) = Z(eta) phi (12).
+"""Weight and buoyancy, linear in the unknown parameters: g(eta) = Z(eta) phi (12).
 
 phi = [W - B, x_G W - x_B B, y_G W - y_B B, z_G W - z_B B], in N and N m.
 """

@@ -1,4 +1,4 @@
-"""Small arrays on the stack: room for a few numbers in functions that are translated to C, which ask for no memory."""
+"""Small arrays on the stack: scratch space in functions that are translated to C, which allocate no memory."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from numpy.typing import NDArray
 
 
 def zeros(*shape: int) -> NDArray[np.float64]:
-    """Return an array of zeros, which in C lasts until the function that asked for it returns.
+    """Return an array of zeros, which in C lasts until the calling function returns.
 
-    It must not be returned, nor kept in what outlasts the call.
+    It must not be returned, nor stored beyond the call.
 
     Parameters
     ----------
     *shape : int
-        Written as numbers, such as ``zeros(3, 3)``; some dozen elements at most.
+        Literal numbers, such as ``zeros(3, 3)``; some dozen elements at most.
 
     Returns
     -------
     ndarray
-        Of float64, in C order.
+        Array of float64, in C order.
     """
     return np.zeros(shape)

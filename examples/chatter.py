@@ -1,4 +1,4 @@
-"""Chatter of an arbiter's weights on the border of a region, and what calms it.
+"""Chatter of an arbiter's weights on the border of a region, and ways to reduce it.
 
 In the vertical plane of the paper's scene a vehicle goes to the surface of the obstacle, holds its station there, and
 goes back, in a band of depths that it should leave all the while. Its position is measured with noise, so that on the
@@ -42,7 +42,7 @@ def on_clearances(start: float, end: float) -> Arbiter:
 
 
 def ways() -> dict[str, Decide]:
-    """Return the ways to decide: from clearances and times to weights, a row for each step."""
+    """Return the ways to decide, by name: functions from clearances and times to weights, a row for each step."""
     crisp, outside, near = Arbiter(), on_clearances(0.0, 0.1), on_clearances(0.0, 0.05)
     narrow, wide = on_clearances(-0.05, 0.05), on_clearances(-0.15, 0.15)
     latched = HysteresisArbiter(near, enter=1.0, release=0.0)
@@ -65,12 +65,12 @@ def variation(weights: Array) -> float:
 
 
 def switches(weights: Array) -> int:
-    """Return how often the obstacle's weight passes 1/2."""
+    """Return the number of times that the obstacle's weight passes 1/2."""
     return int(np.count_nonzero(np.diff(weights[:, 0] > 0.5)))
 
 
 def table() -> list[tuple[str, float, int, float]]:
-    """Return for each way its name, total variation, switches, and total variation without noise."""
+    """Return the name, total variation, switches, and total variation without noise of each way."""
     times, clearances = measured()
     _, true = measured(noise=0.0)
     rows = []

@@ -1,6 +1,6 @@
 """The plant's FMU in FMPy alone: a dive in a current, by nothing but the FMI standard.
 
-What one learns: what the FMU's variables are called, that parameters, start values and inputs are set like those of
+What one learns: the names of the FMU's variables, that parameters, start values and inputs are set as in
 any FMU, and that FMPy's own solver can integrate it as well (model exchange). subreach is needed once, to make the
 file, by a command of its own; where the file is used it need not be installed, nor any Python.
 """

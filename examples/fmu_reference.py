@@ -1,4 +1,4 @@
-"""Run an FMU through the manoeuvre that it carries, compare with the results beside it, and draw both.
+"""Run an FMU through the manoeuvre in it, compare with the reference results in it, and draw both.
 
     python examples/fmu_reference.py        writes fmu-reference.png here
 

@@ -20,7 +20,7 @@ if __name__ == "__main__":
     with Plant("odin") as plant:
         plant.set({"position.z": 1.0, "wrench_force_limit": 60.0})
         plant.initialise()
-        wrench = plant.inputs.values[-6:]  # behind the thrusters
+        wrench = plant.inputs.values[-6:]  # after the thrusters
         for _ in range(round(DURATION / STEP)):
             out = plant.outputs.values
             state = VehicleState(

@@ -1,9 +1,9 @@
-"""A law of one's own: a plain Python function, flown with record, summary, report and replay like any other.
+"""A custom law: a plain Python function, flown with record, summary, report and replay like any other.
 
-What one learns: what a law is told, what it returns, and how it is handed over. This one is a dozen lines long. It
-pulls towards the goal like a spring of limited force, pushes away from regions as far as the arbiter lets them have a
-say, brakes, and keeps upright. It knows nothing of weight and buoyancy, and so stops above the middle of the goal:
-that is what the adaptive laws are for. Writes the folder runs/own-law.
+What one learns: the inputs of a law, its output, and how to pass it to a run. This one is a dozen lines long. It
+pulls towards the goal like a spring of limited force, pushes away from regions in proportion to the arbiter's
+weights, brakes, and keeps upright. It does not know weight and buoyancy, and so stops above the middle of the goal:
+the adaptive laws compensate them. Writes the folder runs/own-law.
 """
 
 from pathlib import Path
@@ -20,7 +20,7 @@ SETTINGS = ["time.step=0.01", "time.control=0.01", "time.arbiter=0.01", "arbiter
 
 
 def direction(vector: np.ndarray) -> np.ndarray:
-    """Return a vector at length 1, and none as none."""
+    """Return a vector scaled to length 1; a zero vector stays."""
     return vector / max(float(np.linalg.norm(vector)), 1e-9)
 
 

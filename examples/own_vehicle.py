@@ -1,6 +1,6 @@
-"""A vehicle of one's own, from a TOML file to an FMU and a run.
+"""A custom vehicle, from a TOML file to an FMU and a run.
 
-What one learns: the few keys that make a vehicle, what its FMU says of it, and that a scenario takes it by the file's
+What one learns: the few keys that make a vehicle, the variables of its FMU, and that a scenario takes it by the file's
 name. The vehicle is a made-up open frame of 20 kg with four vectored horizontal thrusters and two vertical ones: it can
 turn its heading but neither roll nor pitch, and stays upright because its weight hangs below its buoyancy. When run
 it writes frame.toml, frame.fmu, pool.toml and runs/frame here.
@@ -69,7 +69,7 @@ through = "thrusters"
 if __name__ == "__main__":
     Path("frame.toml").write_text(FRAME)
 
-    vehicle = load_vehicle(Path("frame.toml"))  # refuses what cannot be, by the name of its key
+    vehicle = load_vehicle(Path("frame.toml"))  # refuses an invalid value, and names its key
     fmu = build_fmu(vehicle, 3, Path("frame.fmu"))
     print(f"{vehicle.title}: {vehicle.n_thrusters} thrusters, {fmu.name} of {fmu.stat().st_size / 1024:.0f} kB")
 

@@ -15,9 +15,9 @@ if __name__ == "__main__":
     link = Mavlink((parse_endpoint(f"udpout:127.0.0.1:{port}"),), MavlinkOptions())
     scenario = load_scenario("paper-limited", ["time.duration=5.0", "arbiter.engine=closed"])
     run_scenario(scenario, Path("runs/streamed"), mavlink=link, report=False)
-    heard = []
+    received = []
     while message := listener.recv_match(timeout=0.5, blocking=True):
-        heard.append(message)
-    last = next(m for m in reversed(heard) if m.get_type() == "LOCAL_POSITION_NED")
-    print(f"{len(heard)} messages, {len({m.get_type() for m in heard})} kinds")
+        received.append(message)
+    last = next(m for m in reversed(received) if m.get_type() == "LOCAL_POSITION_NED")
+    print(f"{len(received)} messages, {len({m.get_type() for m in received})} kinds")
     print(f"last seen at north {last.x:.2f} m, {last.z:.2f} m deep, {last.time_boot_ms / 1000:.1f} s after the start")

@@ -1,7 +1,7 @@
 """A fuzzy arbiter of prioritised criteria, which decides to what degree each one matters now.
 
 `Arbiter` loads, saves, decides, explains and verifies. The modules `terms` (curves, values), `pictures`, `formats`
-(files as systems, `fold_normalization`) and `export` (C and Python code) are there for those who ask for more.
+(files as systems, `fold_normalization`) and `export` (C and Python code) serve more detailed uses.
 """
 
 import importlib
@@ -50,7 +50,7 @@ __all__ = [
     "triangle",
 ]
 
-# imported when asked for, so that the command can say what is not installed
+# imported on first use, so that the command can report a dependency that is not installed
 _HOMES = {
     "arbiter": {"Arbiter"},
     "terms.automatic": {"auto_terms"},

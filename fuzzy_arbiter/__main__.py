@@ -26,7 +26,7 @@ except ModuleNotFoundError as error:  # in a checkout that is not installed
 
 FINDINGS, FAULT, INTERRUPTED, NO_READER = 1, 2, 130, 141
 
-_EPILOG = """FILE is of JSON, TOML, FCL, FIS or FLL, told by its suffix, or the word section-vi: the arbiter of
+_EPILOG = """FILE is of JSON, TOML, FCL, FIS or FLL, by its suffix, or the word section-vi: the arbiter of
 obstacle, shape and depth.
 
 examples:
@@ -41,7 +41,7 @@ examples:
 
 
 class _Version(argparse.Action):
-    """Prints the version, which takes a while to find."""
+    """Print the version, which takes a while to find."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         from importlib import metadata
@@ -55,7 +55,7 @@ class _Version(argparse.Action):
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line, as all other errors."""
+    """Report a wrong option in one line, as all other errors."""
 
     def print_help(self, file: Any = None) -> None:
         """Print it; argparse itself would pass over output that fails."""
@@ -156,10 +156,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 1 if `verify` found something; 2 where the user must mend something; 130 if interrupted; 141 if what was
-        printed has no reader.
+        0; 1 if `verify` found a defect; 2 if the input or an option is wrong; 130 if interrupted; 141 if the reader of
+        the output closed it.
     """
-    if sys.stdout is None:  # closed by whoever started this: the next file that is opened would take its place
+    if sys.stdout is None:  # closed by the parent process: the next file that is opened would take its place
         return _fault("standard output is closed; expected it open, such as on /dev/null")
     try:
         try:
@@ -182,7 +182,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
-    """Parse, and let values stand behind options too, and begin with a minus."""
+    """Parse, and allow negative numbers and values after options."""
     parser = _parser()
     options, rest = parser.parse_known_args(arguments)
     for word in rest:
@@ -201,20 +201,20 @@ def _is_number(word: str) -> bool:
 
 
 def _drop_output() -> None:
-    """Let what is left of the output go nowhere, else the interpreter fails again to write it at its end."""
+    """Redirect standard output to the null device, else the interpreter fails again as it flushes at its end."""
     with contextlib.suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _tell(what: str) -> None:
-    """Say something in one line on standard error; nothing where that is closed or gone."""
+def _report(what: str) -> None:
+    """Print one line on standard error; nothing where that is closed or gone."""
     if sys.stderr is not None:  # else `print` would take standard output
         with contextlib.suppress(OSError):
             print(f"fuzzy_arbiter: {one_line(what)}", file=sys.stderr, flush=True)
 
 
 def _fault(what: str) -> int:
-    _tell(what)
+    _report(what)
     return FAULT
 
 
@@ -246,7 +246,7 @@ def _run(options: argparse.Namespace) -> int:
         figure = draw(arbiter, options.kind, options.input, options.output, [*options.at, *assumed], options.relief)
         write_atomic(options.out, image(figure, Path(options.out).suffix[1:].lower()))
         if assumed:
-            _tell(f"drawn at the middle of each input that --at leaves out: {' '.join(assumed)}")
+            _report(f"drawn at the middle of each input that --at leaves out: {' '.join(assumed)}")
         print(options.out)
     else:
         _evaluate(arbiter, options)

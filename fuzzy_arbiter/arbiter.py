@@ -1,4 +1,4 @@
-"""The arbiter: inputs in, weights out, by the engine of one's choice."""
+"""The arbiter: inputs in, weights out, by a chosen engine."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Arbiter:
-    """Decides to what degree each of several prioritised criteria matters now, in the manner of a human pilot.
+    """Decide to what degree each of several prioritised criteria matters now, in the manner of a human pilot.
 
     Nothing in it changes after it is made; threads may share it.
 
@@ -33,9 +33,9 @@ class Arbiter:
     criteria : sequence of Criterion
         In order of priority, the highest first; default: obstacle, shape, depth of the paper's section VI.
     form, weight, normalization, outside, points
-        How the criteria become a system, as of `prioritised`.
+        Form of the system, as of `prioritised`.
     system : System, optional
-        Any other Mamdani system, in the place of all of the above.
+        A Mamdani system, in place of all of the above.
     engine : {"auto", "closed", "exact", "grid", "skfuzzy"}
         ``closed`` is the exact centroid in closed form, for outputs of two complementary terms; ``exact`` the exact
         centroid of any system; ``grid`` what scikit-fuzzy's sampling gives, without the sampling; ``skfuzzy`` is
@@ -81,7 +81,7 @@ class Arbiter:
 
     @property
     def system(self) -> System:
-        """What is evaluated."""
+        """System that is evaluated."""
         return self._system
 
     @property
@@ -91,12 +91,12 @@ class Arbiter:
 
     @property
     def engine_reason(self) -> str:
-        """Why it is this engine."""
+        """Reason for the choice of the engine."""
         return self._why
 
     @property
     def samples(self) -> Samples:
-        """What checks the inputs."""
+        """Validator of the inputs."""
         return self._samples
 
     def __call__(self, inputs: Sample | None = None, /, **named: float) -> Result[float]:
@@ -200,7 +200,7 @@ class Arbiter:
         return tuple.__new__(self._result, self._engine.centroids(self._samples.one(_one_of(inputs, named))))
 
     def explain(self, inputs: Sample | None = None, /, **named: float) -> Explanation:
-        """Return which rules fired for one sample, how strongly, and which decided.
+        """Explain the decision for one sample: the strength of each rule, and the rules that decided.
 
         Parameters
         ----------
@@ -210,7 +210,7 @@ class Arbiter:
         Returns
         -------
         Explanation
-            As data; its text is for people.
+            Data; its `str` is a text for people.
 
         Raises
         ------
@@ -222,12 +222,12 @@ class Arbiter:
         return explain(self._engine, self._samples.one(_one_of(inputs, named)))
 
     def verify(self) -> Verification:
-        """Return whether the rules are complete, consistent and exclusive, and the terms without gaps.
+        """Check that the rules are complete, consistent and exclusive, and that the terms have no gaps.
 
         Returns
         -------
         Verification
-            As data; its text is for people.
+            Data; its `str` is a text for people.
         """
         from fuzzy_arbiter.verification import verify
 
@@ -248,27 +248,27 @@ class Arbiter:
         Parameters
         ----------
         path : str or Path
-            Of a JSON, TOML, FCL, FIS or FLL file, told by its suffix.
+            JSON, TOML, FCL, FIS or FLL file; its suffix selects the format.
         engine : str
             As of `Arbiter`.
         outside : {"refuse", "clip"}, optional
-            What happens to an input outside its universe, in the place of what the file says.
+            Treatment of an input outside its universe, in place of the file's.
         default : float or mapping from output's name to float, optional
-            Value of all outputs, or of those that are named, where no rule fires, in the place of what the file says.
+            Value of all outputs, or of the named ones, where no rule fires, in place of the file's.
         block : str, optional
-            Which FUNCTION_BLOCK of a FCL file is meant, by its name; needed where there are several.
+            Name of the FUNCTION_BLOCK in a FCL file; needed where there are several.
 
         Returns
         -------
         Arbiter
-            Of the system in the file.
+            Arbiter of the file's system.
 
         Raises
         ------
         FormatError
-            If the file cannot be read, is not of its format, or says what this package does not know.
+            If the file cannot be read, is not of its format, or uses an unsupported part of it.
         DefinitionError
-            If what it defines cannot be.
+            If the file's definition is invalid.
         """
         from fuzzy_arbiter.formats import load
 
@@ -286,12 +286,12 @@ class Arbiter:
         Parameters
         ----------
         path : str or Path
-            Of a JSON, TOML, FCL, FIS or FLL file, told by its suffix.
+            JSON, TOML, FCL, FIS or FLL file; its suffix selects the format.
 
         Raises
         ------
         UnsupportedError
-            If the format cannot say all of the definition; nothing is written then.
+            If the format cannot represent the definition; nothing is written then.
         FormatError
             If the file cannot be written.
         """
@@ -350,7 +350,7 @@ class Arbiter:
 
 
 def _one_of(inputs: Any, named: Mapping[str, Any]) -> Any:
-    """Return what came, by position or by keywords."""
+    """Return the inputs that were given by position or by keyword; refuse both at once."""
     if not named:
         return inputs
     if inputs is not None:

@@ -1,4 +1,4 @@
-"""What a definition is made of: checked, so that whatever else comes is refused in one line."""
+"""Validate the parts of a definition; refuse each invalid one in one line."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ def finite(value: object) -> float | None:
     Parameters
     ----------
     value : object
-        Anything.
+        Value to check.
 
     Returns
     -------
     float or None
-        None for what is no real number or not finite; a truth value is no number here, nor is a text.
+        None for a value that is not a finite real number; Booleans and texts are not numbers here.
     """
     try:
         x = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     except OverflowError:
         return None
-    return x + 0.0 if math.isfinite(x) else None  # without the sign of zero, so that what is equal looks equal
+    return x + 0.0 if math.isfinite(x) else None  # -0.0 becomes 0.0, so that equal values have equal texts
 
 
 def all_of(kind: type[_T] | tuple[type[_T], ...], values: object, where: object, expected: str) -> tuple[_T, ...]:
-    """Return the members of a sequence or of anything else that can be gone through.
+    """Return the members of an iterable as a tuple, and check the type of each.
 
     Parameters
     ----------
     kind : type or tuple of type
-        What each must be.
+        Type that each member must have.
     values : object
-        What came.
+        Iterable to check.
     where : object
-        What it is, of which the fault says the text.
+        Name of the definition's part; the error quotes its text.
     expected : str
-        What was expected, for the fault.
+        Description of the expected members, for the error.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def all_of(kind: type[_T] | tuple[type[_T], ...], values: object, where: object,
     Raises
     ------
     DefinitionError
-        If it has no members, or one is of another kind.
+        If `values` cannot be iterated, or a member has another type.
     """
     if isinstance(values, str) or not isinstance(values, Iterable):
         raise DefinitionError(f"{where}: {shown(values)} came, expected {expected}")
@@ -68,19 +68,19 @@ def all_of(kind: type[_T] | tuple[type[_T], ...], values: object, where: object,
 
 
 def require_name(name: object, what: str) -> None:
-    """Refuse what cannot be a name.
+    """Require that a value is a valid name.
 
     Parameters
     ----------
     name : object
-        What came.
+        Name to check.
     what : str
-        Whose name it is.
+        Description of what is named, for the error.
 
     Raises
     ------
     DefinitionError
-        Unless it is printable text, not absurdly long, without double quotes or outer spaces.
+        Unless it is printable text of at most `MAX_NAME` characters, without double quotes or outer spaces.
     """
     if isinstance(name, str) and len(name) > MAX_NAME:
         raise DefinitionError(f"{what} name is {shown(name)}, expected at most {MAX_NAME} characters")
@@ -91,17 +91,17 @@ def require_name(name: object, what: str) -> None:
 
 
 def shown(value: object) -> str:
-    """Return what came as a fault quotes it.
+    """Format a value for an error message.
 
     Parameters
     ----------
     value : object
-        Anything.
+        Value to quote.
 
     Returns
     -------
     str
-        Its representation on one line, cut if it is long.
+        Representation on one line, cut if it is long.
     """
     try:
         text = " ".join(repr(value).split())

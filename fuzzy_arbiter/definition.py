@@ -1,4 +1,4 @@
-"""The definition of a fuzzy system, immutable and standing once for all engines, formats and pictures."""
+"""The definition of a fuzzy system: immutable, and the same for all engines, formats and pictures."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Variable:
     Raises
     ------
     DefinitionError
-        If the name cannot stand in a rule, the universe is empty, or two terms share a name.
+        If the name is invalid in a rule, the universe is empty, or two terms share a name.
 
     Examples
     --------
@@ -137,11 +137,11 @@ class Output(Variable):
     default : float or None
         Value in the universe where no rule fires; with None that is NaN.
     defuzzifier : {"centroid", "bisector", "mom", "som", "lom", "average", "sum"}
-        How the joined terms become a number: their centroid, the place that halves their area, or the mean, smallest or
+        Value of the joined terms: their centroid, the place that halves their area, or the mean, smallest or
         largest of the places where they are greatest; for terms that are values (Sugeno), or that only rise or only
         fall (Tsukamoto), the mean of the values, weighted by strength, or their sum.
     aggregation : str
-        How the rules' conclusions are joined: one of `fuzzy_arbiter.terms.norms.AGGREGATIONS`. Of values it joins the
+        Operator that joins the rules' conclusions, of `fuzzy_arbiter.terms.norms.AGGREGATIONS`. Of values it joins the
         strengths of those rules that conclude one term.
     lock_range : bool
         Whether the value is held within the universe.
@@ -233,18 +233,18 @@ class System:
     rules : tuple of Rule
         At least one; a text such as ``if wind is calm then sail is full`` is a rule too.
     name : str
-        What the system is called in files.
+        Name of the system in files.
     conjunction : str
         Degree of *and*: ``min``, ``prod`` or another of `fuzzy_arbiter.terms.norms.T_NORMS`.
     disjunction : str
         Degree of *or*: ``max``, ``probor``, which is a + b - a b, or another of `fuzzy_arbiter.terms.norms.S_NORMS`.
     implication : str
-        How a rule's strength bounds its output's term: ``min`` clips it, ``prod`` scales it; or another of the first.
+        Bound of an output's term by a rule's strength: ``min`` clips it, ``prod`` scales it; or another of the first.
     normalization : {"none", "range", "sum", "max"}
-        What is done to the centroids: ``none`` leaves them; ``range`` maps those of the least and of the greatest term
+        Normalization of the centroids: ``none`` leaves them; ``range`` maps those of the least and of the greatest term
         alone to 0 and 1; ``sum`` and ``max`` then divide by all weights' sum or greatest.
     outside : {"refuse", "clip"}
-        What happens to an input outside its universe.
+        Treatment of an input outside its universe.
     points : int
         Points of an output's universe, 3 to 1 000 000 000, for those engines and formats that sample it.
     weights_of : tuple of str
@@ -253,7 +253,7 @@ class System:
     Raises
     ------
     DefinitionError
-        If names clash, or a rule speaks of what there is not.
+        If names clash, or a rule refers to an unknown variable or term.
 
     Examples
     --------
@@ -335,7 +335,7 @@ class System:
         return "\n".join(f"R{i + 1}: {rule}" for i, rule in enumerate(self.rules))
 
     def __repr__(self) -> str:
-        """Return what makes an equal system; rules are texts, and settings at their defaults are left out."""
+        """Return Python text that builds an equal system; rules are texts, and default settings are left out."""
         rules = tuple(str(rule) if rule.operators is None else rule for rule in self.rules)
         said = [
             f"{key.name}={getattr(self, key.name)!r}" for key in fields(self) if getattr(self, key.name) != key.default

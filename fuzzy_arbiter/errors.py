@@ -1,11 +1,11 @@
-"""What can go wrong when an arbiter is defined, read, or asked."""
+"""Errors of the package, and the format of their messages."""
 
 import os
 import re
 
 MAX_QUOTED = 80  # characters that a message quotes at a time
-MAX_WORDS = 280  # characters of a message, beside
-MAX_WHERE = 250  # those of the file before it
+MAX_WORDS = 280  # characters of the rest of a message
+MAX_WHERE = 250  # characters of the file's name before it
 
 _SEP = re.escape(f"/{os.sep}")  # paths are kept whole
 _QUOTED = re.compile(
@@ -23,31 +23,31 @@ class ArbiterError(Exception):
 
 
 class DefinitionError(ArbiterError):
-    """A definition that cannot be: an unknown term in a rule, two variables of one name, a shape that turns back."""
+    """Raised for an invalid definition: an unknown term in a rule, two variables of one name, places that decrease."""
 
 
 class EngineError(DefinitionError):
-    """An engine that does not exist, or that cannot evaluate this system."""
+    """Raised for an engine that does not exist, or that cannot evaluate this system."""
 
 
 class FormatError(ArbiterError):
-    """A text that is not of its format, or says what this package does not know."""
+    """Raised for a text that is not of its format, or uses an unsupported part of it."""
 
 
 class UnsupportedError(ArbiterError):
-    """A definition that the wished format cannot say."""
+    """Raised for a definition that the format cannot represent."""
 
 
 class PictureError(ArbiterError):
-    """Pictures where Matplotlib is not installed."""
+    """Raised for a picture where Matplotlib is not installed."""
 
 
 class InputError(ArbiterError):
-    """An input that is missing, unknown, not a number, or outside its universe."""
+    """Raised for an input that is missing, unknown, not a number, or outside its universe."""
 
 
 def one_line(said: object) -> str:
-    """Return what is said as one printable line, with the middle cut out of what is quoted at length.
+    """Format a message as one printable line, and cut the middle out of long quotations.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def one_line(said: object) -> str:
     Returns
     -------
     str
-        The file before the first colon as a whole, unless it is absurdly long.
+        The line; a file's name before the first colon is kept, unless it is very long.
     """
     line = _QUOTED.sub(lambda quoted: _cut(quoted[0], MAX_QUOTED), printable(said))
     where, colon, what = line.partition(": ")
@@ -67,17 +67,17 @@ def one_line(said: object) -> str:
 
 
 def printable(said: object) -> str:
-    """Return what is said as one line that a terminal only shows.
+    """Format a message as one line without control characters.
 
     Parameters
     ----------
     said : object
-        Anything.
+        Message.
 
     Returns
     -------
     str
-        What is not printable, such as the escape of a terminal's orders, is as Python writes it.
+        The line; characters that are not printable, such as terminal escapes, are written as Python escapes.
     """
     line = " ".join(str(said).splitlines())
     return line if line.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)

@@ -1,4 +1,4 @@
-"""Why the weights are what they are: degrees of terms, strengths of rules, cuts of outputs, and what decided."""
+"""Explain weights: degrees of terms, strengths of rules, cuts of outputs, and the deciding rules."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class InputDegrees:
 
 @dataclass(frozen=True, slots=True)
 class FiredRule:
-    """What one rule did.
+    """Result of one rule.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class FiredRule:
 
 @dataclass(frozen=True, slots=True)
 class OutputDecision:
-    """How one output came to its weight.
+    """Derivation of one output's weight.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class OutputDecision:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """Why the weights of one sample are what they are.
+    """Derivation of the weights of one sample.
 
     Attributes
     ----------
@@ -125,12 +125,12 @@ class Explanation:
         return tuple.__new__(result_class([o.name for o in self.outputs]), [o.weight for o in self.outputs])
 
     def as_dict(self) -> dict[str, Any]:
-        """Return all of it as JSON knows it.
+        """Convert the explanation to values that JSON can represent.
 
         Returns
         -------
         dict
-            Of texts, numbers, booleans, lists and dicts, and None for NaN.
+            Texts, numbers, Booleans, lists and dicts; None for NaN.
         """
         whole = asdict(self)
         for item in whole["outputs"]:
@@ -147,7 +147,7 @@ class Explanation:
         lines += aligned([(rule.label, f"{rule.strength:.6g}", _short(rule.text)) for rule in fired])
         lines.append("outputs")
         lines += aligned([(_title(o), f"{o.weight:.6g}", _pairs(o.cuts), _decision(o)) for o in self.outputs])
-        if len(self.outputs) == 1:  # that is all there is to say
+        if len(self.outputs) == 1:  # one output has no ranking
             return "\n".join(lines)
         if self.winner is not None:
             second = f", {self.margin:.6g} above {self.runner_up}" if self.runner_up is not None else ""
@@ -160,19 +160,19 @@ class Explanation:
 
 
 def explain(engine: Engine, inputs: Sequence[float]) -> Explanation:
-    """Return why the weights for one sample are what they are.
+    """Explain the weights for one sample.
 
     Parameters
     ----------
     engine : Engine
-        Which gives the weights.
+        Engine that computes the weights.
     inputs : sequence of float
         One value in its universe for each input.
 
     Returns
     -------
     Explanation
-        As data; its text is for people.
+        Data; its `str` is a text for people.
     """
     system, firing = engine.system, engine.firing
     weights, centroids = engine.weights(inputs), engine.centroids(inputs)
@@ -220,7 +220,7 @@ def _strength(rule: FiredRule) -> float:
 
 
 def _ranking(names: Sequence[str], weights: Sequence[float]) -> tuple[str | None, str | None, float, tuple[str, ...]]:
-    """Winner, runner-up, margin, and those who tie."""
+    """Return the winner, the runner-up, the margin, and the outputs that tie."""
     known = [(name, weight) for name, weight in zip(names, weights, strict=True) if weight == weight]
     if not known:
         return None, None, 0.0, ()

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Write files atomically."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from fuzzy_arbiter.errors import FormatError
 
 
 def write_atomic(path: str | Path, data: bytes) -> None:
-    """Write a file that appears whole or not at all, and replaces an older one.
+    """Write a file atomically, and replace an older one.
 
     Parameters
     ----------
     path : str or Path
-        The file; where a link stands, what it leads to.
+        Path of the file; a link is followed.
     data : bytes
-        What is to be in it.
+        Content of the file.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Prioritised criteria, and the rule bases that give each the floor if none of higher priority wants it."""
+"""Prioritised criteria, and the rule bases that weigh each criterion if none of higher priority is active."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ WEIGHT = Output("alpha", (0.0, 1.0), (Term("low", falling(0.0, 1.0)), Term("high
 
 @dataclass(frozen=True, slots=True)
 class Criterion:
-    """Something that may ask for attention: an input variable with two complementary terms.
+    """A criterion that may ask for attention: an input variable with two complementary terms.
 
     Attributes
     ----------
@@ -95,18 +95,18 @@ def prioritised(
     points: int = 101,
     name: str = "arbiter",
 ) -> System:
-    """Return the system in which each criterion gets its weight if none of higher priority wants it.
+    """Return the system in which each criterion gets its weight if none of higher priority is active.
 
     Parameters
     ----------
     criteria : sequence of Criterion
         In order of priority, the highest first.
     form : {"hierarchical", "minimal", "conjunctive", "complete"}
-        How the rules are said, for N criteria: in 3N - 1 rules, as the paper does; in 2N with a long *or* each; in
-        N + N (N + 1) / 2 without any *or*; or as the complete table of N 2^N. The first three give the same weights
+        Form of the rules, for N criteria: 3N - 1 rules, as in the paper; 2N with a long *or* each;
+        N + N (N + 1) / 2 without any *or*; or the complete table of N 2^N. The first three give the same weights
         always, the complete table on crisp inputs (see ``docs/arbiter.md``).
     weight : Output
-        Pattern of the outputs, whose names get the criterion's number: the first term is the low one. Results carry the
+        Template of the outputs; a criterion's number follows its name, and its first term is low. Results carry the
         names of the criteria.
     normalization, outside, points, name
         As of `System`.
@@ -119,7 +119,7 @@ def prioritised(
     Raises
     ------
     DefinitionError
-        If there is no criterion, two share a name, or the pattern has not two terms.
+        If there is no criterion, two share a name, or `weight` does not have two terms.
 
     Examples
     --------
@@ -152,7 +152,7 @@ Rules = tuple[Rule, ...]
 
 
 def _hierarchical(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
-    """Say what section VI says, for three criteria in its eight rules and their order."""
+    """Return the rules of section VI; for three criteria these are its eight rules, in order."""
     rules = [_high(on, off, outputs, 0), _low(off[0], outputs[0])]
     for k in range(1, len(on)):
         rules += [_low(_any(on[:k]), outputs[k]), _low(off[k], outputs[k]), _high(on, off, outputs, k)]
@@ -160,7 +160,7 @@ def _hierarchical(on: Statements, off: Statements, outputs: Sequence[Output]) ->
 
 
 def _minimal(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
-    """Give each output one rule for high and one for low."""
+    """Return one rule for high and one for low for each output."""
     rules = []
     for k, output in enumerate(outputs):
         rules += [_high(on, off, outputs, k), _low(_any((*on[:k], off[k])), output)]
@@ -168,7 +168,7 @@ def _minimal(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rule
 
 
 def _conjunctive(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
-    """Give each reason to be low a rule of its own."""
+    """Return a rule for low for each criterion that makes an output low."""
     rules = []
     for k, output in enumerate(outputs):
         rules += [_high(on, off, outputs, k), *(_low(reason, output) for reason in (*on[:k], off[k]))]
@@ -176,7 +176,7 @@ def _conjunctive(on: Statements, off: Statements, outputs: Sequence[Output]) -> 
 
 
 def _complete(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
-    """Give every combination of terms a rule for each output."""
+    """Return a rule for each combination of terms and each output."""
     if len(on) > MAX_COMPLETE:
         raise DefinitionError(f"complete form of {len(on)} criteria, expected at most {MAX_COMPLETE}")
     rules = []
@@ -196,7 +196,7 @@ _RULES: dict[str, Callable[[Statements, Statements, Sequence[Output]], Rules]] =
 
 
 def _high(on: Statements, off: Statements, outputs: Sequence[Output], k: int) -> Rule:
-    """If no criterion above k asks, and k does, then its weight is high."""
+    """Return the rule: if no criterion above k is active, and k is, then its weight is high."""
     return Rule(_all((*off[:k], on[k])), (outputs[k][outputs[k].term_names[1]],))
 
 

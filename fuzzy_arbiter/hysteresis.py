@@ -23,11 +23,11 @@ from fuzzy_arbiter.verification.questions import Effort, Questions, greatest_ter
 from fuzzy_arbiter.verification.search import Goal
 
 Setting = float | Mapping[str, float]
-EFFORT = 100_000_000  # statements to find the row at rest, a part of a second
+EFFORT = 100_000_000  # statements of the search for the row at rest, less than a second
 
 
 class HysteresisArbiter:
-    """An arbiter of prioritised criteria that remembers which of them ask for attention.
+    """An arbiter of prioritised criteria with a latch on each of them.
 
     Each criterion has a latch. It closes as soon as the criterion's degree reaches `enter`, and opens when the degree
     has come down to `release` and the latch has been closed for `dwell`. While it is closed the criterion counts as
@@ -45,7 +45,7 @@ class HysteresisArbiter:
     release : float or mapping from input's name to float
         Degree of the on-term at which it may open, at least 0.
     dwell : float or mapping from input's name to float
-        How long it stays closed at least [s]. It closes at once always: an obstacle must be heeded.
+        Least time that it stays closed [s]. It closes without delay: an obstacle must count at once.
     graded : bool
         Whether a criterion whose latch is open counts with its degree, in the place of fully off. Weights then rise
         smoothly before `enter`, and follow the noise there; when the latch opens they jump.
@@ -113,7 +113,7 @@ class HysteresisArbiter:
         self.reset()
 
     def reset(self) -> None:
-        """Open all latches and forget the time, as before the first sample."""
+        """Open all latches and clear the time, as before the first sample."""
         self._closed = [False] * len(self._names)
         self._since = [0.0] * len(self._names)
         self._time = -math.inf
@@ -131,7 +131,7 @@ class HysteresisArbiter:
         inputs : sequence of float, or mapping from input's name to float
             As for an arbiter.
         time : float, optional
-            When they were measured [s]; it never decreases. Only a dwell needs it.
+            Time of the measurement [s]; it never decreases. Only a dwell needs it.
 
         Returns
         -------
@@ -153,14 +153,14 @@ class HysteresisArbiter:
         return weights
 
     def scan(self, inputs: ArrayLike, times: ArrayLike | None = None) -> Array:
-        """Return the weights for samples that follow each other, and those before.
+        """Return the weights for a sequence of samples, which continues the samples before.
 
         Parameters
         ----------
         inputs : array_like, shape (n, inputs)
             One sample in each row.
         times : array_like, shape (n,), optional
-            When they were measured [s]; they never decrease. Only a dwell needs them.
+            Times of the measurements [s]; they never decrease. Only a dwell needs them.
 
         Returns
         -------
@@ -189,7 +189,7 @@ class HysteresisArbiter:
         return weights
 
     def batch(self, inputs: ArrayLike) -> NoReturn:
-        """Refuse rows that are independent of each other.
+        """Refuse a batch, whose rows are independent of each other.
 
         Parameters
         ----------
@@ -211,7 +211,7 @@ class HysteresisArbiter:
         degrees: Sequence[float],
         now: float,
     ) -> tuple[list[bool], list[float], list[float]]:
-        """Latches after one sample, since when they are closed, and what the arbiter is asked."""
+        """Return the latches after one sample, the times at which they closed, and the inputs of the arbiter."""
         closed, since, places = list(before), list(since_before), list(values)
         for i, degree in enumerate(degrees):
             if degree >= self._enter[i]:
@@ -235,7 +235,7 @@ class HysteresisArbiter:
 def _settings(
     key: str, received: Setting, names: Sequence[str], expected: str, fits: Callable[[float], bool]
 ) -> list[float]:
-    """One setting for each input, from one for all or from a mapping."""
+    """Return one setting for each input, from one for all or from a mapping."""
     if isinstance(received, Mapping):
         _require_names(key, received, names)
         each = [received[name] for name in names]
@@ -281,7 +281,7 @@ def _on_terms(system: System, on: Mapping[str, str] | None) -> list[str]:
     (answer,) = ask.ask([Goal(high, 0, 0)], 2)
     if len(answer.boxes) != 1 or not answer.all_found or len(answer.boxes[0]) < len(system.inputs):
         raise DefinitionError(
-            "on: the rules do not tell which terms ask for attention, as there is not one single row in which no "
+            "on: the rules do not determine which terms ask for attention, as there is not one single row in which no "
             "output is high; expected a term for each input"
         )
     rest = ask.places(answer.boxes[0])

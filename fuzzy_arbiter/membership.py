@@ -1,8 +1,8 @@
-"""From a measured clearance to a degree of membership."""
+"""Map a measured clearance to a degree of membership."""
 
 
 def ramp(clearance: float, width: float) -> float:
-    """Return to what degree a region matters, given the distance that is left to its surface.
+    """Return the degree to which a region matters, from the distance to its surface.
 
     The degree is 1 in the whole region and on its surface, so that the region has its full priority wherever it is
     violated, and falls linearly to 0 at `width` outside.
@@ -12,7 +12,7 @@ def ramp(clearance: float, width: float) -> float:
     clearance : float
         Signed distance to the region's surface [m], positive outside.
     width : float
-        Where the degree reaches 0 [m]; 0 makes the membership crisp.
+        Distance at which the degree reaches 0 [m]; 0 makes the membership crisp.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What a rule can ask: a variable is in a term, and the conjunctions, disjunctions and negations of that."""
+"""Conditions of rules: a variable is in a term, and the conjunctions, disjunctions and negations of that."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.shapes import Membership
 from fuzzy_arbiter.terms.norms import HEDGES
 
-MAX_NESTING = 100  # parentheses and negations within each other; what is deeper is no rule that a person wrote
+MAX_NESTING = 100  # nested parentheses and negations
 KEYWORDS = ("if", "then", "and", "or", "not", "is", "with", "any")
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 def is_identifier(name: str) -> bool:
-    """Return whether a name can stand in a rule as it is, and in every format.
+    """Return True if a name needs no quotes in a rule, nor in any format.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def is_identifier(name: str) -> bool:
 
 
 def quoted(name: str) -> str:
-    """Return a name as it stands in a rule's text.
+    """Format a name for a rule's text.
 
     Parameters
     ----------
@@ -49,16 +49,16 @@ def quoted(name: str) -> str:
 
 
 class Proposition:
-    """Something that holds to a degree; ``&``, ``|`` and ``~`` combine propositions.
+    """A condition that holds to a degree; ``&``, ``|`` and ``~`` combine propositions.
 
     Raises
     ------
     DefinitionError
-        If it is made of anything but propositions, or its text nests deeper than 100.
+        If a part is not a proposition, or the text nests deeper than 100.
     """
 
     __slots__ = ()
-    nesting: int = 0  # parentheses and negations within each other in the text
+    nesting: int = 0  # nested parentheses and negations in the text
 
     def __and__(self, other: Proposition) -> And:
         return And((self, other))
@@ -79,7 +79,7 @@ class Proposition:
 
 @dataclass(frozen=True, slots=True)
 class Is(Proposition):
-    """A variable is in a term; one that a variable gave knows the term's shape and can be called with a value."""
+    """A variable is in a term; a statement made by a variable has the term's shape and can be called with a value."""
 
     variable: str
     term: str
@@ -95,7 +95,7 @@ class Is(Proposition):
         Raises
         ------
         DefinitionError
-            If the statement was made of names alone, and so knows no shape.
+            If the statement was made of names alone, without a shape.
         """
         if self.shape is None:
             raise DefinitionError(f"{self}: made of names alone, expected such as variable['term'], to be called")
@@ -198,9 +198,9 @@ class Hedged(Proposition):
     Attributes
     ----------
     hedge : {"very", "somewhat", "extremely", "seldom", "cubed", "cube_root"}
-        How it bends the degree, see `fuzzy_arbiter.terms.norms.HEDGES`.
+        Name of the hedge, of `fuzzy_arbiter.terms.norms.HEDGES`.
     part : Proposition
-        What is bent.
+        Proposition that the hedge modifies.
     """
 
     hedge: str
@@ -226,7 +226,7 @@ class Hedged(Proposition):
 
 
 def anything(p: Proposition) -> Iterator[str]:
-    """Yield the variables of which a proposition says that they are in any term.
+    """Yield the variables that a proposition accepts in any term.
 
     Parameters
     ----------
@@ -248,14 +248,14 @@ def anything(p: Proposition) -> Iterator[str]:
 
 
 def _on_one(p: Proposition) -> bool:
-    """Return whether a proposition is a statement on one term, perhaps with hedges and negations."""
+    """Return True if a proposition is a statement on one term, perhaps with hedges and negations."""
     while isinstance(p, Not | Hedged):
         p = p.part
     return isinstance(p, Is | Anything)
 
 
 def _said(p: Proposition) -> tuple[str, str]:
-    """Return the variable of a statement on one term, and what is said after *is*."""
+    """Return the variable of a statement on one term, and the text after *is*."""
     if isinstance(p, Is):
         return p.variable, quoted(p.term)
     if isinstance(p, Anything):
@@ -266,7 +266,7 @@ def _said(p: Proposition) -> tuple[str, str]:
 
 
 def _set_nesting(proposition: _Join | Not | Hedged, nesting: int) -> None:
-    # Python's own stack is the limit of whatever goes through a proposition, so that it stays far from it
+    # the nesting limit keeps recursion over a proposition well below Python's own stack limit
     if nesting > MAX_NESTING:
         raise DefinitionError(f"nested deeper than {MAX_NESTING} parentheses and negations")
     object.__setattr__(proposition, "nesting", nesting)

@@ -1,4 +1,4 @@
-"""What rules and values of a system refer to: refused where it is not there."""
+"""Check the references of a system's rules and values to variables and terms."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ if TYPE_CHECKING:
 
 
 def require_rule(system: System, i: int, rule: Rule) -> None:
-    """Refuse a rule that speaks of what there is not.
+    """Require that a rule refers only to variables and terms of the system.
 
     Parameters
     ----------
     system : System
-        Whose variables are known.
+        System with the variables.
     i : int
-        Place of the rule; it may ask for outputs on which rules before it conclude.
+        Index of the rule; it may use outputs on which earlier rules conclude.
     rule : Rule
-        What is looked at.
+        Rule to check.
 
     Raises
     ------
     DefinitionError
-        If a variable or a term is not there, or two conclusions are on one output.
+        If a variable or a term does not exist, or two conclusions are on one output.
     """
     inputs = {v.name: frozenset(v.term_names) for v in system.inputs}
     outputs = {v.name: frozenset(v.term_names) for v in system.outputs}
@@ -51,12 +51,12 @@ def require_rule(system: System, i: int, rule: Rule) -> None:
 
 
 def require_values(system: System) -> None:
-    """Refuse values that speak of what there is not, and inputs that nothing speaks of.
+    """Require that values refer only to existing variables, and that every input is used.
 
     Parameters
     ----------
     system : System
-        Whose outputs may have terms that are values.
+        System to check; its outputs may have terms that are values.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What an arbiter gives: the value of each output, by position and by name."""
+"""The result of an arbiter: the value of each output, by position and by name."""
 
 from __future__ import annotations
 
@@ -59,12 +59,12 @@ class Result(tuple[T, ...]):
 
 
 def result_class(names: Sequence[str]) -> type[Result[Any]]:
-    """Return the class of results with these names, so that a single result carries no more than its values.
+    """Return the class of results with these names, so that a result stores only its values.
 
     Parameters
     ----------
     names : sequence of str
-        Of the outputs, in their order.
+        Names of the outputs, in their order.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""A rule: a condition, what it concludes, and how much it counts."""
+"""A rule: a condition, its conclusions, and its weight."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Rule:
     weight : float
         Above 0, at most 1.
     operators : Operators or None
-        Those of its block, where a system has several; None for those of the system.
+        Operators of its block, where a system has several; None for those of the system.
 
     Raises
     ------
@@ -95,24 +95,24 @@ class Rule:
 
     @staticmethod
     def parse(text: str, operators: Operators | None = None) -> Rule:
-        """Return the rule that a text says.
+        """Parse a text as a rule.
 
         Parameters
         ----------
         text : str
             Such as ``if wind is calm then sail is full with 0.5``.
         operators : Operators, optional
-            Those of its block.
+            Operators of its block.
 
         Returns
         -------
         Rule
-            As the text says it; only a system knows whether its variables and terms are there.
+            The rule; only a system checks that its variables and terms exist.
 
         Raises
         ------
         DefinitionError
-            If it is no rule.
+            If the text is not a rule.
         """
         from fuzzy_arbiter.rule_text import parse_rule
 

@@ -22,10 +22,10 @@ _SIGNS = {"&": "and", "|": "or", "~": "not", ",": ","}
 
 
 def parse_rules(text: str) -> list[Rule]:
-    """Return the rules that a text says whose conclusions may have hedges, as fuzzylite takes them.
+    """Parse a text whose conclusions may have hedges as rules, in the way of fuzzylite.
 
-    A hedge in a conclusion bends the strength with which that is drawn, and those after it, as one on the whole
-    condition does. So what is concluded with other hedges becomes a rule of its own.
+    A hedge in a conclusion bends the strength of that conclusion and of those after it, as one on the whole
+    condition does. So conclusions with other hedges become a rule of their own.
 
     Parameters
     ----------
@@ -46,11 +46,11 @@ def parse_rules(text: str) -> list[Rule]:
 
 
 def parse_rule(text: str) -> Rule:
-    """Return the rule that a text says.
+    """Parse a text as a rule.
 
-    Words of rules may be in any case. The hedges very, somewhat, extremely, seldom, cubed and cube_root stand
+    Words of rules may be in any case. The hedges very, somewhat, extremely, seldom, cubed and cube_root are written
     before a term. ``&``,
-    ``|``, ``~`` stand for *and*, *or*, *not*; *not* binds before *and*, *and* before *or*. Names that are no
+    ``|``, ``~`` are *and*, *or*, *not*; *not* binds before *and*, *and* before *or*. Names that are no
     identifiers stand in double quotes.
 
     Parameters
@@ -61,7 +61,7 @@ def parse_rule(text: str) -> Rule:
     Returns
     -------
     Rule
-        Whose own text reads as the same rule again.
+        The rule; its text parses as the same rule.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def parse_rule(text: str) -> Rule:
 
 
 class _Parser:
-    """Reads one text by recursive descent."""
+    """Parse one text by recursive descent."""
 
     def __init__(self, text: str) -> None:
         if not isinstance(text, str):
@@ -207,7 +207,7 @@ class _Parser:
         return self.term(variable)
 
     def term(self, variable: str) -> Proposition:
-        """Read what is said of a variable: a term, or *any*, perhaps with hedges or *not* before it."""
+        """Read the statement on a variable: a term, or *any*, perhaps with hedges or *not* before it."""
         bends: list[str] = []
         while True:
             if self.accept("not"):
@@ -232,11 +232,11 @@ def bent_rules(
     Parameters
     ----------
     condition : Proposition
-        Of the rule.
+        Condition of the rule.
     conclusions : sequence of (tuple of str, Is)
         The hedges of each conclusion, *not* among them, and the conclusion.
     weight : float
-        Of the rule.
+        Weight of the rule.
     carry : bool
         Whether hedges also bend the conclusions after theirs, as fuzzylite takes them.
 

@@ -1,4 +1,4 @@
-"""Samples: what comes as inputs, checked, in the order of the inputs, in their universes."""
+"""Validate samples, and return them in the order of the inputs, within their universes."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ Columns = Mapping[str, ArrayLike] | Frame | NDArray[np.void]
 
 
 class Samples:
-    """Checks samples, and clips them if the system says so.
+    """Validate samples, and clip them if the system does.
 
     Parameters
     ----------
     system : System
-        Whose inputs they are.
+        System with the inputs.
     """
 
     def __init__(self, system: System) -> None:
@@ -49,17 +49,17 @@ class Samples:
         self._by_name = itemgetter(*self._names)
 
     def plain(self, inputs: Any) -> Sequence[float] | None:
-        """Return the values of a dict, an array or a sequence as they came, for those who check them themselves.
+        """Return the values of a dict or a one-dimensional array without validation.
 
         Parameters
         ----------
         inputs : object
-            What came.
+            Sample of any type.
 
         Returns
         -------
         sequence, or None
-            In the order of the inputs; None for what has other names or is of another type.
+            In the order of the inputs; None for other names or another type.
         """
         kind = type(inputs)
         if kind is dict and len(inputs) == len(self._names):
@@ -122,7 +122,7 @@ class Samples:
         return values
 
     def rows(self, inputs: ArrayLike) -> tuple[Array, NDArray[np.bool_] | None]:
-        """Return the values of many samples, and which of the samples are masked.
+        """Return the values of many samples, and a mask of the rows with masked values.
 
         Parameters
         ----------
@@ -134,7 +134,7 @@ class Samples:
         values : ndarray, shape (n, inputs)
             In their universes; of masked rows their least ends.
         masked : ndarray of bool, shape (n,), or None
-            Whether a value of the row is masked; None unless a masked array came.
+            True for rows with a masked value; None unless the array is masked.
 
         Raises
         ------
@@ -178,7 +178,7 @@ class Samples:
         Returns
         -------
         ndarray or masked array, shape (n, inputs)
-            As they came, for `rows`.
+            Not validated; an argument for `rows`.
 
         Raises
         ------
@@ -204,12 +204,12 @@ class Samples:
         return np.ma.MaskedArray(values, masks)
 
     def is_table(self, inputs: object) -> bool:
-        """Return whether inputs are columns by name, and not rows.
+        """Return True if inputs are columns by name, and not rows.
 
         Parameters
         ----------
         inputs : object
-            What came.
+            Inputs of any type.
 
         Returns
         -------
@@ -224,7 +224,7 @@ class Samples:
         return np.ma.getmaskarray(inputs) if isinstance(inputs, np.ma.MaskedArray) else None
 
     def _converted(self, values: Sequence[float]) -> list[float]:
-        """Return values as floats, in their universes: a number of another type would bring its own rounding along."""
+        """Return values as floats within their universes, so that other number types add no rounding of their own."""
         if not all(isinstance(x, _NUMBER) for x in values):
             raise TypeError
         if not all(low <= x <= high for x, (low, high) in zip(values, self._limits, strict=True)):
@@ -262,7 +262,7 @@ class Samples:
                 raise InputError(f"{name}: column {fault} in {', '.join(columns)}; expected {', '.join(self._names)}")
 
     def _fault(self, inputs: Sample) -> InputError:
-        """Find out what is wrong with a sample that was refused."""
+        """Return the error for a sample that was refused."""
         masked = isinstance(inputs, np.ma.MaskedArray)
         try:
             values = self._in_order(inputs)

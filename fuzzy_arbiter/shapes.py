@@ -1,4 +1,4 @@
-"""Membership functions: what all of them can do, and those that are piecewise linear, given by their points."""
+"""Membership functions: their common base, and the piecewise-linear ones, given by their points."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Membership(ABC):
         """Return the places within a universe where it bends or jumps, in rising order; between them it is smooth."""
 
     def within(self, universe: tuple[float, float]) -> Membership:
-        """Return what it is in a universe, where what does not matter there is left out."""
+        """Return the same function without parts that do not matter in a universe; by default the function itself."""
         return self
 
     def area(self, universe: tuple[float, float]) -> float:

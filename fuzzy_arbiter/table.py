@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 
 def aligned(table: Sequence[tuple[str, ...]]) -> list[str]:
-    """Return the lines of a table with indented columns of equal width.
+    """Format a table with indented columns of equal width.
 
     Parameters
     ----------

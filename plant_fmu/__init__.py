@@ -19,7 +19,7 @@ __all__ = [
     "shipped_vehicles",
 ]
 
-# imported when asked for, so that the command can say what is not installed
+# imported on first use, so that the command can report a dependency that is not installed
 _HOMES = {
     "build": {"build_fmu"},
     "running": {"Plant"},

@@ -40,7 +40,7 @@ FAULT, INTERRUPTED, NO_READER = 2, 130, 141
 
 
 class _Version(argparse.Action):
-    """Prints the version, which takes a while to find."""
+    """Print the version, which takes a while to find."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         from importlib import metadata
@@ -54,7 +54,7 @@ class _Version(argparse.Action):
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line, as all other errors."""
+    """Report a wrong option in one line, as all other errors."""
 
     def print_help(self, file: Any = None) -> None:
         """Print it; argparse itself would pass over output that fails."""
@@ -62,7 +62,7 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         verb = self.prog.removeprefix("python -m plant_fmu").strip()
-        _tell(f"{verb + ': ' if verb else ''}{message}; see --help")
+        _report(f"{verb + ': ' if verb else ''}{message}; see --help")
         self.exit(FAULT)
 
 
@@ -158,32 +158,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 1 if an importer failed with a checked FMU; 2 where the user must mend something; 130 if interrupted; 141 if
-        nobody reads the output.
+        0; 1 if an importer failed with a checked FMU; 2 if the input or an option is wrong; 130 if interrupted; 141 if
+        the reader of the output closed it.
     """
-    if sys.stdout is None:  # closed by whoever started this: the next file that is opened would take its place
-        _tell("standard output is closed; expected it open, such as on /dev/null")
+    if sys.stdout is None:  # closed by the parent process: the next file that is opened would take its place
+        _report("standard output is closed; expected it open, such as on /dev/null")
         return FAULT
     try:
         try:
             return _run(_parser().parse_args(arguments))
         finally:
             sys.stdout.flush()
-    except ModuleNotFoundError as error:  # of this product, whose version an FMU names
+    except ModuleNotFoundError as error:  # of this product itself: its version goes into an FMU
         print(_missing(error), file=sys.stderr)
         return FAULT
     except PlantFmuError as error:
-        _tell(str(error))
+        _report(str(error))
         return FAULT
     except BrokenPipeError:
         _drop_output()
         return NO_READER
     except OSError as error:  # such as a full disk behind the output
         _drop_output()
-        _tell(f"{error.filename or 'standard output'}: {error.strerror or error}")
+        _report(f"{error.filename or 'standard output'}: {error.strerror or error}")
         return FAULT
     except KeyboardInterrupt:
-        _tell("interrupted")
+        _report("interrupted")
         return INTERRUPTED
 
 
@@ -215,15 +215,15 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _tell(what: str) -> None:
-    """Say something in one line on standard error; nothing where that is closed or gone."""
+def _report(what: str) -> None:
+    """Print one line on standard error; nothing where that is closed or gone."""
     if sys.stderr is not None:  # else `print` would take standard output
         with contextlib.suppress(OSError):
             print(f"plant_fmu: {one_line(what)}", file=sys.stderr, flush=True)
 
 
 def _drop_output() -> None:
-    """Let what is left of the output go nowhere, else the interpreter fails again to write it at its end."""
+    """Redirect standard output to the null device, else the interpreter fails again as it flushes at its end."""
     with contextlib.suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

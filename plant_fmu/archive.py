@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all; zip files that are the same bytes each time."""
+"""Write files atomically, and zip files that are the same bytes each time."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from pathlib import Path
 from plant_fmu.errors import BuildError
 
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that the format knows
-_UNIX = 3  # else the byte that says where the archive was made would differ between systems
+_UNIX = 3  # else the byte for the system of origin would differ between systems
 
 
 def require_place(out: Path) -> None:
-    """Refuse a file that cannot be written, before the work that goes into it.
+    """Require that a file can be written, before the work that goes into it.
 
     Parameters
     ----------
     out : Path
-        The file.
+        Path of the file.
 
     Raises
     ------
     BuildError
-        If it is there and is no file, or its folder cannot be written to.
+        If it exists and is not a file, or its folder cannot be written to.
     """
     try:
         if out.is_dir() or (out.exists() and not out.is_file()):
@@ -38,14 +38,14 @@ def require_place(out: Path) -> None:
 
 
 def write_atomic(out: Path, data: bytes) -> None:
-    """Write a file that appears whole or not at all, and replaces an older one.
+    """Write a file atomically, and replace an older one.
 
     Parameters
     ----------
     out : Path
-        The file.
+        Path of the file.
     data : bytes
-        What is to be in it.
+        Content of the file.
 
     Raises
     ------
@@ -65,12 +65,12 @@ def write_atomic(out: Path, data: bytes) -> None:
 
 
 def write_archive(out: Path, members: Mapping[str, bytes]) -> None:
-    """Write a zip file whole or not at all.
+    """Write a zip file atomically.
 
     Parameters
     ----------
     out : Path
-        The file; it replaces an older one.
+        Path of the file; an older one is replaced.
     members : mapping of str to bytes
         Contents by name, with forward slashes.
 
@@ -83,7 +83,7 @@ def write_archive(out: Path, members: Mapping[str, bytes]) -> None:
 
 
 def archive_of(members: Mapping[str, bytes]) -> bytes:
-    """Return a zip file.
+    """Return the bytes of a zip file.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def archive_of(members: Mapping[str, bytes]) -> bytes:
     Returns
     -------
     bytes
-        The same each time.
+        The archive; equal members give equal bytes.
     """
     data = io.BytesIO()
     with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -1,4 +1,4 @@
-"""How an autopilot's servo outputs drive a vehicle's thrusters; the FMU knows nothing of it."""
+"""The map from an autopilot's servo outputs to a vehicle's thrusters; the FMU does not contain it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Literal
 MOST_CHANNELS = 32  # of the longer servo packet
 SHORTEST, LONGEST = 800, 2200  # us, of a pulse that a speed controller takes for one
 
-Curve = Callable[[float], float]  # from what an output says to a part of the greatest force, -1 to 1; or back
+Curve = Callable[[float], float]  # from a servo output [us] to a part of the greatest force, -1 to 1; or the inverse
 
 
 @dataclass(frozen=True)
@@ -34,16 +34,16 @@ def validate_autopilot(
     Parameters
     ----------
     autopilot : Autopilot
-        As it stands in the file.
+        Table of the vehicle's file.
     n_thrusters : int
-        Of the vehicle.
+        Number of thrusters of the vehicle.
     require : callable
-        Raises unless its first argument is true; then come the key, what it is, and what was expected.
+        Raises unless its first argument is true; the others are the key, its value, and the expected value.
 
     Returns
     -------
     Autopilot
-        Complete.
+        The table, complete.
     """
     given = autopilot
     channels = given.channels or tuple(range(1, n_thrusters + 1))
@@ -82,7 +82,7 @@ def effort_of_pulse(table: Autopilot, sign: int) -> Curve:
     Returns
     -------
     callable
-        u or u|u|, -1 to 1, with u the distance from neutral in spans; 0 within the dead band, and for what is no pulse.
+        u or u|u|, -1 to 1, with u the distance from neutral in spans; 0 within the dead band, and for an invalid pulse.
     """
     neutral, span, dead_band, quadratic = (
         table.pwm_neutral, table.pwm_span, table.pwm_dead_band, table.curve == "quadratic",
@@ -98,7 +98,7 @@ def effort_of_pulse(table: Autopilot, sign: int) -> Curve:
 
 
 def pulse_of_effort(table: Autopilot, sign: int) -> Curve:
-    """Return the function from a part of the greatest force to the pulse [us] that asks for it.
+    """Return the function from a part of the greatest force to the pulse [us] that commands it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""FMU files: made whole or not at all, the same bytes each time, and kept in a cache."""
+"""Build FMU files: written atomically, the same bytes each time, and kept in a cache."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ FMI_VERSIONS = (2, 3)
 
 
 def require_version(fmi: int) -> None:
-    """Refuse, with a BuildError, what is no version of FMI that an FMU can be built for."""
+    """Require that a number is a version of FMI for which FMUs can be built; raise BuildError."""
     if type(fmi) is not int or fmi not in FMI_VERSIONS:
         raise BuildError(f"FMI version is {fmi!r}, expected 2 or 3")
 
@@ -48,11 +48,11 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: Path, platforms: str = N
     Parameters
     ----------
     what : Vehicle or Component
-        The vehicle, whose numbers become the start values of the FMU's parameters; or what else the FMU is to be of.
+        Vehicle, whose numbers become the start values of the FMU's parameters; or another component.
     fmi : int
         2 for FMI 2.0, 3 for FMI 3.0, both of a vehicle for co-simulation and model exchange.
     out : Path
-        The file to write; it appears whole or not at all.
+        File to write; it is written atomically.
     platforms : str
         ``native`` for this machine; ``all``, or FMI 3.0's names with commas between them, such as
         ``x86_64-linux,x86_64-windows``. Libraries that come with the package are taken where they fit. Else they are
@@ -98,7 +98,7 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: Path, platforms: str = N
 
 
 def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
-    """Return the FMU of a vehicle or another component from the cache, building it first where it is not there.
+    """Return the FMU of a vehicle or another component from the cache; build it first where it is missing.
 
     Parameters
     ----------
@@ -110,9 +110,9 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
     Returns
     -------
     Path
-        The file; what it is made from, and by which compiler, is part of its name. Where there is no compiler any more,
-        one that another compiler made does as well. It lies in the user's cache folder or, where that cannot be made,
-        in one that goes with the process.
+        The file; its name has a digest of its sources and compiler. Without a compiler, an FMU that
+        another compiler made is used. The file is in the user's cache folder or, where that cannot be made,
+        in a temporary folder of the process.
 
     Raises
     ------
@@ -122,12 +122,12 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
     require_version(fmi)
     name = f"{what.name}-fmi{fmi}-{_digest(what, fmi)[:16]}"
     path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{name}-{_maker()}.fmu"
-    if _is_whole(path):  # one that was damaged is built anew
+    if _is_whole(path):  # a damaged file is built again
         return path
     component = _component(what)
     if prebuilt_libraries(component, token(component, fmi), fmi, [native_platform()]) is None:
         try:
-            find_compiler()  # so that a missing compiler is said before anything is written
+            find_compiler()  # so that a missing compiler is reported before anything is written
         except BuildError:
             for other in sorted(path.parent.glob(f"{name}-*.fmu")):
                 if _is_whole(other):
@@ -146,7 +146,7 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
 
 
 def _is_whole(path: Path) -> bool:
-    """Return whether a file is there and all that is packed in it has its checksum."""
+    """Return True if a file exists and all its members have their checksums."""
     try:
         about = path.stat()
     except OSError:
@@ -165,15 +165,15 @@ def _has_checksums(path: Path, written: int, size: int) -> bool:
 
 @functools.lru_cache(maxsize=64)
 def _digest(what: Vehicle | Component, fmi: int) -> str:
-    """Return what names an FMU of this machine by all that it is made from.
+    """Return a digest of everything that an FMU for this machine is made from.
 
-    To write all of that down takes longer than to load an FMU, so a process does it once for each vehicle.
+    The digest takes longer than loading an FMU, so a process computes it once for each vehicle.
     """
     return digest(neutral_members(what, fmi), native_platform().name, *FLAGS, fmpy.__version__)
 
 
 def _maker() -> str:
-    """Return what names who makes libraries here: each compiler makes other bytes of the same sources."""
+    """Return a digest of the compiler: each compiler makes other bytes of the same sources."""
     with contextlib.suppress(BuildError):
         return digest({}, *prebuilt_files(), *find_compiler())[:8]
     return digest({}, *prebuilt_files())[:8]
@@ -181,7 +181,7 @@ def _maker() -> str:
 
 @functools.cache
 def _own_folder() -> Path:
-    """Return a folder that goes with the process."""
+    """Return a temporary folder that is removed with the process."""
     folder = tempfile.mkdtemp(prefix="plant_fmu-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return Path(folder)
@@ -192,7 +192,7 @@ def _component(what: Vehicle | Component) -> Component:
 
 
 def neutral_members(what: Vehicle | Component, fmi: int) -> dict[str, bytes]:
-    """Return all that goes into an FMU but the binaries, by name in the archive."""
+    """Return all members of an FMU but the binaries, by name in the archive."""
     component = _component(what)
     key = token(component, fmi)
     sources = c_sources(component, fmi) | {component.header: header(component, key).encode()}

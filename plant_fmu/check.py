@@ -1,4 +1,4 @@
-"""One FMU before every validator and importer that is installed, and how well those that simulate it agree."""
+"""Run every installed validator and importer on one FMU, and compare the results of those that simulate it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from plant_fmu.errors import TaskError
 from plant_fmu.importers import IMPORTERS, Result, Task, read_fmu, run_importer
 from plant_fmu.toml_tables import hint
 
-REFERENCE = "FMPy"  # the importer that the others are measured against
+REFERENCE = "FMPy"  # importer with which the others are compared
 CS_TOLERANCE = 1e-9  # relative to the greater of an output and one: two masters differ in how they add up the time
 
 
@@ -75,7 +75,7 @@ def _compare(result: Result, reference: Result) -> Verdict:
     if result is reference or not (result.values and reference.values):
         return Verdict(result)
     differences = {name: abs(value - reference.values[name]) for name, value in result.values.items()}
-    # a NaN is no difference at all to a comparison, and the greatest to a reader
+    # a comparison with NaN is never true, but a reader must see it as the greatest difference
     found = {name: difference if difference >= 0.0 else math.inf for name, difference in differences.items()}
     scaled = {name: difference / max(1.0, abs(reference.values[name])) for name, difference in found.items()}
     furthest = max(scaled, key=scaled.__getitem__)

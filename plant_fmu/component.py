@@ -1,4 +1,4 @@
-"""What an FMU is made of: a vehicle's plant, or anything else that brings the same few things."""
+"""The parts that an FMU is made of: a vehicle's plant, or another component."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ STEP = 0.01  # s
 
 @dataclass(frozen=True, eq=False)
 class Component:
-    """One FMU to be built: its variables, its C code behind the common wrappers, and what it holds beside them.
+    """One FMU to be built: its variables, its C code behind the common wrappers, and its further members.
 
-    Its C files bring a header ``model.h`` and the definition of ``COMPONENT``, as ``csrc/wrapper/component.h`` says.
+    Its C files include a header ``model.h`` and the definition of ``COMPONENT``, see ``csrc/wrapper/component.h``.
     With states among its variables it is for co-simulation and model exchange, without for co-simulation alone.
     """
 
     name: str  # model identifier, and the beginning of its names in C
     description: str  # one line
-    variables: tuple[Variable, ...]  # the first is the time; states and derivatives each stand side by side
+    variables: tuple[Variable, ...]  # the first is the time; states are consecutive, and so are derivatives
     sources: Mapping[str, bytes]  # its C files, by name
-    contents: Callable[[int], Mapping[str, bytes]]  # by FMI version: what else is in the FMU, by path
+    contents: Callable[[int], Mapping[str, bytes]]  # by FMI version: further members of the FMU, by path
     header: str = "variables.h"  # name of the C header that is generated from the variables
     constants: Mapping[str, int] = field(default_factory=dict)  # in that header
     stop_time: float = STOP_TIME  # s, of the default experiment

@@ -1,4 +1,4 @@
-"""Files made from the table of variables: modelDescription.xml (FMI 2.0 and 3.0), the docs page."""
+"""Generate files from the table of variables: modelDescription.xml (FMI 2.0 and 3.0), the docs page."""
 
 from __future__ import annotations
 
@@ -57,14 +57,14 @@ def token(component: Component, fmi: int) -> str:
     Parameters
     ----------
     component : Component
-        What the FMU is of.
+        Component of the FMU.
     fmi : int
         2 or 3.
 
     Returns
     -------
     str
-        Changes whenever the description or the sources do.
+        Token; it changes whenever the description or the sources do.
     """
     text = model_description(component, fmi, "") + header(component, "")
     digest = hashlib.sha256(text.encode() + b"".join(c_sources(component, fmi).values())).hexdigest()
@@ -77,7 +77,7 @@ def model_description(component: Component, fmi: int, token: str) -> str:
     Parameters
     ----------
     component : Component
-        What the FMU is of.
+        Component of the FMU.
     fmi : int
         2 for FMI 2.0, 3 for FMI 3.0.
     token : str
@@ -134,7 +134,7 @@ def model_description(component: Component, fmi: int, token: str) -> str:
         stepSize=_number(component.step),
     )  # fmt: skip
 
-    # FMI 2.0 needs no variable for the time, and some importers stumble over one
+    # FMI 2.0 needs no variable for the time, and some importers fail on one
     rows = [(vr, v) for vr, v in enumerate(component.variables) if fmi == 3 or v.role != "time"]
     # FMI 2.0 names variables by their position in the list, FMI 3.0 by value reference
     number = {v.name: str(i + 1 if fmi == 2 else vr) for i, (vr, v) in enumerate(rows)}
@@ -181,7 +181,7 @@ def _add_variable(parent: ET.Element, vr: int, v: Variable, fmi: int, number: di
 
 
 def _add_structure(parent: ET.Element, rows: list[Variable], fmi: int, number: dict[str, str]) -> None:
-    """Add outputs and derivatives with what they follow from in an instant, and the unknowns of initialisation."""
+    """Add outputs and derivatives with their direct dependencies, and the unknowns of initialisation."""
     continuous = {v.name for v in rows if v.role in ("time", "state", "input")}
     sections = (
         ("Outputs", "Output", [v for v in rows if v.role in ("state", "output") and not v.local], True),
@@ -213,7 +213,7 @@ def documentation(vehicle: Vehicle) -> str:
     Returns
     -------
     str
-        A table for each role, and one of what a coupled plant has beside them.
+        A table for each role, and one of the additional variables of a coupled plant.
     """
     rows = variables(vehicle)
     plain = {v.name for v in rows}

@@ -1,11 +1,11 @@
-"""What can go wrong while an FMU is made."""
+"""Errors of the package, and the format of their messages."""
 
 import os
 import re
 
 MAX_QUOTED = 80  # characters that a message quotes at a time
-MAX_WORDS = 280  # characters of a message, beside
-MAX_WHERE = 250  # those of the file before it
+MAX_WORDS = 280  # characters of the rest of a message
+MAX_WHERE = 250  # characters of the file's name before it
 
 _SEP = re.escape(f"/{os.sep}")  # paths are kept whole
 _QUOTED = re.compile(
@@ -23,35 +23,35 @@ class PlantFmuError(Exception):
 
 
 class TableError(PlantFmuError):
-    """A TOML file that cannot be read, or a key in it that is missing, unknown or of the wrong kind."""
+    """Raised for a TOML file that cannot be read, or has a key that is missing, unknown or of the wrong type."""
 
 
 class VehicleError(PlantFmuError):
-    """A vehicle that cannot be: unknown name, or numbers that contradict physics."""
+    """Raised for an unknown vehicle, or for numbers that contradict physics."""
 
 
 class BuildError(PlantFmuError):
-    """No compiler, a compiler that fails, or a place that cannot be written."""
+    """Raised where no compiler is found, a compiler fails, or a file cannot be written."""
 
 
 class PlantError(PlantFmuError):
-    """An FMU that cannot be loaded, or refuses a value or a step; its own words are in the message."""
+    """Raised for an FMU that cannot be loaded, or refuses a value or a step; the message quotes the FMU."""
 
 
 class FmuFileError(PlantFmuError):
-    """A file that is no FMU, or one that no importer should extract."""
+    """Raised for a file that is no FMU, or that is unsafe to extract."""
 
 
 class TaskError(PlantFmuError):
-    """A simulation that cannot be: times that do not fit, or variables that the FMU does not have."""
+    """Raised for an impossible simulation: times that do not fit, or variables that the FMU does not have."""
 
 
 class ImporterError(PlantFmuError):
-    """An importer that refuses an FMU, or fails with it."""
+    """Raised for an importer that refuses an FMU, or fails with it."""
 
 
 def one_line(said: object) -> str:
-    """Return what is said as one printable line, with the middle cut out of what is quoted at length.
+    """Format a message as one printable line, and cut the middle out of long quotations.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def one_line(said: object) -> str:
     Returns
     -------
     str
-        The file before the first colon as a whole, unless it is absurdly long.
+        The line; a file's name before the first colon is kept, unless it is very long.
     """
     line = _QUOTED.sub(lambda quoted: _cut(quoted[0], MAX_QUOTED), printable(said))
     where, colon, what = line.partition(": ")
@@ -71,17 +71,17 @@ def one_line(said: object) -> str:
 
 
 def printable(said: object) -> str:
-    """Return what is said as one line that a terminal only shows.
+    """Format a message as one line without control characters.
 
     Parameters
     ----------
     said : object
-        Anything.
+        Message.
 
     Returns
     -------
     str
-        What is not printable, such as the escape of a terminal's orders, is as Python writes it.
+        The line; characters that are not printable, such as terminal escapes, are written as Python escapes.
     """
     line = " ".join(str(said).splitlines())
     return line if line.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)

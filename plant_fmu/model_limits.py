@@ -1,4 +1,4 @@
-"""What a model description may say before an importer takes it at its word."""
+"""Limits of a model description, checked before an importer uses it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from plant_fmu.errors import FmuFileError
 
 MAX_REFERENCE = 2**32 - 1  # of a variable: 32 bits in FMI 2.0 and 3.0
 MAX_NAME = 10_000  # characters of a variable's name
-MAX_INDICATORS = 1_000_000  # of events, for which an importer makes room
+MAX_INDICATORS = 1_000_000  # of events, for which an importer allocates memory
 MAX_ENTRIES = 100_000_000  # of an array, likewise
 
 # part of the path of the library that is loaded
@@ -20,19 +20,19 @@ _INTERFACES = ("CoSimulation", "ModelExchange", "ScheduledExecution")
 
 
 def validate_description(path: Path, root: ET.Element) -> None:
-    """Refuse a model description that would lead an importer astray.
+    """Refuse a model description whose numbers or names could harm an importer.
 
     Parameters
     ----------
     path : Path
         The FMU, for messages.
     root : Element
-        Of ``modelDescription.xml``.
+        Root of ``modelDescription.xml``.
 
     Raises
     ------
     FmuFileError
-        At the first number or name that cannot be.
+        At the first invalid number or name.
     """
     for interface in _INTERFACES:
         for element in root.findall(interface):

@@ -1,4 +1,4 @@
-"""Units, and the domains in which the plant is meant to be used."""
+"""Units, and the domains for which the plant is meant."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ UNITS: dict[str, dict[str, int]] = {
 
 _G = 9.80665  # m/s2, standard gravity
 
-# what else a tool may show a unit in: name, and how many of it are one of the unit
+# further units in which a tool may show a unit: name, and their number in one of the unit
 DISPLAY_UNITS: dict[str, dict[str, float]] = {
     "s": {"ms": 1e3, "min": 1 / 60, "h": 1 / 3600},
     "m": {"mm": 1e3, "cm": 1e2, "km": 1e-3},
@@ -60,22 +60,22 @@ _SHOWN_IN = {"rad": "deg", "rad/s": "deg/s", "rad/s2": "deg/s2"}  # unless the u
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a number measures, and the domain in which the plant is meant to be used; values beyond it are refused."""
+    """The unit of a number, and the domain for which the plant is meant; values beyond it are refused."""
 
     unit: str  # a key of UNITS, or "" for a pure number
     minimum: float
     maximum: float
     nominal: float = 1.0
-    is_gain: bool = False  # of a control law, which is shown as the law has it
+    is_gain: bool = False  # of a control law, which is shown in the law's own unit
 
     @property
     def display_unit(self) -> str:
-        """The unit that tools show it in, "" for its own."""
+        """The unit in which tools show it, "" for its own."""
         return "" if self.is_gain else _SHOWN_IN.get(self.unit, "")
 
     @property
     def bounded(self) -> bool:
-        """Whether the domain says anything."""
+        """True if the domain has bounds."""
         return self.minimum < self.maximum < _ALL
 
 
@@ -115,14 +115,14 @@ SCALE = Quantity("", 0.0, 1e6)
 SCALE_ERROR = Quantity("", -0.5, 0.5)
 ACCELERATION = Quantity("m/s2", -100.0, 100.0)
 SHARE = Quantity("", -1.0, 1.0)
-PULSE = Quantity("", 0.0, 1e4)  # us, which SI has no place for
+PULSE = Quantity("", 0.0, 1e4)  # us; without a unit, as SI has none for it
 VOLTAGE = Quantity("V", 10.0, 20.0)
 SUBSTEP = Quantity("s", 1e-6, 1.0)
 FORCE_LIMIT = Quantity("N", 0.0, 1e10)  # its maximum is above the norm of any force: no limit
 
 
 def unbounded(unit: str, nominal: float = 1.0) -> Quantity:
-    """Return a calculated quantity whose range says nothing."""
+    """Return a calculated quantity without bounds."""
     return Quantity(unit, -_ALL, _ALL, nominal)
 
 

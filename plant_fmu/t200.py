@@ -1,4 +1,4 @@
-"""The force of a T200 thruster by pulse and voltage, as Blue Robotics publishes it, for C and Python."""
+"""The published force of Blue Robotics' T200 thruster by pulse and voltage, for C and Python."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 STANDARD_GRAVITY = 9.80665  # m/s2, of a kilogram-force
-# us; at bollard, of the maker's performance table of September 2019, read off at some of its pulses
+# us; at bollard, from the maker's performance table of September 2019, at some of its pulses
 PULSES = np.array([
     1100, 1150, 1200, 1250, 1300, 1350, 1400, 1440, 1460, 1468, 1500, 1532, 1540, 1560, 1600, 1650, 1700, 1750, 1800,
     1850, 1900,

@@ -1,4 +1,4 @@
-"""Where thrusters push, as far as their wrenches tell."""
+"""Lines of action of thrusters, derived from their wrenches."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from plant_fmu.vehicle import Vehicle
 
 @dataclass(frozen=True, eq=False)
 class ThrusterLine:
-    """The line along which a thruster pushes; how far along it the thruster sits, no wrench tells."""
+    """The line of action of a thruster; a wrench does not determine the thruster's place along it."""
 
     force: NDArray[np.float64]  # (3,) of one newton, body frame; 0 for a thruster that only turns the body
     nearest: NDArray[np.float64]  # (3,) m, its point nearest to the body origin
@@ -24,7 +24,7 @@ def thruster_lines(vehicle: Vehicle) -> list[ThrusterLine]:
     Parameters
     ----------
     vehicle : Vehicle
-        Of any number of thrusters.
+        Vehicle with any number of thrusters.
 
     Returns
     -------

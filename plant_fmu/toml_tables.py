@@ -1,4 +1,4 @@
-"""TOML tables into frozen dataclasses, with messages that name the key, what came and what was expected."""
+"""Decode TOML tables into frozen dataclasses, with errors that name the key, its value and the expected one."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from plant_fmu.errors import TableError
 
 T = TypeVar("T")
 
-MAX_FILE = 4_000_000  # bytes of a file; the longest that comes with the package has a thousandth of that
-MAX_DEPTH = 20  # tables and lists within each other
+MAX_FILE = 4_000_000  # bytes of a file; the longest in the package has a thousandth of that
+MAX_DEPTH = 20  # nested tables and lists
 MAX_DIGITS = 400  # of a whole number; beyond them it is no float either
 
-_LONGEST_NAME = 100  # that is compared with known ones
+_LONGEST_NAME = 100  # characters that are compared with known names
 
-_LISTED = 30  # names that a message still lists
+_LISTED = 30  # names that a message lists at most
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -38,12 +38,12 @@ def read_toml(path: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        Its tables.
+        Tables of the file.
 
     Raises
     ------
     TableError
-        If it cannot be read, is no TOML, or is absurdly long or deep; the caller knows its name.
+        If it cannot be read, is no TOML, or is too long or deep; the caller adds the file's name.
     """
     try:
         if path.exists() and not path.is_file():  # to open a pipe would wait for its other end
@@ -62,17 +62,17 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def require_modest(table: dict[str, Any]) -> None:
-    """Refuse tables so deep, and whole numbers so great, that Python itself stumbles over them.
+    """Refuse tables and whole numbers beyond the limits, on which Python itself would fail.
 
     Parameters
     ----------
     table : dict
-        As TOML has it.
+        Content of a TOML file.
 
     Raises
     ------
     TableError
-        That names the key.
+        With the key in its message.
     """
     waiting: list[tuple[str, Any, int]] = [(key, value, 1) for key, value in table.items()]
     while waiting:
@@ -93,7 +93,7 @@ def decode(table: dict[str, Any], kind: type[T], where: str = "") -> T:
     Parameters
     ----------
     table : dict
-        What a TOML file holds.
+        Content of a TOML file, or a table in it.
     kind : type
         A dataclass; nested dataclasses are nested tables.
     where : str
@@ -120,21 +120,21 @@ def decode(table: dict[str, Any], kind: type[T], where: str = "") -> T:
 
 
 def hint(received: str, known: typing.Iterable[str]) -> str:
-    """Return what to say of a name that nothing knows: the nearest known one, else all of them.
+    """Format a hint for an unknown name: the nearest known one, else a list of all.
 
     Parameters
     ----------
     received : str
-        The name.
+        The unknown name.
     known : iterable of str
-        What was expected.
+        Known names.
 
     Returns
     -------
     str
-        Such as ``did you mean 'mass'?``.
+        Text such as ``did you mean 'mass'?``.
     """
-    known, received = sorted(known), received[:_LONGEST_NAME]  # to compare takes time with the square of the length
+    known, received = sorted(known), received[:_LONGEST_NAME]  # a comparison takes time with the square of the length
     near = difflib.get_close_matches(received, known, n=1, cutoff=0.5)
     if near:
         return f"did you mean {near[0]!r}?"
@@ -191,7 +191,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _mistyped(text: str, at: str, table: Any, kind: Any, where: str) -> TableError:
-    """Turn the decoder's complaint, and its path such as ``$.a.b[0]``, into words of the file."""
+    """Convert the decoder's error, with its path such as ``$.a.b[0]``, to one that names the key."""
     value, annotation, path = table, kind, [where] if where else []
     for part in at.strip("`").removeprefix("$").replace("[...]", ".*").replace("[", ".").replace("]", "").split("."):
         if not part:

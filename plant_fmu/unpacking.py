@@ -1,4 +1,4 @@
-"""An FMU's zip file, looked through before anything of it is parsed, extracted or run."""
+"""Check an FMU's zip file before anything of it is parsed, extracted or run."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ MAX_SIZE = 2**30  # bytes of an FMU's files together, and
 MAX_FILES = 100_000  # their number, above which it is refused unread
 MAX_RATIO = 200  # of those bytes to the FMU's own: libraries and descriptions compress to a tenth or so,
 FREE_SIZE = 2**26  # bytes, below which the ratio does not matter
-MAX_READ = 2**24  # bytes that are read at once: the list of the files is, before anything is known of them
+MAX_READ = 2**24  # bytes that are read at once: as the list of the files is, before any check
 MAX_NAME = 1000  # characters of a file's name
 MAX_XML = 2**26  # bytes of a description,
-MAX_ELEMENTS = 2_000_000  # and of what is in it,
-MAX_DEPTH = 100  # one within the other
+MAX_ELEMENTS = 2_000_000  # its elements,
+MAX_DEPTH = 100  # and their nesting
 
-_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # those of FMI; the others unpack without measure
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # those of FMI; the others have no bound when unpacked
 _DESCRIPTIONS = (DESCRIPTION, "sources/buildDescription.xml")  # that FMPy parses
 _PIECE = 2**20  # bytes
 
 
 class _Source(io.BufferedReader):
-    """A file of which never more than `MAX_READ` bytes are taken at once, whatever a zip file says of itself."""
+    """A file of which at most `MAX_READ` bytes are read at once, whatever sizes a zip file states."""
 
     def read(self, size: int | None = -1, /) -> bytes:
         if size is None or size < 0:
@@ -56,7 +56,7 @@ def opened(path: Path) -> Iterator[zipfile.ZipFile]:
     Yields
     ------
     ZipFile
-        To be read here and now: what is read is what was looked through.
+        Open archive; only what is read from it was checked.
 
     Raises
     ------
@@ -79,21 +79,21 @@ def opened(path: Path) -> Iterator[zipfile.ZipFile]:
 
 
 def unpack(path: Path, folder: Path, platforms: Collection[str]) -> ET.Element:
-    """Extract what a run needs of an FMU, none of whose files leaves the folder, and return its model description.
+    """Extract the files that a run needs from an FMU into a folder, and return its model description.
 
     Parameters
     ----------
     path : Path
         The FMU.
     folder : Path
-        Empty, and of this user alone.
+        Empty folder of this user alone.
     platforms : collection of str
-        Folders of the binaries that are needed. Documents and sources never are: no library can count on them.
+        Folders of the binaries that are needed. Documents and sources are never extracted: no library can rely on them.
 
     Returns
     -------
     Element
-        Of ``modelDescription.xml``.
+        Root of ``modelDescription.xml``.
 
     Raises
     ------
@@ -112,12 +112,12 @@ def _is_needed(name: str, platforms: Collection[str]) -> bool:
 
 
 def descriptions(path: Path, archive: zipfile.ZipFile) -> ET.Element:
-    """Return the model description, after a look at all descriptions that an importer parses.
+    """Return the model description, after a check of all descriptions that an importer parses.
 
     Raises
     ------
     FmuFileError
-        If one is no XML, declares a document type, or is absurdly large or deep.
+        If one is no XML, declares a document type, or is too large or deep.
     """
     names = set(archive.namelist())
     roots = [_parsed(f"{path}: {name}", archive, name) for name in _DESCRIPTIONS if name in names]
@@ -128,7 +128,7 @@ def descriptions(path: Path, archive: zipfile.ZipFile) -> ET.Element:
 
 
 def _check_members(path: Path, archive: zipfile.ZipFile) -> None:
-    """Refuse what no importer should extract: not all of them look where they write."""
+    """Refuse members that are unsafe to extract: not all importers check where they write."""
     members = archive.infolist()
     if len(members) > MAX_FILES:
         raise FmuFileError(f"{path}: refused: holds {len(members)} files, expected at most {MAX_FILES}")
@@ -158,7 +158,7 @@ def _check_members(path: Path, archive: zipfile.ZipFile) -> None:
 
 
 def _folded(name: str) -> str:
-    """Return what is one name on some system: without case, ways to write an accent, dots and blanks at an end."""
+    """Return a key that is equal for names of one file on some system: case folded, accents composed, ends trimmed."""
     parts = (part.rstrip(" .") for part in PurePosixPath(name).parts)
     return unicodedata.normalize("NFC", "/".join(parts)).casefold()
 
@@ -167,7 +167,7 @@ def _folded(name: str) -> str:
 
 
 class _Bounded(ET.TreeBuilder):
-    """Builds a tree that is neither too large nor too deep, of a document that declares no type: so has no entities."""
+    """Build a tree of limited size and depth, from a document without a document type, and so without entities."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -198,13 +198,13 @@ def _parsed(where: str, archive: zipfile.ZipFile, name: str) -> ET.Element:
             return _tree_of(source.read()) if size <= _PIECE else _tree(source)
     except ET.ParseError as error:
         raise FmuFileError(f"{where} is no XML that can be read: {error}") from error
-    except (LookupError, ValueError) as error:  # an encoding that is not known, or not as it says
+    except (LookupError, ValueError) as error:  # an encoding that is unknown, or wrong
         raise FmuFileError(f"{where} is no XML that can be read: {' '.join(str(error).split())}") from error
 
 
 @functools.lru_cache(maxsize=16)
 def _tree_of(content: bytes) -> ET.Element:
-    """Return the root of a document, to be read alone; one FMU is often opened again and again."""
+    """Return the root of a document, which is not to be changed; one FMU is often opened again and again."""
     return _tree(io.BytesIO(content))
 
 

@@ -1,4 +1,4 @@
-"""Vehicles: TOML files in, checked numbers out."""
+"""Load vehicles from TOML files, and validate their numbers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Vector6 = tuple[float, float, float, float, float, float]
 Rows = tuple[tuple[float, ...], ...]
 Matrix = tuple[float | tuple[float, ...], ...]  # rows, or a diagonal
 
-GREATEST = 1e15  # of any number of a vehicle, so that what is made of them is finite
+GREATEST = 1e15  # of any number of a vehicle, so that derived numbers are finite
 MAX_THRUSTERS = 100
 
 # a name becomes C text and a file's name: neither may be a word that C99 or Windows keep for themselves
@@ -31,7 +31,7 @@ _RESERVED = re.compile(
     "(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])"
 )
 
-# where in the file a number of the vehicle stands
+# key of the file for each number of a vehicle
 _KEYS = {
     "mass": "rigid_body.mass",
     "inertia": "rigid_body.inertia",
@@ -65,7 +65,7 @@ class RigidBody:
 
 @dataclass(frozen=True)
 class Hydrostatics:
-    """Buoyancy and where it acts."""
+    """Buoyancy and its centre."""
 
     buoyancy: float  # N
     center_of_buoyancy: Vector3  # m, body frame
@@ -73,7 +73,7 @@ class Hydrostatics:
 
 @dataclass(frozen=True)
 class Hydrodynamics:
-    """Added mass and damping, positive as they stand in the equation of motion."""
+    """Added mass and damping, positive in the equation of motion."""
 
     added_mass: Matrix  # kg, kg m, kg m2: 6 by 6, or its diagonal
     linear_damping: Vector6  # N s/m, N m s/rad
@@ -82,7 +82,7 @@ class Hydrodynamics:
 
 @dataclass(frozen=True)
 class Thrusters:
-    """What each thruster puts on the body, and what it can give."""
+    """Wrench, limits and dynamics of each thruster."""
 
     matrix: Rows  # 6 rows (X Y Z K M N), a column for each thruster: wrench of one newton
     force_min: float | tuple[float, ...]  # N, most negative force
@@ -95,7 +95,7 @@ class Thrusters:
 
 @dataclass(frozen=True)
 class Hull:
-    """The sphere about the body origin that meets surface and bottom, and what the hull looks like."""
+    """The sphere about the body origin that meets surface and bottom, and the shape in pictures."""
 
     radius: float = 0.0  # m
     shape: Literal["frame", "sphere"] = "frame"  # as pictures show it; the dynamics do not depend on it
@@ -185,12 +185,12 @@ def load_vehicle(name_or_file: str | Path) -> Vehicle:
     Returns
     -------
     Vehicle
-        The checked numbers.
+        The validated vehicle.
 
     Raises
     ------
     VehicleError
-        If there is no such vehicle, or its numbers cannot be right.
+        If there is no such vehicle, or a number is impossible.
     TableError
         If the file has a missing, unknown or mistyped key.
 
@@ -212,7 +212,7 @@ def load_vehicle(name_or_file: str | Path) -> Vehicle:
 
 @functools.cache
 def _shipped(name: str) -> Vehicle:
-    """Return a shipped vehicle, which nobody changes: its arrays cannot be written."""
+    """Return a shipped vehicle from the cache; its arrays cannot be written."""
     with resources.as_file(_folder() / f"{name}.toml") as file:
         return _decode(file, name)
 
@@ -230,7 +230,7 @@ def _folder() -> resources.abc.Traversable:
 
 
 def _check(file: _File, where: str) -> Vehicle:
-    """Turn the file's numbers into arrays, and name the first that cannot be right."""
+    """Convert the file's numbers to arrays, and name the first impossible one."""
 
     def require(good: bool, key: str, received: object, expected: str) -> None:
         if not good:
@@ -292,7 +292,7 @@ def _check(file: _File, where: str) -> Vehicle:
 
     for key, value in vars(vehicle).items():
         if not isinstance(value, str | Autopilot | None):
-            good = bool(np.all(np.abs(value) <= GREATEST))  # of no NaN either
+            good = bool(np.all(np.abs(value) <= GREATEST))  # False for NaN too
             require(good, _KEYS.get(key, key), "not finite", f"finite numbers of up to {GREATEST:g}")
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)

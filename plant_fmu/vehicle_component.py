@@ -31,19 +31,19 @@ def of_vehicle(
     start : mapping from str to float, optional
         Start values of parameters and states, by name, over those of the vehicle.
     stop_time, step : float, optional
-        Of the default experiment [s].
+        Times of the default experiment [s].
     coupled : bool, optional
         With the inputs by which other components act on the vehicle; they are off while they are 0.
 
     Returns
     -------
     Component
-        What its FMU is made of.
+        Component for the build of its FMU.
 
     Raises
     ------
     BuildError
-        If a start value is of no parameter, input or state, or beyond its range.
+        If a start value is not of a parameter, input or state, or beyond its range.
     VehicleError
         If a number of the vehicle is beyond the range of its parameter.
     """

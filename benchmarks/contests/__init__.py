@@ -1,1 +1,1 @@
-"""What is timed against peers, a file for each subject: a function of where the peers are, that yields contests."""
+"""The contests with peers, a file for each subject: a function of the peers' environment that yields contests."""

@@ -63,7 +63,7 @@ def contests(environment: Environment) -> Iterator[Contest]:
 
 
 class _Package:
-    """The scenario as a system structure for other masters, made when it is first asked for."""
+    """The scenario as a system structure for other masters, made at its first use."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -124,20 +124,20 @@ def _master(*, record: bool) -> Entry:
 def flights(
     engine: str, *, per_run: bool = True, changes: Sequence[str] = (), batch: int = BATCH, whole: bool = False
 ) -> Entry:
-    """Return the entry of an engine that flies the scenario from many starts.
+    """Return the entry of an engine that runs the scenario from many starts.
 
     Parameters
     ----------
     engine : str
         ``"fused"`` or ``"lanes"``.
     per_run : bool
-        Whether an item is a run, rather than a step.
+        True if an item is a run, and not a step.
     changes : sequence of str
-        Of the scenario, after `CHANGES`.
+        Changes of the scenario, after `CHANGES`.
     batch : int
-        Runs that are flown at once, at least.
+        Least number of concurrent runs.
     whole : bool
-        Whether an item is a batch.
+        True if an item is a batch.
     """
 
     def entry(stack: ExitStack) -> Contestant:
@@ -154,23 +154,23 @@ def flights(
 
 
 class _Flights:
-    """Flights of an engine, each from a start of its own; items are counted pro rata.
+    """Runs by an engine, each from its own start; times are scaled to the number of items.
 
     Parameters
     ----------
     flyer : FusedFlyer or LanesFlyer
-        What flies.
+        Engine that flies the runs.
     batch : int
-        How many it flies at once, at least.
+        Least number of concurrent runs.
     items : float
-        In a flight.
+        Items in a run.
     """
 
     def __init__(self, flyer: Any, batch: int, items: float) -> None:
         self._flyer, self._batch, self._items = flyer, batch, items
 
     def seconds(self, count: int) -> float:
-        """Fly at least so many items, and return what `count` of them take [s]."""
+        """Fly at least `count` items, and return the time of `count` of them [s]."""
         batches = math.ceil(count / self._items / self._batch)
         seeds = np.arange(self._batch)
         starts = np.random.default_rng(0).uniform(-0.2, 0.2, (batches, self._batch, 1))

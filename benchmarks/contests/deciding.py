@@ -1,4 +1,4 @@
-"""A decision of the arbiter by the paper's rules, and a step of the laws."""
+"""A decision of the arbiter with the paper's rules, and a step of the laws."""
 
 from __future__ import annotations
 
@@ -62,21 +62,21 @@ def contests(environment: Environment) -> Iterator[Contest]:
 
 
 class _Decisions:
-    """Decisions with inputs that are new each time: some engines keep what they have computed once.
+    """Decisions with new inputs each time: some engines cache their last results.
 
     Parameters
     ----------
     decide : callable
-        Takes the inputs.
+        Function of the inputs.
     made : callable
-        Of a row of inputs, what `decide` takes.
+        Converts a row of inputs to the argument of `decide`.
     """
 
     def __init__(self, decide: Callable[[Any], object], made: Callable[[list[float]], Any] = list) -> None:
         self._decide, self._made, self._rng = decide, made, np.random.default_rng(0)
 
     def seconds(self, count: int) -> float:
-        """Decide so often, and return what that took [s]."""
+        """Decide `count` times, and return the time [s]."""
         decide, inputs = self._decide, [self._made(row) for row in self._rng.random((count, len(SECTION_VI))).tolist()]
         before = time.perf_counter()
         for row in inputs:

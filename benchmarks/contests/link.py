@@ -50,7 +50,7 @@ def _frame(_: ExitStack) -> Contestant:
 
 
 class _Lockstep:
-    """Whole flights, of which the stand-in for the autopilot takes the time."""
+    """Whole runs, timed by the autopilot's stand-in."""
 
     def seconds(self, count: int) -> float:
         from benchmarks.sitl import lockstep

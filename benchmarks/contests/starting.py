@@ -1,4 +1,4 @@
-"""Cold start: the command from nothing, with caches that are empty, and with those that a run has left."""
+"""Cold start of the command: with empty caches, and with the caches of an earlier run."""
 
 from __future__ import annotations
 
@@ -55,14 +55,14 @@ def _second(stack: ExitStack) -> Contestant:
 
 
 class _Command:
-    """Ours as a process, with caches of its own."""
+    """The project's command as a process, with caches of its own."""
 
     def __init__(self, stack: ExitStack, arguments: Sequence[str]) -> None:
         self._folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="start-")))
         self._arguments = arguments
 
     def empty(self) -> None:
-        """Forget what earlier processes left."""
+        """Clear the caches of earlier processes."""
         shutil.rmtree(self._folder)
         self._folder.mkdir()
 

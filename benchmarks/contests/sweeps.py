@@ -1,4 +1,4 @@
-"""Sweeps of the closed loop by several workers, processes or a Dask cluster, which are there and have compiled."""
+"""Sweeps of the closed loop by several workers, processes or a Dask cluster, which are started and have compiled."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ _VARIED = ("initial.position.0=-0.2:0.2",)
 _WARMING = 64  # rows
 
 
-def sweep(crew: str, workers: int, engine: str) -> Entry:
+def sweep(pool: str, workers: int, engine: str) -> Entry:
     """Return the entry of a sweep, whose items are runs; from the call to the summary, its folder included.
 
     Parameters
     ----------
-    crew : str
+    pool : str
         ``"processes"`` or ``"Dask"``.
     workers : int
-        How many.
+        Number of workers.
     engine : str
         ``"fused"`` or ``"lanes"``.
     """
 
     def entry(stack: ExitStack) -> Contestant:
-        contestant = _Sweep(stack.enter_context(_executor(crew, workers)), workers, engine, stack)
+        contestant = _Sweep(stack.enter_context(_executor(pool, workers)), workers, engine, stack)
         for _ in range(2):  # each worker has its part
             contestant.seconds(_WARMING * workers)
         return contestant
@@ -41,8 +41,8 @@ def sweep(crew: str, workers: int, engine: str) -> Entry:
     return entry
 
 
-def _executor(crew: str, workers: int) -> Executor:
-    if crew == "processes":
+def _executor(pool: str, workers: int) -> Executor:
+    if pool == "processes":
         return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
     from cosim.campaigns.workers.cluster import cluster_executor
 
@@ -60,7 +60,7 @@ class _Sweep:
         self._numbers = itertools.count()
 
     def seconds(self, count: int) -> float:
-        """Fly `count` rows, and return what that took [s]."""
+        """Fly `count` rows, and return the time [s]."""
         from cosim.campaigns.sweep import run_sweep
         from cosim.campaigns.sweeps.design import Design, vary_from
 

@@ -1,5 +1,5 @@
-"""Peers that ours is measured against. Each file stands alone: it runs in the peers' own environment.
+"""Peers for comparison. Each file is independent of this project: it runs in the peers' own environment.
 
-A peer is a function of its setup, plain values, that returns a function which does as many items as it is told; where
-that returns a number, it is what they took [s].
+A peer is a function of its setup, plain values, that returns a function which does the given number of items; if
+that returns a number, it is their time [s].
 """

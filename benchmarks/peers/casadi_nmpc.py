@@ -1,13 +1,13 @@
-"""Nonlinear model predictive control by CasADi and its solver fatrop: what the vehicle does over a horizon of N stages.
+"""Nonlinear model predictive control by CasADi and its solver fatrop, over a horizon of N stages.
 
     minimise    sum_k  w_p (sqrt(|p_k - p_d|^2 + 1) - 1) + w_u |u_k|^2 + w_m |B_r u_k - m_k|^2 + slack's price,
                 and w_v |v_N|^2 at the end
     subject to  x_{k+1} = f(x_k, u_k),   u_min <= u_k <= u_max,   s_k >= 0,   of each obstacle and each depth
                 |p_k - c_i(t_k)| >= r_i + margin - s_k,   z_min + margin - s_k <= z_k <= z_max - margin + s_k
 
-The state x is position and velocity; the inputs u are the thrusters' forces. f is the nominal model with the attitude
-that is measured, drag against still water, and a constant disturbance, which an observer outside finds. m_k is the
-moment that the attitude's loop asks for. Obstacles keep their velocity.
+The state x is position and velocity; the inputs u are the thrusters' forces. f is the nominal model with the measured
+attitude, drag against still water, and a constant disturbance from an observer outside. m_k is the
+moment that the attitude controller commands. Obstacles keep their velocity.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-_FAR = (0.0, 0.0, -1e3, 0.1, 0.0, 0.0, 0.0)  # where obstacles are that there are not
+_FAR = (0.0, 0.0, -1e3, 0.1, 0.0, 0.0, 0.0)  # parked position of unused obstacles
 _SLACK = 1e4  # price of a metre, and of its square
 
 
 def controller(setup: dict[str, Any]) -> Callable[[dict[str, Any]], dict[str, Any]]:
-    """Return a function from what is measured and known to thruster forces.
+    """Return a function from measurements, goal and obstacles to thruster forces.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def _motion(setup: dict[str, Any]) -> ca.Function:
 
 
 def _clearances(x: ca.SX, after: float, spheres: ca.SX, band: ca.SX, margin: ca.SX, s: ca.SX) -> list[ca.SX]:
-    """Return what must be above 0 after a time [s]: clearances less the margin, and the slack."""
+    """Return the constraints g >= 0 after a time [s]: clearances less the margin, plus the slack."""
     found = []
     for i in range(spheres.shape[1]):
         between = x[:3] - spheres[:3, i] - after * spheres[4:, i]

@@ -17,7 +17,7 @@ def _simulate(setup: dict[str, Any], count: int) -> None:
 
 
 def steps(setup: dict[str, Any]) -> Callable[[int], float]:
-    """Return a function that tells what so many steps take [s]: of a long run, without what loading takes."""
+    """Return a function that measures the time of so many steps [s]: in a long run, less the time to load."""
 
     def work(count: int) -> float:
         long = max(count, _LONG)

@@ -1,4 +1,4 @@
-"""Two systems in pyfuzzylite and in simpful; it stands alone, since pyfuzzylite needs a NumPy of its own.
+"""Two systems in pyfuzzylite and in simpful; independent of this project, since pyfuzzylite needs its own NumPy.
 
 One request in JSON comes on the standard input, and one answer in JSON goes to the standard output:
 ``{"library": "simpful", "system": "tipping", "resolution": 100, "inputs": [[6.5, 9.8]]}``.
@@ -35,7 +35,7 @@ _TIP = (
         "high": ((13.0, 0.0), (25.0, 1.0)),
     },
 )
-# inputs, outputs, and rules in a form that is made into the text of each library
+# inputs, outputs, and rules in a form that is converted to the text of each library
 SYSTEMS: dict[str, Any] = {
     "section_vi": (
         {"obstacle": _DEGREE, "shape": _DEGREE, "depth": _DEGREE},
@@ -103,7 +103,7 @@ def pyfuzzylite(system: str, resolution: int) -> tuple[Evaluate, str]:
 
 
 def simpful(system: str, resolution: int) -> tuple[Evaluate, str]:
-    """Return a function of the inputs, and the system's terms and rules as simpful has them."""
+    """Return a function of the inputs, and the system's terms and rules in simpful's format."""
     from simpful import FuzzySet, FuzzySystem, LinguisticVariable
 
     inputs, outputs, rules = SYSTEMS[system]
@@ -112,7 +112,7 @@ def simpful(system: str, resolution: int) -> tuple[Evaluate, str]:
     for name, ((low, high), terms) in {**inputs, **outputs}.items():
         sets = []
         for term, points in terms.items():
-            # it wants a degree at both ends of the universe
+            # simpful needs a degree at both ends of the universe
             ends = [point for point in ((low, points[0][1]), (high, points[-1][1])) if point not in points]
             shown = sorted([*points, *ends])
             sets.append(FuzzySet(points=[list(point) for point in shown], term=term))
@@ -122,7 +122,7 @@ def simpful(system: str, resolution: int) -> tuple[Evaluate, str]:
     for asked, join, concluded in rules:
         first, *others = (f"({clause.replace(' is ', ' IS ')})" for clause in asked)
         clauses = first
-        for i, other in enumerate(others):  # it knows connectives of two
+        for i, other in enumerate(others):  # simpful's connectives have two operands
             clauses = f"{f'({clauses})' if i else clauses} {join.upper()} {other}"
         sentences.append(f"IF {clauses} THEN ({concluded.replace(' is ', ' IS ')})")
     made.add_rules(sentences)
@@ -140,7 +140,7 @@ _LIBRARIES = {"pyfuzzylite": pyfuzzylite, "simpful": simpful}
 
 
 def evaluations(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that evaluates so often, with other inputs each time."""
+    """Return a function that evaluates so many times, with other inputs each time."""
     evaluate, _ = _LIBRARIES[setup["library"]](setup["system"], setup["resolution"])
     n, rng = len(SYSTEMS[setup["system"]][0]), random.Random(0)
     inputs = itertools.cycle([[rng.random() for _ in range(n)] for _ in range(1000)])
@@ -153,7 +153,7 @@ def evaluations(setup: dict[str, Any]) -> Callable[[int], object]:
 
 
 def batches(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that evaluates so many rows at once, which pyfuzzylite alone of these can."""
+    """Return a function that evaluates so many rows at once; of these libraries only pyfuzzylite can."""
     import fuzzylite
     import numpy as np
 

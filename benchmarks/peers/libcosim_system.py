@@ -14,7 +14,7 @@ _TICKS = 10**9  # a second: it counts time in whole nanoseconds
 
 
 def _unpacked(setup: dict[str, Any]) -> str:
-    """Return the folder of the system structure, which is what libcosim takes."""
+    """Return the folder of the unpacked system structure, the input of libcosim."""
     folder = tempfile.mkdtemp()
     with zipfile.ZipFile(setup["ssp"]) as archive:
         archive.extractall(folder)

@@ -1,4 +1,4 @@
-"""The odin vehicle for Numba: the same equations as in NumPy, in loops over arrays that are there already."""
+"""The odin vehicle for Numba: the same equations as in NumPy, in loops over preallocated arrays."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Numbers = tuple[Array, Array, Array, float, Array, Array, Array]  # M_RB, M_A, M
 
 @numba.njit
 def rate(s: Array, tau: Array, numbers: Numbers, force: Array, out: Array) -> None:
-    """Write the time derivative of the state under a body wrench into `out`; `force` is room for six."""
+    """Write the time derivative of the state under a body wrench into `out`; `force`, shape (6,), is scratch space."""
     M_RB, M_A, M_inverse, lift, arm, linear, quadratic = numbers
     e0, e1, e2, e3 = s[3], s[4], s[5], s[6]
     two = 2.0 / (e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
@@ -30,7 +30,7 @@ def rate(s: Array, tau: Array, numbers: Numbers, force: Array, out: Array) -> No
     out[4] = 0.5 * (e0 * p - e3 * q + e2 * r)
     out[5] = 0.5 * (e3 * p + e0 * q - e1 * r)
     out[6] = 0.5 * (-e2 * p + e1 * q + e0 * r)
-    # momenta of body and water, and what they do as the frame turns
+    # momenta of body and water, and their rates in the turning frame
     m0 = m1 = m2 = m3 = m4 = m5 = 0.0
     for j in range(6):
         x = s[7 + j]
@@ -60,7 +60,7 @@ def rate(s: Array, tau: Array, numbers: Numbers, force: Array, out: Array) -> No
 def step(
     s: Array, thrust: Array, wrench: Array, B: Array, low: Array, high: Array, numbers: Numbers, h: float, room: Array
 ) -> None:
-    """Advance the state by one step of Runge-Kutta [s]; `room` has shape (7, 13)."""
+    """Advance the state by one step of Runge-Kutta [s]; `room`, shape (7, 13), is scratch space."""
     tau, k1, k2, k3, k4, there, force = room[0], room[1], room[2], room[3], room[4], room[5], room[6]
     for i in range(6):
         tau[i] = wrench[i]
@@ -88,7 +88,7 @@ def many(
     s: Array, thrust: Array, wrench: Array, B: Array, low: Array, high: Array, numbers: Numbers, h: float, room: Array,
     count: int,
 ) -> None:  # fmt: skip
-    """Take so many steps."""
+    """Run `count` steps."""
     for _ in range(count):
         step(s, thrust, wrench, B, low, high, numbers, h, room)
 

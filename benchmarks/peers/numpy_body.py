@@ -25,7 +25,7 @@ def coriolis(momentum: Array) -> Array:
 
 
 class Body:
-    """A rigid body in resting water, without thrusters' lag.
+    """A rigid body in still water, without thrusters' lag.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Body:
         return np.clip(thrust, self.thrust_min, self.thrust_max)
 
     def tau(self, thrust: Array, wrench: Array) -> Array:
-        """Return the body wrench of thrusters and of what acts beside them [N, N m]."""
+        """Return the body wrench of the thrusters plus an external one [N, N m]."""
         return wrench + self.thruster_matrix @ self.limited(thrust)
 
     def rate(self, state: Array, tau: Array) -> Array:
@@ -64,7 +64,7 @@ class Body:
         S = skew(e[1:])
         R = np.eye(3) + 2.0 / (e @ e) * (e[0] * S + S @ S)
         turn = 0.5 * np.vstack([-e[1:], e[0] * np.eye(3) + S])
-        k = R[2]  # down, seen from the body
+        k = R[2]  # down, in body axes
         restoring = np.concatenate([self.lift * k, np.cross(self.arm, k)])
         damping = (self.linear + self.quadratic * np.abs(nu)) * nu
         C = coriolis(self.M_RB @ nu) + coriolis(self.M_A @ nu)
@@ -81,7 +81,7 @@ class Body:
 
 
 def steps(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that takes so many steps, one call each, the thrusts being brought to a wrench in each."""
+    """Return a function that takes so many steps, one call each, with the thrusts converted to a wrench in each."""
     body, h = Body(setup["vehicle"]), setup["step"]
     thrust, wrench = np.array(setup["thrust"]), np.array(setup["wrench"])
 

@@ -1,7 +1,7 @@
 """A peer as a process: ``python serve.py MODULE FUNCTION``, with its setup in JSON as the first line of the input.
 
-Each further line is a number of items to do, or what else the function takes, in JSON; each answer a line of JSON: what
-it took [s], or the dict that the function returned, or why it was not done.
+Each further line is a number of items, or another argument of the function, in JSON; each answer is a line of JSON:
+the time [s], or the dict that the function returned, or the reason why it failed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import time
 def main(module: str, function: str) -> None:
     """Serve until the input ends."""
     answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # what libraries print is no answer
+    os.dup2(2, 1)  # the output of libraries does not mix with the answers
 
     def answer(**values: object) -> None:
         print(json.dumps(values), file=answers, flush=True)
@@ -27,12 +27,12 @@ def main(module: str, function: str) -> None:
         for line in sys.stdin:
             given = json.loads(line)
             before = time.perf_counter()
-            told = work(given)
+            done = work(given)
             taken = time.perf_counter() - before
             answer(
-                **({"seconds": told if isinstance(told, float) else taken} | (told if isinstance(told, dict) else {}))
+                **({"seconds": done if isinstance(done, float) else taken} | (done if isinstance(done, dict) else {}))
             )
-    except Exception as error:  # noqa: BLE001 -- whatever a peer cannot do is an answer
+    except Exception as error:  # noqa: BLE001 -- any failure of a peer is an answer
         answer(error=f"{type(error).__name__}: {error}")
 
 

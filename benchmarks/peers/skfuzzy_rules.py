@@ -1,4 +1,4 @@
-"""The paper's rules in scikit-fuzzy, as its examples build theirs."""
+"""The paper's rules in scikit-fuzzy, in the style of its examples."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def simulation(points: int) -> Any:
 
 
 def calls(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that computes so often, with other inputs each time: it keeps what it has computed once."""
+    """Return a function that computes so many times, with other inputs each time, since scikit-fuzzy caches results."""
     warnings.simplefilter("ignore", DeprecationWarning)
     system, rng = simulation(setup["points"]), np.random.default_rng(0)
 

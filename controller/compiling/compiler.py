@@ -23,7 +23,7 @@ def compiler_command() -> list[str]:
     Raises
     ------
     CompilationError
-        If there is none.
+        If there is no compiler.
     """
     named = os.environ.get("CC")
     if named:
@@ -47,16 +47,16 @@ def compile_file(source: Path, library: Path, compiler: Sequence[str] | None = N
     Parameters
     ----------
     source, library : Path
-        What is read, and what is written.
+        C file to read, and library to write.
     compiler : sequence of str, optional
-        Its command and first arguments; default: that of this machine.
+        Command and first arguments; default: those of this machine's compiler.
 
     Raises
     ------
     CompilationError
         If there is no compiler, or it fails; its first complaint is in the message.
     """
-    # named, for Apple's linker else writes the place of the build into the library; for others without a table of names
+    # named, for Apple's linker else writes the build folder into the library; for others without a table of names
     link = f"-Wl,-install_name,@rpath/{library.name}" if library.suffix == ".dylib" else "-s"
     command = [*(compiler or compiler_command()), *FLAGS, link, str(source), "-o", str(library), "-lm"]
     try:

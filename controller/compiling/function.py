@@ -1,7 +1,7 @@
-"""Plain functions called as C, again and again with the same arrays, in which the numbers change.
+"""Call plain functions as C many times with the same arrays, in which the numbers change.
 
-A law is given about forty arrays; to look at each at each call would take several times as long as its mathematics.
-Here they are looked at once, and kept as words that the C function makes its arguments of.
+A law has about forty arrays; to validate each at each call would take several times as long as its mathematics.
+Here they are validated once, and stored as the words from which the C function makes its arguments.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from controller.translator.arguments import words_of
 from controller.translator.program import Program
 from controller.translator.types import Type, type_of
 
-INTERPRETED = "SUBREACH_INTERPRETED"  # where the environment has it, Python runs all functions: no compiler is needed
+INTERPRETED = "SUBREACH_INTERPRETED"  # environment variable: if set, Python runs all functions, without a compiler
 Described = dict[int, tuple[Any, Type, list[int]]]  # arguments with their types and words, by their ids
 
-_MOST = 8  # sets of arguments that are kept
+_MOST = 8  # sets of arguments in the cache
 _NONE = (None,) * 7
 _CALLBACK = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)
 
 
 def c_text(function: Callable[..., None], arguments: tuple[Any, ...]) -> str:
-    """Return the C of a function for arguments such as these, as its library is compiled from it.
+    """Translate a function to C for arguments of these types, as its library is compiled from it.
 
     Parameters
     ----------
@@ -84,14 +84,14 @@ class BoundCall:
     arguments : tuple
         Numbers, C-contiguous arrays, and tuples of such; no array is resized in place.
     known : dict, optional
-        What is known of arguments by their ids, which are theirs while it holds them; more is put there.
+        Cache of argument types and words by id, which grows. Its ids are valid while it holds the arguments.
 
     Attributes
     ----------
     call : callable
-        Calls it.
+        Callable without arguments that calls the function.
     address, words : int
-        Of the C function ``void (*)(const void *)``, and of what it is given.
+        Addresses of the C function ``void (*)(const void *)``, and of its argument.
     """
 
     def __init__(self, function: Any, arguments: tuple[Any, ...], known: Described | None = None) -> None:
@@ -102,7 +102,7 @@ class BoundCall:
             self._words = np.array([word for _, _, words in described for word in words], dtype=np.uint64)
             self.words: int = self._words.ctypes.data
             call: Any = functools.partial(self._entry, self.words)
-            call.kept = self._words, arguments  # whoever has it alone can call it
+            call.kept = self._words, arguments  # so that `call` works without this object
             self.call: Callable[[], None] = call
         else:
             self.words, self.call = 0, functools.partial(_quietly, function, arguments)
@@ -117,7 +117,7 @@ class BoundCall:
             self._raised = error
 
     def raise_error(self) -> None:
-        """Raise what the function raised when it was called by its address, if it did."""
+        """Raise the error of the function's last call by address, if there was one."""
         if self._raised is not None:
             raise self._raised
 
@@ -150,19 +150,19 @@ class CompiledFunction:
     def __call__(
         self, a: Any, b: Any = None, c: Any = None, d: Any = None, e: Any = None, f: Any = None, g: Any = None
     ) -> None:
-        """Call it.
+        """Call the function.
 
         Parameters
         ----------
         a, b, c, d, e, f, g : object
-            Arguments of the function; None for those that it has not.
+            Arguments of the function; None for those that it lacks.
 
         Raises
         ------
         TranslationError, CompilationError
             If it cannot be translated, or there is no compiler where one is needed.
         """
-        # one by one: to compare two tuples item by item takes twice as long
+        # one by one: a comparison of two tuples item by item takes twice as long
         call, a0, b0, c0, d0, e0, f0, g0 = self._last
         if not (a is a0 and b is b0 and c is c0 and d is d0 and e is e0 and f is f0 and g is g0):
             call = self._call_of(tuple(argument for argument in (a, b, c, d, e, f, g) if argument is not None))
@@ -179,12 +179,12 @@ class CompiledFunction:
         return bound.call
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Leave out, of a copy, what is kept of these very arrays."""
+        """Leave the cache of arrays out of a copy."""
         return CompiledFunction, (self._function,)
 
 
 def _quietly(function: Any, arguments: tuple[Any, ...]) -> None:
-    """Call a function; what overflows or is divided by 0 is no news, as in C."""
+    """Call a function without warnings of overflow and division by 0, as in C."""
     with np.errstate(all="ignore"):
         function(*arguments)
 

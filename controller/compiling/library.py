@@ -1,7 +1,7 @@
-"""C libraries by their text: with the package, in the user's cache, or compiled now.
+"""Find or compile the C library of a text: in the package, in the user's cache, or compiled now.
 
-A library's name is a digest of the C text that it is made from, so that it is never taken for another one's. Beside it
-lies its checksum: loading half of one could end the process.
+A library's name is a digest of the C text that it is made from, so that it is unique. Beside it is a file with its
+checksum: loading half of one could end the process.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from controller.compiling.compiler import FLAGS, compile_file
 
 log = logging.getLogger(__name__)
 first_use = logging.getLogger("controller.compiling.first_use")  # at INFO, before something is compiled
-first_use.propagate = False  # for who listens to it by its name
+first_use.propagate = False  # only for listeners by its name
 
 PREBUILT = Path(__file__).parents[1] / "prebuilt"  # in a wheel, with a folder for each platform; a checkout has none
 _MACHINE = {"amd64": "x86_64", "arm64": "aarch64"}
@@ -47,7 +47,7 @@ def library_of(text: str) -> ctypes.PyDLL:
     Returns
     -------
     PyDLL
-        Its functions are called without giving up Python's lock: they take microseconds, and to get it back can take
+        The library; calls keep Python's lock: they take microseconds, and to get the lock back can take
         milliseconds.
 
     Raises
@@ -65,7 +65,7 @@ def library_of(text: str) -> ctypes.PyDLL:
 
 
 def library_name(text: str) -> str:
-    """Return the name of the library of a C text, without what the system puts behind it.
+    """Return the name of the library of a C text, without the system's suffix.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def library_name(text: str) -> str:
 
 
 def checksum_path(path: Path) -> Path:
-    """Return where the checksum of a library lies: beside it."""
+    """Return the path of a library's checksum file, which is beside the library."""
     return path.with_name(f"{path.name}.sha256")
 
 
@@ -91,7 +91,7 @@ def digest_of(library: bytes) -> str:
 
 
 def _platform() -> str:
-    """Return the name of this machine and system, as FMI 3.0 has it."""
+    """Return the name of this machine and system in FMI 3.0."""
     machine = platform.machine().lower()
     return f"{_MACHINE.get(machine, machine)}-{_SYSTEM.get(sys.platform, sys.platform)}"
 
@@ -101,7 +101,7 @@ def _cache() -> Path:
 
 
 def is_whole(path: Path) -> bool:
-    """Return whether a library is there, and what was written: loading half of one can end the process."""
+    """Return True if a library exists and has its checksum: loading half of one can end the process."""
     try:
         expected, library = checksum_path(path).read_bytes(), path.read_bytes()
     except OSError:
@@ -113,7 +113,7 @@ def is_whole(path: Path) -> bool:
 
 
 def _is_trusted(folder: Path) -> bool:
-    """Return whether none but the user, or who installed the package, may change what lies there and is to be run."""
+    """Return True if only the user, or the owner of the package, can write in a folder of libraries."""
     try:
         about, trusted = folder.stat(), {Path(__file__).stat().st_uid}
     except OSError:
@@ -128,12 +128,12 @@ def _is_trusted(folder: Path) -> bool:
 
 @functools.cache
 def _warn_of_others(folder: Path) -> None:
-    """Say it once, however many libraries there are."""
+    """Log the warning once, however many libraries there are."""
     log.warning("%s: others can write there; compiled for this process alone", folder)
 
 
 def _compiled(text: str, name: str) -> Path:
-    """Return a library that is compiled now, in the cache if there is a place for it."""
+    """Compile a library now, into the cache if that can be written; return its path."""
     first_use.info("compiling %s", name)
     started = time.perf_counter()
     own = Path(tempfile.mkdtemp(dir=_own_folder()))
@@ -145,19 +145,19 @@ def _compiled(text: str, name: str) -> Path:
 
 
 def keep(built: Path, folder: Path) -> Path:
-    """Copy a library with its checksum into a folder of the cache, whole or not at all.
+    """Copy a library with its checksum into a folder of the cache, atomically.
 
     Parameters
     ----------
     built : Path
         The library.
     folder : Path
-        Made if it is not there.
+        Folder; it is made if it is missing.
 
     Returns
     -------
     Path
-        Where it is: in the folder, or where it was if there is no place.
+        Path in the folder, or `built` if the folder cannot be written.
     """
     kept = folder / built.name
     try:
@@ -174,7 +174,7 @@ def keep(built: Path, folder: Path) -> Path:
 
 
 def _write_whole(path: Path, data: bytes) -> None:
-    """Write a file that appears whole or not at all."""
+    """Write a file atomically."""
     handle, scratch = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".part")
     try:
         with open(handle, "wb") as file:
@@ -187,7 +187,7 @@ def _write_whole(path: Path, data: bytes) -> None:
 
 @functools.cache
 def _own_folder() -> Path:
-    """Return a folder that goes with the process."""
+    """Return a temporary folder that is removed with the process."""
     folder = tempfile.mkdtemp(prefix="subreach-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return Path(folder)

@@ -1,6 +1,6 @@
-"""The laws: one module each, which names its class as ``LAW``.
+"""The laws: one module each, which assigns its class to ``LAW``.
 
-A module that is put here is a law, known by the module's name.
+Each module in this folder is a law; its name is the law's name.
 
 Imports: regions.
 """
@@ -14,7 +14,7 @@ __all__ = ["LAWS"]
 
 
 def _find_laws() -> dict[str, type[CompiledLaw]]:
-    """Return the class of each module here, with its name set."""
+    """Return the class of each module in this folder, with its name set."""
     found = {}
     for module in iter_modules(__path__):
         law = getattr(import_module(f"{__name__}.{module.name}"), "LAW", None)

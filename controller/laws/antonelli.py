@@ -10,9 +10,9 @@ vehicle-fixed frames, for a set point,
 theta holds the three first moments of weight and buoyancy, which turn with the vehicle, and a force and a moment that
 are constant in the world, which is how he takes the effect of a steady current. The net weight W - B is constant in
 the world too, and so is a part of that force: with a parameter of its own there would be ten, two of them the same.
-Neither article nor book was at hand. This is the law as we know it, and the division 3 + 3 + 3 rests on that
-sameness, not on a page. Ours are the saturation, the bounds of the estimate, and the push of the regions, which stays
-out of the adaptation.
+Neither article nor book was at hand. This is the law as we know it, and the division 3 + 3 + 3 follows from that
+equality, not from a page. Ours are the saturation, the bounds of the estimate, and the push of the regions, which is
+not part of the adaptation.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from controller.stack_array import zeros
 
 
 class AntonelliGains(NamedTuple):
-    """Defaults: by ``python -m benchmarks baselines --draws 40 --seed 0``, where no other source stands beside."""
+    """Defaults: by ``python -m benchmarks baselines --draws 40 --seed 0``, where no other source is given."""
 
     k_p1: float = 156.1  # N/m, K_P of position
     k_p2: float = 36.0  # N m, K_P of attitude, section VII
@@ -56,12 +56,12 @@ class AntonelliGains(NamedTuple):
 
 
 class AntonelliMemory(NamedTuple):
-    """What it keeps, and where it computes."""
+    """State between steps, and work arrays."""
 
     desired_quaternion: Array  # (4,)
     period: Array  # (1,) s
     theta: Array  # (9,) first moments [N m], force [N, NED], moment [N m, NED]
-    estimate: Array  # (4,) phi-hat as theta has it: the current's vertical force is taken for weight
+    estimate: Array  # (4,) phi-hat from theta: the current's vertical force counts as weight
     report: Array  # (0,)
     drive: Array  # (6,) s
     field: Field
@@ -87,7 +87,7 @@ def step(
     memory: AntonelliMemory,
     forces: Array,
 ) -> None:
-    """Do what `CompiledLaw.step` says; all regions push in full, whatever their weights."""
+    """Write the forces as `CompiledLaw.step`; all regions push in full, whatever their weights."""
     R, Phi = zeros(3, 3), zeros(6, 9)
     write_rotation(state.quaternion, R)
     write_regressor(state.quaternion, R, Phi)

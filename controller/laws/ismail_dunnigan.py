@@ -13,7 +13,7 @@ from controller.regions.region_set import PackedRegions, evaluate_packed
 
 
 class IsmailDunniganMemory(NamedTuple):
-    """What the paper's law keeps, and where it evaluates regions."""
+    """State between steps, and work arrays for the regions."""
 
     desired_quaternion: Array  # (4,)
     period: Array  # (1,) s
@@ -39,9 +39,9 @@ def step(
     memory: IsmailDunniganMemory,
     forces: Array,
 ) -> None:
-    """Do what `CompiledLaw.step` says, by the paper's law."""
+    """Write the forces as `CompiledLaw.step`, by the paper's law."""
     p, e = state.position, state.quaternion
-    # regions push by force alone (22): what they say of attitude is passed over
+    # regions push by force alone (22): their derivatives by attitude are not used
     evaluate_packed(goal, p, e, memory.goal_value, memory.goal_gradient, memory.goal_turning, memory.goal_clearance)
     evaluate_packed(regions, p, e, memory.values, memory.gradients, memory.rotation_gradients, memory.clearances)
     for i in range(weights.size):
@@ -82,7 +82,7 @@ def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> Ismai
 
 
 class IsmailDunniganLaw(WrenchLaw):
-    """The law as printed: a wrench without limits.
+    """The paper's law: a wrench without limits.
 
     Examples
     --------

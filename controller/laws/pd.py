@@ -1,12 +1,12 @@
-"""PD control to a set point with gravity compensation, the first thing that anyone would try.
+"""PD control to a set point with gravity compensation, the simplest law for comparison.
 
     tau = -k_p1 R^T sat(p - p_d) - k_p2 e_eps - K_v nu + g-hat
 
 Takegaki and Arimoto's regulator (ASME J. Dyn. Syst. Meas. Control 103, 1981) for a vehicle, with attitude in
-quaternions as Fjellstad and Fossen (IEEE Oceans, 1994) have it, the proportional action saturated, and the push of
-the regions. It compensates the weight and buoyancy that it is told. A law is told neither (`VehicleModel`), so that
-g-hat is that of a neutral vehicle, zero, and what is left is a droop of (W - B) / k_p1. Integral action would make it
-another law.
+quaternions as in Fjellstad and Fossen (IEEE Oceans, 1994), the proportional action saturated, and the push of
+the regions. g-hat compensates weight and buoyancy as far as they are given. No law is given either (`VehicleModel`),
+so that g-hat is that of a neutral vehicle, zero, and the vehicle droops by (W - B) / k_p1. Integral action would make
+it another law.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from controller.stack_array import zeros
 
 
 class PdGains(NamedTuple):
-    """Defaults: by ``python -m benchmarks baselines --draws 120 --seed 0``, where no other source stands beside."""
+    """Defaults: by ``python -m benchmarks baselines --draws 120 --seed 0``, where no other source is given."""
 
     k_p1: float = 155.9  # N/m
     k_p2: float = 36.0  # N m, section VII
@@ -43,7 +43,7 @@ class PdGains(NamedTuple):
 
 
 class PdMemory(NamedTuple):
-    """Nothing that lasts; where it computes."""
+    """Work arrays; there is no state between steps."""
 
     desired_quaternion: Array  # (4,)
     estimate: Array  # (4,) zero: it estimates nothing
@@ -60,7 +60,7 @@ def step(
     memory: PdMemory,
     forces: Array,
 ) -> None:
-    """Do what `CompiledLaw.step` says; all regions push in full, whatever their weights."""
+    """Write the forces as `CompiledLaw.step`; all regions push in full, whatever their weights."""
     R, field = zeros(3, 3), memory.field
     write_rotation(state.quaternion, R)
     evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)

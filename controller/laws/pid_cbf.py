@@ -1,6 +1,6 @@
 """PD control with a disturbance observer for integral action, behind a second-order control-barrier-function filter.
 
-The nominal force is that of `pd`, less the disturbance that an observer finds:
+The nominal force is that of `pd`, less the disturbance from an observer:
 
     f = -k_p1 sat(p - p_d) - k_v1 v + push - M d-hat
 
@@ -21,7 +21,7 @@ its gradient and v its rate against the region's,
 keeps h >= 0 if it holds at all times and k_1 h + h' >= 0 at the start: an exponential barrier (Nguyen and Sreenath,
 American Control Conference, 2016), the linear case of high-order barriers (Xiao and Belta, IEEE CDC, 2019). `pull_in`
 and `brake` are k_1 and k_2. Thruster limits are in the quadratic program, and a slack with a price, since limits and
-barriers may contradict each other. Unlike the barriers of the deployable law, these ask for a deceleration that grows
+barriers may contradict each other. Unlike the barriers of the deployable law, these require a deceleration that grows
 with speed, whether the thrusters have it or not.
 
 None of these sources was at hand. Model, gradients and program are those of the deployable law.
@@ -70,7 +70,7 @@ _ABOVE_ZERO = ("k_p1", "observer", "pull_in", "brake")
 
 
 class PidCbfGains(NamedTuple):
-    """Defaults: by ``python -m benchmarks baselines --draws 120 --seed 0``, where no other source stands beside."""
+    """Defaults: by ``python -m benchmarks baselines --draws 120 --seed 0``, where no other source is given."""
 
     k_p1: float = 149.4  # N/m
     k_p2: float = 36.0  # N m, section VII
@@ -87,7 +87,7 @@ class PidCbfGains(NamedTuple):
 
 
 class PidCbfMemory(NamedTuple):
-    """What it keeps, and where it computes; of six numbers three are linear in NED, three angular in body axes."""
+    """State between steps, and work arrays; of six numbers three are linear in NED, three angular in body axes."""
 
     desired_quaternion: Array  # (4,)
     period: Array  # (1,) s
@@ -95,9 +95,9 @@ class PidCbfMemory(NamedTuple):
     position: Array  # (3,) m, NED, estimated
     velocity: Array  # (6,) m/s, rad/s, over ground, estimated
     disturbance: Array  # (6,) m/s2, rad/s2: d-hat
-    still: model.Loads  # no load, and water that rests
+    still: model.Loads  # no load, in still water
     acceleration: Array  # (6, m) of one newton of each thruster
-    estimate: Array  # (4,) the vertical disturbance [N], which it takes for weight; zeros
+    estimate: Array  # (4,) the vertical disturbance [N], which counts as weight; zeros
     report: Array  # (0,)
     field: Field
     observation: RegionObservation
@@ -115,7 +115,7 @@ def step(
     memory: PidCbfMemory,
     forces: Array,
 ) -> None:
-    """Do what `CompiledLaw.step` says; all regions push in full, and hard ones are barriers, whatever their weights."""
+    """Write the forces as `CompiledLaw.step`; all regions push in full, and hard ones are barriers."""
     R, free, wrench, force = zeros(3, 3), zeros(6), zeros(6), zeros(3)
     dynamics, thrusters, field, work = memory.dynamics, memory.thrusters, memory.field, memory.program
     mass, velocity = dynamics.translational_mass[0], memory.velocity
@@ -151,7 +151,7 @@ def step(
 
 
 def _update_thrusters(thrusters: Thrusters, health: Array) -> None:
-    """Take note of thrusters that are reported to work or to have failed."""
+    """Update the thrusters by their reported health."""
     changed = False
     for j in range(health.size):
         works = 1.0 if health[j] > 0.0 else 0.0
@@ -162,7 +162,7 @@ def _update_thrusters(thrusters: Thrusters, health: Array) -> None:
 
 
 def observe(memory: PidCbfMemory, state: VehicleState, R: Array, gains: PidCbfGains) -> None:
-    """Carry the observer over the last period, and correct it by what is measured, as far as that is a number."""
+    """Propagate the observer over the last period, and correct it by the finite measurements."""
     measured, acceleration, thrust, period = zeros(6), zeros(6), zeros(6), memory.period[0]
     position, velocity, disturbance = memory.position, memory.velocity, memory.disturbance
     total = 0.0
@@ -194,7 +194,7 @@ def observe(memory: PidCbfMemory, state: VehicleState, R: Array, gains: PidCbfGa
 
 
 def _write_rows(memory: PidCbfMemory, regions: PackedRegions, free: Array, gains: PidCbfGains) -> int:
-    """Write the barrier of each hard region that the thrusters could violate; return how many there are.
+    """Write the barrier of each hard region that the thrusters could violate; return the number of barriers.
 
     `free`, shape (6,), is the acceleration without thrust.
     """
@@ -231,9 +231,9 @@ class PidCbfLaw(CompiledLaw):
     Parameters
     ----------
     vehicle : VehicleModel
-        Nominal numbers.
+        Nominal numbers of the vehicle.
     gains : PidCbfGains
-        Of the law.
+        Gains of the law.
     desired_quaternion : array_like, shape (4,)
         Attitude to be kept, from body to world.
     period : float
@@ -283,7 +283,7 @@ class PidCbfLaw(CompiledLaw):
 
     @classmethod
     def validate(cls, gains: Any) -> Any:
-        """Return gains if the law can work with them."""
+        """Validate gains, and return them."""
         return validate_gains(gains, _ABOVE_ZERO)
 
 

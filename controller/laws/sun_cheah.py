@@ -5,10 +5,10 @@ paper's reference [1]:
 
     tau = -J^T K_p s(e) - K_v nu + Z(eta) phi-hat,    d(phi-hat)/dt = -L Z^T (nu + sigma J^T s(e))
 
-with s() saturated and the four numbers of the restoring forces (12) as all that is adapted: the law that the printed
-one (25)-(29) generalises to regions. The article was not at hand; this is its form as the paper's law hands it on,
+with s() saturated and only the four numbers of the restoring forces (12) adapted: the law that the paper's
+one (25)-(29) generalises to regions. The article was not at hand; this is its form as the paper's law shows it,
 with attitude errors as quaternions, where J is blkdiag(R, I). Ours are the bounds of the estimate and the push of the
-regions, which stays out of the adaptation.
+regions, which is not part of the adaptation.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from controller.stack_array import zeros
 
 
 class SunCheahGains(NamedTuple):
-    """Defaults: by ``python -m benchmarks baselines --draws 40 --seed 0``, where no other source stands beside."""
+    """Defaults: by ``python -m benchmarks baselines --draws 40 --seed 0``, where no other source is given."""
 
     k_p1: float = 156.1  # N/m
     k_p2: float = 36.0  # N m, section VII
@@ -52,7 +52,7 @@ class SunCheahGains(NamedTuple):
 
 
 class SunCheahMemory(NamedTuple):
-    """What it keeps, and where it computes."""
+    """State between steps, and work arrays."""
 
     desired_quaternion: Array  # (4,)
     period: Array  # (1,) s
@@ -71,7 +71,7 @@ def step(
     memory: SunCheahMemory,
     forces: Array,
 ) -> None:
-    """Do what `CompiledLaw.step` says; all regions push in full, whatever their weights."""
+    """Write the forces as `CompiledLaw.step`; all regions push in full, whatever their weights."""
     R, Z = zeros(3, 3), zeros(6, 4)
     write_rotation(state.quaternion, R)
     write_regressor(state.quaternion, Z)  # (12)

@@ -1,8 +1,8 @@
 """The paper's law (25)-(29) without its arbiter: every region has its full weight at all times.
 
-It is given what the paper's law lacks within real thrusters, as every law for comparison is: a bound on the pull of
+As every law for comparison, it has the parts that the paper's law lacks for real thrusters: a bound on the pull of
 the primary region, a margin within that region, regions that push from a `reach` on, and bounds on the estimate. All
-else is as printed.
+else is the paper's.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from controller.regions.region_set import PackedRegions
 
 
 class UnarbitratedGains(NamedTuple):
-    """Defaults: by 300 draws on plain scenes of seeds 10000-10199 alone, where no other source stands beside."""
+    """Defaults: by 300 draws on plain scenes of seeds 10000-10199 alone, where no other source is given."""
 
     k_p1: float = 115.8  # N/m3, on the primary region (16)
     k_p2: float = 36.0  # N m, on attitude (26), section VII
@@ -38,7 +38,7 @@ class UnarbitratedGains(NamedTuple):
 
 
 class UnarbitratedMemory(NamedTuple):
-    """What it keeps, and where it computes."""
+    """State between steps, and work arrays."""
 
     desired_quaternion: Array  # (4,)
     period: Array  # (1,) s
@@ -56,7 +56,7 @@ def step(
     memory: UnarbitratedMemory,
     forces: Array,
 ) -> None:
-    """Do what `CompiledLaw.step` says; all regions push in full, whatever their weights."""
+    """Write the forces as `CompiledLaw.step`; all regions push in full, whatever their weights."""
     field, estimate = memory.field, memory.estimate
     k_q = 1.0  # cancels
     g = Gains(gains.k_p1, gains.k_p2, k_q, gains.k_v1, gains.k_v2, gains.sigma_p, gains.sigma_a, gains.gamma)

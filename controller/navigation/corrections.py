@@ -1,10 +1,10 @@
 """Corrections of the estimate by a sample of one sensor: depth, velocity, heading or position.
 
-What is measured late is compared with the estimate of its time, and corrects through how the errors have grown since:
-an error of the position then is that of now less what the velocity's error has added, and so on. Samples farther off
-than `_GATE` standard deviations are rejected. After `_REJECTED_IN_A_ROW` of them the estimate is taken to be wrong,
-perhaps by an outlier that came when it was uncertain: its covariance is then that of the start. Where that does not
-help either, the filter starts anew.
+A late measurement is compared with the estimate of its time, and corrects by the growth of the errors since then:
+an error of the position then is that of now less the effect of the velocity's error, and so on. Samples farther off
+than `_GATE` standard deviations are rejected. After `_REJECTED_IN_A_ROW` of them the estimate counts as wrong,
+perhaps by an outlier while it was uncertain: its covariance is then that of the start. If that does not
+help either, the filter starts again.
 """
 
 from __future__ import annotations
@@ -44,28 +44,28 @@ from controller.stack_array import zeros
 Array = NDArray[np.float64]
 
 _GATE = 4.0  # standard deviations
-_UNKNOWN = 10.0  # standard deviations of a sample, beyond which it is nearer to the velocity than the estimate
+_UNKNOWN = 10.0  # standard deviations of a sample, beyond which the sample is nearer to the velocity than the estimate
 _REJECTED_IN_A_ROW = 3  # samples: of outliers one in fifty, as many in a row are rare
-CONFIRMED = 3.0  # samples accepted, from which on one that contradicts them is an outlier
-_RESETS = 4.0  # of the covariance without a confirmed sample in between, after which the filter starts anew
+CONFIRMED = 3.0  # accepted samples, after which a sample that contradicts them is an outlier
+_RESETS = 4.0  # of the covariance without a confirmed sample in between, after which the filter starts again
 _STEEP = 0.1  # cosine of the pitch, squared, below which a compass is not used
 _HALF_TURN, _TURN = 3.141592653589793, 6.283185307179586  # rad
 _LEAST_SCALE = 1e-3  # of a sensor without noise, in its unit, so that the covariance stays positive
 
 
 def correct_by_sensor(memory: NavigationMemory, measurements: Measurements, sensor: int, sensors: SensorModel) -> None:
-    """Correct by the last sample of a sensor.
+    """Correct the estimate by the last sample of a sensor.
 
     Parameters
     ----------
     memory : NavigationMemory
-        Corrected in place.
+        Memory to correct in place.
     measurements : Measurements
-        Of which the sample is used.
+        Samples of all sensors.
     sensor : int
         `DEPTH_SENSOR`, `DVL`, `COMPASS` or `USBL`.
     sensors : SensorModel
-        Its noise.
+        Noise of the sensors.
     """
     count = 3 if sensor in (DVL, USBL) else 1
     position, velocity, quaternion, innovation = zeros(3), zeros(3), zeros(4), zeros(3)
@@ -87,7 +87,7 @@ def correct_by_sensor(memory: NavigationMemory, measurements: Measurements, sens
         if believed and memory.rejected[sensor] < _REJECTED_IN_A_ROW:
             return
         memory.resets[sensor] += 1.0
-        if memory.resets[sensor] > _RESETS:  # no covariance of a start holds such errors
+        if memory.resets[sensor] > _RESETS:  # the covariance of a start does not cover such errors
             restart(memory)
             return
         _reset_covariance(memory, sensor, innovation, sensors)
@@ -114,7 +114,7 @@ def _predict_sample(
     innovation: Array,
     rows: Array,
 ) -> float:
-    """Write innovations and rows at the time of the sample; return its noise, or -1 if it is not used."""
+    """Write innovations and rows at the time of the sample; return its noise, or -1 for an unusable sample."""
     values = measurements.values
     if sensor == DEPTH_SENSOR:
         innovation[0] = values[DEPTH] - position[2] - memory.constants[DEPTH_BIAS - GYRO_BIAS]
@@ -133,7 +133,7 @@ def _predict_sample(
             seen[k] = velocity[k]
         if unknown > square(
             _UNKNOWN * noise
-        ):  # an error of attitude acts on the true velocity, to which this is nearer
+        ):  # an error of attitude acts on the true velocity, to which the sample is nearer
             for k in range(3):
                 seen[k] = 0.0
                 for i in range(3):
@@ -164,7 +164,7 @@ def _predict_sample(
 
 
 def _age_row(rows: Array, i: int, age: float, acceleration: Array, R: Array, gravity: float) -> None:
-    """Bring a row from the errors of the sample's time to those of now, `age` [s] later, to first order in it."""
+    """Transform a row for the errors at the sample's time to those of now, `age` [s] later, to first order in it."""
     f, of_position, of_velocity, of_attitude = zeros(3), zeros(3), zeros(3), zeros(3)
     for k in range(3):
         f[k] = acceleration[k] - (gravity if k == 2 else 0.0)
@@ -181,7 +181,7 @@ def _age_row(rows: Array, i: int, age: float, acceleration: Array, R: Array, gra
 
 
 def _is_outlier(P: Array, rows: Array, innovation: Array, noise: float, count: int) -> bool:
-    """Return whether a number of a sample is farther off than can be."""
+    """Return True if an innovation is beyond the gate, or not a number."""
     for n in range(count):
         variance = square(noise)
         for i in range(N_ERRORS):
@@ -194,13 +194,13 @@ def _is_outlier(P: Array, rows: Array, innovation: Array, noise: float, count: i
 
 
 def restart(memory: NavigationMemory) -> None:
-    """Give up the estimate, so that the filter starts anew with the next fixes."""
+    """Clear the estimate, so that the filter starts again with the next fixes."""
     memory.started[0] = 0.0
     memory.previous_fix[:] = np.nan
 
 
 def _reset_covariance(memory: NavigationMemory, sensor: int, innovation: Array, sensors: SensorModel) -> None:
-    """Widen the covariance to that of the start; that of the position by what a fix or a depth contradicts alone."""
+    """Reset the covariance to the start's; that of the position stays, and grows by a fix's or depth's innovation."""
     kept = zeros(3)
     for i in range(3):
         kept[i] = memory.covariance[POSITION + i, POSITION + i]
@@ -216,7 +216,7 @@ def _reset_covariance(memory: NavigationMemory, sensor: int, innovation: Array, 
 
 
 def _correct_number(memory: NavigationMemory, error: Array, innovation: float, noise: float, sensor: int) -> None:
-    """Correct error, shape (18,), and covariance by one number, whose `row` is set."""
+    """Correct error, shape (18,), and covariance by one measured number, whose `row` is set."""
     P, row, gain = memory.covariance, memory.row, memory.gain
     variance = square(noise)
     for i in range(N_ERRORS):
@@ -236,7 +236,7 @@ def _correct_number(memory: NavigationMemory, error: Array, innovation: float, n
 
 
 def _apply(memory: NavigationMemory, error: Array) -> None:
-    """Take an estimated error, shape (18,), into the estimate."""
+    """Add an estimated error, shape (18,), to the estimate."""
     R, turn = zeros(3, 3), zeros(3)
     write_rotation(memory.quaternion, R)
     for i in range(3):

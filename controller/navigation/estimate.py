@@ -1,4 +1,4 @@
-"""What the navigation filter keeps: the estimated motion and constant errors, their covariance, and the recent past.
+"""The memory of the navigation filter: motion and constant errors, their covariance, and the recent past.
 
 The covariance is that of the errors, true less estimated: position and velocity in world axes, attitude as a small
 rotation in world axes, then the constant errors of gyros, accelerometers, compass, pressure sensor and DVL.
@@ -20,10 +20,10 @@ Array = NDArray[np.float64]
 POSITION, VELOCITY, ATTITUDE, GYRO_BIAS, ACCELERATION_BIAS = 0, 3, 6, 9, 12
 HEADING_BIAS, DEPTH_BIAS, VELOCITY_SCALE, N_ERRORS = 15, 16, 17, 18
 
-# standard deviations at the start, when samples of unknown age are all that is known
+# standard deviations at the start, when only samples of unknown age are known
 _FIRST_POSITION, _FIRST_VELOCITY = 0.1, 0.3  # m beside the noise of a fix, m/s
-_FIRST_TILT, _FIRST_HEADING = 0.05, 0.3  # rad; what accelerates looks like a tilt
-_REMEMBERED = 128  # IMU samples, over which late measurements are taken back
+_FIRST_TILT, _FIRST_HEADING = 0.05, 0.3  # rad; an acceleration looks like a tilt
+_REMEMBERED = 128  # IMU samples in the history, for late measurements
 
 
 class NavigationMemory(NamedTuple):
@@ -40,19 +40,19 @@ class NavigationMemory(NamedTuple):
     sample_times: Array  # (5,) s, of the last samples used
     previous_fix: Array  # (3,) m, NED, the last fix before the start; NaN: none yet
     rejected: Array  # (5,) samples rejected in a row
-    resets: Array  # (5,) of the covariance, by a sensor that has not been confirmed since
-    accepted: Array  # (5,) samples accepted since the start, or since the sensor was believed against the estimate
+    resets: Array  # (5,) of the covariance, by a sensor that is not confirmed since
+    accepted: Array  # (5,) samples accepted since the start, or since the sensor reset the covariance
     innovations: Array  # (5, 3) of each sensor: sum of normalized squared innovations, their degrees, samples rejected
     started: Array  # (1,) 1 once there is an estimate
     imu_motion: Array  # (10,) change of position, velocity and attitude by the IMU alone, since the start
     imu_history: Array  # (128, 11) time and `imu_motion` of the last IMU samples
-    recorded: NDArray[np.int64]  # (1,) how many samples were recorded
-    row: Array  # (18,) how a measured number depends on the errors
+    recorded: NDArray[np.int64]  # (1,) number of recorded samples
+    row: Array  # (18,) derivative of a measured number by the errors
     gain: Array  # (18,)
 
 
 def empty_memory() -> NavigationMemory:
-    """Return what the filter knows before the first sample."""
+    """Return the filter's memory before the first sample."""
     motion = np.zeros(10)
     motion[6] = 1.0
     return NavigationMemory(
@@ -80,14 +80,14 @@ def empty_memory() -> NavigationMemory:
 
 
 def set_first_covariance(memory: NavigationMemory, sensors: SensorModel) -> None:
-    """Set the covariance of the start: constant errors by the data sheets.
+    """Set the covariance of the start, with constant errors from the data sheets.
 
     Parameters
     ----------
     memory : NavigationMemory
-        Its covariance is set.
+        Memory whose covariance is set.
     sensors : SensorModel
-        Of the constant errors.
+        Standard deviations of the constant errors.
     """
     P = memory.covariance
     P[:, :] = 0.0

@@ -1,4 +1,4 @@
-"""Inertial navigation: the estimate and its covariance carried from one IMU sample to the next.
+"""Inertial navigation: propagate the estimate and its covariance from one IMU sample to the next.
 
 p' = v,  v' = R f + g e3,  R' = R S(omega), with the specific force f and the rates omega less their constant errors.
 The errors, true less estimated, follow
@@ -101,7 +101,7 @@ def _add(P: Array, to: int, source: int, k: int, share: float, transposed: int) 
 
 
 def _record(memory: NavigationMemory) -> None:
-    """Record how far the IMU alone has moved the estimate."""
+    """Record the motion by the IMU alone."""
     i = memory.recorded[0] % memory.imu_history.shape[0]
     memory.imu_history[i, 0] = memory.time[0]
     for k in range(10):
@@ -110,7 +110,7 @@ def _record(memory: NavigationMemory) -> None:
 
 
 def estimate_at(memory: NavigationMemory, time: float, position: Array, velocity: Array, quaternion: Array) -> bool:
-    """Write position [m], velocity [m/s] and attitude at a time [s]; return False if that is too long ago."""
+    """Write position [m], velocity [m/s] and attitude at a time [s]; return False if the history does not reach it."""
     later, n = time - memory.time[0], memory.imu_history.shape[0]
     for i in range(4):
         quaternion[i] = memory.quaternion[i]

@@ -35,11 +35,11 @@ class Measurements(NamedTuple):
         Array  # (15,) depth [m]; velocity over ground, body [m/s] (3); altitude [m]; specific force, body [m/s2] (3)
     )
     # angular velocity, body [rad/s] (3); heading [rad]; position, NED [m] (3)
-    times: Array  # (5,) s: of pressure sensor, DVL, IMU, compass, USBL; a later one than before says that it is new
+    times: Array  # (5,) s: of pressure sensor, DVL, IMU, compass, USBL; a later time than before marks a new sample
 
 
 class SensorModel(NamedTuple):
-    """Standard deviations of the sensors' errors, as data sheets have them: of each sample, and of constant errors.
+    """Standard deviations of the sensors' errors, from data sheets: of each sample, and of constant errors.
 
     Examples
     --------

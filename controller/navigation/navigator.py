@@ -1,6 +1,6 @@
 """The navigation filter: pose, motion and their standard deviations from sensors alone.
 
-An error-state Kalman filter. The IMU moves the estimate, pressure sensor, DVL, compass and USBL correct it, each
+An error-state Kalman filter. The IMU propagates the estimate; pressure sensor, DVL, compass and USBL correct it, each
 at its own rate, each sample at the time at which it was taken. It needs no model of the vehicle.
 """
 
@@ -44,10 +44,10 @@ from controller.stack_array import zeros
 Array = NDArray[np.float64]
 
 _NEVER = -1e11  # s, before any sample
-_UNEXPLAINED = 4.0  # standard deviations of a fix, by which two differ by more than noise
+_UNEXPLAINED = 4.0  # standard deviations of a fix, beyond which two differ by more than noise
 _FIX_DEVIATIONS, _FIX_DISTANCE = 6.0, 0.5  # standard deviations, and m, within which two fixes agree
-_LONGEST = 1.0  # s between two IMU samples, beyond which the filter starts anew
-_FAR = 3.0  # m, standard deviation of a coordinate beyond which it is called unknown
+_LONGEST = 1.0  # s between two IMU samples, beyond which the filter starts again
+_FAR = 3.0  # m, standard deviation of a coordinate beyond which it counts as unknown
 _FAST = 0.5  # m/s, the same of the velocity
 _QUARTER_TURN = 1.5707963267948966  # rad
 
@@ -55,7 +55,7 @@ _QUARTER_TURN = 1.5707963267948966  # rad
 def navigate(
     measurements: Measurements, now: Array, sensors: SensorModel, memory: NavigationMemory, state: VehicleState
 ) -> None:
-    """Take in what is new, and write the estimated state at this time, shape (1,) [s]; NaN where nothing is known."""
+    """Process the new samples, and write the estimated state at this time, shape (1,) [s]; NaN where it is unknown."""
     if measurements.times[IMU] > memory.sample_times[IMU]:
         _take_imu_sample(measurements, sensors, memory)
     if memory.started[0] == 0.0:
@@ -70,7 +70,7 @@ def navigate(
 
 
 def _take_imu_sample(measurements: Measurements, sensors: SensorModel, memory: NavigationMemory) -> None:
-    """Propagate to the new sample of the IMU, or begin at it."""
+    """Propagate to the new sample of the IMU, or start at it."""
     time, force, omega = measurements.times[IMU], zeros(3), zeros(3)
     for i in range(3):
         omega[i] = measurements.values[ANGULAR_VELOCITY + i] - memory.constants[i]
@@ -89,8 +89,8 @@ def _take_imu_sample(measurements: Measurements, sensors: SensorModel, memory: N
 def _start(measurements: Measurements, sensors: SensorModel, memory: NavigationMemory) -> None:
     """Start once IMU, compass, pressure sensor and USBL have given a sample, at rest, level by the accelerometers.
 
-    The USBL must have given two positions that agree, since either may be an outlier. The vehicle is taken to be
-    between them, and its place to be as uncertain as they are apart where noise does not explain that.
+    The USBL must have given two positions that agree, since either may be an outlier. The first position is their
+    mean; half their distance adds to its deviation where noise does not explain it.
     """
     times = measurements.times
     latest = min(times[IMU], times[COMPASS], times[DEPTH_SENSOR], times[USBL])
@@ -164,7 +164,7 @@ def _write_state(memory: NavigationMemory, sensors: SensorModel, now: float, sta
 
 
 class Navigator:
-    """An estimate of the vehicle's state from samples of its sensors.
+    """Estimate the vehicle's state from samples of its sensors.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ class Navigator:
     Attributes
     ----------
     measurements : Measurements
-        To be filled before each call of `step`.
+        Samples to fill in before each call of `step`.
     memory : NavigationMemory
         Estimate and covariance.
 
@@ -202,10 +202,10 @@ class Navigator:
 
     @property
     def started(self) -> bool:
-        """Whether there is an estimate."""
+        """True if there is an estimate."""
         return bool(self.memory.started[0] > 0.0)
 
     def step(self, time: float) -> None:
-        """Take in the measurements, and write the state at a time [s]."""
+        """Process the measurements, and write the state at a time [s]."""
         self._now[0] = time
         self._step(self.measurements, self._now, self.sensors, self.memory, self.state)

@@ -1,4 +1,4 @@
-"""Regions: where the vehicle shall be, and where it shall not.
+"""Regions: sets of poses that the vehicle shall reach or avoid.
 
 Imports: compiling, translator.
 """

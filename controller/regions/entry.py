@@ -1,4 +1,4 @@
-"""The entry of a shape: all that the software knows of it, in one place."""
+"""The entry of a shape: all properties that the software uses, in one place."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _FACES = ("unit", "packed", "numbers", "bounds")
 
 @dataclass(frozen=True)
 class Entry:
-    """What a file of `controller.regions.shapes` says of its shape, as ``ENTRY``.
+    """The properties of a shape, which its file in `controller.regions.shapes` defines as ``ENTRY``.
 
     Parameters
     ----------
@@ -23,27 +23,27 @@ class Entry:
     evaluate : callable
         The compiled function of g, its gradient and the distance, as `Shape` says.
     example : Shape
-        One of its kind, which tests and pictures take.
+        An instance of it, for tests and pictures.
     units : mapping of str to str
         Unit of each field of the dataclass, "" for none.
     surface : callable, optional
-        Its mesh, of one of them and the corners of a box in which what has no end is cut: pictures, replay and exports
+        Its mesh, from an instance and the corners of a box that cuts an unbounded shape: pictures, replay and exports
         draw it. A shape of attitude has none.
     of_attitude : bool, optional
-        Whether it depends on attitude.
+        True if it depends on attitude.
     half_axes : callable, optional
         Where it is an ellipsoid: its centre [m, NED], shape (3,), and its half axes as rows [m], shape (3, 3), of one
-        of them. Pictures then draw the very ellipse that it is seen as, not its mesh.
+        of them. Pictures then draw the exact ellipse of its outline, not its mesh.
     planes : callable, optional
-        Where planes bound it and it has no end: a point [m, NED] and the unit normal out of it for each plane, of one
+        Where planes bound an unbounded shape: a point [m, NED] and the outward unit normal of each plane, of one
         of them. Pictures then cut the planes where the picture ends.
     convex : bool, optional
-        Whether each is convex: rays, such as those of a proximity sensor, then go on by tangents, else by distances.
+        True if each is convex: rays, such as those of a proximity sensor, then step by tangents, else by distances.
 
     Raises
     ------
     TypeError
-        If a face is missing, or the numbers that it packs are not those that it names.
+        If an entry is missing, or the packed numbers differ from the named ones.
     """
 
     shape: type[Shape]

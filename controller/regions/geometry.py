@@ -13,12 +13,12 @@ Array = NDArray[np.float64]
 
 
 def clamp(x: float, low: float, high: float) -> float:
-    """Return `x` moved into [low, high]."""
+    """Return `x` clipped to [low, high]."""
     return min(max(x, low), high)
 
 
 def to_local(p: Array, q: Array, at: int) -> tuple[float, float, float]:
-    """Return R^T (p - c) for a centre packed at `at` and a rotation matrix, row by row, behind it."""
+    """Return R^T (p - c) for a centre packed at `at`, followed by a rotation matrix, row by row."""
     d0, d1, d2 = p[0] - q[at], p[1] - q[at + 1], p[2] - q[at + 2]
     R = at + 3
     return (
@@ -38,7 +38,7 @@ def to_world(q: Array, at: int, x: float, y: float, z: float) -> tuple[float, fl
 
 
 def product_distance(first: float, second: float) -> tuple[float, float, float]:
-    """Return the signed distance to the product of two sets in perpendicular directions, and how it follows each.
+    """Return the signed distance to the product of two sets in perpendicular directions, and its derivatives.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def product_distance(first: float, second: float) -> tuple[float, float, float]:
     tuple of float
         Signed distance [m], and its derivatives by `first` and by `second`.
     """
-    if math.isnan(first) or math.isnan(second):  # a lost position is no safe one
+    if math.isnan(first) or math.isnan(second):  # a lost position is not safe
         return math.nan, math.nan, math.nan
     if first > 0.0 and second > 0.0:
         distance = hypotenuse(first, second)

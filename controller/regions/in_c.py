@@ -1,4 +1,4 @@
-"""The C code of the shapes: which of them have any, and one source for the programs that evaluate regions in C."""
+"""The C code of the shapes, and the C sources of programs that evaluate regions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def c_sources() -> dict[str, bytes]:
     Returns
     -------
     dict of str to bytes
-        By name; all of one folder. The kinds of the shapes are those of Python, by name.
+        Contents by name, all in one folder. The kinds of the shapes are those of Python, by name.
     """
     files = {file.name: file.read_bytes() for file in resources.files("controller").joinpath("csrc").iterdir()}
     functions = _functions()
@@ -29,19 +29,19 @@ def c_sources() -> dict[str, bytes]:
 
 
 def require_in_c(regions: Iterable[Region], where: str) -> None:
-    """Raise an error for the first region whose shape has no C code.
+    """Require that the shapes of all regions have C code.
 
     Parameters
     ----------
     regions : iterable of Region
-        That C code is to evaluate.
+        Regions that C code evaluates.
     where : str
-        What evaluates them in C, such as ``"lanes"``.
+        Name of the program that evaluates them in C, such as ``"lanes"``.
 
     Raises
     ------
     RegionError
-        It names the region and its shape.
+        The message names the first region without, and its shape.
     """
     functions = _functions()
     for region in regions:
@@ -54,7 +54,7 @@ def require_in_c(regions: Iterable[Region], where: str) -> None:
 
 
 def _functions() -> dict[str, str]:
-    """Return the C code of each shape that has some, by name: it stands beside the shape's own file."""
+    """Return the C code of each shape that has some, by name: its file is beside the shape's own."""
     folder = resources.files("controller").joinpath("regions", "shapes")
     code = {name: folder.joinpath(f"{name}.c") for name in SHAPES}
     return {name: file.read_text(encoding="utf-8") for name, file in code.items() if file.is_file()}

@@ -17,19 +17,19 @@ FIRST_OF_ATTITUDE = sum(not entry.of_attitude for entry in ENTRIES.values())  # 
 def _by_kind(name: str, arguments: str, of_attitude: bool) -> Callable[..., Any]:
     """Return a function that evaluates the shape of a kind, its first argument, at the `arguments`.
 
-    C has no table of functions that take tuples, so that it is written: a choice of each kind by its number.
+    C has no table of functions that take tuples, so the function is generated: a choice by the number of the kind.
     """
     entries = {kind: entry for kind, entry in ENTRIES.items() if entry.of_attitude == of_attitude}
     names: dict[str, Any] = {f"_{kind}": entry.evaluate for kind, entry in entries.items()}
     choices = [f"    if kind == {entry.shape.kind}: return _{kind}({arguments})\n" for kind, entry in entries.items()]
-    last = f"    return _{list(entries)[-1]}({arguments})\n"  # there are no other kinds: `pack` takes shapes alone
+    last = f"    return _{list(entries)[-1]}({arguments})\n"  # no other kinds are possible: `pack` accepts shapes only
     source = f"def {name}(kind, {arguments}):\n{''.join(choices[:-1])}{last}"
     made: Callable[..., Any] = functions_of(source, names | {"__name__": __name__})[name]
     return made
 
 
-# of a packed shape of position alone, at the position `p` [m, NED]
+# evaluate a packed shape of position alone, at the position `p` [m, NED]
 evaluate_shape = _by_kind("evaluate_shape", "p, q", of_attitude=False)
 
-# of a packed shape of attitude, at the position `p` [m, NED] and the attitude `e`
+# evaluate a packed shape of attitude, at the position `p` [m, NED] and the attitude `e`
 evaluate_shape_of_attitude = _by_kind("evaluate_shape_of_attitude", "p, e, q", of_attitude=True)

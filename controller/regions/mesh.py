@@ -1,4 +1,4 @@
-"""Surfaces as triangles.
+"""Triangle meshes of surfaces.
 
 Every corner of every triangle lies on the surface; between corners a round surface is cut short.
 """
@@ -35,12 +35,12 @@ def closed_grid(points: Array) -> Mesh:
     Parameters
     ----------
     points : ndarray, shape (rows, columns, 3)
-        On the surface [m, NED]; along rows cross along columns points outward.
+        Points on the surface [m, NED]; the product of row and column direction points outward.
 
     Returns
     -------
     Mesh
-        Two triangles for each point.
+        Mesh with two triangles for each point.
     """
     rows, columns = points.shape[:2]
     i, j = (of.ravel() for of in np.mgrid[:rows, :columns])
@@ -50,7 +50,7 @@ def closed_grid(points: Array) -> Mesh:
 
 
 def sector(apex: Sequence[float], axis: Sequence[float], half_angle: float, reach: float) -> Mesh:
-    """Return all that is within a reach [m] of an apex and a half angle [rad] of an axis.
+    """Return the mesh of the points within a reach [m] of an apex and a half angle [rad] of an axis.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def ball() -> Mesh:
 
 
 def _split(mesh: Mesh) -> Mesh:
-    """Return each triangle as four, on the unit ball."""
+    """Split each triangle into four, on the unit ball."""
     vertices, middles, triangles = [*mesh.vertices], {}, []
 
     def middle(a: int, b: int) -> int:
@@ -116,7 +116,7 @@ def _split(mesh: Mesh) -> Mesh:
 
 
 def _outward(vertices: Array, triangles: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the triangles of a body about the origin, each turned so that it faces outward."""
+    """Return the triangles of a body about the origin, with outward orientation."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a + b + c) < 0.0
     turned = triangles.copy()
@@ -138,7 +138,7 @@ def patches(planes: Sequence[tuple[Array, Array]], limits: Bounds) -> Mesh:
 
 
 def welded(mesh: Mesh) -> Mesh:
-    """Return a mesh with one corner where several were, within `_SAME_PLACE`, and without triangles of no area."""
+    """Merge corners within `_SAME_PLACE`, and remove triangles without area."""
     _, first, index = np.unique(np.round(mesh.vertices / _SAME_PLACE), axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)  # the corners stay in their order
     place = np.empty(len(order), dtype=np.intp)
@@ -163,7 +163,7 @@ def circle(u: Array, v: Array) -> Array:
 
 
 def lathe(rings: Sequence[Array], first: Array, last: Array) -> Mesh:
-    """Return the skin over rings one behind the other, each right-handed about the way on, with a point at each end."""
+    """Return the surface over consecutive rings, right-handed about their direction, with a point at each end."""
     n = len(rings[0])
     vertices = np.vstack([*rings, first, last])
     i = np.arange(n)
@@ -179,7 +179,7 @@ def lathe(rings: Sequence[Array], first: Array, last: Array) -> Mesh:
 
 
 def placed(points: Array, centre: Sequence[float], quaternion: Sequence[float]) -> Array:
-    """Return points of a body [m], turned by a quaternion of any length and moved to a centre [m, NED]."""
+    """Rotate points of a body [m] by a quaternion of any length, and move them to a centre [m, NED]."""
     e = np.array(quaternion, dtype=float)
     world: Array = np.array(centre) + points @ rotation_matrix(e / np.linalg.norm(e)).T
     return world

@@ -1,4 +1,4 @@
-"""What the packed numbers of shapes are: their names, units and ranges."""
+"""Names, units and ranges of the packed numbers of shapes."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ def vector(name: str, of: Range) -> tuple[Number, ...]:
     Parameters
     ----------
     name : str
-        Of the vector.
+        Name of the vector.
     of : tuple of (str, float, float)
-        Unit and range of each.
+        Unit and range of each number.
 
     Returns
     -------
     tuple of Number
-        Along x, y and z.
+        The numbers along x, y and z.
     """
     return tuple(Number(f"{name}.{axis}", *of) for axis in "xyz")
 
@@ -52,19 +52,19 @@ TURNED = (  # a centre, and a rotation matrix row by row
 
 
 def constraints(numbers: Sequence[Number]) -> Iterator[tuple[str, int, int, str]]:
-    """Yield what must hold among the numbers of a shape, beyond their ranges.
+    """Yield the constraints among the numbers of a shape, beyond their ranges.
 
     Parameters
     ----------
     numbers : sequence of Number
-        Of one shape.
+        Numbers of one shape.
 
     Yields
     ------
     tuple of (str, int, int, str)
         ``"unit"``, the first of numbers whose squares make 1, and how many they are; ``"rotation"`` and the first of
-        the nine of a rotation matrix, and 9; or ``"above"``, one number, and the place of the one that it exceeds;
-        with what is said where it does not hold.
+        the nine of a rotation matrix, and 9; or ``"above"``, one number, and the index of the one that it exceeds;
+        each with a text for the error.
     """
     names = [number.name for number in numbers]
     for i, number in enumerate(numbers):

@@ -1,4 +1,4 @@
-"""How far one sees from a place: where rays meet the first region, by going on as far as clearances allow."""
+"""Ray casting: the distances at which rays meet the first region, by steps as long as clearances allow."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from controller.regions.shapes.pipe import Pipe
 from controller.regions.shapes.prism import Prism
 from controller.stack_array import zeros
 
-TOUCHING = 1e-4  # m; so near a surface a ray has met it
-LOOKS = 64  # along a ray, at a region
+TOUCHING = 1e-4  # m, the clearance at which a ray has met a surface
+LOOKS = 64  # steps along a ray, for each region
 
 _ELLIPSOID = Ellipsoid.kind
 _PIPE = Pipe.kind
@@ -24,27 +24,27 @@ _CONVEX = tuple(entry.shape.kind for entry in ENTRIES.values() if entry.convex)
 
 
 def ray_distances(regions: PackedRegions, origin: Array, directions: Array, farthest: float, distances: Array) -> None:
-    """Find how far it is along rays to where a region, as it is now, is violated.
+    """Find the distances along rays at which a region, at its present place, is violated.
 
-    A ray goes on by what the clearance allows, which changes by one metre a metre at the most (sphere tracing). Where a
-    convex shape is kept out of, the clearance is convex along the ray, so that its tangent allows more, and tells when
-    a ray passes by (Newton's method, from the side on which it never oversteps). Pipes are taken capsule by capsule.
+    A ray advances by the clearance, which changes by at most one metre a metre (sphere tracing). The
+    clearance of a convex shape that is kept out of is convex along the ray, so that its tangent allows longer steps and
+    shows when a ray passes by (Newton's method, from the side that never oversteps). Pipes are split into capsules.
 
     Parameters
     ----------
     regions : PackedRegions
-        Those that depend on attitude are left out: they close no place.
+        Regions; those that depend on attitude are left out, as they block no position.
     origin : ndarray, shape (3,)
-        Where all rays begin [m, NED].
+        Start of all rays [m, NED].
     directions : ndarray, shape (m, 3)
         Unit vectors, NED.
     farthest : float
-        How far is looked [m].
+        Range of the rays [m].
     distances : ndarray, shape (m,)
-        Receives the distances [m]: 0 everywhere if the origin is inside, or on the surface; infinite where nothing is
-        met nearer than `farthest`; NaN where the numbers of a ray or of a region within reach are lost. Each ends where
+        Receives the distances [m]: 0 everywhere if the origin is inside, or on the surface; infinite where no region
+        is nearer than `farthest`; NaN where the numbers of a ray or of a region within reach are lost. Each ends where
         the clearance is at most `TOUCHING`. Along a shape that is kept within, or a prism that is not convex, a ray
-        that has used up its `LOOKS` ends where it is: nearer than what it would meet, never farther.
+        ends after `LOOKS` steps: nearer than the surface, never beyond it.
     """
     distances[:] = math.inf
     start, piece = zeros(3), zeros(7)
@@ -76,7 +76,7 @@ def _meet(
     farthest: float,
     distances: Array,
 ) -> None:
-    """Shorten the distances of those rays that meet a shape earlier; `outward` is -1 for one kept within."""
+    """Shorten the distances of the rays that meet a shape earlier; `outward` is -1 for one kept within."""
     first = evaluate_shape(kind, start, numbers)
     clearance = outward * first[4]
     if math.isnan(clearance):
@@ -92,7 +92,7 @@ def _meet(
     for k in range(distances.size):
         dx, dy, dz = directions[k, 0], directions[k, 1], directions[k, 2]
         if notched and abs(x * dy - y * dx) > radius * hypotenuse(dx, dy):
-            continue  # it passes by the circle: no need to look
+            continue  # it passes by the circle and cannot meet the prism
         nearest = farthest if distances[k] > farthest else distances[k]
         here, way = first, 0.0
         for _ in range(LOOKS):
@@ -108,9 +108,9 @@ def _meet(
 
 
 def _stride(kind: int, convex: bool, outward: float, here: Evaluation, dx: float, dy: float, dz: float) -> float:
-    """Return how far one may go on [m] from where a shape is `here` as evaluated, outside, and not meet it."""
+    """Return the length [m] of a safe step along a ray, outside a shape whose evaluation is `here`."""
     g, gx, gy, gz, distance = here
-    # what is over or under a prism has only its depths to enter, which are convex
+    # over or under a prism only its depths matter, which are convex
     if not (convex or (kind == _PRISM and outward > 0.0 and gx == 0.0 and gy == 0.0)):
         return outward * distance
     along = gx * dx + gy * dy + gz * dz
@@ -123,7 +123,7 @@ def _stride(kind: int, convex: bool, outward: float, here: Evaluation, dx: float
 
 
 def _circle_about(prism: Array) -> tuple[float, float, float]:
-    """Return middle and radius of a circle that holds all corners of a packed prism [m]."""
+    """Return centre and radius of a circle about all corners of a packed prism [m]."""
     x, y, radius, n = 0.0, 0.0, 0.0, (prism.size - 2) // 2
     for i in range(2, prism.size, 2):
         x += prism[i] / n
@@ -134,7 +134,7 @@ def _circle_about(prism: Array) -> tuple[float, float, float]:
 
 
 def _is_convex(prism: Array) -> bool:
-    """Return whether no corner of a packed prism turns inwards."""
+    """Return True if no corner of a packed prism turns inwards."""
     n = (prism.size - 2) // 2
     for i in range(n):
         a, b, c = 2 + 2 * i, 2 + 2 * ((i + 1) % n), 2 + 2 * ((i + 2) % n)

@@ -1,4 +1,4 @@
-"""Regions in a scene: which shapes, kept within or kept out of, evaluated all at once.
+"""Regions of a scene: shapes that are kept within or kept out of, evaluated together.
 
 One sign for the whole project: g <= 0 is satisfied, g > 0 is violated.
 """
@@ -45,9 +45,9 @@ SHAPES: dict[str, type[Shape]] = {name: entry.shape for name, entry in ENTRIES.i
 
 @dataclass(frozen=True)
 class Region:
-    """A shape to be kept within (``"in"``), or kept out of (``"out"``), at rest or on the move.
+    """A shape to be kept within (``"in"``), or kept out of (``"out"``), at rest or moving.
 
-    A hard region must not be violated; a soft one pushes. Which laws tell them apart is said there.
+    A hard region must not be violated; a soft one pushes. Each law documents if it distinguishes them.
 
     Examples
     --------
@@ -63,7 +63,7 @@ class Region:
     gain: float = 1.0  # alpha_i of section VII, in N per unit of g
     hard: bool = True
     deviation: float | Vector3 = 0.0  # m, standard deviation of its place: in any direction, or north, east and down
-    crossing_cost: float = 2.0  # of a metre of path through it, half a metre deep, beside its length; where it is soft
+    crossing_cost: float = 2.0  # of a metre of path through it, half a metre deep, added to its length; if it is soft
 
     @property
     def deviations(self) -> Vector3:
@@ -86,7 +86,7 @@ class Region:
 
 
 def deviations_of(deviation: float | Vector3) -> Vector3:
-    """Return the standard deviations north, east and down that one number, or three, say."""
+    """Return the standard deviations north, east and down from one number, or three."""
     if isinstance(deviation, float | int):
         return (float(deviation),) * 3
     north, east, down = deviation
@@ -104,12 +104,12 @@ def name_of(shape: Shape) -> str:
     Returns
     -------
     str
-        Its key there.
+        Key of the shape in `SHAPES`.
 
     Raises
     ------
     RegionError
-        If it is none of them.
+        If the shape is not in `SHAPES`.
     """
     for name, kind in SHAPES.items():
         if type(shape) is kind:
@@ -123,9 +123,9 @@ def surface_of(shape: Shape, limits: Bounds) -> Mesh:
     Parameters
     ----------
     shape : Shape
-        None of attitude.
+        Shape of position.
     limits : Bounds
-        What has no end is cut to a patch of their size.
+        Box whose size limits the patch of an unbounded shape.
 
     Raises
     ------
@@ -144,26 +144,26 @@ def shape_entry(shape: Shape) -> Entry:
 
 
 def of_attitude(shape: Shape) -> bool:
-    """Return whether a shape depends on attitude, so that its clearance is in rad instead of m."""
+    """Return True if a shape depends on attitude, so that its clearance is in rad instead of m."""
     return shape.kind >= FIRST_OF_ATTITUDE
 
 
 class PackedRegions(NamedTuple):
     """Regions as arrays, which C reads.
 
-    Who moves regions writes `shifts` and `velocities`; all else stays.
+    Only `shifts` and `velocities` change, when regions move.
     """
 
     kinds: NDArray[np.int64]  # (n,)
     signs: Array  # (n,) +1 kept within, -1 kept out of
     offsets: NDArray[np.int64]  # (n + 1,) into numbers
-    numbers: Array  # what each shape's function reads, one behind the other
-    shifts: Array  # (n, 3) m, NED: how far each has moved from where its numbers have it
+    numbers: Array  # packed numbers of the shapes, consecutive
+    shifts: Array  # (n, 3) m, NED: displacement of each from its packed place
     velocities: Array  # (n, 3) m/s, NED
     gains: Array  # (n,) alpha_i
     hard: NDArray[np.bool_]  # (n,)
     deviations: Array  # (n, 3) m, standard deviations of each place, NED
-    crossing_costs: Array  # (n,) of a metre of path through each, half a metre deep, beside its length
+    crossing_costs: Array  # (n,) of a metre of path through each, half a metre deep, added to its length
 
     def evaluate(
         self,
@@ -181,7 +181,7 @@ class PackedRegions(NamedTuple):
         position : ndarray, shape (3,)
             [m, NED].
         quaternion : ndarray, shape (4,)
-            Unit quaternion from body to world; shapes of position alone do not look at it.
+            Unit quaternion from body to world; shapes of position alone do not use it.
         values : ndarray, shape (n,)
             Receives g_i, at most 0 where satisfied, in the unit of the shape.
         gradients : ndarray, shape (n, 3)
@@ -203,17 +203,17 @@ class PackedRegions(NamedTuple):
         _evaluate(self, position, quaternion, values, gradients, rotation_gradients, clearances)
 
     def move_to(self, time: float) -> None:
-        """Put every region where its velocity has brought it at a time [s]."""
+        """Move every region by its velocity to its place at a time [s]."""
         np.multiply(self.velocities, time, out=self.shifts)
 
 
 def pack(regions: Sequence[Region]) -> PackedRegions:
-    """Turn regions into arrays, as they are at time 0.
+    """Pack regions into arrays, as they are at time 0.
 
     Parameters
     ----------
     regions : sequence of Region
-        Any number, none included.
+        Regions, also none.
 
     Returns
     -------
@@ -255,7 +255,7 @@ def evaluate_packed(
     rotation_gradients: Array,
     clearances: Array,
 ) -> None:
-    """Do what `PackedRegions.evaluate` says, with these `regions`, for functions that are run as C themselves."""
+    """Evaluate `regions` as `PackedRegions.evaluate`, for functions that are themselves run as C."""
     at = zeros(3)
     for i in range(regions.kinds.size):
         tx, ty, tz = 0.0, 0.0, 0.0
@@ -273,7 +273,7 @@ def evaluate_packed(
 def evaluate_place(regions: PackedRegions, i: int, position: Array, at: Array) -> Evaluation:
     """Evaluate the shape of region `i`, of position alone, where it is now, at a `position`, shape (3,) [m, NED].
 
-    Spheres and bands of depth, the most frequent, need no array; for the others `at` is room of shape (3,).
+    Spheres and bands of depth, the most frequent, need no array; the others use `at`, shape (3,), as scratch space.
     """
     x = position[0] - regions.shifts[i, 0]
     y = position[1] - regions.shifts[i, 1]
@@ -291,7 +291,7 @@ def evaluate_place(regions: PackedRegions, i: int, position: Array, at: Array) -
 def evaluate_pose(regions: PackedRegions, i: int, position: Array, e: Array, at: Array) -> EvaluationOfAttitude:
     """Evaluate the shape of region `i`, of attitude, where it is now, at a `position`, shape (3,) [m, NED].
 
-    `e` is the unit quaternion of the pose, and `at` room of shape (3,).
+    `e` is the unit quaternion of the pose, and `at`, shape (3,), is scratch space.
     """
     for axis in range(3):
         at[axis] = position[axis] - regions.shifts[i, axis]
@@ -301,7 +301,7 @@ def evaluate_pose(regions: PackedRegions, i: int, position: Array, e: Array, at:
 
 
 def clearance_of_place(regions: PackedRegions, i: int, position: Array, room: Array) -> float:
-    """Return what `clearance_at` does, of a region known to be of position alone; `room` has shape (3,)."""
+    """Return the clearance [m] as `clearance_at`, of a region of position alone; `room`, shape (3,), is scratch."""
     clearance: float = -regions.signs[i] * evaluate_place(regions, i, position, room)[4]
     return clearance
 
@@ -309,7 +309,7 @@ def clearance_of_place(regions: PackedRegions, i: int, position: Array, room: Ar
 def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
     """Return the clearance [m] of one of the `regions`, `i`, where it is now, at a position, shape (3,) [m, NED].
 
-    Infinite for shapes that depend on attitude: they close no place.
+    Infinite for shapes that depend on attitude: they block no position.
     """
     if regions.kinds[i] >= FIRST_OF_ATTITUDE:
         return math.inf
@@ -317,7 +317,7 @@ def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
 
 
 def clearance_of_pose(regions: PackedRegions, i: int, position: Array, quaternion: Array, room: Array) -> float:
-    """Return the clearance of one of the `regions`, `i`, of any kind, [m] or [rad], at a pose; `room` has shape (3,).
+    """Return the clearance of one of the `regions`, `i`, of any kind, [m] or [rad], at a pose; `room` (3,) is scratch.
 
     The pose is a `position` [m, NED] and a unit `quaternion`.
     """
@@ -328,7 +328,7 @@ def clearance_of_pose(regions: PackedRegions, i: int, position: Array, quaternio
 
 
 def clearance_of_sphere(regions: PackedRegions, i: int, position: Array) -> float:
-    """Return what `clearance_at` does, of a region known to be a sphere, twenty times as fast as for any shape."""
+    """Return the clearance [m] as `clearance_at`, of a sphere, twenty times as fast as for any shape."""
     first = regions.offsets[i]
     x = position[0] - regions.shifts[i, 0] - regions.numbers[first]
     y = position[1] - regions.shifts[i, 1] - regions.numbers[first + 1]
@@ -340,7 +340,7 @@ def clearance_of_sphere(regions: PackedRegions, i: int, position: Array) -> floa
 def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaternion: Array, slope: Array) -> float:
     """Return the clearance [rad] of one of the `regions`, `i`, of attitude.
 
-    Its `slope` over a turn in body axes, shape (3,), is written. The pose is a `position` [m, NED] and a unit
+    The function writes its `slope` by rotation in body axes, shape (3,). The pose is a `position` [m, NED] and a unit
     `quaternion`.
     """
     sign = regions.signs[i]
@@ -353,7 +353,7 @@ def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaterni
 def place_clearance(regions: PackedRegions, i: int, position: Array, slope: Array) -> float:
     """Return the clearance [m] of one of the `regions`, `i`, of position alone.
 
-    Its `slope` at the `position`, shape (3,), of length 1 or 0, is written.
+    The function writes its `slope` at the `position`, shape (3,), of length 1 or 0.
     """
     _, x, y, z, distance = evaluate_place(regions, i, position, zeros(3))
     size, sign = math.sqrt(x * x + y * y + z * z), regions.signs[i]
@@ -371,12 +371,12 @@ def clearances_at(points: Array, region: Region) -> Array:
     points : ndarray, shape (m, 3)
         [m, NED].
     region : Region
-        Whose clearance is asked for.
+        Region to evaluate.
 
     Returns
     -------
     ndarray, shape (m,)
-        As `clearance_at` gives it [m].
+        Clearances [m], as of `clearance_at`.
     """
     clearances = np.empty(len(points))
     arguments = pack([region]), np.ascontiguousarray(points, dtype=float), np.empty(3), clearances
@@ -385,7 +385,7 @@ def clearances_at(points: Array, region: Region) -> Array:
 
 
 def write_clearances(regions: PackedRegions, points: Array, room: Array, clearances: Array) -> None:
-    """Write what `clearance_at` says of the first of the `regions` at each of the points; `room` has shape (3,)."""
+    """Write `clearance_at` of the first of the `regions` at each of the points; `room`, shape (3,), is scratch."""
     for i in range(points.shape[0]):
         if regions.kinds[0] < FIRST_OF_ATTITUDE:
             clearances[i] = clearance_of_place(regions, 0, points[i], room)

@@ -1,4 +1,4 @@
-"""What every shape of region offers, and how its compiled function is called."""
+"""The protocol of a region's shape, and the signature of its compiled function."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Shape(Protocol):
     by rotation; -g is its clearance.
     """
 
-    kind: ClassVar[int]  # tells the shapes apart in packed arrays; given when the shapes are loaded
+    kind: ClassVar[int]  # number of the shape in packed arrays; assigned when the shapes are loaded
     unit: ClassVar[str]  # of g
 
     def packed(self) -> tuple[float, ...]:
@@ -47,11 +47,11 @@ class Shape(Protocol):
         ...
 
     def numbers(self) -> tuple[Number, ...]:
-        """Return name, unit and range of each number that `packed` gives."""
+        """Return name, unit and range of each number of `packed`."""
         ...
 
     def bounds(self) -> Bounds:
-        """Return the corners of an upright box that holds the shape; infinite where it has no end."""
+        """Return the corners of an upright box about the shape; infinite where the shape is unbounded."""
         ...
 
 
@@ -61,13 +61,13 @@ def require(good: bool, shape: str, key: str, received: object, expected: str) -
     Parameters
     ----------
     good : bool
-        The condition.
+        Condition that must hold.
     shape, key : str
-        What is wrong.
+        Names of the shape and of the invalid key.
     received : object
         The value received.
     expected : str
-        What was expected.
+        Description of valid values.
 
     Raises
     ------
@@ -79,14 +79,14 @@ def require(good: bool, shape: str, key: str, received: object, expected: str) -
 
 
 def require_finite(shape: str, **values: float | tuple[float, ...]) -> None:
-    """Raise an error that names the first value that is not finite, or absurdly great.
+    """Require that all values are finite and not too great; name the first that is not.
 
     Parameters
     ----------
     shape : str
-        Whose values they are.
+        Name of the shape.
     **values : float or tuple of float
-        By key.
+        Values by key.
 
     Raises
     ------
@@ -104,19 +104,19 @@ def unit(shape: str, key: str, vector: tuple[float, ...]) -> tuple[float, ...]:
     Parameters
     ----------
     shape, key : str
-        What it is, for the message.
+        Names, for the message.
     vector : tuple of float
-        Any length above zero.
+        Vector of any length above zero.
 
     Returns
     -------
     tuple of float
-        Of length 1.
+        Vector of length 1.
 
     Raises
     ------
     RegionError
-        If it has no direction.
+        If the vector has no direction.
     """
     require_finite(shape, **{key: vector})
     length = math.hypot(*vector)
@@ -125,7 +125,7 @@ def unit(shape: str, key: str, vector: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def about(centre: Vector3, reach: Sequence[float]) -> Bounds:
-    """Return the bounds of what reaches so far from a centre along each axis.
+    """Return the bounds about a centre with a reach along each axis.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The stability analysis of the paper's law, (30)-(45), as functions that can be asked where it holds.
+"""The stability analysis of the paper's law, (30)-(45), as functions that show where it holds.
 
 Imports: nothing.
 """

@@ -1,4 +1,4 @@
-"""The inequalities between the lines of the proof: (35), (36) on the secondary error, (44) on W."""
+"""The inequalities of the proof: (35), (36) on the secondary error, (44) on W."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ Array = NDArray[np.float64]
 
 
 def norm_bound(errors: Array) -> float:
-    """Return what |e_s| is at most: (35), the sum of the |e_si|.
+    """Return the upper bound (35) of |e_s|: the sum of the |e_si|.
 
     Parameters
     ----------
     errors : ndarray, shape (n, 3)
-        e_si of each region.
+        Error e_si of each region.
     """
     return float(np.sum(np.linalg.norm(errors, axis=1)))
 
 
 def square_bound(errors: Array) -> float:
-    """Return what |e_s|^2 is at most: (36), n times the sum of the |e_si|^2. Arguments as `norm_bound`."""
+    """Return the upper bound (36) of |e_s|^2: n times the sum of the |e_si|^2. Arguments as `norm_bound`."""
     return float(len(errors) * np.sum(errors**2))
 
 
 def decay_bound(model: Model, gains: Gains, y: Array, velocity_body: Array, sigma_c0: float) -> float:
-    """Return what W of (41) is at least: (44).
+    """Return the lower bound (44) of W of (41) [W].
 
     Parameters
     ----------
     model : Model
-        The true vehicle.
+        True vehicle.
     gains : Gains
-        Of the law.
+        Gains of the law.
     y : ndarray, shape (6,)
         `mapped_error`.
     velocity_body : ndarray, shape (6,)

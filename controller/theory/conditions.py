@@ -1,6 +1,6 @@
-"""The gain conditions (38) and (45): whether they hold, by how much, and where.
+"""The gain conditions (38) and (45): their validity, margin and range.
 
-lambda_m of (34) is the greatest eigenvalue of M, since J^+ = blkdiag(R^T, I) is orthogonal. sigma_p stands in the
+lambda_m of (34) is the greatest eigenvalue of M, since J^+ = blkdiag(R^T, I) is orthogonal. sigma_p is in the
 conditions on position, sigma_a in that on attitude.
 """
 
@@ -26,7 +26,7 @@ class Fit(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Whether it does."""
+        """True if the condition holds."""
         return self.have > self.need
 
 
@@ -36,7 +36,7 @@ def greatest_inertia(mass: Array) -> float:
 
 
 def potential_matrix(gradient_norm: float, gains: Gains) -> Array:
-    """Return P, shape (6, 6): what potential and attitude give V, (38) on the left."""
+    """Return P, shape (6, 6): the part of potential and attitude in V, (38) on the left."""
     position = 0.5 * (gains.k_p1 + gains.sigma_p * gains.k_v1) / gradient_norm**2 if gradient_norm else np.inf
     attitude = gains.k_p2 + gains.sigma_a * gains.k_v2
     return np.diag([position] * 3 + [attitude] * 3)
@@ -52,18 +52,18 @@ def least_of_potential_test(mass: Array, gradient_norm: float, gains: Gains) -> 
     gradient_norm : float
         |df/dp|, above 0.
     gains : Gains
-        Of the law.
+        Gains of the law.
     """
     sigma = np.diag([gains.sigma_p] * 3 + [gains.sigma_a] * 3)
     return float(np.linalg.eigvalsh(potential_matrix(gradient_norm, gains) - sigma @ mass @ sigma)[0])
 
 
 def potential_fits(mass: Array, gradient_norm: float, gains: Gains) -> tuple[Fit, Fit]:
-    """Return (38), first and second condition, with the scalar lambda_m as printed.
+    """Return (38), first and second condition, with the scalar lambda_m of the paper.
 
     Arguments as `least_of_potential_test`.
 
-    The second takes the mass in kilograms for an inertia: lambda_m is 187.7 for ODIN, whose inertia is 8 kg m2. The
+    The second compares the mass in kilograms with an inertia: lambda_m is 187.7 for ODIN, whose inertia is 8 kg m2. The
     matrix test `least_of_potential_test` does not.
     """
     P = potential_matrix(gradient_norm, gains)
@@ -83,7 +83,7 @@ def secondary_fit(mass: Array, gradient_norms: Array, betas: Array, gains: Gains
     betas : ndarray, shape (n,)
         alpha_i / k_q of these, above 0.
     gains : Gains
-        Of the law.
+        Gains of the law.
     """
     if not len(betas):
         return Fit(math.inf, 0.0)
@@ -98,7 +98,7 @@ def greatest_gradient(mass: Array, gains: Gains) -> float:
 
     Arguments as `least_of_potential_test`.
 
-    By the Schur complement: the translation's part of sigma M sigma, and what the coupling to the rotation adds to it.
+    By the Schur complement: the translation's part of sigma M sigma, plus the effect of the coupling to rotation.
     """
     sigma = np.diag([gains.sigma_p] * 3 + [gains.sigma_a] * 3)
     crossing = sigma @ mass @ sigma
@@ -111,7 +111,7 @@ def greatest_gradient(mass: Array, gains: Gains) -> float:
 
 
 def error_jacobian_bound(jacobian: Array) -> float:
-    """Return the greatest eigenvalue of the symmetric part of de_p/dp, `jacobian`, (3, 3): how fast e_p moves with p.
+    """Return the greatest eigenvalue of the symmetric part of de_p/dp, `jacobian`, (3, 3): the rate of e_p with p.
 
     For a sphere it is |df/dp|^2 + 2 f where f > 0.
     """
@@ -124,7 +124,7 @@ def damping_fit(
     """Return (45), first condition: lambda_min[D] + lambda_min[K_v] against sigma c_0.
 
     Of sigma c_0 the one term with de_p/dt alone, from the translational mass: the other terms of
-    (43) come on top unless they happen to cancel it, so the condition can be counted on at most where this one holds.
+    (43) come on top unless they happen to cancel it, so this condition is necessary for the full one in general.
     (The term with D's linear part is no multiple of |nu|^2 at all; (43) holds for it only together with the errors.)
 
     Parameters
@@ -136,9 +136,9 @@ def damping_fit(
     jacobian_bound : float
         `error_jacobian_bound`.
     gains : Gains
-        Of the law.
+        Gains of the law.
     translation_alone : bool
-        Take D and K_v of translation for the left side: the least that any reading asks.
+        True to use D and K_v of translation on the left side: the weakest reading of the condition.
     """
     drag = np.array(linear_damping, dtype=float)
     least = drag[:3].min() + gains.k_v1 if translation_alone else drag.min() + min(gains.k_v1, gains.k_v2)
@@ -156,7 +156,7 @@ def gain_fits(gains: Gains) -> tuple[Fit, Fit]:
 
 
 def sphere_radii(mass: Array, linear_damping: Array, radius: float, gains: Gains) -> tuple[float, float, float]:
-    """Return how far from the centre of a spherical goal region conditions hold, [m].
+    """Return the distances from the centre of a spherical goal region within which conditions hold [m].
 
     Parameters
     ----------
@@ -165,9 +165,9 @@ def sphere_radii(mass: Array, linear_damping: Array, radius: float, gains: Gains
     linear_damping : ndarray, shape (6,)
         Diagonal of D at rest [N s/m, N m s/rad].
     radius : float
-        Of the goal region [m].
+        Radius of the goal region [m].
     gains : Gains
-        Of the law.
+        Gains of the law.
 
     Returns
     -------

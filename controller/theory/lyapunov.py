@@ -1,12 +1,12 @@
 """V of (31) and its rate -W of (40), (41).
 
 Throughout y = J^+ e_Ts = [R^T (e_p + (k_q/k_p1) e_s); e_e] with J^+ = blkdiag(R^T, I), and sigma = diag(sigma_p I,
-sigma_a I). The lost dots of (39), (41) and (43) are put back: dy/dt is the sum of both terms with M nu.
+sigma_a I). The lost dots of (39), (41) and (43) are restored: dy/dt is the sum of both terms with M nu.
 
 The last term of V comes in three forms, since (31) and (33) agree with each other, and with the normalized force of
 (22), only where |dg_i/dp| = 1: `printed_secondary` (31), `unit_gradient_secondary` (33), and `normalized_secondary`,
 the true potential of the force. (40) is an identity for the last one alone, with constant weights, in still water,
-and where the wrench (25) is what acts.
+and where the wrench (25) acts.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def mapped_error(e_p: Array, e_s: Array, e_att: Array, R: Array, gains: Gains) -
     R : ndarray, shape (3, 3)
         From body to world.
     gains : Gains
-        Of the law.
+        Gains of the law.
     """
     y = np.empty(6)
     y[:3] = R.T @ (e_p + (gains.k_q / gains.k_p1) * e_s)
@@ -86,15 +86,15 @@ def primary_value(
     Parameters
     ----------
     model : Model
-        The true vehicle.
+        True vehicle.
     gains : Gains
-        Of the law.
+        Gains of the law.
     goal_value : float
         f (13).
     error_quaternion : ndarray, shape (4,)
         (23), its scalar part at least 0.
     y : ndarray, shape (6,)
-        `mapped_error`; with e_s = 0 nothing of the secondary regions is left.
+        `mapped_error`; with e_s = 0 the secondary regions drop out.
     velocity_body : ndarray, shape (6,)
         nu [m/s, rad/s].
     estimate : ndarray, shape (4,)
@@ -130,7 +130,7 @@ def printed_secondary(values: Array, gradients: Array, betas: Array, gains: Gain
     betas : ndarray, shape (n,)
         alpha_i / k_q; a region of weight 0 contributes nothing.
     gains : Gains
-        Of the law.
+        Gains of the law.
     """
     total = 0.0
     for i in range(values.size):
@@ -141,7 +141,7 @@ def printed_secondary(values: Array, gradients: Array, betas: Array, gains: Gain
 
 
 def unit_gradient_secondary(values: Array, betas: Array, gains: Gains) -> float:
-    """Return what (33) says the last sum of (31) is; so it is where |dg_i/dp| = 1. Arguments as `printed_secondary`."""
+    """Return the last sum of (31) in the form of (33), which is valid where |dg_i/dp| = 1; as `printed_secondary`."""
     total = 0.0
     for i in range(values.size):
         total += betas[i] * positive_part(values[i]) ** 2
@@ -185,9 +185,9 @@ def value_rate(model: Model, gains: Gains, y: Array, y_rate: Array, velocity_bod
     Parameters
     ----------
     model : Model
-        The true vehicle, in still water.
+        True vehicle, in still water.
     gains : Gains
-        Of the law.
+        Gains of the law.
     y, y_rate : ndarray, shape (6,)
         `mapped_error` and `mapped_error_rate`.
     velocity_body : ndarray, shape (6,)
@@ -210,12 +210,12 @@ def lower_bound(
     velocity_body: Array,
     estimate: Array,
 ) -> float:
-    """Return what (34) and (37) leave of `primary_value` once the square is completed, with the matrix sigma.
+    """Return the lower bound (34), (37) of `primary_value` by completing the square, with the matrix sigma.
 
     V is at least a quarter of nu^T M nu, the terms of potential, attitude and estimate, less (sigma y)^T M sigma y; the
     difference is (nu + 2 sigma y)^T M (nu + 2 sigma y) / 4. Arguments as `primary_value`.
 
-    From there (34) goes on to |e_p|^2 and the |e_si|^2 apart, and so loses the factor k_q/k_p1 of (28) and the
+    From there (34) splits into |e_p|^2 and the |e_si|^2, and so loses the factor k_q/k_p1 of (28) and the
     product of the two: its last line holds where no secondary region is active.
     """
     crossing = weighted(y, gains)

@@ -1,4 +1,4 @@
-"""The vehicle as the analysis knows it, (11), (12), and its Properties 1-3."""
+"""The vehicle model of the analysis, (11), (12), and its Properties 1-3."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def coriolis(mass: Array, velocity_body: Array) -> Array:
 def damping(linear: Array, quadratic: Array, velocity_body: Array) -> Array:
     """Return the diagonal of D(nu), shape (6,) [N s/m, N m s/rad]: (11), of nu, `velocity_body`, in SI units.
 
-    `linear` is what it is at rest, and `quadratic` how it grows with |nu|.
+    `linear` is the damping at rest, and `quadratic` its growth with |nu|.
     """
     return linear + quadratic * np.abs(velocity_body)
 
@@ -57,7 +57,7 @@ def asymmetry(matrix: Array) -> float:
 
 
 def skew_defect(mass: Array, velocity_body: Array) -> float:
-    """Return how far dM/dt - 2 C(nu) is from skew-symmetric (Property 2), over the greatest element of C [-].
+    """Return the deviation of dM/dt - 2 C(nu) from skew-symmetry (Property 2), over the greatest element of C [-].
 
     `mass` and `velocity_body` as for `coriolis`.
 
@@ -68,7 +68,7 @@ def skew_defect(mass: Array, velocity_body: Array) -> float:
 
 
 def restoring_defect(weight: float, buoyancy: float, r_G: Array, r_B: Array, quaternion: Array) -> float:
-    """Return how far Z phi of (12) is from weight and buoyancy taken at their centres [N, N m].
+    """Return the difference of Z phi of (12) from weight and buoyancy at their centres [N, N m].
 
     Parameters
     ----------

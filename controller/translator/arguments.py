@@ -1,4 +1,4 @@
-"""Arguments of translated functions as words of eight bytes, in the order of their C structs."""
+"""Convert arguments of translated functions to words of eight bytes, in the order of their C structs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _NUMBER = struct.Struct("=d")
 
 
 def words_of(value: Any) -> list[int]:
-    """Return the words of one argument: of a number one, of an array its address and its shape.
+    """Return the words of one argument: one for a number, address and shape for an array.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ def words_of(value: Any) -> list[int]:
     Returns
     -------
     list of int
-        Of eight bytes each.
+        Words of eight bytes each.
     """
     if isinstance(value, np.ndarray):
         return [value.ctypes.data, *value.shape]

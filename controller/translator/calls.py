@@ -1,4 +1,4 @@
-"""Calls: of what Python has, of `math` and NumPy, and of functions that are translated too."""
+"""Translate calls: of Python's built-in functions, of `math` and NumPy, and of translated functions."""
 
 from __future__ import annotations
 

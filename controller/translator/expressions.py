@@ -1,4 +1,4 @@
-"""Expressions of numbers: what each becomes in C, in Python's order of evaluation and rounding."""
+"""Translate expressions of numbers to C, in Python's order of evaluation and rounding."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from controller.translator.types import BOOL, DOUBLE, INT, UINT, Array, Record, 
 _ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*"}
 _BITS = {ast.BitXor: "^", ast.BitAnd: "&", ast.BitOr: "|", ast.LShift: "<<", ast.RShift: ">>"}
 _COMPARED = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
-_LARGEST_POWER = 8  # that is multiplied out
+_LARGEST_POWER = 8  # greatest exponent that is multiplied out
 
 
 class Expressions(Operands):
-    """Translates names, numbers, operators and choices."""
+    """Translate names, numbers, operators and choices."""
 
     def expression(self, node: ast.expr) -> Operand:
-        """Return what an expression is."""
+        """Return the operand of an expression."""
         method = getattr(self, f"_{type(node).__name__.lower()}", None)
         if method is None:
             self.fail(node, f"{type(node).__name__} is not translated")
@@ -76,7 +76,7 @@ class Expressions(Operands):
         return self.arithmetic(node.op, left, right, node)
 
     def arithmetic(self, op: ast.operator, left: Operand, right: Operand, node: ast.AST) -> Operand:
-        """Return what an operator makes of two numbers."""
+        """Return the C expression of an operator on two numbers."""
         if isinstance(op, ast.Pow):
             return self._power(left, right, node)
         a, b = self.scalar(left, node), self.scalar(right, node)

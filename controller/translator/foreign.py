@@ -1,11 +1,11 @@
-"""Calls of C functions by their address, out of translated functions."""
+"""Call C functions by address, from translated functions."""
 
 from __future__ import annotations
 
 import ctypes
 from typing import Any
 
-# kinds of arguments, as C writes them
+# types of arguments, as C writes them
 POINTER, SIZE, INT, DOUBLE, BOOL = "void *", "size_t", "int", "double", "bool"
 
 _TYPES = {
@@ -23,16 +23,16 @@ def call_c(address: int, kinds: tuple[str, ...], *arguments: Any) -> int:
     Parameters
     ----------
     address : int
-        Of the function.
+        Address of the function.
     kinds : tuple of str
-        Of its arguments; a constant.
+        Types of its arguments; a constant.
     *arguments : int, float, bool or ndarray
-        One for each kind; an address, or an array, for a pointer.
+        One for each type; an address, or an array, for a pointer.
 
     Returns
     -------
     int
-        What it returns.
+        Result of the function.
     """
     function = ctypes.PYFUNCTYPE(ctypes.c_int, *(_TYPES[kind] for kind in kinds))(int(address))
     returned: int = function(*(getattr(argument, "ctypes", argument) for argument in arguments))

@@ -22,11 +22,11 @@ _KEPT = {
     "while", "bool", "true", "false", "NAN", "INFINITY", "gamma", "div", "free", "index", "j0", "j1", "jn",
     "y0", "y1", "yn", "time", "remove", "signal",
 }  # fmt: skip
-_PASSES = 6  # until the types of variables stand
+_PASSES = 6  # until the types of variables are fixed
 
 
 class Functions(Protocol):
-    """What a function that is translated asks of the program that it is part of."""
+    """The program's interface for a function that is translated."""
 
     def instance(self, function: FunctionType, arguments: tuple[Type, ...]) -> tuple[str, Type]:
         """Return the C name of a function for some arguments, and the type of what it returns."""
@@ -43,11 +43,11 @@ class Function(Statements):
     Parameters
     ----------
     program : Functions
-        Which translates what it calls.
+        Program that translates the called functions.
     function : function
         Plain Python.
     arguments : tuple of Type
-        Of its parameters.
+        Types of the parameters.
     """
 
     def __init__(self, program: Functions, function: FunctionType, arguments: tuple[Type, ...]) -> None:
@@ -68,7 +68,7 @@ class Function(Statements):
         self.result: Type = Nothing()
 
     def fail(self, node: ast.AST, what: str) -> NoReturn:
-        """Refuse a construct by its place.
+        """Refuse a construct, with its place.
 
         Raises
         ------
@@ -79,7 +79,7 @@ class Function(Statements):
         raise TranslationError(f"{self._file}:{line}: {what}, which is not translated to C")
 
     def translate(self, name: str) -> str:
-        """Return the function in C, under a name; its result's type is known then."""
+        """Return the function in C, under a name; afterwards the type of its result is known."""
         for _ in range(_PASSES):
             known, result = dict(self.names), self.result
             self.lines: list[str] = []
@@ -122,7 +122,7 @@ class Function(Statements):
         return f"{name}_" if name in _KEPT else name
 
     def temporary(self, kind: Type, code: str) -> Value:
-        """Return a new variable with a value."""
+        """Assign a value to a new variable, and return that."""
         name = self.new_name("t")
         self.declared[name] = f"{self._declaration(kind, name)}{_zero(kind)};"
         if code:

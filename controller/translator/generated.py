@@ -1,4 +1,4 @@
-"""Functions of Python that stand in no file, but in a text that was written by a program."""
+"""Define Python functions from a generated text."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ def functions_of(text: str, names: dict[str, Any]) -> dict[str, FunctionType]:
     text : str
         Python: functions alone, of our own making, since it is executed.
     names : dict
-        What they refer to by name; ``__name__`` is the module that they are said to be of.
+        Objects that they refer to by name; ``__name__`` is the module that they belong to.
 
     Returns
     -------
     dict of str to function
-        By name; each has its own text as ``source``.
+        Functions by name; each has its own text as ``source``.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Operands of expressions: what C computes, what is known beforehand, and tuples that are known by their items."""
+"""Operands of expressions: C values, values known at translation, and tuples known by their items."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from controller.translator.types import BOOL, DOUBLE, INT, UINT, Scalar, Tuple, 
 
 @dataclass(frozen=True)
 class Value:
-    """A value that C computes: of a record, the pointer to it."""
+    """A value that C computes: for a record, its pointer."""
 
     type: Type
     code: str
-    simple: bool = False  # a name or a number: it may be written twice, and nothing that follows changes it
+    simple: bool = False  # a name or a number: it may be written twice, and no later statement changes it
 
 
 @dataclass(frozen=True)
 class Known:
-    """What is known when the code is translated: a number, a tuple of such, a function, a module, a class."""
+    """A value that is known at translation: a number, a tuple of such, a function, a module, a class."""
 
     value: Any
 
 
 @dataclass(frozen=True)
 class Items:
-    """A tuple that is not put together, but known by its items."""
+    """A tuple that is not stored, but known by its items."""
 
     items: tuple[Operand, ...]
 
@@ -40,18 +40,18 @@ Operand = Value | Known | Items
 
 
 class Operands:
-    """Computes the operands of one function; statements that they need first go to `lines`."""
+    """Compute the operands of one function; statements that they need first go to `lines`."""
 
     names: dict[str, Type]  # of variables, as far as they are known
     globals: dict[str, Any]
     lines: list[str]
 
     def fail(self, node: ast.AST, what: str) -> NoReturn:
-        """Refuse a construct by its place."""
+        """Refuse a construct, with its place."""
         raise NotImplementedError
 
     def temporary(self, kind: Type, code: str) -> Value:
-        """Return a new variable with a value."""
+        """Assign a value to a new variable, and return that."""
         raise NotImplementedError
 
     def call_translated(self, function: Callable[..., Any], arguments: Sequence[Operand], node: ast.AST) -> Operand:
@@ -67,7 +67,7 @@ class Operands:
         raise NotImplementedError
 
     def expression(self, node: ast.expr) -> Operand:
-        """Return what an expression is."""
+        """Return the operand of an expression."""
         raise NotImplementedError
 
     def variable(self, name: str) -> str:
@@ -75,7 +75,7 @@ class Operands:
         raise NotImplementedError
 
     def in_order(self, nodes: Sequence[ast.expr]) -> list[Operand]:
-        """Return operands, each evaluated before what the following ones do first."""
+        """Return operands, each evaluated before the statements that the next ones need."""
         operands: list[Operand] = []
         for node in nodes:
             mark = len(self.lines)
@@ -95,7 +95,7 @@ class Operands:
         return operand
 
     def value(self, operand: Operand, node: ast.AST) -> Value:
-        """Return an operand as C computes it."""
+        """Return an operand as a C value."""
         if isinstance(operand, Value):
             return operand
         known = operand.value if isinstance(operand, Known) else None
@@ -114,7 +114,7 @@ class Operands:
         return self.fail(node, "not a value")
 
     def compound(self, kind: Type, codes: Sequence[str]) -> str:
-        """Return a tuple made of its items."""
+        """Return the C expression of a tuple from its items."""
         inside = ", ".join(codes)
         braces = f"{{{inside}}}" if isinstance(kind, Tuple) and kind.uniform else inside
         return f"({self.c(kind)}){{{braces}}}"
@@ -124,14 +124,14 @@ class Operands:
         raise NotImplementedError
 
     def scalar(self, operand: Operand, node: ast.AST) -> Value:
-        """Return an operand that is a number."""
+        """Return an operand as a number; refuse another type."""
         value = self.value(operand, node)
         if not isinstance(value.type, Scalar):
             self.fail(node, f"{name_of(value.type)}, expected a number")
         return value
 
     def converted(self, value: Value, kind: Type) -> str:
-        """Return the code of a number as another type of number."""
+        """Return the C expression of a number, converted to another type of number."""
         if value.type == kind or not isinstance(kind, Scalar):
             return value.code
         return f"({kind.c}){bracketed(value)}"
@@ -149,7 +149,7 @@ class Operands:
 
 
 def number(x: float) -> str:
-    """Return a number as C writes it."""
+    """Format a number in C."""
     if math.isnan(x):
         return "NAN"
     if math.isinf(x):
@@ -158,7 +158,7 @@ def number(x: float) -> str:
 
 
 def bracketed(value: Value, kind: Type | None = None) -> str:
-    """Return a value's code as an operand: with brackets around it unless it is a name, a number or a call."""
+    """Return a value's C expression as an operand: in brackets unless it is a name, a number or a call."""
     code = value.code
     if kind is not None and kind != value.type and isinstance(kind, Scalar):
         return f"({kind.c})({code})"

@@ -1,4 +1,4 @@
-"""A program: functions with all that they call, as one file of C99."""
+"""A program: functions with all functions that they call, as one file of C99."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _HELPERS = {
 
 
 class Program:
-    """Functions in C, each for arguments of the types that it is called with.
+    """Functions in C, each for the argument types of its calls.
 
     Examples
     --------
@@ -56,16 +56,16 @@ class Program:
         self._exports: list[str] = []
 
     def export(self, name: str, function: Callable[..., None], arguments: tuple[Type, ...]) -> None:
-        """Translate a function, and let it be called by a name, with its arguments as words.
+        """Translate a function, and make it callable by a name, with its arguments as words.
 
         Parameters
         ----------
         name : str
-            In C, of ``void name(const void *words)``.
+            Name in C, of ``void name(const void *words)``.
         function : function
             Plain Python; it returns nothing.
         arguments : tuple of Type
-            That it is called with.
+            Types of its arguments.
 
         Raises
         ------
@@ -116,7 +116,7 @@ class Program:
         return self._instances[key]
 
     def name(self, kind: Type) -> str:
-        """Return the C name of a type, which is defined before what uses it."""
+        """Return the C name of a type, which is defined before its first use."""
         match kind:
             case Scalar():
                 return kind.c
@@ -156,14 +156,14 @@ def _numbered(stem: str) -> Iterator[str]:
 
 
 def _array(kind: Array) -> str:
-    """Return the struct of a view."""
+    """Return the C struct of an array view."""
     sizes = "".join(f"    int64_t n{i};\n" for i in range(kind.ndim))
     strides = "" if kind.contiguous else "".join(f"    int64_t s{i};\n" for i in range(kind.ndim))
     return f"typedef struct {{\n    {kind.item.c} *data;\n{sizes}{strides}}} {kind.c};\n"
 
 
 def _helpers_of(kind: Array) -> Iterator[tuple[str, str]]:
-    """Yield what slices, fills and copies contiguous views of a type, by name."""
+    """Yield the functions that slice, fill and copy contiguous views of a type, by name."""
     if not kind.contiguous:
         return
     name, item = kind.c, kind.item.c

@@ -1,4 +1,4 @@
-"""Statements: what each becomes in C."""
+"""Translate statements to C."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from controller.translator.types import BOOL, INT, Array, Nothing, Record, Scala
 
 
 class Statements(Calls):
-    """Translates the statements of one function into `lines`."""
+    """Translate the statements of one function into `lines`."""
 
     parameters: list[str]
-    declared: dict[str, str]  # of variables that Python has not, what declares them
+    declared: dict[str, str]  # declarations of variables that Python does not have
     result: Type
 
     def new_name(self, stem: str) -> str:
@@ -69,7 +69,7 @@ class Statements(Calls):
             self.fail(node, str(error))
 
     def _as(self, value: Value, kind: Type, node: ast.AST) -> str:
-        """Return a value's code as that of another type that holds it."""
+        """Return a value's C expression, converted to a type that holds it."""
         if isinstance(kind, Tuple) and value.type != kind:
             items = [self.value(item, node) for item in self.items_of(value, node)]
             return self.compound(kind, [self._as(v, k, node) for v, k in zip(items, kind.items, strict=True)])

@@ -1,4 +1,4 @@
-"""Arguments of translated functions as static data in C: what a law begins with, for where no Python runs."""
+"""Write arguments of translated functions as static data in C: the data of a law at the start, without Python."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ def static_data(program: Program, name: str, arguments: tuple[Any, ...]) -> str:
     Parameters
     ----------
     program : Program
-        That exports the function by that name.
+        Program that exports the function.
     name : str
-        Of the function; its arguments are called ``name_data``, and are given to ``name`` by their address.
+        Name of the function; its arguments are called ``name_data``, and are passed to ``name`` by their address.
     arguments : tuple
-        Such as it was exported for.
+        Arguments of the types that it was exported for.
 
     Returns
     -------
     str
-        C, to stand behind the program's text. Arrays are static, and may be written.
+        C, to be put after the program's text. Arrays are static, and may be written.
 
     Raises
     ------
     TypeError
-        If an argument is of a type that C has no words for.
+        If an argument has a type without words in C.
     """
     arrays: list[str] = []
 
@@ -55,14 +55,14 @@ def initializer(value: Any, pointer: Callable[[np.ndarray, str], str], path: str
     value : number, ndarray or tuple of such
         The argument.
     pointer : callable
-        Gives the C expression of where an array stands, of the array and its path.
+        Returns the C expression of an array's address, from the array and its path.
     path : str, optional
-        Of the argument: with the names of fields, a C name for each array.
+        Path of the argument: with the names of fields, a C name for each array.
 
     Returns
     -------
     str
-        Of the struct that a `Program` has for its type.
+        Initializer of the struct that a `Program` has for its type.
     """
     if isinstance(value, tuple):
         keys = getattr(value, "_fields", range(len(value)))
@@ -79,16 +79,16 @@ def array_data(array: np.ndarray, name: str, qualifier: str = "static") -> str:
     Parameters
     ----------
     array : ndarray
-        Not empty.
+        Array, not empty.
     name : str
-        In C.
+        Name in C.
     qualifier : str, optional
-        Before its type.
+        Text before its type.
 
     Returns
     -------
     str
-        One line.
+        Definition in one line.
     """
     kind = type_of(array)
     numbers = ", ".join(_number(x) for x in array.ravel())

@@ -1,4 +1,4 @@
-"""Items of tuples, elements of arrays, and views of them."""
+"""Translate items of tuples, elements of arrays, and views of arrays."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from controller.translator.types import BOOL, INT, Array, Tuple, name_of
 
 
 class Subscripts(Expressions):
-    """Translates what stands before brackets."""
+    """Translate subscripts."""
 
     def _subscript(self, node: ast.Subscript) -> Operand:
         owner = self.expression(node.value)

@@ -1,4 +1,4 @@
-"""Types of translated code: numbers, arrays, tuples and named tuples, and the C that stands for each."""
+"""Types of translated code: numbers, arrays, tuples and named tuples, and the C type of each."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Scalar:
 
 
 DOUBLE, INT, UINT, BOOL = Scalar("double"), Scalar("int64_t"), Scalar("uint64_t"), Scalar("bool")
-REFERENCE = Scalar("uint32_t")  # of a variable of an FMU
+REFERENCE = Scalar("uint32_t")  # value reference of an FMU's variable
 _ITEMS = {np.dtype(n): c for n, c in (("f8", DOUBLE), ("i8", INT), ("u8", UINT), ("u4", REFERENCE), ("?", BOOL))}
 _SHORT = {DOUBLE: "f64", INT: "i64", UINT: "u64", REFERENCE: "u32", BOOL: "b8"}
 
@@ -43,7 +43,7 @@ class Tuple:
 
     @property
     def uniform(self) -> bool:
-        """Whether all items are numbers of one type: then a place in it may be computed."""
+        """True if all items are numbers of one type: then an index in it may be computed."""
         return isinstance(self.items[0], Scalar) and len(set(self.items)) == 1
 
     def item(self, place: int) -> str:
@@ -67,7 +67,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Nothing:
-    """What a function without a result returns."""
+    """The result type of a function without a result."""
 
 
 Type = Scalar | Array | Tuple | Record | Nothing
@@ -102,12 +102,12 @@ def type_of(value: Any) -> Type:
 
 
 def unified(one: Type, other: Type) -> Type:
-    """Return the type that holds values of both: of numbers the wider one.
+    """Return the type that holds values of both: the wider one of two numbers.
 
     Raises
     ------
     TypeError
-        If there is none.
+        If there is no such type.
     """
     if one == other:
         return one
@@ -122,7 +122,7 @@ def unified(one: Type, other: Type) -> Type:
 
 
 def name_of(kind: Type) -> str:
-    """Return a type in a few words, for errors."""
+    """Describe a type in a few words, for errors."""
     match kind:
         case Scalar():
             return kind.c

@@ -29,7 +29,7 @@ class Current(Fmi2Slave):
             )
 
     def do_step(self, current_time, step_size):
-        """Put out the current at the end of the step."""
+        """Write the current at the end of the step."""
         remaining = math.exp(-(current_time + step_size) / self.rise_time)
         share, growth = 1.0 - remaining, remaining / self.rise_time
         speed = self.surface_speed + self.shear * self.depth

@@ -20,7 +20,7 @@ from plant_fmu.vehicle_component import of_vehicle
 
 START = {"weight": 1248.25}  # N, of a buoyancy of 1228.25 N
 POSE = {f"position.{axis}": f"position_{axis}" for axis in "xyz"} | {f"quaternion.e{i}": f"e{i}" for i in range(4)}
-# from whose output to whose input
+# connections: from an output to an input
 CONNECTIONS = {
     ("plant", "current"): {"position.z": "depth"},
     ("plant", "tether"): POSE | {f"velocity.{name}": name for name in "uvwpqr"},
@@ -65,7 +65,7 @@ def structure(stop_time: float, step: float) -> bytes:
 
 
 def write_system(out: Path, stop_time: float, step: float) -> Path:
-    """Write the three FMUs and how they are connected."""
+    """Write the three FMUs and their connections."""
     plant = of_vehicle(load_vehicle("odin"), START, coupled=True)
     members = {"SystemStructure.ssd": structure(stop_time, step)}
     members["resources/plant.fmu"] = cached_fmu(plant, 2).read_bytes()

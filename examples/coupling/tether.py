@@ -41,13 +41,13 @@ class Tether(Fmi2Slave):
             )
 
     def to_world(self, a):
-        """Turn a vector of the body frame by the quaternion."""
+        """Rotate a vector of the body frame to the world by the quaternion."""
         twice = [2.0 * x for x in cross([self.e1, self.e2, self.e3], a)]
         again = cross([self.e1, self.e2, self.e3], twice)
         return [x + self.e0 * y + z for x, y, z in zip(a, twice, again, strict=True)]
 
     def do_step(self, current_time, step_size):
-        """Put out the force at the pose and velocity that came in."""
+        """Write the force at the pose and velocity of the inputs."""
         point = [self.point_x, self.point_y, self.point_z]
         place = [self.position_x, self.position_y, self.position_z]
         anchor = [self.anchor_x, self.anchor_y, self.anchor_z]

@@ -1,4 +1,4 @@
-"""What the verbs of the command line do; it alone prints.
+"""The verbs of the command line; only this package prints.
 
 Imports: terms, engines, formats, export, pictures.
 """

@@ -1,4 +1,4 @@
-"""What a system costs: times of every engine, one sample at a time and many at once."""
+"""Measure the time of every engine for a system, one sample at a time and in batches."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ _MOST_ROWS = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """What one engine takes for one system.
+    """Times of one engine for one system.
 
     Attributes
     ----------
     engine : str
-        Its name.
+        Name of the engine.
     call, row : float or None
         Median time of a call and of a row of a batch [us]; None if the engine cannot evaluate the system.
     rows : int
         Rows of the batch.
     reason : str
-        Why there are no times.
+        Reason why there are no times.
     """
 
     engine: str
@@ -44,12 +44,12 @@ class Cost:
 
 
 def bench(system: System) -> list[Cost]:
-    """Return what every engine takes for a system, over random samples that do not come twice in a row.
+    """Measure the time of every engine for a system, over random samples that do not repeat in a row.
 
     Parameters
     ----------
     system : System
-        What is evaluated.
+        System to evaluate.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def _batch(arbiter: Arbiter, samples: Array) -> Callable[[int], object]:
     start = 0
 
     def work(n: int) -> None:
-        nonlocal start  # scikit-fuzzy's results are remembered, and other rows cost what they would cost
+        nonlocal start  # the scikit-fuzzy engine caches results, so that each call gets new rows
         start = start + n if start + 2 * n <= len(samples) else 0
         arbiter.batch(samples[start : start + n])
 
@@ -104,7 +104,7 @@ def _batch(arbiter: Arbiter, samples: Array) -> Callable[[int], object]:
 
 def _median(work: Callable[[int], object], most: int) -> tuple[float, int]:
     """Return the median time of one of n things [us], and the n that takes about a repeat's time."""
-    work(min(4, most))  # what is made at the first call
+    work(min(4, most))  # warm up: caches and lazy imports
     n, spent = 1, 0.0
     while True:
         spent = _timed(work, n)

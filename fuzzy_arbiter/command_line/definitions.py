@@ -1,4 +1,4 @@
-"""Definitions: read, described in words, and written in another format."""
+"""Read definitions, describe them in words, and convert them."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ def load_system(file: str, block: str | None = None) -> System:
     file : str
         Path, or ``section-vi``.
     block : str, optional
-        Which FUNCTION_BLOCK of a FCL file is meant.
+        Name of the FUNCTION_BLOCK in a FCL file.
 
     Returns
     -------
     System
-        As it is defined there.
+        System that the file defines.
 
     Raises
     ------
     FormatError, DefinitionError
-        If the file is none.
+        If the file is not a valid definition.
     """
     if file == BUILT_IN:
         return prioritised()
@@ -51,7 +51,7 @@ def described(arbiter: Arbiter) -> str:
     Parameters
     ----------
     arbiter : Arbiter
-        What is described.
+        Arbiter to describe.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def _described(variable: Variable) -> list[str]:
 
 
 def _numbers(term: Term) -> str:
-    """Say what makes a term: its points, or its kind and numbers."""
+    """Format the numbers of a term: its points, or its kind and parameters."""
     shape = term.shape
     if isinstance(shape, Shape):
         return " ".join(f"({x!r}, {degree!r})" for x, degree in shape.points)
@@ -104,7 +104,7 @@ def convert(file: str, out: str, native: bool, block: str | None = None) -> None
     file : str
         Path of the system, or ``section-vi``.
     out : str
-        File to write, whose suffix says how.
+        File to write; its suffix selects the format.
     native : bool
         Whether its centroids shall be the weights, so that other tools give them without a normalization.
     block : str, optional
@@ -115,7 +115,7 @@ def convert(file: str, out: str, native: bool, block: str | None = None) -> None
     FormatError
         If the suffix is unknown, or the file cannot be read or written.
     UnsupportedError
-        If the format cannot say all of the system; nothing is written then.
+        If the format cannot represent the system; nothing is written then.
     """
     from fuzzy_arbiter.formats import FORMATS, fold_normalization, save
 

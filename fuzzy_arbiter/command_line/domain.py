@@ -1,4 +1,4 @@
-"""Where a system's outputs are defined, and random samples of that."""
+"""Find where a system's outputs are defined, and draw random samples there."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from fuzzy_arbiter.engines.firing import Array, Firing
 
 
 def defined(system: System, samples: Array) -> NDArray[np.bool_]:
-    """Return at which of many samples every output has a value.
+    """Return a mask of the samples at which every output has a value.
 
     Parameters
     ----------
     system : System
-        Whose rules fire.
+        System to evaluate.
     samples : ndarray, shape (n, inputs)
         Values in their universes.
 
@@ -41,16 +41,16 @@ def random_samples(system: System, n: int, seed: int = 0) -> Array:
     Parameters
     ----------
     system : System
-        Whose inputs.
+        System whose inputs are sampled.
     n : int
-        How many are drawn; fewer are returned where outputs are undefined at some.
+        Number of samples; fewer are returned where outputs are undefined at some.
     seed : int
-        Of the random numbers; equal seeds give equal samples.
+        Seed of the random numbers; equal seeds give equal samples.
 
     Returns
     -------
     ndarray, shape (n or fewer, inputs)
-        Values, the same at any time.
+        Values of the inputs; equal seeds give equal values.
     """
     low, high = np.array([v.universe for v in system.inputs]).T
     samples: Array = np.random.default_rng(seed).uniform(low, high, (n, len(system.inputs)))

@@ -1,4 +1,4 @@
-"""Pictures: which one, of what, and as a file."""
+"""Draw a picture of a system, and write it as a file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fuzzy_arbiter.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# each with the options that it heeds
+# kinds of picture, each with its options
 PICTURES: dict[str, tuple[str, ...]] = {
     "terms": ("--input", "--output", "--at"),
     "rules": ("--output", "--at"),
@@ -33,16 +33,16 @@ def draw(
     at: Sequence[str],
     relief: bool,
 ) -> Figure:
-    """Return a picture.
+    """Draw a picture.
 
     Parameters
     ----------
     arbiter : Arbiter
-        What is drawn.
+        Arbiter to draw.
     kind : {"terms", "rules", "profile", "surface", "decisions"}
-        Which picture.
+        Kind of picture.
     inputs, outputs : sequence of str
-        Names; where none came, as many of the first as the picture needs, and for terms all.
+        Names; without any, as many of the first as the picture needs, and for ``terms`` all.
     at : sequence of str
         Values of inputs, as ``name=value``.
     relief : bool
@@ -51,14 +51,14 @@ def draw(
     Returns
     -------
     Figure
-        Of the picture alone.
+        Figure of the picture alone.
 
     Raises
     ------
     DefinitionError
         If a name is unknown.
     InputError
-        If a value is refused, the number of inputs or outputs does not fit, or the picture heeds no such option.
+        If a value is refused, the number of inputs or outputs does not fit, or the picture has no such option.
     """
     from fuzzy_arbiter import pictures
     from fuzzy_arbiter.pictures.style import new_axes, require_matplotlib
@@ -98,9 +98,9 @@ def middles(at: Sequence[str], system: System) -> list[str]:
     Parameters
     ----------
     at : sequence of str
-        As ``name=value``; to values without names nothing is added.
+        As ``name=value``; nothing is added to values without names.
     system : System
-        Whose inputs.
+        System whose inputs these are.
 
     Returns
     -------
@@ -139,19 +139,19 @@ def _figure(ax: Any) -> Figure:
 
 
 def image(figure: Figure, suffix: str) -> bytes:
-    """Return a figure as a file, the same for the same figure at any time.
+    """Encode a figure as an image file; equal figures give equal bytes.
 
     Parameters
     ----------
     figure : Figure
         The picture.
     suffix : {"png", "svg", "pdf"}
-        Kind of the file.
+        Format of the file.
 
     Returns
     -------
     bytes
-        What stands in it.
+        Content of the file.
     """
     import matplotlib as mpl
     from matplotlib.text import Text

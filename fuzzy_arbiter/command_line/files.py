@@ -1,4 +1,4 @@
-"""Files: told by their suffix, and read whole."""
+"""Read input files, and check the suffixes of output files."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from fuzzy_arbiter.errors import FormatError, InputError
 
 
 def read_text(path: str, stdin: TextIO | None) -> tuple[str, str]:
-    """Return what stands in a file, or comes from standard input.
+    """Read a text from a file or from standard input.
 
     Parameters
     ----------
     path : str
-        The file, or ``-``.
+        Path of the file, or ``-`` for standard input.
     stdin : text stream or None
         Standard input; None if it is closed.
 
     Returns
     -------
     text, where : str
-        What was read, and what it is called in errors.
+        The content, and its name for errors.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def read_text(path: str, stdin: TextIO | None) -> tuple[str, str]:
 
 
 def require_suffix(out: str, expected: Sequence[str]) -> None:
-    """Refuse a file of a suffix that says nothing.
+    """Require that a file has one of the known suffixes.
 
     Parameters
     ----------

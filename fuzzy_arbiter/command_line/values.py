@@ -1,4 +1,4 @@
-"""Values: a sample or a table of them in, weights out."""
+"""Evaluate a sample or a table of samples, and format the weights."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from fuzzy_arbiter.errors import ArbiterError, InputError
 
 
 def sample(words: Sequence[str], system: System) -> list[float] | dict[str, float]:
-    """Return the sample that words of the command line say.
+    """Parse words of the command line as a sample.
 
     Parameters
     ----------
     words : sequence of str
         All as ``name=value``, or all values in the order of the inputs.
     system : System
-        Whose inputs.
+        System whose inputs these are.
 
     Returns
     -------
@@ -32,7 +32,7 @@ def sample(words: Sequence[str], system: System) -> list[float] | dict[str, floa
     Raises
     ------
     InputError
-        If a word is neither, or a name came twice.
+        If a word is neither, or a name is given twice.
     """
     if not words:
         raise InputError(f"no values came, expected {', '.join(variable_names(system.inputs))}")
@@ -51,24 +51,24 @@ def sample(words: Sequence[str], system: System) -> list[float] | dict[str, floa
 
 
 def number(text: str, where: str) -> float:
-    """Return the number that a text says.
+    """Parse a text as a number.
 
     Parameters
     ----------
     text : str
-        As Python reads it.
+        Number in Python's notation.
     where : str
-        What stands before it in the error.
+        Name of the value, which starts the error.
 
     Returns
     -------
     float
-        Maybe not finite.
+        The number; infinity and NaN are accepted.
 
     Raises
     ------
     InputError
-        If it is none.
+        If the text is not a number.
     """
     try:
         return float(text)
@@ -82,7 +82,7 @@ def evaluated(arbiter: Arbiter, inputs: Sequence[float] | Mapping[str, float], a
     Parameters
     ----------
     arbiter : Arbiter
-        What is asked.
+        Arbiter to evaluate.
     inputs : sequence or mapping of float
         The sample.
     as_json : bool
@@ -105,11 +105,11 @@ def evaluated_table(arbiter: Arbiter, text: str, where: str, as_json: bool) -> s
     Parameters
     ----------
     arbiter : Arbiter
-        What is asked.
+        Arbiter to evaluate.
     text : str
         The table; its first line names the columns, of which those that are no inputs are passed over.
     where : str
-        What the table is called in errors.
+        Name of the table for errors.
     as_json : bool
         A list of objects instead of a table.
 

@@ -18,14 +18,14 @@ ENGINES: tuple[str, ...] = get_args(EngineName)
 
 
 def choose(system: System, engine: str) -> tuple[Engine, str]:
-    """Return the engine that evaluates a system, and why it is this one.
+    """Return the engine that evaluates a system, and the reason for the choice.
 
     Parameters
     ----------
     system : System
-        What is evaluated.
+        System to evaluate.
     engine : {"auto", "closed", "exact", "grid", "skfuzzy"}
-        The wish.
+        Name of the engine; ``auto`` selects one.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What `fuzzy_arbiter.engines.sweep` does, for many samples at a time, to the same bits."""
+"""The algorithm of `fuzzy_arbiter.engines.sweep` for many samples at a time, equal to the bit."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def centroids(cuts: Array, shape: Outline) -> Array:
     cuts : ndarray, shape (terms, n)
         Degree at which each term is clipped; not all of one sample are 0.
     shape : Outline
-        Of the output.
+        Outline of the output.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def centroids(cuts: Array, shape: Outline) -> Array:
 
 
 def _band(a: float, b: float, below: Array | None, cut: Array) -> tuple[Array, Array]:
-    """Return area and moment of what a line from a to b has between two heights, over a piece of the width 1."""
+    """Return area and moment of the band under a line from a to b between two heights, over a piece of the width 1."""
     low, high = min(a, b), max(a, b)  # as if it rose; a fall is seen from the other end
     h1 = np.minimum(cut, high)
     if below is None:

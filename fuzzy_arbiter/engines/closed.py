@@ -35,12 +35,12 @@ _BLOCK = 8192  # samples evaluated at a time; longer arrays leave the caches and
 
 
 class NoClosedFormError(EngineError):
-    """A system that this engine cannot evaluate.
+    """Raised for a system that this engine cannot evaluate.
 
     Attributes
     ----------
     reason : str
-        Why, in words.
+        Reason, in words.
     """
 
     def __init__(self, reason: str) -> None:
@@ -49,7 +49,7 @@ class NoClosedFormError(EngineError):
 
 
 class ClosedEngine(Engine):
-    """Evaluates C(h) for outputs of two terms whose cuts are 1 - h and h, which is proved from the rules.
+    """Evaluate C(h) for outputs of two terms whose cuts are 1 - h and h, which is proved from the rules.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class ClosedEngine(Engine):
         return normalize_weights_of_many(result, self.system.normalization)
 
     def shortcut(self) -> Shortcut | None:
-        """Return a faster way to the weights of prioritised criteria whose degrees are the inputs; as of `Engine`."""
+        """Return a faster function for the weights where the inputs are the criteria's degrees; as of `Engine`."""
         whole = self.clips or self.system.normalization not in ("range", "none")  # more to be done with the weights
         if self._plain and not whole and self._cubic is not None and self._cubic[:2] == (0.0, 0.0):
             return _smooth_ladder(len(self.system.inputs), *self._cubic[2:])
@@ -178,7 +178,7 @@ class ClosedEngine(Engine):
 
 
 def _proved(system: System) -> tuple[tuple[Clause, ...], ...] | str:
-    """Return the clauses of each output's h, or why there is no h."""
+    """Return the clauses of each output's h, or the reason why there is no h."""
     if reason := beyond_plain(system, curved_inputs=True):
         return reason
     if (system.conjunction, system.disjunction, system.implication) != ("min", "max", "min"):
@@ -194,21 +194,21 @@ def _proved(system: System) -> tuple[tuple[Clause, ...], ...] | str:
 
 
 def _pieces(outputs: Sequence[Output]) -> tuple[tuple[tuple[Piece, ...], ...], tuple[tuple[Piece, ...], ...]]:
-    """Return C(h) of each output, raw and scaled, worked out once for those that differ in name alone."""
+    """Return C(h) of each output, raw and scaled, computed once for outputs that differ in name alone."""
     patterns = [replace(output, name="any") for output in outputs]
     known = {pattern: pieces(pattern) for pattern in dict.fromkeys(patterns)}
     return tuple(known[pattern][0] for pattern in patterns), tuple(known[pattern][1] for pattern in patterns)
 
 
 def _one_cubic(forms: Sequence[tuple[Piece, ...]]) -> tuple[float, ...] | None:
-    """Return the coefficients of the cubic that all outputs have in common, if they have."""
+    """Return the coefficients of the cubic that all outputs share; None if they differ."""
     if len(set(forms)) > 1 or len(forms[0]) != 1 or forms[0][0].denominator != (1.0, 0.0, 0.0):
         return None
     return forms[0][0].numerator
 
 
 def _smooth_ladder(n: int, n2: float, n3: float) -> Shortcut:
-    """Return what gives the weights (n2 + n3 h) h^2 of n criteria."""
+    """Return a function from the n degrees m to the n weights (n2 + n3 h) h^2; it returns None for invalid degrees."""
 
     def weights(degrees: Sequence[float]) -> list[float] | None:
         if len(degrees) != n:

@@ -1,4 +1,4 @@
-"""What every engine is: from one sample or many to centroids, and from these to weights."""
+"""The base of all engines: from samples to centroids, and from centroids to weights."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from fuzzy_arbiter.terms.values import Constant, Value
 
 Shortcut = Callable[[Sequence[float]], list[float] | None]
 _BLOCK = 8192  # samples at a time, so that what is worked on stays in the cache
-_EACH_BY_ITSELF = ("range", "none")  # normalizations that look at one output at a time
+_EACH_BY_ITSELF = ("range", "none")  # normalizations that use one output at a time
 
 
 class Engine(ABC):
     """A way to evaluate a system; it never changes, so that threads may share it.
 
-    Subclasses say what the centroid of one output is, given the cuts of its terms; the rest is common.
+    Subclasses compute the centroid of one output from the cuts of its terms; this class does the rest.
 
     Parameters
     ----------
     system : System
-        What is evaluated.
+        System to evaluate.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Engine(ABC):
         Parameters
         ----------
         k : int
-            Which output.
+            Index of the output.
         cuts : sequence of float
             Degree in [0, 1] at which each of its terms is cut; not all are 0.
 
@@ -73,7 +73,7 @@ class Engine(ABC):
         Parameters
         ----------
         k : int
-            Which output.
+            Index of the output.
         cuts : ndarray, shape (terms, n)
             Degrees in [0, 1]; not all of one sample are 0.
 
@@ -200,7 +200,7 @@ class Engine(ABC):
         Returns
         -------
         tuple of float
-            As the system's normalization says; NaN for an output without default if no rule fires for it.
+            Normalized by the system's normalization; NaN for an output without default if no rule fires for it.
         """
         raw = self.centroids(inputs)
         if not self.scale:
@@ -219,7 +219,7 @@ class Engine(ABC):
         Returns
         -------
         ndarray, shape (n, outputs)
-            As the system's normalization says; NaN where no rule fires for an output without default.
+            Normalized by the system's normalization; NaN where no rule fires for an output without default.
         """
         raw = self.centroids_of_many(inputs)
         if not self.scale:
@@ -228,13 +228,13 @@ class Engine(ABC):
         return normalize_weights_of_many(np.clip((raw - low) / (high - low), 0.0, 1.0), self.system.normalization)
 
     def shortcut(self) -> Shortcut | None:
-        """Return a faster way to `weights` for samples that are plain, if there is one.
+        """Return a faster function for `weights` that evaluates samples of plain numbers, if there is one.
 
         Returns
         -------
         callable, or None
-            Takes a sequence of anything; gives its weights, or None unless it is a sample with all inputs in their
-            universes.
+            From any object to its weights; None unless the object is a sequence with a number for each input, in its
+            universe.
         """
         return None
 
@@ -264,14 +264,14 @@ class Engine(ABC):
 
 
 def normalize_weights(weights: Sequence[float], normalization: str) -> tuple[float, ...]:
-    """Return range-normalized weights as a normalization over all outputs wants them.
+    """Apply a normalization over all outputs to range-normalized weights.
 
     Parameters
     ----------
     weights : sequence of float
         In [0, 1], or NaN, which stays and counts for nothing.
     normalization : {"none", "range", "sum", "max"}
-        The first two leave them.
+        ``none`` and ``range`` leave the weights unchanged.
 
     Returns
     -------
@@ -287,14 +287,14 @@ def normalize_weights(weights: Sequence[float], normalization: str) -> tuple[flo
 
 
 def normalize_weights_of_many(weights: Array, normalization: str) -> Array:
-    """Return range-normalized weights of many samples as a normalization over all outputs wants them.
+    """Apply a normalization over all outputs to range-normalized weights of many samples.
 
     Parameters
     ----------
     weights : ndarray, shape (n, outputs)
         In [0, 1], or NaN, which stays and counts for nothing.
     normalization : {"none", "range", "sum", "max"}
-        The first two leave them.
+        ``none`` and ``range`` leave the weights unchanged.
 
     Returns
     -------
@@ -309,16 +309,16 @@ def normalize_weights_of_many(weights: Array, normalization: str) -> Array:
 
 
 def default_of(output: Output) -> float:
-    """Return the value of an output for which no rule fires, or what the rules conclude is no number.
+    """Return the value of an output for which no rule fires, or whose conclusion is not a number.
 
     Parameters
     ----------
     output : Output
-        Of which no rule fires.
+        Output of the system.
 
     Returns
     -------
     float
-        Its default; NaN if it has none.
+        Default of the output; NaN if it has none.
     """
     return math.nan if output.default is None else output.default

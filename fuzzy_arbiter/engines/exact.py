@@ -1,4 +1,4 @@
-"""The engine of any system, exact wherever there is an exact value."""
+"""The engine for any system: exact wherever there is an exact value."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _BLOCK = 8192  # samples evaluated at a time
 
 
 class ExactEngine(Engine):
-    """Evaluates any system: straight terms exactly, over all their breakpoints; values as they are; else by quadrature.
+    """Evaluate any system: straight terms exactly, over all their breakpoints; values as they are; else by quadrature.
 
     Attributes
     ----------
     methods : dict from str to str
-        For each output how it is evaluated, and how far that may be off.
+        Method and error bound of each output.
     """
 
     name: ClassVar[str] = "exact"
@@ -59,13 +59,13 @@ class ExactEngine(Engine):
         super().__init__(system)
 
     def quadrature(self, name: str) -> bool:
-        """Return whether an output is integrated by quadrature."""
+        """Return True if an output is integrated by quadrature."""
         return any(
             o.name == name and isinstance(w, Quadrature) for o, w in zip(self.system.outputs, self._ways, strict=True)
         )
 
     def centroid(self, k: int, cuts: Sequence[float]) -> float:
-        """Return the value of an output, as exact as `methods` says."""
+        """Return the value of an output, with the error bound in `methods`."""
         way = self._ways[k]
         if isinstance(way, Quadrature):
             return way.value(cuts)
@@ -74,7 +74,7 @@ class ExactEngine(Engine):
         return float(centroid(cuts, *way, self._scaled[k]))
 
     def centroid_of_many(self, k: int, cuts: Array) -> Array:
-        """Return the values of an output for many samples, as exact as `methods` says."""
+        """Return the values of an output for many samples, with the error bound in `methods`."""
         way = self._ways[k]
         if isinstance(way, Quadrature):
             return np.array([way.value(column) for column in cuts.T.tolist()])
@@ -98,7 +98,7 @@ class ExactEngine(Engine):
 
 
 def _centroids(cuts: Array, shape: Outline) -> Array:
-    """Return what `sweep.scaled` does, as centroids, for each column of the cuts."""
+    """Return the centroids of scaled terms for many samples: `sweep.scaled` for each column of `cuts`, shape (n,)."""
     terms, n = cuts.shape
     area, moment = np.zeros(n), np.zeros(n)
     left, right = (np.reshape(side, (-1, terms, 1)) for side in (shape.left, shape.right))
@@ -127,7 +127,7 @@ def _centroids(cuts: Array, shape: Outline) -> Array:
 
 
 def _crossings(a: Array, b: Array, c: Array, d: Array, n: int) -> Array:
-    """Return where the lines from a to b meet the line from c to d, in shares of the piece; 0 where they do not."""
+    """Return the crossings of lines a..b with the line c..d, as fractions of the piece's width; 0 where none cross."""
     a, b, c, d = np.broadcast_arrays(a, b, c, d)
     meet = (a < c) != (b < d)
     shares = np.divide(a - c, (a - c) - (b - d), out=np.zeros(a.shape), where=meet)

@@ -21,7 +21,7 @@ D = TypeVar("D")
 
 @dataclass(frozen=True, slots=True)
 class Logic(Generic[D]):
-    """What *and*, *or*, *not* and hedges do with degrees of one kind: numbers, arrays, or others."""
+    """The operators *and*, *or*, *not* and hedges on one type of degree: numbers, arrays, or others."""
 
     conjunction: Callable[[D, D], D]
     disjunction: Callable[[D, D], D]
@@ -35,14 +35,14 @@ class Logic(Generic[D]):
         Parameters
         ----------
         proposition : Proposition
-            Of terms of the system's inputs.
+            Proposition on terms of the system's inputs.
         of : callable
-            Gives the degree of each statement in it.
+            Returns the degree of each statement in it.
 
         Returns
         -------
         D
-            Its degree.
+            Degree of the proposition.
         """
         if isinstance(proposition, Is):
             return of(proposition)
@@ -65,7 +65,7 @@ def number_logic(operators: System | Operators) -> Logic[float]:
     Parameters
     ----------
     operators : System or Operators
-        Which has the norms.
+        System or rule that defines the norms.
 
     Returns
     -------
@@ -84,7 +84,7 @@ def array_logic(operators: System | Operators, n: int = 1) -> Logic[Array]:
     Parameters
     ----------
     operators : System or Operators
-        Which has the norms.
+        System or rule that defines the norms.
     n : int
         Length of the arrays.
 
@@ -105,16 +105,16 @@ def array_logic(operators: System | Operators, n: int = 1) -> Logic[Array]:
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """One of the sets or values that an output joins.
+    """One of the sets or values that are joined to an output.
 
     Attributes
     ----------
     term : int
-        Which of the output's terms it is.
+        Index of the output's term.
     rules : tuple of int
         The rules that conclude it, of which the joined strength is the slot's degree.
     implication : str
-        Of these rules.
+        Implication of these rules.
     """
 
     term: int
@@ -123,19 +123,19 @@ class Slot:
 
 
 def slots_of(system: System, output: Output) -> tuple[Slot, ...]:
-    """Return what an output joins: each of its terms once where that is all the same, else each conclusion.
+    """Return the slots of an output: one for each term where the result is the same, else one for each conclusion.
 
     Parameters
     ----------
     system : System
-        Whose rules conclude.
+        System with the rules.
     output : Output
         One of its outputs.
 
     Returns
     -------
     tuple of Slot
-        Of the terms in their order, or of the rules in theirs.
+        Slots in the order of the terms, or of the rules.
     """
     names = output.term_names
     concluded = [
@@ -157,7 +157,7 @@ class Firing:
     Parameters
     ----------
     system : System
-        Whose rules fire.
+        System with the rules.
     """
 
     def __init__(self, system: System) -> None:
@@ -170,7 +170,7 @@ class Firing:
         self._joins = [AGGREGATIONS[output.aggregation] for output in system.outputs]
 
     def strengths(self, inputs: Sequence[float]) -> list[float]:
-        """Return how strongly each rule fires for one sample.
+        """Return the firing strength of each rule for one sample.
 
         Parameters
         ----------
@@ -185,7 +185,7 @@ class Firing:
 
         def of(statement: Is) -> float:
             place = self._inputs.get(statement.variable)
-            if place is None:  # an output, as the rules before have concluded on it
+            if place is None:  # an output: its degree by the rules before this one
                 return float(self._concluded(statement, result, number=True))
             return self._shapes[statement.variable, statement.term](inputs[place])
 
@@ -195,7 +195,7 @@ class Firing:
         return result
 
     def _concluded(self, statement: Is, strengths: Sequence[Any], number: bool) -> Any:
-        """Return how strongly the rules so far conclude that an output is in a term."""
+        """Return the joined strength of the rules so far that conclude a statement on an output."""
         found = [s for s, rule in zip(strengths, self.system.rules, strict=False) if statement in rule.conclusions]
         if not found:
             return 0.0 if number else np.zeros_like(strengths[0])
@@ -203,7 +203,7 @@ class Firing:
         return functools.reduce(self._joins[k].number if number else self._joins[k].array, found)
 
     def strengths_of_many(self, inputs: Array) -> list[Array]:
-        """Return how strongly each rule fires for each of many samples.
+        """Return the firing strength of each rule for many samples.
 
         Parameters
         ----------
@@ -237,7 +237,7 @@ class Firing:
         Parameters
         ----------
         strengths : sequence of float
-            Of each rule, as from `strengths`.
+            Strength of each rule, as from `strengths`.
 
         Returns
         -------
@@ -259,7 +259,7 @@ class Firing:
         Parameters
         ----------
         strengths : sequence of ndarray, shape (n,)
-            Of each rule, as from `strengths_of_many`.
+            Strength of each rule, as from `strengths_of_many`.
 
         Returns
         -------
@@ -281,9 +281,9 @@ class Firing:
         Parameters
         ----------
         k : int
-            Which output.
+            Index of the output.
         strengths : sequence of float
-            Of each rule, as from `strengths`.
+            Strength of each rule, as from `strengths`.
 
         Returns
         -------

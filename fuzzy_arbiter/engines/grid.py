@@ -1,9 +1,9 @@
-"""What scikit-fuzzy's sampling gives, at a cost that does not grow with the number of points.
+"""The values of scikit-fuzzy's sampling, at a cost that does not grow with the number of points.
 
 scikit-fuzzy samples the terms of an output on a grid. It adds the places where a term crosses its own cut, joins the
 clipped terms at all these places by the maximum, and integrates the straight lines between them exactly. So its
 centroid is that of the exact outline of the *sampled* terms, except in cells of the grid in which that outline breaks
-elsewhere, where a term crosses the cut of another, or another term: there it is a chord. All that matters can be named
+elsewhere, where a term crosses the cut of another, or another term: there it is a chord. All these places are known
 without the grid: the grid places around each break, and the own crossings.
 """
 
@@ -29,7 +29,7 @@ _ROUNDING = 4 * LEAST_AREA
 
 
 class GridEngine(Engine):
-    """Gives the centroid that scikit-fuzzy gives on `System.points` points, to rounding.
+    """Compute the centroid that scikit-fuzzy gives on `System.points` points, to rounding.
 
     For the two triangles of section VI, with D the distance of two points as a part of the universe, the centroid is at
     most D^2/6 of the universe off the exact one, and a range-normalized weight D^2/2: 1.7e-5 and 5e-5 at 101 points.
@@ -117,14 +117,14 @@ class _Piece:
 
 
 def require_plain(system: System, engine: str, curved_inputs: bool) -> None:
-    """Refuse what scikit-fuzzy does not know.
+    """Require that scikit-fuzzy supports a system.
 
     Parameters
     ----------
     system : System
-        What is to be evaluated.
+        System to evaluate.
     engine : str
-        Name for the message.
+        Name of the engine, for the message.
     curved_inputs : bool
         Whether terms of inputs may be any membership functions.
 
@@ -148,9 +148,9 @@ def sampled(output: Output, points: int) -> tuple[Array, Array]:
     Parameters
     ----------
     output : Output
-        Whose terms are sampled.
+        Output to sample.
     points : int
-        How many places, evenly over the universe.
+        Number of places, evenly over the universe.
 
     Returns
     -------
@@ -210,7 +210,7 @@ def _bends(output: Output, grid: Array, samples: Array) -> list[int]:
 
 
 def _piece(grid: Array, samples: Array, a: int, b: int) -> _Piece:
-    """Return what matters between two places of a grid."""
+    """Return the piece between two indices of a grid, with the lines that can cross a cut in it."""
     ends = samples[:, [a, b]].tolist()
     terms = [(t, left, right - left) for t, (left, right) in enumerate(ends) if max(left, right) > 0.0]
     own = [line for line in terms if line[2] != 0.0]

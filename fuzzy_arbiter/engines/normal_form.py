@@ -18,11 +18,11 @@ from fuzzy_arbiter.shapes import Shape
 Literal = tuple[str, str, bool]  # variable, term, and whether it is affirmed
 Clause = frozenset[Literal]
 
-MAX_CLAUSES = 512  # more are given up
+MAX_CLAUSES = 512  # a form with more is not computed
 
 
 def complementary(variable: Variable) -> bool:
-    """Return whether a variable has two terms whose degrees are one minus each other, at the knots to the last bit.
+    """Return True if a variable has two terms whose degrees sum to 1, at the knots to the last bit.
 
     Parameters
     ----------
@@ -43,12 +43,12 @@ def complementary(variable: Variable) -> bool:
 
 
 def ladder(system: System, clauses: Sequence[Sequence[Clause]]) -> tuple[Literal, ...] | None:
-    """Return the literals of prioritised criteria, if that is what the clauses say.
+    """Return the literals of prioritised criteria, if the clauses have this form.
 
     Parameters
     ----------
     system : System
-        Whose rules they are.
+        System with the rules.
     clauses : sequence of sequence of frozenset
         As from `high_clauses`.
 
@@ -81,7 +81,7 @@ def high_clauses(system: System) -> list[tuple[Clause, ...]] | str:
     -------
     list of tuple of frozenset, or str
         For each output, such that the cut of its second term is the greatest of the clauses' least degrees, and that of
-        its first term one minus this; or why that is not so.
+        its first term one minus this; or the reason why there are no such clauses.
     """
     complements = _complements(system)
     result = []
@@ -120,7 +120,7 @@ def _opposite(literal: Literal, complements: dict[str, tuple[str, str]]) -> Lite
 def _clauses(
     proposition: Proposition, affirmed: bool, complements: dict[str, tuple[str, str]]
 ) -> frozenset[Clause] | None:
-    """Disjunctive normal form of a proposition or of its negation; None if it is too long."""
+    """Return the disjunctive normal form of a proposition or of its negation; None if it is too long."""
     if isinstance(proposition, Not):
         return _clauses(proposition.part, not affirmed, complements)
     if isinstance(proposition, Is):
@@ -132,7 +132,7 @@ def _clauses(
 
 
 def _joined(parts: Iterable[frozenset[Clause] | None], any_of: bool) -> frozenset[Clause] | None:
-    """Disjunction or conjunction of normal forms, in normal form."""
+    """Return the disjunction or conjunction of normal forms, in normal form."""
     result: frozenset[Clause] = frozenset() if any_of else frozenset((frozenset(),))
     for part in parts:
         if part is None:

@@ -25,7 +25,7 @@ class Piece:
     Attributes
     ----------
     start : float
-        Where the piece begins; it ends where the next one begins, the last one at 1.
+        Start of the piece; its end is the start of the next one, and that of the last one 1.
     numerator : tuple of 4 float
         Coefficients of t^0 to t^3.
     denominator : tuple of 3 float
@@ -106,7 +106,7 @@ def _forms(
 
 
 def _starts(start: Fraction, end: Fraction, area: Polynomial) -> Iterator[Fraction]:
-    """Yield where to begin anew in a piece: an area that is small beside the first one would be lost to rounding."""
+    """Yield the starts of parts of a piece: an area that is small beside the first one would be lost to rounding."""
     yield start
     middle = (start + end) / 2
     if 4 * min(_at(middle, area), _at(end, area)) < _at(start, area):

@@ -1,4 +1,4 @@
-"""What a system has beyond the plain kind: straight terms, min and max or their products, the centroid."""
+"""Check that a system is of the plain kind: straight terms, min and max or their products, the centroid."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ PLAIN = {"conjunction": ("min", "prod"), "disjunction": ("max", "probor"), "impl
 
 
 def beyond_plain(system: System, curved_inputs: bool = False) -> str:
-    """Return why a system is not of the plain kind, which is all that some engines and checks know.
+    """Return the first reason why a system is not of the plain kind, which some engines and checks require.
 
     Parameters
     ----------
     system : System
-        What an engine or a check is asked to take.
+        System to check.
     curved_inputs : bool
         Whether terms of inputs may be any membership functions.
 
@@ -52,7 +52,7 @@ def beyond_plain(system: System, curved_inputs: bool = False) -> str:
 
 
 def curved(variable: Variable) -> str:
-    """Return which term of a variable is not piecewise linear.
+    """Describe the first term of a variable that is not piecewise linear.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def curved(variable: Variable) -> str:
 
 
 def bent(p: Proposition) -> bool:
-    """Return whether a condition has hedges, or asks for any term.
+    """Return True if a condition has hedges or the term *any*.
 
     Parameters
     ----------

@@ -48,9 +48,9 @@ class Quadrature:
     Parameters
     ----------
     output : Output
-        Any whose terms are membership functions.
+        Output whose terms are membership functions.
     slots : sequence of Slot
-        What is joined.
+        Sets that are joined.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ class _Joined:
         return height
 
     def _signs(self) -> list[tuple[int, int]]:
-        """Return what may bend the joined terms, as a slot and another, or `_CUT`, `_REST`, `_FULL`, `_PASSED`."""
+        """Return the events that can bend the joined terms: (slot, slot or `_CUT`, `_REST`, `_FULL`, `_PASSED`)."""
         signs: list[tuple[int, int]] = []
         for a, i in enumerate(self.active):
             implication = self.of._slots[i].implication
@@ -148,9 +148,9 @@ class _Joined:
         return signs
 
     def _bends(self, signs: Sequence[tuple[int, int]], degrees: Array, implied: Array) -> Array:
-        """Return what changes its sign where the joined terms bend, shape (signs, ..)."""
+        """Return values whose sign changes where the joined terms bend, one for each event, shape (signs, ..)."""
         bends = np.empty((len(signs), *degrees.shape[1:]))
-        before = [np.zeros(degrees.shape[1:])]  # what the slots before each have joined to
+        before = [np.zeros(degrees.shape[1:])]  # joined height of the slots before each
         if any(b in (_FULL, _PASSED) for _, b in signs):
             for height in implied[:-1]:
                 before.append(self.of._join(before[-1], height))
@@ -172,7 +172,7 @@ class _Joined:
         bends = self._bends(signs, scanned, implied)
         above = bends >= 0.0
         changes = above[..., 1:] != above[..., :-1]
-        if of._output.aggregation == "max":  # of slots below the greatest nothing is seen
+        if of._output.aggregation == "max":  # slots below the greatest do not matter
             top = implied >= implied.max(axis=0) * _EQUAL
             seen = top[..., 1:] | top[..., :-1]
             changes &= np.array([seen[a] | seen[b if b >= 0 else a] for a, b in signs]).reshape(changes.shape)
@@ -203,7 +203,7 @@ class _Joined:
         return heights.sum(axis=0) * half, (heights * (places - self.of._low)).sum(axis=0) * half
 
     def parts(self) -> Parts:
-        """Return area and moment in parts, which together are as exact as is promised."""
+        """Return area and moment of each part, halved until their sum is within the tolerance."""
         starts, ends = self.breaks[:-1], self.breaks[1:]
         areas, moments = self._integrals(starts, ends)
         done: list[Parts] = []

@@ -29,10 +29,10 @@ _DISJUNCTIONS: dict[str, Callable[..., Any]] = {"max": np.fmax, "probor": lambda
 
 
 class ScikitEngine(Engine):
-    """Runs the rules in scikit-fuzzy, of which each thread gets a system of its own.
+    """Run the rules in scikit-fuzzy, with one system a thread.
 
-    Inputs are sampled at the knots of their terms, which is exact, outputs at `System.points` places. How far that is
-    off the exact centroid stands at `GridEngine`, which gives the same values.
+    Inputs are sampled at the knots of their terms, which is exact, outputs at `System.points` places. For the error
+    against the exact centroid see `GridEngine`, which gives the same values.
 
     Raises
     ------
@@ -84,7 +84,7 @@ class ScikitEngine(Engine):
 
 
 class _Runner:
-    """A simulation of scikit-fuzzy, and what it gave for the last inputs; for one thread."""
+    """A simulation of scikit-fuzzy that caches the result of the last inputs; for one thread."""
 
     def __init__(self, system: System, samples: Sequence[tuple[Array, Array]]) -> None:
         self._inputs = variable_names(system.inputs)
@@ -112,7 +112,7 @@ class _Runner:
 
 
 class _ControlSystem(control.ControlSystem):  # type: ignore[misc]
-    """A control system whose rules stand in one order, since none needs another's result.
+    """A control system whose rules are in one fixed order, since none needs another's result.
 
     scikit-fuzzy works the order out at each run, and again at each rule that is added, from a graph that also links
     terms and rules.
@@ -194,7 +194,7 @@ def _condition(proposition: Proposition, inputs: dict[str, Any]) -> Any:
 
 
 def _stateful(system: _ControlSystem) -> list[tuple[dict[Any, Any], Any]]:
-    """Return where scikit-fuzzy keeps the state of a system: dictionaries of its classes, and the key in each."""
+    """Return the places of scikit-fuzzy's state of a system: dictionaries of its classes, and the key in each."""
     variables = list(system.graph.nodes())
     terms = [term for variable in variables for term in variable.terms.values()]
     return [

@@ -34,7 +34,7 @@ class Outline(NamedTuple):
     places : tuple of float, length pieces + 1
         Knots of the variable.
     left, right : tuple of float, length pieces * terms
-        Degree of each term just right of each piece's start, and just left of its end; those of a piece stand together.
+        Degree of each term just right of each piece's start, and just left of its end; by piece.
     order : tuple of int, length pieces * terms
         The terms of each piece, the highest first.
     """
@@ -86,7 +86,7 @@ def outline(variable: Variable, number: Callable[[float], Any] = float) -> Outli
 
 
 def _meeting(starts: Numbers, ends: Numbers, t: int, u: int) -> Any:
-    """Return where two lines meet within a piece, in shares of it; None if they do not."""
+    """Return the crossing of two lines, as a fraction of the piece's width; None if they do not cross."""
     before, after = starts[t] - starts[u], ends[t] - ends[u]
     return before / (before - after) if before * after < 0 else None
 
@@ -180,7 +180,7 @@ def scaled(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers) -> tup
         x0 = zero
         for x1 in breaks:
             if x0 < x1:
-                # the middle tells which line is the greatest; at an end it would be lost to rounding
+                # the middle shows which line is the greatest; at an end it would be lost to rounding
                 height = y0 = y1 = zero
                 for t in range(terms):
                     a, rise, cut = left[first + t], right[first + t] - left[first + t], cuts[t]

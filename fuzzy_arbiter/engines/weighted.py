@@ -1,7 +1,7 @@
 """Outputs of values: the mean of what the rules conclude, weighted by their strengths, or the sum.
 
-Sugeno's terms are values that may depend on the inputs. Tsukamoto's only rise or only fall, and stand for the place
-where they have the rule's strength.
+Sugeno's terms are values that may depend on the inputs. Tsukamoto's only rise or only fall, and their value is the
+place where they have the rule's strength.
 """
 
 from __future__ import annotations
@@ -92,5 +92,5 @@ def _array(shape: object, inputs: Sequence[str], outputs: Sequence[str]) -> Call
     if isinstance(shape, Value):
         of = shape.array(inputs, outputs)
         return lambda cut, samples: of(samples)
-    # a strength of 0 has no place that matters
+    # a strength of 0 has no weight, so that its place does not matter
     return lambda cut, samples: np.array([place_of(shape, w) if w > 0.0 else 0.0 for w in cut.tolist()])  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Export to code that needs nothing of this package.
+"""Export to code that does not depend on this package.
 
 Imports: terms, engines.
 """

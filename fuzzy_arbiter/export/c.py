@@ -17,7 +17,7 @@ def to_c(system: System) -> str:
     Parameters
     ----------
     system : System
-        What the code evaluates.
+        System to evaluate.
 
     Returns
     -------

@@ -16,7 +16,7 @@ def compiled(system: System) -> Any:
     Parameters
     ----------
     system : System
-        What is compiled.
+        System to compile.
 
     Returns
     -------

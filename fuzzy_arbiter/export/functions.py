@@ -1,4 +1,4 @@
-"""What exported code calls: norms, hedges and the functions of expressions, in Python and in C."""
+"""Functions that exported code calls: norms, hedges and functions of expressions, in Python and in C."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.terms import norms
 
-# each as IEEE 754 has it, where Python raises
+# each by IEEE 754, where Python raises
 _PYTHON = {
     "least": '"""Return the lesser of two numbers."""|return a if a < b else b',
     "greatest": '"""Return the greater of two numbers."""|return a if a > b else b',
@@ -104,7 +104,7 @@ def in_python(name: str) -> str:
     Returns
     -------
     str
-        Its lines.
+        Lines of the definition.
     """
     if name in _PYTHON:
         return f"def {name}(a, b):\n    " + _PYTHON[name].replace("|", "\n    ")
@@ -128,7 +128,7 @@ def in_c(name: str) -> str:
     Returns
     -------
     str
-        Its line; empty for one of ``math.h``.
+        Line of the definition; empty for one of ``math.h``.
     """
     if name in _C_NORMS:
         return f"static inline double {name}(double a, double b) {{ return {_C_NORMS[name]}; }}"

@@ -1,4 +1,4 @@
-"""What exported code does, before a language says it: statements, whose expressions are the same in C and in Python.
+"""Exported code as statements, before they are written in a language; C and Python share the expressions.
 
 ``least``, ``greatest`` and ``either`` are functions of two degrees: their minimum, maximum and probabilistic sum.
 """
@@ -31,13 +31,13 @@ from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
 from fuzzy_arbiter.terms.values import Formula, Value
 
 _JOINS = {name: norm.code for name, norm in {**T_NORMS, **AGGREGATIONS}.items()}
-_DEEPEST = 20  # parentheses within each other; parsers give up at some hundred
-_LONGEST = 16  # branches after each other, likewise
+_DEEPEST = 20  # nested parentheses; parsers accept some hundred
+_LONGEST = 16  # branches of one choice, likewise
 
 
 @dataclass(frozen=True, slots=True)
 class Assign:
-    """A number gets a name; the words say what it is."""
+    """Assign an expression to a name; `words` is its comment."""
 
     name: str
     expression: str
@@ -46,14 +46,14 @@ class Assign:
 
 @dataclass(frozen=True, slots=True)
 class Choose:
-    """The first branch of which the condition holds; an empty condition always does."""
+    """Run the first branch whose condition holds; an empty condition always holds."""
 
     branches: tuple[tuple[str, tuple[Statement, ...]], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """A number becomes the centroid of the k-th output, whose terms are cut at these numbers."""
+    """Assign the centroid of the k-th output, whose terms are cut at these numbers."""
 
     name: str
     k: int
@@ -63,7 +63,7 @@ class Sweep:
 
 @dataclass(frozen=True, slots=True)
 class Return:
-    """The end, with a status."""
+    """Return a status."""
 
     status: int
 
@@ -73,16 +73,16 @@ Statement = Assign | Choose | Sweep | Return
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """Everything that is evaluated, in its order.
+    """The statements of a system, in their order.
 
     Attributes
     ----------
     system : System
-        What is said.
+        System that the program evaluates.
     statements : tuple of Statement
         From the inputs ``x1``, ``x2``, .. to the outputs ``y1``, ``y2``, ..
     outlines : tuple of Outline or None
-        Of the outputs, if they are swept; None for one of values; empty where there is a closed form.
+        Outlines of the outputs, if they are swept; None for one of values; empty where there is a closed form.
     functions : tuple of str
         Names of the functions that the statements call.
     """
@@ -94,18 +94,18 @@ class Program:
 
     @property
     def mathematical(self) -> bool:
-        """Whether it needs more than arithmetic."""
+        """True if the program needs functions beyond arithmetic."""
         plain = {"least", "greatest", "either"}
         return not set(self.functions) <= plain or any(o.weighted for o in self.system.outputs)
 
 
 def program(system: System) -> Program:
-    """Return what evaluates a system: the closed form where there is one, else the sweep.
+    """Return the program of a system: the closed form where it exists, else the sweep.
 
     Parameters
     ----------
     system : System
-        What the code evaluates.
+        System to evaluate.
 
     Returns
     -------
@@ -115,9 +115,9 @@ def program(system: System) -> Program:
     Raises
     ------
     DefinitionError
-        If it is no system.
+        If `system` is not a `System`.
     UnsupportedError
-        If an output needs quadrature, or the value before, or a condition asks for an output.
+        If an output needs quadrature or its previous value, or a condition uses an output.
     """
     if not isinstance(system, System):
         raise DefinitionError(f"system is {shown(system)}, expected a System, such as arbiter.system")
@@ -142,7 +142,7 @@ def _texts(statements: Sequence[Statement]) -> Iterator[str]:
 
 
 def _require_sayable(system: System, engine: Engine) -> None:
-    """Refuse what the exported code does not do."""
+    """Require that the exported code supports a system."""
     for output, slots in zip(system.outputs, engine.firing.slots, strict=True):
         what = f"export: output {output.name!r}"
         if output.lock_previous:
@@ -197,14 +197,14 @@ class _Degrees:
 
 
 class _Expressions:
-    """Says operators on degrees; what has become deep gets a name, before the statement that it is for."""
+    """Format operators on degrees; a deep expression is assigned to a name before the statement that uses it."""
 
     def __init__(self) -> None:
         self._names = 0
         self._waiting: list[Statement] = []
 
     def said(self, template: str, *degrees: str) -> str:
-        """Return an operator's value."""
+        """Return the expression of an operator's value."""
         text = template.format(*degrees)
         depth = max(accumulate((sign == "(") - (sign == ")") for sign in text))
         if depth <= _DEEPEST:
@@ -214,11 +214,11 @@ class _Expressions:
         return f"t{self._names}"
 
     def join(self, kind: str, degrees: Iterable[str]) -> str:
-        """Return several degrees joined, the first two first."""
+        """Return the expression that joins several degrees, from left to right."""
         return reduce(partial(self.said, _JOINS[kind]), degrees)
 
     def assign(self, name: str, expression: str, words: str) -> Iterator[Statement]:
-        """Give a name to a value, after what it needs."""
+        """Assign a value to a name, after the assignments that it needs."""
         yield from self._waiting
         self._waiting.clear()
         yield Assign(name, expression, words)
@@ -244,7 +244,7 @@ def _first(name: str, values: Sequence[tuple[str, str]]) -> Choose:
 
 
 def _degree(x: str, shape: Membership, universe: tuple[float, float]) -> list[tuple[str, str]]:
-    """Say a membership function in its universe, as the shape itself evaluates it."""
+    """Format a membership function in its universe with the operations of the shape itself."""
     if isinstance(shape, Curve):
         return [
             ("" if end == math.inf else f"{x} < {end!r}", f"least(greatest({code(tree, {'x': x})}, 0.0), 1.0)")
@@ -276,7 +276,7 @@ def _degree(x: str, shape: Membership, universe: tuple[float, float]) -> list[tu
 
 
 def _line(x: str, a: float, start: float, run: float, rise: float) -> str:
-    """Say start + rise * ((x - a) / run), without what changes no bit."""
+    """Format start + rise * ((x - a) / run), without operations that change no bit."""
     share = (x if a == 0.0 else f"({x} - {a!r})") + ("" if run == 1.0 else f" / {run!r}")
     if rise == 0.0:
         return repr(start)
@@ -285,7 +285,7 @@ def _line(x: str, a: float, start: float, run: float, rise: float) -> str:
 
 
 def _closed(engine: ClosedEngine) -> Iterator[Statement]:
-    """Work out h of each output, and C(h)."""
+    """Compute h of each output, and C(h)."""
     degrees, logic = _Degrees(engine.system), _Expressions()
     values: list[Statement] = []
     unclaimed = ""
@@ -331,7 +331,7 @@ def _horner(coefficients: Sequence[float], t: str) -> str:
 
 
 def _swept(engine: Engine) -> Iterator[Statement]:
-    """Work out the strength of each rule, the cut of each output's term, and the centroids."""
+    """Compute the strength of each rule, the cut of each output's term, and the centroids."""
     system = engine.system
     degrees, logic = _Degrees(system), _Expressions()
     rules: list[Statement] = []
@@ -373,7 +373,7 @@ def _swept(engine: Engine) -> Iterator[Statement]:
 
 
 def _valued(output: Output, k: int, cuts: Sequence[str], system: System) -> tuple[Statement, ...]:
-    """Work out the mean of an output's values, weighted by their strengths, or the sum."""
+    """Compute the mean of an output's values, weighted by their strengths, or the sum."""
     names = {v.name: f"x{i}" for i, v in enumerate(system.inputs, 1)}
     statements: list[Statement] = [Assign(f"w{k}", "0.0")]
     for cut, term in zip(cuts, output.terms, strict=True):
@@ -385,12 +385,12 @@ def _valued(output: Output, k: int, cuts: Sequence[str], system: System) -> tupl
 
 
 def _shared(system: System) -> Iterator[Statement]:
-    """Divide by the sum or the greatest of all, if that is the normalization."""
+    """Divide by the sum or the maximum of all weights, if that is the normalization."""
     if system.normalization not in ("sum", "max"):
         return
     ys = [f"y{k}" for k in range(1, len(system.outputs) + 1)]
     logic = _Expressions()
     whole = " + ".join(ys) if system.normalization == "sum" else logic.join("max", ys)
     yield from logic.assign("whole", whole, "")
-    # where all are 0 they stay so
+    # if all are 0, they stay 0
     yield Choose((("whole > 0.0", tuple(Assign(y, f"{y} / whole") for y in ys)),))

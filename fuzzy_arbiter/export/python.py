@@ -1,4 +1,4 @@
-"""Export to plain Python, which needs nothing and which Numba compiles as it is."""
+"""Export to plain Python without imports, which Numba compiles unchanged."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def to_python(system: System) -> str:
     Parameters
     ----------
     system : System
-        What the code evaluates.
+        System to evaluate.
 
     Returns
     -------

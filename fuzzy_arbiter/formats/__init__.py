@@ -38,28 +38,28 @@ _WRITE: dict[str, Callable[[System], str]] = {
 
 
 def reads(text: str, format: str, block: str | None = None) -> System:
-    """Return the system that a text defines.
+    """Parse a text as a system.
 
     Parameters
     ----------
     text : str
-        All of a file; a byte order mark and the ends of lines do not matter.
+        Content of a file; a byte order mark and the ends of lines do not matter.
     format : {"json", "toml", "fcl", "fis", "fll"}
-        What it is written in.
+        Format of the text.
     block : str, optional
-        Which FUNCTION_BLOCK of a FCL text is meant, by its name; needed where there are several.
+        Name of the FUNCTION_BLOCK in a FCL text; needed where there are several.
 
     Returns
     -------
     System
-        Nothing that the text says is left out but descriptions.
+        The system; only descriptions in the text are dropped.
 
     Raises
     ------
     FormatError
-        If there is no such format or block, the text is not of it, or it says what this package does not know.
+        If there is no such format or block, the text is not of it, or uses an unsupported part of it.
     DefinitionError
-        If what it defines cannot be.
+        If the definition is invalid.
 
     Examples
     --------
@@ -81,26 +81,26 @@ def reads(text: str, format: str, block: str | None = None) -> System:
 
 
 def writes(system: System, format: str) -> str:
-    """Return a system as text that reads as the same system again.
+    """Format a system as text that parses as the same system.
 
     Parameters
     ----------
     system : System
-        What is to be said.
+        System to write.
     format : {"json", "toml", "fcl", "fis", "fll"}
-        What it is written in.
+        Format of the text.
 
     Returns
     -------
     str
-        All of a file, every number in full precision.
+        Content of a file, with every number in full precision.
 
     Raises
     ------
     FormatError
         If there is no such format.
     UnsupportedError
-        If the format cannot say all of the system; what it cannot say is named.
+        If the format cannot represent the system; the unsupported part is named.
 
     Examples
     --------
@@ -117,12 +117,12 @@ def writes(system: System, format: str) -> str:
 
 
 def load(path: str | Path, block: str | None = None) -> System:
-    """Return the system that a file defines.
+    """Load the system of a file.
 
     Parameters
     ----------
     path : str or Path
-        Of a JSON, TOML, FCL, FIS or FLL file, told by its suffix in any case.
+        JSON, TOML, FCL, FIS or FLL file; its suffix, in any case, selects the format.
     block : str, optional
         As of `reads`.
 
@@ -134,9 +134,9 @@ def load(path: str | Path, block: str | None = None) -> System:
     Raises
     ------
     FormatError
-        If the file cannot be read, is not of its format, or says what this package does not know.
+        If the file cannot be read, is not of its format, or uses an unsupported part of it.
     DefinitionError
-        If what it defines cannot be.
+        If the definition is invalid.
 
     Examples
     --------
@@ -167,19 +167,19 @@ def load(path: str | Path, block: str | None = None) -> System:
 
 
 def save(system: System, path: str | Path) -> None:
-    """Write a system to a file, which appears whole or not at all.
+    """Write a system to a file atomically.
 
     Parameters
     ----------
     system : System
-        What is to be said.
+        System to write.
     path : str or Path
-        Of a JSON, TOML, FCL, FIS or FLL file, told by its suffix in any case; it replaces an older one.
+        JSON, TOML, FCL, FIS or FLL file; its suffix, in any case, selects the format. An older file is replaced.
 
     Raises
     ------
     UnsupportedError
-        If the format cannot say all of the system; nothing is written then.
+        If the format cannot represent the system; nothing is written then.
     FormatError
         If the file cannot be written.
 

@@ -21,17 +21,17 @@ _SETTINGS = ("normalization", "outside", "points")
 
 
 def write(system: System) -> str:
-    """Return a system as a function block.
+    """Format a system as a function block.
 
     Parameters
     ----------
     system : System
-        Any that the language can say.
+        A system that the language can represent.
 
     Returns
     -------
     str
-        Text of a file; settings that the language has no words for stand in a comment.
+        Content of a file; settings that the language cannot represent are in a comment.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def _say_rule(i: int, rule: Rule) -> str:
 
 
 def _require_one_case(system: System) -> None:
-    """Refuse names that the standard, to which the case of letters means nothing, takes for the same."""
+    """Require that no two names differ only in the case of letters, which the standard ignores."""
     variables = (*system.inputs, *system.outputs)
     for names in (variable_names(variables), *(v.term_names for v in variables)):
         known: dict[str, str] = {}
@@ -114,29 +114,29 @@ def _require_one_case(system: System) -> None:
 
 
 def read(text: str, block: str | None = None) -> System:
-    """Return the system that a function block defines.
+    """Parse a function block as a system.
 
-    A variable without RANGE has the universe of its points. NC becomes a missing default. What is not said is as
-    jFuzzyLogic takes it: ACT is MIN, ACCU is MAX, METHOD is COG; where fuzzylite wrote the text, values are added.
+    A variable without RANGE has the universe of its points. NC becomes a missing default. Missing statements have
+    jFuzzyLogic's defaults: ACT is MIN, ACCU is MAX, METHOD is COG; where fuzzylite wrote the text, values are added.
 
     Parameters
     ----------
     text : str
         One function block, or several.
     block : str, optional
-        Name of the one that is meant; needed where there are several.
+        Name of the block; needed where there are several.
 
     Returns
     -------
     System
-        Of any kind.
+        System of any kind.
 
     Raises
     ------
     FormatError
-        If the text is no FCL, has no such block, or says what this package does not know; the line is named.
+        If the text is no FCL, has no such block, or uses an unsupported part of FCL; the line is named.
     DefinitionError
-        If what it defines cannot be.
+        If the definition is invalid.
     """
     tokens, comments = cut(text)
     fuzzylite = any("generated with fuzzylite" in text for _, text in comments)

@@ -1,4 +1,4 @@
-"""Goes through the words of the Fuzzy Control Language, and reads what stands in one place of them."""
+"""Read the tokens of the Fuzzy Control Language in order, and parse small groups of them."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ _T = TypeVar("_T")
 
 @dataclass
 class Cursor:
-    """A place among the words of a text.
+    """A position among the tokens of a text.
 
     Attributes
     ----------
     tokens : list of Token
-        Of all of the text.
+        All tokens of the text.
     at : int
-        Which of them comes next.
+        Index of the next token.
     fuzzylite : bool
-        Whether something so far is as fuzzylite writes it, and not as the standard and jFuzzyLogic do.
+        True if a construct so far is one of fuzzylite's, and not of the standard or jFuzzyLogic.
     """
 
     tokens: list[Token]
@@ -37,11 +37,11 @@ class Cursor:
 
     @property
     def here(self) -> Token:
-        """The token that comes next."""
+        """The next token."""
         return self.tokens[self.at]
 
     def unexpected(self, expected: str) -> NoReturn:
-        """Refuse what comes next."""
+        """Refuse the next token."""
         before = f" after {self.tokens[self.at - 1].text!r}" if self.at else ""
         found = self.here.text if self.here.kind == "end" else repr(self.here.text)
         refuse(self.here.line, f"{found} came{before}, expected {expected}")
@@ -89,7 +89,7 @@ class Cursor:
         return found
 
     def range(self) -> tuple[float, float]:
-        """Take the two limits behind the word of a range, in the units of the variable."""
+        """Take the two limits after the word of a range, in the units of the variable."""
         self.accept(":=")  # which some texts of the standard leave out
         self.take("(")
         low = self.number("the least value")
@@ -107,19 +107,19 @@ class Cursor:
         return " ".join(token.text for token in self.tokens[start : self.at])
 
     def shape(self, inputs: int | None) -> tuple[Membership | Value, list[float]]:
-        """Take a term's shape, and the least and greatest place that it speaks of.
+        """Take a term's shape, and the least and greatest place in it.
 
         Parameters
         ----------
         inputs : int or None
-            How many inputs there are; None for a term of an input, which cannot be a value.
+            Number of inputs; None for a term of an input, which cannot be a value.
 
         Returns
         -------
         Membership or Value
-            What the term is.
+            Shape of the term.
         list of float
-            Places from which a universe is made where none is said.
+            Places for the default universe of a variable without RANGE.
         """
         if self.here.kind == "number":
             value = self.number("a value")
@@ -148,7 +148,7 @@ class Cursor:
         return Shape(tuple(points)), [x for x, _ in points]
 
     def function(self) -> Formula | Linear:
-        """Take jFuzzyLogic's function of the inputs, as a linear one where it is said as such."""
+        """Take jFuzzyLogic's function of the inputs, as a linear value where it has that form."""
         formula = Formula(_decimal_logs(self.rest()))
         linear = Linear.of(formula.expression(sorted(formula.names)).tree, self.input_names())
         return linear or formula

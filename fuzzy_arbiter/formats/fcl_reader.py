@@ -1,4 +1,4 @@
-"""Reads the Fuzzy Control Language."""
+"""Read the Fuzzy Control Language."""
 
 from __future__ import annotations
 
@@ -30,21 +30,21 @@ _RULE_WORDS = frozenset(("if", "then", "and", "or", "not", "is", "with"))
 
 
 def system_of(tokens: list[Token], fuzzylite: bool, settings: dict[str, Any]) -> System:
-    """Return the system of one function block.
+    """Build the system of one function block.
 
     Parameters
     ----------
     tokens : list of Token
-        Of all of the text.
+        All tokens of the text.
     fuzzylite : bool
-        Whether a comment says that fuzzylite wrote it.
+        True if a comment names fuzzylite as the writer.
     settings : dict
-        Further attributes of `System`, of the comment.
+        Further attributes of `System`, from the comment.
 
     Returns
     -------
     System
-        What is not said in it is as jFuzzyLogic takes it, or fuzzylite where the text is as that writes it.
+        The system; missing statements have jFuzzyLogic's defaults, or fuzzylite's where the text is fuzzylite's.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def system_of(tokens: list[Token], fuzzylite: bool, settings: dict[str, Any]) ->
 
 @dataclass
 class _Draft:
-    """What is known of a variable so far."""
+    """The part of a variable that is read so far."""
 
     line: int
     universe: tuple[float, float] | None = None
@@ -70,14 +70,14 @@ class _Draft:
 
 @dataclass
 class _Block:
-    """A rule block, as it is said."""
+    """The statements of a rule block."""
 
     line: int
     said: dict[str, str] = field(default_factory=dict)
     rules: list[tuple[int, Rule]] = field(default_factory=list)
 
     def operators(self) -> Operators:
-        """Return its operators; of AND and OR the one makes the other, and ACT is MIN, where nothing is said."""
+        """Return the operators; AND and OR imply each other, and a missing ACT is MIN."""
         conjunction = self.said.get("AND") or next((a for a, b in PAIRS.items() if b == self.said.get("OR")), "min")
         return Operators(conjunction, self.said.get("OR", PAIRS[conjunction]), self.said.get("ACT", "min"))
 
@@ -101,7 +101,7 @@ def _on_first_of_value(rule: Rule, outputs: list[Output]) -> Rule:
 
 @dataclass
 class _Reader(Cursor):
-    """Reads one text by recursive descent."""
+    """Parse one text by recursive descent."""
 
     inputs: dict[str, _Draft] = field(default_factory=dict)
     outputs: dict[str, _Draft] = field(default_factory=dict)
@@ -243,7 +243,7 @@ class _Reader(Cursor):
                 draft.method = self.choice(METHODS)
 
     def default(self, draft: _Draft) -> None:
-        """Take a default: a number, or none; fuzzylite adds NC where the value before is kept."""
+        """Take a default: a number, or none; fuzzylite adds NC where the previous value is kept."""
         self.take(":=")
         if not self.accept("NC", "NAN"):
             draft.default = self.number("the default, or NC")
@@ -303,7 +303,7 @@ class _Reader(Cursor):
             block.rules += [(line, rule) for rule in parse_rules(" ".join(token.text for token in words))]
 
     def next_statement(self) -> bool:
-        """Return whether another statement of a rule block begins here."""
+        """Return True if another statement of a rule block begins here."""
         after = self.tokens[self.at + 1] if self.here.kind != "end" else self.here
         word = self.here.text.upper()
         return word in ("RULE", "END_RULEBLOCK") and (word != "RULE" or after.kind in ("name", "number", "sign"))

@@ -13,30 +13,30 @@ from fuzzy_arbiter.terms.values import Constant, Formula, Linear, Value
 
 CURVES = {kind.fcl[0]: (name, kind.fcl[1]) for name, kind in KINDS.items() if kind.fcl}
 COUNTS = {"TRIAN": 3, "TRAPE": 4, "COSINE": 2, **{word: len(order) for word, (_, order) in CURVES.items()}}
-"""How many numbers each of jFuzzyLogic's functions has."""
+"""Number of parameters of each of jFuzzyLogic's functions."""
 
 
 def read_curve(word: str, numbers: Sequence[float]) -> tuple[Membership, list[float]]:
-    """Return what one of jFuzzyLogic's functions and its numbers say.
+    """Return the shape of one of jFuzzyLogic's functions and its numbers, and its default universe.
 
     Parameters
     ----------
     word : str
-        One of `COUNTS`.
+        Name of the function, one of `COUNTS`.
     numbers : sequence of float
-        As many as it has.
+        Numbers of the function; their count is checked before.
 
     Returns
     -------
     Membership
-        Of these.
+        Membership function.
     list of float
-        Least and greatest place of the universe that jFuzzyLogic takes where none is said.
+        Least and greatest place of jFuzzyLogic's default universe.
 
     Raises
     ------
     DefinitionError
-        If the numbers make none.
+        If the numbers are invalid for the function.
     """
     if word in ("TRIAN", "TRAPE"):
         places = [numbers[0], numbers[-1]]
@@ -58,7 +58,7 @@ def read_curve(word: str, numbers: Sequence[float]) -> tuple[Membership, list[fl
 
 
 def _rises_first(rising: float, left: float, falling: float, right: float) -> bool:
-    """Return whether the first sigmoid is never below the second."""
+    """Return True if the first sigmoid is never below the second."""
     return rising == falling and (left <= right if rising > 0.0 else left >= right)
 
 
@@ -79,14 +79,14 @@ def _extent(name: str, p: Sequence[float]) -> list[float]:
 
 
 def say_shape(shape: Membership | Value, term: str, inputs: Sequence[str]) -> str:
-    """Return a term's shape as the standard and jFuzzyLogic say it.
+    """Format a term's shape in the words of the standard and jFuzzyLogic.
 
     Parameters
     ----------
     shape : Membership or Value
-        What is written.
+        Shape to write.
     term : str
-        Its name, for the fault.
+        Name of the term, for the error.
     inputs : sequence of str
         Names of the system's inputs.
 
@@ -129,12 +129,12 @@ def say_shape(shape: Membership | Value, term: str, inputs: Sequence[str]) -> st
 
 
 def universe_of(places: Sequence[float]) -> tuple[float, float] | None:
-    """Return the universe that points make, where none is said.
+    """Return the universe from a term's points, for a variable without RANGE.
 
     Parameters
     ----------
     places : sequence of float
-        Of all terms of a variable.
+        Places of all terms of a variable.
 
     Returns
     -------
@@ -146,16 +146,16 @@ def universe_of(places: Sequence[float]) -> tuple[float, float] | None:
 
 
 def require_known(word: str, line: int, known: Sequence[str]) -> None:
-    """Refuse a word that is no function.
+    """Require that a word is a known function.
 
     Parameters
     ----------
     word : str
-        What came.
+        Name of the function.
     line : int
-        Where it stands.
+        Line number, for the error.
     known : sequence of str
-        What was expected.
+        Known names.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The words of the Fuzzy Control Language: what its texts are cut into, and which names they take."""
+"""Tokens of the Fuzzy Control Language, and the names in it."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ _TOKEN = re.compile(
 
 
 class Token(NamedTuple):
-    """A word, number or sign, and the line where it stands; the last of a text is its ``end``."""
+    """A word, number or sign, with its line; the last of a text is its ``end``."""
 
     kind: str
     text: str
@@ -74,12 +74,12 @@ class Token(NamedTuple):
 
 
 def cut(text: str) -> tuple[list[Token], list[tuple[int, str]]]:
-    """Return the words of a text and, apart, its comments.
+    """Split a text into tokens and comments.
 
     Parameters
     ----------
     text : str
-        All of a file.
+        Content of a file.
 
     Returns
     -------
@@ -113,12 +113,12 @@ def cut(text: str) -> tuple[list[Token], list[tuple[int, str]]]:
 
 
 def block_name(tokens: Sequence[Token]) -> str:
-    """Return the name that begins a function block: all that stands in its line, up to a word of the language.
+    """Return the name that begins a function block: all tokens of its line, up to a word of the language.
 
     Parameters
     ----------
     tokens : sequence of Token
-        What follows ``FUNCTION_BLOCK``.
+        Tokens after ``FUNCTION_BLOCK``.
 
     Returns
     -------
@@ -139,14 +139,14 @@ def chosen_block(tokens: list[Token], name: str | None) -> list[Token]:
     Parameters
     ----------
     tokens : list of Token
-        Of all of a text.
+        All tokens of a text.
     name : str or None
-        Of the block; None where there is but one.
+        Name of the block; None if there is only one.
 
     Returns
     -------
     list of Token
-        All of them, if the text does not consist of function blocks and no name was asked for.
+        All of them, if the text does not consist of function blocks and `name` is None.
 
     Raises
     ------

@@ -24,23 +24,23 @@ _SIGNS = "'=:,"  # at which MATLAB's reader cuts its lines
 
 
 def write(system: System) -> str:
-    """Return a system as MATLAB's text.
+    """Format a system as MATLAB's text.
 
     Parameters
     ----------
     system : System
-        Any that the format can say: terms that are triangles, trapezoids or their halves, MATLAB's curves, constants
+        A system that the format can represent: triangles, trapezoids or their halves, MATLAB's curves, constants
         and linear values, at most one connective in a rule, no hedges, no defaults.
 
     Returns
     -------
     str
-        Text of a file; settings that the format has no words for stand in a comment.
+        Content of a file; settings that the format cannot represent are in a comment.
 
     Raises
     ------
     UnsupportedError
-        If the format cannot say a name, a term, a rule or a default; it is quoted.
+        If the format cannot represent a name, a term, a rule or a default; it is quoted.
     """
     _require_names(system)
     kind, method, aggregation = _method(system)
@@ -99,7 +99,7 @@ def _variable(v: Variable, system: System) -> list[str]:
 
 
 def _function(term: Term, v: Variable) -> str:
-    """Say a term's function and places; half a triangle gets its other foot beyond the range, as Octave wants it."""
+    """Format a term's function and places; half a triangle gets its other foot beyond the range, as Octave needs it."""
     if not isinstance(term.shape, Shape):
         return _named(term, v)
     low, high = v.universe
@@ -138,7 +138,7 @@ def _function(term: Term, v: Variable) -> str:
 
 
 def _named(term: Term, v: Variable) -> str:
-    """Say a curve or a value."""
+    """Format a curve or a value."""
     shape, what = term.shape, f"fis cannot say the term {term.name!r} of {v.name!r}"
     if isinstance(shape, Constant):
         return f"'constant',[{say_number(shape.value)}]"

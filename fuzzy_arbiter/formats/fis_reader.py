@@ -1,4 +1,4 @@
-"""Reads MATLAB's text."""
+"""Read MATLAB's text."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable
 from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.formats.fis_rules import read_rules, with_complements
-from fuzzy_arbiter.formats.fis_terms import numbers_of, read_function, told_apart
+from fuzzy_arbiter.formats.fis_terms import numbers_of, read_function, with_unique_names
 from fuzzy_arbiter.formats.fis_words import (
     DEFUZZIFIERS,
     FUZZYLITE_KEYS,
@@ -34,7 +34,7 @@ _SYSTEM_KEYS = ("Name", "Type", "Version", *_COUNTS, *METHODS, "DefuzzMethod")
 
 @dataclass
 class _Section:
-    """The lines of one section: entries by key, and those that are no entries."""
+    """The lines of one section: entries by key, and lines that are not entries."""
 
     name: str
     line: int
@@ -63,29 +63,29 @@ class _Section:
 
 
 def read(text: str) -> System:
-    """Return the system that MATLAB's text defines.
+    """Parse MATLAB's text as a system.
 
     Terms of one name are numbered, as rules speak of them by their place. Where a rule concludes that an output is not
     in a term, its complement becomes a term of its own. The strengths of rules that conclude one value are added,
     whatever AggMethod says, as MATLAB does it; where a comment names the fuzzy-logic-toolkit, they are joined as
-    AggMethod says, as Octave does it.
+    AggMethod defines, as in Octave.
 
     Parameters
     ----------
     text : str
-        All of a file.
+        Content of a file.
 
     Returns
     -------
     System
-        With defaults and locks only of fuzzylite's versions 3 to 5, whose keys these are.
+        The system; it has defaults and locks only where the keys of fuzzylite's versions 3 to 5 define them.
 
     Raises
     ------
     FormatError
-        If the text is not of this format, or says what this package does not know; the line is named.
+        If the text is not of this format, or uses an unsupported part of it; the line is named.
     DefinitionError
-        If what it defines cannot be.
+        If the definition is invalid.
     """
     sections, comments = _sections(text)
     settings = read_settings(comments, SETTINGS)
@@ -239,7 +239,7 @@ def _variable(section: _Section, inputs: int | None) -> _Parts:
         term, function, places = match.groups()
         with located(f"line {line}: term {term!r}"):
             terms.append(Term(term, read_function(function, places, line, term, inputs)))
-    parts = name, (bounds[0], bounds[1]), told_apart(terms)
+    parts = name, (bounds[0], bounds[1]), with_unique_names(terms)
     with located(f"line {section.line}"):
         if inputs is None:
             Variable(*parts)

@@ -1,4 +1,4 @@
-"""Reads the rows of rules in MATLAB's text, with the hedges of Octave and fuzzylite."""
+"""Read the rows of rules in MATLAB's text, with the hedges of Octave and fuzzylite."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ _RULE = re.compile(r"([^,()]*),([^,()]*)\(([^()]*)\)\s*:\s*(\S+)")
 def read_rules(
     line: int, row: str, inputs: Sequence[Variable], outputs: Sequence[Output], fuzzylite: bool
 ) -> list[Rule]:
-    """Return what a row of [Rules] says.
+    """Parse a row of [Rules].
 
     Parameters
     ----------
     line : int
-        Where it stands.
+        Line number, for the error.
     row : str
         Numbers of terms, weight and connective.
     inputs, outputs : sequence
-        Which the numbers mean, in their order.
+        Variables that the numbers refer to, in their order.
     fuzzylite : bool
         Whether hedges are fuzzylite's, and not Octave's.
 
@@ -42,7 +42,7 @@ def read_rules(
     Raises
     ------
     FormatError
-        If it is none, or says what is not known here.
+        If the row is invalid, or uses an unsupported part of the format.
     """
     match = _RULE.fullmatch(row)
     if not match:
@@ -106,7 +106,7 @@ def _indices(
 
 
 def with_complements(output: Output, rules: Sequence[tuple[int, Rule]]) -> Output:
-    """Return an output with a further term for each that a rule concludes to be not so.
+    """Return an output with the complement of each term that a rule concludes negated.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def with_complements(output: Output, rules: Sequence[tuple[int, Rule]]) -> Outpu
     Returns
     -------
     Output
-        The same, if no rule does.
+        The same output, if no rule does.
 
     Raises
     ------

@@ -17,32 +17,32 @@ from fuzzy_arbiter.terms.values import Formula, Value
 
 
 def read_function(function: str, text: str, line: int, term: str, inputs: int | None) -> Membership | Value:
-    """Return what a function's name and numbers say.
+    """Return the membership function or value of a function's name and numbers.
 
     Parameters
     ----------
     function : str
         Such as ``trimf``.
     text : str
-        What stands in its brackets.
+        Text in its brackets.
     line : int
-        Where it stands.
+        Line number, for the error.
     term : str
         Name of the term.
     inputs : int or None
-        How many inputs there are; None for a term of an input, which cannot be a value.
+        Number of inputs; None for a term of an input, which cannot be a value.
 
     Returns
     -------
     Membership or Value
-        Of these.
+        Shape of the term.
 
     Raises
     ------
     FormatError
-        If the function is not known, or its numbers are not as it wants them.
+        If the function is unknown, or has the wrong number of parameters.
     DefinitionError
-        If they make none.
+        If the numbers are invalid for the function.
     """
     if function not in FUNCTIONS:
         refuse(line, f"term {term!r} is {function!r}, which is not known here; expected {', '.join(FUNCTIONS)}")
@@ -74,7 +74,7 @@ def complement(shape: Membership) -> Membership:
     Parameters
     ----------
     shape : Membership
-        Of straight pieces, or a curve in one piece.
+        Function of straight pieces, or a curve in one piece.
 
     Returns
     -------
@@ -93,18 +93,18 @@ def complement(shape: Membership) -> Membership:
     raise DefinitionError("the complement of this function is not known, expected straight pieces or a curve in one")
 
 
-def told_apart(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """Return terms with a number after a name that came before.
+def with_unique_names(terms: Sequence[Term]) -> tuple[Term, ...]:
+    """Append a number to each repeated name, so that all terms have different names.
 
     Parameters
     ----------
     terms : sequence of Term
-        Of one variable; rules speak of their places, so that their names may be the same.
+        Terms of one variable; rules refer to their positions, so that names may repeat in the file.
 
     Returns
     -------
     tuple of Term
-        Each name once.
+        Terms with different names.
     """
     found: list[Term] = []
     for term in terms:
@@ -118,16 +118,16 @@ def told_apart(terms: Sequence[Term]) -> tuple[Term, ...]:
 
 
 def numbers_of(text: str, line: int, what: str) -> list[float]:
-    """Return the numbers that stand in brackets, which may be worked out as in ``-pi/4``.
+    """Parse the numbers in brackets; each may be an expression such as ``-pi/4``.
 
     Parameters
     ----------
     text : str
         Numbers with spaces, commas or semicolons between them.
     line : int
-        Where they stand.
+        Line number, for the error.
     what : str
-        What they are, for the fault.
+        Description of the numbers, for the error.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def numbers_of(text: str, line: int, what: str) -> list[float]:
     Raises
     ------
     FormatError
-        If one is none.
+        If one is not a finite number.
     """
     return [_number(part, line, what) for part in re.split(r"[\s,;]+", text.strip()) if part]
 

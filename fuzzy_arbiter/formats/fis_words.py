@@ -41,7 +41,7 @@ SHOULDERS = {"linsmf": rising, "linzmf": falling}
 FUNCTIONS = (*STRAIGHT, *SHOULDERS, *CURVES, *VALUES)
 # keys of a variable that fuzzylite's versions 3 to 5 add
 FUZZYLITE_KEYS = ("Enabled", "Default", "LockRange", "LockPrevious")
-# what stands after the point of a term's number, as Octave writes hedges: ten times that is the power
+# digits after the point of a term's number, as Octave writes hedges: ten times that is the power
 OCTAVE_HEDGES: dict[str, tuple[str, ...]] = {
     "": (),
     "05": ("somewhat",),

@@ -17,22 +17,22 @@ __all__ = ["read", "write"]
 
 
 def write(system: System) -> str:
-    """Return a system in the FuzzyLite Language.
+    """Format a system in the FuzzyLite Language.
 
     Parameters
     ----------
     system : System
-        Any that the language can say: only single terms are negated.
+        System that the language can represent: only single terms are negated.
 
     Returns
     -------
     str
-        Text of a file; the normalization, for which the language has no word, stands in a comment.
+        Content of a file; the normalization, for which the language has no word, is in a comment.
 
     Raises
     ------
     UnsupportedError
-        If the language cannot say a name or a rule; it is quoted.
+        If the language cannot represent a name or a rule; it is quoted.
     """
     if "#" in system.name:
         raise UnsupportedError(f"fll cannot say the name {system.name!r}: what follows # is a comment")

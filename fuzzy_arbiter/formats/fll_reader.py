@@ -1,4 +1,4 @@
-"""Reads the FuzzyLite Language."""
+"""Read the FuzzyLite Language."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class _Block:
     many: list[tuple[int, str]] = field(default_factory=list)
 
     def word(self, key: str, known: dict[str, Any], missing: str = "") -> Any:
-        """Return what a key's word means."""
+        """Look up the word of a key in `known`; refuse another word."""
         line, value = self.entries.get(key, (self.line, missing))
         if value not in known:
             expected = " or ".join(word for word in known if word)
@@ -52,10 +52,10 @@ class _Block:
 
 
 def read(text: str) -> System:
-    """Return the system that a text in the FuzzyLite Language defines.
+    """Parse a text in the FuzzyLite Language as a system.
 
-    The points are the most of any output's defuzzifier; an output's default of ``nan`` is none; ranges that are locked
-    clip inputs. An aggregation of ``none`` adds the strengths of values, as fuzzylite does. Terms of one name are
+    `points` is the greatest resolution of any output's defuzzifier; a default of ``nan`` is none; locked ranges clip
+    inputs. An aggregation of ``none`` adds the strengths of values, as fuzzylite does. Terms of one name are
     refused, for rules mean the first in fuzzylite and the last in pyfuzzylite.
 
     Parameters
@@ -66,14 +66,14 @@ def read(text: str) -> System:
     Returns
     -------
     System
-        Of any kind.
+        System of any kind.
 
     Raises
     ------
     FormatError
-        If the text is not of this language, or says what this package does not know; the line is named.
+        If the text is not of this language, or uses an unsupported part of it; the line is named.
     DefinitionError
-        If what it defines cannot be.
+        If the definition is invalid.
     """
     blocks, comments = _blocks(text)
     engines = [b for b in blocks if b.kind == "Engine"]
@@ -137,7 +137,7 @@ def _blocks(text: str) -> tuple[list[_Block], list[tuple[int, str]]]:
 
 
 def _alike(blocks: Sequence[_Block], values: Sequence[Any]) -> Any:
-    """Return what all variables say; None if there are none."""
+    """Return the value that all variables share, and refuse different ones; None without variables."""
     for block, value in zip(blocks, values, strict=True):
         if value != values[0]:
             where = f"{block.name!r} has another lock-range than {blocks[0].name!r}"
@@ -202,7 +202,7 @@ def _defuzzifier(block: _Block) -> tuple[Any, int]:
 
 
 def _rules(block: _Block, values: set[str]) -> tuple[list[tuple[int, Rule]], Operators]:
-    """Return the rules of a block, and its operators; one that no rule needs may be none."""
+    """Return the rules of a block, and its operators; one that no rule needs may be missing."""
     block.require_enabled()
     rules: list[tuple[int, Rule]] = []
     for line, content in block.many:

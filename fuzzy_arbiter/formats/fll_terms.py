@@ -1,4 +1,4 @@
-"""The terms of the FuzzyLite Language, which fuzzylite's FIS and FCL share, and the words that it keeps for itself."""
+"""Terms of the FuzzyLite Language, which fuzzylite's FIS and FCL share, and its reserved words."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _FUNCTIONS = "acosh asinh atanh gt lt le ge eq neq abs fabs"
 RESERVED = frozenset(
     (*(word for word, hedge in HEDGES.items() if hedge.fll), "any", "not", *WORDS, *_FUNCTIONS.split())
 )
-# each with the number of its places; a height may follow
+# number of places of each; a height may follow
 _PLACES = {"Triangle": 3, "Trapezoid": 4, "Ramp": 2, "Rectangle": 2, "Binary": 2}
 CURVES = {kind.fll[0]: (name, kind.fll[1]) for name, kind in KINDS.items() if kind.fll[0]}
 VALUES = ("Constant", "Linear", "Function")
@@ -26,12 +26,12 @@ TYPES = (*_PLACES, "Discrete", *CURVES, *VALUES)
 
 
 def say_shape(shape: Membership | Value) -> str:
-    """Return a term's shape as its type and numbers.
+    """Format a term's shape as its type and numbers.
 
     Parameters
     ----------
     shape : Membership or Value
-        What is written.
+        Shape to write.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def say_shape(shape: Membership | Value) -> str:
     Raises
     ------
     UnsupportedError
-        If the language has no word for it.
+        If the language cannot represent it.
     """
     if isinstance(shape, Curve):
         word, order = ("Triangle", (0, 0, 0)) if shape.kind == "singleton" else KINDS[shape.kind].fll
@@ -69,18 +69,18 @@ def say_shape(shape: Membership | Value) -> str:
 
 
 def read_shape(kind: str, text: str, line: int, inputs: int | None = None) -> Membership | Value:
-    """Return what a term's type and numbers say.
+    """Return the membership function or value of a term's type and numbers.
 
     Parameters
     ----------
     kind : str
         Type of the term.
     text : str
-        Its numbers, or the text of a function.
+        Numbers of the term, or the expression of a function.
     line : int
-        Where it stands.
+        Line number, for the error.
     inputs : int, optional
-        How many inputs there are; only terms of outputs can be values.
+        Number of inputs; only terms of outputs can be values.
 
     Returns
     -------
@@ -90,9 +90,9 @@ def read_shape(kind: str, text: str, line: int, inputs: int | None = None) -> Me
     Raises
     ------
     FormatError
-        If the type is not known here, or its numbers are not as it wants them.
+        If the type is unknown, or has the wrong number of parameters.
     DefinitionError
-        If they make no shape.
+        If the numbers are invalid for the type.
     """
     if kind not in TYPES:
         refuse(line, f"term type {kind!r} is not known here, expected one of {', '.join(TYPES)}")
@@ -121,28 +121,28 @@ def read_shape(kind: str, text: str, line: int, inputs: int | None = None) -> Me
 
 
 def read_value(kind: str, numbers: Sequence[float], line: int, inputs: int | None) -> Value:
-    """Return the value that a constant's or linear term's numbers say.
+    """Return the value of a constant's or linear term's numbers.
 
     Parameters
     ----------
     kind : str
-        Its type, such as ``Constant``.
+        Type of the term, such as ``Constant``.
     numbers : sequence of float
-        The number; or a coefficient for each input, and perhaps what is added.
+        The number; or a coefficient for each input, and perhaps a constant.
     line : int
-        Where it stands.
+        Line number, for the error.
     inputs : int or None
-        How many inputs there are; None for a term of an input.
+        Number of inputs; None for a term of an input.
 
     Returns
     -------
     Value
-        Of these.
+        Value of the term.
 
     Raises
     ------
     FormatError
-        If there are more numbers, or fewer.
+        If the count of the numbers is wrong.
     """
     if inputs is None:
         refuse(line, f"an input's term is {kind}, which is a value, expected a membership function")
@@ -156,32 +156,32 @@ def read_value(kind: str, numbers: Sequence[float], line: int, inputs: int | Non
 
 
 def curve_of(name: str, order: Sequence[int], numbers: Sequence[float], line: int, word: str) -> Curve:
-    """Return the curve that a format's word and numbers say.
+    """Return the curve of a format's word and numbers.
 
     Parameters
     ----------
     name : str
         Kind of the curve.
     order : sequence of int
-        Which of its parameters each number is.
+        Index of the curve's parameter for each number.
     numbers : sequence of float
         Parameters, and perhaps a height.
     line : int
-        Where it stands.
+        Line number, for the error.
     word : str
-        What the format calls it.
+        The format's word for the curve.
 
     Returns
     -------
     Curve
-        Of that kind.
+        Curve of that kind.
 
     Raises
     ------
     FormatError
-        If there are more numbers, or fewer.
+        If the count of the numbers is wrong.
     DefinitionError
-        If they make none.
+        If the numbers are invalid for the curve.
     """
     count = len(order)
     if len(numbers) not in (count, count + 1):

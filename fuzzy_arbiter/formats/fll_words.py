@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from fuzzy_arbiter.definition import Output
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
 
-CONJUNCTIONS = {norm.fll: name for name, norm in T_NORMS.items()}  # and implications
+CONJUNCTIONS = {norm.fll: name for name, norm in T_NORMS.items()}  # also implications
 DISJUNCTIONS = {norm.fll: name for name, norm in S_NORMS.items()}
 JOINS = {norm.fll: name for name, norm in AGGREGATIONS.items()}
-RESOLUTION = 1000  # of fuzzylite's defuzzifiers, where none is said
+RESOLUTION = 1000  # fuzzylite's default for its defuzzifiers
 DEFUZZIFIERS = {
     "Centroid": "centroid",
     "Bisector": "bisector",
@@ -30,17 +30,17 @@ KEYS: dict[str, tuple[str, ...]] = {
     ),
     "RuleBlock": ("description", "enabled", "conjunction", "disjunction", "implication", "activation", "rule"),
 }
-MANY = ("term", "rule")  # keys that may come again in one block
+MANY = ("term", "rule")  # keys that may repeat in one block
 OLD = {"accumulation": "aggregation"}  # keys of fuzzylite 5
 
 
 def settings_of(outputs: Sequence[Output]) -> tuple[str, ...]:
-    """Return the settings of a system that the language has no words for.
+    """Return the settings of a system that the language cannot represent.
 
     Parameters
     ----------
     outputs : sequence of Output
-        Of the system; where all are of values, none has points.
+        Outputs of the system; where all are of values, none has points.
 
     Returns
     -------

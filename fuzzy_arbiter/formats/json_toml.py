@@ -1,4 +1,4 @@
-"""Our own schema, in JSON and in TOML."""
+"""The package's own schema, in JSON and in TOML."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SETTINGS = ("name", "conjunction", "disjunction", "implication", "normalization
 
 
 def read_json(text: str) -> System:
-    """Return the system that a JSON text defines.
+    """Parse a JSON text as a system.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def read_json(text: str) -> System:
     FormatError
         If the text is no JSON, repeats a key, or is not of the schema.
     DefinitionError
-        If what it defines cannot be.
+        If the definition is invalid.
     """
     try:
         data = json.loads(text, object_pairs_hook=_unique, parse_constant=_no_constant)
@@ -51,12 +51,12 @@ def read_json(text: str) -> System:
 
 
 def read_toml(text: str) -> System:
-    """Return the system that a TOML text defines.
+    """Parse a TOML text as a system.
 
     Parameters
     ----------
     text : str
-        All of a file.
+        Content of a file.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def read_toml(text: str) -> System:
     FormatError
         If the text is no TOML, or is not of the schema.
     DefinitionError
-        If what it defines cannot be.
+        If the definition is invalid.
     """
     try:
         data = tomllib.loads(text)
@@ -91,12 +91,12 @@ def _no_constant(word: str) -> NoReturn:
 
 
 def write_json(system: System) -> str:
-    """Return a system as JSON.
+    """Format a system as JSON.
 
     Parameters
     ----------
     system : System
-        What is written.
+        System to write.
 
     Returns
     -------
@@ -123,19 +123,19 @@ def _json_variable(v: Variable) -> str:
 
 
 def write_toml(system: System) -> str:
-    """Return a system as TOML.
+    """Format a system as TOML.
 
     Parameters
     ----------
     system : System
-        What is written.
+        System to write.
 
     Returns
     -------
     str
         With a table for each variable, and the points of a term on one line.
     """
-    # by hand, for tomli_w gives every number in a list a line of its own, and with that a triangle 14
+    # by hand, for tomli_w writes each number of a list on its own line: 14 lines for a triangle
     lines = [f"{key} = {_text(value)}" for key, value in _settings(system)]
     lines += ["rules = [", *(f"  {_rule(rule, ' = ', str)}," for rule in system.rules), "]"]
     for key, variables in (("inputs", system.inputs), ("outputs", system.outputs)):
@@ -152,7 +152,7 @@ def _key(name: str) -> str:
 
 
 def _options(v: Variable) -> Iterator[tuple[str, Any]]:
-    """Yield what an output has beyond a plain one."""
+    """Yield the options of an output that differ from their defaults."""
     if isinstance(v, Output):
         for key in ("default", "defuzzifier", "aggregation", "lock_range", "lock_previous"):
             plain = next(field.default for field in fields(Output) if field.name == key)
@@ -161,7 +161,7 @@ def _options(v: Variable) -> Iterator[tuple[str, Any]]:
 
 
 def _rule(rule: Rule, sign: str, key: Callable[[str], str]) -> str:
-    """Say a rule: its text, or a table where it has operators of its own."""
+    """Format a rule: its text, or a table where it has operators of its own."""
     text = _text(str(rule))
     if rule.operators is None:
         return text
@@ -170,7 +170,7 @@ def _rule(rule: Rule, sign: str, key: Callable[[str], str]) -> str:
 
 
 def _shape(shape: Membership | Value, sign: str, key: Callable[[str], str]) -> str:
-    """Say a term: its points, or a table of its kind and numbers."""
+    """Format a term: its points, or a table of its kind and numbers."""
     if isinstance(shape, Shape):
         return _text([list(point) for point in shape.points])
     if isinstance(shape, Curve):
@@ -192,5 +192,5 @@ def _quoted(word: str) -> str:
 
 
 def _text(value: Any) -> str:
-    """Return a value in a form that JSON and TOML share; names are printable, so that both escape the same signs."""
+    """Format a value in a form that JSON and TOML share; names are printable, so that both escape the same signs."""
     return json.dumps(value, ensure_ascii=False, allow_nan=False)

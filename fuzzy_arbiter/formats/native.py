@@ -1,4 +1,4 @@
-"""Range normalization said in the outputs' universe, for tools that know nothing of it."""
+"""Fold range normalization into the outputs' universe, for tools that do not support it."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ def fold_normalization(system: System) -> System:
     Raises
     ------
     UnsupportedError
-        If the normalization is over all outputs, an output's terms have one centroid and so no range, or floating point
-        has no room for the mapped terms.
+        If the normalization is over all outputs, an output's terms have one centroid and so no range, or the mapped
+        terms overflow floating point.
 
     Notes
     -----
-    Where the engines hold a centroid within [0, 1], because it lies beyond those of the least and the greatest term,
-    the new system has it as it is.
+    Where the engines clip a centroid to [0, 1], because it is beyond those of the least and the greatest term,
+    the new system does not clip it.
 
     Examples
     --------
@@ -63,7 +63,7 @@ def range_ends(output: Output) -> tuple[Fraction, Fraction]:
     Parameters
     ----------
     output : Output
-        Whose value is scaled.
+        Output to scale.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What the formats share: numbers without loss, names, faults that say where, and the system put together."""
+"""Common parts of the formats: numbers without loss, names, errors with a line, and the assembly of a system."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
 
 def say_number(x: float) -> str:
-    """Return the shortest text that reads as the same number again.
+    """Format a number as the shortest text that parses as the same number.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def say_number(x: float) -> str:
     Returns
     -------
     str
-        With a point or an exponent unless it is a whole number; an exponent follows a point, as IEC 61131-3 wants it.
+        With a point or an exponent unless it is a whole number; an exponent follows a point, as in IEC 61131-3.
     """
     text = repr(float(x))
     if "e" in text and "." not in text:
@@ -36,7 +36,7 @@ def say_number(x: float) -> str:
 
 
 def say_numbers(xs: Iterable[float]) -> str:
-    """Return numbers with spaces between them.
+    """Format numbers with spaces between them.
 
     Parameters
     ----------
@@ -52,16 +52,16 @@ def say_numbers(xs: Iterable[float]) -> str:
 
 
 def read_number(text: str, line: int, what: str) -> float:
-    """Return the number that a text says.
+    """Parse a text as a finite number.
 
     Parameters
     ----------
     text : str
         Digits, with or without sign, point and exponent.
     line : int
-        Where it stands, for the fault.
+        Line number, for the error.
     what : str
-        What it is, for the fault.
+        Description of the number, for the error.
 
     Returns
     -------
@@ -80,12 +80,12 @@ def read_number(text: str, line: int, what: str) -> float:
 
 
 def refuse(line: int, what: str) -> NoReturn:
-    """Raise the fault that a line has.
+    """Raise the error of a line.
 
     Parameters
     ----------
     line : int
-        Its number, from 1.
+        Line number, from 1.
     what : str
         The offending text, and what was expected.
 
@@ -98,12 +98,12 @@ def refuse(line: int, what: str) -> NoReturn:
 
 
 def shortened(text: str) -> str:
-    """Return a text without its middle if it is long.
+    """Cut the middle out of a long text.
 
     Parameters
     ----------
     text : str
-        Part of a fault, which may quote a long line.
+        Part of an error, which may quote a long line.
 
     Returns
     -------
@@ -115,17 +115,17 @@ def shortened(text: str) -> str:
 
 @contextmanager
 def located(where: str) -> Iterator[None]:
-    """Say where in the file a definition stands that cannot be.
+    """Add the place in the file to the text of a `DefinitionError`.
 
     Parameters
     ----------
     where : str
-        Such as ``line 7`` or a key's path.
+        Place, such as ``line 7`` or a key's path.
 
     Raises
     ------
     DefinitionError
-        With the place before its text.
+        The same error, with the place before its text.
     """
     try:
         yield
@@ -140,28 +140,28 @@ def assembled(
     rules: Sequence[tuple[int, Rule]],
     **options: Any,
 ) -> System:
-    """Return the system of a file.
+    """Build the system of a file.
 
     Parameters
     ----------
     line : int
-        Where the system begins.
+        Line where the system begins.
     inputs, outputs
         As of `System`.
     rules : sequence of (int, Rule)
-        Each with the line where it stands.
+        Each with its line.
     **options
         The other attributes of `System`.
 
     Returns
     -------
     System
-        Of these.
+        System of these parts.
 
     Raises
     ------
     DefinitionError
-        If it cannot be; the line is named, for a rule its own.
+        If the system is invalid; the line is named, for a rule its own.
     """
     try:
         return System(tuple(inputs), tuple(outputs), tuple(rule for _, rule in rules), **options)
@@ -172,16 +172,16 @@ def assembled(
 
 
 def require_words(system: System, format: str, reserved: frozenset[str]) -> None:
-    """Refuse a system with names that are no words of a format.
+    """Require that a format accepts the names of a system.
 
     Parameters
     ----------
     system : System
-        What is to be written.
+        System to write.
     format : str
         Name of the format.
     reserved : frozenset of str
-        Words, in lower case, that mean something in the format.
+        Words, in lower case, that are reserved in the format.
 
     Raises
     ------
@@ -194,7 +194,7 @@ def require_words(system: System, format: str, reserved: frozenset[str]) -> None
 
 
 def require_word(name: str, format: str, reserved: frozenset[str]) -> None:
-    """Refuse a name that is no word of a format.
+    """Require that a format accepts a name.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def require_word(name: str, format: str, reserved: frozenset[str]) -> None:
 
 
 def cannot_say(format: str, i: int, rule: Rule, expected: str, what: str = "condition") -> UnsupportedError:
-    """Return the error for a rule that a format cannot say.
+    """Return the error for a rule that a format cannot represent.
 
     Parameters
     ----------
@@ -226,25 +226,25 @@ def cannot_say(format: str, i: int, rule: Rule, expected: str, what: str = "cond
     rule : Rule
         The rule, which is quoted.
     expected : str
-        What the format can say instead.
+        Supported form, for the error.
     what : str
-        Which part of the rule it is.
+        Part of the rule that is unsupported.
 
     Returns
     -------
     UnsupportedError
-        To be raised.
+        The error, to be raised.
     """
     return UnsupportedError(f"{format} cannot say the {what} of R{i + 1} {shortened(str(rule))!r}: expected {expected}")
 
 
 def blocks(system: System) -> list[tuple[Operators, list[tuple[int, Rule]]]]:
-    """Return a system's rules in blocks of the same operators.
+    """Group a system's rules into blocks with the same operators.
 
     Parameters
     ----------
     system : System
-        What is to be written.
+        System to write.
 
     Returns
     -------

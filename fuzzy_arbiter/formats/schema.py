@@ -1,4 +1,4 @@
-"""From the values of a JSON or TOML file to a system, with faults that name the key."""
+"""Build a system from the values of a JSON or TOML file, with errors that name the key."""
 
 from __future__ import annotations
 
@@ -39,30 +39,30 @@ _KINDS = (*_SHAPES, *KINDS, *_VALUES)
 
 
 def system_of(data: object) -> System:
-    """Return the system that the values of a file define.
+    """Build the system that the values of a file define.
 
     Either ``inputs``, ``outputs`` and ``rules`` are given, with the keys of `System`; or, in short, ``criteria`` in
     order of priority, with the keys of `prioritised`. Terms are given by their points; as one of ``triangle``,
     ``trapezoid``, ``rising`` and ``falling`` with its places; as a curve with its parameters, such as ``gaussian``,
     and perhaps a ``height``; or, of an output, as a ``constant``, as ``linear`` with a coefficient for each input and
-    what is added, or as a ``formula``. A rule is a text, or a table of it and of the operators of its block.
+    a constant, or as a ``formula``. A rule is a text, or a table with the text and the operators of its block.
 
     Parameters
     ----------
     data : object
-        As JSON or TOML reads it.
+        Values as JSON or TOML reads them.
 
     Returns
     -------
     System
-        With the defaults of `System` for what is not given.
+        The system, with the defaults of `System` for missing keys.
 
     Raises
     ------
     FormatError
         If a key is unknown or missing, or a value has another type; the key is named.
     DefinitionError
-        If what they define cannot be.
+        If the definition is invalid.
     """
     table = _table(data, "", _SHORT if isinstance(data, dict) and "criteria" in data else _LONG)
     settings = {key: table[key] for key in ("name", *_SETTINGS) if key in table}
@@ -147,7 +147,7 @@ def _shape(data: object, where: str) -> Membership | Value:
 
 
 def _table(data: object, where: str, known: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return a table of known keys; of any if none is known."""
+    """Return a table of known keys; of any keys if none is known."""
     if not isinstance(data, dict):
         _refuse(where or "the file", data, "a table of keys and values")
     for key in data:

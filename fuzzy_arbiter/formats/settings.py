@@ -1,4 +1,4 @@
-"""What FCL, FIS and FLL have no words for, in one comment that this package reads back, and others for people."""
+"""Settings that FCL, FIS and FLL cannot represent: one comment that this package reads back, and others for people."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from fuzzy_arbiter.formats.native import range_ends
 from fuzzy_arbiter.formats.notation import refuse, say_number
 
 MARK = "fuzzy_arbiter:"
-# what a file means that says nothing of it
+# settings of a file without such a comment
 PLAIN: dict[str, Any] = {"normalization": "none", "outside": "refuse", "points": 101}
 _NAMES = "weights_of"
-_PART = re.compile(r'(?:[^,"]|"[^"]*"|")+')  # between commas that stand outside of quotes
+_PART = re.compile(r'(?:[^,"]|"[^"]*"|")+')  # between commas outside of quotes
 
 
 def say_settings(system: System, keys: Sequence[str]) -> list[str]:
-    """Return the texts of the comments that a system needs.
+    """Format the comments that a system needs.
 
     Parameters
     ----------
     system : System
-        What is written.
+        System to write.
     keys : sequence of str
-        Settings that the format has no words for.
+        Settings that the format cannot represent.
 
     Returns
     -------
     list of str
-        First the one that `read_settings` reads, if a setting is not the plain one; then, for people, how the raw
-        centroids that other tools give become weights.
+        First the one that `read_settings` reads, if a setting differs from its default; then, for people, the map from
+        the raw centroids of other tools to weights.
     """
     said = [f"{key} = {getattr(system, key)}" for key in keys if getattr(system, key) != PLAIN[key]]
     if system.weights_of:
@@ -53,14 +53,14 @@ def say_settings(system: System, keys: Sequence[str]) -> list[str]:
 
 
 def read_settings(comments: Iterable[tuple[int, str]], keys: Sequence[str]) -> dict[str, Any]:
-    """Return the settings that the comments of a file say.
+    """Parse the settings in the comments of a file.
 
     Parameters
     ----------
     comments : iterable of (int, str)
-        Line and text of each comment, without the signs that make it one.
+        Line and text of each comment, without its delimiters.
     keys : sequence of str
-        Settings that the format has no words for.
+        Settings that the format cannot represent.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def read_settings(comments: Iterable[tuple[int, str]], keys: Sequence[str]) -> d
     Raises
     ------
     FormatError
-        If a comment that begins as ours, or almost so, says what there is not, or there are two.
+        If a comment that begins as ours, or almost so, has an unknown setting, or there are two such comments.
     """
     settings = {**{key: PLAIN[key] for key in keys}, _NAMES: ()}
     first: int | None = None

@@ -1,4 +1,4 @@
-"""Pictures of an arbiter: its terms, what its rules do at a sample, and its weights over its inputs.
+"""Pictures of an arbiter: its terms, its rules at a sample, and its weights over its inputs.
 
 Every function draws on the axes that it is given, or on those of a new figure, and returns them; none shows or saves
 anything. Matplotlib is needed only when one is called.

@@ -1,4 +1,4 @@
-"""Pictures over two inputs: one output as a surface, and which output wins."""
+"""Pictures over two inputs: one output as a surface, and the output with the greatest weight."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ def surface(
     Parameters
     ----------
     arbiter : Arbiter
-        What is drawn.
+        Arbiter to draw.
     output : str
         Name of the output, in results or its own.
     over : (str, str)
         Names of the inputs along the two axes.
     at : mapping from str to float, optional
-        Values of the others; default: the middle of each universe. The picture says them.
+        Values of the others, which the picture shows; default: the middle of each universe.
     ax : Axes, optional
         Default: those of a new figure; with ``projection="3d"`` a relief is drawn.
     points : int
-        Along each axis.
+        Number of points along each axis.
 
     Returns
     -------
@@ -103,15 +103,15 @@ def decisions(
     Parameters
     ----------
     arbiter : Arbiter
-        What is drawn, of two outputs or more.
+        Arbiter to draw, with two outputs or more.
     over : (str, str)
         Names of the inputs along the two axes.
     at : mapping from str to float, optional
-        Values of the others; default: the middle of each universe. The picture says them.
+        Values of the others, which the picture shows; default: the middle of each universe.
     ax : Axes, optional
         Default: those of a new figure.
     points : int
-        Along each axis.
+        Number of points along each axis.
 
     Returns
     -------
@@ -182,7 +182,7 @@ def decisions(
 
 
 def _mixed(whole: tuple[float, float, float], share: float) -> str:
-    """Return some of a colour in white."""
+    """Return a colour mixed with white."""
     from matplotlib.colors import to_hex
 
     red, green, blue = (1.0 - share * (1.0 - part) for part in whole)
@@ -192,7 +192,7 @@ def _mixed(whole: tuple[float, float, float], share: float) -> str:
 def _field(
     arbiter: Arbiter, over: tuple[str, str], at: Mapping[str, float] | None, points: int
 ) -> tuple[Array, Array, Array, str]:
-    """Places along both axes, the weights over them (rows along the second), and the fixed inputs in words."""
+    """Return places along both axes, the weights over them (rows along the second), and the fixed inputs in words."""
     if isinstance(over, str) or len(over) != 2:
         raise DefinitionError(f"over is {over!r}, expected the names of two inputs")
     fixed = fixed_inputs(arbiter, over, at)
@@ -210,5 +210,5 @@ def _relief(ax: Any, x: Array, y: Array, z: Array, over: tuple[str, str], output
     xlabel, ylabel, zlabel = (wrapped(name, 20) for name in (*over, output))
     ax.set(xlabel=xlabel, ylabel=ylabel, zlabel=zlabel)
     ax.xaxis.labelpad, ax.yaxis.labelpad = (4.0 + 10.0 * label.count("\n") for label in (xlabel, ylabel))
-    ax.set_box_aspect(None, zoom=0.8)  # the layout knows nothing of labels in three dimensions
+    ax.set_box_aspect(None, zoom=0.8)  # the layout ignores labels in three dimensions
     ax.locator_params(nbins=6)

@@ -1,4 +1,4 @@
-"""What the rules do at one sample: each rule's strength and clipped term, the joined outline, its centroid."""
+"""A picture of the rules at one sample: each rule's strength and clipped term, the joined outline, its centroid."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _TALL = 1.6  # how many times higher the outline at the foot is drawn
 
 
 def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes | None = None) -> Axes:
-    """Draw which rules fire for an output at a sample, and how its value comes about.
+    """Draw the rules that fire for an output at a sample, and the centroid of their joined terms.
 
     Each row is a rule: its condition, the term that it concludes, clipped (or scaled) at the rule's strength, and that
     strength, in bold and with a dot where none is greater for the term. At the foot all rows are joined by their
@@ -36,7 +36,7 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
     Parameters
     ----------
     arbiter : Arbiter
-        What is drawn.
+        Arbiter to draw.
     inputs : sequence of float, or mapping from input's name to float
         The sample, as for a call.
     output : str, optional
@@ -120,7 +120,7 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
 
 @dataclass(frozen=True, slots=True)
 class _Row:
-    """A rule that concludes on the output, how strongly it fires, and which of the output's terms it concludes."""
+    """A rule that concludes on the output, its strength, and the index of the concluded term."""
 
     name: str
     rule: Rule
@@ -128,14 +128,14 @@ class _Row:
     term: int
 
     def label(self) -> str:
-        """Return the condition in a few lines; the middle of a long one is left out."""
+        """Return the condition in a few lines, without the middle of a long one."""
         weight = "" if self.rule.weight == 1.0 else f" with {self.rule.weight:g}"
         lines = wrapped(f"{self.name}: if {self.rule.condition}{weight}", _LETTERS).split("\n")
         return "\n".join(lines if len(lines) <= 4 else [*lines[:2], f"{lines[2]} …", lines[-1]])
 
 
 def _draw_row(ax: Axes, drawn: Output, place: int, row: _Row, outline: tuple[Array, Array], cut: float) -> None:
-    """Draw the term of a rule, what is left of it at the rule's strength, and that strength."""
+    """Draw the term of a rule, its part below the rule's strength, and that strength."""
     term = drawn.terms[row.term]
     x, degrees = outline
     fires = row.strength > 0.0
@@ -172,7 +172,7 @@ def _centroid(ax: Axes, arbiter: Arbiter, values: Sample, k: int, place: tuple[f
         return f"{output.name}: no rule fires"
     ax.plot([centre, centre], [foot, foot - tall], color=INK, linewidth=1.4, linestyle=(0, (4, 2)))
     ax.plot(centre, foot, "^", color=INK, markersize=8, clip_on=False, zorder=5)
-    side = -1 if centre > sum(output.universe) / 2.0 else 1  # where there is more room
+    side = -1 if centre > sum(output.universe) / 2.0 else 1  # on the wider side
     ax.annotate(
         f"{what} {centre:.4g}", (centre, foot - tall), xytext=(6 * side, -3), textcoords="offset points",
         ha="right" if side < 0 else "left", va="top", fontsize=9.5, color=INK,
@@ -182,7 +182,7 @@ def _centroid(ax: Axes, arbiter: Arbiter, values: Sample, k: int, place: tuple[f
 
 
 def _alone(arbiter: Arbiter, output: Output) -> Arbiter:
-    """Return an arbiter of this output's centroid, whatever the others do."""
+    """Return an arbiter of this output's centroid alone."""
     system = arbiter.system
     parts = [(rule, tuple(c for c in rule.conclusions if c.variable == output.name)) for rule in system.rules]
     rules = tuple(replace(rule, conclusions=conclusions) for rule, conclusions in parts if conclusions)

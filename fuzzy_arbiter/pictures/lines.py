@@ -43,11 +43,11 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
     Parameters
     ----------
     arbiter : Arbiter
-        Whose variable.
+        Arbiter with the variable.
     variable : str
         Name of an input or an output.
     at : float, optional
-        A place, at which the terms' degrees are marked.
+        Place at which the terms' degrees are marked.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -99,9 +99,9 @@ def corners(term: Term, universe: tuple[float, float]) -> tuple[list[float], lis
     Parameters
     ----------
     term : Term
-        Of a variable.
+        Term of a variable.
     universe : (float, float)
-        Of that variable.
+        Universe of that variable.
 
     Returns
     -------
@@ -128,11 +128,11 @@ def profile(
     Parameters
     ----------
     arbiter : Arbiter
-        What is drawn.
+        Arbiter to draw.
     over : str
-        Name of the input along which.
+        Name of the input along the axis.
     at : mapping from str to float, optional
-        Values of the others; default: the middle of each universe. The picture says them.
+        Values of the others, which the picture shows; default: the middle of each universe.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -183,9 +183,9 @@ def normalizations(
     Parameters
     ----------
     arbiter : Arbiter
-        What is drawn; its own normalization does not matter.
+        Arbiter to draw; its own normalization does not matter.
     over : str
-        Name of the input along which.
+        Name of the input along the axis.
     at : mapping from str to float, optional
         Values of the others; default: the middle of each universe.
     axes : mapping from str to Axes, optional

@@ -1,4 +1,4 @@
-"""The places that pictures are drawn for, and the weights there."""
+"""Places at which pictures evaluate an arbiter, and the weights there."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from fuzzy_arbiter.errors import DefinitionError
 
 
 def one_of(variables: Sequence[Variable], name: str, kind: str) -> int:
-    """Return the place of the variable of a name.
+    """Return the index of a variable by name.
 
     Parameters
     ----------
     variables : sequence of Variable
         Inputs or outputs.
     name : str
-        Its name.
+        Name of the variable.
     kind : str
-        What the variables are, for the error.
+        Kind of the variables, for the error.
 
     Returns
     -------
     int
-        Its index.
+        Index of the variable.
 
     Raises
     ------
     DefinitionError
-        If there is none; those that there are, are listed.
+        If there is no such variable; the known ones are listed.
     """
     names = variable_names(variables)
     if name not in names:
@@ -41,24 +41,24 @@ def one_of(variables: Sequence[Variable], name: str, kind: str) -> int:
 
 
 def output_place(system: System, name: str) -> int:
-    """Return the place of the output of a name.
+    """Return the index of an output by name.
 
     Parameters
     ----------
     system : System
-        Whose outputs.
+        System with the outputs.
     name : str
-        The output's own, or that which results carry.
+        Name of the output, or of its criterion as results carry it.
 
     Returns
     -------
     int
-        Its index.
+        Index of the output.
 
     Raises
     ------
     DefinitionError
-        If there is none; those that there are, are listed.
+        If there is no such output; the known ones are listed.
     """
     for names in (system.result_names, variable_names(system.outputs)):
         if name in names:
@@ -67,14 +67,14 @@ def output_place(system: System, name: str) -> int:
 
 
 def fixed_inputs(arbiter: Arbiter, over: Sequence[str], at: Mapping[str, float] | None) -> dict[str, float]:
-    """Return the values of the inputs that a picture does not go over.
+    """Return the values of the inputs that are not axes of a picture.
 
     Parameters
     ----------
     arbiter : Arbiter
-        Whose inputs.
+        Arbiter with the inputs.
     over : sequence of str
-        Inputs that the picture goes over.
+        Inputs along the axes of the picture.
     at : mapping from str to float, optional
         Values of others.
 
@@ -86,7 +86,7 @@ def fixed_inputs(arbiter: Arbiter, over: Sequence[str], at: Mapping[str, float] 
     Raises
     ------
     DefinitionError
-        If an input does not exist, or is both fixed and gone over.
+        If an input does not exist, or is both fixed and an axis.
     InputError
         If a value is not a number in its universe.
     """
@@ -110,9 +110,9 @@ def weights_at(arbiter: Arbiter, fixed: Mapping[str, float], over: Mapping[str, 
     Parameters
     ----------
     arbiter : Arbiter
-        What is drawn.
+        Arbiter to draw.
     fixed : mapping from str to float
-        Inputs of one value.
+        Inputs with one value.
     over : mapping from str to ndarray, shape (n,)
         All other inputs.
 
@@ -130,12 +130,12 @@ def weights_at(arbiter: Arbiter, fixed: Mapping[str, float], over: Mapping[str, 
 
 
 def said(values: Mapping[str, float]) -> str:
-    """Return values as a text.
+    """Format values as text.
 
     Parameters
     ----------
     values : mapping from str to float
-        By name.
+        Values by name.
 
     Returns
     -------
@@ -151,9 +151,9 @@ def places_in(variable: Variable, count: int) -> Array:
     Parameters
     ----------
     variable : Variable
-        Over whose universe the line is drawn.
+        Variable along the axis.
     count : int
-        Of places at equal distances.
+        Number of equally spaced places.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""How the pictures look: new axes, colours and lines that can be told apart, texts that have room."""
+"""The style of the pictures: new axes, colours and lines that can be distinguished, texts that fit."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fuzzy_arbiter.errors import PictureError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Okabe and Ito's, which colour-blind people can tell apart, from dark to light
+# Okabe and Ito's colours, which colour-blind people can distinguish, from dark to light
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 DASHES = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (1, 2)))
 HATCHES = ("////", "....", "\\\\\\\\", "xx", "----", "||||")
@@ -21,24 +21,24 @@ _LETTERS = 14  # of a legend or title to an inch of the axes
 
 
 def require_matplotlib() -> None:
-    """Refuse to draw where Matplotlib is not installed.
+    """Require that Matplotlib is installed.
 
     Raises
     ------
     PictureError
-        It names the extra that brings it.
+        If it is not; the message names the extra that installs it.
     """
     if find_spec("matplotlib") is None:
         raise PictureError("pictures: Matplotlib is not installed, expected the extra fuzzy-arbiter[plot]")
 
 
 def new_axes(width: float, height: float, **keywords: Any) -> Axes:
-    """Return the axes of a new figure, which belongs to nobody else.
+    """Return the axes of a new figure.
 
     Parameters
     ----------
     width, height : float
-        Of the figure [in].
+        Size of the figure [in].
     **keywords
         For the axes, such as ``projection``.
 
@@ -55,7 +55,7 @@ def new_axes(width: float, height: float, **keywords: Any) -> Axes:
 
 
 def colour(i: int) -> str:
-    """Return the colour of the i-th of several things.
+    """Return the colour of the i-th line or area.
 
     Parameters
     ----------
@@ -65,13 +65,13 @@ def colour(i: int) -> str:
     Returns
     -------
     str
-        The same again after six.
+        Colour; the six colours repeat.
     """
     return COLOURS[i % len(COLOURS)]
 
 
 def hatch(i: int) -> str:
-    """Return the hatches of the i-th of several areas.
+    """Return the hatching of the i-th area.
 
     Parameters
     ----------
@@ -81,13 +81,13 @@ def hatch(i: int) -> str:
     Returns
     -------
     str
-        Others where the colour comes again.
+        Hatching; it differs where the colour repeats.
     """
     return HATCHES[(i + i // len(COLOURS)) % len(HATCHES)]
 
 
 def line_style(i: int) -> dict[str, Any]:
-    """Return what makes the i-th line unlike the others, in colour and in grey, and visible below the next.
+    """Return the style of the i-th line, which differs in colour and dashes, and is narrower than the line below.
 
     Parameters
     ----------
@@ -97,19 +97,19 @@ def line_style(i: int) -> dict[str, Any]:
     Returns
     -------
     dict
-        Keywords of ``Axes.plot``; other dashes where the colour comes again.
+        Keywords of ``Axes.plot``; the dashes differ where the colour repeats.
     """
     dashes = DASHES[(i + i // len(COLOURS)) % len(DASHES)]
     return {"color": colour(i), "linestyle": dashes, "linewidth": max(1.8, 2.8 - 0.25 * i)}
 
 
 def tidy(ax: Axes) -> None:
-    """Leave out the frame's upper and right sides, and draw a faint grid.
+    """Remove the frame's upper and right sides, and draw a faint grid.
 
     Parameters
     ----------
     ax : Axes
-        To be changed.
+        Axes to change.
     """
     ax.spines[["top", "right"]].set_visible(False)
     ax.grid(color="#e4e4e4", linewidth=0.6)
@@ -117,7 +117,7 @@ def tidy(ax: Axes) -> None:
 
 
 def legend_above(ax: Axes, names: Sequence[str], title: str = "") -> None:
-    """Set the legend above the axes, where it covers nothing, in as many columns as the names leave room for.
+    """Set the legend above the axes, where it covers nothing, in as many columns as fit.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def legend_above(ax: Axes, names: Sequence[str], title: str = "") -> None:
     names : sequence of str
         Their labels.
     title : str
-        Stands above the legend.
+        Title of the legend.
     """
     ax.legend(
         loc="lower left",
@@ -140,16 +140,16 @@ def legend_above(ax: Axes, names: Sequence[str], title: str = "") -> None:
 
 
 def legend_style(names: Sequence[str], title: str, letters: int) -> dict[str, Any]:
-    """Return what makes a legend no wider than a number of letters.
+    """Return the layout of a legend that is at most a number of letters wide.
 
     Parameters
     ----------
     names : sequence of str
-        Its labels.
+        Labels of the legend.
     title : str
-        Stands above it.
+        Title of the legend.
     letters : int
-        In a line.
+        Letters in a line.
 
     Returns
     -------
@@ -167,7 +167,7 @@ def legend_style(names: Sequence[str], title: str, letters: int) -> dict[str, An
 
 
 def room(ax: Axes) -> int:
-    """Return how many letters have room above some axes.
+    """Return the number of letters that fit in a line above some axes.
 
     Parameters
     ----------
@@ -183,14 +183,14 @@ def room(ax: Axes) -> int:
 
 
 def wrapped(text: str, width: int) -> str:
-    """Return a text in lines of at most some letters, broken between words where that is possible.
+    """Break a text into lines of at most some letters, between words where that is possible.
 
     Parameters
     ----------
     text : str
         One line.
     width : int
-        Letters.
+        Letters in a line.
 
     Returns
     -------

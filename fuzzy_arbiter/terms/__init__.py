@@ -1,4 +1,4 @@
-"""What terms are made of beyond straight lines: curves by name, values, expressions; and the norms that join degrees.
+"""Terms beyond straight lines: curves by name, values, expressions; and the norms that join degrees.
 
 Imports: nothing.
 """

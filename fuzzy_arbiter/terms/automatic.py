@@ -1,4 +1,4 @@
-"""Terms that cover a universe evenly, for those who only want to name them."""
+"""Terms that cover a universe evenly, from their names alone."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class AutomaticTerms:
-    """Names of terms whose shapes follow from the universe of the variable that they are given to."""
+    """Names of terms whose shapes follow from the universe of their variable."""
 
     names: tuple[str, ...]
 
@@ -43,12 +43,12 @@ class AutomaticTerms:
 
 
 def auto_terms(terms: int | Sequence[str]) -> AutomaticTerms:
-    """Return triangles at equal distances, to be given to a variable in the place of its terms.
+    """Return triangles at equal distances, to be used as the terms of a variable.
 
     Parameters
     ----------
     terms : {3, 5, 7} or sequence of str
-        How many, named as in scikit-fuzzy, such as ``poor``, ``average``, ``good``; or two or more names of one's own.
+        Number of terms, named as in scikit-fuzzy, such as ``poor``, ``average``, ``good``; or two or more names.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Smooth membership functions by name, of the kinds that stand in `fuzzy_arbiter.terms.kinds`."""
+"""Smooth membership functions by name, of the kinds in `fuzzy_arbiter.terms.kinds`."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ class Curve(Membership):
     Attributes
     ----------
     kind : str
-        Such as ``gaussian``; `KINDS` has them all.
+        Name of the kind, such as ``gaussian``; `KINDS` lists all.
     parameters : tuple of float
         As many as the kind has, in its order.
     height : float
-        By which all degrees are multiplied, above 0 and at most 1.
+        Factor of all degrees, above 0 and at most 1.
 
     Raises
     ------
     DefinitionError
-        If there is no such kind, or the parameters make none.
+        If there is no such kind, or the parameters are invalid for it.
 
     Examples
     --------
@@ -129,7 +129,7 @@ class Curve(Membership):
         return tuple(sorted({end for end in self.ends if universe[0] < end < universe[1]}))
 
     def place_of(self, degree: float) -> float:
-        """Return where a curve that only rises or only falls has a degree, as Tsukamoto's method asks.
+        """Return the place at which a monotonic curve has a degree, for Tsukamoto's method.
 
         Parameters
         ----------
@@ -150,7 +150,7 @@ class Curve(Membership):
 
     @property
     def invertible(self) -> bool:
-        """Whether it only rises or only falls, so that `place_of` knows a place."""
+        """True if the curve only rises or only falls, so that `place_of` is defined."""
         return KINDS[self.kind].inverse is not None
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -176,17 +176,17 @@ def curve(kind: str, *parameters: float, height: float = 1.0) -> Membership:
     *parameters : float
         As many as the kind has.
     height : float
-        By which all degrees are multiplied.
+        Factor of all degrees.
 
     Returns
     -------
     Membership
-        Which gives the degree at a place when called.
+        Callable: from a place to the degree.
 
     Raises
     ------
     DefinitionError
-        If there is no such kind, or the parameters make none.
+        If there is no such kind, or the parameters are invalid for it.
 
     Examples
     --------

@@ -1,6 +1,6 @@
-"""Arithmetic in text, as files and terms say it: read by a parser of its own, never run as Python.
+"""Arithmetic expressions of files and terms: read by a parser of their own, never run as Python.
 
-One tree serves all: it is evaluated on numbers and on arrays, and written as text, or as C and Python alike.
+One tree is evaluated on numbers and on arrays, and written as text, or as C and Python.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ class Expression:
     Attributes
     ----------
     text : str
-        With ``+ - * / % ^``, parentheses, names, and functions such as ``sin(x)``; two that say the same are equal.
+        With ``+ - * / % ^``, parentheses, names, and functions such as ``sin(x)``; texts with one tree are equal.
 
     Raises
     ------
     DefinitionError
-        If the text is none, is longer than 2000 characters, or nests deeper than 50 parentheses.
+        If the text is no expression, is longer than 2000 characters, or nests deeper than 50 parentheses.
 
     Examples
     --------
@@ -56,7 +56,7 @@ class Expression:
 
     @property
     def names(self) -> frozenset[str]:
-        """The names whose numbers it needs."""
+        """Names of the numbers in the expression."""
         return frozenset(_names(self.tree))
 
     def __call__(self, values: Mapping[str, float]) -> float:
@@ -69,7 +69,7 @@ class Expression:
             return self._array(values)
 
     def bound(self, values: Mapping[str, float]) -> Expression:
-        """Return the expression with numbers in the place of some names, worked out as far as they go."""
+        """Return the expression with numbers for some names, simplified as far as possible."""
         return Expression("", _bound(self.tree, values))
 
 
@@ -91,12 +91,12 @@ def _bound(node: Node, values: Mapping[str, float]) -> Node:
 
 
 def number_function(node: Node) -> Callable[[Mapping[str, float]], float]:
-    """Return what evaluates a tree on numbers.
+    """Return a function that evaluates a tree on numbers.
 
     Parameters
     ----------
     node : Node
-        Of an `Expression`.
+        Tree of an `Expression`.
 
     Returns
     -------
@@ -116,12 +116,12 @@ def number_function(node: Node) -> Callable[[Mapping[str, float]], float]:
 
 
 def array_function(node: Node) -> Callable[[Mapping[str, Any]], Any]:
-    """Return what evaluates a tree on arrays.
+    """Return a function that evaluates a tree on arrays.
 
     Parameters
     ----------
     node : Node
-        Of an `Expression`.
+        Tree of an `Expression`.
 
     Returns
     -------
@@ -137,12 +137,12 @@ def array_function(node: Node) -> Callable[[Mapping[str, Any]], Any]:
 
 
 def said(node: Node) -> str:
-    """Return a tree as text that reads as the same tree again.
+    """Format a tree as text that parses as the same tree.
 
     Parameters
     ----------
     node : Node
-        Of an `Expression`.
+        Tree of an `Expression`.
 
     Returns
     -------
@@ -153,7 +153,7 @@ def said(node: Node) -> str:
 
 
 def _said(node: Node) -> tuple[str, int]:
-    """Return a node's text, and how strongly its outermost operator binds."""
+    """Return a node's text, and the precedence of its outermost operator."""
     if isinstance(node, str):
         return node, 9
     if isinstance(node, float):
@@ -185,14 +185,14 @@ def _within(part: tuple[str, int], binds: int) -> str:
 
 
 def code(node: Node, names: Mapping[str, str]) -> str:
-    """Return a tree as C and Python alike say it.
+    """Format a tree as code that is valid in C and in Python.
 
     Parameters
     ----------
     node : Node
-        Of an `Expression`.
+        Tree of an `Expression`.
     names : mapping from name to str
-        What each name is called there.
+        Name of each variable in the code.
 
     Returns
     -------

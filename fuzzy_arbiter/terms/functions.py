@@ -1,4 +1,4 @@
-"""The functions and operators of expressions, as IEEE 754 has them: on numbers, where Python raises, and on arrays."""
+"""Functions and operators of expressions by IEEE 754: on numbers, where Python raises, and on arrays."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 
 class Function(NamedTuple):
-    """Something that an expression may call."""
+    """A function that an expression may call."""
 
     arguments: int
     number: Callable[..., float]
@@ -18,7 +18,7 @@ class Function(NamedTuple):
 
 
 def _guarded(function: Callable[..., float]) -> Callable[..., float]:
-    """Return a function that gives what IEEE 754 and NumPy give, where Python's own raises."""
+    """Return a function with the results of IEEE 754 and NumPy, where Python's own raises."""
 
     def value(*arguments: float) -> float:
         try:
@@ -87,7 +87,7 @@ FUNCTIONS: dict[str, Function] = {
     "tan": Function(1, _guarded(math.tan), np.tan),
     "tanh": Function(1, math.tanh, np.tanh),
 }
-# other tools' words for the same
+# words of other tools for the same functions
 SAME = {"fabs": "abs", "ln": "log"}
 OPERATORS: dict[str, Function] = {
     "+": Function(2, lambda a, b: a + b, np.add),

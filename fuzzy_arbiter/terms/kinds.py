@@ -1,4 +1,4 @@
-"""The kinds of smooth membership functions: each is one entry, with all that engines, formats and exports need."""
+"""The kinds of smooth membership functions: one entry each, for engines, formats and exports."""
 
 from __future__ import annotations
 
@@ -6,28 +6,28 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-Pieces = list[tuple[float, str]]  # where each ends, the last at infinity, and its expression
-Word = tuple[str, tuple[int, ...]]  # what a format calls it, and which parameters it names, in its order
+Pieces = list[tuple[float, str]]  # end of each piece, the last at infinity, and its expression
+Word = tuple[str, tuple[int, ...]]  # a format's word, and the indices of its parameters in the format's order
 
 _END = math.inf
 
 
 @dataclass(frozen=True, slots=True)
 class CurveKind:
-    """A kind of membership function, with all its faces.
+    """A kind of membership function, with its words in all formats.
 
     Attributes
     ----------
     parameters : tuple of str
         Their names, in the order of `Curve.parameters`.
     pieces : callable
-        From the parameters to its smooth pieces, whose expressions speak of ``x`` and of the parameters' names.
+        From the parameters to its smooth pieces, whose expressions use ``x`` and the parameters' names.
     good : callable
-        Whether there is such a function.
+        Predicate: True if the parameters are valid.
     expected : str
-        What the parameters have to be, in words.
+        Valid parameters, in words.
     fll, fis, fcl : Word, optional
-        How fuzzylite, MATLAB or fuzzylite, and jFuzzyLogic spell it; an empty word is none.
+        Word of fuzzylite, of MATLAB or fuzzylite, and of jFuzzyLogic; empty if there is none.
     polynomial : bool
         Whether its pieces are polynomials.
     inverse : callable, optional

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Norm:
-    """A way to join two degrees, with all its faces.
+    """An operator that joins two degrees, with its words in all formats.
 
     Attributes
     ----------
@@ -23,9 +23,9 @@ class Norm:
     array : callable
         Joins two arrays, or an array and a float, each pair as `number` does.
     code : str
-        The same in C and in Python, of the degrees ``{0}`` and ``{1}``.
+        Expression in C and in Python of the degrees ``{0}`` and ``{1}``.
     fll, fcl, fis : str
-        Its word in the formats; empty where there is none. That of FIS is Octave's, and MATLAB's where it has one.
+        Word in the format; empty where there is none. That of FIS is Octave's, and MATLAB's where it has one.
     """
 
     number: Callable[[float, float], float]
@@ -198,7 +198,7 @@ class HedgeKind:
     number, array : callable
         Bends a float, or each of an array.
     fll : bool
-        Whether fuzzylite has it, too.
+        True if fuzzylite has the hedge.
     """
 
     number: Callable[[float], float]

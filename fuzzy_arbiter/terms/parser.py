@@ -1,4 +1,4 @@
-"""Reads expressions."""
+"""Parse expressions."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.terms.functions import FUNCTIONS, SAME, WORDS
 
 MAX_LENGTH = 2000  # characters of an expression
-MAX_NESTING = 50  # parentheses and signs within each other
-MAX_DEPTH = 200  # operators within each other, of which a row of sums has as many as it has signs
+MAX_NESTING = 50  # nested parentheses and signs
+MAX_DEPTH = 200  # nested operators; a sum of n terms has n - 1
 
 _TOKEN = re.compile(r"\s*(?:(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)|(\S))", re.ASCII)
 
@@ -21,7 +21,7 @@ Node = float | str | tuple[Any, ...]  # a number, a name, or (function, argument
 
 
 def parsed(text: str) -> Node:
-    """Return the tree of a text.
+    """Parse a text as an expression's tree.
 
     Parameters
     ----------
@@ -31,18 +31,18 @@ def parsed(text: str) -> Node:
     Returns
     -------
     Node
-        Of numbers, names, functions and operators.
+        Tree of numbers, names, functions and operators.
 
     Raises
     ------
     DefinitionError
-        If the text is none, is longer than 2000 characters, or nests deeper than 50 parentheses.
+        If the text is no expression, is longer than 2000 characters, or nests deeper than 50 parentheses.
     """
     return _Parser(text).all()
 
 
 class _Parser:
-    """Reads one text by recursive descent."""
+    """Parse one text by recursive descent."""
 
     def __init__(self, text: str) -> None:
         if not isinstance(text, str):

@@ -26,7 +26,7 @@ class Term:
     Raises
     ------
     DefinitionError
-        If the shape is none.
+        If the shape is neither a membership function nor a value.
 
     Examples
     --------
@@ -51,7 +51,7 @@ class Term:
         Raises
         ------
         DefinitionError
-            If it is a value.
+            If the term is a value.
         """
         value = isinstance(self.shape, Formula) and self.shape.names - {"x"}
         if value or not isinstance(self.shape, Membership):
@@ -65,7 +65,7 @@ class Term:
         Raises
         ------
         DefinitionError
-            If it is another.
+            If the shape is not piecewise linear.
         """
         if not isinstance(self.shape, Shape):
             raise DefinitionError(f"term {shown(self.name)} is {self.kind}, expected a piecewise-linear one")
@@ -73,7 +73,7 @@ class Term:
 
     @property
     def kind(self) -> str:
-        """What it is, in words."""
+        """Kind of the shape, in words."""
         if isinstance(self.shape, Curve):
             return f"a curve of the kind {self.shape.kind}"
         return "piecewise linear" if isinstance(self.shape, Shape) else f"a {type(self.shape).__name__.lower()}"

@@ -18,20 +18,20 @@ from fuzzy_arbiter.terms.parser import Node
 
 
 class Value(ABC):
-    """What a rule of Sugeno's kind concludes: a number for each sample."""
+    """The conclusion of a Sugeno rule: a number for each sample."""
 
     __slots__ = ()
 
     @abstractmethod
     def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
-        """Return it as arithmetic on the names of the inputs, and of the outputs that come before its own.
+        """Return the value as an expression of the inputs and of earlier outputs.
 
         Parameters
         ----------
         inputs : sequence of str
             Names of the system's inputs.
         outputs : sequence of str
-            Names of the outputs before its own.
+            Names of the outputs before this one.
 
         Raises
         ------
@@ -40,12 +40,12 @@ class Value(ABC):
         """
 
     def number(self, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Sequence[float]], float]:
-        """Return what gives the number for one sample, of the inputs and these outputs."""
+        """Return a function from one sample, (inputs and outputs,), to the number."""
         whole, names = self.expression(inputs, outputs), (*inputs, *outputs)
         return lambda sample: whole(dict(zip(names, sample, strict=True)))
 
     def array(self, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Array], Array]:
-        """Return what gives the numbers for many samples, shape (n, inputs and outputs)."""
+        """Return a function from many samples, shape (n, inputs and outputs), to the numbers, shape (n,)."""
         whole, names = self.expression(inputs, outputs), (*inputs, *outputs)
 
         def numbers(samples: Array) -> Array:
@@ -57,12 +57,12 @@ class Value(ABC):
 
 @dataclass(frozen=True, slots=True)
 class Constant(Value):
-    """One number, whatever the inputs are: a singleton.
+    """One number, independent of the inputs: a singleton.
 
     Raises
     ------
     DefinitionError
-        If it is not finite.
+        If the number is not finite.
 
     Examples
     --------
@@ -93,7 +93,7 @@ class Linear(Value):
     coefficients : tuple of float
         One for each input, in the order of the system's inputs.
     constant : float
-        What is added.
+        Constant term of the sum.
 
     Raises
     ------
@@ -141,19 +141,19 @@ class Linear(Value):
 
     @classmethod
     def of(cls, tree: Node, inputs: Sequence[str]) -> Linear | None:
-        """Return the linear value that a tree says, if it says it as `expression` does.
+        """Return the linear value of a tree that has the form of `expression`.
 
         Parameters
         ----------
         tree : Node
-            Of an expression.
+            Tree of an expression.
         inputs : sequence of str
             Names of the inputs.
 
         Returns
         -------
         Linear or None
-            None if the tree says something else, or the same in another way.
+            None if the tree has another form.
         """
         coefficients = dict.fromkeys(inputs, 0.0)
         constant = 0.0
@@ -172,7 +172,7 @@ class Linear(Value):
 
 @dataclass(frozen=True, slots=True)
 class Formula(Value, Membership):
-    """Any arithmetic: of an output's term on the inputs' names, or of a membership function on the place ``x``.
+    """An arithmetic expression: a term of an output on the inputs' names, or a membership function on the place ``x``.
 
     Attributes
     ----------
@@ -201,7 +201,7 @@ class Formula(Value, Membership):
 
     @property
     def names(self) -> frozenset[str]:
-        """The names whose numbers it needs."""
+        """Names of the numbers in the expression."""
         return self._whole.names
 
     def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
@@ -210,7 +210,7 @@ class Formula(Value, Membership):
         Raises
         ------
         DefinitionError
-            If it speaks of other names than these.
+            If it uses other names than these.
         """
         whole, known = self._whole, (*inputs, *outputs)
         unknown = sorted(whole.names - set(known))
@@ -231,7 +231,7 @@ class Formula(Value, Membership):
         return np.clip(np.broadcast_to(np.asarray(values, dtype=np.float64), np.shape(places)), 0.0, 1.0)
 
     def breaks(self, universe: tuple[float, float]) -> tuple[float, ...]:
-        """Return none: where it bends is not known.
+        """Return (): the places where an expression bends are not known.
 
         Parameters
         ----------
@@ -241,12 +241,12 @@ class Formula(Value, Membership):
         return ()
 
     def within(self, universe: tuple[float, float]) -> Formula:
-        """Return it, if it gives degrees in a universe.
+        """Return the formula itself, if its values in a universe are degrees.
 
         Raises
         ------
         DefinitionError
-            If at one of 1001 places it gives no number, or one above 1; below 0 it counts as 0.
+            If at one of 1001 places its value is not a number, or above 1; below 0 it counts as 0.
         """
         places = np.linspace(*universe, 1001)
         values = np.broadcast_to(self.expression(["x"]).of_many({"x": places}), places.shape)
@@ -260,12 +260,12 @@ class Formula(Value, Membership):
 
 
 def invertible(shape: object) -> bool:
-    """Return whether a term only rises or only falls, so that each degree has a place, as Tsukamoto's method asks.
+    """Return True if a term only rises or only falls, so that each degree has a place, for Tsukamoto's method.
 
     Parameters
     ----------
     shape : object
-        Of a term.
+        Shape of a term.
 
     Returns
     -------
@@ -280,14 +280,14 @@ def _is_ramp(shape: Shape) -> bool:
 
 
 def place_of(shape: Curve | Shape, degree: float) -> float:
-    """Return where a term that only rises or only falls has a degree.
+    """Return the place at which a monotonic term has a degree.
 
     Parameters
     ----------
     shape : Curve or Shape
-        See `invertible`.
+        Shape for which `invertible` is true.
     degree : float
-        Above 0. One above the term's height is taken as it is: a line goes on, a curve may have no place.
+        Degree above 0. Above the term's height a line is extended, while a curve may have no place.
 
     Returns
     -------

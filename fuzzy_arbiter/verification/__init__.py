@@ -1,4 +1,4 @@
-"""What is known about a system from its definition alone: completeness, consistency, exclusivity, gaps.
+"""Verify a system from its definition alone: completeness, consistency, exclusivity, gaps.
 
 Imports: engines.
 """

@@ -1,4 +1,4 @@
-"""What an input's terms do over its universe, exactly: where their degrees are of one kind, where they leave gaps."""
+"""Exact partition of an input's universe by its terms: patterns of degrees, and gaps."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ROUNDING = Fraction(1, 2**50)  # a sum of degrees that is nearer to 1 than this 
 
 @dataclass(frozen=True, slots=True)
 class Domain:
-    """All that an input can be, as far as rules can tell: a few places that stand for all others.
+    """The finite domain of an input: one place for each pattern of degrees that rules can distinguish.
 
     Attributes
     ----------
@@ -52,11 +52,11 @@ class Stretch:
     kind : {"gap", "below", "above"}
         No term has a degree above 0; the sum is below 1 (gaps are part of that); the sum is above 1.
     start, end : float
-        Its ends.
+        Ends of the stretch.
     start_in, end_in : bool
         Whether the ends belong to it.
     least, greatest : float
-        Bounds of the sum in it, which it reaches or comes as near to as one likes.
+        Bounds of the sum in it, reached or approached.
     """
 
     variable: str
@@ -77,10 +77,10 @@ class Stretch:
 
 
 def rank(degree: Fraction, levels: Sequence[Fraction]) -> int:
-    """Return where a degree stands among levels.
+    """Return the rank of a degree among levels.
 
     Minimum and maximum of degrees have the minimum and maximum of their ranks; if with each level one minus it is a
-    level too, then one minus a degree has the rank 2 L - r. So what rules make of degrees can be told from ranks.
+    level too, then one minus a degree has the rank 2 L - r. So rules can be evaluated on ranks instead of degrees.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def graded(variable: Variable, levels: Sequence[Fraction]) -> Domain:
 
 
 def stretches(variable: Variable) -> tuple[Stretch, ...]:
-    """Return where an input's degrees do not sum to 1.
+    """Return the stretches of an input's universe on which the degrees do not sum to 1.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ def _exact(variable: Variable) -> list[Degree]:
 
 
 def _opposite(shape: Shape, other: Shape) -> bool:
-    """Return whether shapes are one minus each other but for rounding, and exactly so where one is 0 or 1."""
+    """Return True if shapes sum to 1 but for rounding, and exactly so where one is 0 or 1."""
     if shape.jumps or other.jumps or len(shape.points) != len(other.points):
         return False
     return (shape.complement() == other or other.complement() == shape) and all(
@@ -262,5 +262,5 @@ def _limit(shape: Shape) -> Degree:
 
 
 def _between(degrees: Sequence[Degree], a: Fraction, b: Fraction, end: bool) -> list[Fraction]:
-    """Degrees just within the interval from a to b, at its end or at its start."""
+    """Return the degrees just within the interval from a to b, at its end or at its start."""
     return [of(b, False) if end else of(a, True) for of in degrees]

@@ -1,4 +1,4 @@
-"""The checks of a system, one after the other, and what they found in words."""
+"""The checks of a system, in their order, and their findings in words."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from fuzzy_arbiter.verification.report import Check, Finding, Row, Severity, Ver
 from fuzzy_arbiter.verification.rules import labels, redundant, unused
 from fuzzy_arbiter.verification.search import Answer, Goal
 
-EFFORT = 4_000_000_000  # statements, some seconds; forty prioritised criteria need a five-hundredth of it
+EFFORT = 4_000_000_000  # statements, some seconds; forty prioritised criteria need 1/500 of it
 MAX_ROWS = 256
 NAMED_ROWS = 8
 _ALL = "for all real inputs"
@@ -39,24 +39,24 @@ _WORST_FIRST = {"fault": 0, "warning": 1, "note": 2}
 
 
 def verify(system: System, effort: int = EFFORT) -> Verification:
-    """Return whether a system's rules are complete, consistent and exclusive, and its terms without gaps.
+    """Check that a system's rules are complete, consistent and exclusive, and that its terms have no gaps.
 
     Parameters
     ----------
     system : System
-        What is verified.
+        System to verify.
     effort : int
-        Most statements to evaluate; a check that needs more is not decided, and says so.
+        Most statements to evaluate; a check that needs more is undecided.
 
     Returns
     -------
     Verification
-        As data; its text is for people.
+        Data; its `str` is a text for people.
 
     Raises
     ------
     UnsupportedError
-        If the system has more than the checks know: piecewise-linear terms, *min* and *max* or their products, the
+        If the system has more than the checks support: piecewise-linear terms, *min* and *max* or their products, the
         centroid.
 
     Examples
@@ -88,7 +88,7 @@ def verify(system: System, effort: int = EFFORT) -> Verification:
 
 
 class _Checks:
-    """Asks the questions, and puts the answers into words."""
+    """Ask the questions, and format the answers."""
 
     def __init__(self, system: System, effort: int) -> None:
         self.system = system
@@ -99,7 +99,7 @@ class _Checks:
         self._high = tuple(Is(v.name, greatest_term(v)) for v in system.outputs)
 
     def rows(self) -> None:
-        """Check what the rules say on crisp rows."""
+        """Check the rules on crisp rows."""
         ask = Questions.of_rows(self.system, self._effort)
         self._complete("complete", ask, "on every crisp row")
         goals = [Goal(tuple(map(ask.fully, terms)), 2, ANY) for terms in self._terms.values()]
@@ -129,7 +129,7 @@ class _Checks:
             self._found("note", "exclusive", "there may be more rows like that, which were not looked for")
 
     def support(self) -> None:
-        """Check what fires at all for graded inputs."""
+        """Check that rules fire at all for graded inputs."""
         ask = Questions.of_support(self.system, self._effort)
         self._complete("graded_complete", ask, _ALL)
         conditions = labels(self.system)
@@ -139,7 +139,7 @@ class _Checks:
                 self._found("warning", "rules", f"{label}: never fires, as '{condition}' holds for no real inputs")
 
     def halves(self) -> None:
-        """Check what fires above 1/2 for graded inputs."""
+        """Check that conclusions for graded inputs are not both above 1/2."""
         ask = Questions.of_halves(self.system, self._effort)
         for name, sets, text in (
             ("graded_consistent", self._terms, "output {!r}: rules put it into two terms, both above 1/2,"),
@@ -163,7 +163,7 @@ class _Checks:
     def _both_above_half(
         self, ask: Questions, terms: Sequence[Is], answer: Answer
     ) -> tuple[bool | None, str, dict[str, float | str] | None]:
-        """Return whether never two of some terms are above 1/2, how that is known, and where they are."""
+        """Decide if no two of some terms are above 1/2 at once; return verdict, method, and counterexample."""
         reaches = reach(self.system, [rule.condition for term in terms for rule in rules_on(self.system, term)])
         if answer.all_found and not answer.boxes and reaches == "exact":
             return True, _ALL, None

@@ -1,4 +1,4 @@
-"""The questions about a system, asked of all crisp rows or of all graded inputs, within a common effort."""
+"""Questions about a system, for all crisp rows or all graded inputs, within a common effort."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from fuzzy_arbiter.verification.search import Answer, Goal, Group, Search
 Reach = Literal["exact", "bound", "samples"]
 HALF = Fraction(1, 2)
 SUPPORT = (Fraction(0), Fraction(1))
-FIRES, FULLY = rank(Fraction(0), SUPPORT), rank(Fraction(1), SUPPORT) - 1  # ranks above which a condition does so
+FIRES, FULLY = rank(Fraction(0), SUPPORT), rank(Fraction(1), SUPPORT) - 1  # ranks to exceed
 ANY = 2**30  # groups
 SAMPLES = 4096
 
 
 class Effort:
-    """How many statements searches may evaluate in all; what one leaves over the others may use.
+    """The statements that searches may evaluate in all; a search leaves its unused part to the next ones.
 
     Parameters
     ----------
     limit : int
-        In all.
+        Statements in all.
     searches : int
-        How many there will be.
+        Number of searches.
     """
 
     def __init__(self, limit: int, searches: int) -> None:
@@ -42,18 +42,18 @@ class Effort:
         self._searches = searches
 
     def share(self) -> int:
-        """Return what the next search may use."""
+        """Return the number of statements that the next search may evaluate."""
         share = max(0, self._left) // max(1, self._searches)
         self._searches -= 1
         return share
 
     def use(self, statements: int) -> None:
-        """Take off what a search has used."""
+        """Subtract the statements that a search has evaluated."""
         self._left -= statements
 
 
 def greatest_term(output: Output) -> str:
-    """Return the term of an output that stands for its greatest value.
+    """Return the term of an output with the greatest centroid.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def rules_on(system: System, statement: Is) -> tuple[Rule, ...]:
     Parameters
     ----------
     system : System
-        What is verified.
+        System to verify.
     statement : Is
         About an output.
 
@@ -88,18 +88,18 @@ def rules_on(system: System, statement: Is) -> tuple[Rule, ...]:
 
 
 class Questions:
-    """Asks one kind of inputs.
+    """Questions on one kind of inputs, crisp rows or graded inputs.
 
     Parameters
     ----------
     system : System
-        Which is asked about.
+        System to verify.
     domains : sequence of Domain
-        What the inputs can be.
+        Domain of each input.
     levels : sequence of Fraction
-        By which the domains were made.
+        Levels of the domains.
     effort : Effort
-        Common to all questions.
+        Budget of all questions.
     """
 
     def __init__(self, system: System, domains: Sequence[Domain], levels: Sequence[Fraction], effort: Effort) -> None:
@@ -110,17 +110,17 @@ class Questions:
 
     @classmethod
     def of_rows(cls, system: System, effort: Effort) -> Questions:
-        """Ask the crisp rows."""
+        """Return the questions on crisp rows."""
         return cls(system, [crisp(v, SUPPORT) for v in system.inputs], SUPPORT, effort)
 
     @classmethod
     def of_support(cls, system: System, effort: Effort) -> Questions:
-        """Ask all graded inputs what fires at all; that holds for every *and*, *or* and weight."""
+        """Return the questions on rules that fire at all; the answers hold for every *and*, *or* and weight."""
         return cls(system, [graded(v, SUPPORT) for v in system.inputs], SUPPORT, effort)
 
     @classmethod
     def of_halves(cls, system: System, effort: Effort) -> Questions:
-        """Ask all graded inputs what fires above 1/2; that holds for ``min`` and ``max`` and every weight."""
+        """Return the questions on rules that fire above 1/2; they hold for ``min`` and ``max`` and every weight."""
         above = {HALF, *(level for rule in system.rules if (level := HALF / Fraction(rule.weight)) < 1)}
         levels = tuple(sorted(above | {1 - level for level in above}))
         return cls(system, [graded(v, levels) for v in system.inputs], levels, effort)
@@ -142,12 +142,12 @@ class Questions:
         )
 
     def ask(self, goals: Sequence[Goal], wanted: int = 1) -> list[Answer]:
-        """Search for the goals, those that speak of the same inputs together.
+        """Search for the goals; goals with the same inputs share a search.
 
         Parameters
         ----------
         goals : sequence of Goal
-            What to look for.
+            Combinations to search for.
         wanted : int
             Boxes to find; with more than one for one goal only.
 
@@ -171,11 +171,11 @@ class Questions:
         return [answers[i] for i in range(len(goals))]
 
     def places(self, box: dict[str, int]) -> dict[str, float | str]:
-        """Return a box as inputs: a number or a term for each one that matters."""
+        """Format a box as inputs: a number or a term for each one that matters."""
         return {v.name: self._domains[v.name].places[box[v.name]] for v in self._system.inputs if v.name in box}
 
     def combinations(self) -> int:
-        """Return how many combinations of patterns there are."""
+        """Return the number of combinations of patterns."""
         return math.prod(len(domain.places) for domain in self._domains.values())
 
     def samples(self) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
@@ -188,20 +188,20 @@ class Questions:
 
 
 def reach(system: System, conditions: Sequence[Proposition]) -> Reach:
-    """Return what the ranks at 1/2 prove for a system's *and* and *or*.
+    """Return the strength of a proof by ranks at 1/2 for a system's *and* and *or*.
 
     Parameters
     ----------
     system : System
-        What is verified.
+        System to verify.
     conditions : sequence of Proposition
-        Those that matter.
+        Conditions in question.
 
     Returns
     -------
     {"exact", "bound", "samples"}
-        All, with ``min`` and ``max``; that what cannot happen with ``min`` cannot with ``prod`` either, which is never
-        above it, if only statements are negated; nothing.
+        ``exact``: all, with ``min`` and ``max``. ``bound``: only impossibility, as ``prod`` is never above ``min`` if
+        only statements are negated. ``samples``: nothing.
     """
     parts = [part for condition in conditions for part in _parts(condition)]
     if system.disjunction != "max" and any(isinstance(part, Or) for part in parts):
@@ -224,11 +224,11 @@ def sampled(system: System, questions: Questions, statements: Sequence[Is]) -> d
     Parameters
     ----------
     system : System
-        What is verified.
+        System to verify.
     questions : Questions
-        Of halves.
+        Questions of `Questions.of_halves`.
     statements : sequence of Is
-        About outputs.
+        Statements about outputs.
 
     Returns
     -------

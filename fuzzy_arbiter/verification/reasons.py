@@ -1,4 +1,4 @@
-"""Which rules it was, at a place that a search has found."""
+"""Name the rules that fire at a place that a search has found."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from fuzzy_arbiter.propositions import Is
 
 
 def row_strengths(system: System, place: Mapping[str, float | str]) -> list[float]:
-    """Return how strongly each rule fires in a crisp row.
+    """Return the firing strength of each rule in a crisp row.
 
     Parameters
     ----------
     system : System
-        What is verified.
+        System to verify.
     place : mapping from str to str
         Term of each input, or of those that matter.
 
@@ -32,12 +32,12 @@ def row_strengths(system: System, place: Mapping[str, float | str]) -> list[floa
 
 
 def graded_strengths(system: System, place: Mapping[str, float | str]) -> list[float]:
-    """Return how strongly each rule fires for real inputs.
+    """Return the firing strength of each rule for real inputs.
 
     Parameters
     ----------
     system : System
-        What is verified.
+        System to verify.
     place : mapping from str to float
         Value of each input, or of those that matter.
 
@@ -50,18 +50,18 @@ def graded_strengths(system: System, place: Mapping[str, float | str]) -> list[f
 
 
 def reasons(system: System, strengths: Sequence[float], statements: Sequence[Is], above: float) -> str:
-    """Return which rules conclude statements strongly, as text.
+    """Name the rules that conclude statements above a strength.
 
     Parameters
     ----------
     system : System
-        What is verified.
+        System to verify.
     strengths : sequence of float
-        Of each rule.
+        Strength of each rule.
     statements : sequence of Is
-        About outputs.
+        Statements about outputs.
     above : float
-        Strength that counts: 1, or anything above a lesser one.
+        Threshold of the strength; 1 includes rules of exactly 1.
 
     Returns
     -------

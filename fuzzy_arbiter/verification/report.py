@@ -1,4 +1,4 @@
-"""What a verification found, as data and as text."""
+"""The result of a verification, as data and as text."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ SHOWN_ROWS = 32
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Something to know about a system.
+    """A finding about a system.
 
     Attributes
     ----------
     severity : {"fault", "warning", "note"}
-        It fails or contradicts itself; it may not be what was meant; it is as it should be, and good to know.
+        ``fault``: a check fails; ``warning``: perhaps a mistake; ``note``: information.
     about : str
         Name of the check, or ``terms`` or ``rules``.
     text : str
-        What it is, naming rule, term and place.
+        Description, with rule, term and place.
     place : dict from str to float or str, or None
-        Inputs at which it shows: numbers, or for crisp rows terms. An input that is not in it can be anything.
+        Inputs at which it occurs: numbers, or for crisp rows terms. An input that is not in it can have any value.
     """
 
     severity: Severity
@@ -45,7 +45,7 @@ class Check:
     holds : bool or None
         None if that was not decided.
     how : str
-        What was looked at, and how far the answer goes.
+        Method of the check, and the range of its answer.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What the rules say where every input is in one term.
+    """The conclusions of the rules where every input is in one term.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """What is known about a system from its definition alone.
+    """The properties of a system that follow from its definition alone.
 
     Crisp rows are all combinations of terms, each taken as a label. Graded inputs are all real numbers in the
     universes; what is said of them holds in real arithmetic.
@@ -82,17 +82,17 @@ class Verification:
     Attributes
     ----------
     inputs, outputs : tuple of str
-        Names.
+        Names of the inputs and outputs.
     checks : tuple of Check
         Answers.
     findings : tuple of Finding
         Worst first.
     row_count : int
-        How many crisp rows there are.
+        Number of crisp rows.
     rows : tuple of Row
         All of them, the last term first; none if there are too many.
     stretches : tuple of Stretch
-        Where the degrees of an input do not sum to 1.
+        Stretches on which the degrees of an input do not sum to 1.
 
     Examples
     --------
@@ -150,12 +150,12 @@ class Verification:
         return next(check.holds for check in self.checks if check.name == name)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return all of it as JSON knows it.
+        """Convert the verification to values that JSON can represent.
 
         Returns
         -------
         dict
-            Of texts, numbers, booleans, lists and dicts.
+            Texts, numbers, Booleans, lists and dicts.
         """
         return {
             "ok": self.ok,

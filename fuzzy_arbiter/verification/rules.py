@@ -1,4 +1,4 @@
-"""What can be told from rules as they are written: what none of them uses, and which of them add nothing."""
+"""Check the rules as text: names that no rule uses, and redundant rules."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def unused(system: System) -> Iterator[Finding]:
     Parameters
     ----------
     system : System
-        What is verified.
+        System to verify.
 
     Yields
     ------
     Finding
-        One for each.
+        One for each input or term.
     """
     stated = {s for rule in system.rules for s in rule.condition.terms()}
     concluded = {s for rule in system.rules for s in rule.conclusions}
@@ -45,19 +45,19 @@ def unused(system: System) -> Iterator[Finding]:
 
 
 def redundant(system: System) -> Iterator[Finding]:
-    """Yield the rules whose conclusion another rule draws at least as strongly, always.
+    """Yield the rules whose conclusion another rule always draws at least as strongly.
 
-    Found is what follows from the form of the conditions: ``a and b`` is never above ``a``, nor ``a`` above ``a or b``.
+    The check uses the form of conditions: ``a and b`` is never above ``a``, nor ``a`` above ``a or b``.
 
     Parameters
     ----------
     system : System
-        What is verified.
+        System to verify.
 
     Yields
     ------
     Finding
-        One for each; of two rules that say the same the later.
+        One for each rule; of two equal rules the later.
     """
     lattice = system.conjunction == "min" and system.disjunction == "max"
     by_conclusion: dict[Is, list[tuple[int, Rule]]] = defaultdict(list)
@@ -87,12 +87,12 @@ def redundant(system: System) -> Iterator[Finding]:
 
 
 def _below(p: Proposition, q: Proposition, lattice: bool) -> bool:
-    """Return whether the form of two propositions shows that the first is never above the second."""
+    """Return True if the form of two propositions shows that the first is never above the second."""
     if p == q:
         return True
     if isinstance(p, Not) and isinstance(q, Not):
         return _below(q.part, p.part, lattice)
-    if not lattice:  # p times p is below p, so that parts count as often as they stand
+    if not lattice:  # p times p is below p, so that repeated parts count
         if isinstance(p, And) and not Counter(q.parts if isinstance(q, And) else (q,)) - Counter(p.parts):
             return True
         return isinstance(q, Or) and not Counter(p.parts if isinstance(p, Or) else (p,)) - Counter(q.parts)
@@ -106,12 +106,12 @@ def _below(p: Proposition, q: Proposition, lattice: bool) -> bool:
 
 
 def labels(system: System) -> dict[Proposition, str]:
-    """Return the labels of the rules that have each condition.
+    """Return the labels of the rules with each condition.
 
     Parameters
     ----------
     system : System
-        What is verified.
+        System to verify.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""An exhaustive search over all combinations of inputs' patterns, which leaves out what bounds refute.
+"""Search all combinations of inputs' patterns exhaustively, without those that bounds refute.
 
 Inputs are settled one after the other. As long as one is open, a statement about it has bounds, the least and the
 greatest rank of its term. *and*, *or* and *not* take bounds to bounds, so a question is often answered for a whole box
@@ -20,7 +20,7 @@ from fuzzy_arbiter.engines.firing import Logic
 from fuzzy_arbiter.propositions import Is, Proposition
 from fuzzy_arbiter.verification.cells import Domain, Ranks
 
-CHUNK = 8192  # combinations that are looked at together
+CHUNK = 8192  # combinations evaluated together
 Bounds = tuple[Ranks, Ranks]
 Group = tuple[tuple[Proposition, int], ...]
 Box = dict[str, int]
@@ -36,7 +36,7 @@ class Goal:
     groups : tuple of tuple of (Proposition, int)
         A group fires where any of its propositions has a rank above the number beside it.
     least, most : int
-        How many groups must fire.
+        Least and greatest number of groups that fire.
     """
 
     groups: tuple[Group, ...]
@@ -50,7 +50,7 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What a search found.
+    """The result of a search.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Answer:
     all_found : bool
         Whether the search went through all combinations, so that there are no more boxes.
     combinations : int
-        How many there are of the inputs that the goal speaks of.
+        Number of combinations of the goal's inputs.
     """
 
     boxes: tuple[Box, ...]
@@ -73,11 +73,11 @@ class Search:
     Parameters
     ----------
     goals : sequence of Goal
-        What to look for.
+        Combinations to search for.
     domains : mapping from str to Domain
-        Of each input.
+        Domain of each input.
     top : int
-        The rank of one minus a degree is this less the degree's rank.
+        Greatest rank: one minus a degree has the rank `top` less the degree's rank.
     """
 
     def __init__(self, goals: Sequence[Goal], domains: Mapping[str, Domain], top: int) -> None:
@@ -90,7 +90,7 @@ class Search:
         for group, g in groups.items():
             for condition, threshold in group:
                 self._uses.setdefault(condition, []).append((g, threshold))
-        # the inputs that most statements speak of come first: they refute most
+        # the inputs of most statements come first: they refute most
         statements = [statement for condition in self._uses for statement in condition.terms()]
         self._cost = max(1, len(statements))
         stated_ones = set(statements)
@@ -99,7 +99,7 @@ class Search:
         self._position = {name: i for i, name in enumerate(self._order)}
         self._ranks: dict[Is, Ranks] = {}
         self._bounds: dict[Is, Bounds] = {}
-        self._patterns: list[NDArray[np.intp]] = []  # of each input in order, those that its stated terms tell apart
+        self._patterns: list[NDArray[np.intp]] = []  # patterns of each input in order that its stated terms distinguish
         for name in self._order:
             domain = domains[name]
             stated = [j for j, term in enumerate(domain.terms) if Is(name, term) in stated_ones]
@@ -133,7 +133,7 @@ class Search:
         stack = [np.zeros((1, 0), dtype=np.int32)]
         seen = 0
         while stack and wanting and seen * self._cost < limit:
-            # few at a time in the beginning, so that what is easily found is found soon
+            # few at a time in the beginning, so that an easy goal ends early
             size = min(CHUNK, max(16, seen // 8), max(1, limit // self._cost))
             boxes = stack.pop()
             if len(boxes) > size:
@@ -161,7 +161,7 @@ class Search:
         return {self._order[i]: int(self._patterns[i][p]) for i, p in enumerate(row)}
 
     def _judge(self, boxes: NDArray[np.int32]) -> tuple[list[Flags], list[Flags]]:
-        """Return whether each goal is met in all of a box, and whether it may be in some of it."""
+        """Return two masks for each goal: it is met in all of a box; it may be met in some of the box."""
         n, depth = boxes.shape
         known: dict[Is, Bounds] = {}
 

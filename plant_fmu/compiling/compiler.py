@@ -1,4 +1,4 @@
-"""Finding a C compiler on this machine, and making a shared library with it."""
+"""Find a C compiler on this machine, and make a shared library with it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FLAGS = (
     "-std=c99", "-O3", "-fno-math-errno", "-g0", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared",
     "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX",
 )  # fmt: skip
-_BESIDE_STEPS = ("constants.c", "forces_tangent.c", "tangent.c")  # not in a step: unrolled they are but larger
+_BESIDE_STEPS = ("constants.c", "forces_tangent.c", "tangent.c")  # not in a step: unrolling only makes them larger
 _WARNINGS = ("-Wall", "-Wextra", "-Wpedantic")
 _ZIGLANG = "ziglang>=0.13"  # which is a C compiler too
 
@@ -42,7 +42,7 @@ def find_compiler() -> list[str]:
     Raises
     ------
     BuildError
-        If there is none.
+        If there is no compiler.
     """
     named = os.environ.get("CC")
     if named:
@@ -66,7 +66,7 @@ def cross_compiler(platform: Platform) -> list[str]:
     Parameters
     ----------
     platform : Platform
-        What to compile for.
+        Platform of the libraries.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def cross_compiler(platform: Platform) -> list[str]:
     Raises
     ------
     BuildError
-        If the package is not there.
+        If the package is not installed.
     """
     if importlib.util.find_spec("ziglang") is None:
         hint = install_hint(_ZIGLANG)
@@ -99,13 +99,13 @@ def compile_library(
     compiler : sequence of str
         The command and its first arguments.
     platform : Platform
-        What the compiler compiles for.
+        Target of the compiler.
     sources : sequence of Path
         The C files.
     includes : sequence of Path
         Folders of headers.
     library : Path
-        What to write.
+        File to write.
     flags : sequence of str, optional
         After `FLAGS`.
 
@@ -116,8 +116,8 @@ def compile_library(
     """
     link = ["-s"]
     if platform.system == "darwin":
-        # Named, for the linker else writes the place of the build into the library. Names of functions stay: Apple's
-        # linker knows no -s, and ziglang's, told to drop them, leaves some numbers of a table to chance.
+        # Named, for the linker else writes the build folder into the library. Names of functions stay: Apple's
+        # linker has no -s, and ziglang's, with that flag, makes some numbers of a table vary between builds.
         link = [f"-Wl,-install_name,@rpath/{library.name}"]
     options = [*FLAGS, *_WARNINGS, *flags, *(f"-I{folder}" for folder in includes)]
     with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:

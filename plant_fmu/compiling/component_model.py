@@ -120,7 +120,7 @@ def wit(model_exchange: bool) -> str:
     Parameters
     ----------
     model_exchange : bool
-        Whether it offers model exchange beside co-simulation.
+        True for model exchange beside co-simulation.
 
     Returns
     -------

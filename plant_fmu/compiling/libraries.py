@@ -27,9 +27,9 @@ def compiled_libraries(
     Parameters
     ----------
     component : Component
-        What the libraries are of.
+        Component of the libraries.
     token : str
-        Of the description that they go with.
+        Token of their description.
     fmi : int
         2 or 3.
     compilers : sequence of (Platform, list of str)
@@ -60,14 +60,14 @@ def compiled_libraries(
 
 
 def made_from(component: Component, token: str, fmi: int) -> str:
-    """Return a digest of all that libraries are compiled from, whatever the platform and the compiler.
+    """Return a digest of the sources, headers and flags of libraries, independent of platform and compiler.
 
     Parameters
     ----------
     component : Component
-        What they are of.
+        Component of the libraries.
     token : str
-        Of the description that they go with.
+        Token of their description.
     fmi : int
         2 or 3.
 
@@ -89,9 +89,9 @@ def digest(files: dict[str, bytes], *words: str) -> str:
     Parameters
     ----------
     files : dict of str to bytes
-        By name, in any order.
+        Contents by name, in any order.
     *words : str
-        What else counts.
+        Further parts of the digest.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The platforms that an FMU can hold binaries for: their names in FMI, and what a compiler calls them."""
+"""The platforms that an FMU can hold binaries for: their names in FMI and in a compiler."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from plant_fmu.errors import BuildError
 
 NATIVE = "native"
 ALL = "all"
-WASM = "wasm"  # no platform of a library: a component of fmi-ls-wasm
+WASM = "wasm"  # not the platform of a library, but a component of fmi-ls-wasm
 
 
 @dataclass(frozen=True)
 class Platform:
     """One machine and operating system."""
 
-    name: str  # of the folder in an FMI 3.0 FMU
-    fmi2_names: tuple[str, ...]  # of the folders in an FMI 2.0 FMU
-    target: str  # of the ziglang package's compiler
-    suffix: str  # of shared libraries
+    name: str  # folder in an FMI 3.0 FMU
+    fmi2_names: tuple[str, ...]  # folders in an FMI 2.0 FMU
+    target: str  # name in the ziglang package's compiler
+    suffix: str  # suffix of shared libraries
 
     @property
     def system(self) -> str:
@@ -42,11 +42,11 @@ PLATFORMS = {
     )
 }
 
-# alone on its machine a library of 64-bit ARM also lies where FMPy looks there: in the folders of x86-64
+# in an FMU for this machine alone, a library of 64-bit ARM is also in the folders of x86-64, where FMPy looks
 _NATIVE_FMI2 = {"linux": "linux64", "windows": "win64", "darwin": "darwin64"}
 _ARM_WINDOWS = Platform(
     "aarch64-windows", ("aarch64-windows",), "aarch64-windows-gnu", ".dll"
-)  # built where it is at home only
+)  # built only on such a machine
 
 
 def native_platform() -> Platform:
@@ -55,7 +55,7 @@ def native_platform() -> Platform:
     Returns
     -------
     Platform
-        With the FMI 2.0 name under which importers on this machine look.
+        The platform, with the FMI 2.0 name under which importers on this machine look.
 
     Raises
     ------
@@ -74,17 +74,17 @@ def native_platform() -> Platform:
 
 
 def without_wasm(text: str) -> tuple[str | None, bool]:
-    """Return what a text of platforms names beside WebAssembly.
+    """Remove WebAssembly from a list of platforms, and return True if it was there.
 
     Parameters
     ----------
     text : str
-        As `plant_fmu.build_fmu` takes it.
+        Names of platforms, as of `plant_fmu.build_fmu`.
 
     Returns
     -------
     (str or None, bool)
-        The same without ``wasm``, None where it stands alone; and whether it was there.
+        The list without ``wasm``, None if nothing else was in it; and whether ``wasm`` was in it.
     """
     names = [name.strip() for name in text.split(",")]
     if WASM not in names:
@@ -94,7 +94,7 @@ def without_wasm(text: str) -> tuple[str | None, bool]:
 
 
 def cross_platforms(text: str) -> list[Platform]:
-    """Return the platforms that a text names.
+    """Parse a list of platforms.
 
     Parameters
     ----------

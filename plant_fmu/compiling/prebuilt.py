@@ -1,9 +1,9 @@
 """Libraries that come compiled with the package, so that an FMU can be made where there is no compiler.
 
-One vehicle's library differs from that of another with as many thrusters in numbers alone: the start values of its
-variables and the token, which stand in one table of the binary. A prebuilt library is compiled with stand-ins there,
-numbers that no vehicle has, and each vehicle's own are written over them. Its file is named by a digest of the very
-sources, flags and headers that it is compiled from, so that one of other sources is never taken.
+The library of one vehicle differs from that of another with as many thrusters only in numbers: the start values of its
+variables and the token, which are in one table of the binary. A prebuilt library is compiled with stand-ins there,
+numbers that no vehicle has, and each vehicle's own are written over them. Its file is named by a digest of the exact
+sources, flags and headers that it is compiled from, so that a library of other sources is never used.
 """
 
 from __future__ import annotations
@@ -30,44 +30,44 @@ from plant_fmu.vehicle import Vehicle, load_vehicle, shipped_vehicles
 from plant_fmu.vehicle_component import of_vehicle
 
 FOLDER = Path(__file__).parents[1] / "prebuilt"  # in a wheel; a checkout has none
-NAME = "prebuilt"  # which their functions begin with
+NAME = "prebuilt"  # prefix of their functions
 
-STAND_IN = "{" + "-".join("0" * n for n in (8, 4, 4, 4, 12)) + "}"  # for a token
-_GIVEN = ("state", "input", "parameter")  # what has a start value
+STAND_IN = "{" + "-".join("0" * n for n in (8, 4, 4, 4, 12)) + "}"  # instead of a token
+_GIVEN = ("state", "input", "parameter")  # roles of variables with a start value
 _ROW = struct.Struct("<4d")  # of the table: start, min, max, nominal; every platform is little-endian
 
 
 def prebuilt_files() -> list[str]:
-    """Return the names of the files that come with the package, which say what their libraries are made from."""
+    """Return the names of the prebuilt files in the package, which are digests of their sources."""
     return sorted(path.name for path in FOLDER.iterdir()) if FOLDER.is_dir() else []
 
 
 def prebuilt_libraries(
     component: Component, token: str, fmi: int, platforms: Sequence[Platform]
 ) -> list[tuple[Platform, bytes]] | None:
-    """Return a component's libraries from those that come with the package.
+    """Return a component's libraries from the prebuilt ones in the package.
 
     Parameters
     ----------
     component : Component
-        What they are to be of.
+        Component of the libraries.
     token : str
-        Of the description that they go with.
+        Token of their description.
     fmi : int
         2 or 3.
     platforms : sequence of Platform
-        What they are to run on.
+        Targets of the libraries.
 
     Returns
     -------
     list of (Platform, bytes) or None
-        In the order of `platforms`; None where the package has not all of them, of these very sources: one that was
-        installed from a checkout has this machine's alone.
+        In the order of `platforms`; None where the package has not all of them from these sources: an installation
+        from a checkout has only this machine's.
 
     Raises
     ------
     BuildError
-        If what comes with the package is damaged.
+        If a prebuilt file is damaged.
     """
     if not FOLDER.is_dir() or not all(map(_has_libc, platforms)):
         return None
@@ -86,7 +86,7 @@ def prebuilt_libraries(
 
 
 def shipped_structures() -> list[Component]:
-    """Return what libraries of the package are compiled from: for the shipped vehicles, and for six thrusters.
+    """Return the components that prebuilt libraries are compiled from: for the shipped vehicles, and for six thrusters.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def shipped_structures() -> list[Component]:
 
 
 def write_prebuilt(structure: Component, fmi: int, platforms: str, folder: Path) -> Path:
-    """Compile libraries that come with the package.
+    """Compile the prebuilt libraries of one structure.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def write_prebuilt(structure: Component, fmi: int, platforms: str, folder: Path)
     platforms : str
         ``all``, by the compiler of the ziglang package, or ``native``, by any.
     folder : Path
-        Where the file goes.
+        Folder of the file.
 
     Returns
     -------
@@ -139,17 +139,17 @@ def _with_thrusters(vehicle: Vehicle, n: int) -> Vehicle:
 
 
 def general_component(component: Component) -> Component:
-    """Return what a component's prebuilt library is compiled from: the same with a stand-in for each start value.
+    """Return the component of a prebuilt library: the same with a stand-in for each start value.
 
     Parameters
     ----------
     component : Component
-        Whose start values are replaced.
+        Component whose start values are replaced.
 
     Returns
     -------
     Component
-        The same for all components that differ in their numbers alone, but for the description.
+        Equal for all components that differ only in numbers, except for the description.
     """
     rows = tuple(replace(v, start=_stand_in(i)) if v.role in _GIVEN else v for i, v in enumerate(component.variables))
     return replace(component, name=NAME, variables=rows)
@@ -172,7 +172,7 @@ def file_name(general: Component, fmi: int) -> str:
     Returns
     -------
     str
-        It tells all that the libraries are compiled from.
+        The name, with a digest of everything that the libraries are compiled from.
     """
     return f"fmi{fmi}-{made_from(general, STAND_IN, fmi)[:32]}.zip"
 
@@ -182,7 +182,7 @@ def _member(platform: Platform) -> str:
 
 
 def _has_libc(platform: Platform) -> bool:
-    """Return whether a library with glibc loads: Linux may have another C library."""
+    """Return True if a library that needs glibc can load: Linux may have another C library."""
     if platform.system != "linux" or not sys.platform.startswith("linux"):
         return True
     try:

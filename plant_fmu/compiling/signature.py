@@ -1,7 +1,7 @@
-"""The signature of a library for macOS, made anew after bytes of the library have changed.
+"""Re-sign a library for macOS after bytes of the library have changed.
 
-Macs with ARM processors load no library without one. The linker's own is "ad hoc": it names nobody and holds a hash of
-each page, as Apple's ``cs_blobs.h`` says.
+Macs with ARM processors load no library without a signature. The linker's own is "ad hoc": it has no signer and holds
+a hash of each page, as in Apple's ``cs_blobs.h``.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from plant_fmu.errors import BuildError
 _MACH_O_64 = b"\xcf\xfa\xed\xfe"  # little-endian
 _HEADER = 32  # bytes
 _CODE_SIGNATURE = 0x1D  # load command
-_DIRECTORY = 0xFADE0C02  # magic of what lists the hashes; all of the signature is big-endian
+_DIRECTORY = 0xFADE0C02  # magic of the list of hashes; all of the signature is big-endian
 _SHA256 = (32, 2)  # bytes of a hash, and its kind
 
 
 def signed_anew(library: bytes) -> bytes:
-    """Return a library whose signature fits its bytes.
+    """Return a library with a valid signature.
 
     Parameters
     ----------
     library : bytes
-        Of any platform; those that carry no signature come back as they are.
+        Library of any platform; one without a signature is returned unchanged.
 
     Returns
     -------

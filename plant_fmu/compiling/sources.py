@@ -1,4 +1,4 @@
-"""The C sources of FMUs: the plant's, the wrappers' that are common to all, and what is generated beside them."""
+"""The C sources of FMUs: the plant's, the common wrappers', and the generated ones."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _files(folder: str) -> dict[str, bytes]:
 
 
 def external_names(headers: Iterable[bytes]) -> list[str]:
-    """Return the names that C files share with each other, which the linker sees.
+    """Return the names that C files share with each other, which the linker resolves.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def external_names(headers: Iterable[bytes]) -> list[str]:
 
 
 def compiled_files(component: Component, fmi: int) -> list[str]:
-    """Return the names of those C files that a compiler is given, the rest being headers.
+    """Return the names of the C files that a compiler is given, without headers.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ _PROCESSOR = struct.Struct("<II")  # after the magic of a library
 
 
 def universal_library(libraries: Sequence[bytes]) -> bytes:
-    """Return one library that serves several processors.
+    """Return one library for several processors.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""WebAssembly: a component as fmi-ls-wasm asks for it, or a module with FMI's functions that any host can call."""
+"""WebAssembly: a component as of fmi-ls-wasm, or a module with FMI's functions that any host can call."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def module(component: Component, token: str) -> bytes:
     component : Component
         The component.
     token : str
-        Of the FMI 3.0 description that it goes with.
+        Token of the FMI 3.0 description that belongs to it.
 
     Returns
     -------
@@ -43,7 +43,7 @@ def module(component: Component, token: str) -> bytes:
     Raises
     ------
     BuildError
-        If the ziglang package is not there, or its compiler fails.
+        If the ziglang package is not installed, or its compiler fails.
 
     Examples
     --------
@@ -68,7 +68,7 @@ def component_binary(component: Component, token: str) -> bytes:
     component : Component
         The component.
     token : str
-        Of the FMI 3.0 description that it goes with.
+        Token of the FMI 3.0 description that belongs to it.
 
     Returns
     -------
@@ -79,7 +79,7 @@ def component_binary(component: Component, token: str) -> bytes:
     Raises
     ------
     BuildError
-        If the ziglang package or wasm-tools is not there, or fails.
+        If the ziglang package or wasm-tools is not installed, or fails.
     """
     tools = _wasm_tools()
     glue = resources.files("plant_fmu") / "csrc" / "wasm"
@@ -97,14 +97,14 @@ def component_binary(component: Component, token: str) -> bytes:
 
 
 def members(component: Component, token: str) -> dict[str, bytes]:
-    """Return what fmi-ls-wasm adds to an FMU, by name in the archive.
+    """Return the members that fmi-ls-wasm adds to an FMU, by name in the archive.
 
     Parameters
     ----------
     component : Component
         The component.
     token : str
-        Of the FMI 3.0 description that it goes with.
+        Token of the FMI 3.0 description that belongs to it.
 
     Returns
     -------
@@ -135,7 +135,7 @@ def members(component: Component, token: str) -> dict[str, bytes]:
 
 
 def _compiled(component: Component, token: str, folder: Path, more: dict[str, bytes], flags: tuple[str, ...]) -> bytes:
-    """Return a core module of a component's sources and some more; `folder` is for what is made on the way."""
+    """Return a core module of a component's sources and more; `folder` is for intermediate files."""
     for name, data in {**c_sources(component, 3), component.header: header(component, token).encode(), **more}.items():
         (folder / name).write_bytes(data)
     files = [*compiled_files(component, 3), *(name for name in more if name.endswith(".c"))]

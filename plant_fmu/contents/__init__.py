@@ -1,4 +1,4 @@
-"""What an FMU holds beside its description, binaries and sources: page, licences, icon, terminals, references.
+"""Members of an FMU beside description, binaries and sources: page, licences, icon, terminals, references.
 
 Imports: variables.
 """
@@ -27,7 +27,7 @@ def contents(vehicle: Vehicle, fmi: int, rows: Sequence[Variable] | None = None)
     fmi : int
         2 or 3.
     rows : sequence of Variable, optional
-        Its variables, where they start at other values than the vehicle's own.
+        Variables of its FMU, where they start at other values than the vehicle's own.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def contents(vehicle: Vehicle, fmi: int, rows: Sequence[Variable] | None = None)
     Raises
     ------
     BuildError
-        If the installation has lost its licence.
+        If the installation lacks its licence file.
     VehicleError
         If a number of the vehicle is beyond the range of its parameter.
     """

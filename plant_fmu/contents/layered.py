@@ -19,7 +19,7 @@ FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 _MANIFEST = {
     "xmlns:fmi-ls": "http://fmi-standard.org/fmi-ls-manifest",
     "fmi-ls:fmi-ls-name": "org.fmi-standard.fmi-ls-ref",
-    # whose labels are used; its own text still names the release before, which knew none
+    # whose labels are used; its own text still names the previous release, which lacked them
     "fmi-ls:fmi-ls-version": "1.0.0-beta.1",
     # the schema of the layered standard fixes this sentence
     "fmi-ls:fmi-ls-description": "Layered Standard providing information on related files included in an FMU.",
@@ -38,12 +38,12 @@ def layered_files(vehicle: Vehicle, rows: Sequence[Variable] | None = None) -> d
     vehicle : Vehicle
         The vehicle.
     rows : sequence of Variable, optional
-        Of its FMU, where they start at other values than the vehicle's own.
+        Variables of its FMU, where they start at other values than the vehicle's own.
 
     Returns
     -------
     dict of str to str
-        The manifest and the vehicle's parameter set; for a vehicle that comes with the package, as it comes, also a
+        The manifest and the vehicle's parameter set; for an unchanged vehicle of the package also a
         manoeuvre and its reference results.
     """
     name = vehicle.name
@@ -76,7 +76,7 @@ def reference_files(vehicle: Vehicle, results: Reference) -> dict[str, str]:
     vehicle : Vehicle
         The vehicle.
     results : Reference
-        Its reference results.
+        Reference results of the vehicle.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def reference_files(vehicle: Vehicle, results: Reference) -> dict[str, str]:
 
 
 def _is_shipped(vehicle: Vehicle) -> bool:
-    """Return whether this is a vehicle of the package with all the FMU's numbers, not one of the same name."""
+    """Return True for a vehicle of the package with all its numbers, not one with the same name alone."""
     if vehicle.name not in shipped_vehicles():
         return False
     shipped = load_vehicle(vehicle.name)

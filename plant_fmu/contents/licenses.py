@@ -1,4 +1,4 @@
-"""What may be done with an FMU: this project's licence, and that of what is compiled into it."""
+"""Licences of an FMU: this project's, and that of the code that is compiled into it."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def licenses(fmi: int) -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        ``license.txt``, which both FMI versions take for the entry, and what it refers to.
+        ``license.txt``, the entry in both FMI versions, and the files that it refers to.
 
     Raises
     ------
     BuildError
-        If the installation has lost its licence.
+        If the installation lacks its licence file.
     """
     package = resources.files("plant_fmu")
     # a wheel has a copy in the package, a checkout has the one file beside it

@@ -1,4 +1,4 @@
-"""The page that an FMU carries: ``documentation/index.html``, one file that needs no network."""
+"""The page in an FMU: ``documentation/index.html``, one file that needs no network."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle
 
-# role: title and remark; a role that is not named here goes under its own name
+# role: title and remark; another role has its own name as its title
 _ROLES = {
     "input": ("Inputs", "Commands; they may change at every communication point."),
     "state": ("States", "Start values may be set until initialisation ends."),
@@ -33,7 +33,7 @@ def page(vehicle: Vehicle, fmi: int, rows: Sequence[Variable] | None = None) -> 
     fmi : int
         2 or 3.
     rows : sequence of Variable, optional
-        Of its FMU, where they start at other values than the vehicle's own.
+        Variables of its FMU, where they start at other values than the vehicle's own.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def text(name: str) -> str:
     Returns
     -------
     str
-        What is in it.
+        Content of the file.
     """
     return (resources.files("plant_fmu.contents") / "pages" / name).read_text(encoding="utf-8")
 
@@ -74,7 +74,7 @@ def tables(rows: Sequence[Variable]) -> str:
     Parameters
     ----------
     rows : sequence of Variable
-        Of an FMU.
+        Variables of an FMU.
 
     Returns
     -------

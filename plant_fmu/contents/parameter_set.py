@@ -25,7 +25,7 @@ def ssv(vehicle: Vehicle, rows: Sequence[Variable] | None = None) -> str:
     vehicle : Vehicle
         The vehicle.
     rows : sequence of Variable, optional
-        Of its FMU, where they start at other values than the vehicle's own.
+        Variables of its FMU, where they start at other values than the vehicle's own.
 
     Returns
     -------
@@ -47,9 +47,9 @@ def parameter_set(name: str, description: str, values: Iterable[tuple[Variable, 
     Parameters
     ----------
     name : str
-        What the set is called.
+        Name of the set.
     description : str
-        What it is for.
+        Purpose of the set.
     values : iterable of (Variable, float)
         The variables, which give name, type and unit, and a value for each in SI units.
 

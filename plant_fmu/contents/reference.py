@@ -1,6 +1,6 @@
 """Reference results: a manoeuvre of all six degrees of freedom, integrated apart from the FMU.
 
-Nothing is shared with the C core but the vehicle's numbers. Fossen's equations stand here in matrix form and in the
+The C core is not used; only the vehicle's numbers are shared. Fossen's equations are here in matrix form and in the
 velocity relative to the water, in which a steady current drops out of them (Fossen 2011, Property 8.1); attitude is a
 rotation matrix, C(ν) does not depend on the linear velocity, and the integrator is DOP853 of SciPy with error control.
 """
@@ -32,7 +32,7 @@ START = dict(
 _START_QUATERNION = np.array([START[f"quaternion.e{i}"] for i in range(4)])
 CURRENT = {"current.x": 0.3, "current.y": -0.2, "current.z": 0.05}  # m/s, world frame
 
-# What is asked of each axis in each second: an amount of either sign, or nothing. The thrusters follow it as it stands,
+# Command of each axis in each second: an amount of either sign, or nothing. The thrusters follow it unchanged,
 # the wrench input backwards and by half. Moments sum up to nothing: not every vehicle rights itself.
 _TABLE = {
     "X": "+++00000----++++",
@@ -44,14 +44,14 @@ _TABLE = {
 }
 _FORCE = 0.25  # of the greatest that the thrusters give
 _ANGULAR_ACCELERATION = 0.6  # rad/s2, of a vehicle at rest
-_FULL_AHEAD, _BEYOND = 6, 1.2  # a second in which the thrusters are asked for more than they can give
+_FULL_AHEAD, _BEYOND = 6, 1.2  # a second in which the command is beyond the thrusters' limits
 
 RATE_LIMITED_LAG = 1e-3  # s, the least time constant of a thruster with a rate limit, as the plant defines it
 
 
 @dataclass(frozen=True)
 class Reference:
-    """A manoeuvre and what it leads to."""
+    """A manoeuvre and its results."""
 
     input_names: tuple[str, ...]  # of the columns after the time
     inputs: Array  # (rows, 1 + inputs), s, N, N m; two rows of one time are a jump

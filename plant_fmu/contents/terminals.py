@@ -38,7 +38,7 @@ class _Terminal:
     nested: dict[str, _Terminal] = field(default_factory=dict)
 
     def at(self, path: tuple[str, ...]) -> _Terminal:
-        """Return the terminal at a path below this one, made if need be."""
+        """Return the terminal at a path below this one; make it where it is missing."""
         if not path:
             return self
         return self.nested.setdefault(path[0], _Terminal()).at(path[1:])
@@ -65,7 +65,7 @@ def terminals_and_icons(vehicle: Vehicle) -> str:
             path, member = place
             root.at(path).members.append((member, v.name))
 
-    # FMI Library takes a file of another FMI version for broken, so this one is for FMI 3.0 alone
+    # FMI Library refuses such a file of another FMI version as damaged, so this one is for FMI 3.0 alone
     document = ET.Element("fmiTerminalsAndIcons", fmiVersion="3.0")
     picture = ET.SubElement(document, "GraphicalRepresentation")
     square = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}

@@ -13,7 +13,7 @@ from plant_fmu.importers.task import Answer, Task
 
 
 def main() -> None:
-    """Do what is requested; that an importer cannot be loaded, or refuses, is a reply too."""
+    """Run the requested driver; an importer that cannot be loaded, or refuses, is a reply too."""
     folder = Path.cwd()  # an importer may change it
     request = json.loads((folder / "request.json").read_text(encoding="utf-8"))
     reply: dict[str, object]
@@ -25,7 +25,7 @@ def main() -> None:
         try:
             answer: Answer = driver.run(read_fmu(Path(request["fmu"])), Task(**request["task"]), folder / "fmu")
             reply = asdict(answer)
-        except Exception as error:  # noqa: BLE001 whatever an importer raises is its answer
+        except Exception as error:  # noqa: BLE001 any exception of an importer is its answer
             reply = {"error": str(error) or type(error).__name__}
     (folder / "reply.json").write_text(json.dumps(reply), encoding="utf-8")
 

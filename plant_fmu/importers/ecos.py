@@ -13,7 +13,7 @@ from plant_fmu.importers.task import Answer, Task
 
 
 def _preload_tbb() -> None:
-    """Load what ecospy's library needs on Linux, and would not find where pip puts it."""
+    """Load the TBB library that ecospy needs on Linux, and does not find in the folder of its package."""
     if sys.platform != "linux":
         return
     for file in metadata.files("tbb") or []:
@@ -31,7 +31,7 @@ from ecospy import EcosLib, EcosSimulation, EcosSimulationStructure  # noqa: E40
 def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
     """Simulate to the stop time.
 
-    An ImporterError tells what Ecos refuses, in its own words.
+    An ImporterError quotes the error of Ecos.
     """
     EcosLib.set_log_level("err")
     with EcosSimulationStructure() as structure:

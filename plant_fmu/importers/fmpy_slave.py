@@ -12,14 +12,14 @@ from plant_fmu.importers.fmu_file import FmuFile
 
 
 class FmpySlave:
-    """One instance of an FMU. Messages go to the standard output, as FMPy has it.
+    """One instance of an FMU. FMPy prints its messages on the standard output.
 
     Parameters
     ----------
     fmu : FmuFile
         The FMU.
     folder : Path
-        Where it is extracted to.
+        Folder to which it is extracted.
     """
 
     def __init__(self, fmu: FmuFile, folder: Path) -> None:
@@ -30,7 +30,7 @@ class FmpySlave:
         self.instance = instantiate_fmu(str(folder), description, "CoSimulation")
 
     def initialise(self, start: Mapping[str, float], stop_time: float) -> None:
-        """Pass through initialisation at time 0 with start values, `stop_time` [s] announced."""
+        """Initialise at time 0 with start values; `stop_time` [s] is passed to the FMU."""
         if self._fmu.fmi == 2:
             self.instance.setupExperiment(startTime=0.0, stopTime=stop_time)
             self._set(start)

@@ -1,7 +1,7 @@
-"""FMPy saving a co-simulation FMU's state at half time, and going on from it three times to the same end.
+"""FMPy saving a co-simulation FMU's state at half time, and continuing from it three times to the same end.
 
-Once unbroken; once with the state put back into the same instance; and, where the FMU can serialise its state, once in
-an instance that never was initialised.
+Once without interruption; once with the state restored in the same instance; and, where the FMU can serialise its
+state, once in an instance that never was initialised.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from plant_fmu.importers.task import Answer, Task
 
 
 def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
-    """Simulate to the stop time by all ways, which must agree to the last bit."""
+    """Simulate to the stop time in each way, which must agree to the last bit."""
     fmpy.extract(fmu.path, folder)
     serialises = fmu.offers("CS", "canSerializeFMUState")
     half = task.steps // 2

@@ -12,9 +12,9 @@ from plant_fmu.importers.task import Answer, Task
 
 
 def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
-    """Validate an FMU; see `plant_fmu.importers.registry` for when.
+    """Validate an FMU; `plant_fmu.importers.registry` defines for which it applies.
 
-    An ImporterError names the first problem that is found.
+    An ImporterError names the first defect.
     """
     problems = validate_fmu(str(fmu.path))
     if problems:

@@ -1,4 +1,4 @@
-"""What an FMU file says of itself, read without running anything of it."""
+"""Read the description of an FMU file, without running anything of it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class FmuVariable:
 
 @dataclass(frozen=True)
 class FmuFile:
-    """An FMU file that is safe to extract, and what its model description says."""
+    """An FMU file that is safe to extract, with the content of its model description."""
 
     path: Path
     fmi: int  # 2 or 3
@@ -51,7 +51,7 @@ class FmuFile:
         return tuple(v for v in self.variables if v.is_real and v.causality == causality)
 
     def offers(self, interface: str, capability: str) -> bool:
-        """Tell whether an interface has a capability, whose name is in FMI 3.0's spelling."""
+        """Return True if an interface has a capability, which is named as in FMI 3.0."""
         attributes = {name.lower(): value for name, value in self.interfaces.get(interface, {}).items()}
         return attributes.get(capability.lower()) in ("true", "1")  # FMI 2.0 writes canGetAndSetFMUstate
 
@@ -67,12 +67,12 @@ def read_fmu(path: Path) -> FmuFile:
     Returns
     -------
     FmuFile
-        What it says.
+        The description.
 
     Raises
     ------
     FmuFileError
-        If there is no such file, it is not safe to extract, or has no model description of FMI 2.0 or 3.0 that can be.
+        If there is no such file, it is not safe to extract, or has no valid model description of FMI 2.0 or 3.0.
     """
     path = Path(path)
     with opened(path) as archive:

@@ -22,7 +22,7 @@ _TICKS = 10**9  # a second: libcosim counts time in whole nanoseconds
 def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
     """Simulate to the stop time.
 
-    An ImporterError tells what libcosim refuses, in its own words.
+    An ImporterError quotes the error of libcosim.
     """
     ticks = round(task.step * _TICKS)
     if not math.isclose(ticks / _TICKS, task.step, rel_tol=1e-12):

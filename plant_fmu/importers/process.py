@@ -1,4 +1,4 @@
-"""Running a driver in a process of its own, so that an importer that crashes or hangs is a result like any other."""
+"""Run a driver in its own process, so that an importer that crashes or hangs is a result like any other."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from plant_fmu.installing import install_hint
 
 TIMEOUT = 120.0  # s
 
-_TAIL = 4096  # bytes of what was said that are looked at
-_NOISE = "Start attribute is required"  # FMI Library, inside libcosim, says so of any independent variable
+_TAIL = 4096  # bytes at the end of the output that are searched for the error
+_NOISE = "Start attribute is required"  # FMI Library, inside libcosim, reports this for any independent variable
 
 
 def run_importer(importer: Importer, fmu: FmuFile, task: Task, timeout: float = TIMEOUT) -> Result:
-    """Let an importer do a task with an FMU.
+    """Run a task with an FMU in an importer.
 
     The FMU's binary is run, with the rights of this user: a process of its own guards against crashes, not against
     malice.
@@ -35,14 +35,14 @@ def run_importer(importer: Importer, fmu: FmuFile, task: Task, timeout: float = 
     fmu : FmuFile
         From `read_fmu`.
     task : Task
-        What to simulate.
+        Simulation to run.
     timeout : float
-        How long it may take [s].
+        Time limit [s].
 
     Returns
     -------
     Result
-        Whatever happens in the other process; nothing is raised.
+        The result; failures of the other process are results too, and nothing is raised.
     """
     version = importer.version()
 
@@ -69,7 +69,7 @@ def run_importer(importer: Importer, fmu: FmuFile, task: Task, timeout: float = 
             reply = json.loads((folder / "reply.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return result("failed", f"ended without an answer{said}")
-    if "unusable" in reply:  # which is no fault of the FMU
+    if "unusable" in reply:  # not a defect of the FMU
         return result("not installed", f"cannot be loaded: {reply['unusable']}")
     if "error" in reply:
         return result("failed", reply["error"] + said)
@@ -77,7 +77,7 @@ def run_importer(importer: Importer, fmu: FmuFile, task: Task, timeout: float = 
 
 
 def _run_child(folder: Path, timeout: float) -> tuple[int | None, str]:
-    """Run the driver; return its exit code, None if it was ended, and what was said last of an error."""
+    """Run the driver; return its exit code, None after a timeout, and the last line of its error output."""
     home = str(Path(__file__).parents[2])  # of this very package, which need not be installed
     paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
     with open(folder / "said.txt", "wb") as sink:

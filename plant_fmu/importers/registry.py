@@ -1,4 +1,4 @@
-"""The importers there are drivers for."""
+"""The importers that have drivers."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ class Importer:
 
     name: str
     module: str
-    packages: tuple[str, ...]  # what pip must have installed, as its requirements; the first is the importer itself
-    interface: str  # "CS", "ME", or "" where nothing is simulated
-    inapplicable: Callable[[FmuFile], str] = lambda fmu: ""  # why it does not apply to an FMU, "" if it does
+    packages: tuple[str, ...]  # requirements that pip must have installed; the first is the importer itself
+    interface: str  # "CS", "ME", or "" for a validator without simulation
+    inapplicable: Callable[[FmuFile], str] = lambda fmu: ""  # reason why it does not apply to an FMU, "" if it does
 
     def version(self) -> str:
-        """Return the version that is installed, or ``""`` if there is none."""
+        """Return the installed version, or ``""`` if there is none."""
         return _installed(Requirement(self.packages[0]))
 
     def missing(self) -> list[str]:
-        """Return the packages that are not there, or too old."""
+        """Return the packages that are missing or too old."""
         needed = {package: Requirement(package) for package in self.packages}
         return [package for package, r in needed.items() if not (v := _installed(r)) or v not in r.specifier]
 
     def objection(self, fmu: FmuFile) -> str:
-        """Return why this importer has nothing to do with an FMU, `fmu`, or ``""``."""
+        """Return the reason why this importer does not apply to an FMU, or ``""``."""
         if not self.interface:
             return self.inapplicable(fmu)
         if self.interface not in fmu.interfaces:

@@ -1,4 +1,4 @@
-"""What an importer is asked to do with an FMU, and what it answers."""
+"""The task of an importer with an FMU, and its answer."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _ROUNDING = 1e-9  # relative, of a stop time against a whole number of steps
 
 @dataclass(frozen=True)
 class Task:
-    """A simulation from time 0 with inputs that stay as they start.
+    """A simulation from time 0 with constant inputs.
 
     Parameters
     ----------
@@ -50,13 +50,13 @@ class Task:
 
     @property
     def steps(self) -> int:
-        """How many steps lead to the stop time."""
+        """Number of steps to the stop time."""
         return round(self.stop_time / self.step)
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a driver returns from its process when the importer took the FMU."""
+    """The result that a driver returns from its process when the importer accepted the FMU."""
 
     values: dict[str, float] = field(default_factory=dict)  # real outputs at the stop time
     jacobian: Jacobian = field(default_factory=dict)  # at the start
@@ -65,11 +65,11 @@ class Answer:
 
 @dataclass(frozen=True)
 class Result:
-    """What came of one importer; `note` is one line, and says why where the status is not ``"ok"``."""
+    """The result of one importer; `note` is one line, with the reason where the status is not ``"ok"``."""
 
     importer: str
     version: str  # "" where it is not installed
-    interface: str  # "CS", "ME", or "" where nothing is simulated
+    interface: str  # "CS", "ME", or "" for a validator without simulation
     status: Status
     note: str = ""
     values: dict[str, float] = field(default_factory=dict)

@@ -14,7 +14,7 @@ from plant_fmu.importers.task import Answer, Task
 
 
 class _Complaints(logging.Handler):
-    """Keeps what is logged as an error, which is how the checks speak."""
+    """Collect log records of errors, through which the checks report."""
 
     def __init__(self) -> None:
         super().__init__(level=logging.ERROR)
@@ -27,7 +27,7 @@ class _Complaints(logging.Handler):
 def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
     """Apply every check the toolbox has to an FMU.
 
-    An ImporterError names the first problem that is found.
+    An ImporterError names the first defect.
     """
     complaints = _Complaints()
     logging.getLogger("fmu_manipulation_toolbox").addHandler(complaints)

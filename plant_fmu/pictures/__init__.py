@@ -1,4 +1,4 @@
-"""Pictures of a vehicle: where its thrusters push, and the variables of its FMU.
+"""Pictures of a vehicle: lines of action of its thrusters, and the variables of its FMU.
 
 Every function returns a new figure; none shows or saves anything. Matplotlib is needed only when one is called.
 

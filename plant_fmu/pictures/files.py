@@ -1,4 +1,4 @@
-"""Figures as files."""
+"""Encode figures as files."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ IMAGES = ("png", "svg", "pdf")
 
 
 def image(figure: Figure, suffix: str) -> bytes:
-    """Return a figure as a file, the same for the same figure at any time.
+    """Encode a figure as an image file; equal figures give equal bytes.
 
     Parameters
     ----------
     figure : Figure
         The picture.
     suffix : {"png", "svg", "pdf"}
-        Kind of the file.
+        Format of the file.
 
     Returns
     -------
     bytes
-        What stands in it.
+        Content of the file.
     """
     import matplotlib as mpl
     from matplotlib.text import Text

@@ -1,4 +1,4 @@
-"""Where the thrusters push, seen from above, from starboard and from behind."""
+"""A picture of the thrusters' forces from above, from starboard and from behind."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _View:
-    """One way to look at the body; body axes are told by their places in x, y, z."""
+    """A direction of view; body axes are given by their indices in x, y, z."""
 
     title: str
     across: int  # to the right
     upright: int
     down: bool  # the upright axis points downwards
-    eye: tuple[float, float, float]  # from the body towards who looks
+    eye: tuple[float, float, float]  # from the body towards the viewer
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class _Push:
 
     place: Array  # (2,) m
     arrow: Array  # (2,) m
-    towards: float  # 1 towards who looks, -1 away, 0 across
+    towards: float  # 1 towards the viewer, -1 away, 0 across
     numbers: str
 
     def along(self) -> Array:
@@ -51,9 +51,9 @@ _VIEWS = (
 _AXES = ("x forward", "y to starboard", "z down")
 _PUSH, _HULL, _WEIGHT, _LIFT = "#0072b2", "#999999", "#d55e00", "#009e73"
 _FLAT = 0.2  # part of a unit force in the plane of a view, below which it is drawn as a dot or a cross
-_SAME = 1e-3  # of the vehicle's reach; what is nearer together is one place
+_SAME = 1e-3  # of the vehicle's reach; points at a smaller distance are one place
 _ROOM, _ARROW, _BESIDE, _LETTER = 1.7, 0.42, 0.17, 0.06  # of that reach: half a view, an arrow, to a number, a letter
-_AROUND = 16  # places about an end of an arrow where its numbers may stand
+_AROUND = 16  # possible places of the numbers about an end of an arrow
 _NOTE = (
     "An arrow is the force of a positive command; a dot comes towards you, a cross goes away. A vehicle's file has the "
     "thrusters' wrenches alone:\neach stands at the point of its line of action that is nearest to the body origin."
@@ -66,7 +66,7 @@ def thrusters(vehicle: Vehicle) -> Figure:
     Parameters
     ----------
     vehicle : Vehicle
-        What is drawn.
+        Vehicle to draw.
 
     Returns
     -------
@@ -133,7 +133,7 @@ def _draw_view(ax: Axes, view: _View, vehicle: Vehicle, lines: list[ThrusterLine
 
 
 def _places(lines: list[ThrusterLine], plane: list[int], reach: float) -> dict[tuple[float, float], list[int]]:
-    """Return which thrusters stand at each place of a view, those one behind the other together."""
+    """Group the thrusters by their place in a view; thrusters behind each other share a place."""
     places: dict[tuple[float, float], list[int]] = {}
     for i, line in enumerate(lines):
         if not line.force.any():
@@ -145,7 +145,7 @@ def _places(lines: list[ThrusterLine], plane: list[int], reach: float) -> dict[t
 
 
 def _ways(lines: list[ThrusterLine], members: list[int], view: _View) -> dict[tuple[float, float, float], list[int]]:
-    """Return which of some thrusters push which way: in the plane of a view, or towards who looks (1) or away (-1)."""
+    """Group thrusters by the direction of their force: (x, y, 0) in the view's plane, or (0, 0, ±1) across it."""
     ways: dict[tuple[float, float, float], list[int]] = {}
     for i in members:
         force = lines[i].force / np.linalg.norm(lines[i].force)
@@ -168,7 +168,7 @@ def _draw_push(ax: Axes, push: _Push) -> None:
 
 
 def _free_place(push: _Push, width: Array, taken: Array, beside: float) -> Array:
-    """Return the place for a push's numbers that is farthest from all that is drawn."""
+    """Return the place for a push's numbers that is farthest from everything drawn."""
     angles = np.linspace(0.0, 2.0 * np.pi, _AROUND, endpoint=False)
     around = beside * np.column_stack([np.cos(angles), np.sin(angles)])
     candidates = np.vstack([push.place + around, push.place + push.arrow + around])

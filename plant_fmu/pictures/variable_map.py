@@ -1,4 +1,4 @@
-"""The variables of a vehicle's FMU: what goes in, what is integrated, what comes out, and what can be set."""
+"""A map of the variables of a vehicle's FMU: inputs, states, outputs and parameters."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# beginnings of parameters' names, by what they are of
+# prefixes of parameters' names, by their family
 FAMILIES = {
     "body": ("mass", "inertia", "r_G", "r_B", "weight", "buoyancy", "hull_radius"),
     "water on the body": ("added_mass", "linear_damping", "quadratic_damping"),
@@ -35,7 +35,7 @@ class Row:
 
     text: str  # such as position.{x, y, z}
     count: int
-    units: str  # and what is unusual
+    units: str  # and remarks
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def variable_map(vehicle: Vehicle) -> Figure:
     Parameters
     ----------
     vehicle : Vehicle
-        What is drawn.
+        Vehicle to draw.
 
     Returns
     -------
@@ -106,7 +106,7 @@ def variable_map(vehicle: Vehicle) -> Figure:
 
 
 def rows_of(table: Iterable[Variable]) -> list[Row]:
-    """Return variables in lines, those together whose names differ in an index or a last part.
+    """Group variables into lines; names that differ in an index or a last part share one.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def rows_of(table: Iterable[Variable]) -> list[Row]:
     Returns
     -------
     list of Row
-        Every variable is counted in one of them.
+        Lines; each variable is in one of them.
     """
     stems: dict[str, list[Variable]] = {}
     for v in table:

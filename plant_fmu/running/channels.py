@@ -1,4 +1,4 @@
-"""Inputs and outputs of an FMU as arrays, and the C calls that carry them, prepared once."""
+"""Inputs and outputs of an FMU as arrays, and the prepared C calls that transfer them."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Bound:
     instance : Instance
         The FMU's instance; the calls are for its life alone.
     brief : bool
-        They take microseconds, and keep Python's global lock meanwhile; otherwise each gives it up.
+        True if the calls take microseconds: they keep Python's global lock. Otherwise each call releases it.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Bound:
     starts : ndarray, shape (n,)
         Start values of the inputs.
     set_inputs, get_outputs, get_flags, do_step : Call
-        Made with ``function(*arguments)``, which is what a step spends its time on.
+        Made with ``function(*arguments)``, which takes most of the time of a step.
     now, length : ctypes.c_double
         Arguments of `do_step` [s].
     ended : ctypes.c_bool
@@ -67,7 +67,7 @@ class Bound:
     """
 
     def __init__(self, instance: Instance, brief: bool = False) -> None:
-        # a call that gives the lock up wakes every thread that waits for it, mostly to find it taken again
+        # a call that releases the lock wakes every thread that waits for it, mostly to find it taken again
         self._library = ctypes.PyDLL(None, handle=instance.fmu.dll._handle) if brief else instance.fmu.dll
         scalars = [v for v in instance.variables.values() if not v.dimensions]
         inputs = [v for v in scalars if v.causality == "input" and v.type in DOUBLES]
@@ -94,7 +94,7 @@ class Bound:
 
     def _of_step(self, instance: Instance) -> Call:
         component = ctypes.c_void_p(instance.fmu.component)
-        # an FMU may forget what was before a step, unless its state may be restored
+        # an FMU without save and restore may discard the state before a step
         forgets = "state" not in instance.capabilities
         if instance.fmi == 2:
             return self._library["fmi2DoStep"], (component, self.now, self.length, ctypes.c_int(forgets))
@@ -103,7 +103,7 @@ class Bound:
         return self._library["fmi3DoStep"], (component, self.now, self.length, ctypes.c_bool(forgets), *results)
 
     def _of_values(self, instance: Instance, name: str, variables: list[Any], buffer: Any) -> Call:
-        if not variables:  # some FMUs refuse to be asked for nothing
+        if not variables:  # some FMUs refuse a call without variables
             return _nothing, ()
         n = ctypes.c_size_t(len(variables))
         references = (ctypes.c_uint * len(variables))(*(v.valueReference for v in variables))
@@ -122,7 +122,7 @@ def _doubles(values: NDArray[np.float64]) -> Any:
 
 
 def _as_bools(buffer: Any, size: int) -> NDArray[np.bool_]:
-    """Return a view of Booleans of `size` bytes each: of FMI 2.0's ints, 0 or 1, the lowest byte tells."""
+    """Return a view of Booleans of `size` bytes each; FMI 2.0's ints are 0 or 1, in the lowest byte."""
     if not len(buffer):
         return np.zeros(0, np.bool_)
     return np.frombuffer(buffer, np.bool_)[0 if sys.byteorder == "little" else size - 1 :: size]

@@ -1,4 +1,4 @@
-"""An FMU that steps, driven through FMPy with buffers and calls that are made once."""
+"""A co-simulation FMU driven through FMPy, with buffers and calls that are made once."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ _AT_ZERO = Clock(0.0, 0, math.nan)
 
 
 class CoSimulationInstance:
-    """Any co-simulation FMU, FMI 2.0 or 3.0, that is stepped from Python.
+    """A co-simulation FMU, FMI 2.0 or 3.0, that is stepped from Python.
 
     Parameters
     ----------
     path : Path
         The FMU file.
     brief : bool
-        A step of it takes microseconds. Then it keeps Python's global lock: threads beside it wait no longer for that,
-        and cost it less. Otherwise they run while it steps.
+        True if a step takes microseconds. Then it keeps Python's global lock: other threads wait no longer than that,
+        and slow it less. Otherwise they run while it steps.
 
     Attributes
     ----------
     inputs : Channels
         Real scalar inputs. Write into ``inputs.values``; each step sends them.
     outputs : Channels
-        Real scalar outputs, as they are after the last step; ``outputs.values`` cannot be written.
+        Real scalar outputs after the last step; ``outputs.values`` cannot be written.
     flags : Channels
-        Boolean outputs; ``flags.values`` is what `read_flags` last read.
+        Boolean outputs; `read_flags` updates ``flags.values``.
     time : float
         [s].
 
@@ -65,12 +65,12 @@ class CoSimulationInstance:
         self._wind(_AT_ZERO, initialised=False)
 
     def _wind(self, clock: Clock, *, initialised: bool) -> None:
-        """Set the clock. The next step passes through `_pace`, whatever its length, for NaN equals none."""
+        """Set the clock. The next step calls `_pace`, whatever its length, for NaN equals no number."""
         self._start, self._count, self._last_step = clock.start, clock.count, clock.step
         self._step = math.nan
         self.time, self.initialised = clock.time, initialised
 
-    # ---- what there is ----
+    # ---- properties ----
 
     @property
     def name(self) -> str:
@@ -114,7 +114,7 @@ class CoSimulationInstance:
             variables, numbers = batches.setdefault(variable.type, ([], []))
             variables.append(variable)
             numbers.append(checked(variable, value))
-        # real numbers go in one call, of which the FMU takes all or none: last, after what may be refused one by one
+        # real numbers go last, in one call, of which the FMU takes all or none
         for _, (variables, numbers) in sorted(batches.items(), key=lambda batch: batch[0] in DOUBLES):
             self._instance.set(variables, numbers)
             for variable, number in zip(variables, numbers, strict=True):
@@ -165,17 +165,17 @@ class CoSimulationInstance:
     # ---- life ----
 
     def initialise(self, time: float = 0.0) -> None:
-        """Pass through initialisation, and read the outputs.
+        """Initialise the FMU, and read the outputs.
 
         Parameters
         ----------
         time : float
-            When to start [s].
+            Start time [s].
 
         Raises
         ------
         PlantError
-            If the FMU finds its parameters wanting, or was initialised before; `reset` takes the plant back then.
+            If the FMU refuses its parameters, or is initialised already; `reset` it first then.
         """
         self._require_open()
         if self.initialised:
@@ -198,7 +198,7 @@ class CoSimulationInstance:
         self._read()
 
     def reset(self) -> None:
-        """Go back to where the plant was after loading: start values of the FMU, not initialised, time 0.
+        """Return to the state after loading: start values of the FMU, not initialised, time 0.
 
         Raises
         ------
@@ -207,7 +207,7 @@ class CoSimulationInstance:
         """
         self._require_open()
         self._instance.do(self._instance.fmu.reset)
-        self._instance.messages.said()  # no error to come is explained by what was before
+        self._instance.messages.said()  # so that a later error does not quote earlier messages
         self.inputs.values[:] = self._bound.starts
         self._wind(_AT_ZERO, initialised=False)
 
@@ -261,7 +261,7 @@ class CoSimulationInstance:
             raise PlantError(f"the outputs cannot be read: {self._said()}")
 
     def read_flags(self) -> NDArray[np.bool_]:
-        """Read the Boolean outputs as they are after the last step.
+        """Read the Boolean outputs after the last step.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""One instance of a co-simulation FMU, FMI 2.0 or 3.0, loaded through FMPy: its life, its messages, its variables."""
+"""One instance of a co-simulation FMU, FMI 2.0 or 3.0, loaded through FMPy: life cycle, messages, variables."""
 
 from __future__ import annotations
 
@@ -40,27 +40,27 @@ _CAPABILITIES = {
 
 
 class Messages:
-    """What an FMU says. It knows nothing of the instance, so that callbacks keep nothing alive."""
+    """Messages of an FMU. The object has no reference to the instance, so that callbacks keep nothing alive."""
 
     def __init__(self) -> None:
         self._failures: deque[str] = deque(maxlen=4)
 
-    def hear(self, status: int, message: bytes) -> None:
-        """Log a message, and keep it if it tells of a failure."""
+    def receive(self, status: int, message: bytes) -> None:
+        """Log a message, and keep it if its status is a failure."""
         text = message.decode("utf-8", "replace")
         log.debug("FMU: %s", text)
         if status > WARNING:
             self._failures.append(" ".join(text.split()))
 
     def said(self) -> str:
-        """Return the failures told of since this was last asked, "" for none."""
+        """Return the failures since the last call, joined by semicolons, and clear them; "" for none."""
         said = "; ".join(self._failures)
         self._failures.clear()
         return said
 
 
 class Instance:
-    """An instantiated FMU in a temporary folder that goes with it.
+    """An instantiated FMU in a temporary folder, which is removed with it.
 
     Parameters
     ----------
@@ -74,19 +74,19 @@ class Instance:
     variables : dict from str to fmpy.model_description.ScalarVariable
         By name, in the order of the model description.
     fmu : FMU2Slave or FMU3Slave
-        What FMPy offers.
+        FMPy's object for the FMU.
 
     Raises
     ------
     PlantError
-        If it cannot be loaded; nothing is left behind.
+        If it cannot be loaded; no file is left behind.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.messages = Messages()
         self._states: dict[int, Any] = {}  # handles to free, by address
-        self._dropped: deque[int] = deque()  # addresses of those that nobody holds any more
+        self._dropped: deque[int] = deque()  # addresses of states without references
         folder = tempfile.mkdtemp(prefix="plant_fmu-")
         loaded: list[Any] = []
         self._end = weakref.finalize(self, _release, loaded, self._states, folder)
@@ -139,13 +139,13 @@ class Instance:
         if self.fmi == 2:
             self.fmu.instantiate(callbacks=_callbacks_fmi2(self.messages))
         else:
-            hear = self.messages.hear
-            self.fmu.instantiate(logMessage=lambda environment, status, category, message: hear(status, message))
+            receive = self.messages.receive
+            self.fmu.instantiate(logMessage=lambda environment, status, category, message: receive(status, message))
 
     # ---- calls ----
 
     def do(self, call: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
-        """Call one of FMPy's methods; what it raises becomes a PlantError in the FMU's own words."""
+        """Call one of FMPy's methods; raise its error as a PlantError with the FMU's own message."""
         try:
             return call(*arguments, **named)
         except Exception as error:
@@ -169,16 +169,16 @@ class Instance:
     # ---- FMU states ----
 
     def keep(self, handle: Any) -> Any:
-        """Remember a state's handle, to be freed at the end at the latest, and return it."""
+        """Store a state's handle, so that `close` frees it at the latest, and return it."""
         self._states[handle.value] = handle
         return handle
 
     def drop(self, address: int) -> None:
-        """Note that nobody holds a state any more. Any thread may say so; it is freed in the instance's own."""
+        """Mark a state for `sweep`. Any thread may call this; the state is freed in the instance's own thread."""
         self._dropped.append(address)
 
     def sweep(self) -> None:
-        """Free the states that nobody holds any more."""
+        """Free the marked states."""
         while self._dropped:
             self.free(self._dropped.popleft())
 
@@ -191,7 +191,7 @@ class Instance:
 
     @property
     def closed(self) -> bool:
-        """Whether `close` was called."""
+        """True after `close`."""
         return not self._end.alive
 
     def close(self) -> None:
@@ -201,9 +201,9 @@ class Instance:
 
 @functools.lru_cache(maxsize=16)
 def _described(xml: bytes) -> Any:
-    """Return what FMPy reads in a model description, to be read alone: half of the time that an instance takes to make.
+    """Return FMPy's parsed model description, which is not to be changed; parsing is half of an instance's start.
 
-    It wants an FMU, so there is one of nothing else.
+    FMPy reads FMUs only, so the text is packed into one without other files.
     """
     return fmpy.read_model_description(io.BytesIO(archive_of({DESCRIPTION: xml})))
 
@@ -230,11 +230,11 @@ def _one_line(error: Exception) -> str:
 
 def _callbacks_fmi2(messages: Messages) -> fmi2CallbackFunctions:
     # not through FMPy's logger proxy, which formats variadic messages but serves one instance in the whole process
-    def hear(environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
-        messages.hear(status, message)
+    def receive(environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
+        messages.receive(status, message)
 
     callbacks = fmi2CallbackFunctions()
-    callbacks.logger = fmi2CallbackLoggerTYPE(hear)
+    callbacks.logger = fmi2CallbackLoggerTYPE(receive)
     callbacks.allocateMemory = default_callbacks.allocateMemory
     callbacks.freeMemory = default_callbacks.freeMemory
     return callbacks

@@ -1,4 +1,4 @@
-"""The C functions of an instance as numbers, for compiled loops that call them without Python."""
+"""Addresses of an instance's C functions, for compiled loops that call them without Python."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from plant_fmu.running.instance import Instance
 class Native(NamedTuple):
     """An FMI 3.0 instance for callers in C: addresses of C functions, and the buffers that they read and fill.
 
-    It holds while the plant is open, and only one caller may step at a time.
+    It is valid while the plant is open, and only one caller may step at a time.
     """
 
     instance: int  # first argument of every function
@@ -27,23 +27,23 @@ class Native(NamedTuple):
     inputs: NDArray[np.float64]  # (n,) sent by set_values
     output_references: NDArray[np.uint32]  # (m,)
     outputs: NDArray[np.float64]  # (m,) filled by get_values
-    results: NDArray[np.int64]  # (4,) room for what fmi3DoStep returns by pointer, each at the first byte of its place
+    results: NDArray[np.int64]  # (4,) results of fmi3DoStep by pointer, each at the first byte of its element
 
 
 def native_of(instance: Instance, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Native:
-    """Return the addresses of an instance.
+    """Return the addresses of an instance's C functions, with buffers.
 
     Parameters
     ----------
     instance : Instance
-        Of an FMI 3.0 FMU.
+        Instance of an FMI 3.0 FMU.
     inputs, outputs : tuple of str
         Real scalar variables, in the order of the buffers.
 
     Returns
     -------
     Native
-        With buffers of its own, all zero.
+        Addresses, with buffers of their own, all zero.
 
     Raises
     ------

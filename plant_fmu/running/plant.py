@@ -1,4 +1,4 @@
-"""A vehicle to step from Python: its FMU, made where it is not there yet, with its state and its derivatives."""
+"""A vehicle that is stepped from Python: its FMU, built where it is missing, with its state and its derivatives."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ class Plant(CoSimulationInstance):
     source : str, Path or Vehicle
         A shipped vehicle's name, a vehicle's TOML file, a vehicle, or a file that ends in .fmu.
     fmi : int
-        2 or 3: which FMU a vehicle gets. An FMU file has its own version.
+        FMI version of a vehicle's FMU, 2 or 3. An FMU file has its own version.
 
     Attributes
     ----------
     inputs : Channels
         Real scalar inputs. Write into ``inputs.values``; each step sends them.
     outputs : Channels
-        Real scalar outputs, as they are after the last step; ``outputs.values`` cannot be written.
+        Real scalar outputs after the last step; ``outputs.values`` cannot be written.
     flags : Channels
-        Boolean outputs; ``flags.values`` is what `read_flags` last read.
+        Boolean outputs; `read_flags` updates ``flags.values``.
     time : float
         [s].
     initialised : bool
-        Whether it can step.
+        True if the plant can step.
 
     Raises
     ------
@@ -49,8 +49,8 @@ class Plant(CoSimulationInstance):
 
     Notes
     -----
-    ``plant[name]`` reads any scalar variable; ``plant[name] = value`` sets an input for the next step, or whatever else
-    `set` sets. A plant belongs to one thread at a time; different plants know nothing of each other.
+    ``plant[name]`` reads any scalar variable; ``plant[name] = value`` sets an input for the next step, or another
+    variable that `set` accepts. A plant belongs to one thread at a time; different plants are independent.
 
     Examples
     --------
@@ -66,7 +66,7 @@ class Plant(CoSimulationInstance):
 
     def __init__(self, source: str | Path | Vehicle, fmi: int = 3) -> None:
         path = _fmu_of(source, fmi)
-        super().__init__(path, brief=str(path) != str(source))  # what is no FMU file is a vehicle, whose FMU is ours
+        super().__init__(path, brief=str(path) != str(source))  # a vehicle's FMU is this package's own, and fast
 
     def save(self) -> State:
         """Save the present state: that of the FMU, the time and the inputs.
@@ -74,12 +74,12 @@ class Plant(CoSimulationInstance):
         Returns
         -------
         State
-            For `restore`, as often as wanted.
+            State for `restore`, which can be used many times.
 
         Raises
         ------
         PlantError
-            If the FMU cannot.
+            If the FMU does not support it.
         """
         self._require("state", "cannot save its state")
         self._instance.sweep()
@@ -88,7 +88,7 @@ class Plant(CoSimulationInstance):
         return State(self._instance, handle, clock, self.initialised, self.inputs.values.copy())
 
     def restore(self, state: State) -> None:
-        """Go back, or on, to a saved state of this plant; all goes on from there to the last bit as it did then.
+        """Restore a saved state of this plant, from which the simulation is the same to the last bit.
 
         Parameters
         ----------
@@ -98,7 +98,7 @@ class Plant(CoSimulationInstance):
         Raises
         ------
         PlantError
-            If it was freed, or is of another plant.
+            If the state was freed, or is of another plant.
         """
         self._require_open()
         self._instance.sweep()
@@ -109,7 +109,7 @@ class Plant(CoSimulationInstance):
             self._read()
 
     def free(self, state: State) -> None:
-        """Free a saved state now, rather than when nobody holds it any more. May be called twice."""
+        """Free a saved state now, rather than with its last reference. May be called twice."""
         if not self._instance.closed:
             state.free(self._instance)
 
@@ -119,31 +119,31 @@ class Plant(CoSimulationInstance):
         Raises
         ------
         PlantError
-            If the FMU cannot, or the state is not of this plant.
+            If the FMU does not support it, or the state is of another plant.
         """
         self._require("serialise", "cannot serialise its state")
         return to_bytes(state, self._instance)
 
     def deserialise(self, data: bytes) -> State:
-        """Return the state that `serialise` made the bytes `data` of.
+        """Return the state that `serialise` converted to the bytes `data`.
 
         Raises
         ------
         PlantError
-            If the bytes are of no state, of another FMU's, or damaged.
+            If the bytes are no state, of another FMU, or damaged.
         """
         self._require("serialise", "cannot serialise its state")
         return from_bytes(data, self._instance)
 
     def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NDArray[np.float64]:
-        """Return the partial derivatives of some variables by others, as things are now.
+        """Return the partial derivatives of some variables by others at the present state.
 
         Parameters
         ----------
         unknowns : sequence of str
             Names of `m` outputs or derivatives.
         knowns : sequence of str
-            Names of `n` inputs or states; what else may stand here is the FMU's affair.
+            Names of `n` inputs or states; an FMU may accept further variables.
 
         Returns
         -------
@@ -170,7 +170,7 @@ class Plant(CoSimulationInstance):
     def native(self, inputs: Sequence[str], outputs: Sequence[str]) -> Native:
         """Return the C functions of an initialised FMI 3.0 plant for a compiled loop.
 
-        Such a loop steps the FMU behind this object's back: `time` and the channels stay as they were, so `reset` the
+        Such a loop steps the FMU without this object: `time` and the channels do not change, so `reset` the
         plant, or close it, afterwards.
 
         Parameters

@@ -1,4 +1,4 @@
-"""A plant's saved state: the FMU's own, and what the master's side of it remembers; as bytes too."""
+"""A plant's saved state: the FMU's own, with clock and inputs; as bytes too."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MAGIC = b"PLANTST1"
 
 @dataclass(frozen=True)
 class Clock:
-    """Where a plant is in time: `count` steps of `step` after `start`, so that no rounding adds up."""
+    """The time of a plant: `count` steps of `step` after `start`, so that no rounding adds up."""
 
     start: float  # s
     count: int
@@ -35,16 +35,16 @@ class Clock:
 
 
 class State:
-    """What `Plant.save` returns. It is freed with `Plant.free`, else when nobody holds it any more.
+    """A state from `Plant.save`. `Plant.free` frees it, else its last reference does.
 
     Attributes
     ----------
     clock : Clock
-        Where in time it was saved.
+        Time at which it was saved.
     initialised : bool
-        Whether the plant was, then.
+        True if the plant was initialised then.
     inputs : ndarray, shape (n,)
-        The inputs then.
+        Inputs at that time.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class State:
 
     @property
     def time(self) -> float:
-        """When it was saved [s]."""
+        """Time at which it was saved [s]."""
         return self.clock.time
 
     def __reduce_ex__(self, protocol: Any) -> Any:
@@ -69,7 +69,7 @@ class State:
         Raises
         ------
         PlantError
-            If it was freed, or is of another plant.
+            If the state was freed, or is of another plant.
         """
         if self._instance is not instance:
             raise PlantError("the state is of another plant; serialise it there, and deserialise it here")
@@ -78,7 +78,7 @@ class State:
         return self._handle
 
     def free(self, instance: Instance) -> None:
-        """Free it now, in its own `instance`; a second time does nothing."""
+        """Free the state now, in its own `instance`; a second call does nothing."""
         if self._end.alive:
             self.handle(instance)
             self._end.detach()
@@ -86,7 +86,7 @@ class State:
 
 
 def to_bytes(state: State, instance: Instance) -> bytes:
-    """Return a state as bytes that any plant with the same FMU can read, on the same kind of machine."""
+    """Serialise a state to bytes that any plant with the same FMU can read, on the same kind of machine."""
     own: bytes = instance.do(instance.fmu.serializeFMUState, state.handle(instance))
     clock, inputs = state.clock, state.inputs.astype("<f8")
     start = _BODY.pack(state.initialised, clock.start, clock.count, clock.step, len(inputs))
@@ -100,7 +100,7 @@ def from_bytes(data: bytes, instance: Instance) -> State:
     Raises
     ------
     PlantError
-        If the bytes are of no state, of another FMU's, or damaged.
+        If the bytes are no state, of another FMU, or damaged.
     """
     if len(data) < _HEAD.size + _BODY.size or not data.startswith(_MAGIC):
         raise PlantError(f"{len(data)} bytes came, expected a serialised state of a plant")
@@ -117,5 +117,5 @@ def from_bytes(data: bytes, instance: Instance) -> State:
 
 
 def _mark(instance: Instance) -> bytes:
-    """Return what tells one FMU from another."""
+    """Return an 8-byte digest that identifies the FMU: its FMI version and token."""
     return hashlib.sha256(f"{instance.fmi} {instance.token}".encode()).digest()[:8]

@@ -1,4 +1,4 @@
-"""Values on their way into an FMU: each is checked against the type of its variable before the FMU sees it."""
+"""Check values against the type of their variable before an FMU receives them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from plant_fmu.running.channels import DOUBLES
 Value = float | int | bool | str
 
 _REALS = (*DOUBLES, "Float32")
-_WHOLE = {  # how many bits, and whether signed
+_WHOLE = {  # number of bits, and True if signed
     "Integer": (32, True),
     "Enumeration": (32, True),  # of FMI 3.0 it is wider; no enumeration has that many items
     **{f"Int{bits}": (bits, True) for bits in (8, 16, 32, 64)},
@@ -22,19 +22,19 @@ _WHOLE = {  # how many bits, and whether signed
 
 
 def checked(variable: Any, value: object) -> Value:
-    """Return a value as its variable's type has it.
+    """Convert a value to its variable's type.
 
     Parameters
     ----------
     variable : fmpy.model_description.ScalarVariable
-        Where it goes.
+        Variable to set.
     value : float, int, bool or str
-        What came. Whole numbers may come as floats, and Booleans as 0 and 1.
+        Value to convert. Whole numbers may be floats, and Booleans 0 and 1.
 
     Returns
     -------
     float, int, bool or str
-        For FMPy's setter of the variable's type.
+        Argument for FMPy's setter of the variable's type.
 
     Raises
     ------
@@ -60,19 +60,19 @@ def checked(variable: Any, value: object) -> Value:
 
 
 def require_settable(variable: Any, initialised: bool) -> None:
-    """Refuse to set what FMI does not let be set.
+    """Require that FMI allows to set a variable now.
 
     Parameters
     ----------
     variable : fmpy.model_description.ScalarVariable
-        What is to be set.
+        Variable to set.
     initialised : bool
-        Whether initialisation is over.
+        True after initialisation.
 
     Raises
     ------
     PlantError
-        If it is calculated, constant, or fixed by now.
+        If the variable is calculated, constant, or fixed by now.
     """
     if variable.causality == "input":
         return

@@ -44,6 +44,6 @@ def coupling_inputs(vehicle: Vehicle) -> Iterator[Variable]:
 
 
 def coupling_parameters() -> Iterator[Variable]:
-    """Yield what the inputs need beside them."""
+    """Yield the parameters that belong to the inputs."""
     description = "Supply voltage of thrusters that are commanded by pulses"
     yield Variable("supply_voltage", "parameter", "coupling.supply_voltage", q.VOLTAGE, description, 16.0)

@@ -19,14 +19,14 @@ def variables(vehicle: Vehicle, coupled: bool = False) -> list[Variable]:
     Parameters
     ----------
     vehicle : Vehicle
-        Gives the start values and the number of thrusters.
+        Vehicle with the start values and the number of thrusters.
     coupled : bool, optional
         With the inputs by which other components act on the vehicle.
 
     Returns
     -------
     list of Variable
-        Real variables first, then the Integer and the Boolean ones. The states stand together, in the order of their
+        Real variables first, then the Integer and the Boolean ones. The states are consecutive, in the order of their
         derivatives.
 
     Raises
@@ -59,14 +59,14 @@ def variables(vehicle: Vehicle, coupled: bool = False) -> list[Variable]:
 
 
 def _expand(patterns: tuple[str, ...], names: list[str]) -> tuple[str, ...]:
-    """Return the names that the patterns mean, in the order of the table."""
+    """Return the names that match the patterns, in the order of the table."""
     exact = {pattern for pattern in patterns if not pattern.endswith("*")}
     beginnings = tuple(pattern[:-1] for pattern in patterns if pattern.endswith("*"))
     return tuple(name for name in names if name in exact or (beginnings and name.startswith(beginnings)))
 
 
 def _along(i: int) -> str:
-    """Say along or about which body axis component `i` of a velocity or a wrench is."""
+    """Describe the body axis along or about which component `i` of a velocity or a wrench is."""
     return f"{'along' if i < 3 else 'about'} body {AXES[i % 3]}"
 
 

@@ -42,7 +42,7 @@ class Variable:
         return (abs(self.start) if self.role == "parameter" else 0.0) or self.quantity.nominal
 
     def text(self, value: float) -> str:
-        """Write a value of this variable as XML has it; a real number reads back to the same bits."""
+        """Format a value of this variable for XML; a real number reads back to the same bits."""
         if self.type == "boolean":
             return "true" if value else "false"
         return str(int(value)) if self.type == "integer" else repr(float(value))

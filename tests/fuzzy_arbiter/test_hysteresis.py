@@ -110,9 +110,9 @@ def plain(rules, shapes=CROSSED):
     return Arbiter(system=System((x,), (y,), rules, normalization="range"))
 
 
-def test_terms_can_be_given_where_the_rules_do_not_tell():
+def test_terms_can_be_given_where_the_rules_do_not_determine_them():
     arbiter = plain(("if x is on or x is off then y is high",))
-    with pytest.raises(DefinitionError, match="on: the rules do not tell"):
+    with pytest.raises(DefinitionError, match="on: the rules do not determine"):
         HysteresisArbiter(arbiter, enter=1, release=0)
     assert HysteresisArbiter(arbiter, enter=1, release=0, on={"x": "off"})([0.0], 0) == (1,)
     turned = HysteresisArbiter(Arbiter([Criterion("c")]), enter=1, release=0, on={"c": "off"})

@@ -1,6 +1,6 @@
-"""Shapes: one file each, which holds all that the software knows of the shape as its ``ENTRY``.
+"""Shapes: one file each, which defines all properties of the shape as its ``ENTRY``.
 
-A file that is put here is a shape, known by the name of the file; C code of the same name may stand beside it.
+Each file in this folder is a shape, with the file's name; C code of the same name may be beside it.
 
 Imports: nothing.
 """
@@ -12,7 +12,7 @@ from controller.regions.entry import Entry
 
 
 def _found() -> dict[str, Entry]:
-    """Return the entries of all files here, those of position first, each with its kind."""
+    """Return the entries of all files in this folder, those of position first, each with its kind."""
     found = {}
     for module in iter_modules(__path__):
         entry = getattr(import_module(f"{__name__}.{module.name}"), "ENTRY", None)

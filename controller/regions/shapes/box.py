@@ -1,4 +1,4 @@
-"""Box, turned as one likes: the cuboid that section V.B speaks of, with no equation in the paper."""
+"""Box with any orientation: the cuboid of section V.B, without an equation in the paper."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Box:
         return (*self.centre, *R.ravel().tolist(), *(s / 2.0 for s in self.size))
 
     def numbers(self) -> tuple[Number, ...]:
-        """Return what `packed` gives, by name and unit."""
+        """Return name and unit of each number of `packed`."""
         return (*TURNED, *vector("half_size", SIZE))
 
     def bounds(self) -> Bounds:

@@ -1,4 +1,4 @@
-"""Cone of visibility: from where a feature can be seen, as section I asks; without an equation in the paper."""
+"""Cone of visibility: the places from which a feature can be seen, of section I; without an equation in the paper."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Cone:
         return (*self.feature, *axis, math.sin(self.half_angle), math.cos(self.half_angle), self.range)
 
     def numbers(self) -> tuple[Number, ...]:
-        """Return what `packed` gives, by name and unit."""
+        """Return name and unit of each number of `packed`."""
         return (
             *vector("feature", LENGTH),
             *vector("axis", PART),

@@ -56,7 +56,7 @@ class Cylinder:
         return (*middle, *unit("cylinder", "axis", between), math.hypot(*between) / 2.0, self.radius)
 
     def numbers(self) -> tuple[Number, ...]:
-        """Return what `packed` gives, by name and unit."""
+        """Return name and unit of each number of `packed`."""
         return (
             *vector("middle", LENGTH),
             *vector("axis", PART),

@@ -39,16 +39,16 @@ class DepthBand:
         return (self.depth, self.tolerance)
 
     def numbers(self) -> tuple[Number, ...]:
-        """Return what `packed` gives, by name and unit."""
+        """Return name and unit of each number of `packed`."""
         return (Number("depth", *LENGTH), Number("tolerance", *SIZE))
 
     def bounds(self) -> Bounds:
-        """Return the depths, without end to the sides."""
+        """Return the depths, unbounded to the sides."""
         return (-inf, -inf, self.depth - self.tolerance), (inf, inf, self.depth + self.tolerance)
 
 
 def band_about(z: float, tolerance: float) -> Evaluation:
-    """Evaluate a band of a tolerance at a depth told from its middle [m]."""
+    """Evaluate a band of a tolerance at a depth `z`, relative to its middle [m]."""
     return z * z - tolerance * tolerance, 0.0, 0.0, 2.0 * z, abs(z) - tolerance
 
 

@@ -1,4 +1,4 @@
-"""Ellipsoid, turned as one likes. Beyond the paper, as a region of section V."""
+"""Ellipsoid with any orientation. Beyond the paper, as a region of section V."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from controller.regions.mesh import Mesh, ball, placed
 from controller.regions.numbers import SIZE, TURNED, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, Vector4, about, require, require_finite, unit
 
-_STEPS = 200  # more than the root below ever takes
+_STEPS = 200  # more than the root below ever needs
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Ellipsoid:
         return (*self.centre, *R.ravel().tolist(), *self.semi_axes)
 
     def numbers(self) -> tuple[Number, ...]:
-        """Return what `packed` gives, by name and unit."""
+        """Return name and unit of each number of `packed`."""
         return (*TURNED, *vector("semi_axes", SIZE))
 
     def bounds(self) -> Bounds:
@@ -69,7 +69,7 @@ def ellipsoid(p: Array, q: Array) -> Evaluation:
 
 
 def _surface_distance(x: float, y: float, z: float, a: float, b: float, c: float) -> float:
-    """Distance from a point of the first octant to the surface.
+    """Return the distance from a point of the first octant to the surface.
 
     The nearest point is x_i a_i^2 / (t + a_i^2), with t the root of sum (a_i x_i / (t + a_i^2))^2 = 1 above -min a_i^2
     (Eberly). With s = t + min a_i^2 as unknown, nothing cancels near the centre. The sum falls and is convex: Newton's
@@ -77,7 +77,7 @@ def _surface_distance(x: float, y: float, z: float, a: float, b: float, c: float
     """
     least = square(min(a, b, c))
     da, db, dc = a * a - least, b * b - least, c * c - least
-    # a point in a plane of symmetry is moved out of it by less than rounding shows
+    # a point in a plane of symmetry is moved out of it by less than rounding
     x, y, z = max(x, 1e-14 * a), max(y, 1e-14 * b), max(z, 1e-14 * c)
     s = max(a * x - da, b * y - db, c * z - dc)
     for _ in range(_STEPS):
@@ -93,7 +93,7 @@ def _surface_distance(x: float, y: float, z: float, a: float, b: float, c: float
 
 
 def surface(shape: Ellipsoid, limits: Bounds) -> Mesh:
-    """Return a ball that is drawn out."""
+    """Return a ball, scaled along the axes."""
     unit_ball = ball()
     scaled = unit_ball.vertices * np.array(shape.semi_axes)
     return Mesh(placed(scaled, shape.centre, shape.quaternion), unit_ball.triangles)

@@ -39,11 +39,11 @@ class HalfSpace:
         return (*self.point, *unit("half_space", "normal", self.normal))
 
     def numbers(self) -> tuple[Number, ...]:
-        """Return what `packed` gives, by name and unit."""
+        """Return name and unit of each number of `packed`."""
         return (*vector("point", LENGTH), *vector("normal", PART))
 
     def bounds(self) -> Bounds:
-        """Return no bounds: it ends in no direction of the axes."""
+        """Return infinite bounds: it is unbounded along every axis."""
         return (-inf, -inf, -inf), (inf, inf, inf)
 
 

@@ -16,9 +16,9 @@ from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector
 
 @dataclass(frozen=True)
 class Orientation:
-    """All attitudes within `tolerance` [rad] of the one that `quaternion` (scalar first) says, by the shortest turn.
+    """All attitudes within `tolerance` [rad] of `quaternion` (scalar first), by the shortest rotation.
 
-    g is the angle of that turn less the tolerance [rad]. Its derivative is taken as zero where it has none: at the
+    g is the angle of that rotation less the tolerance [rad]. Its derivative is set to zero where it has none: at the
     attitude itself, and half a turn away from it.
 
     Examples
@@ -42,16 +42,16 @@ class Orientation:
         return (*unit("orientation", "quaternion", self.quaternion), self.tolerance)
 
     def numbers(self) -> tuple[Number, ...]:
-        """Return what `packed` gives, by name and unit."""
+        """Return name and unit of each number of `packed`."""
         return (*(Number(f"quaternion.e{i}", *PART) for i in range(4)), Number("tolerance", *ANGLE))
 
     def bounds(self) -> Bounds:
-        """Return no bounds: every place is in it."""
+        """Return infinite bounds: every position is in it."""
         return (-inf, -inf, -inf), (inf, inf, inf)
 
 
 def orientation(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
-    """Evaluate a packed `Orientation` at the attitude `e`, wherever that is."""
+    """Evaluate a packed `Orientation` at the attitude `e`; the position does not matter."""
     turn = error_parts(q[:4], e)
     sine = math.sqrt(turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3])
     g = 2.0 * arctangent(sine, turn[0]) - q[4]

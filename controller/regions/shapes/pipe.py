@@ -1,4 +1,4 @@
-"""Pipe: a chain of capsules, such as the bent pipeline of section V.B, without an equation there."""
+"""Pipe: a chain of capsules, such as the bent pipeline of section V.B, without an equation in the paper."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Pipe:
         return (self.radius, *(x for point in self.points for x in point))
 
     def numbers(self) -> tuple[Number, ...]:
-        """Return what `packed` gives, by name and unit."""
+        """Return name and unit of each number of `packed`."""
         return (
             Number("radius", *SIZE),
             *(number for i in range(1, len(self.points) + 1) for number in vector(f"point[{i}]", LENGTH)),
@@ -89,23 +89,23 @@ def surface(shape: Pipe, limits: Bounds) -> Mesh:
 
 
 def _rings(shape: Pipe, around: int) -> tuple[Array, list[Array], Array]:
-    """Return the surface of a pipe.
+    """Return the surface of a pipe as rings with two end points.
 
     Parameters
     ----------
     shape : Pipe
-        Whose surface it is.
+        Pipe of the surface.
     around : int
         Points of a ring.
 
     Returns
     -------
     ndarray, shape (3,)
-        The end before the first ring [m, NED].
+        End point before the first ring [m, NED].
     list of ndarray, shape (around, 3)
-        Rings, right-handed about the way on, whose points of one place lie in a line along the pipe.
+        Rings, right-handed about the pipe's direction; points of one index are in a line along the pipe.
     ndarray, shape (3,)
-        The end behind the last ring.
+        End point behind the last ring.
     """
     points = np.array(shape.points)
     ways = np.diff(points, axis=0)
@@ -133,7 +133,7 @@ def _rays(points: Array, ways: Array, around: int) -> Iterator[tuple[Array, Arra
         if turn > _STRAIGHT:
             axis = np.cross(way, on)
             axis = axis / np.linalg.norm(axis) if turn < math.pi - _STRAIGHT else out[0]
-            outer = np.cross(way, axis)  # away from where the pipe turns to
+            outer = np.cross(way, axis)  # away from the inside of the bend
             k, o = (out @ axis)[:, None], (out @ outer)[:, None]
             # outside, rings fan out about the corner; inside, where they would cross, all stay in the plane between
             between = _turned(outer, axis, turn / 2.0)
@@ -146,12 +146,12 @@ def _rays(points: Array, ways: Array, around: int) -> Iterator[tuple[Array, Arra
 
 
 def _turned(vector: Array, axis: Array, angle: float) -> Array:
-    """Return a vector across a unit axis, turned about it."""
+    """Return a vector rotated about a unit axis that is perpendicular to it."""
     return math.cos(angle) * vector + math.sin(angle) * np.cross(axis, vector)
 
 
 def _left(shape: Pipe, origins: Array, directions: Array) -> Array:
-    """Return where rays from inside leave the pipe: the distance to the surface is never more than is left to go."""
+    """Return the exits of rays that start inside: a step by the distance to the surface never leaves the pipe."""
     packed = np.array(shape.packed())
     gone = np.zeros(len(origins))
     inside = np.arange(len(origins))

@@ -1,4 +1,4 @@
-"""Upright prism over a polygon: the complex shape of section V.B, such as a hexagonal one, with no equation there."""
+"""Upright prism over a polygon: the complex shape of section V.B, such as a hexagon, without an equation."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ class Prism:
         )
 
     def packed(self) -> tuple[float, ...]:
-        """Return top, bottom, and the corners in the sense in which the outward normal is to the right."""
+        """Return top, bottom, and the corners in the order in which the outward normal is to the right."""
         corners = self.corners if _signed_area(self.corners) > 0.0 else self.corners[::-1]
         return (self.top, self.bottom, *(x for corner in corners for x in corner))
 
     def numbers(self) -> tuple[Number, ...]:
-        """Return what `packed` gives, by name and unit."""
+        """Return name and unit of each number of `packed`."""
         return (
             Number("top", *LENGTH),
             Number("bottom", *LENGTH, above="top"),
@@ -74,13 +74,13 @@ def _signed_area(corners: tuple[Vector2, ...]) -> float:
 
 
 def _touches_itself(corners: tuple[Vector2, ...]) -> bool:
-    """Return whether edges that are no neighbours have a point in common, or neighbours more than their corner."""
+    """Return True if edges that are no neighbours share a point, or neighbours more than their corner."""
 
     def side(a: Vector2, b: Vector2, c: Vector2) -> float:
         return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
     def between(a: Vector2, b: Vector2, c: Vector2) -> bool:
-        """Return whether c, known to be on the line through a and b, lies between them."""
+        """Return True if c, a point of the line through a and b, is between them."""
         return min(a[0], b[0]) <= c[0] <= max(a[0], b[0]) and min(a[1], b[1]) <= c[1] <= max(a[1], b[1])
 
     def meet(a: Vector2, b: Vector2, c: Vector2, d: Vector2) -> bool:
@@ -166,7 +166,7 @@ def _ears(corners: Array) -> list[tuple[int, int, int]]:
             if side(a, b, c) > 0.0 and not any(min(side(a, b, p), side(b, c, p), side(c, a, p)) >= 0.0 for p in others):
                 triangles.append((a, b, c))
                 break
-        else:  # corners in a line are no ear of any area
+        else:  # corners in a line make no ear
             i = next(i for i in range(len(left)) if side(left[i - 1], left[i], left[(i + 1) % len(left)]) <= 0.0)
             triangles.append((left[i - 1], left[i], left[(i + 1) % len(left)]))
         left.pop(i)

@@ -39,7 +39,7 @@ class Sphere:
         return (*self.centre, self.radius)
 
     def numbers(self) -> tuple[Number, ...]:
-        """Return what `packed` gives, by name and unit."""
+        """Return name and unit of each number of `packed`."""
         return (*vector("centre", LENGTH), Number("radius", *SIZE))
 
     def bounds(self) -> Bounds:
@@ -48,7 +48,7 @@ class Sphere:
 
 
 def sphere_about(x: float, y: float, z: float, radius: float) -> Evaluation:
-    """Evaluate a sphere of a radius at a place told from its centre [m]."""
+    """Evaluate a sphere of a radius at a place (x, y, z), relative to its centre [m]."""
     square = x * x + y * y + z * z
     return square - radius * radius, 2.0 * x, 2.0 * y, 2.0 * z, math.sqrt(square) - radius
 
@@ -59,7 +59,7 @@ def sphere(p: Array, q: Array) -> Evaluation:
 
 
 def surface(shape: Sphere, limits: Bounds) -> Mesh:
-    """Return the ball."""
+    """Return the ball, scaled and moved."""
     unit_ball = ball()
     return Mesh(np.array(shape.centre) + shape.radius * unit_ball.vertices, unit_ball.triangles)
 

@@ -1,4 +1,4 @@
-"""Visibility: the poses from which a camera of the vehicle sees a feature, as section I asks; no equation there."""
+"""Visibility: the poses from which a camera of the vehicle sees a feature, of section I; without an equation there."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class Visibility:
     """All poses that have a `feature` [m, NED] within `half_angle` [rad] of the axis of a camera.
 
     `camera_axis` and `camera_position` [m] are in the body frame. g is the angle between axis and line of sight, less
-    the half angle [rad]. How far it sees is a region of its own, such as a sphere or a `Cone` about the feature.
-    By position, g changes with one over the distance: a feature closer than some tenths of a metre asks for the
-    impossible. A feature in the camera itself counts as behind it.
+    the half angle [rad]. The camera's range is a region of its own, such as a sphere or a `Cone` about the feature.
+    By position, g changes with one over the distance: a feature closer than some tenths of a metre makes g change too
+    fast to follow. A feature in the camera itself counts as behind it.
 
     Examples
     --------
@@ -52,7 +52,7 @@ class Visibility:
         )
 
     def numbers(self) -> tuple[Number, ...]:
-        """Return what `packed` gives, by name and unit."""
+        """Return name and unit of each number of `packed`."""
         return (
             *vector("feature", LENGTH),
             *vector("camera_axis", PART),
@@ -61,7 +61,7 @@ class Visibility:
         )
 
     def bounds(self) -> Bounds:
-        """Return no bounds: from every place the feature is seen at some attitude."""
+        """Return infinite bounds: from every place the feature is seen at some attitude."""
         return (-inf, -inf, -inf), (inf, inf, inf)
 
 
@@ -80,7 +80,7 @@ def visibility(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     if square == 0.0:
         return math.pi - q[9], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
-    # the angle to the axis a, and how it follows b: ((a . b) b / |b|^2 - a) / |a x b|
+    # the angle to the axis a, and its derivative by b: ((a . b) b / |b|^2 - a) / |a x b|
     ax, ay, az = q[3], q[4], q[5]
     along = ax * bx + ay * by + az * bz
     cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
