@@ -40,7 +40,7 @@ def columns_of(scenario: Scenario, plant: SteppedPlant, law: Law) -> list[Column
 
 
 def names_of(scenario: Scenario) -> list[str]:
-    """Return the names of the columns of a run, without the reports of a law that is not shipped.
+    """Return the names of the columns of a run, without the diagnostics of a custom law.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def names_of(scenario: Scenario) -> list[str]:
 
 
 def columns_without_plant(scenario: Scenario) -> list[Column]:
-    """Return the columns of a run as `columns_of` does, from the vehicle's table of variables and a shipped law.
+    """Return the columns of a run as `columns_of` does, from the vehicle's table of variables and a built-in law.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def _columns(
 
 
 def _rules(scenario: Scenario) -> Iterator[Column]:
-    """Yield what the arbiter decides by, where that is not the memberships alone."""
+    """Yield the columns of the arbiter's inputs, where these are not the memberships alone."""
     if scenario.arbiter.file:
         for signal in scenario.rules.inputs:
             yield Column(f"arbiter.{signal.name}", signal.unit, f"Input {signal.name} of the arbiter: {signal.what}")
