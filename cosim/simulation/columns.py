@@ -136,18 +136,18 @@ def _sensed(scenario: Scenario) -> Iterator[Column]:
     if scenario.sensing.exact:
         return
     for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
-        yield Column(f"sensed.{axis}", "m", f"Position {where} that the law is told")
+        yield Column(f"sensed.{axis}", "m", f"Position {where} for the law")
     for i, name in enumerate("uvwpqr"):
-        yield Column(f"sensed.{name}", "m/s" if i < 3 else "rad/s", f"Velocity {name} that the law is told, body frame")
+        yield Column(f"sensed.{name}", "m/s" if i < 3 else "rad/s", f"Velocity {name} for the law, body frame")
     if scenario.sensing.through == "state":
         return
     for i in range(4):
-        yield Column(f"sensed.e{i}", "", f"Attitude that the law is told, unit quaternion, part {i}")
+        yield Column(f"sensed.e{i}", "", f"Attitude for the law, unit quaternion, part {i}")
     for name, unit in (("position", "m"), ("velocity", "m/s"), ("attitude", "rad")):
         for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
-            yield Column(f"deviation.{name}.{axis}", unit, f"Standard deviation of the told {name}, {where}")
+            yield Column(f"deviation.{name}.{axis}", unit, f"Standard deviation of the sensed {name}, {where}")
     for name in "pqr":
-        yield Column(f"deviation.rate.{name}", "rad/s", f"Standard deviation of the told rate {name}, body frame")
+        yield Column(f"deviation.rate.{name}", "rad/s", f"Standard deviation of the sensed rate {name}, body frame")
 
 
 def _ordered(scenario: Scenario) -> Iterator[Column]:
