@@ -138,7 +138,7 @@ class LiveView:
         try:
             self._loop.call_soon_threadsafe(work, *arguments)
         except RuntimeError:  # the thread has failed, which was logged
-            log.debug("nobody is served any more")
+            log.debug("the view is closed")
 
     def _live(self) -> None:
         asyncio.set_event_loop(self._loop)

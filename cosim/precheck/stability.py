@@ -46,7 +46,7 @@ def vehicle_findings(scenario: Scenario) -> Iterator[Finding]:
     Parameters
     ----------
     scenario : Scenario
-        What is checked.
+        The scenario to check.
 
     Yields
     ------
@@ -104,7 +104,7 @@ def start_weights(scenario: Scenario) -> Array:
     Parameters
     ----------
     scenario : Scenario
-        What is checked.
+        The scenario to check.
 
     Raises
     ------

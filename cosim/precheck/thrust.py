@@ -29,7 +29,7 @@ def thrust_findings(scenario: Scenario) -> Iterator[Finding]:
     Parameters
     ----------
     scenario : Scenario
-        What is checked.
+        The scenario to check.
 
     Yields
     ------

@@ -238,7 +238,7 @@ def load_record(folder: Path) -> Record:
     Raises
     ------
     RunError
-        If there is none, or it cannot be read.
+        If the folder holds no record, or it cannot be read.
     """
     require_utf8(folder)
     files = [folder / RECORD] if (folder / RECORD).exists() else part_files(folder)

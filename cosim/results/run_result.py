@@ -102,7 +102,7 @@ class Run:
         *signals : str
             Names, or patterns such as ``"weight.*"``. Default: the clearance of the goal and of each region.
         ax : matplotlib.axes.Axes, optional
-            Where to draw; default: new axes.
+            Axes to draw into; default: new ones.
 
         Returns
         -------

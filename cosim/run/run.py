@@ -80,14 +80,14 @@ def run_scenario(
     Parameters
     ----------
     scenario : Scenario
-        What to run.
+        The scenario of the run.
     out : str or Path, optional
         The run folder; it must not exist, or be empty. Default: a new one below ``runs``. Runs after a reset add a
         number to the name.
     mavlink : Mavlink, optional
         MAVLink setup of the run as a vehicle; default: no link.
     rate : float, optional
-        Simulated seconds a wall-clock second at the most.
+        Greatest number of simulated seconds per wall-clock second; default: no limit.
     progress : bool
         Show a bar, if there is a terminal.
     report : bool

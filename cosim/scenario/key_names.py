@@ -11,7 +11,7 @@ from plant_fmu.vehicle import Vehicle
 
 PARAMETERS = "plant.parameters."
 
-_WORDS = {  # for keys whose parts are no good name
+_WORDS = {  # for keys whose parts make no clear name
     "time.duration": "duration",
     "time.step": "time step",
     "time.control": "control period",

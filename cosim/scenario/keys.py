@@ -56,7 +56,7 @@ KEYS = {
     "goal.velocity": Key("m/s", "as of a region", ", below", default="0 0 0"),
     "goal.streamed": Key("", "as of a region", ", below", default="false"),
     "goal.then": Key("m", "middles of the goal, north east down, where it is next in turn", ", below", default="none"),
-    "goal.stay": Key("s", "how long the vehicle is within the goal before the goal goes on", default="5"),
+    "goal.stay": Key("s", "time within the goal before the goal moves to its next place", default="5"),
     "law.name": Key(
         "", "one of `controller.LAWS`",
         "; naming another one than the base drops the base's gains. In the folder of a run that "
@@ -129,7 +129,7 @@ KEYS = {
     "failures[].thruster": Key("", "from 1"),
     "failures[].time": Key("s", "from when on it fails"),
     "failures[].effectiveness": Key("", "part of its force that is left, 0 to 1"),
-    "failures[].stuck": Key("", "it goes on with the force that was commanded last"),
+    "failures[].stuck": Key("", "it keeps the force that was commanded last"),
     "outages": Key("", "times in which a sensor gives no samples; where sensing is through `sensors`", default="none"),
     "outages[].sensor": Key("", "`depth_sensor`, `dvl`, `imu`, `compass` or `usbl`"),
     "outages[].time": Key("s", "when it begins"),
@@ -141,7 +141,7 @@ KEYS = {
     "regions[].gain": Key("", "alpha of section VII"),
     "regions[].shape": Key("", "a shape", ", below"),
     "regions[].velocity": Key("m/s", "north east down; the law receives it"),
-    "regions[].streamed": Key("", "moved from outside while the run goes on", ", below"),
+    "regions[].streamed": Key("", "moved from outside during the run", ", below"),
     "regions[].deviation": Key(
         "m", "standard deviation of its place, or three: north, east, down", ": margins of the deployable law grow"
     ),

@@ -156,7 +156,7 @@ def check_commands(
 ) -> tuple[SecondaryRegion, ...]:
     """Check the commands; return the regions of the obstacle slots, none if commands are not enabled."""
     if not commands.enabled:
-        _require(not commands.await_arm, "commands.await_arm", "true", "false without commands.enabled: nobody arms")
+        _require(not commands.await_arm, "commands.await_arm", "true", "false without commands.enabled: no way to arm")
         return ()
     _require(not record.lyapunov, "record.lyapunov", "true", "false with commands.enabled: V is of one target")
     _require(not is_own(law), "commands.enabled", "true", f"false: nothing of {law} can be commanded from outside")

@@ -22,7 +22,7 @@ class Actuators:
     Parameters
     ----------
     scenario : Scenario
-        What is run.
+        The scenario of the run.
     plant : SteppedPlant
         Receives the inputs, and the parameters of thrusters that fail or are limited.
     signals : Signals

@@ -24,7 +24,7 @@ def columns_of(scenario: Scenario, plant: SteppedPlant, law: Law) -> list[Column
     Parameters
     ----------
     scenario : Scenario
-        What is run.
+        The scenario of the run.
     plant : SteppedPlant
         Its outputs, flags and inputs are columns.
     law : Law
@@ -45,7 +45,7 @@ def names_of(scenario: Scenario) -> list[str]:
     Parameters
     ----------
     scenario : Scenario
-        What is run.
+        The scenario of the run.
 
     Returns
     -------

@@ -38,7 +38,7 @@ class BoundRules:
     Parameters
     ----------
     system : System
-        Whose inputs clip, and whose outputs all have a rule that fires or a default.
+        The rules. Inputs clip, and each output has a rule that fires for any input, or a default.
     inputs, outputs : ndarray
         C-contiguous; the outputs are filled with what the arbiter's exact engine gives, to the last bit.
 

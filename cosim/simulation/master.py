@@ -1,7 +1,7 @@
 """The co-simulation master: steps plant, arbiter and controller, and publishes their signals.
 
-`Master.run` loops over the steps; `Master.step` does one, a stage a call. After each step the observers receive the row
-of signals. The row is read-only and is overwritten in the next step.
+`Master.run` loops over the steps; `Master.step` does one, with a call for each stage. After each step the observers
+receive the row of signals, which is read-only, and which the next step overwrites.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Master:
     Parameters
     ----------
     scenario : Scenario
-        What to run.
+        The scenario of the run.
     law : Law, optional
         The control law; default: the scenario's.
     plant : SteppedPlant, optional
@@ -187,7 +187,7 @@ class Master:
         observers : sequence of Observer
             Called in this order after each step.
         rate : float, optional
-            Simulated seconds a wall-clock second at the most; default: as fast as it goes.
+            Greatest number of simulated seconds per wall-clock second; default: no limit.
         commands : CommandSource, optional
             Commands during the run, if the scenario's commands are enabled. With `commands.await_arm` the first step
             waits for the command to arm. A command to reset ends the run.
@@ -264,6 +264,7 @@ class Master:
                 self.actuators.fail(failure)
 
     def _measure(self, k: int) -> None:
+        """Copy the plant's outputs into the row, and update the measured state."""
         self._measured[:] = self._plant_measured
         if self._sensor is not None:
             self._sensor.measure(self.signals.row[0], k % self.scenario.control_every == 0)

@@ -37,7 +37,7 @@ _MICRO = 1e6
 
 @dataclass(frozen=True)
 class DvlOptions:
-    """How the autopilot gets the velocity over ground, as VISION_POSITION_DELTA."""
+    """Rate, latency and dropout of the velocity over ground, sent as VISION_POSITION_DELTA."""
 
     rate: float = 8.0  # Hz
     latency: float = 0.1  # s, between the end of an interval and its message
@@ -51,7 +51,7 @@ class Dvl:
     Parameters
     ----------
     options : DvlOptions
-        How often, how late, and how much is lost.
+        Rate, latency and dropout.
 
     Examples
     --------

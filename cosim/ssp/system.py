@@ -164,7 +164,7 @@ def _require(scenario: Scenario) -> None:
             repr(scenario.arbiter.engine),
             "'closed' or 'exact', such as by --set arbiter.engine=closed",
         ),
-        (not scenario.commands.enabled, "commands.enabled", "true", "false: nobody steers a system from outside"),
+        (not scenario.commands.enabled, "commands.enabled", "true", "false: a system takes no commands"),
         (not scenario.goal_streamed, "goal.streamed", "true", "false"),
         (not streamed, f"regions.{streamed}.streamed", "true", "false"),
     ):

@@ -23,7 +23,7 @@ def norms_of(record: Rows) -> dict[str, Array]:
     Parameters
     ----------
     record : Rows
-        Any rows of a run.
+        Rows of a run, or a part of them.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def thrusts_of(scenario: Scenario, record: Rows) -> Array:
     scenario : Scenario
         The scenario of the run.
     record : Rows
-        Any rows of it.
+        Rows of the run, or a part of them.
 
     Returns
     -------

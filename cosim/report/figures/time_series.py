@@ -110,7 +110,7 @@ def error_of(scenario: Scenario, record: Rows) -> tuple[str, Array]:
     scenario : Scenario
         The scenario of the run.
     record : Rows
-        Any rows of it.
+        Rows of the run, or a part of them.
 
     Returns
     -------

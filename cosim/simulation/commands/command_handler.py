@@ -50,7 +50,7 @@ class CommandHandler:
     Parameters
     ----------
     scenario : Scenario
-        What is run; its commands are enabled.
+        The scenario of the run, with commands enabled.
     environment : RegionEnvironment
         Its target and obstacles are moved.
     actuators : Actuators

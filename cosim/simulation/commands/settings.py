@@ -41,7 +41,7 @@ class LiveSettings:
     Parameters
     ----------
     scenario : Scenario
-        What is run.
+        The scenario of the run.
 
     Attributes
     ----------

@@ -116,7 +116,7 @@ def read_log(file: Path) -> list[tuple[int, Command]]:
     Raises
     ------
     RunError
-        If it cannot be read, or a line is no command.
+        If it cannot be read, or a line is not a command.
     """
     try:
         content = file.read_bytes()
@@ -174,7 +174,7 @@ class ReplayedCommands(ScheduledCommands):
     Raises
     ------
     RunError
-        If it cannot be read, or a line is no command.
+        If it cannot be read, or a line is not a command.
     """
 
     def __init__(self, file: Path) -> None:
@@ -187,7 +187,7 @@ class LoggedCommands:
     Parameters
     ----------
     source : CommandSource
-        Where the commands come from.
+        Source of the commands.
     file : Path
         The log; made when the first command is taken.
     tell : callable, optional
