@@ -83,7 +83,7 @@ class Hub:
         self._middle, self._target_radius = shape_center(scenario.goal), 0.0
         self._regions = ["goal", *(secondary.region.name for secondary in scenario.regions)]
         self._slots = ObstacleSlots(scenario.commands.obstacles)
-        self._came = [secondary.region.name for secondary in scenario.regions if secondary.is_dynamic]  # by slot
+        self._slot_names = [secondary.region.name for secondary in scenario.regions if secondary.is_dynamic]  # by slot
         self._history = History(len(self._viewing.columns))
         self._texts, self._dropped, self._last = [], 0, None
         self.desk = CommandDesk(scenario, queue, self._has_come)
@@ -130,7 +130,7 @@ class Hub:
                 if region is not None:
                     self._change(region, time)
             case AddObstacle():
-                name = self._came[self._slots.take(command.number)]
+                name = self._slot_names[self._slots.take(command.number)]
                 self._change(name, time, Sphere(PARKED_POSITION, command.radius))
                 self._header["changes"][-1]["number"] = command.number  # for commands that move or remove it
             case RemoveObstacle():

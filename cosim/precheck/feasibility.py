@@ -20,8 +20,8 @@ from cosim.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
 
-_ROOM = 3.0  # m, margin around start and regions of the box that is searched
-_MOST_ROOM = 1e5  # m
+_MARGIN = 3.0  # m, margin around start and regions of the box that is searched
+_MAX_MARGIN = 1e5  # m
 
 
 def region_findings(scenario: Scenario) -> Iterator[Finding]:
@@ -54,13 +54,13 @@ def region_findings(scenario: Scenario) -> Iterator[Finding]:
 
 def _box(goal: Region, regions: Sequence[Region], start: tuple[float, float, float]) -> tuple[Array, Array]:
     """Return the corners of a box with the start, all bounded regions, and a point of each region to stay within."""
-    room = _ROOM
+    margin = _MARGIN
     while True:
-        low, high = box_about([goal, *regions], [start], room)
+        low, high = box_about([goal, *regions], [start], margin)
         wanted = [goal, *(region for region in regions if region.keep == "in")]
-        if room > _MOST_ROOM or all(search([region], low, high, tolerance=room).found for region in wanted):
+        if margin > _MAX_MARGIN or all(search([region], low, high, tolerance=margin).found for region in wanted):
             return low, high
-        room *= 2.0
+        margin *= 2.0
 
 
 def _clearance(region: Region, scenario: Scenario) -> float:

@@ -32,7 +32,9 @@ def scenario_as_flown(scenario: Scenario, record: Rows) -> Scenario:
     """
     if not scenario.commands.enabled:
         return scenario
-    regions = tuple(region for region in (_came(region, record) for region in scenario.regions) if region is not None)
+    regions = tuple(
+        region for region in (_region_as_flown(region, record) for region in scenario.regions) if region is not None
+    )
     goal, radius = scenario.goal, record.value("target.radius", -1)
     if radius > 0.0:
         goal = Sphere(shape_center(goal), radius)
@@ -62,7 +64,7 @@ def radii_of(record: Rows, name: str) -> Iterator[tuple[Array, Array]]:
         yield block["time"][known], radii[known]
 
 
-def _came(secondary: SecondaryRegion, record: Rows) -> SecondaryRegion | None:
+def _region_as_flown(secondary: SecondaryRegion, record: Rows) -> SecondaryRegion | None:
     """Return a region at its last size; None for an obstacle that was never added, or whose radius is not known."""
     if not secondary.is_dynamic:
         return secondary

@@ -88,7 +88,7 @@ def _text(path: Path) -> str:
 def check_rules(
     setup: ArbiterSetup, criteria: tuple[CriterionSetup, ...], regions: Sequence[SecondaryRegion]
 ) -> ArbiterRules:
-    """Make the rules of an arbiter, whose file has been read.
+    """Return the checked rules of an arbiter, whose file has been read.
 
     Parameters
     ----------

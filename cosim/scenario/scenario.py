@@ -319,15 +319,15 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
     regions = check_regions(file.regions)
     criterion_entries, criteria = check_criteria(file.criteria)
     overlapping = check_intersection(file.intersection, regions)
-    seen = check_commands(file.commands, file.record, file.law.name, tuple(r.region.name for r in regions))
-    check_criteria_of_regions(regions + seen, criteria)
+    slots = check_commands(file.commands, file.record, file.law.name, tuple(r.region.name for r in regions))
+    check_criteria_of_regions(regions + slots, criteria)
     arbiter = read_rules(file.arbiter)
     rules = check_rules(arbiter, criteria, regions)
     vehicle_file = Path(file.vehicle) if file.vehicle.endswith(".toml") else None
     vehicle = vehicle or load_vehicle(vehicle_file or file.vehicle)
     check_parameters(file.plant.parameters, vehicle)
     regions = with_crossing_costs(regions, tuple(c.name for c in criteria), rules, file.initial.position[2])
-    law = check_law(file.law, file.actuation.through, vehicle, time.control, len(regions) + len(seen))
+    law = check_law(file.law, file.actuation.through, vehicle, time.control, len(regions) + len(slots))
     check_failures(file.failures, file.actuation.through, vehicle)
     check_outages(file.outages, file.sensing.through)
     check_record(file.record, law, regions)
@@ -369,7 +369,7 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
         goal_streamed=motion.streamed or file.commands.enabled,
         goal_then=motion.then,
         goal_stay=motion.stay,
-        regions=regions + seen,
+        regions=regions + slots,
         intersection=overlapping,
         compare=file.compare,
         table=msgspec.to_builtins(dataclasses.asdict(filled)),

@@ -167,15 +167,15 @@ def check_commands(
     for key, greatest in (("obstacle_gain", math.inf), ("surface_depth", 1e3), ("pilot_gain", 1.0)):
         value = getattr(commands, key)
         _require(0.0 <= value <= greatest and value < math.inf, f"commands.{key}", value, f"0 to {greatest:g}")
-    seen = [f"seen {i}" for i in range(1, commands.obstacles + 1)]
-    for name in seen:
+    slots = [f"seen {i}" for i in range(1, commands.obstacles + 1)]
+    for name in slots:
         _require(name not in names, f"regions.{name}.name", "used", "another one: obstacles that come in have it")
     far = Sphere(PARKED_POSITION, commands.obstacle_radius)
     return tuple(
         SecondaryRegion(
             Region(name, far, "out", gain=commands.obstacle_gain), "obstacle", streamed=True, is_dynamic=True
         )
-        for name in seen
+        for name in slots
     )
 
 

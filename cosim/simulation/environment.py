@@ -78,7 +78,7 @@ class RegionEnvironment:
             region.region.name for region in scenario.regions if region.streamed and not region.is_dynamic
         ]
         self._moving = [self._names.index(name) for name in scenario.moving]
-        self._seen = [i for i, region in enumerate(scenario.regions) if region.is_dynamic]
+        self._dynamic = [i for i, region in enumerate(scenario.regions) if region.is_dynamic]
         # m, NED: shift of each region, extrapolated to time 0 at its present velocity
         self._origins: Array = np.zeros((len(secondary), 3))
         self._evaluate_places = CompiledFunction(evaluate_places)
@@ -196,13 +196,13 @@ class RegionEnvironment:
         time : float
             [s].
         """
-        i = self._seen[slot]
+        i = self._dynamic[slot]
         self._reshape(self.regions, i, Sphere(PARKED_POSITION, radius))
         self._set_motion(i, np.subtract(position, PARKED_POSITION), np.array(velocity), time)
 
     def remove_obstacle(self, slot: int) -> None:
         """Remove the obstacle in a slot, from 0."""
-        self._set_motion(self._seen[slot], np.zeros(3), np.zeros(3), 0.0)
+        self._set_motion(self._dynamic[slot], np.zeros(3), np.zeros(3), 0.0)
 
     def shift_region(self, name: str, by: Vector3) -> None:
         """Move a region, or an obstacle, by a displacement [m, NED].
@@ -216,7 +216,7 @@ class RegionEnvironment:
         if name not in movable:
             raise CommandError(f"region is {name!r}, expected one of {', '.join(movable) or 'none'}")
         i = self._names.index(name) - 1
-        if i in self._seen and not self._origins[i].any():
+        if i in self._dynamic and not self._origins[i].any():
             raise CommandError(f"region is {name!r}: no such obstacle has come")
         self._origins[i] += by
 
