@@ -29,9 +29,7 @@ _LOW_OVERHEAD: dict[str, Any] = {
     "distributed.admin.tick.interval": "1s",
     "distributed.scheduler.allowed-failures": 0,  # `dispatch` counts crashes itself, and finds the row
 }
-_SETTLING = (
-    1.0  # s, wait for new workers before the next batch, so that one that crashes at once is not restarted again
-)
+_SETTLING = 1.0  # s, wait for new workers, so that one that crashes at once is not restarted again
 
 
 def is_cluster(executor: Executor) -> bool:
