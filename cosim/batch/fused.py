@@ -1,4 +1,4 @@
-"""Flights by the fused loop: the vehicle's own FMU, stepped in C by the functions of the master."""
+"""Flights by the fused loop: the vehicle's FMU, stepped in C with the functions of the master."""
 
 from __future__ import annotations
 
@@ -45,18 +45,18 @@ _NONE = Allocator(np.zeros((1, 0, 6)), np.zeros((1, 0)), np.zeros((1, 0)), False
 
 
 class FusedFlyer:
-    """Flies variations of a scenario one after the other, with one plant that is reset in between.
+    """Flies variations of a scenario one after the other, with one plant that is reset before each.
 
     Parameters
     ----------
     variation : Variation
-        What is flown. Any law, shape, actuation, noise, failure.
+        The variation, with any built-in law, shape, actuation, noise and failures.
 
     Raises
     ------
     RunError
-        If the scenario has what the loop does not: commands from outside, an engine of the arbiter that samples, the
-        order of Jacobi, FMI 2.0.
+        If the scenario has features that the loop lacks: commands, a sampling engine of the arbiter, Jacobi order, FMI
+        2.0, or a custom law.
     BuildError, PlantError
         If there is no FMU of the vehicle.
     """
@@ -77,14 +77,14 @@ class FusedFlyer:
         Parameters
         ----------
         values : ndarray, shape (rows, keys)
-            Of the keys that vary, in their units.
+            Values of the keys that vary, in their units.
         seeds : ndarray of int, shape (rows,)
-            Of what is random.
+            Seed of each row.
 
         Returns
         -------
         Flown
-            What came of each row.
+            Outcome of each row, or the reason why it was refused.
         """
         outcomes, refused = nothing(len(seeds)), {}
         for row, (of_row, seed) in enumerate(zip(values, seeds, strict=True)):
@@ -103,17 +103,17 @@ class FusedFlyer:
         scenario : Scenario
             From `Variation.scenario`.
         trace : bool
-            Whether to keep what happened, see `cosim.batch.fused_loop`.
+            Return a trace, see `cosim.batch.fused_loop`.
 
         Returns
         -------
         ndarray of OUTCOME, shape (), and ndarray
-            What it came to, and the trace, shape (0, 0) if none is kept.
+            The outcome, and the trace, shape (0, 0) without one.
 
         Raises
         ------
         PlantError
-            If the plant cannot be as the scenario has it. The flyer can go on with another one.
+            If the plant refuses the scenario. The flyer can then fly another one.
         """
         metrics, setup, native, estimate, rows = fly_scenario(self._plant, scenario, trace)
         return _outcome(metrics, setup, native, estimate), rows
@@ -132,7 +132,7 @@ class FusedFlyer:
 
 
 def require_fused(scenario: Scenario) -> None:
-    """Raise `RunError` for the first key of a scenario by which the fused loop cannot fly it."""
+    """Raise `RunError` for the first key of a scenario that the fused loop does not support."""
     for key, (received, expected) in _fixed(scenario).items():
         if received != expected:
             way = f", such as by --set {key}={expected}" if isinstance(expected, str) else ""
@@ -140,7 +140,7 @@ def require_fused(scenario: Scenario) -> None:
 
 
 def _fixed(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
-    """Return of each key that cannot be otherwise what it is, and what it has to be."""
+    """Return the present and the required value of each key that has to have a fixed value."""
     return {
         "arbiter.engine": (scenario.arbiter.engine, Arbiter(system=scenario.rules.system).engine),
         "master.order": (scenario.master.order, "gauss-seidel"),
@@ -152,7 +152,7 @@ def _fixed(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
 def fly_scenario(
     plant: Plant, scenario: Scenario, trace: bool = False, clock: NDArray[np.int64] = _NO_CLOCK
 ) -> tuple[FlightMetrics, FlightConfig, Native, Array, Array]:
-    """Fly a scenario by the plant of its vehicle, which is reset before.
+    """Reset a plant, and fly a scenario with it.
 
     Parameters
     ----------
@@ -161,20 +161,20 @@ def fly_scenario(
     scenario : Scenario
         With nothing that `FusedFlyer` refuses.
     trace : bool
-        Whether to keep what happened.
+        Return a trace.
     clock : ndarray of int
-        Of `Clock`, if the law is to be timed.
+        Numbers of a `Clock`, to time the law; empty for no timing.
 
     Returns
     -------
     FlightMetrics, FlightConfig, Native, ndarray, ndarray
-        What it came to, of what it was made, the plant at its end, the last estimate, shape (4,), and the trace, shape
-        (0, 0) if none is kept.
+        Metrics, configuration, the plant at the end, the last estimate, shape (4,), and the trace, shape (0, 0) without
+        one.
 
     Raises
     ------
     PlantError
-        If the plant cannot be as the scenario has it.
+        If the plant refuses the scenario.
     """
     law = law_of(scenario)
     n, through = scenario.vehicle.n_thrusters, scenario.actuation.through == "thrusters"
@@ -205,21 +205,21 @@ def fly_scenario(
 
 
 def configure_flight(scenario: Scenario, thrusters: int, clock: NDArray[np.int64] = _NO_CLOCK) -> FlightConfig:
-    """Return what a flight of a scenario is made of.
+    """Make the configuration of a flight from a scenario.
 
     Parameters
     ----------
     scenario : Scenario
-        What is flown.
+        The scenario.
     thrusters : int
-        That carry the wrench; 0 where it acts on the body directly.
+        Number of thrusters that give the wrench; 0 if it acts on the body directly.
     clock : ndarray of int, optional
-        Of `Clock`, if the law is to be timed.
+        Numbers of a `Clock`, to time the law.
 
     Returns
     -------
     FlightConfig
-        Its regions are where they are at time 0.
+        With the regions at time 0.
     """
     sensing, step = scenario.sensing, scenario.time.step
     decisions = -(-scenario.steps // scenario.control_every)
@@ -267,19 +267,19 @@ def configure_flight(scenario: Scenario, thrusters: int, clock: NDArray[np.int64
 
 
 def failure_stages(scenario: Scenario, setup: FlightConfig) -> Allocator:
-    """Return what allocation goes by, a stage for each number of failures that have been reported.
+    """Return the arguments of the allocation for each number of reported failures.
 
     Parameters
     ----------
     scenario : Scenario
-        Of the vehicle and its limits.
+        With the vehicle and its limits.
     setup : FlightConfig
-        Of the scenario's failures.
+        With the scenario's failures.
 
     Returns
     -------
     Allocator
-        The first stage is of no failure.
+        The first stage is without failures.
     """
     vehicle, limits = scenario.vehicle, scenario.actuation.limits
     health, stages = np.ones(vehicle.n_thrusters), []

@@ -46,7 +46,7 @@ def _formats(text: str) -> list[str]:
 
 
 def report(options: argparse.Namespace) -> int:
-    """Run ``cosim report``: one bad folder does not keep the others from theirs."""
+    """Run ``cosim report``; continue with the other folders after an invalid one."""
     from controller import ControllerError
     from cosim.errors import CosimError
     from cosim.results.wording import verdict

@@ -100,7 +100,7 @@ def _json(run: Run) -> str:
 
 
 def _mavlink(options: argparse.Namespace) -> Mavlink | None:
-    """Return what the flags say of the link, None if there is to be none."""
+    """Return the MAVLink setup from the flags, None without endpoints."""
     if not options.mavlink:
         for flag in ("signing_key", "allow_system"):
             if getattr(options, flag):

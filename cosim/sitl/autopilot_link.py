@@ -1,4 +1,4 @@
-"""A MAVLink link beside the lockstep: hears the autopilot's own estimate, and tells it what a DVL measures."""
+"""A MAVLink link beside the lockstep: receives the autopilot's estimate, and sends the measurements of a DVL."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _MICRO = 1e6
 
 @dataclass(frozen=True)
 class DvlOptions:
-    """How the autopilot gets the velocity over ground, as VISION_POSITION_DELTA."""
+    """Rate, latency and dropout of the velocity over ground, sent as VISION_POSITION_DELTA."""
 
     rate: float = 8.0  # Hz
     latency: float = 0.1  # s, between the end of an interval and its message
@@ -51,7 +51,7 @@ class Dvl:
     Parameters
     ----------
     options : DvlOptions
-        How often, how late, and how much is lost.
+        Rate, latency and dropout.
 
     Examples
     --------
@@ -75,7 +75,7 @@ class Dvl:
         self._due: deque[tuple[float, Any]] = deque()
 
     def take(self, motion: Motion) -> list[Any]:
-        """Take the motion at an instant; return what is sent now: time and interval [us], turn [rad], way [m]."""
+        """Integrate the motion; return the deltas due now: time and interval [us], rotation [rad], displacement [m]."""
         now = motion.time
         if not self._last <= now:
             self._begun = self._last = now
@@ -94,19 +94,19 @@ class Dvl:
 
 
 class AutopilotLink:
-    """Listens to the autopilot that flies the plant.
+    """MAVLink link to the autopilot that flies the plant.
 
     Parameters
     ----------
     endpoint : Endpoint
         One of its ports; messages go out as component 197 of the vehicle.
     dvl : DvlOptions, optional
-        Tell it what a DVL measures; default: nothing.
+        DVL whose measurements are sent; default: none.
 
     Attributes
     ----------
     estimate : ndarray, shape (len(ESTIMATE),)
-        As `ESTIMATE` names it; NaN before it is heard.
+        Values of `ESTIMATE`; NaN before they are received.
 
     Raises
     ------
@@ -125,7 +125,7 @@ class AutopilotLink:
 
     @property
     def is_armed(self) -> bool:
-        """Whether the autopilot said so last."""
+        """Whether the autopilot was armed in its last heartbeat."""
         return self._reported.is_armed
 
     def close(self) -> None:
@@ -133,7 +133,7 @@ class AutopilotLink:
         self._link.close()
 
     def exchange(self, motion: Motion) -> None:
-        """Tell what is measured at an instant, and listen now and then."""
+        """Send the DVL's measurements at an instant, and receive messages at intervals."""
         m = self._mavlink
         if self._dvl is not None:
             for stamp, interval, turned, moved in self._dvl.take(motion):

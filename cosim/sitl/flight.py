@@ -23,22 +23,22 @@ class Flight:
     Parameters
     ----------
     scenario : Scenario
-        What is flown.
+        The scenario of the run.
     law : AutopilotLaw
-        The autopilot; nobody else's.
+        The autopilot; not shared with other flights.
     out : Path or None
         The run folder, as for `claim`.
     record_rate : float
-        Rows a simulated second at the most [Hz].
+        Greatest number of rows per simulated second [Hz].
 
     Attributes
     ----------
     folder : Path
         The run folder.
     steps : int
-        That were made.
+        Number of steps made.
     waited : int
-        Frames of the autopilot before them, in which the vehicle was lowered to where it starts, and held there.
+        Frames of the autopilot before the first step, in which the vehicle is lowered to its start and held there.
 
     Raises
     ------
@@ -75,7 +75,7 @@ class Flight:
         return self.steps >= self.scenario.steps
 
     def step(self) -> Motion:
-        """Make the next step, with the law as it stands, and record it where it is due.
+        """Make the next step with the present outputs of the law, and record it if a row is due.
 
         Returns
         -------
@@ -96,20 +96,20 @@ class Flight:
 
     @property
     def can_start(self) -> bool:
-        """Whether the vehicle is where the scenario starts: lowered there, or never seen elsewhere."""
+        """Whether the vehicle is at the start of the scenario: lowering is over, or no frame has been waited."""
         return self.waited == 0 or self._lowering.is_over(self.waited * self.scenario.time.step)
 
     def wait(self) -> Motion:
-        """Let a frame go by with the vehicle lowered from the surface to where it starts, and held there."""
+        """Pass one frame of lowering the vehicle from the surface to its start, and holding it there."""
         self.waited += 1
         return carried(self.motion(), *self._lowering.at(self.waited * self.scenario.time.step))
 
     def motion(self) -> Motion:
-        """Return the vehicle's motion as it is now, by the autopilot's time."""
+        """Return the present motion of the vehicle, at the autopilot's time."""
         return self._reader.read((self.waited + self.steps) * self.scenario.time.step)
 
     def _record(self) -> None:
-        """Keep the row of the step that was made last, if it is due."""
+        """Record the row of the last step, if one is due."""
         if self.steps % self._every == 0:
             with self._writing():
                 self._recorder.observe(self.steps, self._master.row)
@@ -129,12 +129,12 @@ class Flight:
                 self._claimed.keep(self._recorder)
 
     def conclude(self, status: str, report: bool) -> Run:
-        """Write the summary of a flight that has ended, and made a step.
+        """Write the summary of a flight that has ended after at least one step.
 
         Parameters
         ----------
         status : str
-            How it ended.
+            Status for the summary.
         report : bool
             Write report and figures too.
 

@@ -20,7 +20,7 @@ _INT16, _UINT16 = 32767, 65535
 
 
 def hil_messages(mavlink: Any, motion: Motion, time_us: int, origin: tuple[float, float], gps: bool) -> list[Any]:
-    """Return what PX4 is told of an instant; the last message, HIL_SENSOR, sets its clock.
+    """Make the messages to PX4 for an instant; the last one, HIL_SENSOR, sets its clock.
 
     Parameters
     ----------
@@ -33,12 +33,12 @@ def hil_messages(mavlink: Any, motion: Motion, time_us: int, origin: tuple[float
     origin : (float, float)
         Latitude and longitude [deg] of position 0, which is at the surface.
     gps : bool
-        Tell the position too.
+        Include HIL_GPS.
 
     Returns
     -------
     list of messages
-        HIL_GPS where it is asked for, HIL_STATE_QUATERNION, HIL_SENSOR.
+        HIL_GPS if `gps`, HIL_STATE_QUATERNION, HIL_SENSOR.
     """
     latitude, longitude = (round(1e7 * angle) for angle in LocalFrame(*origin).to_global(motion.position_ned)[:2])
     up = -motion.position_ned[2]
@@ -71,7 +71,7 @@ def hil_messages(mavlink: Any, motion: Motion, time_us: int, origin: tuple[float
 
 
 def air_pressure(altitude: float) -> float:
-    """Return the pressure [hPa] from which PX4, which knows of no water, finds an altitude [m] again.
+    """Return the air pressure [hPa] from which PX4, whose model has no water, computes an altitude [m].
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def air_pressure(altitude: float) -> float:
     Returns
     -------
     float
-        Of the standard atmosphere, carried on below sea level.
+        By the standard atmosphere, extrapolated below sea level.
     """
     return float(1013.25 * max(0.0, 1.0 - 0.0065 * altitude / 288.15) ** (_GRAVITY * 0.0289644 / (8.31446 * 0.0065)))
 

@@ -1,7 +1,7 @@
-"""Noise in C: the layers of a ziggurat under the normal density, and where NumPy's generator begins.
+"""Noise in C: the layers of a ziggurat under the normal density, and the initial state of NumPy's generator.
 
-The method is that of Marsaglia and Tsang, The Ziggurat Method for Generating Random Variables (2000), with the
-256 layers that NumPy has.
+The method is that of Marsaglia and Tsang, The Ziggurat Method for Generating Random Variables (2000), with 256 layers
+as in NumPy.
 """
 
 from __future__ import annotations

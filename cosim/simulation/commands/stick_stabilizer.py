@@ -1,4 +1,4 @@
-"""Sticks with help, as ArduSub's STABILIZE and ALT_HOLD: the vehicle keeps level and its heading, and its depth too."""
+"""Stabilized manual control, as ArduSub's STABILIZE and ALT_HOLD: attitude, heading and optionally depth are kept."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from controller.quaternion import error, from_axis_angle, multiply, rotation_mat
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
-_CENTERED = 0.02  # part of a stick's way that counts as released
+_CENTERED = 0.02  # fraction of full stick below which it counts as released
 _GREATEST_TILT = math.radians(30.0)  # of full roll and pitch sticks
 YAW_RATE = math.radians(
     202.5
 )  # rad/s of a full stick at a pilot gain of 1, as ArduSub has it: 45 deg/s by ACRO_YAW_P of 4.5
 _CLIMB_RATE = 0.3  # m/s of a full stick
-_FARTHEST = math.radians(20.0), 0.3  # rad, m: by which heading and depth that are asked for lead the vehicle
+_FARTHEST = math.radians(20.0), 0.3  # rad, m: bounds by which desired heading and depth may lead the vehicle's
 _ATTITUDE, _DEPTH, _INTEGRAL = 2.5, 1.5, 0.3  # rad/s of both loops, 1/s of the depth's integral
 _NORTH, _EAST, _DOWN = np.eye(3)
 
 
 class StickStabilizer:
-    """Turns sticks into a wrench: surge and sway push, the others ask for angles and rates that are kept.
+    """Computes a wrench from sticks: surge and sway command forces, the others angles and rates.
 
-    It knows the vehicle's mass and inertia, as an autopilot that is tuned for it does, and nothing of the water.
+    Its model has the vehicle's mass and inertia, like a tuned autopilot, but no hydrodynamic damping or current.
 
     Parameters
     ----------
     vehicle : Vehicle
-        That is steered.
+        The vehicle.
     state : VehicleState
-        As the law is given it; read at each step.
+        The state that the law receives; read at each step.
     period : float
         Between two steps [s].
     reach : ndarray, shape (6,)
@@ -47,7 +47,7 @@ class StickStabilizer:
         self.begin()
 
     def begin(self) -> None:
-        """Keep heading and depth as they are now."""
+        """Keep the present heading and depth from now on."""
         self._heading, self._depth = self._yaw(), float(self._state.position[2])
         self._integral = 0.0  # N
 
@@ -57,18 +57,19 @@ class StickStabilizer:
         Parameters
         ----------
         sticks : ndarray, shape (6,)
-            Parts of X Y Z K M N, -1 to 1.
+            Fractions of X Y Z K M N, -1 to 1.
         gain : float
             The pilot's, 0 to 1.
         keep_depth : bool
-            Whether the vertical stick asks for a rate, and the depth is kept once it is released; else it pushes.
+            True: the vertical stick commands a vertical speed, and the depth is kept once it is released. False: it
+            commands a force.
 
         Returns
         -------
         ndarray, shape (6,)
-            [N, N m], body frame; nothing where the state that it needs is not known.
+            [N, N m], body frame; 0 in elements whose state is NaN.
         """
-        if math.isnan(self._heading):  # not known so far, or not any more
+        if math.isnan(self._heading):  # there was no measurement when it was set
             self._heading = self._yaw()
         if math.isnan(self._depth):
             self._depth = float(self._state.position[2])

@@ -135,7 +135,7 @@ def test_rows_that_kill_workers_of_dask_are_refused_and_all_others_flown(tmp_pat
 @pytest.mark.slow
 def test_a_scheduler_that_is_not_there_is_one_line(tmp_path, capsys, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("cosim.campaigns.workers.cluster._PATIENCE_WITH_SCHEDULER", 0.5)
+    monkeypatch.setattr("cosim.campaigns.workers.cluster._SCHEDULER_TIMEOUT", 0.5)
     words = ["sweep", "docking", "--vary", "law.gains.k_p1=1:2", "--samples", "3", "--out", str(tmp_path / "out")]
     assert main([*words, "--scheduler", "tcp://127.0.0.1:9"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
