@@ -45,12 +45,12 @@ class Manual(Service):
             return
         self._heard = None
         if context.mode_ahead in STICK_MODES:
-            self._order(_NEUTRAL)
+            self._order(_NEUTRAL, by_gain=True)
             context.say("Lost manual control", context.mavlink.MAV_SEVERITY_CRITICAL, "sticks", _TIMEOUT)
 
     def _manual_control(self, sender: Sender, message: Any) -> None:
         if message.target == self.context.options.system_id:
-            self._take(sender, self._wrench(message))
+            self._take(sender, self._wrench(message), by_gain=True)
 
     def _override(self, sender: Sender, message: Any) -> None:
         pulses = [getattr(message, f"chan{i}_raw") for i in range(1, _CHANNELS + 1)]
@@ -60,9 +60,9 @@ class Manual(Service):
             old if pulse == _IGNORED else 0.0 if pulse == _RELEASED else _part((pulse - _CENTRE) / _SWING)
             for pulse, old in zip(pulses, before, strict=True)
         )
-        self._take(sender, (surge, sway, -up + 0.0, roll, pitch, yaw))
+        self._take(sender, (surge, sway, -up + 0.0, roll, pitch, yaw), by_gain=False)
 
-    def _take(self, sender: Sender, sticks: Vector6) -> None:
+    def _take(self, sender: Sender, sticks: Vector6, by_gain: bool) -> None:
         context = self.context
         if not context.accepts_commands:
             context.submit()
@@ -73,26 +73,29 @@ class Manual(Service):
             context.reject("another station has the vehicle in hand", "active gcs")
             return
         self._heard = context.now
-        self._order(sticks)
+        self._order(sticks, by_gain)
 
-    def _order(self, sticks: Vector6) -> None:
+    def _order(self, sticks: Vector6, by_gain: bool) -> None:
         context = self.context
         if sticks == context.sticks:
             return
-        if context.submit(ManualControl(self._parts(sticks))) == context.mavlink.MAV_RESULT_ACCEPTED:
+        command = ManualControl(self._parts(sticks, by_gain), by_gain)
+        if context.submit(command) == context.mavlink.MAV_RESULT_ACCEPTED:
             context.sticks = sticks
 
-    def _parts(self, sticks: Vector6) -> Vector6:
+    def _parts(self, sticks: Vector6, by_gain: bool) -> Vector6:
         """Return which parts of the greatest wrench the sticks ask for, before the pilot's gain.
 
-        An ArduSub asks its thrusters for gain times stick, and their force goes with the square of that.
+        An ArduSub asks its thrusters for gain times stick, and their force goes with the square of that. The gain does
+        not scale channels that are overridden.
         """
         context, table = self.context, self.context.scenario.vehicle.autopilot
         if context.profile.name != "ardusub" or table is None or table.curve != "quadratic":
             return sticks
-        gain = context.settings["commands.pilot_gain"]
+        gain = context.settings["commands.pilot_gain"] if by_gain else 1.0
         scales = (gain, gain, gain, 1.0 / gain, 1.0 / gain, gain)  # the gain leaves roll and pitch alone
-        squared = 6 if context.mode_ahead == "manual" else 3  # in other modes the last three ask for angles and rates
+        # in other modes the last three ask for angles and rates, and so does the third where the depth is kept
+        squared = {"manual": 6, "depth_hold": 2}.get(context.mode_ahead, 3)
         x, y, z, k, m, n = (
             scale * s * abs(s) if i < squared else s for i, (scale, s) in enumerate(zip(scales, sticks, strict=True))
         )

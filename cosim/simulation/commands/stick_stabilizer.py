@@ -12,15 +12,44 @@ from controller.quaternion import error, from_axis_angle, multiply, rotation_mat
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
-_CENTERED = 0.02  # part of a stick's way that counts as released
 _GREATEST_TILT = math.radians(30.0)  # of full roll and pitch sticks
-YAW_RATE = math.radians(
-    202.5
-)  # rad/s of a full stick at a pilot gain of 1, as ArduSub has it: 45 deg/s by ACRO_YAW_P of 4.5
-_CLIMB_RATE = 0.3  # m/s of a full stick
+# of full sticks at a pilot gain of 1, and the part of a stick's way that counts as released, as ArduSub has them:
+# 45 deg/s by ACRO_YAW_P of 4.5 beyond 40 of 400 us; PILOT_SPEED_UP of 0.5 m/s beyond THR_DZ of 100 of 500
+YAW_RATE, YAW_DEAD_ZONE = math.radians(202.5), 0.1  # rad/s
+CLIMB_RATE, CLIMB_DEAD_ZONE = 0.5, 0.2  # m/s
 _FARTHEST = math.radians(20.0), 0.3  # rad, m: by which heading and depth that are asked for lead the vehicle
 _ATTITUDE, _DEPTH, _INTEGRAL = 2.5, 1.5, 0.3  # rad/s of both loops, 1/s of the depth's integral
 _NORTH, _EAST, _DOWN = np.eye(3)
+
+
+def beyond_dead_zone(deflection: float, dead_zone: float) -> float:
+    """Return the part of a full rate that a stick asks for.
+
+    Parameters
+    ----------
+    deflection : float
+        Of the stick, times the gain that scales it, -1 to 1.
+    dead_zone : float
+        Part of the way that asks for nothing, below 1.
+
+    Returns
+    -------
+    float
+        -1 to 1; 0 within the dead zone, and straight from its end on.
+
+    Examples
+    --------
+    >>> from cosim.simulation.commands.stick_stabilizer import beyond_dead_zone, deflection_of
+    >>> beyond_dead_zone(0.1, 0.2), round(beyond_dead_zone(deflection_of(-0.3, 0.2), 0.2), 6)
+    (0.0, -0.3)
+    """
+    beyond = abs(deflection) - dead_zone
+    return math.copysign(beyond / (1.0 - dead_zone), deflection) if beyond > 0.0 else 0.0
+
+
+def deflection_of(part: float, dead_zone: float) -> float:
+    """Return the deflection that asks for a part of a full rate: the inverse of `beyond_dead_zone`; 0 for 0."""
+    return math.copysign(dead_zone + (1.0 - dead_zone) * abs(part), part) if part else 0.0
 
 
 class StickStabilizer:
@@ -47,21 +76,24 @@ class StickStabilizer:
         self.begin()
 
     def begin(self) -> None:
-        """Keep heading and depth as they are now."""
+        """Keep heading and depth as they are now, and no other attitude."""
+        self.attitude: Array | None = None  # quaternion that is kept instead of what sticks ask for
         self._heading, self._depth = self._yaw(), float(self._state.position[2])
         self._integral = 0.0  # N
 
-    def wrench(self, sticks: Array, gain: float, keep_depth: bool) -> Array:
+    def wrench(self, sticks: Array, gain: float, keep_depth: bool, rate_down: float | None = None) -> Array:
         """Return the wrench of a control period.
 
         Parameters
         ----------
         sticks : ndarray, shape (6,)
-            Parts of X Y Z K M N, -1 to 1.
+            Parts of X Y Z K M N, -1 to 1, as the gain has scaled them.
         gain : float
-            The pilot's, 0 to 1.
+            The pilot's, 0 to 1, which scales dead zones too.
         keep_depth : bool
             Whether the vertical stick asks for a rate, and the depth is kept once it is released; else it pushes.
+        rate_down : float, optional
+            Rate of the depth [m/s] that is asked for in place of the vertical stick.
 
         Returns
         -------
@@ -72,34 +104,38 @@ class StickStabilizer:
             self._heading = self._yaw()
         if math.isnan(self._depth):
             self._depth = float(self._state.position[2])
-        wrench: Array = gain * sticks * self._reach
+        wrench: Array = sticks * self._reach
         wrench[3:] = self._moment(sticks, gain)
-        if keep_depth:
+        if keep_depth or rate_down is not None:
             wrench[2] = 0.0
+            asked = CLIMB_RATE * beyond_dead_zone(float(sticks[2]), gain * CLIMB_DEAD_ZONE)
             R = rotation_matrix(self._state.quaternion)
-            wrench[:3] += R.T @ (self._heave(float(sticks[2]), R) * _DOWN)
+            wrench[:3] += R.T @ (self._heave(asked if rate_down is None else rate_down, R) * _DOWN)
         result: Array = np.clip(np.where(np.isfinite(wrench), wrench, 0.0), -self._reach, self._reach)
         return result
 
     def _moment(self, sticks: Array, gain: float) -> Array:
-        rate, turn = np.zeros(3), float(sticks[5])
-        if abs(turn) > _CENTERED:
-            rate[2] = gain * turn * YAW_RATE
-            ahead = math.remainder(self._heading + rate[2] * self._period - self._yaw(), math.tau)
-            self._heading = self._yaw() + min(max(ahead, -_FARTHEST[0]), _FARTHEST[0])
-        tilt = multiply(
-            from_axis_angle(_EAST, float(sticks[4]) * _GREATEST_TILT),
-            from_axis_angle(_NORTH, float(sticks[3]) * _GREATEST_TILT),
-        )
-        angle = 2.0 * error(multiply(from_axis_angle(_DOWN, self._heading), tilt), self._state.quaternion)[1:]
+        rate, asked = np.zeros(3), self.attitude
+        if asked is None:
+            rate[2] = YAW_RATE * beyond_dead_zone(float(sticks[5]), gain * YAW_DEAD_ZONE)
+            if rate[2]:
+                ahead = math.remainder(self._heading + rate[2] * self._period - self._yaw(), math.tau)
+                self._heading = self._yaw() + min(max(ahead, -_FARTHEST[0]), _FARTHEST[0])
+            tilt = multiply(
+                from_axis_angle(_EAST, float(sticks[4]) * _GREATEST_TILT),
+                from_axis_angle(_NORTH, float(sticks[3]) * _GREATEST_TILT),
+            )
+            asked = multiply(from_axis_angle(_DOWN, self._heading), tilt)
+        else:
+            self._heading = self._yaw()  # kept once the attitude is free again
+        angle = 2.0 * error(asked, self._state.quaternion)[1:]
         moment: Array = -self._inertia * _ATTITUDE * (_ATTITUDE * angle + 2.0 * (self._state.velocity_body[3:] - rate))
         return moment
 
-    def _heave(self, stick: float, R: Array) -> float:
-        """Return the force down [N], world axes."""
-        depth, rate = float(self._state.position[2]), 0.0
-        if abs(stick) > _CENTERED:
-            rate = stick * _CLIMB_RATE
+    def _heave(self, rate: float, R: Array) -> float:
+        """Return the force down [N], world axes, for a rate of the depth [m/s]."""
+        depth = float(self._state.position[2])
+        if rate:
             ahead = self._depth + rate * self._period - depth
             self._depth = depth + min(max(ahead, -_FARTHEST[1]), _FARTHEST[1])
         error_down = self._depth - depth
