@@ -7,11 +7,12 @@ from typing import Any
 
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
+from cosim.mavlink.wire.thrust_body import THRUST_BODY_SET, thrust_body_of
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import Mode, SetAttitude, SetTarget
 from cosim.simulation.commands.stick_stabilizer import CLIMB_RATE
 
-_THRUST_BODY, _THRUST_IGNORED, _ATTITUDE_IGNORED = 1 << 5, 1 << 6, 1 << 7  # type_mask
+_THRUST_IGNORED, _ATTITUDE_IGNORED = 1 << 6, 1 << 7  # type_mask
 _LASTS: dict[Mode, float] = {"reach": 3.0, "depth_hold": 5.0}  # s without another one, after which it ends
 _PATIENCE, _AGAIN = 3.0, 10.0  # s of set-points in another mode, after which that is worth a word; until the next one
 _STILL: Vector3 = (0.0, 0.0, 0.0)
@@ -80,11 +81,11 @@ class AttitudeTargets(Service):
             return "rates alone are not followed; an attitude is"
         if not abs(math.hypot(*message.q) - 1.0) < 1e-2:
             return "its quaternion is not of length 1"
-        if mask & _THRUST_BODY and self.context.profile.name == "ardusub":
+        if mask & THRUST_BODY_SET and self.context.profile.name == "ardusub":
             return "thrust along each axis is not followed; a rate of climb is"
         if mask & _THRUST_IGNORED and self.context.profile.name != "ardusub":
             return "a thrust is needed"
-        asked = message.thrust_body if mask & _THRUST_BODY else (0.0 if mask & _THRUST_IGNORED else thrust,)
+        asked = thrust_body_of(message) if mask & THRUST_BODY_SET else (0.0 if mask & _THRUST_IGNORED else thrust,)
         return "" if all(-1.0 <= part <= 1.0 for part in asked) else "a thrust is beyond -1 to 1"
 
     def _counts(self, message: Any) -> bool:
@@ -106,7 +107,7 @@ class AttitudeTargets(Service):
         q0, q1, q2, q3 = message.q
         attitude, mask = (q0, q1, q2, q3), message.type_mask
         if self.context.profile.name != "ardusub":
-            ahead, right, down = message.thrust_body if mask & _THRUST_BODY else (message.thrust, 0.0, 0.0)
+            ahead, right, down = thrust_body_of(message) if mask & THRUST_BODY_SET else (message.thrust, 0.0, 0.0)
             return SetAttitude(attitude, (ahead, right, down))
         if mask & _THRUST_IGNORED:
             return SetAttitude(attitude)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from cosim.mavlink.services.service import Service
+from cosim.mavlink.vehicle.sticks import CLIMB_DEAD_ZONE, YAW_DEAD_ZONE, beyond_dead_zone
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector6
-from cosim.simulation.commands.commands import STICK_MODES, ManualControl
+from cosim.simulation.commands.commands import STICK_MODES, ManualControl, Mode
 
 _FULL = 1000.0
 _INVALID = 0x7FFF
@@ -16,6 +17,7 @@ _PITCH, _ROLL = 1, 2  # enabled_extensions
 _CENTRE, _SWING = 1500, 400  # us of a channel
 _CHANNELS = 6  # pitch, roll, up, yaw, forward, right, as ArduSub has them
 _RELEASED, _IGNORED = 0, 0xFFFF  # a channel that is given back, and one that stays as it is
+_PUSHES: dict[Mode, int] = {"manual": 6, "stabilize": 3, "depth_hold": 2}  # axes that do; the others ask for something
 _NEUTRAL: Vector6 = (0.0,) * 6
 
 
@@ -89,16 +91,22 @@ class Manual(Service):
         An ArduSub asks its thrusters for gain times stick, and their force goes with the square of that. The gain does
         not scale channels that are overridden.
         """
-        context, table = self.context, self.context.scenario.vehicle.autopilot
-        if context.profile.name != "ardusub" or table is None or table.curve != "quadratic":
+        context, table, mode = self.context, self.context.scenario.vehicle.autopilot, self.context.mode_ahead
+        if context.profile.name != "ardusub":
             return sticks
-        gain = context.settings["commands.pilot_gain"] if by_gain else 1.0
-        scales = (gain, gain, gain, 1.0 / gain, 1.0 / gain, gain)  # the gain leaves roll and pitch alone
-        # in other modes the last three ask for angles and rates, and so does the third where the depth is kept
-        squared = {"manual": 6, "depth_hold": 2}.get(context.mode_ahead, 3)
-        x, y, z, k, m, n = (
-            scale * s * abs(s) if i < squared else s for i, (scale, s) in enumerate(zip(scales, sticks, strict=True))
-        )
+        gain = context.settings["commands.pilot_gain"]
+        scale = gain if by_gain else 1.0
+        parts = list(sticks)
+        if mode == "manual":
+            parts[3], parts[4] = sticks[3] / scale, sticks[4] / scale  # which the gain leaves alone
+        else:  # beyond a dead zone, a rate of turn
+            parts[5] = beyond_dead_zone(scale * sticks[5], gain * YAW_DEAD_ZONE) / scale
+        if mode == "depth_hold":  # likewise of the depth
+            parts[2] = beyond_dead_zone(scale * sticks[2], gain * CLIMB_DEAD_ZONE)
+        if table is not None and table.curve == "quadratic":
+            for i in range(_PUSHES[mode]):
+                parts[i] *= scale * abs(parts[i])
+        x, y, z, k, m, n = parts
         return x, y, z, k, m, n
 
     def _wrench(self, message: Any) -> Vector6:

@@ -115,15 +115,13 @@ class CommandHandler:
         """Return what the sticks ask for in a control period, shape (6,) [N, N m], body frame; nothing unless armed."""
         if not self.armed:
             return np.zeros(6)
-        gain, sticks = self.settings["commands.pilot_gain"], self._manual.copy()
-        sticks[[0, 1, 2, 5] if self.mode != "manual" else slice(None)] *= gain if self._by_gain else 1.0
+        gain = self.settings["commands.pilot_gain"] if self._by_gain else 1.0
         if self.mode == "manual":
-            wrench: Array = sticks * self._reach
+            wrench: Array = gain * self._manual * self._reach
             return wrench
-        rate = None if self._attitude is None else self._attitude.rate_down
-        if self._pushed:
-            assert self._attitude is not None
-            sticks[:3] = self._attitude.force
+        sticks, attitude, rate = self._manual, self._attitude, None
+        if attitude is not None and attitude.force is not None:
+            sticks, gain, rate = np.array([*attitude.force, 0.0, 0.0, 0.0]), 1.0, attitude.rate_down
         return self._stabilizer.wrench(sticks, gain, self.mode == "depth_hold", rate)
 
     def apply(self, command: Command, time: float) -> None:

