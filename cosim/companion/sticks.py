@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from cosim.mavlink.vehicle.profile import Profile
-from cosim.mavlink.vehicle.sticks import CLIMB_DEAD_ZONE, YAW_DEAD_ZONE, deflection_of
+from cosim.mavlink.vehicle.sticks import CLIMB_DEAD_ZONE, YAW_DEAD_ZONE, MotorMixer, deflection_of
 from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.commands.stick_stabilizer import YAW_RATE
 from cosim.simulation.signals import Array
@@ -21,7 +21,6 @@ STICKS_BY: tuple[SticksBy, ...] = get_args(SticksBy)
 PILOT_SPEED = 0.5  # m/s, of a full vertical stick where the depth is kept: ArduSub's PILOT_SPEED_UP
 _FULL = 1000.0
 _PITCH, _ROLL = 1, 2  # enabled_extensions
-_MOSTLY = 0.6  # of the greatest part that a thruster has in an axis, from which on it works for that axis
 _CENTER, _SWING, _AXES = 1500, 400, 6  # us of a channel; channels
 _RELEASED, _LEFT_ALONE = 0, 0xFFFF  # what channels 1 to 8 are told so by
 
@@ -106,16 +105,13 @@ def scale_of(vehicle: Vehicle, profile: Profile, pilot_gain: float, sticks_by: S
     """
     gain = pilot_gain if sticks_by == "manual-control" else 1.0
     reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
-    table = vehicle.autopilot
-    quadratic = profile.name == "ardusub" and table is not None and table.curve == "quadratic"
     if profile.name != "ardusub":  # it brings each axis to the thrusters by itself
         share = np.diag(np.divide(1.0, reach, out=np.zeros(6), where=reach > 0.0))
-        return StickScale(share, np.eye(6), gain, True, quadratic, 0.0)
-    matrix = vehicle.thruster_matrix
-    mixer = np.where(np.abs(matrix) > _MOSTLY * np.abs(matrix).max(axis=1, keepdims=True), np.sign(matrix), 0.0).T
-    most = 0.5 * (vehicle.thrust_max - vehicle.thrust_min)
-    made = (matrix * most) @ mixer  # by full sticks, one axis a column, with what comes along in others
-    return StickScale(mixer @ np.linalg.pinv(made), mixer, gain, False, quadratic, pilot_gain)
+        return StickScale(share, np.eye(6), gain, True, False, 0.0)
+    mixer = MotorMixer(vehicle)
+    made = (vehicle.thruster_matrix * mixer.greatest) @ mixer.asked  # by full sticks, one axis a column
+    efforts = mixer.asked @ np.linalg.pinv(made)
+    return StickScale(efforts, mixer.asked, gain, False, mixer.is_quadratic, pilot_gain)
 
 
 def manual_control(mavlink: Any, system: int, profile: Profile, sticks: Array, all_axes: bool) -> Any:

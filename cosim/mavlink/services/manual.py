@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vehicle.sticks import CLIMB_DEAD_ZONE, YAW_DEAD_ZONE, beyond_dead_zone
+from cosim.mavlink.vehicle.sticks import CLIMB_DEAD_ZONE, YAW_DEAD_ZONE, MotorMixer, beyond_dead_zone
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector6
+from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.commands.commands import STICK_MODES, ManualControl, Mode
 
 _FULL = 1000.0
@@ -27,6 +30,10 @@ class Manual(Service):
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
         self.messages = {"MANUAL_CONTROL": self._manual_control, "RC_CHANNELS_OVERRIDE": self._override}
+        vehicle = context.scenario.vehicle
+        reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+        self._mixer = None if vehicle.autopilot is None else MotorMixer(vehicle)
+        self._reciprocal = np.divide(1.0, reach, out=np.zeros(6), where=reach > 0.0)
         self._heard: float | None = None
         self._state = (context.armed, context.mode)
 
@@ -88,25 +95,24 @@ class Manual(Service):
     def _parts(self, sticks: Vector6, by_gain: bool) -> Vector6:
         """Return which parts of the greatest wrench the sticks ask for, before the pilot's gain.
 
-        An ArduSub asks its thrusters for gain times stick, and their force goes with the square of that. The gain does
-        not scale channels that are overridden.
+        An ArduSub asks its thrusters for gain times stick, and their force goes with the square of the sum. The gain
+        does not scale channels that are overridden.
         """
-        context, table, mode = self.context, self.context.scenario.vehicle.autopilot, self.context.mode_ahead
+        context, mode = self.context, self.context.mode_ahead
         if context.profile.name != "ardusub":
             return sticks
         gain = context.settings["commands.pilot_gain"]
         scale = gain if by_gain else 1.0
-        parts = list(sticks)
-        if mode == "manual":
-            parts[3], parts[4] = sticks[3] / scale, sticks[4] / scale  # which the gain leaves alone
-        else:  # beyond a dead zone, a rate of turn
-            parts[5] = beyond_dead_zone(scale * sticks[5], gain * YAW_DEAD_ZONE) / scale
+        scaled = np.array(sticks) * (scale, scale, scale, 1.0, 1.0, scale)  # the gain leaves roll and pitch alone
+        pushes, parts = np.arange(len(scaled)) < _PUSHES[mode], np.array(sticks)
+        if self._mixer is not None:
+            mixed = np.clip(self._mixer.wrench(np.where(pushes, scaled, 0.0)) * self._reciprocal, -1.0, 1.0) / scale
+            parts[pushes] = mixed[pushes]
+        if mode != "manual":  # beyond a dead zone, a rate of turn
+            parts[5] = beyond_dead_zone(scaled[5], gain * YAW_DEAD_ZONE) / scale
         if mode == "depth_hold":  # likewise of the depth
-            parts[2] = beyond_dead_zone(scale * sticks[2], gain * CLIMB_DEAD_ZONE)
-        if table is not None and table.curve == "quadratic":
-            for i in range(_PUSHES[mode]):
-                parts[i] *= scale * abs(parts[i])
-        x, y, z, k, m, n = parts
+            parts[2] = beyond_dead_zone(scaled[2], gain * CLIMB_DEAD_ZONE)
+        x, y, z, k, m, n = np.clip(parts, -1.0, 1.0).tolist()
         return x, y, z, k, m, n
 
     def _wrench(self, message: Any) -> Vector6:
