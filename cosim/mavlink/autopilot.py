@@ -10,6 +10,7 @@ from cosim.mavlink.events import Events
 from cosim.mavlink.messages import status
 from cosim.mavlink.messages.streams import Streams
 from cosim.mavlink.messages.table import HEARTBEAT
+from cosim.mavlink.services.attitude_targets import AttitudeTargets
 from cosim.mavlink.services.commands import Commands
 from cosim.mavlink.services.ftp import FileServer
 from cosim.mavlink.services.gcs_failsafe import GcsFailsafe
@@ -74,6 +75,7 @@ class Autopilot:
             Requests(context, self._streams),
             Modes(context),
             targets,
+            AttitudeTargets(context),
             Obstacles(context),
             Manual(context),
             parameters,

@@ -16,6 +16,7 @@ from cosim.simulation.commands.commands import (
     ManualControl,
     RemoveObstacle,
     Reset,
+    SetAttitude,
     SetCurrentItem,
     SetHeading,
     SetMission,
@@ -95,6 +96,8 @@ def command_words(command: Command) -> str:
             return f"Heading {math.degrees(command.heading) % 360.0:.0f}°"
         case ManualControl():
             return "Sticks moved"
+        case SetAttitude():
+            return "Attitude given" if command.quaternion is not None else "Attitude free"
         case AddObstacle():
             return f"Obstacle {command.number} at {_place(command.position)}, radius {command.radius:.3g} m"
         case RemoveObstacle():

@@ -14,6 +14,7 @@ from fuzzy_arbiter.engines.firing import Firing
 _DRAWN = (  # beginnings of the names of what a view draws
     "time", "position.", "quaternion.", "velocity.", "attitude.", "membership.", "weight.", "arbiter.", "estimate.",
     "command.", "thruster_force[", "actuation.", "commands.", "target.", "wrench_saturated", "allocation_saturated",
+    "autopilot.", "companion.", "stick.", "velocity_target.",
 )  # fmt: skip
 _DRAWN_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")
 

@@ -15,6 +15,7 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.master import Master
 from cosim.sitl.law import AutopilotLaw
 from cosim.sitl.motion import Lowering, Motion, MotionReader, carried
+from cosim.sitl.rangefinder import Rangefinder
 
 
 class Flight:
@@ -62,7 +63,7 @@ class Flight:
         except BaseException:
             self._master.close()
             raise
-        self._reader = MotionReader(self._master.plant, "bottom_depth" in scenario.plant.parameters)
+        self._reader = MotionReader(self._master.plant, Rangefinder(scenario))
         self._every = max(1, round(1.0 / (record_rate * scenario.time.step)))
         self._started = time.perf_counter()
         self._wall_time: float | None = None

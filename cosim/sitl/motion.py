@@ -9,6 +9,7 @@ import numpy as np
 
 from controller.quaternion import rotation_matrix
 from cosim.simulation.stepped_plant import SteppedPlant
+from cosim.sitl.rangefinder import Rangefinder
 
 Three = tuple[float, float, float]
 
@@ -36,7 +37,7 @@ class Motion(NamedTuple):
     velocity_ned: Three  # m/s, over ground
     attitude: Three  # rad, roll, pitch, yaw
     quaternion: tuple[float, float, float, float]  # from body to world, scalar first
-    altitude: float | None  # m, above the bottom as the DVL measures it; None where there is no bottom
+    altitude: float | None  # m, to what is below along the body's vertical axis; None where there is nothing to meet
     dvl: Three  # m/s, over ground, body frame, as the DVL measures it
 
 
@@ -47,13 +48,15 @@ class MotionReader:
     ----------
     plant : SteppedPlant
         Initialised.
-    bottom : bool
-        True if there is a bottom, so that the altitude is measured.
+    rangefinder : Rangefinder
+        Rangefinder that looks down.
     """
 
-    def __init__(self, plant: SteppedPlant, bottom: bool) -> None:
+    def __init__(self, plant: SteppedPlant, rangefinder: Rangefinder) -> None:
         names = plant.outputs.names
-        self._values, self._bottom = plant.outputs.values, bottom
+        self._values, self._rangefinder = plant.outputs.values, rangefinder
+        x = names.index("position.x")
+        self._position = self._values[x : x + 3]
         self._at = np.array([names.index(name) for name in _NAMES])
         e0, u = names.index("quaternion.e0"), names.index("velocity.u")
         self._quaternion, self._velocity_body = self._values[e0 : e0 + 4], self._values[u : u + 3]
@@ -62,10 +65,12 @@ class MotionReader:
         """Return the motion after the plant's last step, which ended at `time` [s]."""
         p, q, r, fx, fy, fz, x, y, z, roll, pitch, yaw, altitude, u, v, w = self._values[self._at].tolist()
         e0, e1, e2, e3 = self._quaternion.tolist()
+        below = self._rangefinder
+        distance = below.measure(self._position, self._quaternion, altitude) if below.is_fitted else None
         vx, vy, vz = (rotation_matrix(self._quaternion) @ self._velocity_body).tolist()  # (15)
         return Motion(
             time, (p, q, r), (fx, fy, fz), (x, y, z), (vx, vy, vz), (roll, pitch, yaw), (e0, e1, e2, e3),
-            altitude if self._bottom else None, (u, v, w),
+            distance, (u, v, w),
         )  # fmt: skip
 
 

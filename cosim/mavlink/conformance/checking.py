@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from cosim.errors import TelemetryError
 from cosim.mavlink.conformance import commands, identity, missions, parameters, streams
+from cosim.mavlink.conformance.baselines import baseline_of
 from cosim.mavlink.conformance.client import Client
 from cosim.mavlink.conformance.connect import qgc_connect
 from cosim.mavlink.conformance.outcome import Check, Outcome, Subject, failed, judged, skipped, speed_of
@@ -84,9 +85,11 @@ def check_vehicle(link: GroundLink, writes: bool) -> Iterator[Result]:
         raise TelemetryError(f"{link.name}: no vehicle was heard in {_FINDING:g} s")
     client.forget()
     subject = Subject(client, *_listen(client), writes)
+    baseline = baseline_of(subject)
     for check in CHECKS:
         started = time.monotonic()
         outcome = check.run(subject) if writes or not check.writes else skipped("only with --commands")
+        outcome = baseline.judge(check.name, outcome)
         if time.monotonic() - client.last_heard > _GONE:
             raise TelemetryError(f"{link.name}: the vehicle has gone, in check {check.name}")
         yield Result(check, outcome, time.monotonic() - started)

@@ -112,7 +112,7 @@ def download(client: Client, path: str) -> Download:
     if size > _GREATEST:
         return Download(None, f"a file of {size} bytes", session.retries)
     pieces = _burst(session, size)
-    _fill(session, size, pieces)
+    size = _fill(session, size, pieces)
     session.ask(_END)
     data = b"".join(pieces[offset] for offset in sorted(pieces))
     if len(data) != size:
@@ -133,14 +133,16 @@ def _burst(session: _Session, size: int) -> dict[int, bytes]:
     return pieces
 
 
-def _fill(session: _Session, size: int, pieces: dict[int, bytes]) -> None:
-    """Read what the bursts left out."""
+def _fill(session: _Session, size: int, pieces: dict[int, bytes]) -> int:
+    """Read what the bursts left out; return where the file ends, which ArduPilot's size is but an estimate of."""
     at = 0
     while at < size:
         if at not in pieces:
             following = min((offset for offset in pieces if offset > at), default=size)
             packet = session.ask(_READ, at, size=min(_DATA, following - at))
             if packet is None or packet.refused or not packet.data:
-                return
+                ended = packet is not None and packet.refused and packet.error == _END_OF_FILE and following == size
+                return at if ended else size
             pieces[at] = packet.data
         at += len(pieces[at])
+    return size

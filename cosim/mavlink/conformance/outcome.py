@@ -10,7 +10,7 @@ from typing import Any, Literal
 from cosim.mavlink.conformance.client import Client
 from cosim.mavlink.wire.ground_end import Heard
 
-Status = Literal["pass", "fail", "skip"]
+Status = Literal["pass", "fail", "skip", "differs"]  # the last: as this autopilot is known to
 
 
 @dataclass(frozen=True)

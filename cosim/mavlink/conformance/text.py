@@ -23,7 +23,8 @@ def summary(results: Sequence[Result]) -> str:
     """Return how many of the `results` passed, failed and were skipped."""
     counts = Counter(result.outcome.status for result in results)
     took = sum(result.seconds for result in results)
-    return f"{counts['pass']} passed, {counts['fail']} failed, {counts['skip']} skipped, {took:.1f} s"
+    differ = f"{counts['differs']} differ as known, " if counts["differs"] else ""
+    return f"{counts['pass']} passed, {counts['fail']} failed, {differ}{counts['skip']} skipped, {took:.1f} s"
 
 
 def as_json(name: str, results: Sequence[Result]) -> str:

@@ -56,7 +56,6 @@ class Targets(Service):
         self.messages = {
             "SET_POSITION_TARGET_LOCAL_NED": self._local,
             "SET_POSITION_TARGET_GLOBAL_INT": self._global,
-            "SET_ATTITUDE_TARGET": self._attitude,
         }
         self.commands = {
             m.MAV_CMD_DO_REPOSITION: self._reposition,
@@ -175,11 +174,6 @@ class Targets(Service):
             self._drifting = velocity if said[0] == "velocity" else None
             if self._drifting is None:
                 self.warn_of(place)
-
-    def _attitude(self, sender: Sender, message: Any) -> None:
-        self.context.reject(
-            "attitude set-points: the law keeps the attitude; CONDITION_YAW turns the vehicle", "attitude"
-        )
 
     def warn_of(self, place: Vector3, of: str = "target") -> None:
         """Say what stands against a target, which is followed all the same.

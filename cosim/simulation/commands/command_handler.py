@@ -25,6 +25,7 @@ from cosim.simulation.commands.commands import (
     Mode,
     RemoveObstacle,
     Reset,
+    SetAttitude,
     SetCurrentItem,
     SetHeading,
     SetMission,
@@ -93,6 +94,8 @@ class CommandHandler:
         # greatest wrench along and about each axis, which a full stick commands
         self._reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
         self._manual: Array = np.zeros(6)
+        self._by_gain = True  # whether the pilot's gain scales the sticks
+        self._attitude: SetAttitude | None = None
         self._stabilizer = StickStabilizer(vehicle, state, scenario.time.control, self._reach)
         self._mission = MissionExecutor()
         self._slots = ObstacleSlots(scenario.commands.obstacles)
@@ -100,15 +103,25 @@ class CommandHandler:
     @property
     def automatic_control(self) -> bool:
         """Whether the law computes the forces; otherwise `wrench` does."""
-        return self.armed and self.mode not in STICK_MODES
+        return self.armed and self.mode not in STICK_MODES and not self._pushed
+
+    @property
+    def _pushed(self) -> bool:
+        """Whether an attitude with a force is commanded in the law's place."""
+        return self.mode == "reach" and self._attitude is not None and self._attitude.force is not None
 
     def wrench(self) -> Array:
         """Return the wrench by the sticks for a control period, shape (6,) [N, N m], body frame; 0 unless armed."""
-        gain = self.settings["commands.pilot_gain"] if self.armed else 0.0
-        if self.armed and self.mode != "manual":
-            return self._stabilizer.wrench(self._manual, gain, self.mode == "depth_hold")
-        wrench: Array = gain * self._manual * self._reach
-        return wrench
+        if not self.armed:
+            return np.zeros(6)
+        gain = self.settings["commands.pilot_gain"] if self._by_gain else 1.0
+        if self.mode == "manual":
+            wrench: Array = gain * self._manual * self._reach
+            return wrench
+        sticks, attitude, rate = self._manual, self._attitude, None
+        if attitude is not None and attitude.force is not None:
+            sticks, gain, rate = np.array([*attitude.force, 0.0, 0.0, 0.0]), 1.0, attitude.rate_down
+        return self._stabilizer.wrench(sticks, gain, self.mode == "depth_hold", rate)
 
     def apply(self, command: Command, time: float) -> None:
         """Apply a command at the beginning of a step; one that is invalid is logged and changes nothing.
@@ -131,27 +144,25 @@ class CommandHandler:
         match command:
             case Arm():
                 self.armed = command.armed
-                self._manual[:] = 0.0
-                self._stabilizer.begin()
+                self._release()
             case SetMode():
                 self._set_mode(command.mode, time)
             case SetTarget():
                 self._environment.set_target(command.position, command.radius, command.velocity, time)
                 self._environment.save_target()
                 self.mode = "reach"
+                self._release()
             case SetHeading():
                 self.heading, self.turned = command.heading, True
             case ManualControl():
-                self._manual[:] = command.wrench
-            case AddObstacle():
-                slot = self._slots.take(command.number)
-                self._environment.add_obstacle(slot, command.position, command.radius, command.velocity, time)
-            case RemoveObstacle():
-                left = self._slots.leave(command.number)
-                if left is not None:
-                    self._environment.remove_obstacle(left)
-            case ShiftRegion():
-                self._environment.shift_region(command.region, command.by)
+                self._manual[:], self._by_gain = command.wrench, command.by_gain
+            case SetAttitude():
+                if self._attitude is None:
+                    self._stabilizer.begin()
+                self._attitude = command if command.quaternion is not None else None
+                self._stabilizer.attitude = None if command.quaternion is None else np.array(command.quaternion)
+            case AddObstacle() | RemoveObstacle() | ShiftRegion():
+                self._move_regions(command, time)
             case ChangeSetting():
                 self.settings.change(command.key, command.value)
                 self.changed = True
@@ -168,6 +179,18 @@ class CommandHandler:
                 self.reset = True
             case _:
                 assert_never(command)
+
+    def _move_regions(self, command: AddObstacle | RemoveObstacle | ShiftRegion, time: float) -> None:
+        match command:
+            case AddObstacle():
+                slot = self._slots.take(command.number)
+                self._environment.add_obstacle(slot, command.position, command.radius, command.velocity, time)
+            case RemoveObstacle():
+                left = self._slots.leave(command.number)
+                if left is not None:
+                    self._environment.remove_obstacle(left)
+            case ShiftRegion():
+                self._environment.shift_region(command.region, command.by)
 
     def mark_applied(self) -> None:
         """Clear `control_regained`, `turned` and `changed`, once the master has applied them."""
@@ -191,7 +214,7 @@ class CommandHandler:
         if mode == "mission" and not self._mission.items:
             raise CommandError("mode mission: there is no mission")
         self.mode = mode
-        self._manual[:] = 0.0
+        self._release()
         match mode:
             case "hold":
                 self._environment.set_target(here, radius)
@@ -200,11 +223,14 @@ class CommandHandler:
                 self._environment.set_target(up, radius)
             case "reach":
                 self._environment.restore_target()
-            case "stabilize" | "depth_hold":
-                self._stabilizer.begin()
             case "mission":
                 self._mission.enter(max(self._mission.at, 0))
                 self._resume(time)
+
+    def _release(self) -> None:
+        """Clear sticks and attitude; the stabilizer keeps the present heading and depth, and levels."""
+        self._manual[:], self._attitude = 0.0, None
+        self._stabilizer.begin()
 
     def _resume(self, time: float) -> None:
         """Continue the present mission item from the vehicle's present position."""

@@ -21,6 +21,7 @@ NOT_A_COMMAND = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)  # rai
 _FAR = 1e5  # m; beyond it nothing is commanded
 _FAST = 1e2  # m/s
 _LONG = 1e9  # s
+_UNIT = 1e-2  # by which a quaternion's length may differ from 1
 
 
 def _tag(name: str) -> str:
@@ -70,6 +71,18 @@ class ManualControl(_Command, frozen=True):
     """Control manually: a fraction, from -1 to 1, of the greatest wrench along and about each body axis."""
 
     wrench: Vector6  # fractions, [-]
+    by_gain: bool = True  # the pilot's gain scales them
+
+
+class SetAttitude(_Command, frozen=True):
+    """Keep an attitude in the modes in which sticks steer, or with a force in place of the law while it reaches.
+
+    Another mode, another target, or an attitude of None ends it.
+    """
+
+    quaternion: tuple[float, float, float, float] | None  # from body to world, scalar first
+    force: Vector3 | None = None  # fractions of the greatest force along each body axis, -1 to 1; None: the sticks'
+    rate_down: float | None = None  # m/s, of the depth, in place of a vertical force
 
 
 class AddObstacle(_Command, frozen=True):
@@ -140,6 +153,7 @@ Command = (
     | SetTarget
     | SetHeading
     | ManualControl
+    | SetAttitude
     | AddObstacle
     | RemoveObstacle
     | ShiftRegion
@@ -176,6 +190,13 @@ def validate_command(command: Command) -> None:
                 _check_item(item, len(command.items))
         case ManualControl():
             _require(all(abs(x) <= 1.0 for x in command.wrench), "wrench", command.wrench, "six numbers from -1 to 1")
+        case SetAttitude(quaternion=q) if q is not None:
+            unit = abs(math.hypot(*q) - 1.0) <= _UNIT
+            _require(unit, "quaternion", q, "four numbers of length 1")
+            parts = command.force or ()
+            _require(all(abs(x) <= 1.0 for x in parts), "force", parts, "three numbers from -1 to 1")
+            rate = command.rate_down or 0.0
+            _require(abs(rate) <= _FAST, "rate_down", rate, f"up to {_FAST:g} m/s")
         case SetHeading():
             _require(math.isfinite(command.heading), "heading", command.heading, "a finite angle")
         case ChangeSetting():
