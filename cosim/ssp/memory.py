@@ -53,6 +53,11 @@ class Memory:
                 self._kept.append(array)
                 self.definitions.append(array_data(array, name, "static const"))
 
+    def name(self, array: np.ndarray, expression: str) -> None:
+        """Let an array stand where a C expression says."""
+        self._constants[id(array)] = expression
+        self._kept.append(array)
+
     def call(self, program: Program, name: str, arguments: tuple[Any, ...]) -> str:
         """Return the C function ``void control_name(Model *m)``, which calls a function of the program.
 
