@@ -131,12 +131,12 @@ class FusedFlyer:
         self.close()
 
 
-def require_fused(scenario: Scenario) -> None:
-    """Raise `RunError` for the first key of a scenario by which the fused loop cannot fly it."""
+def require_fused(scenario: Scenario, what: str = "flights without a record") -> None:
+    """Raise `RunError` for the first key of a scenario by which the fused loop cannot fly it; `what` asks for that."""
     for key, (received, expected) in _fixed(scenario).items():
         if received != expected:
             way = f", such as by --set {key}={expected}" if isinstance(expected, str) else ""
-            raise RunError(f"{key} is {received!r}, expected {expected!r} for flights without a record{way}")
+            raise RunError(f"{key} is {received!r}, expected {expected!r} for {what}{way}")
 
 
 def _fixed(scenario: Scenario) -> dict[str, tuple[Any, Any]]:

@@ -193,7 +193,7 @@ def fly(  # noqa: C901 - one loop, as a whole
             if timed:
                 worst = max(worst, seconds(setup.clock, workspace.ticks) - started)
             if out.reasons.shape[0]:
-                _give_reasons(out.reasons[k // setup.control_every], out.estimate, workspace)
+                _give_reasons(out.reasons[k // setup.control_every], out.estimate, place, workspace)
             if out.trace.shape[0]:
                 _trace(out.trace[k // setup.control_every], now, native, state.position, by_criterion, law.report)
             for j in range(inputs.size):
@@ -295,7 +295,7 @@ def _trace(row: Array, now: float, native: Native, position: Array, weights: Arr
     row[17 + c + m :] = report
 
 
-def _give_reasons(row: Array, estimate: Array, workspace: Workspace) -> None:
+def _give_reasons(row: Array, estimate: Array, place: int, workspace: Workspace) -> None:
     n, c, m = workspace.clearances.size, workspace.signals.memberships.size, workspace.signals.inputs.size
     row[0] = workspace.goal_clearance[0]
     row[1 : 1 + n] = workspace.clearances
@@ -303,6 +303,7 @@ def _give_reasons(row: Array, estimate: Array, workspace: Workspace) -> None:
     row[1 + n + c : 1 + n + c + m] = workspace.signals.inputs
     row[1 + n + c + m : 5 + n + c + m] = estimate
     row[5 + n + c + m : 11 + n + c + m] = workspace.wrench
+    row[11 + n + c + m] = place
 
 
 def fly_law(

@@ -58,6 +58,10 @@ class Memory:
         self._constants[id(array)] = expression
         self._kept.append(array)
 
+    def is_named(self, array: np.ndarray) -> bool:
+        """Return whether an array is a constant, or stands where a C expression says."""
+        return id(array) in self._constants
+
     def call(self, program: Program, name: str, arguments: tuple[Any, ...]) -> str:
         """Return the C function ``void control_name(Model *m)``, which calls a function of the program.
 

@@ -56,7 +56,7 @@ class Flight:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        require_fused(scenario)
+        require_fused(scenario, "a page that flies")
         self.scenario, self.law = scenario, law_of(scenario)
         self.start = start_values(scenario)
         through, m = scenario.actuation.through == "thrusters", scenario.vehicle.n_thrusters
@@ -84,7 +84,7 @@ class Flight:
         self.workspace = make_workspace(self.setup, criteria, len(inputs), m)
         rule_inputs, forces = self.workspace.signals.inputs.size, (m if through else 0) + 3
         self.trace = np.zeros((decisions, 17 + criteria + len(inputs) + self.law.report.size))
-        self.reasons = np.zeros((decisions, 11 + n + criteria + rule_inputs + forces))
+        self.reasons = np.zeros((decisions, 12 + n + criteria + rule_inputs + forces))
         self.metrics, self.estimate = np.zeros(len(FlightMetrics._fields)), np.zeros(4)
         self.expected = np.zeros(6)  # stands for what the law expects, or for nothing where sensing is exact
 
