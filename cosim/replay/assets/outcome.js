@@ -1,7 +1,7 @@
 // What a flight in the page came to: summary, verdict and events, in the words of the recorded run's.
 
 /** What stands in the header of a run that was recorded, of one that was flown here. */
-function outcomeOf(data, result, run) {
+function outcomeOf(data, result, run, failure) {
   const { header } = run;
   const [firstInside, lastEntered, inside] = result.metrics;
   const end = result.metrics[12] >= 0 ? result.metrics[12] : (run.end - run.start) / data.step;
@@ -9,7 +9,7 @@ function outcomeOf(data, result, run) {
   const reach = firstInside >= 0 ? firstInside * data.step : null;
   const least = Object.fromEntries(header.regions.slice(1).map(({ name }) => [name, run.column(`${name}.clearance`).reduce((a, b) => (b < a ? b : a), Infinity)]));
   const summary = { reach_time: reach, settle_time: settled ? lastEntered * data.step : null, min_clearance: least };
-  return { summary, verdict: verdictOf(result, run, summary), events: eventsOf(result, run, summary), status: "completed" };
+  return { summary, verdict: verdictOf(result, run, summary), events: eventsOf(run, summary, failure), status: "completed" };
 }
 
 function verdictOf(result, run, { reach_time: reach, settle_time: settled, min_clearance: least }) {
@@ -24,8 +24,8 @@ function verdictOf(result, run, { reach_time: reach, settle_time: settled, min_c
   return `${goal}; it ${kept}.${stopped}`;
 }
 
-function eventsOf(result, run, { reach_time: reach }) {
-  const events = [];
+function eventsOf(run, { reach_time: reach }, failure) {
+  const events = failure ? [{ time: failure.time, kind: "failure", text: `Thruster ${failure.thruster} fails` }] : [];
   if (reach !== null) events.push({ time: reach, kind: "goal", text: "Enters the goal region" });
   for (const { name, unit } of run.header.regions.slice(1)) {
     for (const [from, until] of below(run, `${name}.clearance`).slice(0, 5)) {

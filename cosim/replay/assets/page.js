@@ -50,8 +50,10 @@ class Page {
     this.board.setRuns(runs, this.shown, this.selected);
     if (same) {
       this.player.seek(t);
-      if (this.scene()) Object.assign(this.scene().camera, { azimuth, elevation, distance, target, fitted });
-      this.scene()?.camera.aim(target);
+      if (this.scene() && !fitted) {
+        Object.assign(this.scene().camera, { azimuth, elevation, distance });
+        this.scene().camera.aim(target);
+      }
     }
     this.paint();
   }

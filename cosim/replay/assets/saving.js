@@ -8,8 +8,7 @@ function tomlNumber(x) {
 /** The text of the scenario as it is now. */
 function scenarioText(whatIf) {
   const { toml, title } = whatIf.flight.data;
-  const changed = [...whatIf.values].map(([key, value]) => `${key} = ${Number(value.toPrecision(6))}`);
-  if (whatIf.failure) changed.push(`thruster ${whatIf.failure.thruster} fails at ${whatIf.failure.time} s`);
+  const changed = whatIf.words();
   const more = changed.length > 3 ? ` and ${changed.length - 3} more` : "";
   const words = changed.length ? `${title} (what if: ${changed.slice(0, 3).join(", ")}${more})` : title;
   const filled = toml.keys.map((key) => (key === "title" ? JSON.stringify(words) : tomlNumber(whatIf.value(key))));

@@ -97,7 +97,7 @@ class WhatIf {
     this._flying = false;
     this.last = result;
     if (result.refused) this._refuse(result.refused);
-    else this._show(runOfFlight(this.flight.data, result, header), result, changed);
+    else this._show(runOfFlight(this.flight.data, result, header), result, changed, failure);
     if (this._again) {
       this._again = false;
       this._fly();
@@ -109,8 +109,8 @@ class WhatIf {
     this.panel.say("refused");
   }
 
-  _show(run, result, changed) {
-    Object.assign(run.header, outcomeOf(this.flight.data, result, run));
+  _show(run, result, changed, failure) {
+    Object.assign(run.header, outcomeOf(this.flight.data, result, run, failure));
     this.took = result.took;
     this.page.say("");
     if (!changed) {
@@ -125,7 +125,7 @@ class WhatIf {
       this.page.show([this._asRecorded(), run], true);
       this.page.select(1);
     }
-    const repeats = this.repeats === 0 ? "repeats the record to the last bit" : `repeats the record within ${this.repeats?.toExponential(0)} m`;
+    const repeats = this.repeats === 0 ? "as recorded, to the last bit" : `as recorded, within ${this.repeats?.toExponential(0)} m`;
     this.panel.say(changed ? `flown in ${(result.took / 1000).toFixed(2)} s` : repeats);
   }
 
@@ -156,7 +156,18 @@ class WhatIf {
     });
     const more = this.flight.slots.has(restoring.key) ? this.value(restoring.key) - this.flight.slots.get(restoring.key).value : 0;
     const truth = { ...header.truth, estimate: restoring.truth.map((phi, i) => phi + more * restoring.slopes[i]) };
-    return { ...header, name: "what if", regions, truth, changes: [], gaps: {} };
+    const asked = this.changed ? `With ${this.words().join(", ")}.` : header.asked;
+    return { ...header, name: "what if", asked, regions, truth, changes: [], gaps: {} };
+  }
+
+  /** What is changed, in words. */
+  words() {
+    const { slots, data: { moves } } = this.flight;
+    const moved = moves.flatMap((axes, i) => (axes?.flat().some((key) => this.values.has(key)) ? [`${this.recorded.header.regions[i].name} moved`] : []));
+    const placed = new Set(moves.flatMap((axes) => axes?.flat() ?? []));
+    const numbers = [...this.values].filter(([key]) => !placed.has(key)).map(([key, value]) => `${slots.get(key).words} ${shortNumber(value)} ${slots.get(key).unit}`.trim());
+    const failed = this.failure ? [`thruster ${this.failure.thruster} failing at ${this.failure.time} s`] : [];
+    return [...moved, ...numbers, ...failed];
   }
 }
 
