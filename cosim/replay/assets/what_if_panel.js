@@ -45,7 +45,7 @@ class WhatIfPanel {
       return made;
     };
     this.resetting = button("Reset", "Back to the run as it was recorded (R)", () => this.whatIf.reset());
-    button("Save as scenario", "A file that “cosim run” repeats (S)", () => saveScenario(this.whatIf));
+    button("Save scenario", "A file that “cosim run” repeats (S)", () => saveScenario(this.whatIf));
     return group;
   }
 
@@ -85,6 +85,7 @@ class WhatIfPanel {
     const { key, weight } = this.whatIf.flight.data.restoring;
     if (!this.slots.has(key)) return both;
     const set = this._set("Weight less buoyancy, N");
+    set.classList.add("of-two");
     const now = () => shortNumber(weight - this.whatIf.value(key));
     this._number(set, "W−B", "weight less buoyancy in newtons", 0.5, now, (value) => this.whatIf.set(key, Number((weight - value).toFixed(4))));
     both.append(set);
