@@ -74,9 +74,7 @@ def _embedded(data: Any) -> str:
     return text.replace("<", "\\u003c")
 
 
-def write_page(
-    path: Path, runs: Sequence[dict[str, Any]], title: str, flight: dict[str, Any] | None = None
-) -> Path:
+def write_page(path: Path, runs: Sequence[dict[str, Any]], title: str, flight: dict[str, Any] | None = None) -> Path:
     """Write the page of some runs.
 
     Parameters

@@ -13,8 +13,6 @@ import numpy as np
 OUTERMOST = 3.6541528853610088  # abscissa at which the tail begins
 _LAYERS = 256
 _STEPS = 2.0**52  # of a layer's width
-
-
 _FACTOR = 2549297995355413924 << 64 | 4865540595714422341  # of PCG's linear congruential generator
 _SIZE = 2**128  # of its state
 
@@ -48,7 +46,7 @@ def ziggurat() -> str:
 
 
 def _widths() -> list[float]:
-    """Return the widths of NumPy's layers, a 2^52-nd part of each: the numbers that it draws one step from the middle."""
+    """Return a 2^52-nd part of the width of each of NumPy's layers: what it draws one step from the middle."""
     generator, widths = np.random.PCG64(0), []
     state = generator.state
     back, increment = pow(_FACTOR, -1, _SIZE), state["state"]["inc"]

@@ -1,7 +1,7 @@
 """Which numbers of a scenario a page may change, and where they stand in the WebAssembly of its flight.
 
-Each key is tried: what else changes in the flight's arrays when it does says whether its number stands there as it is. A
-key whose number something else is made of is not offered, for the page makes nothing of numbers but puts them in.
+Each key is tried: what changes in the flight's arrays with it says whether its number stands there as it is. A key
+whose number something else is made of is not offered: the page puts numbers in, and works nothing out of them.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from controller import ControllerError
 from cosim.errors import ScenarioError
@@ -30,7 +31,10 @@ NOISE = ("sensing.position_noise", "sensing.velocity_noise")
 _POINTS = ("centre", "feature", "point", "start", "end")  # of shapes: vectors that say where they are
 _LISTS = ("points", "corners")  # lists of such
 _DEPTHS = ("top", "bottom", "depth")
-_STEP, _APART = 0.0037291, 1.7e-5  # by which numbers that are tried differ from the scenario's, and these steps from each other
+_STEP, _APART = (
+    0.0037291,
+    1.7e-5,
+)  # by which numbers that are tried differ from the scenario's, and these steps from each other
 
 
 @dataclass(frozen=True)
@@ -130,9 +134,7 @@ def _moving_keys(path: str, shape: dict[str, Any]) -> tuple[tuple[str, ...], ...
     return tuple(map(tuple, axes))
 
 
-def _search(
-    flight: Flight, memory: Memory, keys: Sequence[str]
-) -> Iterator[tuple[str, tuple[tuple[str, int], ...]]]:
+def _search(flight: Flight, memory: Memory, keys: Sequence[str]) -> Iterator[tuple[str, tuple[tuple[str, int], ...]]]:
     """Yield keys with where their numbers stand; many are tried at once, and fewer where that does not tell."""
     for sign in (1.0, -1.0):
         changes = {key: _value(flight.scenario, key) + sign * (_STEP + _APART * i) for i, key in enumerate(keys)}
@@ -200,9 +202,9 @@ def _numbers(value: Any) -> Iterator[Any]:
         yield value
 
 
-def _equal(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    same = one == other
-    return same | (np.isnan(one) & np.isnan(other)) if one.dtype == np.float64 else same
+def _equal(one: np.ndarray, other: np.ndarray) -> NDArray[np.bool_]:
+    same = np.asarray(one == other)
+    return np.asarray(same | (np.isnan(one) & np.isnan(other))) if one.dtype == np.float64 else same
 
 
 def _copied(value: Any) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import dataclasses
 import zlib
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,20 +17,21 @@ from cosim.replay.interactive.flight import Flight
 from cosim.replay.interactive.module import flight_module
 from cosim.replay.interactive.scenario_template import scenario_template
 from cosim.replay.interactive.signals import sources_of
-from cosim.replay.viewing import Viewing
 from cosim.results.run_result import Run
 from cosim.results.summary import SETTLED_FOR
-from cosim.simulation.signals import Array
+from cosim.simulation.signals import Array, Column
 from cosim.ssp.memory import Memory
 
 
-def flight_data(run: Run) -> dict[str, Any]:
+def flight_data(run: Run, columns: Sequence[Column]) -> dict[str, Any]:
     """Return what a page needs to fly a run again, with other numbers.
 
     Parameters
     ----------
     run : Run
         Of a scenario that the fused loop flies.
+    columns : sequence of Column
+        That a view of the run has.
 
     Returns
     -------
@@ -47,14 +49,16 @@ def flight_data(run: Run) -> dict[str, Any]:
     """
     scenario = run.scenario
     if scenario.log:
-        raise RunError(f"{run.folder}: is imported from {scenario.log}, expected a run that was simulated for a page that flies")
+        raise RunError(
+            f"{run.folder}: is imported from {scenario.log}, expected a run that was simulated for a page that flies"
+        )
     made = flight_module(scenario)
     flight, memory = made.flight, made.memory
     slots, moves = find_slots(flight, memory)
     deflate = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
     template = scenario_template(scenario, slots)
     regions = [scenario.goal_velocity, *(secondary.region.velocity for secondary in scenario.regions)]
-    return nan_to_none({
+    data: dict[str, Any] = nan_to_none({
         "wasm": base64.b64encode(deflate.compress(made.binary) + deflate.flush()).decode(),
         "name": scenario.name,
         "title": scenario.title,
@@ -72,7 +76,7 @@ def flight_data(run: Run) -> dict[str, Any]:
         "slots": [dataclasses.asdict(slot) for slot in slots],
         "moves": moves,
         "noise": [scenario.sensing.position_noise, scenario.sensing.velocity_noise],
-        "signals": sources_of(flight, Viewing(scenario, run.record.columns).columns),
+        "signals": sources_of(flight, columns),
         "velocities": [list(velocity) for velocity in regions],
         "goal_places": flight.setup.goal_places.tolist(),
         "criteria": list(scenario.criterion_places),
@@ -80,13 +84,15 @@ def flight_data(run: Run) -> dict[str, Any]:
         "failures": _failures(flight, memory),
         "toml": dataclasses.asdict(template),
     })  # fmt: skip
+    return data
 
 
 def _restoring(flight: Flight) -> dict[str, Any]:
     """Return how the true restoring parameters (12) go with buoyancy."""
     scenario = flight.scenario
     begun, more = (
-        s.true_restoring_parameters for s in (scenario, changed_scenario(scenario, {BUOYANCY: _buoyancy(scenario) + 1.0}))
+        s.true_restoring_parameters
+        for s in (scenario, changed_scenario(scenario, {BUOYANCY: _buoyancy(scenario) + 1.0}))
     )
     weight = scenario.plant.parameters.get("weight", scenario.vehicle.weight)
     return {"key": BUOYANCY, "weight": weight, "truth": begun.tolist(), "slopes": (more - begun).tolist()}

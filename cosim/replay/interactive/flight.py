@@ -29,7 +29,7 @@ NEVER = -1  # step of a failure that does not come
 
 
 class Flight:
-    """What `cosim.batch.fused_loop.fly` is given for a scenario, with one more failure of a thruster, which never comes.
+    """What `cosim.batch.fused_loop.fly` is given for a scenario, with one more failure of a thruster, never to come.
 
     Parameters
     ----------
@@ -68,13 +68,14 @@ class Flight:
         stages = failure_stages(scenario, self.setup) if through else _no_stages()
         self.setup = self.setup._replace(
             noise=self.noise,
-            exact=Expression("m->exact") if self.exact else self.setup.exact,
+            exact=Expression("m->exact") if self.exact else self.setup.exact,  # type: ignore[arg-type]
             failed=np.append(self.setup.failed, 0),
             failure_steps=np.append(self.setup.failure_steps, NEVER),
             remaining=np.append(self.setup.remaining, 1.0),
         )
         if self.setup.tell:
-            stages = Allocator(*(np.concatenate([rows, rows[-1:]]) for rows in stages[:3]), stages.direction)
+            inverse, lower, upper = (np.concatenate([rows, rows[-1:]]) for rows in stages[:3])
+            stages = Allocator(inverse, lower, upper, stages.direction)
         self.allocator = stages
         inputs, outputs = exchanged_variables(scenario)
         self.native = self._plant(inputs, outputs)

@@ -49,8 +49,8 @@ def _known(flight: Flight) -> Iterator[tuple[str, list[Any]]]:
         yield f"membership.{name}", ["reasons", 1 + n + i]
     for i, name in enumerate(["goal", *(secondary.region.name for secondary in scenario.regions)]):
         yield f"{name}.clearance", ["reasons", i]
-        for axis in range(3) if name in scenario.moving else ():
-            yield f"{name}.shift.{'xyz'[axis]}", ["shift", i, axis]
+        for k, letter in enumerate("xyz" if name in scenario.moving else ""):
+            yield f"{name}.shift.{letter}", ["shift", i, k]
     for i, signal in enumerate(scenario.rules.inputs if scenario.arbiter.file else ()):
         yield f"arbiter.{signal.name}", ["reasons", 1 + n + c + i]
     for i in range(4):
@@ -72,4 +72,3 @@ def _known(flight: Flight) -> Iterator[tuple[str, list[Any]]]:
     yield "active", ["active"]
     for i in range(len(scenario.rules.system.rules)):
         yield f"rule.R{i + 1}", ["rules", i]
-

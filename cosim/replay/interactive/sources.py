@@ -1,4 +1,4 @@
-"""The C of a flight: translated functions, where their arrays stand, and what of the scenario is no number of theirs."""
+"""The C of a flight: translated functions, where their arrays stand, and what the plant is given before it starts."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cosim.simulation.sensor import STREAM
 from cosim.ssp.c_sources import c_files
 from cosim.ssp.memory import Memory, Named
 from cosim.ssp.normal_tables import OUTERMOST, generator_state, ziggurat
-from fuzzy_arbiter import Constant, Output, Rule, System
+from fuzzy_arbiter import Constant, Output, Rule, System, Term
 from fuzzy_arbiter.export import to_c
 from plant_fmu.variables import variables
 
@@ -141,7 +141,7 @@ def _name_arrays(flight: Flight, memory: Memory) -> None:
 
 def _strengths(system: System) -> System:
     """Return a system of the same conditions, whose outputs are the strengths of the rules."""
-    one = {"one": Constant(1.0)}
+    one = (Term("one", Constant(1.0)),)
     outputs = tuple(Output(f"r{i}", (0.0, 1.0), one, 0.0, "sum") for i in range(len(system.rules)))
     rules = (
         Rule(rule.condition, (output["one"],), rule.weight, rule.operators)
@@ -166,7 +166,8 @@ def _scene(flight: Flight, token: str) -> Iterator[str]:
         told = [(table[name][0], value) for name, value in flight.start.items() if table[name][1] == kind]
         values = [number(float(value)) if kind == "real" else str(int(value)) for _, value in told]
         yield f"#define N_{names} {len(told)}"
-        yield f"static const fmi3ValueReference {prefix}_REFERENCES[] = {_braced([str(at) for at, _ in told] or ['0'])};"
+        references = [str(at) for at, _ in told] or ["0"]
+        yield f"static const fmi3ValueReference {prefix}_REFERENCES[] = {_braced(references)};"
         yield f"static const {c} {prefix}_VALUES[] = {_braced(values or ['0'])};"
     upper, lower, increment, rest = generator_state(scenario.sensing.seed, STREAM)
     words = [f"UINT64_C({word})" for word in (upper, lower, increment, rest)]

@@ -28,9 +28,15 @@ SCENES = {
     "docking": ("docking", ()),
     "a moving view": ("pipe-inspection", ("time.duration=20",)),
     "through sensors": ("harbour", ("time.duration=30",)),
-    "exact, a wrench": ("paper-limited", ("arbiter.engine=closed", "time.duration=10")),
-    "exact, allocated": ("paper-limited", ("arbiter.engine=closed", "time.duration=5", "actuation.through=thrusters")),
-    "goals in turn": ("docking", ("goal.then=[[6.0, -2.5, 3.0]]", "goal.stay=1", "time.duration=40", "plant.current=[0,0,0]")),
+    "exact, a wrench": ("paper-limited", ("arbiter.engine=closed", "time.duration=5")),
+    "exact, allocated": (
+        "paper",
+        ("arbiter.engine=closed", "time.duration=5", "actuation.through=thrusters", "vehicle=bluerov2_heavy"),
+    ),
+    "goals in turn": (
+        "docking",
+        ("goal.then=[[6.0, -2.5, 3.0]]", "goal.stay=1", "time.duration=40", "plant.current=[0,0,0]"),
+    ),
     "known failures": (
         "docking",
         ("tell_failures=true", "failures=[{thruster = 2, time = 3.0}, {thruster = 5, time = 1.0, stuck = true}]",
@@ -81,7 +87,10 @@ def test_a_saved_scenario_repeats_the_flight_to_the_last_bit(values, failure, fl
 
 
 def test_noise_can_be_added_to_an_exact_run(fly, tmp_path):
-    run = flown_run(load_scenario("docking", ["sensing.position_noise=0", "sensing.velocity_noise=0", "time.duration=8"]), tmp_path / "exact")
+    run = flown_run(
+        load_scenario("docking", ["sensing.position_noise=0", "sensing.velocity_noise=0", "time.duration=8"]),
+        tmp_path / "exact",
+    )
     flown = fly(run, {"sensing.position_noise": 0.01, "sensing.velocity_noise": 0.005})
     noisy = load_scenario("docking", ["time.duration=8"])
     assert_same(flown, flown_run(noisy, tmp_path / "noisy"))
