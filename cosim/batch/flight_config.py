@@ -163,6 +163,8 @@ class FlightOutputs(NamedTuple):
     estimate: Array  # (4,) used in the last control step
     trace: Array  # (control steps, 17 + c + i + r), or (0, 0) for none; a row: time, true position, quaternion
     # and velocity, position as measured, the weights of the c criteria, the i inputs, the law's r reports
+    reasons: Array  # (control steps, 12 + n + c + m + f), or (0, 0); a row: clearances of the goal and the n regions, c
+    # memberships, m inputs of the rules, the estimate, the wrench that is allocated, the goal's place, and f forces
 
 
 SENSOR_OUTPUTS = (

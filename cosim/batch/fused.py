@@ -131,12 +131,12 @@ class FusedFlyer:
         self.close()
 
 
-def require_fused(scenario: Scenario) -> None:
-    """Raise `RunError` for the first key of a scenario that the fused loop does not support."""
+def require_fused(scenario: Scenario, what: str = "flights without a record") -> None:
+    """Raise `RunError` for the first key of a scenario that the fused loop does not support; `what` needs the loop."""
     for key, (received, expected) in _fixed(scenario).items():
         if received != expected:
             way = f", such as by --set {key}={expected}" if isinstance(expected, str) else ""
-            raise RunError(f"{key} is {received!r}, expected {expected!r} for flights without a record{way}")
+            raise RunError(f"{key} is {received!r}, expected {expected!r} for {what}{way}")
 
 
 def _fixed(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
@@ -181,14 +181,7 @@ def fly_scenario(
     plant.reset()
     plant.set(start_values(scenario))
     plant.initialise()
-    if through:
-        inputs = tuple(f"thrust[{i + 1}]" for i in range(n))
-        forces = (*(f"thruster_force[{i + 1}]" for i in range(n)), *(f"actuation.{axis}" for axis in "XYZ"))
-    else:
-        inputs = tuple(f"wrench.{axis}" for axis in "XYZKMN")
-        forces = tuple(f"actuator.wrench.{axis}" for axis in "XYZ")  # states: they cost no evaluation
-    through_sensors = scenario.sensing.through == "sensors"
-    native = plant.native(inputs, (*PLANT_OUTPUTS, *forces, *(SENSOR_OUTPUTS if through_sensors else ())))
+    native = plant.native(*exchanged_variables(scenario))
     names = [f"thrust_effectiveness[{i + 1}]" for i in range(n)]
     effectiveness = plant.native(names, ())
     effectiveness.inputs[:] = [plant[name] for name in names] if scenario.failures else 1.0
@@ -198,10 +191,35 @@ def fly_scenario(
     allocator = failure_stages(scenario, setup) if through else _NONE
     decisions = -(-scenario.steps // scenario.control_every)
     criteria, rules = len(scenario.criteria), scenario.rules
-    rows = np.zeros((decisions, 17 + criteria + len(inputs) + law.report.size) if trace else (0, 0))
-    workspace = make_workspace(setup, criteria, len(inputs), n)
+    inputs = native.inputs.size
+    rows = np.zeros((decisions, 17 + criteria + inputs + law.report.size) if trace else (0, 0))
+    workspace = make_workspace(setup, criteria, inputs, n)
     metrics, estimate = fly_law(setup, native, effectiveness, losses, allocator, law, rules.system, workspace, rows)
     return metrics, setup, native, estimate, rows
+
+
+def exchanged_variables(scenario: Scenario) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names of the plant's variables that the loop exchanges with it in each step.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is flown.
+
+    Returns
+    -------
+    tuple of str, tuple of str
+        Inputs and outputs, in the order of the buffers of the loop's plant.
+    """
+    if scenario.actuation.through == "thrusters":
+        n = scenario.vehicle.n_thrusters
+        inputs = tuple(f"thrust[{i + 1}]" for i in range(n))
+        forces = (*(f"thruster_force[{i + 1}]" for i in range(n)), *(f"actuation.{axis}" for axis in "XYZ"))
+    else:
+        inputs = tuple(f"wrench.{axis}" for axis in "XYZKMN")
+        forces = tuple(f"actuator.wrench.{axis}" for axis in "XYZ")  # states: they cost no evaluation
+    sensed = SENSOR_OUTPUTS if scenario.sensing.through == "sensors" else ()
+    return inputs, (*PLANT_OUTPUTS, *forces, *sensed)
 
 
 def configure_flight(scenario: Scenario, thrusters: int, clock: NDArray[np.int64] = _NO_CLOCK) -> FlightConfig:

@@ -192,6 +192,8 @@ def fly(  # noqa: C901 - one loop, as a whole
                 allocate(allocator.inverse[known_failures], lower, upper, allocator.direction, workspace.wrench, inputs)
             if timed:
                 worst = max(worst, seconds(setup.clock, workspace.ticks) - started)
+            if out.reasons.shape[0]:
+                _give_reasons(out.reasons[k // setup.control_every], out.estimate, place, workspace)
             if out.trace.shape[0]:
                 _trace(out.trace[k // setup.control_every], now, native, state.position, by_criterion, law.report)
             for j in range(inputs.size):
@@ -206,6 +208,10 @@ def fly(  # noqa: C901 - one loop, as a whole
         if not (fmi_do_step(native, now, setup.step) and fmi_get(native)):
             refused = k
             break
+        if controls and out.reasons.shape[0]:
+            given = native.outputs[13 : 16 + m]
+            for j in range(given.size):
+                out.reasons[k // setup.control_every, out.reasons.shape[1] - given.size + j] = given[j]
         for j in range(m):
             thrust_effort += abs(native.outputs[13 + j]) * setup.step
         x, y, z = native.outputs[13 + m], native.outputs[14 + m], native.outputs[15 + m]
@@ -289,6 +295,17 @@ def _trace(row: Array, now: float, native: Native, position: Array, weights: Arr
     row[17 + c + m :] = report
 
 
+def _give_reasons(row: Array, estimate: Array, place: int, workspace: Workspace) -> None:
+    n, c, m = workspace.clearances.size, workspace.signals.memberships.size, workspace.signals.inputs.size
+    row[0] = workspace.goal_clearance[0]
+    row[1 : 1 + n] = workspace.clearances
+    row[1 + n : 1 + n + c] = workspace.signals.memberships
+    row[1 + n + c : 1 + n + c + m] = workspace.signals.inputs
+    row[1 + n + c + m : 5 + n + c + m] = estimate
+    row[5 + n + c + m : 11 + n + c + m] = workspace.wrench
+    row[11 + n + c + m] = place
+
+
 def fly_law(
     setup: FlightConfig,
     native: Native,
@@ -330,7 +347,7 @@ def fly_law(
     bound = BoundLaw(decide.address, decide.words, is_wrench, law.estimate, expected, law.report)
     weigh = BoundRules(rules, workspace.signals.inputs, workspace.by_criterion)
     arbiter = BoundArbiter(weigh.address, weigh.words)
-    out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), np.zeros(4), trace)
+    out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), np.zeros(4), trace, np.zeros((0, 0)))
     BoundCall(fly, (setup, native, effectiveness, losses, allocator, bound, arbiter, workspace, out)).call()
     decide.raise_error()
     weigh.raise_error()

@@ -87,7 +87,7 @@ def _of_flight(goal: PackedRegions, regions: PackedRegions) -> tuple[Any, ...]:
         False, False, SensorModel(), _INTEGERS, _INTEGERS, _FLAT, _INTEGERS, _INTEGERS, _FLAT, False, 1, -1,
         Clock().numbers,
     )  # fmt: skip
-    out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), _FLAT, np.zeros((0, 0)))
+    out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), _FLAT, np.zeros((0, 0)), np.zeros((0, 0)))
     law, allocator = BoundLaw(0, 0, True, _FLAT, _FLAT, _FLAT), Allocator(np.zeros((1, 1, 6)), _TABLE, _TABLE, True)
     arbiter = BoundArbiter(0, 0)
     return setup, native, native, native, allocator, law, arbiter, make_workspace(setup, 3, 1, 1), out

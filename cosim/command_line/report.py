@@ -35,6 +35,10 @@ def add_verbs(verbs: Any) -> None:
         help="file to write (default: replay.html, in the folder of a single run, or here for several)",
     )  # fmt: skip
     replay.add_argument("--title", help="of the page (default: the scenario's)")
+    replay.add_argument(
+        "--interactive", action="store_true",
+        help="let the page fly its run again, with a goal, regions, a current, noise, gains that its reader changes",
+    )  # fmt: skip
 
 
 def _formats(text: str) -> list[str]:
@@ -71,5 +75,5 @@ def replay(options: argparse.Namespace) -> int:
     """Run ``cosim replay``."""
     from cosim.replay.pages import replay as write
 
-    print(write(options.folders, options.out, options.title))
+    print(write(options.folders, options.out, options.title, options.interactive))
     return 0

@@ -53,6 +53,15 @@ class Memory:
                 self._kept.append(array)
                 self.definitions.append(array_data(array, name, "static const"))
 
+    def name(self, array: np.ndarray, expression: str) -> None:
+        """Let an array stand where a C expression says."""
+        self._constants[id(array)] = expression
+        self._kept.append(array)
+
+    def is_named(self, array: np.ndarray) -> bool:
+        """Return whether an array is a constant, or stands where a C expression says."""
+        return id(array) in self._constants
+
     def call(self, program: Program, name: str, arguments: tuple[Any, ...]) -> str:
         """Return the C code of ``void control_name(Model *m)``, which calls a function of the program.
 
