@@ -59,7 +59,7 @@ _STALE = 0.15  # s without a measurement, after which the vehicle goes slower
 _TRUSTED_SPREAD = 0.3  # m, of those deviations, beyond which it does too; at twice as much it stops
 _SEED = 1
 _ON_THE_WAY = 0.3  # m/s, from which on soft regions do not push back at all
-_SHALLOWEST = 1e-3  # m, depth in the goal region in which they do again
+_SHALLOWEST = 1e-3  # m, least depth in the goal region at which they do so in full again
 _LEAST_EFFECTIVENESS = 0.5  # by which more force is commanded
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 
@@ -142,7 +142,8 @@ def step(
             acceleration[axis] - free[axis] - memory.filtered_acceleration[axis]
         )
     _force_of(dynamics, R_ahead, memory.filtered_acceleration, wrench)
-    entered = min(max(clearance_at(goal, 0, ahead.position) / max(gains.depth, _SHALLOWEST), 0.0), 1.0)
+    deep = min(clearance_at(goal, 0, memory.plan.path[memory.plan.counts[0] - 1]), gains.depth)
+    entered = min(max(clearance_at(goal, 0, ahead.position) / max(deep, _SHALLOWEST), 0.0), 1.0)
     _soft_forces(memory.observation, regions, memory.weights[1], desired, entered, R_ahead, dynamics, wrench)
     attitude_loop.update_desired(memory.attitude, regions, ahead.position, gains, period)
     attitude_loop.compute_moment(
@@ -251,7 +252,7 @@ def _soft_forces(
 
     Each is at most the force that the thrusters give in every direction. The path decides what is crossed: on the way,
     which is as fast as `desired` [m/s, NED], a region pushes aside, but not back. Nor does it outside the goal region,
-    however slow the approach is: `entered` is 0 there, and 1 at the depth at which the path ends.
+    however slow the approach is: `entered` is 0 there, and 1 where the vehicle is as deep in it as the path's end.
     """
     speed, force = length3(desired[0], desired[1], desired[2]), zeros(3)
     most = dynamics.translational_mass[0] * model.smallest(dynamics.braking)
