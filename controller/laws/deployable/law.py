@@ -52,13 +52,14 @@ from controller.linear_algebra import copy
 from controller.quadratic_program import empty_workspace
 from controller.quaternion import write_rotation
 from controller.regions.kinds import FIRST_OF_ATTITUDE
-from controller.regions.region_set import PackedRegions
+from controller.regions.region_set import PackedRegions, clearance_at
 from controller.stack_array import zeros
 
 _STALE = 0.15  # s without a measurement, after which the vehicle goes slower
 _TRUSTED_SPREAD = 0.3  # m, of those deviations, beyond which it does too; at twice as much it stops
 _SEED = 1
 _ON_THE_WAY = 0.3  # m/s, from which on soft regions do not push back at all
+_SHALLOWEST = 1e-3  # m, least depth in the goal region at which they do so in full again
 _LEAST_EFFECTIVENESS = 0.5  # by which more force is commanded
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 
@@ -141,7 +142,9 @@ def step(
             acceleration[axis] - free[axis] - memory.filtered_acceleration[axis]
         )
     _force_of(dynamics, R_ahead, memory.filtered_acceleration, wrench)
-    _soft_forces(memory.observation, regions, memory.weights[1], desired, R_ahead, dynamics, wrench)
+    deep = min(clearance_at(goal, 0, memory.plan.path[memory.plan.counts[0] - 1]), gains.depth)
+    entered = min(max(clearance_at(goal, 0, ahead.position) / max(deep, _SHALLOWEST), 0.0), 1.0)
+    _soft_forces(memory.observation, regions, memory.weights[1], desired, entered, R_ahead, dynamics, wrench)
     attitude_loop.update_desired(memory.attitude, regions, ahead.position, gains, period)
     attitude_loop.compute_moment(
         memory.attitude, dynamics, ahead.quaternion, ahead.velocity[3:], against, gains, wrench[3:]
@@ -240,6 +243,7 @@ def _soft_forces(
     regions: PackedRegions,
     weights: Array,
     desired: Array,
+    entered: float,
     R: Array,
     dynamics: Dynamics,
     wrench: Array,
@@ -247,7 +251,8 @@ def _soft_forces(
     """Add the repulsive force of violated soft regions of position (22), -alpha_i g_i grad g_i / |grad g_i|.
 
     Each is at most the force that the thrusters give in every direction. The path decides what is crossed: on the way,
-    which is as fast as `desired` [m/s, NED], a region pushes aside, but not back.
+    which is as fast as `desired` [m/s, NED], a region pushes aside, but not back. Nor does it outside the goal region,
+    however slow the approach is: `entered` is 0 there, and 1 where the vehicle is as deep in it as the path's end.
     """
     speed, force = length3(desired[0], desired[1], desired[2]), zeros(3)
     most = dynamics.translational_mass[0] * model.smallest(dynamics.braking)
@@ -262,8 +267,9 @@ def _soft_forces(
             force[axis] = -push * observation.gradients[i, axis] / size
             along += force[axis] * desired[axis]
         if along < 0.0:
+            spared = max(min(speed / _ON_THE_WAY, 1.0), 1.0 - entered)  # share of the push back
             for axis in range(3):
-                force[axis] -= along * desired[axis] / (speed * max(speed, _ON_THE_WAY))
+                force[axis] -= spared * along * desired[axis] / square(speed)
         for k in range(3):
             for axis in range(3):
                 wrench[k] += R[axis, k] * force[axis]

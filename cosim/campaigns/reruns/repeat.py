@@ -162,33 +162,38 @@ def _of_scene(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Rep
         scenario = scene_scenario(decode_scene(line), plan["law"], gains, conditions)
 
     def outcome(scenario: Scenario, record: Record, summary: dict[str, Any]) -> Outcome:
-        return _scene_outcome(record, summary, conditions)
+        return _scene_outcome(scenario, record, summary, conditions)
 
     return Repeat(stored, SceneTask(plan["law"], gains, conditions), [line], scenario, outcome)
 
 
 def _row_outcome(scenario: Scenario, record: Record, summary: dict[str, Any]) -> Outcome:
     """Return the columns of a sweep's row from a recorded run."""
-    hard = [r.region.name for r in scenario.regions if r.region.hard and not of_attitude(r.region.shape)]
     same = ("reached", "reach_time", "settled", "closest_to_goal", "effort", "max_force", "max_speed")
     return {name: summary[name] for name in same} | {
         "violated": bool(summary["hard_violated"]),
-        "min_clearance": min((summary["min_clearance"][name] for name in hard), default=math.inf),
+        "min_clearance": _least_clearance(scenario, summary),
     }
 
 
-def _scene_outcome(record: Record, summary: dict[str, Any], conditions: Conditions) -> Outcome:
+def _scene_outcome(scenario: Scenario, record: Record, summary: dict[str, Any], conditions: Conditions) -> Outcome:
     """Return the columns of a row of a campaign of scenes from a recorded run."""
     time, inside = record["time"], record["goal.clearance"] >= 0.0
     entered = spans(inside, time)[-1][0] if inside[-1] else math.inf
     reached = bool(time[-1] - entered >= conditions.settled - 0.5 * conditions.plant_step)
-    clearance = min(summary["min_clearance"].values())
+    clearance = _least_clearance(scenario, summary)
     return {
         "reached": reached,
         "violation": clearance < 0.0,
-        "min_clearance": clearance,
+        "min_clearance": clearance if math.isfinite(clearance) else None,
         "reach_time": entered if reached else None,
     }
+
+
+def _least_clearance(scenario: Scenario, summary: dict[str, Any]) -> float:
+    """Return the least clearance of hard regions of position [m], inf where there is none."""
+    hard = [r.region.name for r in scenario.regions if r.region.hard and not of_attitude(r.region.shape)]
+    return min((summary["min_clearance"][name] for name in hard), default=math.inf)
 
 
 def _close(one: Any, other: Any, tolerance: float) -> bool:
