@@ -14,13 +14,13 @@ _INVALID = 0x7FFF
 _TIMEOUT = 3.0  # s of the wall clock
 _PITCH, _ROLL = 1, 2  # enabled_extensions
 _CENTRE, _SWING = 1500, 400  # us of a channel
-_CHANNELS = 6  # pitch, roll, up, yaw, forward, right, as ArduSub has them
-_RELEASED, _IGNORED = 0, 0xFFFF  # a channel that is given back, and one that stays as it is
+_CHANNELS = 6  # pitch, roll, up, yaw, forward, right, in ArduSub's order
+_RELEASED, _IGNORED = 0, 0xFFFF  # values that release a channel, and leave it unchanged
 _NEUTRAL: Vector6 = (0.0,) * 6
 
 
 class Manual(Service):
-    """Sticks become parts of the greatest wrench, while the mode is one that they steer in."""
+    """Convert sticks to fractions of the greatest wrench, in the modes of manual control."""
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
@@ -29,7 +29,7 @@ class Manual(Service):
         self._state = (context.armed, context.mode)
 
     def restart(self) -> None:
-        """Let go of the sticks."""
+        """Release the sticks."""
         self._heard = None
 
     def on_snapshot(self) -> None:
@@ -39,13 +39,13 @@ class Manual(Service):
             self._state, self.context.sticks = state, _NEUTRAL
 
     def tick(self) -> None:
-        """Let go of sticks that nobody holds any more."""
+        """Release the sticks after 3 s without a message."""
         context = self.context
         if self._heard is None or context.now - self._heard < _TIMEOUT:
             return
         self._heard = None
         if context.mode_ahead in STICK_MODES:
-            self._order(_NEUTRAL)
+            self._submit(_NEUTRAL)
             context.say("Lost manual control", context.mavlink.MAV_SEVERITY_CRITICAL, "sticks", _TIMEOUT)
 
     def _manual_control(self, sender: Sender, message: Any) -> None:
@@ -73,9 +73,9 @@ class Manual(Service):
             context.reject("another station has the vehicle in hand", "active gcs")
             return
         self._heard = context.now
-        self._order(sticks)
+        self._submit(sticks)
 
-    def _order(self, sticks: Vector6) -> None:
+    def _submit(self, sticks: Vector6) -> None:
         context = self.context
         if sticks == context.sticks:
             return
@@ -83,23 +83,23 @@ class Manual(Service):
             context.sticks = sticks
 
     def _parts(self, sticks: Vector6) -> Vector6:
-        """Return which parts of the greatest wrench the sticks ask for, before the pilot's gain.
+        """Return the fractions of the greatest wrench that the sticks command, before the pilot gain.
 
-        An ArduSub asks its thrusters for gain times stick, and their force goes with the square of that.
+        ArduSub commands its thrusters by gain times stick, and their force is proportional to the square of that.
         """
         context, table = self.context, self.context.scenario.vehicle.autopilot
         if context.profile.name != "ardusub" or table is None or table.curve != "quadratic":
             return sticks
         gain = context.settings["commands.pilot_gain"]
-        scales = (gain, gain, gain, 1.0 / gain, 1.0 / gain, gain)  # the gain leaves roll and pitch alone
-        squared = 6 if context.mode_ahead == "manual" else 3  # in other modes the last three ask for angles and rates
+        scales = (gain, gain, gain, 1.0 / gain, 1.0 / gain, gain)  # the gain does not apply to roll and pitch
+        squared = 6 if context.mode_ahead == "manual" else 3  # in other modes the last three command angles and rates
         x, y, z, k, m, n = (
             scale * s * abs(s) if i < squared else s for i, (scale, s) in enumerate(zip(scales, sticks, strict=True))
         )
         return x, y, z, k, m, n
 
     def _wrench(self, message: Any) -> Vector6:
-        """Return X Y Z K M N from -1 to 1; the vertical stick is up where positive, Z is down."""
+        """Return X Y Z K M N from -1 to 1; the vertical stick is positive up, Z is positive down."""
         centre = self.context.profile.centred_stick
         up = 0.0 if message.z == _INVALID else _part((message.z - centre) / (_FULL - centre))
         full = self.context.profile.full_tilt_stick

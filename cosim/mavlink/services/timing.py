@@ -11,7 +11,7 @@ _NANO = 1000  # ns in a µs
 
 
 class Timing(Service):
-    """Answers with the time since boot."""
+    """Answer TIMESYNC with the time since boot, and PING."""
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)

@@ -1,4 +1,4 @@
-"""What is near the vehicle: regions that stand for obstacles, where they are now, and a level scan of them."""
+"""Proximity sensing: present positions of the regions that are obstacles, and a level scan of them."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from cosim.simulation.commands.settings import LiveSettings
 
 SECTORS = 72
 REACH = 20.0  # m
-_RAYS = 3  # in each sector, so that at the end of its reach nothing wider than 0.6 m slips through
+_RAYS = 3  # in each sector: at full range the scan detects anything wider than 0.6 m
 _AT_REST = (0.0, 0.0, 0.0)
 
 
 class Proximity:
-    """Obstacles, packed once; only what changed is written anew.
+    """Obstacles, packed once; an update writes only changes.
 
-    Making one loads the libraries that it uses, which may take seconds: not to be done beside a running simulation.
+    The constructor loads libraries, which may take seconds: call it before the simulation.
 
     Parameters
     ----------
     scenario : Scenario
-        Which regions; of those to be kept out of for the criterion ``obstacle``, the ones in space stand for obstacles.
+        Scenario whose regions in space to keep out of, of the criterion ``obstacle``, are the obstacles.
 
     Attributes
     ----------
@@ -57,14 +57,14 @@ class Proximity:
         self.scan(_AT_REST, 0.0)
 
     def update(self, view: View, settings: LiveSettings) -> None:
-        """Put the obstacles where a snapshot has them, in the shapes that they have now.
+        """Update positions of the obstacles from a snapshot, and their shapes from the settings.
 
         Parameters
         ----------
         view : View
             The snapshot.
         settings : LiveSettings
-            The present shapes.
+            Settings with the present shapes.
         """
         regions, clearances = self._regions, view.clearances
         for k, name in enumerate(self._names):
@@ -73,7 +73,7 @@ class Proximity:
                 self._shifts[k] = shift
                 regions.shifts[k] = shift
             if self._seen[k]:
-                if shift != _AT_REST:  # it has come; only its clearance tells the radius
+                if shift != _AT_REST:  # present: its radius follows from its clearance
                     centre = [a + b for a, b in zip(PARKED_POSITION, shift, strict=True)]
                     regions.numbers[first + 3] = math.dist(centre, view.position_ned) - clearances[self.ids[k]]
             elif (shape := settings.shapes[name]) is not self._shapes[k]:
@@ -81,12 +81,12 @@ class Proximity:
                 regions.numbers[first : regions.offsets[k + 1]] = shape.packed()
 
     def inwards(self, position_ned: Vector3) -> list[list[float]]:
-        """Return in which direction the clearance of each obstacle falls.
+        """Return the direction in which the clearance of each obstacle decreases.
 
         Parameters
         ----------
         position_ned : tuple of float
-            Of the vehicle [m].
+            Position of the vehicle [m].
 
         Returns
         -------
@@ -101,20 +101,20 @@ class Proximity:
         return directions
 
     def scan(self, position_ned: Vector3, heading: float) -> list[float]:
-        """Look around in the level plane of the vehicle.
+        """Scan the horizontal plane of the vehicle.
 
         Parameters
         ----------
         position_ned : tuple of float
-            Of the vehicle [m].
+            Position of the vehicle [m].
         heading : float
-            From north, clockwise [rad].
+            Heading from north, clockwise [rad].
 
         Returns
         -------
         list of float
-            The distance to what is nearest in each sector [m], that about the heading first, then clockwise; infinite
-            where nothing is met within `REACH`, 0 everywhere for a vehicle inside an obstacle, NaN where unknown.
+            Distance to the nearest obstacle in each sector [m], from the sector about the heading clockwise; infinite
+            beyond `REACH`, 0 everywhere for a vehicle inside an obstacle, NaN where unknown.
         """
         self._position[:] = position_ned
         np.cos(self._angles + heading, out=self._directions[:, 0])
