@@ -121,7 +121,7 @@ class TcpOut(OneStream):
         with contextlib.suppress(OSError):
             stream = stream_of(socket.create_connection((host, port), _CONNECTING))
         if stream is None:
-            log.warning("MAVLink: tcp:%s:%s: nobody listens yet; waiting", host, port)
+            log.warning("MAVLink: tcp:%s:%s: no server yet; waiting", host, port)
         super().__init__(stream, gone="server", slow="for a slow server")
 
     def tend(self, now: float) -> None:

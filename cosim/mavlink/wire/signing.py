@@ -61,9 +61,7 @@ def read_key(path: Path) -> bytes:
     except OSError as error:
         raise TelemetryError(f"{path}: the key cannot be read: {error.strerror or error}") from error
     if os.name == "posix" and mode & 0o077:
-        raise TelemetryError(
-            f"{path}: mode is {mode & 0o777:o}, expected 600: whoever reads it can command the vehicle"
-        )
+        raise TelemetryError(f"{path}: mode is {mode & 0o777:o}, expected 600: its readers can command the vehicle")
     if len(content) > _LONGEST_KEY:
         raise TelemetryError(f"{path}: more than {_LONGEST_KEY} bytes, expected a key or a passphrase")
     try:
