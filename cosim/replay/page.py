@@ -1,4 +1,4 @@
-"""The page of one or several runs: one HTML file that needs nothing else."""
+"""The page of one or several runs: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ _STYLES = ("style.css", "stage.css", "charts.css", "panel.css", "transport.css",
 
 _COMMENT = re.compile(
     r"^[ ]*(?:/\*.*?\*/|//[^\n]*)?\n", re.DOTALL | re.MULTILINE
-)  # on lines of its own, or an empty line
+)  # on its own lines; and empty lines, which are removed as well
 
-_MARK = '<script type="application/json" id="runs">'  # where the data of a page begins
+_MARK = '<script type="application/json" id="runs">'  # start of the data in a page
 
 
 def replay_page(runs: Sequence[dict[str, Any]], title: str) -> str:
@@ -39,21 +39,21 @@ def replay_page(runs: Sequence[dict[str, Any]], title: str) -> str:
     Parameters
     ----------
     runs : sequence of dict
-        Traces as JSON knows them; none for a live page, which is told of its run over its connection.
+        Traces as plain values; none for a live page, which receives its run over its connection.
     title : str
-        Of the page.
+        Title of the page.
 
     Returns
     -------
     str
-        HTML.
+        The page as HTML.
     """
     assets = resources.files("cosim.replay") / "assets"
     style, script = (
         "".join(_COMMENT.sub("", (assets / name).read_text(encoding="utf-8")) for name in names)
         for names in (_STYLES, _SCRIPTS)
     )
-    # "</script" would end the element that it stands in, and "<!--" with "<script" would keep it from ending
+    # "</script" would end its element, and "<!--" with "<script" would keep it open
     data = json.dumps(list(runs), separators=(",", ":"), allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
     return Template((assets / "page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(title),
@@ -69,11 +69,11 @@ def write_page(path: Path, runs: Sequence[dict[str, Any]], title: str) -> Path:
     Parameters
     ----------
     path : Path
-        The file; it appears only when it is whole.
+        The file, which is written atomically.
     runs : sequence of dict
         As for `replay_page`.
     title : str
-        Of the page.
+        Title of the page.
 
     Returns
     -------
@@ -84,5 +84,5 @@ def write_page(path: Path, runs: Sequence[dict[str, Any]], title: str) -> Path:
 
 
 def is_page(path: Path) -> bool:
-    """Return whether it is a file, and a page of this kind: a pipe would be waited for."""
+    """Return True if a path is a regular file with a page of this kind; a pipe, which would block, is not read."""
     return path.is_file() and _MARK in path.read_text(encoding="utf-8", errors="replace")

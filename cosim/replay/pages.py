@@ -17,11 +17,11 @@ def write_replay(run: Run, out: Path | None = None, title: str | None = None) ->
     Parameters
     ----------
     run : Run
-        What is replayed.
+        The run.
     out : Path, optional
         The file; default: ``replay.html`` in the run folder.
     title : str, optional
-        Of the page; default: the scenario's.
+        Title of the page; default: the scenario's.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def write_replay(run: Run, out: Path | None = None, title: str | None = None) ->
 
 
 def replay(folders: Sequence[Path], out: Path | None = None, title: str | None = None) -> Path:
-    """Write the page of runs that are done, were interrupted, or were killed.
+    """Write the page of finished, interrupted or killed runs.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def replay(folders: Sequence[Path], out: Path | None = None, title: str | None =
     out : Path, optional
         The file; default: ``replay.html``, in the folder of a single run, or in the current one.
     title : str, optional
-        Of the page; default: that of the scenario; of several runs `joint_title`.
+        Title of the page; default: the scenario's; of several runs `joint_title`.
 
     Returns
     -------
@@ -56,10 +56,9 @@ def replay(folders: Sequence[Path], out: Path | None = None, title: str | None =
     Raises
     ------
     RunError
-        If a folder holds no run that can be read, or is named twice, or the file is something else, or cannot be
-        written.
+        If a folder holds no readable run, or is named twice, or the file exists and is no page, or cannot be written.
     ScenarioError
-        If the scenario of a run is none.
+        If the scenario of a run is invalid.
     """
     names = _names(folders)
     file = out or (folders[0] / REPLAY if len(folders) == 1 else Path(REPLAY))
@@ -79,17 +78,17 @@ def replay(folders: Sequence[Path], out: Path | None = None, title: str | None =
 
 
 def joint_title(titles: Mapping[str, str]) -> str:
-    """Return the title of several runs: each title once, before the names of those that have it.
+    """Return the title of several runs: each title once, before the names of its runs.
 
     Parameters
     ----------
     titles : mapping from str to str
-        Of the scenarios, by the name of the run.
+        Titles of the scenarios, by the name of the run.
 
     Returns
     -------
     str
-        Such as ``Docking: a, b; Docking (changed: time.duration = 5 s): c``.
+        Title such as ``Docking: a, b; Docking (changed: time.duration = 5 s): c``.
     """
     return "; ".join(
         f"{title}: {', '.join(n for n in titles if titles[n] == title)}" for title in dict.fromkeys(titles.values())
@@ -97,7 +96,7 @@ def joint_title(titles: Mapping[str, str]) -> str:
 
 
 def _names(folders: Sequence[Path]) -> list[str]:
-    """Return the shortest ends of the folders' paths that tell them apart."""
+    """Return the shortest ends of the folders' paths that distinguish them."""
     paths = [folder.resolve() for folder in folders]
     for i, path in enumerate(paths):
         if path in paths[:i]:
