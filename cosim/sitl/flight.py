@@ -1,4 +1,4 @@
-"""One run that an autopilot flies: the plant, its record and its folder, stepped from outside."""
+"""One run that an autopilot flies: plant, record and folder, stepped by a server."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ class Flight:
     Parameters
     ----------
     scenario : Scenario
-        What is flown.
+        The scenario to fly.
     law : AutopilotLaw
-        The autopilot; nobody else's.
+        The autopilot, used by this run only.
     out : Path or None
         The run folder, as for `claim`.
     record_rate : float
-        Rows a simulated second at the most [Hz].
+        Most rows per simulated second [Hz].
 
     Attributes
     ----------
     folder : Path
         The run folder.
     steps : int
-        That were made.
+        Steps of the plant so far.
     waited : int
-        Frames of the autopilot before them, in which the vehicle was lowered to where it starts, and held there.
+        Frames before them, in which the vehicle was lowered to its start, and held there.
 
     Raises
     ------
@@ -71,16 +71,16 @@ class Flight:
 
     @property
     def done(self) -> bool:
-        """Whether the scenario's time is over."""
+        """True if the scenario's time is over."""
         return self.steps >= self.scenario.steps
 
     def step(self) -> Motion:
-        """Make the next step, with the law as it stands, and record it where it is due.
+        """Step the plant with the last outputs of the autopilot, and record the row if it is due.
 
         Returns
         -------
         Motion
-            At the end of the step.
+            Motion at the end of the step.
 
         Raises
         ------
@@ -96,31 +96,31 @@ class Flight:
 
     @property
     def can_start(self) -> bool:
-        """Whether the vehicle is where the scenario starts: lowered there, or never seen elsewhere."""
+        """True if the vehicle is at the scenario's start: lowered there, or no frame was waited for."""
         return self.waited == 0 or self._lowering.is_over(self.waited * self.scenario.time.step)
 
     def wait(self) -> Motion:
-        """Let a frame go by with the vehicle lowered from the surface to where it starts, and held there."""
+        """Return the motion of a frame in which the vehicle is lowered from the surface to its start, or held there."""
         self.waited += 1
         return carried(self.motion(), *self._lowering.at(self.waited * self.scenario.time.step))
 
     def motion(self) -> Motion:
-        """Return the vehicle's motion as it is now, by the autopilot's time."""
+        """Return the vehicle's present motion, at the autopilot's time."""
         return self._reader.read((self.waited + self.steps) * self.scenario.time.step)
 
     def _record(self) -> None:
-        """Keep the row of the step that was made last, if it is due."""
+        """Record the row of the last step, if it is due."""
         if self.steps % self._every == 0:
             with self._writing():
                 self._recorder.observe(self.steps, self._master.row)
 
     def end(self) -> None:
-        """Close plant and record; RunError if it cannot be written. May be called twice."""
+        """Close plant and record; raise RunError if it cannot be written. May be called twice."""
         if self._wall_time is not None:
             return
         self._wall_time = time.perf_counter() - self._started
         try:
-            if self.done:  # the last row: it moves nothing
+            if self.done:  # the last row, at the end time
                 self._master.step(self.steps)
                 self._record()
         finally:
@@ -134,14 +134,14 @@ class Flight:
         Parameters
         ----------
         status : str
-            How it ended.
+            Status of the run.
         report : bool
             Write report and figures too.
 
         Returns
         -------
         Run
-            With its summary.
+            The run with its summary.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""What an autopilot is told of the vehicle: where it is, how it moves, and what its IMU feels."""
+"""The motion of the vehicle for an autopilot: position, attitude, velocity, and the IMU's measurements."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _NAMES = (
     "measured.altitude",
     *(f"measured.velocity.{name}" for name in "uvw"),
 )
-_GRAVITY = 9.81  # m/s2, as ArduPilot and PX4 have it, near enough
+_GRAVITY = 9.81  # m/s2, close to ArduPilot's and PX4's
 _AT_THE_SURFACE = 4.0  # s, in which an autopilot calibrates its sensors
-_LOWERING, _LONGEST = 1.0, 6.0  # m/s at the most, unless it took longer than so many seconds
+_LOWERING, _LONGEST = 1.0, 6.0  # m/s, greatest speed, unless lowering would take longer than that many seconds
 
 
 class Motion(NamedTuple):
@@ -36,19 +36,19 @@ class Motion(NamedTuple):
     velocity_ned: Three  # m/s, over ground
     attitude: Three  # rad, roll, pitch, yaw
     quaternion: tuple[float, float, float, float]  # from body to world, scalar first
-    altitude: float | None  # m, above the bottom as the DVL measures it; None where there is no bottom
+    altitude: float | None  # m, above the bottom as the DVL measures it; None without a bottom
     dvl: Three  # m/s, over ground, body frame, as the DVL measures it
 
 
 class MotionReader:
-    """Reads the motion off a plant's outputs.
+    """Read the motion from a plant's outputs.
 
     Parameters
     ----------
     plant : SteppedPlant
-        Initialised.
+        Initialized plant.
     bottom : bool
-        Whether there is one.
+        True if the scenario has a bottom.
     """
 
     def __init__(self, plant: SteppedPlant, bottom: bool) -> None:
@@ -59,7 +59,7 @@ class MotionReader:
         self._quaternion, self._velocity_body = self._values[e0 : e0 + 4], self._values[u : u + 3]
 
     def read(self, time: float) -> Motion:
-        """Return the motion as it is after the plant's last step, which ended at a time [s]."""
+        """Return the motion after the plant's last step, which ended at a time [s]."""
         p, q, r, fx, fy, fz, x, y, z, roll, pitch, yaw, altitude, u, v, w = self._values[self._at].tolist()
         e0, e1, e2, e3 = self._quaternion.tolist()
         vx, vy, vz = (rotation_matrix(self._quaternion) @ self._velocity_body).tolist()  # (15)
@@ -70,24 +70,24 @@ class MotionReader:
 
 
 def at_rest(motion: Motion) -> Motion:
-    """Return the motion of a vehicle that is held where it is: the IMU feels gravity alone."""
+    """Return the motion of a vehicle that is held in place: the IMU measures only gravity."""
     return carried(motion, motion.position_ned[2], 0.0, 0.0)
 
 
 def carried(motion: Motion, depth: float, speed: float, acceleration: float) -> Motion:
-    """Return the motion of a vehicle that is carried down at the place and the attitude of another motion.
+    """Return the motion of a vehicle that is lowered at the horizontal position and attitude of another motion.
 
     Parameters
     ----------
     motion : Motion
-        Whose place and attitude count.
+        Motion with the horizontal position and attitude.
     depth, speed, acceleration : float
-        Of the vehicle [m, m/s, m/s2], downwards.
+        Vertical motion of the vehicle [m, m/s, m/s2], positive down.
 
     Returns
     -------
     Motion
-        The IMU feels gravity and the acceleration, and the DVL measures the speed.
+        Motion in which the IMU measures gravity and the acceleration, and the DVL the speed.
     """
     to_body = rotation_matrix(np.array(motion.quaternion)).T
     fx, fy, fz = (to_body @ np.array([0.0, 0.0, acceleration - _GRAVITY])).tolist()
@@ -100,14 +100,14 @@ def carried(motion: Motion, depth: float, speed: float, acceleration: float) -> 
 
 
 class Lowering:
-    """How a vehicle comes from the surface, where it is switched on, to the depth at which a scenario starts.
+    """Motion of a vehicle from the surface, where it is switched on, to the depth at which a scenario starts.
 
     An ArduSub calibrates its depth sensor when it is switched on, and again whenever it comes above that depth.
 
     Parameters
     ----------
     depth : float
-        At the end [m]; what is at the surface already is not moved.
+        Depth at the end [m]; at 0 or less the vehicle does not move.
 
     Examples
     --------
@@ -122,7 +122,7 @@ class Lowering:
         self._duration = min(0.5 * math.pi * self._depth / _LOWERING, _LONGEST)
 
     def at(self, time: float) -> Three:
-        """Return depth, speed and acceleration [m, m/s, m/s2] so many seconds after the vehicle was switched on."""
+        """Return depth, speed and acceleration [m, m/s, m/s2] at a time [s] since the vehicle was switched on."""
         if self.is_over(time) or time <= _AT_THE_SURFACE:
             return (self._depth if self.is_over(time) else 0.0), 0.0, 0.0
         rate = math.pi / self._duration
@@ -130,5 +130,5 @@ class Lowering:
         return half * (1.0 - math.cos(phase)), half * rate * math.sin(phase), half * rate**2 * math.cos(phase)
 
     def is_over(self, time: float) -> bool:
-        """Return whether it is where it starts, at a time [s]."""
+        """Return True if the vehicle is at its final depth at a time [s]."""
         return self._depth == 0.0 or time >= _AT_THE_SURFACE + self._duration

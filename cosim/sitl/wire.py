@@ -1,7 +1,7 @@
 """The wire of ArduPilot's JSON backend: servo packets in, a line of JSON out.
 
-The autopilot reads the line with a search for the bare key words, and takes the number two characters behind the first
-one that it finds: so there is no blank behind a colon, and no key that holds another one's word before it.
+The autopilot searches the line for the bare key words, and reads the number two characters after the first match: so
+there is no blank after a colon, and no earlier key that contains the word of a later one.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ class ServoPacket:
     """One frame of the autopilot."""
 
     frame_rate: int  # Hz
-    frame_count: int  # of the frames that the autopilot has taken in since it started
-    pwm: tuple[int, ...]  # us, 16 or 32 servo outputs, 0 for one that gives no pulse
+    frame_count: int  # frames that the autopilot has received since it started
+    pwm: tuple[int, ...]  # us, 16 or 32 servo outputs, 0 without a pulse
 
 
 def decode(data: bytes) -> ServoPacket | None:
-    """Read a servo packet.
+    """Decode a servo packet.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def decode(data: bytes) -> ServoPacket | None:
     Returns
     -------
     ServoPacket or None
-        None if it is none.
+        The packet, or None if the datagram is invalid.
     """
     magic, packing = _MAGIC_OF_LENGTH.get(len(data), (0, None))
     if packing is None:
@@ -49,12 +49,12 @@ def decode(data: bytes) -> ServoPacket | None:
 
 
 def encode(motion: Motion) -> bytes:
-    """Write the plant's state as the autopilot reads it.
+    """Encode the plant's state as the autopilot's line of JSON.
 
     Parameters
     ----------
     motion : Motion
-        Of the vehicle.
+        Motion of the vehicle.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def encode(motion: Motion) -> bytes:
     Raises
     ------
     RunError
-        If a number is not finite, which JSON cannot say.
+        If a number is not finite, which JSON cannot represent.
     """
     t, (p, q, r), (fx, fy, fz), (x, y, z), (vx, vy, vz), (roll, pitch, yaw), (e0, e1, e2, e3), altitude, _ = motion
     total = t + p + q + r + fx + fy + fz + x + y + z + vx + vy + vz + roll + pitch + yaw + e0 + e1 + e2 + e3
