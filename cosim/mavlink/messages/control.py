@@ -10,7 +10,7 @@ from cosim.mavlink.messages.pose import degrees
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.encode import wrapped
 
-_CENTRE, _SWING = 1500, 400  # µs of PWM: at rest, and to either end
+_CENTER, _SWING = 1500, 400  # µs of PWM: at rest, and to either end
 _SERVOS, _OUTPUTS = 16, 32
 _LONGEST_NAME = 10  # characters of a named value
 _POSITION_AND_VELOCITY = 0b110111000000  # type_mask: all but these is ignored
@@ -55,7 +55,7 @@ def rc_channels(context: VehicleContext) -> list[Any]:
     """RC_CHANNELS: the last applied sticks, in the order of ArduSub: pitch roll up yaw forward lateral."""
     surge, sway, heave, roll, pitch, yaw = context.sticks
     order = pitch, roll, -heave, yaw, surge, sway
-    pulses = [_CENTRE + _SWING * stick for stick in order] + [0xFFFF] * 12
+    pulses = [_CENTER + _SWING * stick for stick in order] + [0xFFFF] * 12
     return [context.make("RC_CHANNELS", wrapped(context.view.boot_us), len(order), *pulses, 0xFF)]
 
 

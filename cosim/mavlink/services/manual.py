@@ -13,7 +13,7 @@ _FULL = 1000.0
 _INVALID = 0x7FFF
 _TIMEOUT = 3.0  # s of the wall clock
 _PITCH, _ROLL = 1, 2  # enabled_extensions
-_CENTRE, _SWING = 1500, 400  # us of a channel
+_CENTER, _SWING = 1500, 400  # us of a channel
 _CHANNELS = 6  # pitch, roll, up, yaw, forward, right, in ArduSub's order
 _RELEASED, _IGNORED = 0, 0xFFFF  # values that release a channel, and leave it unchanged
 _NEUTRAL: Vector6 = (0.0,) * 6
@@ -57,7 +57,7 @@ class Manual(Service):
         surge, sway, heave, roll, pitch, yaw = self.context.sticks
         before = pitch, roll, -heave, yaw, surge, sway
         pitch, roll, up, yaw, surge, sway = (
-            old if pulse == _IGNORED else 0.0 if pulse == _RELEASED else _part((pulse - _CENTRE) / _SWING)
+            old if pulse == _IGNORED else 0.0 if pulse == _RELEASED else _part((pulse - _CENTER) / _SWING)
             for pulse, old in zip(pulses, before, strict=True)
         )
         self._take(sender, (surge, sway, -up + 0.0, roll, pitch, yaw))
@@ -100,8 +100,8 @@ class Manual(Service):
 
     def _wrench(self, message: Any) -> Vector6:
         """Return X Y Z K M N from -1 to 1; the vertical stick is positive up, Z is positive down."""
-        centre = self.context.profile.centred_stick
-        up = 0.0 if message.z == _INVALID else _part((message.z - centre) / (_FULL - centre))
+        center = self.context.profile.centred_stick
+        up = 0.0 if message.z == _INVALID else _part((message.z - center) / (_FULL - center))
         full = self.context.profile.full_tilt_stick
         roll = _axis(message.t, full) if message.enabled_extensions & _ROLL else 0.0
         pitch = _axis(message.s, full) if message.enabled_extensions & _PITCH else 0.0

@@ -119,11 +119,11 @@ class Targets(Service):
         """Return a position [m, NED]; body frames are level, rotated only by yaw, as in ArduPilot."""
         if frame == _LOCAL:
             return raw
-        north, east, down = self._levelled(frame, raw)
+        north, east, down = self._rotate_by_heading(frame, raw)
         x, y, z = self.context.view.position_ned
         return x + north, y + east, z + down
 
-    def _levelled(self, frame: int, vector: Vector3) -> Vector3:
+    def _rotate_by_heading(self, frame: int, vector: Vector3) -> Vector3:
         if frame not in (_BODY, _BODY_OFFSET, _BODY_FRD):
             return vector
         yaw = self.context.view.heading
@@ -154,7 +154,7 @@ class Targets(Service):
         going = (0.0, 0.0, 0.0) if mask & _VELOCITY else (message.vx, message.vy, message.vz)
         yaw = None if mask & _YAW or not math.isfinite(message.yaw) else message.yaw
         since, self._last_at = context.now - self._last_at, context.now
-        velocity = self._levelled(frame, going)
+        velocity = self._rotate_by_heading(frame, going)
         commands: list[Command] = []
         if mask & _X_Y and mask & _Z:
             said: tuple[object, ...] = ("velocity", yaw)

@@ -41,14 +41,14 @@ class Proximity:
     def __init__(self, scenario: Scenario) -> None:
         every = [(i, secondary) for i, secondary in enumerate(scenario.regions, 1) if _is_obstacle(secondary)]
         self.ids = tuple(i for i, _ in every)
-        self._seen = tuple(secondary.is_dynamic for _, secondary in every)
+        self._dynamic = tuple(secondary.is_dynamic for _, secondary in every)
         self._names = tuple(secondary.region.name for _, secondary in every)
         self._shapes: list[Shape] = [secondary.region.shape for _, secondary in every]
         self._shifts: list[Vector3] = [_AT_REST] * len(every)
         self._regions = pack([secondary.region for _, secondary in every])
         n = len(every)
         self._values, self._clearances = np.zeros(n), np.zeros(n)
-        self._gradients, self._turnings = np.zeros((n, 3)), np.zeros((n, 3))
+        self._gradients, self._rotation_gradients = np.zeros((n, 3)), np.zeros((n, 3))
         self._angles = (np.arange(SECTORS * _RAYS) - _RAYS // 2) * (2.0 * math.pi / (SECTORS * _RAYS))
         self._directions, self._distances = np.zeros((SECTORS * _RAYS, 3)), np.zeros(SECTORS * _RAYS)
         self._position, self._level = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
@@ -72,10 +72,10 @@ class Proximity:
             if shift != self._shifts[k]:
                 self._shifts[k] = shift
                 regions.shifts[k] = shift
-            if self._seen[k]:
+            if self._dynamic[k]:
                 if shift != _AT_REST:  # present: its radius follows from its clearance
-                    centre = [a + b for a, b in zip(PARKED_POSITION, shift, strict=True)]
-                    regions.numbers[first + 3] = math.dist(centre, view.position_ned) - clearances[self.ids[k]]
+                    center = [a + b for a, b in zip(PARKED_POSITION, shift, strict=True)]
+                    regions.numbers[first + 3] = math.dist(center, view.position_ned) - clearances[self.ids[k]]
             elif (shape := settings.shapes[name]) is not self._shapes[k]:
                 self._shapes[k] = shape
                 regions.numbers[first : regions.offsets[k + 1]] = shape.packed()
@@ -95,7 +95,7 @@ class Proximity:
         """
         self._position[:] = position_ned
         self._regions.evaluate(
-            self._position, self._level, self._values, self._gradients, self._turnings, self._clearances
+            self._position, self._level, self._values, self._gradients, self._rotation_gradients, self._clearances
         )
         directions: list[list[float]] = self._gradients.tolist()
         return directions
