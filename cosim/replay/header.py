@@ -108,8 +108,8 @@ def limits_of(scenario: Scenario) -> Bounds:
 def _drawing(shape: Shape, limits: Bounds) -> dict[str, Any]:
     entry = shape_entry(shape)
     if entry.half_axes is not None:
-        centre, axes = entry.half_axes(shape)
-        return {"centre": centre.tolist(), "half_axes": axes.tolist()}
+        center, axes = entry.half_axes(shape)
+        return {"centre": center.tolist(), "half_axes": axes.tolist()}
     if entry.planes is not None:
         return {"planes": [{"point": p.tolist(), "normal": n.tolist()} for p, n in entry.planes(shape)]}
     mesh = surface_of(shape, limits)

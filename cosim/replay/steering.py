@@ -94,7 +94,7 @@ class _Changes:
         self._step = run.scenario.time.step
         self._limits = limits_of(run.scenario)
         self._settings = LiveSettings(run.planned)
-        self._middle = shape_center(run.planned.goal)
+        self._center = shape_center(run.planned.goal)
         self._index = {"goal": 0, **{r.region.name: i + 1 for i, r in enumerate(run.scenario.regions)}}
         self._gains = [run.scenario.goal_region.gain, *(r.region.gain for r in run.scenario.regions)]
         self._last_row = len(run.record) - 1
@@ -153,7 +153,7 @@ class _Changes:
     def _change(self, name: str, k: int, target_radius: float) -> dict[str, Any]:
         shape: Shape = self._settings.shapes[name]
         if name == "goal" and target_radius > 0.0:
-            shape = Sphere(self._middle, target_radius)
+            shape = Sphere(self._center, target_radius)
         return _changed(k * self._step, self._index[name], shape, self._gains[self._index[name]], self._limits)
 
 
