@@ -102,7 +102,7 @@ def run_falsification(work: Search, out: Path, workers: int = 1, progress: bool 
     Raises
     ------
     RunError
-        If the folder holds something else or cannot be written, or all processes crash.
+        If the folder holds something else or cannot be written, or processes crash on any row.
     BuildError, PlantError
         If there is no FMU of the vehicle.
     KeyboardInterrupt
@@ -124,7 +124,7 @@ def run_falsification(work: Search, out: Path, workers: int = 1, progress: bool 
         folder.remove_parts()
         random = None if settings.rare_event else work.fly_random(out / RANDOM, workers, progress)
         try:
-            summary = _summarise(work, out, results, random, flights.points)
+            summary = _summarize(work, out, results, random, flights.points)
             summary["estimate"] = estimate and asdict(estimate)
             write_atomic(out / SUMMARY, json_text(summary))
         except OSError as error:
@@ -159,7 +159,7 @@ def costs_of(rows: Any, objective: Objective, horizon: float) -> NDArray[np.floa
     return np.where(to_array(pc.is_null(rows["refused"])), costs, _REFUSED)
 
 
-def _summarise(
+def _summarize(
     work: Search, out: Path, results: Results, random: Results | None, points: NDArray[np.float64]
 ) -> dict[str, Any]:
     costs = costs_of(results.table, work.settings.objective, work.horizon)

@@ -42,7 +42,7 @@ class SearchSettings:
     ----------
     objective : str
         ``"clearance"``, the least one; ``"violation"``, the greatest one weighted by priority; ``"arrival"``, the
-        latest one, or none.
+        latest one, where no arrival is the worst.
     budget : int
         Number of rows.
     seed : int
