@@ -1,4 +1,4 @@
-"""The page of one or several runs: one HTML file that needs nothing else."""
+"""The page of one or several runs: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ _STYLES = ("style.css", "stage.css", "charts.css", "panel.css", "transport.css",
 
 _COMMENT = re.compile(
     r"^[ ]*(?:/\*.*?\*/|//[^\n]*)?\n", re.DOTALL | re.MULTILINE
-)  # on lines of its own, or an empty line
+)  # on its own lines; and empty lines, which are removed as well
 
-_MARK = '<script type="application/json" id="runs">'  # where the data of a page begins
+_MARK = '<script type="application/json" id="runs">'  # start of the data in a page
 
 
 def replay_page(runs: Sequence[dict[str, Any]], title: str, flight: dict[str, Any] | None = None) -> str:
@@ -41,7 +41,7 @@ def replay_page(runs: Sequence[dict[str, Any]], title: str, flight: dict[str, An
     Parameters
     ----------
     runs : sequence of dict
-        Traces as JSON knows them; none for a live page, which is told of its run over its connection.
+        Traces as plain values; none for a live page, which receives its run over its connection.
     title : str
         Of the page.
     flight : dict, optional
@@ -50,7 +50,7 @@ def replay_page(runs: Sequence[dict[str, Any]], title: str, flight: dict[str, An
     Returns
     -------
     str
-        HTML.
+        The page as HTML.
     """
     assets = resources.files("cosim.replay") / "assets"
     style, script = (
@@ -80,7 +80,7 @@ def write_page(path: Path, runs: Sequence[dict[str, Any]], title: str, flight: d
     Parameters
     ----------
     path : Path
-        The file; it appears only when it is whole.
+        The file, which is written atomically.
     runs : sequence of dict
         As for `replay_page`.
     title : str
@@ -97,5 +97,5 @@ def write_page(path: Path, runs: Sequence[dict[str, Any]], title: str, flight: d
 
 
 def is_page(path: Path) -> bool:
-    """Return whether it is a file, and a page of this kind: a pipe would be waited for."""
+    """Return True if a path is a regular file with a page of this kind; a pipe, which would block, is not read."""
     return path.is_file() and _MARK in path.read_text(encoding="utf-8", errors="replace")

@@ -19,7 +19,7 @@ def write_replay(run: Run, out: Path | None = None, title: str | None = None, in
     Parameters
     ----------
     run : Run
-        What is replayed.
+        The run.
     out : Path, optional
         The file; default: ``replay.html`` in the run folder.
     title : str, optional
@@ -70,7 +70,7 @@ def replay(
         If a folder holds no run that can be read, or is named twice, or the file is something else, or cannot be
         written; or if the page is to fly what it cannot.
     ScenarioError
-        If the scenario of a run is none.
+        If the scenario of a run is invalid.
     """
     names = _names(folders)
     if interactive and len(folders) > 1:
@@ -92,17 +92,17 @@ def replay(
 
 
 def joint_title(titles: Mapping[str, str]) -> str:
-    """Return the title of several runs: each title once, before the names of those that have it.
+    """Return the title of several runs: each title once, before the names of its runs.
 
     Parameters
     ----------
     titles : mapping from str to str
-        Of the scenarios, by the name of the run.
+        Titles of the scenarios, by the name of the run.
 
     Returns
     -------
     str
-        Such as ``Docking: a, b; Docking (changed: time.duration = 5 s): c``.
+        Title such as ``Docking: a, b; Docking (changed: time.duration = 5 s): c``.
     """
     return "; ".join(
         f"{title}: {', '.join(n for n in titles if titles[n] == title)}" for title in dict.fromkeys(titles.values())
@@ -110,7 +110,7 @@ def joint_title(titles: Mapping[str, str]) -> str:
 
 
 def _names(folders: Sequence[Path]) -> list[str]:
-    """Return the shortest ends of the folders' paths that tell them apart."""
+    """Return the shortest ends of the folders' paths that distinguish them."""
     paths = [folder.resolve() for folder in folders]
     for i, path in enumerate(paths):
         if path in paths[:i]:

@@ -30,7 +30,7 @@ ESTIMATE = (
 )
 
 _RATES = {0: 5.0, 31: 50.0, 32: 50.0}  # Hz, by message id: HEARTBEAT, ATTITUDE_QUATERNION, LOCAL_POSITION_NED
-_LISTENING = 0.005  # s of simulated time between two looks at the link
+_LISTENING = 0.005  # s of simulated time between two readings of the link
 _ASKING, _HEARTBEAT = 10.0, 1.0  # s of the link's clock
 _MICRO = 1e6
 
@@ -41,12 +41,12 @@ class DvlOptions:
 
     rate: float = 8.0  # Hz
     latency: float = 0.1  # s, between the end of an interval and its message
-    dropout: float = 0.0  # part of the messages that do not come, 0 to 1
-    seed: int = 1  # of those
+    dropout: float = 0.0  # fraction of lost messages, 0 to 1
+    seed: int = 1  # of the losses
 
 
 class Dvl:
-    """Integrates the DVL's velocity and the gyro over each interval.
+    """Integrate the DVL's velocity and the gyro over each interval.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Dvl:
 
     Examples
     --------
-    The autopilot's time in microseconds, the interval, the turn and the way in it:
+    The autopilot's time and the interval in microseconds, and the turn and the displacement in it:
 
     >>> from cosim.sitl.autopilot_link import Dvl, DvlOptions
     >>> from cosim.sitl.motion import Motion
@@ -99,7 +99,7 @@ class AutopilotLink:
     Parameters
     ----------
     endpoint : Endpoint
-        One of its ports; messages go out as component 197 of the vehicle.
+        Port of the autopilot; messages are sent as component 197 of the vehicle.
     dvl : DvlOptions, optional
         DVL whose measurements are sent; default: none.
 

@@ -1,4 +1,4 @@
-"""One run that an autopilot flies: the plant, its record and its folder, stepped from outside."""
+"""One run that an autopilot flies: plant, record and folder, stepped by a server."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Flight:
 
     @property
     def done(self) -> bool:
-        """Whether the scenario's time is over."""
+        """True if the scenario's time is over."""
         return self.steps >= self.scenario.steps
 
     def step(self) -> Motion:
@@ -81,7 +81,7 @@ class Flight:
         Returns
         -------
         Motion
-            At the end of the step.
+            Motion at the end of the step.
 
         Raises
         ------
@@ -116,12 +116,12 @@ class Flight:
                 self._recorder.observe(self.steps, self._master.row)
 
     def end(self) -> None:
-        """Close plant and record; RunError if it cannot be written. May be called twice."""
+        """Close plant and record; raise RunError if it cannot be written. May be called twice."""
         if self._wall_time is not None:
             return
         self._wall_time = time.perf_counter() - self._started
         try:
-            if self.done:  # the last row: it moves nothing
+            if self.done:  # the last row, at the end time
                 self._master.step(self.steps)
                 self._record()
         finally:
@@ -142,7 +142,7 @@ class Flight:
         Returns
         -------
         Run
-            With its summary.
+            The run with its summary.
 
         Raises
         ------

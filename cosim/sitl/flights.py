@@ -16,7 +16,7 @@ from plant_fmu.build import cached_fmu
 
 RESTARTED = "ended: the autopilot started again"
 
-_SOME_RATE = 1000  # Hz, with which a scenario is tried before an autopilot comes
+_SOME_RATE = 1000  # Hz, frame rate for the validation of a scenario before an autopilot connects
 
 
 @dataclass
@@ -26,10 +26,10 @@ class Counts:
     steps: int = 0
     waited: int = 0  # before the first one, with the vehicle held
     resent: int = 0  # answered again, without a step
-    lost: int = 0  # that have not come
+    lost: int = 0  # never received
     malformed: int = 0
     refused: int = 0  # of a second sender
-    unsent: int = 0  # answers that the network did not take
+    unsent: int = 0  # answers that could not be sent
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class FlightOptions:
     scenario: str | Path = SCENARIO
     overrides: tuple[str, ...] = ()
     vehicle: str | None = None  # None: the scenario's
-    out: Path | None = None  # run folder; those of later runs have a number behind it
+    out: Path | None = None  # run folder; later runs have a number after its name
     record_rate: float = 100.0  # Hz, simulated
     report: bool = True
 
@@ -67,7 +67,7 @@ class Flights:
     Attributes
     ----------
     flight : Flight or None
-        The present one.
+        The present run.
     law : AutopilotLaw
         Law of the present one.
 
@@ -90,7 +90,7 @@ class Flights:
         self._ended: list[tuple[Flight, str]] = []
 
     def begin(self, frame_rate: int) -> Flight:
-        """Begin a run at the rate of an autopilot's frames [Hz].
+        """Start a run at the rate of an autopilot's frames [Hz].
 
         Raises
         ------
@@ -121,7 +121,7 @@ class Flights:
         work : callable
             The server: it begins and steps flights, and returns the status of the last one.
         counts : Counts
-            Of the server.
+            Counts of the server.
 
         Returns
         -------

@@ -19,13 +19,13 @@ from cosim.sitl.motion import Motion, at_rest
 log = logging.getLogger(__name__)
 
 LEFT = "ended: the autopilot left"
-RATE = 250  # Hz, frames a simulated second
-SYSTEM_ID, COMPONENT_ID = 254, 25  # of neither a vehicle nor a ground station
+RATE = 250  # Hz, frames per simulated second
+SYSTEM_ID, COMPONENT_ID = 254, 25  # different from vehicles and ground stations
 
 _GPS_EVERY, _HEARTBEAT_EVERY = RATE // 10, RATE
 _POLL = 0.25  # s of the wall clock
 _ARMED = 128  # bit of HIL_ACTUATOR_CONTROLS.mode
-_SENT_AT_ONCE = 5.0  # s of the wall clock, within which PX4 must take a frame
+_SENT_AT_ONCE = 5.0  # s of the wall clock, timeout of sending a frame
 _CHANNELS = 16
 
 
@@ -38,7 +38,7 @@ class _SilentError(Exception):
 
 
 class HilServer:
-    """Flies the plant in lockstep with a PX4.
+    """Fly the plant in lockstep with a PX4.
 
     PX4 starts up by the wall clock; meanwhile the vehicle is held at its start. The run begins with the first actuator
     controls, and each of these makes one step.
@@ -124,7 +124,7 @@ class HilServer:
             try:
                 found = self._listener.accept()
             except TimeoutError:
-                self._look_at_the_clock()
+                self._check_timeout()
             else:
                 self._heard = time.monotonic()
                 return found
@@ -134,14 +134,14 @@ class HilServer:
         codec = self._mavlink.MAVLink(None, srcSystem=SYSTEM_ID, srcComponent=COMPONENT_ID)
         codec.robust_parsing = True
         motion = at_rest(flight.motion())
-        frame = 0  # of PX4's clock, which goes on from its start
+        frame = 0  # of PX4's clock, which is never reset
         controls: Iterator[list[float]] = iter(())
         while not flight.done:
             self._send(connection, codec, motion, frame)
             frame += 1
             while (answer := next(controls, None)) is None:
                 data = self._receive(connection, waits=flight.steps > 0)
-                if data is None:  # it is still starting: the clock must go on for it
+                if data is None:  # PX4 is still starting: its clock must advance
                     break
                 controls = iter(self._controls(codec, data))
             if answer is not None:
@@ -162,7 +162,7 @@ class HilServer:
         connection.settimeout(_SENT_AT_ONCE)
         try:
             connection.sendall(data)
-        except OSError as error:  # a part may have gone out: nothing that follows could be read
+        except OSError as error:  # the stream may end within a message
             raise _GoneError from error
 
     def _receive(self, connection: socket.socket, *, waits: bool) -> bytes | None:
@@ -172,7 +172,7 @@ class HilServer:
             try:
                 data = connection.recv(4096)
             except TimeoutError:
-                self._look_at_the_clock()
+                self._check_timeout()
                 if not waits:
                     return None
             except OSError as error:
@@ -194,6 +194,6 @@ class HilServer:
                 found.append(list(message.controls) if message.mode & _ARMED else [0.0] * _CHANNELS)
         return found
 
-    def _look_at_the_clock(self) -> None:
+    def _check_timeout(self) -> None:
         if self._timeout is not None and time.monotonic() - self._heard > self._timeout:
             raise _SilentError

@@ -11,7 +11,7 @@ from controller.quaternion import rotation_matrix
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.sitl.motion import Motion
 
-FIELD_NED = (0.175, -0.012, 0.466)  # gauss, of the Earth, where it is told to be: near Edinburgh
+FIELD_NED = (0.175, -0.012, 0.466)  # gauss, magnetic field near Edinburgh, at the default origin
 TEMPERATURE = 15.0  # degrees Celsius
 
 _ALL_BUT_AIRSPEED = 0x1BFF  # fields of HIL_SENSOR: accelerations, rates, field, pressure, its altitude, temperature
@@ -27,9 +27,9 @@ def hil_messages(mavlink: Any, motion: Motion, time_us: int, origin: tuple[float
     mavlink : module
         The dialect.
     motion : Motion
-        Of the vehicle.
+        Motion of the vehicle.
     time_us : int
-        Of PX4's clock [us].
+        Time of PX4's clock [us].
     origin : (float, float)
         Latitude and longitude [deg] of position 0, which is at the surface.
     gps : bool
@@ -76,7 +76,7 @@ def air_pressure(altitude: float) -> float:
     Parameters
     ----------
     altitude : float
-        Above the surface [m]; a depth is an altitude below 0.
+        Altitude above the surface [m]; a depth is negative.
 
     Returns
     -------

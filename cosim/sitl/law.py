@@ -18,7 +18,7 @@ from plant_fmu.autopilot import Curve, effort_of_pulse
 
 
 class AutopilotLaw:
-    """Thruster forces by the last outputs of an autopilot.
+    """Thruster forces from the last outputs of an autopilot.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class AutopilotLaw:
     lost : int
         Number of lost frames of the autopilot.
     link : AutopilotLink or None
-        As given.
+        The given link.
     """
 
     output: ClassVar[Output] = "thrusters"
@@ -123,7 +123,7 @@ def law_of_pwm(vehicle: Vehicle, link: AutopilotLink | None = None) -> Autopilot
     vehicle : Vehicle
         Its table ``autopilot`` maps pulses to forces.
     link : AutopilotLink, optional
-        To the autopilot.
+        Link to the autopilot.
 
     Returns
     -------

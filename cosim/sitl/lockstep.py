@@ -28,7 +28,7 @@ class Lockstep:
         Parameters
         ----------
         count : int
-            Of the frame.
+            Count of the frame.
 
         Returns
         -------

@@ -22,9 +22,9 @@ _NAMES = (
     "measured.altitude",
     *(f"measured.velocity.{name}" for name in "uvw"),
 )
-_GRAVITY = 9.81  # m/s2, as ArduPilot and PX4 have it, near enough
+_GRAVITY = 9.81  # m/s2, close to ArduPilot's and PX4's
 _AT_THE_SURFACE = 4.0  # s, in which an autopilot calibrates its sensors
-_LOWERING, _LONGEST = 1.0, 6.0  # m/s at the most, unless it took longer than so many seconds
+_LOWERING, _LONGEST = 1.0, 6.0  # m/s, greatest speed, unless lowering would take longer than that many seconds
 
 
 class Motion(NamedTuple):
@@ -87,7 +87,7 @@ def carried(motion: Motion, depth: float, speed: float, acceleration: float) -> 
     motion : Motion
         Its horizontal position and attitude are used.
     depth, speed, acceleration : float
-        Of the vehicle [m, m/s, m/s2], downwards.
+        Vertical motion of the vehicle [m, m/s, m/s2], positive down.
 
     Returns
     -------

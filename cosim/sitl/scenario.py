@@ -10,7 +10,7 @@ from cosim.errors import RunError
 from cosim.scenario.scenario import Scenario, load_scenario
 from cosim.scenario.validation import MAX_STEPS
 
-SCENARIO = "sitl"  # that is flown where none is named
+SCENARIO = "sitl"  # default scenario
 LOWEST_RATE, HIGHEST_RATE = 11, 65535  # Hz: an autopilot's frame is shorter than 0.1 s, and a packet holds 16 bits
 
 
@@ -28,7 +28,7 @@ def scenario_to_fly(
     vehicle : str or None
         A shipped vehicle or a TOML file; None for the scenario's.
     frame_rate : int
-        Of the autopilot [Hz], `LOWEST_RATE` to `HIGHEST_RATE`.
+        Frame rate of the autopilot [Hz], `LOWEST_RATE` to `HIGHEST_RATE`.
     autopilot : str
         Name of the autopilot, used as the law's name in summary and report, such as ``ardupilot``.
 

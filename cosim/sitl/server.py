@@ -17,13 +17,13 @@ log = logging.getLogger(__name__)
 
 Sender = tuple[str, int]
 
-_POLL = 0.25  # s of the wall clock, after which a silent socket is left to look at the clock
-_PRESENT = 1.0  # s of the wall clock, for which a silent autopilot keeps its place against another sender
+_POLL = 0.25  # s of the wall clock, timeout of the socket, after which the silence is checked
+_PRESENT = 1.0  # s of the wall clock without frames, before another sender is accepted
 _WARNING_PERIOD = 10.0  # s of the wall clock, between two warnings of one kind
 
 
 class JsonServer:
-    """Flies the plant in lockstep with an ArduPilot.
+    """Fly the plant in lockstep with an ArduPilot.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class JsonServer:
         while True:
             try:
                 data, sender = receive(wire.LARGEST + 1)
-            except OSError:  # nothing in time; or word that an answer before did not arrive, where a system tells that
+            except OSError:  # timeout; or the report of an earlier answer that was refused
                 data, sender = b"", None
             now = time.monotonic()
             if sender is not None and self._accept(data, sender, now):
@@ -145,7 +145,7 @@ class JsonServer:
                 self._warn("refused", f"{sender[0]}:{sender[1]} sends too, beside {there}: refused")
                 return False
             if self._lockstep.count is None or packet.frame_count != self._lockstep.count + 1:
-                self._lockstep = Lockstep()  # not the same one from another port: whatever its count, it begins anew
+                self._lockstep = Lockstep()  # another autopilot, not the same from another port: restart for any count
         self._sender = sender
         return True
 
@@ -153,7 +153,7 @@ class JsonServer:
         if self._flights.flight is not None:
             self._flights.end(RESTARTED)
         flight = self._flights.begin(frame_rate)
-        sender = f"{self._sender[0]}:{self._sender[1]}" if self._sender else "nobody"
+        sender = f"{self._sender[0]}:{self._sender[1]}" if self._sender else "no sender"
         self._tell(f"{flight.folder}: {sender} flies, {frame_rate} frames a simulated second")
 
     def _lose(self, missed: int) -> None:
@@ -169,7 +169,7 @@ class JsonServer:
         if flight.steps or (law.is_driving and flight.can_start):
             motion = flight.step()
             self.counts.steps += 1
-        else:  # it starts, or is not armed yet
+        else:  # the autopilot starts, or is not armed yet
             motion = flight.wait()
             self.counts.waited += 1
         if law.link is not None:

@@ -24,12 +24,12 @@ class ServoPacket:
     """One frame of the autopilot."""
 
     frame_rate: int  # Hz
-    frame_count: int  # of the frames that the autopilot has taken in since it started
-    pwm: tuple[int, ...]  # us, 16 or 32 servo outputs, 0 for one that gives no pulse
+    frame_count: int  # frames that the autopilot has received since it started
+    pwm: tuple[int, ...]  # us, 16 or 32 servo outputs, 0 without a pulse
 
 
 def decode(data: bytes) -> ServoPacket | None:
-    """Read a servo packet.
+    """Decode a servo packet.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def encode(motion: Motion) -> bytes:
     Parameters
     ----------
     motion : Motion
-        Of the vehicle.
+        Motion of the vehicle.
 
     Returns
     -------

@@ -17,7 +17,7 @@ _FULL = 1000.0
 _INVALID = 0x7FFF
 _TIMEOUT = 3.0  # s of the wall clock
 _PITCH, _ROLL = 1, 2  # enabled_extensions
-_CENTRE, _SWING = 1500, 400  # us of a channel
+_CENTER, _SWING = 1500, 400  # us of a channel
 _CHANNELS = 6  # pitch, roll, up, yaw, forward, right, as ArduSub has them
 _RELEASED, _IGNORED = 0, 0xFFFF  # a channel that is given back, and one that stays as it is
 _PUSHES: dict[Mode, int] = {"manual": 6, "stabilize": 3, "depth_hold": 2}  # axes that do; the others ask for something
@@ -25,7 +25,7 @@ _NEUTRAL: Vector6 = (0.0,) * 6
 
 
 class Manual(Service):
-    """Sticks become parts of the greatest wrench, while the mode is one that they steer in."""
+    """Convert sticks to fractions of the greatest wrench, in the modes of manual control."""
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
@@ -38,7 +38,7 @@ class Manual(Service):
         self._state = (context.armed, context.mode)
 
     def restart(self) -> None:
-        """Let go of the sticks."""
+        """Release the sticks."""
         self._heard = None
 
     def on_snapshot(self) -> None:
@@ -48,13 +48,13 @@ class Manual(Service):
             self._state, self.context.sticks = state, _NEUTRAL
 
     def tick(self) -> None:
-        """Let go of sticks that nobody holds any more."""
+        """Release the sticks after 3 s without a message."""
         context = self.context
         if self._heard is None or context.now - self._heard < _TIMEOUT:
             return
         self._heard = None
         if context.mode_ahead in STICK_MODES:
-            self._order(_NEUTRAL, by_gain=True)
+            self._submit(_NEUTRAL, by_gain=True)
             context.say("Lost manual control", context.mavlink.MAV_SEVERITY_CRITICAL, "sticks", _TIMEOUT)
 
     def _manual_control(self, sender: Sender, message: Any) -> None:
@@ -66,7 +66,7 @@ class Manual(Service):
         surge, sway, heave, roll, pitch, yaw = self.context.sticks
         before = pitch, roll, -heave, yaw, surge, sway
         pitch, roll, up, yaw, surge, sway = (
-            old if pulse == _IGNORED else 0.0 if pulse == _RELEASED else _part((pulse - _CENTRE) / _SWING)
+            old if pulse == _IGNORED else 0.0 if pulse == _RELEASED else _part((pulse - _CENTER) / _SWING)
             for pulse, old in zip(pulses, before, strict=True)
         )
         self._take(sender, (surge, sway, -up + 0.0, roll, pitch, yaw), by_gain=False)
@@ -82,9 +82,9 @@ class Manual(Service):
             context.reject("another station has the vehicle in hand", "active gcs")
             return
         self._heard = context.now
-        self._order(sticks, by_gain)
+        self._submit(sticks, by_gain)
 
-    def _order(self, sticks: Vector6, by_gain: bool) -> None:
+    def _submit(self, sticks: Vector6, by_gain: bool) -> None:
         context = self.context
         if sticks == context.sticks:
             return
@@ -116,9 +116,9 @@ class Manual(Service):
         return x, y, z, k, m, n
 
     def _wrench(self, message: Any) -> Vector6:
-        """Return X Y Z K M N from -1 to 1; the vertical stick is up where positive, Z is down."""
-        centre = self.context.profile.centred_stick
-        up = 0.0 if message.z == _INVALID else _part((message.z - centre) / (_FULL - centre))
+        """Return X Y Z K M N from -1 to 1; the vertical stick is positive up, Z is positive down."""
+        center = self.context.profile.centred_stick
+        up = 0.0 if message.z == _INVALID else _part((message.z - center) / (_FULL - center))
         full = self.context.profile.full_tilt_stick
         roll = _axis(message.t, full) if message.enabled_extensions & _ROLL else 0.0
         pitch = _axis(message.s, full) if message.enabled_extensions & _PITCH else 0.0
