@@ -1,4 +1,4 @@
-"""Time axes that are broken where the vehicle has come to rest, so that its tail does not squeeze what it did before."""
+"""Time axes that are broken where the vehicle has come to rest: its tail does not squeeze what it did before."""
 
 from __future__ import annotations
 

@@ -32,7 +32,9 @@ def test_a_broken_axis_gives_what_moves_most_of_its_room_and_ends_at_the_end():
     (ax,) = [Figure().subplots()]
     ax.plot([0.0, 20.0, 100.0], [0.0, 1.0, 1.0])
     break_time([ax], 20.0, 100.0)
-    start, rest, end = ax.transAxes.inverted().transform(ax.transData.transform([(0.0, 0), (20.0, 0), (100.0, 0)]))[:, 0]
+    start, rest, end = ax.transAxes.inverted().transform(ax.transData.transform([(0.0, 0), (20.0, 0), (100.0, 0)]))[
+        :, 0
+    ]
     assert (start, end) == pytest.approx((0.0, 1.0))
     assert rest == pytest.approx(0.85)
     assert ax.xaxis.get_majorticklocs()[-1] == 100.0
