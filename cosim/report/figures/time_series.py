@@ -15,6 +15,7 @@ from matplotlib.ticker import MaxNLocator
 
 from controller.regions import Sphere
 from controller.regions.region_set import of_attitude
+from cosim.report.figures.broken_time import break_time, rests_from
 from cosim.report.figures.layout import legend, limits_of, panels, symlog_axis
 from cosim.report.figures.style import (
     BLACK,
@@ -81,9 +82,13 @@ def _zoomed(data: FigureData, heights: Sequence[float], labels: Sequence[str]) -
 
 
 def over_time(data: FigureData, heights: Sequence[float], labels: Sequence[str]) -> tuple[Figure, Any]:
-    """Create axes over the whole run, shape (rows,)."""
+    """Create axes over the whole run, shape (rows,); a break in time shortens an early rest."""
     figure, axes = panels(heights, labels=labels)
-    axes[0, 0].set_xlim(0.0, data.summary["simulated_time"] or data.scenario.time.step)
+    end = data.summary["simulated_time"]
+    axes[0, 0].set_xlim(0.0, end or data.scenario.time.step)
+    rest = rests_from(data.record)
+    if rest is not None:
+        break_time(axes[:, 0], rest, end)
     axes[-1, 0].set_xlabel(_TIME)
     return figure, axes[:, 0]
 

@@ -14,10 +14,13 @@ FLOWN = "subreach.whatIf.took !== null && !subreach.whatIf._flying && subreach.r
 NAME = """
 const { scene } = subreach;
 for (let y = 60; y < scene.canvas.clientHeight; y += 3) {
-  for (let x = 0; x < scene.canvas.clientWidth; x += 3) if (scene.labels.nameAt(x, y)?.region === arguments[0]) return [x, y];
+  for (let x = 0; x < scene.canvas.clientWidth; x += 3) {
+    if (scene.labels.nameAt(x, y)?.region === arguments[0]) return [x, y];
+  }
 }"""
 OVERLAP = """
-const boxes = [...document.querySelectorAll("#scene-bar .group"), document.getElementById("commands")].map((e) => e.getBoundingClientRect());
+const groups = document.querySelectorAll("#scene-bar .group");
+const boxes = [...groups, document.getElementById("commands")].map((e) => e.getBoundingClientRect());
 const apart = (a, b) => a.right <= b.left || b.right <= a.left || a.bottom <= b.top || b.bottom <= a.top;
 return boxes.some((a, i) => boxes.slice(i + 1).some((b) => !apart(a, b)))"""
 
@@ -108,7 +111,9 @@ def test_the_numbers_hide_no_button(size, browser, page):
 
 
 def test_without_webassembly_it_is_the_plain_replay(browser, page):
-    hide = browser.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": "delete window.WebAssembly"})
+    hide = browser.driver.execute_cdp_cmd(
+        "Page.addScriptToEvaluateOnNewDocument", {"source": "delete window.WebAssembly"}
+    )
     try:
         browser.open(page)
         assert browser.js("return subreach.whatIf === null && document.getElementById('commands') === null")

@@ -1,0 +1,69 @@
+"""Time axes that are broken where the vehicle has come to rest: its tail does not squeeze what it did before."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FixedLocator, MaxNLocator
+
+from cosim.report.figures.style import BLACK
+from cosim.results.record import Rows
+from cosim.simulation.signals import Array
+
+_NEAR = 0.02  # of the size of the way
+_TURNED = 0.05  # in parts of the quaternion
+_ROOM = 1.05  # more than up to where it rests
+_LATEST = 2.0 / 3.0  # of the run, up to which it must have come to rest
+_TAIL = 0.15  # of the axis
+
+
+def rests_from(record: Rows) -> float | None:
+    """Return from when on the vehicle stays where it is at the end [s], as replays have it.
+
+    Parameters
+    ----------
+    record : Rows
+        Of a run.
+
+    Returns
+    -------
+    float or None
+        None where it moves in the last third of the run, or a pose is missing.
+    """
+    time = record["time"]
+    places = record.stack([f"position.{axis}" for axis in "xyz"])
+    turns = record.stack([f"quaternion.e{i}" for i in range(4)])
+    if len(time) < 2 or not (np.isfinite(places).all() and np.isfinite(turns).all()):
+        return None
+    way = float(np.linalg.norm(np.ptp(places, axis=0)))
+    moves = (np.abs(places - places[-1]) > _NEAR * way).any(axis=1) | (np.abs(turns - turns[-1]) > _TURNED).any(axis=1)
+    rows = np.flatnonzero(moves)
+    if not rows.size or rows[-1] + 1 == len(time):
+        return None
+    start, end = float(time[0]), float(time[-1])
+    rest = start + _ROOM * (float(time[rows[-1] + 1]) - start)
+    return rest if start < rest < start + _LATEST * (end - start) else None
+
+
+def break_time(axes: Sequence[Axes], rest: float, end: float) -> None:
+    """Draw the time from `rest` to `end` [s] short, on grey, in axes that show a whole run and share their time."""
+    slope = _TAIL / (1.0 - _TAIL) * rest / (end - rest)
+
+    def forward(t: Array) -> Array:
+        return np.where(t > rest, rest + slope * (t - rest), t)
+
+    def back(x: Array) -> Array:
+        return np.where(x > rest, rest + (x - rest) / slope, x)
+
+    ticks = [t for t in MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(0.0, rest) if 0.0 <= t <= 0.97 * rest]
+    for ax in axes:
+        ax.set_xscale("function", functions=(forward, back))
+        ax.set_xlim(0.0, end)
+        ax.xaxis.set_major_locator(FixedLocator([*ticks, end]))
+        ax.axvspan(rest, end, color=BLACK, alpha=0.06, linewidth=0)
+    middle = back(np.array(rest + 0.5 * slope * (end - rest)))
+    axes[0].text(
+        float(middle), 0.98, "at rest", transform=axes[0].get_xaxis_transform(), ha="center", va="top", fontsize=7
+    )

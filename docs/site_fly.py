@@ -1,0 +1,42 @@
+"""Puts a page that flies on the site, where its WebAssembly can be built, and a link to it on the front page.
+
+A hook of MkDocs (`hooks` in mkdocs.yml).
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import tempfile
+from pathlib import Path
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import Files
+from mkdocs.structure.pages import Page
+
+FRONT, NAME = "index.md", "fly.html"
+_WORDS = "drag its goal and walls, change the current, fail a thruster"
+_LINK = f'\n\n<a href="{NAME}">Fly a docking run in your browser</a>: {_WORDS}.\n'
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Add the link."""
+    del config, files
+    head, rest = markdown.split("\n\n", 1)
+    return f"{head}{_LINK}\n{rest}" if page.file.src_uri == FRONT and _can_build() else markdown
+
+
+def on_post_build(config: MkDocsConfig) -> None:
+    """Fly the run, and write its page."""
+    if not _can_build():
+        return
+    from cosim.replay.pages import replay
+    from cosim.run.run import run_scenario
+    from cosim.scenario.scenario import load_scenario
+
+    with tempfile.TemporaryDirectory() as scratch:
+        run = run_scenario(load_scenario("docking"), Path(scratch, "docking"), report=False)
+        replay([run.folder], Path(config.site_dir, NAME), interactive=True)
+
+
+def _can_build() -> bool:
+    return importlib.util.find_spec("ziglang") is not None
