@@ -117,7 +117,7 @@ def body(function: griffe.Function) -> Iterator[ast.AST]:
                 pending.append(child)
 
 
-def test_sections_of_parameters_have_each_parameter_and_no_other():
+def test_parameters_sections_match_signatures():
     wrong = {}
     for function in functions():
         documented = sorted(name for name, _ in section(function, Part.parameters))
@@ -127,7 +127,7 @@ def test_sections_of_parameters_have_each_parameter_and_no_other():
     assert not wrong, shown(wrong)
 
 
-def test_what_is_public_names_each_of_its_parameters():
+def test_public_docstrings_name_every_parameter():
     """In a section, or in the words where there is none."""
     wrong = {}
     for name in public.names():
@@ -141,7 +141,7 @@ def test_what_is_public_names_each_of_its_parameters():
     assert not wrong, shown(wrong)
 
 
-def test_what_comes_back_is_said():
+def test_return_values_are_documented():
     wrong = []
     for function in functions():
         kinds = {part.kind for part in function.docstring.parse("numpy")} if function.docstring else set()
@@ -157,7 +157,7 @@ def test_what_comes_back_is_said():
     assert not wrong, "\n".join(wrong)
 
 
-def test_what_a_function_raises_is_said():
+def test_raised_exceptions_are_documented():
     wrong = {}
     for function in functions():
         if function.path.startswith("cosim.command_line."):
@@ -174,7 +174,7 @@ def test_what_a_function_raises_is_said():
     assert not wrong, shown(wrong)
 
 
-def test_physical_quantities_have_units():
+def test_physical_quantities_have_documented_units():
     """Parameters and what comes back: where they are listed, there; else somewhere in the docstring."""
     wrong = {}
     for function in functions():
@@ -201,14 +201,14 @@ def test_fields_and_properties_that_are_physical_quantities_have_units():
     assert not wrong, shown(wrong)
 
 
-def test_the_rule_of_units_can_fail():
+def test_unit_check_detects_missing_units():
     for words in ("", "A thruster fails.", "Where the vehicle is, shape (3,).", "a thing of its own", "(6, 6)"):
         assert not UNIT.search(words), words
     for words in ("[m]", "m, NED", "# s", "(3,) m/s", "float [N m]", "[-]", "shape (6,) [N, N m]", "in seconds"):
         assert UNIT.search(words), words
 
 
-def test_a_first_line_is_imperative_and_no_parameter_is_any():
+def test_summaries_are_imperative_and_no_parameter_is_described_as_any():
     """What a function does, not what it is about; properties say what they are."""
     wrong = {}
     for function in functions():
