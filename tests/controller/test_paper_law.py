@@ -99,7 +99,7 @@ def test_errors_are_gradients_of_the_potentials():
     assert slopes == pytest.approx(100.0 * secondary_error(values, unit, alphas / 100.0), abs=1e-8)
 
 
-def test_a_lost_measurement_is_no_peace():
+def test_missing_measurement_gives_nan_errors():
     assert np.isnan(primary_error(math.nan, np.ones(3))).all()
     assert np.isnan(secondary_error(np.array([math.nan]), np.ones((1, 3)), np.ones(1))).all()
 
@@ -129,7 +129,7 @@ def test_the_law_evaluates_its_regions_and_weighs_them():
     assert law.estimate[0] == pytest.approx(0.0) and law.report.shape == (0,)
 
 
-def test_satisfied_regions_push_not():
+def test_satisfied_regions_give_zero_error():
     assert primary_error(-1.0, np.ones(3)) == pytest.approx(np.zeros(3))
     assert secondary_error(np.array([-0.1]), np.ones((1, 3)), np.array([5.0])) == pytest.approx(np.zeros(3))
 
@@ -154,7 +154,7 @@ def test_defaults_are_those_of_section_vii():
     ("change", "words"),
     [({"k_p1": 0.0}, "k_p1"), ({"gamma": -1.0}, "gamma"), ({"k_v1": math.nan}, "k_v1"), ({"sigma_p": -0.1}, "sigma_p")],
 )
-def test_gains_that_cannot_be_are_named(change, words):
+def test_invalid_gains_are_rejected_by_name(change, words):
     with pytest.raises(LawError, match=words):
         IsmailDunniganLaw(GAINS._replace(**change), IDENTITY, 0.001, 0)
 
@@ -168,6 +168,6 @@ def test_gains_that_cannot_be_are_named(change, words):
         (IDENTITY, np.inf),
     ],
 )
-def test_set_up_that_cannot_be_is_refused(attitude, period):
+def test_invalid_setup_is_rejected(attitude, period):
     with pytest.raises(LawError):
         IsmailDunniganLaw(GAINS, attitude, period, 0)

@@ -96,7 +96,7 @@ def test_a_sample_corrects_as_by_plain_matrices(sensor):
 
 @pytest.mark.medium(fast=3)
 @pytest.mark.parametrize("sensor", list(PLACES))
-def test_a_late_sample_corrects_what_has_become_of_its_error(sensor):
+def test_delayed_sample_corrects_the_propagated_error(sensor):
     """Errors 0.1 s ago, carried on: a sample of then, told now, corrects what has become of them, to second order."""
     rng, late = np.random.default_rng(10 + sensor), []
     for _ in range(6):
@@ -123,7 +123,7 @@ def test_a_late_sample_corrects_what_has_become_of_its_error(sensor):
     assert np.mean(late) > 5e-5  # to which what came later adds up to 1e-4
 
 
-def test_an_outlier_is_rejected_and_a_third_in_a_row_believed():
+def test_single_outlier_is_rejected_and_third_consecutive_is_accepted():
     memory, _, _ = begun(np.random.default_rng(5))
     set_first_covariance(memory, SENSORS)
     memory.covariance[:3, :3], memory.accepted[USBL] = 1e-4 * np.eye(3), 3.0
@@ -142,7 +142,7 @@ def test_an_outlier_is_rejected_and_a_third_in_a_row_believed():
     assert memory.position[0] == pytest.approx(before[0], abs=0.05)
 
 
-def test_headings_are_compared_round_the_circle():
+def test_heading_innovation_wraps_around():
     memory, _, _ = begun(np.random.default_rng(6))
     set_first_covariance(memory, SENSORS)
     memory.quaternion[:] = Rotation.from_euler("Z", np.pi - 0.01).as_quat()[[3, 0, 1, 2]]
@@ -155,7 +155,7 @@ def test_headings_are_compared_round_the_circle():
     assert abs((yaw - (np.pi + 0.01) + np.pi) % (2 * np.pi) - np.pi) < 1e-3
 
 
-def test_a_compass_tells_nothing_of_a_vehicle_that_stands_on_its_stern():
+def test_compass_sample_is_ignored_at_vertical_pitch():
     memory, _, _ = begun(np.random.default_rng(7))
     memory.quaternion[:] = Rotation.from_euler("Y", 1.5).as_quat()[[3, 0, 1, 2]]
     before = copy.deepcopy(memory)

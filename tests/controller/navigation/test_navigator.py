@@ -33,14 +33,14 @@ def rest(navigator, seconds, first=0.0, sensors=range(5)):
 
 
 @pytest.mark.parametrize("missing", [DEPTH_SENSOR, IMU, COMPASS, USBL])
-def test_nothing_is_known_before_each_sensor_that_is_needed_has_told_something(missing):
+def test_state_is_nan_until_every_required_sensor_has_a_sample(missing):
     navigator = Navigator(MODEL, told())
     state = rest(navigator, 0.1, sensors=[sensor for sensor in range(5) if sensor != missing])
     for part in state[:3]:
         assert np.isnan(part).all(), SENSORS[missing]
 
 
-def test_a_vehicle_at_rest_is_found():
+def test_state_of_a_resting_vehicle_is_estimated():
     state = rest(Navigator(MODEL, told()), 5.0)
     assert state.position == pytest.approx([1.0, 2.0, 5.0], abs=1e-3)
     assert state.velocity_body == pytest.approx(np.zeros(6), abs=1e-3)
@@ -52,7 +52,7 @@ def test_a_vehicle_at_rest_is_found():
 
 
 @pytest.mark.parametrize("tilt", [0.0, 1.0, 3.0])
-def test_it_starts_however_the_vehicle_lies(tilt):
+def test_alignment_works_at_any_attitude(tilt):
     navigator, turned = Navigator(MODEL, told()), Rotation.from_euler("ZYX", [0.4, 0.3, tilt])
     for time in (0.0, 0.5):
         level(navigator, time)
@@ -62,7 +62,7 @@ def test_it_starts_however_the_vehicle_lies(tilt):
     assert (ours * turned.inv()).magnitude() < 1e-9
 
 
-def test_what_is_lost_for_long_is_called_unknown_and_what_is_measured_stays():
+def test_long_unmeasured_states_become_nan_and_measured_ones_stay():
     """DVL and USBL tell nothing any more: velocity and position get lost, depth and attitude do not."""
     navigator = Navigator(MODEL, told())
     rest(navigator, 3.0)
@@ -81,7 +81,7 @@ def test_what_is_lost_for_long_is_called_unknown_and_what_is_measured_stays():
     assert state.position == pytest.approx([1.0, 2.0, 5.0], abs=0.05)
 
 
-def test_without_the_imu_nothing_is_known_and_afterwards_it_starts_anew():
+def test_imu_outage_makes_the_state_nan_and_recovery_realigns():
     navigator = Navigator(MODEL, told())
     rest(navigator, 1.0)
     state = rest(navigator, 2.0, 1.0, sensors=[DEPTH_SENSOR, DVL, COMPASS, USBL])
@@ -90,7 +90,7 @@ def test_without_the_imu_nothing_is_known_and_afterwards_it_starts_anew():
     assert state.position == pytest.approx([1.0, 2.0, 5.0], abs=0.01)
 
 
-def test_a_first_fix_that_the_next_contradicts_is_not_believed():
+def test_contradicted_first_position_fix_is_rejected():
     navigator = Navigator(MODEL, told())
     for k in range(301):
         level(navigator, 0.01 * k, sensors=[DEPTH_SENSOR, DVL, IMU, COMPASS])
@@ -113,7 +113,7 @@ def test_a_start_is_between_two_fixes_and_as_uncertain_as_they_are_apart():
         assert navigator.state.deviation[9:] == pytest.approx(np.full(3, rates), rel=0.01)
 
 
-def test_an_estimate_that_no_sample_agrees_with_is_given_up_and_found_anew():
+def test_inconsistent_estimate_is_reset_and_realigned():
     """Its attitude is wrong by 40 degrees, more than the covariance of a start holds: the DVL contradicts for ever."""
     navigator = Navigator(MODEL, told())
     rest(navigator, 0.01)
@@ -133,7 +133,7 @@ def test_an_estimate_that_no_sample_agrees_with_is_given_up_and_found_anew():
 
 
 @pytest.mark.medium
-def test_a_filter_is_consistent_on_a_motion_of_its_own():
+def test_filter_is_consistent_on_simulated_motion():
     """Circles with a swell, by 30 sets of noise and constant errors; NEES and NIS within 99.9 % of a consistent one."""
     rng, h, runs = np.random.default_rng(11), 0.01, 30
     nees, nis = [], np.zeros((5, 2))
