@@ -35,7 +35,7 @@ SCENE = Scene(
         ("ismail_dunnigan", {}),
     ],
 )
-def test_master_and_compiled_loop_fly_the_same_way(law, changes):
+def test_master_and_compiled_loop_give_the_same_run(law, changes):
     conditions = Conditions(duration=12.0, **changes)
     with SceneFlyer(law, conditions) as flyer:
         score, trace = flyer.fly(SCENE, trace=True)
