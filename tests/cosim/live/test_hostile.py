@@ -37,7 +37,7 @@ def closed_with(client):
         return error.rcvd.code
 
 
-def test_the_page_is_served_alone_and_to_our_own_pages(live):
+def test_only_the_page_is_served_and_only_to_own_origin(live):
     running = live(commands=True)
     with ask(running.url) as page:
         text = page.read().decode()
@@ -57,7 +57,7 @@ def test_the_page_is_served_alone_and_to_our_own_pages(live):
 
 
 @pytest.mark.medium
-def test_nothing_that_comes_hurts_the_run(live, tmp_path, caplog):
+def test_malformed_requests_do_not_affect_the_run(live, tmp_path, caplog):
     running = live(commands=True)
     host, port = running.url.removeprefix("http://").strip("/").split(":")
     place = (host, int(port))
@@ -117,7 +117,7 @@ def test_nothing_that_comes_hurts_the_run(live, tmp_path, caplog):
 
 
 @pytest.mark.slow
-def test_a_flood_is_slowed_down_and_shut_out(live):
+def test_flooding_viewer_is_throttled_and_disconnected(live):
     running = live(commands=True)
     with connect(running.url.replace("http", "ws") + "ws") as flood:
         with contextlib.suppress(ConnectionClosed):
@@ -130,7 +130,7 @@ def test_a_flood_is_slowed_down_and_shut_out(live):
     assert running.end().summary["commands"] < 500
 
 
-def test_more_viewers_than_there_is_room_for_are_sent_away(live):
+def test_excess_viewers_are_rejected(live):
     running = live(commands=True)
     with contextlib.ExitStack() as stack:
         viewers = [stack.enter_context(running.viewer()) for _ in range(16)]
@@ -143,7 +143,7 @@ def test_more_viewers_than_there_is_room_for_are_sent_away(live):
         viewers[0].until("end")
 
 
-def test_connections_beyond_the_most_are_cut_off_so_that_the_run_keeps_files_to_write(live):
+def test_excess_connections_are_closed_to_preserve_file_descriptors(live):
     running = live(commands=True)
     host, port = running.url.removeprefix("http://").strip("/").split(":")
     with contextlib.ExitStack() as stack:

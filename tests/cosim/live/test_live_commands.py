@@ -23,7 +23,7 @@ def commanded(viewer, *commands):
 
 
 @pytest.mark.medium
-def test_commands_are_followed_told_to_all_and_repeat_to_the_last_bit(live, tmp_path):
+def test_commands_are_applied_broadcast_and_reproducible(live, tmp_path):
     running = live("harbour", commands=True)
     with running.viewer() as viewer, running.viewer() as other:
         refused = commanded(
@@ -58,7 +58,7 @@ def test_commands_are_followed_told_to_all_and_repeat_to_the_last_bit(live, tmp_
     assert same(record, load_record(again.folder))
 
 
-def test_what_cannot_be_is_refused_with_the_reason(live):
+def test_invalid_commands_are_rejected_with_a_reason(live):
     running = live("harbour", commands=True)
     wrong = {
         "expected one of ship": {"command": "shift_region", "region": "shop", "by": [1, 0, 0]},
@@ -82,7 +82,7 @@ def test_what_cannot_be_is_refused_with_the_reason(live):
 
 
 @pytest.mark.medium
-def test_without_commands_every_order_is_refused(live):
+def test_without_commands_flag_every_command_is_rejected(live):
     running = live(rate=4.0)
     with running.viewer() as viewer:
         assert viewer.until("header")["run"]["commands"] is False
@@ -93,7 +93,7 @@ def test_without_commands_every_order_is_refused(live):
 
 
 @pytest.mark.slow
-def test_a_run_that_repeats_commands_takes_no_others(live, tmp_path):
+def test_replayed_run_accepts_no_other_commands(live, tmp_path):
     (tmp_path / "commands.jsonl").write_text(
         '{"step":20,"command":{"command":"shift_region","region":"ship","by":[0.0,3.0,0.0]}}\n'
     )
@@ -109,7 +109,7 @@ def test_a_run_that_repeats_commands_takes_no_others(live, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_ground_station_and_a_viewer_order_the_same_run(live):
+def test_ground_station_and_viewer_command_the_same_run(live):
     from tests.cosim.run.test_run_on_a_link import Station, command, on
 
     with Station(command(400, 1.0), command(192, -1.0, 1.0, 0.0, 0.7)) as station:
