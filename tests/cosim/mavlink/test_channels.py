@@ -45,7 +45,7 @@ def closed_port():
 # ---- UDP ----
 
 
-def test_udpout_speaks_with_one_peer_alone():
+def test_udpout_accepts_only_its_configured_peer():
     with udp_socket() as peer, udp_socket() as stranger:
         link = link_of(UdpOut(*peer.getsockname()))
         tended(link, heartbeat())
@@ -57,7 +57,7 @@ def test_udpout_speaks_with_one_peer_alone():
         link.channel.close()
 
 
-def test_nobody_listening_is_survived_and_who_comes_later_hears_the_next_frame():
+def test_udpout_survives_absent_peer_and_late_peer_receives_frames():
     port = closed_port()
     link = link_of(UdpOut(HERE, port))
     for _ in range(50):
@@ -72,7 +72,7 @@ def test_nobody_listening_is_survived_and_who_comes_later_hears_the_next_frame()
     assert not link.troubles()
 
 
-def test_udpin_sends_to_each_who_spoke_a_heeded_frame():
+def test_udpin_sends_to_peers_with_accepted_frames():
     link = link_of(UdpIn(HERE, 0))
     with udp_socket() as good, udp_socket() as other, udp_socket() as bad:
         to = (HERE, link.channel.port)
@@ -90,7 +90,7 @@ def test_udpin_sends_to_each_who_spoke_a_heeded_frame():
     link.channel.close()
 
 
-def test_each_peer_is_answered_in_the_version_that_it_speaks():
+def test_udp_peers_are_answered_in_their_mavlink_version():
     """By MAVLink's specification an old one has neither extensions nor ids above 255; what pymavlink 1.0 decodes."""
     link, old_side, new_side = link_of(UdpIn(HERE, 0)), Station(), Station(254)
     with udp_socket() as old, udp_socket() as new:
@@ -116,7 +116,7 @@ def test_each_peer_is_answered_in_the_version_that_it_speaks():
     link.channel.close()
 
 
-def test_who_speaks_mavlink_1_over_tcp_is_answered_in_it():
+def test_tcp_client_is_answered_in_its_mavlink_version():
     link = link_of(TcpIn(HERE, 0))
     (side,) = connected(link.channel)
     side.settimeout(60.0)
@@ -128,7 +128,7 @@ def test_who_speaks_mavlink_1_over_tcp_is_answered_in_it():
     link.channel.close()
 
 
-def test_peers_are_bounded_and_forgotten_when_silent():
+def test_peer_count_is_bounded_and_silent_peers_expire():
     link, sockets = link_of(UdpIn(HERE, 0)), [udp_socket() for _ in range(udp.PEERS + 2)]
     for one in sockets:
         one.sendto(Station().pack(heartbeat()), (HERE, link.channel.port))
@@ -145,7 +145,7 @@ def test_peers_are_bounded_and_forgotten_when_silent():
     link.channel.close()
 
 
-def test_ports_that_are_taken_are_refused_in_one_line():
+def test_occupied_ports_give_one_line_error():
     udp_in, tcp_in = UdpIn(HERE, 0), TcpIn(HERE, 0)
     with pytest.raises(TelemetryError, match=f"udpin:127.0.0.1:{udp_in.port}: Address already in use"):
         UdpIn(HERE, udp_in.port)
@@ -185,7 +185,7 @@ def drained(client):
     return data
 
 
-def test_a_server_has_many_clients_and_hears_each():
+def test_server_receives_from_all_clients():
     link = link_of(TcpIn(HERE, 0))
     a, b = connected(link.channel, 2)
     tended(link, attitude(1))
@@ -202,7 +202,7 @@ def test_a_server_has_many_clients_and_hears_each():
     link.channel.close()
 
 
-def test_a_client_that_goes_is_let_go():
+def test_disconnected_client_is_removed():
     link = link_of(TcpIn(HERE, 0))
     for _ in range(3):
         (client,) = connected(link.channel)
@@ -212,7 +212,7 @@ def test_a_client_that_goes_is_let_go():
     link.channel.close()
 
 
-def test_a_client_that_resets_while_it_is_sent_to_is_let_go():
+def test_client_reset_during_send_is_removed():
     link = link_of(TcpIn(HERE, 0))
     (client,) = connected(link.channel)
     client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\x01\x00\x00\x00\x00\x00\x00\x00")
@@ -225,7 +225,7 @@ def test_a_client_that_resets_while_it_is_sent_to_is_let_go():
     link.channel.close()
 
 
-def test_clients_are_bounded_and_one_too_many_is_turned_away():
+def test_excess_clients_are_rejected():
     link = link_of(TcpIn(HERE, 0))
     clients = connected(link.channel, tcp.CLIENTS)
     with socket.create_connection((HERE, link.channel.port), 2.0) as extra:
@@ -242,7 +242,7 @@ def test_clients_are_bounded_and_one_too_many_is_turned_away():
 
 
 @pytest.mark.slow
-def test_a_slow_reader_loses_whole_frames_and_no_other_client_any():
+def test_slow_reader_loses_whole_frames_and_other_clients_none():
     """Field notes, 3.1.5: 200 000 unread ODOMETRY left 2 torn frames and no word of the rest."""
     link = link_of(TcpIn(HERE, 0))
     slow, quick = connected(link.channel, 2)
@@ -269,7 +269,7 @@ def test_a_slow_reader_loses_whole_frames_and_no_other_client_any():
         client.close()
 
 
-def test_a_client_that_takes_nothing_is_closed_after_a_while():
+def test_stalled_client_is_closed_after_a_timeout():
     link = link_of(TcpIn(HERE, 0))
     (client,) = connected(link.channel)
     while link.send(odometry()):
@@ -283,7 +283,7 @@ def test_a_client_that_takes_nothing_is_closed_after_a_while():
     link.channel.close()
 
 
-def test_patience_ends_after_a_while_without_any_progress():
+def test_send_timeout_restarts_with_progress():
     out = Outgoing(Taker([None, None, None, 2, None, None, None]))
     out.put(b"frame")
     assert out.flush(10.0)
@@ -309,7 +309,7 @@ class Taker:
         return len(data[:size])
 
 
-def test_what_is_taken_in_pieces_arrives_whole():
+def test_partially_sent_frames_arrive_complete():
     taker = Taker([3, None, 5, None, 1, 1000])
     out = Outgoing(taker, limit=100)
     frames = [bytes([i]) * 30 for i in range(6)]
@@ -320,7 +320,7 @@ def test_what_is_taken_in_pieces_arrives_whole():
     assert taker.taken == b"".join(kept)
 
 
-def test_a_client_waits_for_a_server_that_does_not_listen_yet(monkeypatch):
+def test_tcp_client_waits_for_its_server(monkeypatch):
     monkeypatch.setattr(tcp, "_AGAIN", 0.0)
     with socket.create_server((HERE, 0)) as probe:
         port = probe.getsockname()[1]
@@ -336,7 +336,7 @@ def test_a_client_waits_for_a_server_that_does_not_listen_yet(monkeypatch):
     link.channel.close()
 
 
-def test_a_client_of_a_server_comes_back_after_the_server_did(monkeypatch):
+def test_tcp_client_reconnects_after_server_restart(monkeypatch):
     monkeypatch.setattr(tcp, "_AGAIN", 0.0)
     server = socket.create_server((HERE, 0))
     port = server.getsockname()[1]
@@ -392,7 +392,7 @@ def come_to(terminal, count, station=None):
 
 
 @pty
-def test_a_serial_line_carries_frames_both_ways_and_every_byte():
+def test_serial_line_is_bidirectional_and_8_bit_clean():
     ours, theirs = os.openpty()
     link = link_of(Serial(os.ttyname(theirs), 57600))
     for message in (odometry(0x0D0A1113), attitude(0x03040D1A)):  # bytes that terminals like to eat
@@ -412,7 +412,7 @@ def test_a_serial_line_carries_frames_both_ways_and_every_byte():
 
 
 @pty
-def test_a_line_that_takes_nothing_drops_whole_frames():
+def test_blocked_serial_line_drops_whole_frames():
     ours, theirs = os.openpty()
     link = link_of(Serial(os.ttyname(theirs), 57600))
     sent = [link.send(attitude(i)) for i in range(2000)]
@@ -433,7 +433,7 @@ def test_a_line_that_takes_nothing_drops_whole_frames():
 
 
 @pty
-def test_a_device_that_disappears_is_opened_when_it_is_back(tmp_path, caplog):
+def test_serial_device_is_reopened_after_disconnection(tmp_path, caplog):
     path = tmp_path / "ttyUSB0"
     ours, theirs = os.openpty()
     path.symlink_to(os.ttyname(theirs))
@@ -458,7 +458,7 @@ def test_a_device_that_disappears_is_opened_when_it_is_back(tmp_path, caplog):
 
 
 @pty
-def test_lines_that_cannot_be_are_refused(tmp_path):
+def test_invalid_serial_devices_are_rejected(tmp_path):
     with pytest.raises(TelemetryError, match="serial:/dev/none: No such file"):
         Serial("/dev/none", 57600)
     with pytest.raises(TelemetryError, match=r"baud is 57601, expected one that the system knows, such as .*57600"):
@@ -480,7 +480,7 @@ def logged(path):
     return found
 
 
-def test_a_log_reads_back_with_the_times_of_the_simulation(tmp_path):
+def test_tlog_timestamps_follow_simulation_time(tmp_path):
     path = tmp_path / "dive.tlog"
     before = time.time()
     link = link_of(Tlog(str(path)))
@@ -499,7 +499,7 @@ def test_a_log_reads_back_with_the_times_of_the_simulation(tmp_path):
     assert not link.troubles()
 
 
-def test_a_log_of_a_run_that_gets_ahead_of_the_clock_has_no_times_in_the_future(tmp_path):
+def test_tlog_of_a_fast_run_has_no_future_timestamps(tmp_path):
     path = tmp_path / "fast.tlog"
     link = link_of(Tlog(str(path)))
     link.channel.begin_earlier(600.0)
@@ -523,7 +523,7 @@ def test_a_log_is_never_overwritten(tmp_path):
     assert path.read_bytes() == b"precious"
 
 
-def test_a_log_that_nothing_was_sent_to_leaves_no_file(tmp_path):
+def test_unused_tlog_leaves_no_file(tmp_path):
     path = tmp_path / "dive.tlog"
     Tlog(str(path)).close()
     assert not path.exists()
@@ -546,7 +546,7 @@ class FullDisk:
         self.file.close()
 
 
-def test_a_full_disk_is_told_once_and_tears_no_frame(tmp_path, caplog):
+def test_full_disk_is_reported_once_and_truncates_no_frame(tmp_path, caplog):
     path = tmp_path / "dive.tlog"
     channel = Tlog(str(path))
     channel._file = disk = FullDisk(channel._file)

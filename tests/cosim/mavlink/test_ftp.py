@@ -106,7 +106,7 @@ def test_folders(client):
     "path",
     [b"", b"/etc/passwd", b"../../etc/passwd", b"@PARAM/../etc/passwd", b"@SYS/threads.txt", b"@PARAM", b"\xff" * 239],
 )
-def test_there_is_nothing_else(client, path):
+def test_other_paths_are_not_found(client, path):
     (reply,) = client.ask(OPEN, path)
     assert (reply.opcode, reply.payload[0]) == (NAK, NOT_FOUND)
 
@@ -114,7 +114,7 @@ def test_there_is_nothing_else(client, path):
 @pytest.mark.parametrize(
     ("opcode", "error"), [(CREATE, PROTECTED), (WRITE, PROTECTED), (8, PROTECTED), (13, PROTECTED), (99, UNKNOWN)]
 )
-def test_nothing_can_be_written(client, opcode, error):
+def test_write_operations_are_rejected(client, opcode, error):
     (reply,) = client.ask(opcode, FILE)
     assert (reply.opcode, reply.payload[0], reply.req_opcode) == (NAK, error, opcode)
 
@@ -137,7 +137,7 @@ def test_a_file_that_is_open_does_not_change(client):
     assert client.whole() != before
 
 
-def test_what_was_lost_is_sent_again(client):
+def test_repeated_request_gets_the_same_reply(client):
     packet = FTP_OP(5, 0, OPEN, len(FILE), 0, 0, 0, bytearray(FILE)).pack()
     assert [bytes(r.payload) for r in client.send(packet)] == [bytes(r.payload) for r in client.send(packet)]
 

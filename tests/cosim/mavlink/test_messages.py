@@ -82,7 +82,7 @@ def servos(of, profile="ardusub", **row):
     return [getattr(message, f"servo{i}_raw") for i in range(1, 10)]
 
 
-def test_pulses_are_those_of_the_vehicles_own_table():
+def test_servo_pulses_follow_the_vehicle_table():
     """A real ArduSub that drives a BlueROV2 Heavy forward gives 1300, 1300, 1700, 1700 (measured)."""
     forward = {"thrust[1]": (10.0, 10.0, -10.0, -10.0)}
     heavy = scenario("vehicle='bluerov2_heavy'", "actuation.through='thrusters'")
@@ -97,7 +97,7 @@ def test_pulses_and_forces_are_each_others_inverse():
     assert pulse_of_effort(table, 1)(math.nan) == 1500
 
 
-def test_a_vehicle_without_a_table_has_straight_pulses_in_order():
+def test_vehicle_without_a_table_has_linear_pulses_in_order():
     forces = (13.5, -27.0, 0.0, 54.0)
     assert servos(scenario(), **{"thrust[1]": forces})[:4] == [1700, 1100, 1500, 1900]
 
@@ -112,7 +112,7 @@ def test_time_of_servos_wraps():
     assert attitude.time_boot_ms == 5_000_000_000 % 2**32
 
 
-def test_all_sensors_that_mavsdk_asks_for_are_healthy(station):
+def test_sensors_checked_by_mavsdk_are_healthy(station):
     (status,) = ask(station, 1)
     for bit in (1, 2, 4, 32, mavlink.MAV_SYS_STATUS_PREARM_CHECK):
         assert status.onboard_control_sensors_present & status.onboard_control_sensors_enabled & bit
@@ -147,7 +147,7 @@ def test_arrays(station):
     assert arrays[3].data[:4] == [-3.0, 2.0, 2.0, 2.0] and arrays[4].data[:2] == [13.5, -27.0]
 
 
-def test_obstacles_as_the_vehicle_sees_them():
+def test_obstacle_distances_are_relative_to_the_vehicle():
     station = Station()
     # SR1 of the scenario: a sphere of 0.5 m about (2, 0, 1.8); a seen one about (5, 2, 5) of 1 m
     there = np.array([5.0, 2.0, 5.0]) - [0.0, 0.0, -1e5]
@@ -164,7 +164,7 @@ def test_obstacles_as_the_vehicle_sees_them():
     assert found[4] == pytest.approx(back @ np.array([3.0, 0.0, 0.0]), abs=1e-5)
 
 
-def test_the_bottom_where_there_is_one(station):
+def test_rangefinder_is_reported_only_above_a_bottom(station):
     for message_id in (132, 173, 11038):
         assert ask(station, message_id) == []
     station.look(13.0, **{"altitude": 2.5, "measured.altitude": 2.5})
@@ -172,7 +172,7 @@ def test_the_bottom_where_there_is_one(station):
     assert ask(station, 173)[0].distance == 2.5 and ask(station, 11038)[0].distance == 2.5
 
 
-def test_what_is_armed_is_under_way_even_on_the_bottom(station):
+def test_armed_vehicle_is_in_air_even_on_the_bottom(station):
     assert ask(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
     station.look(13.0, bottom_contact=1.0)
     assert ask(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
@@ -188,14 +188,14 @@ def test_what_is_armed_is_under_way_even_on_the_bottom(station):
         ("generic", OWN[0] << 24 | OWN[1] << 16 | OWN[2] << 8 | 255, b"subreach"),
     ],
 )
-def test_the_version_is_that_of_whom_the_profile_stands_for(profile, flight, custom):
+def test_version_matches_the_emulated_autopilot(profile, flight, custom):
     (version,) = ask(Station(profile), 148)
     assert version.flight_sw_version == flight  # ends in 255 if official, which QGroundControl compares with the newest
     assert version.middleware_sw_version == OWN[0] << 24 | OWN[1] << 16 | OWN[2] << 8 | 255
     assert bytes(version.flight_custom_version) == custom
 
 
-def test_before_the_first_step_the_vehicle_is_where_the_scenario_has_it():
+def test_initial_position_is_reported_before_the_first_step():
     station = Station(of=scenario("initial.position=[1.0, 2.0, 3.0]"))
     (local,) = ask(station, 32)
     assert (local.x, local.y, local.z) == (1.0, 2.0, 3.0)
@@ -252,7 +252,7 @@ def test_the_local_frame_stays_finite_at_the_pole():
 # ---- fields ----
 
 
-def test_fields_hold_what_comes():
+def test_out_of_range_values_are_clamped_to_the_field():
     make = Encoder(mavlink)
     coder = mavlink.MAVLink(None)
     message = make("GLOBAL_POSITION_INT", -1, math.inf, -math.inf, 1e300, math.nan, 1e9, -1e9, 0.6, math.nan)
@@ -278,7 +278,7 @@ def test_euler_angles_are_those_of_the_plant():
         assert euler_of(whole_turn.tolist()) == pytest.approx((roll, pitch, yaw), abs=1e-9)
 
 
-def test_weights_of_criteria_of_ones_own_have_names_that_differ():
+def test_weight_names_of_custom_criteria_are_unique():
     assert weight_names(("obstacle", "shape", "depth")) == ["w_obstacle", "w_shape", "w_depth"]
     assert weight_names(("visibility", "visibilitx", "v")) == ["w_visibili", "w_visibil2", "w_v"]
 

@@ -59,7 +59,7 @@ def met(distances):
 # ---- the message ---------------------------------------------------------------------------------------------------
 
 
-def test_its_fields_are_as_stations_read_them():
+def test_obstacle_distance_fields_follow_the_specification():
     stood = station()
     stood.look(12.5)
     (message,) = asked(stood)
@@ -89,7 +89,7 @@ def test_it_is_streamed_once_a_second(profile):
 
 
 @pytest.mark.parametrize(("yaw", "sector"), [(90, AHEAD), (0, RIGHT), (-90, BEHIND), (180, LEFT), (75, 3), (-135, 45)])
-def test_what_is_east_is_in_the_sector_of_its_bearing(yaw, sector):
+def test_obstacle_is_in_the_sector_of_its_bearing(yaw, sector):
     distances = scan(station(), **attitude(yaw=yaw))
     assert distances[sector] == min(distances) == 500
     assert abs(distances[sector - 1] - distances[(sector + 1) % 72]) <= 1  # it lies evenly about the sector's middle
@@ -101,7 +101,7 @@ def test_sectors_go_clockwise():
     assert set(met(distances)) <= set(range(7, 12))
 
 
-def test_each_sector_has_the_nearest_that_is_in_it():
+def test_each_sector_holds_its_nearest_obstacle():
     distances = scan(station(centre=at(6.0, 0.0, 0.0), radius=2.0))
     for i, distance in enumerate(distances):
         near, far = (math.radians(max(abs((i + 36) % 72 - 36) * 5.0 + s, 0.0)) for s in (-2.5, 2.5))
@@ -117,31 +117,31 @@ def test_each_sector_has_the_nearest_that_is_in_it():
 
 @pytest.mark.medium(fast=13)
 @pytest.mark.parametrize("bearing", np.radians(np.arange(0.0, 360.0, 7.3)))
-def test_nothing_wider_than_it_tells_slips_through(bearing):
+def test_obstacle_of_documented_size_is_always_detected(bearing):
     away = 19.6 * np.array([math.cos(bearing), math.sin(bearing), 0.0])
     assert met(scan(station(centre=HERE + away, radius=0.3)))
 
 
-def test_the_scan_stays_level():
+def test_scan_plane_stays_horizontal():
     level = scan(station(), **attitude(yaw=40.0))
     assert scan(station(), **attitude(roll=30.0, pitch=-50.0, yaw=40.0)) == level
 
 
-def test_what_is_above_or_below_is_not_in_it():
+def test_obstacles_above_or_below_are_excluded():
     assert met(scan(station(centre=at(0.0, 6.0, 1.05)))) == {}
     assert met(scan(station(centre=at(0.0, 6.0, -0.8))))[RIGHT] == 540
 
 
-def test_nothing_is_one_more_than_the_greatest():
+def test_empty_sector_holds_maximum_plus_one():
     assert scan(station(centre=at(0.0, 21.5, 0.0))) == [NOTHING] * 72
     assert min(scan(station(centre=at(0.0, 20.5, 0.0)))) == 1950
 
 
-def test_inside_an_obstacle_all_is_at_hand():
+def test_inside_an_obstacle_all_distances_are_minimal():
     assert scan(station(centre=at(0.0, 0.3, 0.0))) == [0] * 72
 
 
-def test_only_what_is_to_be_kept_out_of_as_an_obstacle_counts():
+def test_only_keep_out_obstacle_regions_are_scanned():
     base = ["regions.SR1.shape.centre=[90.0, 0.0, 5.0]"]
     near = "regions.{}.shape={{type='sphere', centre=[4.0, 2.0, 5.0], radius=1.0}}"
     other = Station(of=scenario(*base, near.format("SR2")))  # of the criterion shape
@@ -170,7 +170,7 @@ def test_a_moving_region_is_where_it_is_now():
     assert scan(stood, 4.0)[RIGHT] == 500
 
 
-def test_a_seen_obstacle_is_as_wide_as_its_clearance_says():
+def test_dynamic_obstacle_width_follows_its_clearance():
     stood = station(centre=(90.0, 0.0, 0.0))
     assert met(scan(stood)) == {}
     for radius in (0.5, 1.5):
@@ -181,7 +181,7 @@ def test_a_seen_obstacle_is_as_wide_as_its_clearance_says():
     assert met(scan(stood)) == {}  # forgotten
 
 
-def test_before_the_first_snapshot_no_obstacle_has_come():
+def test_before_the_first_snapshot_only_scenario_obstacles_are_reported():
     stood = station(centre=(0.0, 6.0, 1.0))  # the scenario begins at depth 1
     stood.wait(3.0)  # streams go by the wall clock
     assert stood.wire.of("OBSTACLE_DISTANCE_3D") == []
@@ -200,7 +200,7 @@ def test_a_changed_setting_changes_the_scan():
 
 
 @pytest.mark.parametrize("lost", [{"position.x": (math.nan, 2.0, 5.0)}, {"attitude.yaw": math.nan}])
-def test_lost_numbers_are_unknown(lost):
+def test_nan_values_are_reported_as_unknown(lost):
     assert scan(station(), **lost) == [UNKNOWN] * 72
 
 

@@ -69,7 +69,7 @@ def row(t):
     return np.array([t, 1.0, 2.0])
 
 
-def test_snapshots_come_in_order_every_10_ms_of_the_simulation_and_are_copies():
+def test_snapshots_are_ordered_copies_every_10_ms():
     with Ear() as ear:
         vehicle = StubVehicle()
         links = LinkThread(vehicle, [udp_link(ear.port)], step=1e-3)
@@ -86,7 +86,7 @@ def test_snapshots_come_in_order_every_10_ms_of_the_simulation_and_are_copies():
         assert all((b - a) % 256 == 1 for a, b in zip(sequence, sequence[1:], strict=False))
 
 
-def test_each_row_of_a_coarse_run_is_shown():
+def test_every_row_of_a_coarse_run_is_observed():
     vehicle = StubVehicle()
     links = LinkThread(vehicle, [], step=0.05)
     for k in range(5):
@@ -96,7 +96,7 @@ def test_each_row_of_a_coarse_run_is_shown():
     assert len(vehicle.rows) == 5
 
 
-def test_an_answer_comes_while_nothing_is_observed_and_ticks_go_on():
+def test_requests_are_answered_while_the_simulation_is_paused():
     with Ear() as ear:
         vehicle = StubVehicle()
         links = LinkThread(vehicle, [udp_link(ear.port)], step=1e-3)
@@ -133,7 +133,7 @@ def test_many_links_at_once_each_with_a_sequence_of_its_own():
         assert other.count("ATTITUDE") == 600 and other.count("COMMAND_ACK") == 1
 
 
-def test_a_log_beside_a_link_has_what_went_out_and_what_was_heeded(tmp_path):
+def test_log_holds_sent_and_accepted_frames(tmp_path):
     path = tmp_path / "dive.tlog"
     with Ear() as ear:
         vehicle = StubVehicle()
@@ -175,7 +175,7 @@ class Clumsy(StubVehicle):
         raise ValueError("attach")
 
 
-def test_an_error_of_the_vehicle_is_told_once_a_kind_and_costs_no_more(caplog):
+def test_vehicle_errors_are_logged_once_per_kind_and_isolated(caplog):
     with Ear() as ear:
         vehicle = Clumsy()
         links = LinkThread(vehicle, [udp_link(ear.port)], step=0.01)
@@ -202,7 +202,7 @@ def test_an_error_of_the_vehicle_is_told_once_a_kind_and_costs_no_more(caplog):
     )
 
 
-def test_what_cannot_be_encoded_is_counted_and_the_sequence_has_no_gap(caplog):
+def test_unencodable_messages_are_counted_without_sequence_gap(caplog):
     text = mavlink.MAVLink_statustext_message(6, b"")
     text._text_raw = "letters where bytes belong"
     with Ear() as ear:
@@ -243,7 +243,7 @@ def test_a_budget_thins_streams_before_answers(monkeypatch):
     assert sequence == list(range(len(sequence)))
 
 
-def test_a_stalled_thread_drops_the_oldest_and_says_how_many(caplog):
+def test_stalled_thread_drops_oldest_snapshots_and_reports_the_count(caplog):
     vehicle = StubVehicle()
     links = LinkThread(vehicle, [], step=0.01)
     for k in range(thread.SNAPSHOTS + 904):
@@ -255,7 +255,7 @@ def test_a_stalled_thread_drops_the_oldest_and_says_how_many(caplog):
     assert "904 snapshots dropped" in caplog.text
 
 
-def test_closing_is_bounded_by_time_and_counts_what_was_left(monkeypatch, caplog):
+def test_closing_is_time_bounded_and_counts_dropped_snapshots(monkeypatch, caplog):
     monkeypatch.setattr(thread, "_DRAINING", 0.05)
     vehicle = StubVehicle()
     vehicle.observe = lambda row: time.sleep(0.02)
@@ -270,7 +270,7 @@ def test_closing_is_bounded_by_time_and_counts_what_was_left(monkeypatch, caplog
     assert "mavlink" not in [t.name for t in threading.enumerate()]
 
 
-def test_links_that_were_never_started_are_closed_too(tmp_path):
+def test_unstarted_links_are_closed(tmp_path):
     channel = UdpIn(HERE, 0)
     LinkThread(StubVehicle(), [link_of(channel)], step=0.01).close()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:

@@ -76,7 +76,7 @@ class MavProxy:
         self.process.stdout.close()
 
 
-def test_a_pilot_connects_arms_changes_modes_and_lists_what_there_is(ardupilots_tools, udp_port, tmp_path):
+def test_mavproxy_connects_arms_changes_modes_and_lists_parameters(ardupilots_tools, udp_port, tmp_path):
     python, port, folder = ardupilots_tools, udp_port(), tmp_path / "run"
     with cosim_run(folder, "ardusub", f"udpout:127.0.0.1:{port}"), MavProxy(python, tmp_path, port) as mavproxy:
         mavproxy.see(r"Detected vehicle 1:1")
