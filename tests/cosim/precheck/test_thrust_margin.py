@@ -32,13 +32,13 @@ def test_greatest_force(direction, expected):
     assert greatest_force(ODIN, np.array(DIRECTIONS[direction]), NOTHING, ALL) == pytest.approx(expected)
 
 
-def test_a_lost_vertical_thruster_takes_its_opposite_with_it():
+def test_losing_a_vertical_thruster_halves_the_vertical_force():
     alive = ALL.copy()
     alive[4] = False
     assert greatest_force(ODIN, np.array(DIRECTIONS["down"]), NOTHING, alive) == pytest.approx(54.0)
 
 
-def test_what_cannot_be_held_is_none():
+def test_unsustainable_load_gives_none():
     assert greatest_force(ODIN, np.array(DIRECTIONS["down"]), np.r_[0.0, 0.0, 108.1, 0.0, 0.0, 0.0], ALL) is None
     left = greatest_force(ODIN, np.array(DIRECTIONS["down"]), np.r_[0.0, 0.0, 100.0, 0.0, 0.0, 0.0], ALL)
     assert left == pytest.approx(8.0)
@@ -76,12 +76,12 @@ def test_weight_narrows_the_vertical():
     assert m.left_without[4] is None
 
 
-def test_too_much_cannot_be_held():
+def test_excessive_current_has_no_margin():
     assert margin([2.0, 0.0, 0.0]).left is None
 
 
 @pytest.mark.medium
-def test_munks_moment_is_held_too():
+def test_munk_moment_is_included():
     """A long body in an oblique stream wants to turn across it."""
     rov = load_vehicle("bluerov2_heavy")
     m = margin([0.3, 0.3, 0.0], weight=rov.weight, vehicle=rov)
