@@ -36,7 +36,7 @@ def test_shipped_paper_runs_scikit_fuzzy(shipped_run):
 
 
 @pytest.mark.parametrize("duration", [5, pytest.param(60, marks=pytest.mark.slow)])
-def test_both_engines_drive_the_same_path(shipped_run, duration):
+def test_both_arbiter_engines_give_the_same_path(shipped_run, duration):
     """Their weights differ by at most the square of the grid's step over 2; the path hardly notices."""
     closed, skfuzzy = (
         load_record(shipped_run("paper", f"arbiter.engine={e}", f"time.duration={duration}").folder)
