@@ -25,7 +25,7 @@ def run(tmp_path_factory):
 
 
 @pytest.mark.medium
-def test_the_goal_goes_on_when_the_vehicle_has_stayed_in_it(run):
+def test_goal_advances_after_the_stay_time(run):
     record = load_record(run.folder)
     place = np.rint(record["goal.place"]).astype(int)
     position = np.column_stack([record[f"position.{axis}"] for axis in "xyz"])
@@ -37,14 +37,14 @@ def test_the_goal_goes_on_when_the_vehicle_has_stayed_in_it(run):
     assert place[-1] == 2
 
 
-def test_the_last_place_alone_counts_as_reached(run):
+def test_only_the_last_goal_counts_as_reached(run):
     record = load_record(run.folder)
     within = (record["goal.place"] == 2.0) & (record["goal.clearance"] >= 0.0)
     assert run.summary["reached"] and run.summary["reach_time"] == record["time"][np.argmax(within)]
     assert run.summary["closest_to_goal"] == -record["goal.clearance"][record["goal.place"] == 2.0].max()
 
 
-def test_the_fused_loop_flies_it_as_the_master_does(run):
+def test_fused_loop_equals_the_master(run):
     for duration in (40.0, 6.0):  # 6 s end at the second place
         scenario = load_scenario("paper", [*TOUR, f"time.duration={duration}", "arbiter.engine=closed"])
         with FusedFlyer(Variation(scenario, [])) as flyer:
@@ -69,6 +69,6 @@ def test_the_fused_loop_flies_it_as_the_master_does(run):
         ("commands.enabled=true", "commands.enabled is true"),
     ],
 )
-def test_what_cannot_be_beside_it_is_refused_by_name(change, words):
+def test_incompatible_keys_are_rejected_by_name(change, words):
     with pytest.raises(ScenarioError, match=words.replace(".", r"\.")):
         load_scenario("paper", [*TOUR, change])

@@ -78,7 +78,7 @@ def test_rate_is_that_of_v_up_to_the_sampling():
 
 
 @pytest.mark.medium
-def test_rate_is_not_that_of_v_where_the_theory_does_not_reach():
+def test_rate_differs_from_v_outside_the_theory():
     """A limit on the force; weights that change (d alpha/dt neglected); gradients that are not 1 (as printed)."""
     strong = ("regions.SR1.gain=1e5", "regions.SR2.gain=1e5", "time.duration=0.3")
     assert defect(run("time.duration=1.0", *ALONE, "limit.force=108"), "normalized", 1e-3) > 0.3
@@ -89,13 +89,13 @@ def test_rate_is_not_that_of_v_where_the_theory_does_not_reach():
     assert defect(changing, "printed", 1e-3) > 0.05
 
 
-def test_nothing_is_recorded_unless_asked_for():
+def test_lyapunov_columns_exist_only_if_requested():
     with Master(load_scenario("paper", ["arbiter.engine=closed"])) as master:
         assert not [c.name for c in master.signals.columns if c.name.startswith("lyapunov")]
 
 
 @pytest.mark.medium
-def test_recording_changes_nothing_else(shipped_run):
+def test_recording_lyapunov_changes_no_other_column(shipped_run):
     short = ("arbiter.engine=closed", "time.duration=1")
     without, with_v = (load_record(shipped_run("paper", *short, *more).folder) for more in ((), QUICK[1:]))
     assert set(with_v.units) - set(without.units) == {f"lyapunov.{name}" for name in (*FORMS, "rate")}
@@ -154,7 +154,7 @@ LOOKING = (
     ],
     ids=["another law", "a region of attitude"],
 )
-def test_v_is_refused_where_it_is_not_defined(overrides, words):
+def test_undefined_lyapunov_function_is_rejected(overrides, words):
     with pytest.raises(ScenarioError, match=words):
         load_scenario("paper", [*QUICK, *overrides])
 
