@@ -36,7 +36,7 @@ def told(options, seconds=10.0, rate=400):
     return found
 
 
-def test_the_ways_of_a_dvl_add_up():
+def test_dvl_displacements_sum_to_the_motion():
     found = told(DvlOptions(rate=8.0, latency=0.0))
     assert len(found) == 80
     assert {interval for _, _, interval, _, _ in found} == {125_000}
@@ -45,7 +45,7 @@ def test_the_ways_of_a_dvl_add_up():
 
 
 @pytest.mark.medium
-def test_a_dvl_is_late_and_loses_what_it_is_said_to():
+def test_dvl_has_its_configured_latency_and_dropout():
     late = told(DvlOptions(rate=8.0, latency=0.25))
     assert [time - stamp / 1e6 for time, stamp, *_ in late] == pytest.approx([0.25] * len(late), abs=1e-6)
     lossy = told(DvlOptions(rate=8.0, latency=0.0, dropout=0.3), seconds=100.0)
@@ -53,7 +53,7 @@ def test_a_dvl_is_late_and_loses_what_it_is_said_to():
     assert [one[1] for one in lossy] == [one[1] for one in told(DvlOptions(8.0, 0.0, 0.3), seconds=100.0)]
 
 
-def test_the_estimate_is_in_the_record_and_arming_lets_go(tmp_path):
+def test_estimate_is_recorded_and_arming_releases_the_vehicle(tmp_path):
     m, port = dialect(), free_port()
     link = AutopilotLink(parse_endpoint(f"udpin:127.0.0.1:{port}"), DvlOptions(rate=100.0, latency=0.0))
     options = FlightOptions(
