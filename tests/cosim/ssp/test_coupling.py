@@ -99,7 +99,7 @@ def test_masters_connect_a_current_and_a_tether(master, packed, tmp_path):
 
 
 @pytest.mark.slow
-def test_shorter_steps_come_to_the_solution_of_the_equations(packed, tmp_path):
+def test_coupling_error_converges_linearly_with_the_step(packed, tmp_path):
     """Half the step, half the error: what is held within a step lags by that much."""
     exact = continuous(20.0)
     errors = []
@@ -112,7 +112,7 @@ def test_shorter_steps_come_to_the_solution_of_the_equations(packed, tmp_path):
 
 
 @pytest.mark.slow
-def test_at_rest_the_stretch_is_that_of_net_weight_and_drag(packed, tmp_path):
+def test_static_tether_stretch_matches_net_weight_and_drag(packed, tmp_path):
     """By hand, with the drag of each body axis; and the moments of tether and weight cancel."""
     end = in_master("fmpy", packed(STEP), 12500, STEP, tmp_path / "rows.npy")[-1]
     assert np.abs(end[7:]).max() < 1e-3
