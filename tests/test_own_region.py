@@ -132,7 +132,7 @@ def copy(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_the_torus_of_the_page_flies(copy):
+def test_documented_torus_region_is_avoided(copy):
     done = python(copy, "-c", FLY)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["True", "True", "True", "True"]

@@ -124,7 +124,7 @@ class SampledPath:
 @pytest.mark.parametrize(
     ("name", "said"), [("paper", "1.1 mm (`paper`)"), ("paper-limited", "0.6 mm (`paper-limited`)")]
 )
-def test_what_the_arbiter_changes_at_the_printed_gains(name, said):
+def test_arbiter_effect_at_the_papers_gains_matches_the_document(name, said):
     ways = []
     for all_on in (False, True):
         scenario = load_scenario(name, ["arbiter.engine=closed", "time.duration=20"])
