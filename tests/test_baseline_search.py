@@ -1,4 +1,4 @@
-"""The search for the gains of the laws for comparison: its draws, its order, and what it found."""
+"""The gain search of the baseline laws: its draws, its ranking, and its result."""
 
 import math
 import re

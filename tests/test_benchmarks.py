@@ -1,4 +1,4 @@
-"""The benchmarks run, and what they compare is one plant. No test asserts a time."""
+"""The benchmarks run and compare the same plant. No test asserts a time."""
 
 import json
 import re

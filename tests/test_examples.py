@@ -1,4 +1,4 @@
-"""Each example runs from an empty folder, says something, and stays as short as it claims to be."""
+"""Each example runs from an empty folder, prints something, and is short."""
 
 import ast
 import runpy

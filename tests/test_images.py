@@ -1,4 +1,4 @@
-"""The pictures of the documents: each is drawn by a maker, and each maker runs."""
+"""The pictures of the documents are drawn by scripts that run."""
 
 import re
 import sys

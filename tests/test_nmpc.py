@@ -1,4 +1,4 @@
-"""The predictive controller of the benchmarks with another planner in its place: what it is given, and when."""
+"""The predictive controller of the benchmarks with a stub planner: its inputs and their timing."""
 
 import contextlib
 import json

@@ -1,4 +1,4 @@
-"""The page on laws of one's own, followed to the letter in a copy of the packages: its law flies."""
+"""The page on custom laws, followed in a copy of the packages: its law runs."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""The page on regions of one's own, followed to the letter in a copy of the packages: its shape flies."""
+"""The page on custom regions, followed in a copy of the packages: its shape runs."""
 
 import re
 

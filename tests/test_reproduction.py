@@ -1,4 +1,4 @@
-"""What docs/reproduction.md says of each claim of the paper, against runs of the shipped scenarios."""
+"""The figures of docs/reproduction.md against runs of the shipped scenarios."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The site of the documents: navigation, reference, what the pages name, and that it builds without a warning."""
+"""The documentation site: navigation, reference, links into the code, and a build without warnings."""
 
 import ast
 import importlib

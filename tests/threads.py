@@ -1,4 +1,4 @@
-"""Threads of tests: none may outlive its test, however that ends, since it would hold up the whole session."""
+"""Threads of tests, stopped at the end of each test."""
 
 import ctypes
 

@@ -1,4 +1,4 @@
-"""Words that the code and the documents no longer use, which ``banned.toml`` lists."""
+"""Words that the code and the documents no longer use, from ``banned.toml``."""
 
 import ast
 import io

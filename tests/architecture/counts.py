@@ -1,4 +1,4 @@
-"""How large the house is, in numbers: ``python -m tests.architecture.counts``."""
+"""Count modules, lines and words of the repository: ``python -m tests.architecture.counts``."""
 
 import re
 import statistics

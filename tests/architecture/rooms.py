@@ -1,4 +1,4 @@
-"""The rooms of the house: folders of the four packages, and what each says and does import."""
+"""The subpackages of the four packages: their stated and their actual imports."""
 
 import ast
 import re

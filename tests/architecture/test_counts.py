@@ -1,4 +1,4 @@
-"""The counts of the house, and the words that do not come back."""
+"""Size counts of the repository and the list of banned words."""
 
 import shutil
 import subprocess

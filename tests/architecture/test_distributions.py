@@ -1,4 +1,4 @@
-"""Two distributions come from this repository; what both must agree on stands in both."""
+"""Consistency of the two distributions that this repository builds."""
 
 import itertools
 import re

@@ -1,4 +1,4 @@
-"""What docstrings say is what the code has: parameters, errors, what comes back, and units."""
+"""Docstrings match the code: parameters, errors, return values, and units."""
 
 import ast
 import re

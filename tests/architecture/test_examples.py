@@ -1,4 +1,4 @@
-"""Every public function and class has an example in its docstring, and each gives what it shows."""
+"""Every public function and class has a docstring example with correct output."""
 
 import doctest
 import importlib

@@ -1,4 +1,4 @@
-"""Who may import whom, what stays out until it is asked for, and how long a file is."""
+"""Import layering, lazy imports, and file sizes."""
 
 import graphlib
 import subprocess

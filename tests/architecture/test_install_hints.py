@@ -1,4 +1,4 @@
-"""What says how to install something says it by one helper, with the bounds of ``pyproject.toml``, and pip takes it."""
+"""Install hints come from one helper, use the bounds of ``pyproject.toml``, and are accepted by pip."""
 
 import ast
 import re

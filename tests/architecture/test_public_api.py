@@ -1,4 +1,4 @@
-"""What is public changes when somebody means it to."""
+"""The public API changes only with its recorded listing."""
 
 import difflib
 import importlib

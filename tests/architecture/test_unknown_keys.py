@@ -1,4 +1,4 @@
-"""A key that nothing knows is refused by name, in every table of every file that somebody writes by hand or sends."""
+"""Unknown keys are rejected by name in every table of every handwritten or received file."""
 
 import copy
 import json

@@ -1,4 +1,4 @@
-"""The laws for comparison against plain matrices, and what each is good for on a simple vehicle in still water."""
+"""The baseline laws against plain matrices, and their behavior on a simple vehicle in still water."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A function as a law: told copies of what is, and held to what it returns."""
+"""A function as a law: it receives copies of its inputs, and its output is validated."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The PD law with observer and barriers: its observer's poles, its barriers along a motion, and what it is good for."""
+"""The PD law with observer and barriers: observer poles, barrier inequality, and closed-loop behavior."""
 
 import math
 

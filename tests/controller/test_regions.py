@@ -1,4 +1,4 @@
-"""Regions: values, gradients and distances, each shape against what its definition says."""
+"""Regions: values, gradients and distances of each shape against its definition."""
 
 import dataclasses
 import inspect

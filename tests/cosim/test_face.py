@@ -1,4 +1,4 @@
-"""The names of `cosim` itself: what a script or a notebook does with them."""
+"""The public names of `cosim`, as scripts and notebooks use them."""
 
 import ast
 import json

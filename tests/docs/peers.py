@@ -1,4 +1,4 @@
-"""Who comes when a command of the documents waits for somebody."""
+"""Peers for commands of the documents that wait for a connection."""
 
 import contextlib
 import socket

@@ -1,4 +1,4 @@
-"""Pages, run: their blocks in order, in one folder and one namespace of Python."""
+"""Run the blocks of a page in order, in one folder and one Python namespace."""
 
 import shutil
 from collections.abc import Sequence

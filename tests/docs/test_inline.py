@@ -1,4 +1,4 @@
-"""Commands and flags in running text, in tables and in comments of commands are those of the programs."""
+"""Commands and flags in running text, in tables and in comments exist in the programs."""
 
 import re
 import shlex

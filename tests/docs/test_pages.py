@@ -1,4 +1,4 @@
-"""Every block and command of every page is run, or checked as far as it goes with a reason that stands in the page."""
+"""Every block and command of every page is run, or checked with a stated reason."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The runner itself: what a page says wrongly is found, and what is right passes."""
+"""The page runner: incorrect pages fail, and correct ones pass."""
 
 import re
 

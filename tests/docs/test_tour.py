@@ -1,4 +1,4 @@
-"""The tour itself: it does what a page says as a reader would, and what is not so fails."""
+"""The tour: it runs a page's commands as a reader would, and failures are reported."""
 
 import itertools
 import re

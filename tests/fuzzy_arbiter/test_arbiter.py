@@ -1,4 +1,4 @@
-"""The arbiter itself: section VI, inputs and their faults, normalization, threads, memory, imports."""
+"""The arbiter: section VI, inputs and their errors, normalization, threads, memory, imports."""
 
 import copy
 import gc

@@ -1,4 +1,4 @@
-"""The command line: each verb, its exit status, and that bad input costs one line and no file."""
+"""The command line: each verb, its exit status, and one-line errors without files."""
 
 import csv
 import io

@@ -1,4 +1,4 @@
-"""Data frames as inputs, as pandas has them; other columns of theirs are passed over."""
+"""Data frames of pandas as inputs; other columns are ignored."""
 
 import pytest
 

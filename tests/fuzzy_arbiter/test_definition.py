@@ -1,4 +1,4 @@
-"""Definitions: whatever cannot be one is refused in a line that says what came and what was expected."""
+"""Definitions: invalid ones are rejected in one line with the given and the expected value."""
 
 import copy
 import pickle

@@ -1,4 +1,4 @@
-"""The example of a building's ventilation and those of the manual, against values worked out by other means."""
+"""The ventilation example and those of the manual, against independently computed values."""
 
 import ast
 import re

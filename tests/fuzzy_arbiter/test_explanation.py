@@ -1,4 +1,4 @@
-"""Explanations: what fired, how strongly, and what decided."""
+"""Explanations: fired rules, their strengths, and the deciding rule."""
 
 import json
 import math

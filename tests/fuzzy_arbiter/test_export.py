@@ -1,4 +1,4 @@
-"""Exported code gives the arbiter's own bits: C, plain Python, and what Numba makes of it."""
+"""Exported code equals the arbiter bit for bit: C, plain Python, and Numba."""
 
 import ctypes
 import os

@@ -1,4 +1,4 @@
-"""Files appear whole or not at all, with the permissions that other files get."""
+"""Files are written atomically, with the usual permissions."""
 
 import os
 import stat

@@ -1,4 +1,4 @@
-"""Hysteresis: latches by hand, scans against calls, and the chatter that it takes away."""
+"""Hysteresis: latches by hand, scans against calls, and chatter removal."""
 
 import copy
 import math

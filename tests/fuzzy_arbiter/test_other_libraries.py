@@ -1,4 +1,4 @@
-"""Other libraries give the same weights, each to within the error of its own way to sum."""
+"""Other libraries give the same weights within their own numerical error."""
 
 import json
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Pictures show the numbers that the arbiter gives, and leave everything else alone."""
+"""Pictures show the arbiter's numbers and change no global state."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""What is different for tests of a mutant: their order, a limit of time for each, and C that is compiled but once."""
+"""Pytest plugin for tests of a mutant: their order, a time limit for each, and C compiled once."""
 
 from __future__ import annotations
 

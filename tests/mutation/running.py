@@ -1,4 +1,4 @@
-"""Mutants given to processes, each with a copy of the project of its own; what came out is kept as it comes."""
+"""Run mutants in processes with copies of the project, and save each result at once."""
 
 from __future__ import annotations
 

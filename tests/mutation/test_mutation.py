@@ -1,4 +1,4 @@
-"""The mutation test itself: which signs it finds, what it does with them, that its plan fits the sources."""
+"""The mutation test: found signs, their mutants, and a plan that fits the sources."""
 
 import ast
 import shutil

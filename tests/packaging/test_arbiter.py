@@ -1,4 +1,4 @@
-"""fuzzy-arbiter: what its wheel holds, that NumPy suffices, and that its tests run from its source distribution."""
+"""fuzzy-arbiter: the content of its wheel, its dependencies, and its tests from the source distribution."""
 
 import os
 import subprocess

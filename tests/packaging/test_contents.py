@@ -1,4 +1,4 @@
-"""What is in the wheel and in the source distribution, and what is not."""
+"""The content of the wheel and of the source distribution."""
 
 import tarfile
 import tomllib

@@ -1,4 +1,4 @@
-"""How an autopilot drives the thrusters: what a table of a vehicle's file may say."""
+"""The autopilot table of a vehicle file: validation, and pulses of thrusters."""
 
 import dataclasses
 

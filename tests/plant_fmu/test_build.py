@@ -1,4 +1,4 @@
-"""Building FMUs, and refusing to."""
+"""Building FMUs, and rejected builds."""
 
 import os
 import re

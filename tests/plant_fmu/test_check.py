@@ -1,4 +1,4 @@
-"""`plant_fmu check`: files that are no FMUs, importers that fail, crash, hang or are not there."""
+"""`plant_fmu check`: invalid FMUs, and importers that fail, crash, hang or are missing."""
 
 import dataclasses
 import shutil

@@ -1,4 +1,4 @@
-"""What lies in an FMU beside description and binary, against FMPy's schemas and parsers of HTML and of images."""
+"""Files in an FMU beside description and binary, against FMPy's schemas and parsers of HTML and images."""
 
 import re
 import zipfile

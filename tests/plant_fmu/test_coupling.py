@@ -1,4 +1,4 @@
-"""Inputs by which other components act on the vehicle: each does what the parameters, or the wrench, would do."""
+"""Coupling inputs: each has the effect of the equivalent parameters or wrench."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""modelDescription.xml, the C header and the docs page: one table, one truth."""
+"""Consistency of modelDescription.xml, the C header and the docs page."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""Many instances, one after the other and side by side."""
+"""Many instances in sequence and in parallel."""
 
 import ctypes
 import resource

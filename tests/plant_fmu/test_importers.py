@@ -1,4 +1,4 @@
-"""The same motion in every importer that pip can install: one vehicle, one end."""
+"""The same motion in every importer that pip can install."""
 
 import functools
 import tomllib

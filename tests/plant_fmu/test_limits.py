@@ -1,4 +1,4 @@
-"""What integration cannot follow, and times at the edge of numbers: refused, or done right, never almost right."""
+"""Motions that integration cannot follow, and times at numerical limits: rejected or exact."""
 
 import numpy as np
 import pytest

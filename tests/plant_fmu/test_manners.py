@@ -1,4 +1,4 @@
-"""How the FMU refuses: always with a message that names the variable, and without harm."""
+"""Rejections of the FMU: a message that names the variable, and an unchanged state."""
 
 import ctypes
 import math

@@ -1,4 +1,4 @@
-"""NULL where FMI wants a pointer: an error with a reason, never a crash, in every function of FMI's own headers."""
+"""NULL for each pointer of every FMI function: an error with a reason, never a crash."""
 
 import zipfile
 

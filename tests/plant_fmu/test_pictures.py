@@ -1,4 +1,4 @@
-"""Pictures of a vehicle: what they say is what its file says, and nothing covers anything else."""
+"""Pictures of a vehicle: consistent with its file, without overlapping labels."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""`Plant` against FMPy's own calls, and all that a user may do with values and in the wrong order."""
+"""`Plant` against FMPy's own calls, and invalid values and call orders."""
 
 import copy
 import pickle

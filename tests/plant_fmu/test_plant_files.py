@@ -1,4 +1,4 @@
-"""Plants beside each other, plants of foreign FMUs and of broken ones, and what they leave on the disk: nothing."""
+"""Several plants, foreign and broken FMUs, and removal of temporary files."""
 
 import gc
 import os

@@ -1,4 +1,4 @@
-"""FMUs for all platforms: what is in them, what it exports and needs, and what it computes where that can be run."""
+"""FMUs for all platforms: content, exports, dependencies, and results where they can run."""
 
 import hashlib
 import os

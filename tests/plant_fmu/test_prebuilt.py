@@ -1,4 +1,4 @@
-"""Libraries that come compiled: what is made of them is what a compiler makes, and what does not fit is left alone."""
+"""Prebuilt libraries: equal to compiled ones, and unused where they do not fit."""
 
 import dataclasses
 import hashlib

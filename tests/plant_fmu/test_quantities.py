@@ -1,4 +1,4 @@
-"""Units and domains: exponents are those that the name of the unit spells."""
+"""Units and ranges: exponents match the name of the unit."""
 
 import re
 

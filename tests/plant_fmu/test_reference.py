@@ -1,4 +1,4 @@
-"""The FMU against trajectories that this project did not compute."""
+"""The FMU against trajectories computed outside this project."""
 
 import json
 

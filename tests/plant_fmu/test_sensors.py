@@ -1,4 +1,4 @@
-"""Measured outputs: truth where nothing is switched on, samples with seeded noise where it is."""
+"""Measured outputs: true values by default, and samples with seeded noise."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The sources in an FMU: all that another needs to compile the plant, and the same plant once compiled."""
+"""The sources in an FMU: complete, and equal in results once compiled."""
 
 import re
 import shutil

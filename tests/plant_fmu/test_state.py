@@ -1,4 +1,4 @@
-"""FMU states: kept, restored, carried over as bytes, and refused where they do not fit."""
+"""FMU states: saved, restored, serialized, and rejected where they do not fit."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""How many steps a step is made of, and which motion they can follow: by what does not depend on it."""
+"""The number of substeps of a step, and the stability limit on the motion."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The shipped vehicles: what was published, turned here by other means, and what any sound vehicle does."""
+"""The shipped vehicles: published values converted independently, and physical validity."""
 
 import dataclasses
 from importlib import resources

@@ -1,4 +1,4 @@
-"""The WebAssembly component of fmi-ls-wasm and the module alone: interfaces, and the bits of the native library."""
+"""The WebAssembly component of fmi-ls-wasm and the bare module: interfaces, and bit-identical results."""
 
 import json
 import shutil

@@ -1,4 +1,4 @@
-"""Runs variants: a Python where it needs one of its own, a look at what it really computes with, then the tests."""
+"""Run variants: install a Python if needed, verify the active kernels, then run the tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The choice of variants, what a machine lacks for them, whether they were taken, and how results are told."""
+"""The choice of variants, missing requirements, verification, and the report of results."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""What the tests are run with, one at a time: kernels of OpenBLAS, the processor that NumPy sees, Pythons."""
+"""Variants of the test environment: OpenBLAS kernels, the processor that NumPy sees, Pythons."""
 
 from __future__ import annotations
 

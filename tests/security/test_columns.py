@@ -1,4 +1,4 @@
-"""D6: records that lack a column end in one line that names it, unless nothing is made of it."""
+"""D6: records that lack a used column are rejected in one line that names it."""
 
 import shutil
 

@@ -1,4 +1,4 @@
-"""Records that are none, folders with traps in them, and files that are written whole or not at all."""
+"""Invalid records, malicious folders, and atomic writes."""
 
 import json
 import math

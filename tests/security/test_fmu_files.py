@@ -1,4 +1,4 @@
-"""FMUs made to do harm: each is refused by both readers, with one line, and nothing of it is written or run."""
+"""Malicious FMUs: both readers reject each in one line, and nothing of it is written or run."""
 
 import io
 import os

@@ -1,4 +1,4 @@
-"""D9: a disk that is full before anything is recorded leaves no folder that the same command would refuse."""
+"""D9: a disk that is full before anything is recorded leaves no folder that blocks the same command."""
 
 import contextlib
 import errno

@@ -1,4 +1,4 @@
-"""What no file of the product does, beyond what the linter sees."""
+"""Rules for every source file beyond those of the linter."""
 
 import ast
 

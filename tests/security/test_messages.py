@@ -1,4 +1,4 @@
-"""D11: every message is one printable line that names its file or key and quotes little of what came."""
+"""D11: every message is one printable line that names its file or key and quotes little of the input."""
 
 import inspect
 import logging

@@ -1,4 +1,4 @@
-"""Names and texts from outside, in the pages and pictures that show them: they are read, never run."""
+"""External names and texts in pages and pictures are escaped, never executed."""
 
 import html.parser
 import json

@@ -1,4 +1,4 @@
-"""Scenarios, vehicles, arbiters, scenes and commands made to do harm end in one short line of a known kind."""
+"""Malicious scenarios, vehicles, arbiters, scenes and commands give one short line of a known kind."""
 
 import json
 import math

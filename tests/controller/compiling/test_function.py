@@ -1,4 +1,4 @@
-"""Plain functions run as C: the same numbers, arguments that stay alive, and what is no plain function."""
+"""Python functions compiled to C: equal numbers, argument lifetime, and plain callables."""
 
 import copy
 import gc

@@ -1,4 +1,4 @@
-"""Where C libraries come from, and what becomes of damaged ones, of no compiler, and of no place."""
+"""Compiled C libraries: cache, damage, missing compiler, and missing cache folder."""
 
 import ctypes
 import os

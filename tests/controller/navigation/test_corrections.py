@@ -1,4 +1,4 @@
-"""Corrections against differences of what a sensor would tell, and against a Kalman filter of plain matrices."""
+"""Corrections against finite differences of the sensor models and a Kalman filter in plain matrices."""
 
 import copy
 

@@ -1,4 +1,4 @@
-"""The navigation filter as a whole, on measurements of a motion that is known."""
+"""The complete navigation filter on measurements of a known motion."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""All ways to ask for a clearance say the same, of each region of a scene that has moved."""
+"""All evaluations of a clearance agree for each region of a shifted scene."""
 
 import numpy as np
 import pytest

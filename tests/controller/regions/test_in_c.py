@@ -1,4 +1,4 @@
-"""Shapes without C code are refused by name, by all that evaluates regions in C."""
+"""Every evaluation in C rejects shapes without C code by name."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Outlines of prisms: touching themselves, convex, and held by a circle, wherever they lie and however turned."""
+"""Outlines of prisms: self-intersection, convexity, and bounding circle in any pose."""
 
 import itertools
 

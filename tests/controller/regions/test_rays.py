@@ -1,4 +1,4 @@
-"""Rays: how far they go, against closed forms, against walking along them, and where nothing is to be met."""
+"""Ray distances against closed forms and dense sampling."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The gain conditions on figures measured independently of this project, of the ODIN-like vehicle in section VII."""
+"""The gain conditions against independently computed figures of the ODIN-like vehicle in section VII."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Each construct of the subset, as C against Python; and what is refused, with its line."""
+"""Each construct of the subset, as C against Python, and rejected constructs with their line."""
 
 import inspect
 import math

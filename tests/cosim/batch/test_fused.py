@@ -1,4 +1,4 @@
-"""The fused loop flies as the readable master does, to the last bit, whatever the law."""
+"""The fused loop equals the reference master bit for bit for every law."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Flights: the compiled loop does what a readable one does, and a plant that flew before flies as a new one."""
+"""The compiled loop against a reference loop in Python, and reuse of a plant."""
 
 import ctypes
 import math

@@ -1,4 +1,4 @@
-"""Whole flights in lanes against the fused loop, which steps the FMU."""
+"""Complete runs in lanes against the fused loop, which steps the FMU."""
 
 import math
 import pickle

@@ -1,4 +1,4 @@
-"""The library of the lanes: built once, whole, and anew where it is damaged."""
+"""The library of the lanes: cached, complete, and rebuilt if damaged."""
 
 import logging
 

@@ -1,4 +1,4 @@
-"""All that a user's flights run as C comes compiled with the package."""
+"""Every function that user runs execute as C is shipped precompiled."""
 
 import ctypes
 import platform

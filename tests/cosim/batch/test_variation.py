@@ -1,4 +1,4 @@
-"""Variations of a scenario: what makes the same one by file makes it by values, and what cannot be is named."""
+"""Variations by values equal those by file; invalid keys and values are rejected by name."""
 
 import pickle
 

@@ -1,4 +1,4 @@
-"""Campaigns as commands in sessions of their own, which tests may kill."""
+"""Campaign commands in sessions of their own, which tests can kill."""
 
 import contextlib
 import os

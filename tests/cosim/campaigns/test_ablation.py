@@ -1,4 +1,4 @@
-"""Ablations: the deployable law beside itself without parts of it."""
+"""Ablations: the deployable law compared with variants that lack one part."""
 
 import json
 import re

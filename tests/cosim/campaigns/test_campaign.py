@@ -1,4 +1,4 @@
-"""Campaigns: a row a scene, none lost and none repeated, whatever comes in between."""
+"""Campaigns: one row per scene, none lost and none repeated after interruptions."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""The page on campaigns says what the code does."""
+"""The page on campaigns matches the code."""
 
 import dataclasses
 import re

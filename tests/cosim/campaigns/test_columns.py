@@ -1,4 +1,4 @@
-"""Columns made by hand are those that pyarrow makes."""
+"""Columns built from buffers equal those of pyarrow."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Comparisons: each law on the same scenes, and two at a time on what one completes."""
+"""Comparisons of laws on the same scenes, and paired statistics."""
 
 import json
 import math

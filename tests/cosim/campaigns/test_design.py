@@ -1,4 +1,4 @@
-"""Designs, held against scipy's and numpy's own."""
+"""Designs against those of SciPy and NumPy."""
 
 import itertools
 import json

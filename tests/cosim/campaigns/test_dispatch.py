@@ -1,4 +1,4 @@
-"""Batches shared out: what dies is flown again, taken apart, and laid to the row that is to blame."""
+"""Dispatch of batches: crashed batches are retried and split until the faulty row is isolated."""
 
 from concurrent.futures import Future
 

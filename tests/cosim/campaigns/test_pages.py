@@ -1,4 +1,4 @@
-"""The pages of campaigns, sweeps and comparisons: whole, self-contained, the same again, with the worst to be seen."""
+"""Pages of campaigns, sweeps and comparisons: complete, self-contained, reproducible, with worst replays."""
 
 import json
 import re

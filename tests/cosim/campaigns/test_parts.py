@@ -1,4 +1,4 @@
-"""Rows on disk while a campaign goes on: none lost, none twice, few files."""
+"""Rows on disk during a campaign: none lost, none duplicated, few files."""
 
 import tempfile
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A row again: by the engine that flew it, and by the readable master."""
+"""Rerun of a row by its engine and by the reference master."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Rates, bins and paired differences against numbers that are worked out otherwise."""
+"""Rates, bins and paired differences against independently computed values."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""Sweeps around engines whose outcomes are known: a row each, whoever flies it, whatever comes in between."""
+"""Sweeps with engines of known outcomes: one row per design point for any executor and interruption."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Sweeps in processes of their own and on Dask: whatever dies, no row is lost and none comes twice."""
+"""Sweeps in worker processes and on Dask: worker crashes neither lose nor duplicate rows."""
 
 import logging
 import os

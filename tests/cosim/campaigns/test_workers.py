@@ -1,4 +1,4 @@
-"""Campaigns in processes of their own: the same rows, and whatever ends a process leaves what is done."""
+"""Campaigns in worker processes: equal rows, and completed rows survive any termination."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""The command: one clear line and exit code 2 for whatever the user must mend."""
+"""The command line: one clear line and exit code 2 for every user error."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""What people and programs expect of a command: help, versions, JSON, quiet, completion."""
+"""Command-line conventions: help, versions, JSON, quiet, completion."""
 
 import json
 import shutil

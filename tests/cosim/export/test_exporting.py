@@ -1,4 +1,4 @@
-"""What of a run is exported, into which files, and what is refused."""
+"""Export of a run: selection of signals and steps, files, and rejected requests."""
 
 import builtins
 import importlib

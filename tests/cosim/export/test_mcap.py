@@ -1,4 +1,4 @@
-"""MCAP, read back by its own library: signals to the last bit, and a scene that stands upright."""
+"""MCAP read back by its own library: bit-identical signals and the orientation of the scene."""
 
 import re
 

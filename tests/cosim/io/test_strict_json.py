@@ -1,4 +1,4 @@
-"""JSON with numbers that are none: what Python writes by itself, no other reader takes."""
+"""JSON with NaN and infinity replaced by null, which every reader accepts."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Runs that are shown while they go on, and viewers."""
+"""Runs with a live view, and viewers."""
 
 import contextlib
 import json

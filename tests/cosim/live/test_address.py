@@ -1,4 +1,4 @@
-"""Where a live view is served, and who may come there."""
+"""Addresses of the live view, and its accepted hosts and origins."""
 
 import socket
 

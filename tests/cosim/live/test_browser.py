@@ -1,4 +1,4 @@
-"""The live page in a real browser: the vehicle moves, and what is dragged arrives in the run."""
+"""The live page in a real browser: displayed motion, and commands by dragging."""
 
 import io
 import json

@@ -1,4 +1,4 @@
-"""What late viewers get of a run."""
+"""The history of rows that late viewers receive."""
 
 import numpy as np
 from hypothesis import given

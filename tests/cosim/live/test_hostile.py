@@ -1,4 +1,4 @@
-"""Pages of other sites, floods and garbage: none of it commands anything, or hurts the run."""
+"""Foreign origins, floods and malformed requests neither command nor disturb the run."""
 
 import contextlib
 import socket

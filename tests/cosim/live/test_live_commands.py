@@ -1,4 +1,4 @@
-"""What viewers order is followed, logged, told to all, and repeated; or refused with the reason."""
+"""Commands of viewers: applied, logged, broadcast, and replayed; or rejected with a reason."""
 
 import json
 

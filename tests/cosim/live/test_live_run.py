@@ -1,4 +1,4 @@
-"""A run that is shown while it goes on: viewers see the record, and the record does not know of them."""
+"""A run with a live view: viewers receive the record, and do not change it."""
 
 import logging
 import socket

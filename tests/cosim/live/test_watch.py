@@ -1,4 +1,4 @@
-"""A run in the terminal."""
+"""``cosim watch``: a run displayed in the terminal."""
 
 import io
 import re

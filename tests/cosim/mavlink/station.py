@@ -1,4 +1,4 @@
-"""A ground station without a network: what it sends and gets goes through the wire format both ways."""
+"""A ground station without a network; its messages pass through the wire format both ways."""
 
 from __future__ import annotations
 

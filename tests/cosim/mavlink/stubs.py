@@ -1,4 +1,4 @@
-"""A vehicle that does little, and frames and links for it."""
+"""A stub vehicle, with frames and links for it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The vehicle as a whole: whatever comes, and whatever the numbers are."""
+"""The complete vehicle under any message and any row values."""
 
 import math
 import struct

@@ -1,4 +1,4 @@
-"""What carries frames: each kind against a peer of the standard library or pymavlink."""
+"""Channels: each kind against a peer of the standard library or pymavlink."""
 
 import errno
 import os

@@ -1,4 +1,4 @@
-"""The client's side of the checks, against a scripted other side: what is lost on the way is asked for again."""
+"""The client side of the conformance checks against a scripted vehicle that loses messages."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""The checks of a vehicle: ours passes all of them, and each of them fails on a vehicle that has its fault."""
+"""The conformance checks: this vehicle passes all, and each check fails on a vehicle with its fault."""
 
 import itertools
 import json

@@ -1,4 +1,4 @@
-"""Where links lead: what is understood, and what is refused in which words."""
+"""Endpoint texts: accepted forms and rejection messages."""
 
 import pytest
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""Texts about what happens, and the watch over the station."""
+"""Status texts of events, and the ground-station failsafe."""
 
 import pytest
 from pymavlink.dialects.v20 import all as mavlink

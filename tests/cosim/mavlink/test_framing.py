@@ -1,4 +1,4 @@
-"""Frames: found in datagrams and streams, whatever stands between them; every check against pymavlink's own codec."""
+"""Frames in datagrams and streams with garbage in between, checked against pymavlink's codec."""
 
 import random
 import struct

@@ -1,4 +1,4 @@
-"""Whatever is sent: no error, no memory, no time of the stepper, and good frames in between are heeded."""
+"""Hostile input causes no error, leak or delay, and valid frames in between are accepted."""
 
 import socket
 import time

@@ -1,4 +1,4 @@
-"""Listening: what is known of vehicles, how it is shown, and that nothing from outside can outgrow or steer it."""
+"""``cosim listen``: known vehicles, their display, bounded memory, and terminal safety."""
 
 import os
 import pty

@@ -1,4 +1,4 @@
-"""Who asks for log files is answered at once: there are none."""
+"""Requests for log files are answered at once with an empty list."""
 
 from pymavlink.dialects.v20 import all as mavlink
 

@@ -1,4 +1,4 @@
-"""What the messages say of a snapshot."""
+"""The content of telemetry messages for a given snapshot."""
 
 import math
 from importlib import metadata

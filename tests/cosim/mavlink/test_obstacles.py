@@ -1,4 +1,4 @@
-"""What stations are told of obstacles: a level scan, and the nearest points."""
+"""Obstacle messages: a horizontal scan and the nearest points."""
 
 import math
 

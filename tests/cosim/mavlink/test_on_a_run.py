@@ -1,4 +1,4 @@
-"""The vehicle on the link and the run behind it, step by step."""
+"""The vehicle on the link with a simulated run, step by step."""
 
 import numpy as np
 import pytest

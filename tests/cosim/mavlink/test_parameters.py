@@ -1,4 +1,4 @@
-"""Parameters: read, set, refused, and as a file."""
+"""Parameters: read, set, rejected, and as a file."""
 
 import struct
 from decimal import Decimal

@@ -1,4 +1,4 @@
-"""A recorded run on MAVLink links: what comes is what was recorded, none of it is left out, and nothing is heeded."""
+"""A recorded run streamed over MAVLink: complete, equal to the record, and read-only."""
 
 import shutil
 import socket

@@ -1,4 +1,4 @@
-"""Signatures: ours are taken by pymavlink, its are taken by us, and neither takes what is forged or repeated."""
+"""Signatures: compatible with pymavlink both ways; forged and replayed frames are rejected."""
 
 import hashlib
 import os

@@ -1,4 +1,4 @@
-"""Set-points, sticks and obstacles."""
+"""Setpoints, manual control and obstacles."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The thread of all links: what it owes the stepper, the vehicle and each peer."""
+"""The thread of all links: isolation of the stepper, the vehicle and each peer."""
 
 import socket
 import threading

@@ -1,4 +1,4 @@
-"""`cosim check_scenario`: every shipped scenario, the paper's figures, and advice that mends what it is given for."""
+"""`cosim check`: shipped scenarios, the paper's figures, and the effect of its advice."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Common points of regions: known places, and certificates that brute force cannot contradict."""
+"""Common points of regions: known points, and certificates checked by brute force."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Thrust in each direction, against what can be read off the ODIN-like vehicle's thrusters."""
+"""Thrust in each direction, against values derived by hand from the ODIN-like vehicle."""
 
 import math
 

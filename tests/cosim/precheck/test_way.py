@@ -1,4 +1,4 @@
-"""Whether there is a way: what the search finds is one, and what nothing can pass is not passed."""
+"""Path search: found paths are free, and blocked scenes have none."""
 
 import numpy as np
 import pytest

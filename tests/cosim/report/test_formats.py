@@ -1,4 +1,4 @@
-"""Reports as pages and as pictures; and what a bad run leaves."""
+"""Reports as pages and as pictures, and reports of incomplete runs."""
 
 import shutil
 import struct

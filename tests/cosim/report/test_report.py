@@ -1,4 +1,4 @@
-"""The report: complete, self-contained, and saying no more than the numbers."""
+"""The report: complete, self-contained, and consistent with the numbers."""
 
 import re
 import tomllib

@@ -1,4 +1,4 @@
-"""Outlines of shapes in figures, against lines of sight through the shapes themselves."""
+"""Outlines of shapes in figures, against ray casting."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Regions in pictures: where those that move were, and those that are at no place left out."""
+"""Regions in figures: moving regions, and regions without a position."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""What was kept in the form of another version is refused in one line."""
+"""Files of another format version are rejected in one line."""
 
 import json
 import shutil

@@ -1,4 +1,4 @@
-"""The shipped scenarios against numbers measured independently of this project, one region active at a time."""
+"""The shipped scenarios against independently computed figures, one active region at a time."""
 
 import numpy as np
 import pytest

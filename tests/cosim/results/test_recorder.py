@@ -1,4 +1,4 @@
-"""What is recorded is there once, to the last bit, however the writing of it ends."""
+"""The record holds each row once, bit for bit, for any interruption of its writing."""
 
 import contextlib
 import itertools

@@ -1,4 +1,4 @@
-"""A bar on a terminal, and a line where something is compiled first."""
+"""The progress bar on a terminal, and the notice of a compilation."""
 
 import io
 import logging

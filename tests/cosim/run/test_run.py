@@ -1,4 +1,4 @@
-"""Run folders: whole, readable, and complete even after an interruption."""
+"""Run folders: complete and readable, even after an interruption."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""A run that is a MAVLink vehicle: its record does not know who listens, and repeats from what was commanded."""
+"""A run as a MAVLink vehicle: telemetry does not change the record, and commands replay it."""
 
 import socket
 import threading

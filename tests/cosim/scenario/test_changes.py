@@ -1,4 +1,4 @@
-"""Titles say what was changed since they were written, wherever they are shown."""
+"""Titles list the changes made since they were written."""
 
 import dataclasses
 import re

@@ -1,4 +1,4 @@
-"""Regions are told apart by their colours, and belong to their criteria by them."""
+"""Region colors are distinguishable and derived from their criteria."""
 
 from itertools import combinations
 

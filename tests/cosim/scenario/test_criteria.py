@@ -1,4 +1,4 @@
-"""Criteria and rules of a scenario: what stands in its file, what is filled in, and what is refused."""
+"""Criteria and rules of a scenario: file content, defaults, and rejected values."""
 
 import tomllib
 

@@ -1,4 +1,4 @@
-"""Keys of scenarios in words: each number has some, with the unit that the documents give it."""
+"""Labels of scenario keys with the units of the documents."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A law of one's own in the place of a scenario's: flown, named in the run folder, refused where it cannot be."""
+"""Custom laws: run, named in the run folder, and rejected where unsupported."""
 
 import json
 import tomllib

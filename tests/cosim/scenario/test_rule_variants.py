@@ -1,4 +1,4 @@
-"""Rules to compare an arbiter with, and what a path through a region costs by the arbiter."""
+"""Rule variants for comparison with an arbiter, and path costs through its regions."""
 
 import itertools
 

@@ -1,4 +1,4 @@
-"""Scenario files: every key checked, every fault named."""
+"""Scenario files: every key validated, every error named."""
 
 import dataclasses
 import tomllib

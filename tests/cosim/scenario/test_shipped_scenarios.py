@@ -1,4 +1,4 @@
-"""Shipped scenarios with the deployable law: the goal reached for good, every hard region kept."""
+"""Shipped scenarios with the deployable law: goal reached and every hard region satisfied."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""``cosim show``: a template, which repeats the scenario."""
+"""``cosim show``: a commented template that round-trips."""
 
 import dataclasses
 import re

@@ -1,4 +1,4 @@
-"""The vehicle with the plant's parameters laid over."""
+"""The vehicle with the plant's parameter overrides applied."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What the arbiter gets: speeds and times against motion itself, given signals against NumPy's interpolation."""
+"""Arbiter inputs: speeds and times against motion, given signals against NumPy's interpolation."""
 
 import numpy as np
 import pytest

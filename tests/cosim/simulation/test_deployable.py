@@ -1,4 +1,4 @@
-"""The deployable law on the plant: what it does when measurements, thrusters or regions are not as they should be."""
+"""The deployable law on the plant with faulty measurements, thrusters or regions."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The deployable law against what nobody should give it, and against places that are hard to get through."""
+"""The deployable law with invalid inputs, and in geometrically difficult scenes."""
 
 from typing import NamedTuple
 

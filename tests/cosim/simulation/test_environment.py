@@ -1,4 +1,4 @@
-"""Regions that move: by their velocity, or from outside."""
+"""Regions that move by their velocity or by external updates."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A goal that goes on to other places: when it does, what counts as reached, and the fused loop to the last bit."""
+"""Successive goals: when they advance, when they count as reached, and the fused loop bit for bit."""
 
 import numpy as np
 import pytest

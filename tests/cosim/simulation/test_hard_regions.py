@@ -1,4 +1,4 @@
-"""Regions that are hard to keep and ways that are hard to find: those of a list, and families drawn at random."""
+"""Difficult regions and paths: regression scenes, and randomly drawn families."""
 
 import functools
 from pathlib import Path

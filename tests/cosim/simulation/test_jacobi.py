@@ -1,4 +1,4 @@
-"""The order of a step: Jacobi's is that of masters that exchange all values at once."""
+"""The order of a step: Jacobi is that of masters that exchange all values at once."""
 
 from pathlib import Path
 

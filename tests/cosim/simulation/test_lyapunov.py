@@ -1,4 +1,4 @@
-"""V and its rate in the record of a run, and what summary and report say of them."""
+"""V and its rate in the record, the summary and the report of a run."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The stepping: order, periods, actuation, and what observers see."""
+"""Stepping: order, periods, actuation, and observers."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""Memberships of criteria against the same in NumPy, and against the terms themselves."""
+"""Memberships of criteria against NumPy and against their terms."""
 
 import numpy as np
 import pytest

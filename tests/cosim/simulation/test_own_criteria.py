@@ -1,4 +1,4 @@
-"""Runs with criteria and rules of one's own: against independent computation, and in the fused loop to the last bit."""
+"""Runs with custom criteria and rules, against independent computation and the fused loop bit for bit."""
 
 import functools
 

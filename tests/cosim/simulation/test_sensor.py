@@ -1,4 +1,4 @@
-"""What law and arbiter are told, and what they are not."""
+"""Information that reaches law and arbiter, and information that is withheld."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar

@@ -1,4 +1,4 @@
-"""Thrusters that fail in a run: what they are commanded, and what they give."""
+"""Thruster failures in a run: commanded and actual forces."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A stand-in for ArduPilot, of no code of ours: frames as it packs them, answers read as naively as it reads them."""
+"""An independent stand-in for ArduPilot that packs frames and parses answers as ArduPilot does."""
 
 import re
 import socket

@@ -1,4 +1,4 @@
-"""A real ArduSub, where there is one on the path: it arms, dives in MANUAL, and holds its depth in ALT_HOLD."""
+"""A real ArduSub, if one is on the path: it arms, dives in MANUAL, and holds its depth in ALT_HOLD."""
 
 import contextlib
 import os

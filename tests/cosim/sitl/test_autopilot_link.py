@@ -1,4 +1,4 @@
-"""The link beside the lockstep: the autopilot's estimate in the record, and the DVL that it is told of."""
+"""The MAVLink connection beside the lockstep: the recorded estimate, and the DVL messages."""
 
 import contextlib
 

@@ -1,4 +1,4 @@
-"""``cosim sitl`` as a user has it."""
+"""``cosim sitl`` on the command line."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""From pulses to forces: frame, signs, curve, and what gives no force."""
+"""From pulses to forces: frame, signs, curve, and dead band."""
 
 import math
 from importlib import resources

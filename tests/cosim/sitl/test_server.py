@@ -1,4 +1,4 @@
-"""Lockstep with a stand-in for ArduPilot: frames exact, repeated, lost, foreign; restarts; and what is left of them."""
+"""Lockstep with a stand-in for ArduPilot: exact, repeated, lost and foreign frames; restarts; and records."""
 
 import random
 import struct

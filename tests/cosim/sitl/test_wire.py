@@ -1,4 +1,4 @@
-"""The bytes on the wire, against bytes by hand and a reader as naive as ArduPilot's."""
+"""The wire format, against manually assembled bytes and a parser as simple as ArduPilot's."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Controller and arbiter as FMUs of their own, against the Python law, regions and arbiter."""
+"""Controller and arbiter as separate FMUs, against the Python law, regions and arbiter."""
 
 import ctypes
 import logging

@@ -1,4 +1,4 @@
-"""FMUs of others on a coupled plant, in masters of others: a vehicle on a tether in a current, from the examples."""
+"""External FMUs on a coupled plant in independent masters: the example of a tethered vehicle in a current."""
 
 import runpy
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A scenario as a system of FMUs: the same flight in masters that we did not write as in Jacobi's order here."""
+"""A scenario as a system of FMUs: the same run in independent masters as in Jacobi order here."""
 
 import io
 import re

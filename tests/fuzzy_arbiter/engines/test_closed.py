@@ -1,4 +1,4 @@
-"""The closed form against the exact centroid, and the proof that there is one."""
+"""The closed form against the exact centroid, and the proof of its existence."""
 
 import math
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""The grid engine gives what scikit-fuzzy gives, whatever the number of points."""
+"""The grid engine equals scikit-fuzzy at any number of points."""
 
 import itertools
 import pickle

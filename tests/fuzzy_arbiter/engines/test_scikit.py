@@ -1,4 +1,4 @@
-"""The engine that is scikit-fuzzy gives what scikit-fuzzy gives, and has none of its traps."""
+"""The scikit-fuzzy engine equals scikit-fuzzy and avoids its known defects."""
 
 import gc
 import multiprocessing

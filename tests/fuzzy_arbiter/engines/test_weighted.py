@@ -1,4 +1,4 @@
-"""Values: Sugeno's and Tsukamoto's outputs, against sums worked out here; defaults, locks, chains, hedges."""
+"""Weighted outputs of Sugeno and Tsukamoto, against sums computed here; defaults, locks, chains, hedges."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What jFuzzyLogic, fuzzylite, MATLAB and Octave write beyond the standard, in their manner."""
+"""The dialects of jFuzzyLogic, fuzzylite, MATLAB and Octave beyond the standard."""
 
 import math
 

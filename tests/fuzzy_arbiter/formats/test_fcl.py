@@ -1,4 +1,4 @@
-"""The Fuzzy Control Language: what others write, and what is refused."""
+"""The Fuzzy Control Language: foreign files, and rejected content."""
 
 from dataclasses import replace
 

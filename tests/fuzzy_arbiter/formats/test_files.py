@@ -1,4 +1,4 @@
-"""Files: told by their suffix, read with their name in every fault, written whole or not at all."""
+"""Files: format by suffix, errors that name the file, atomic writes."""
 
 import os
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""MATLAB's text: what MATLAB and Octave write, and what is refused."""
+"""The MATLAB format FIS: files of MATLAB and Octave, and rejected content."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The FuzzyLite Language: what fuzzylite writes, and what is refused."""
+"""The FuzzyLite Language: files of fuzzylite, and rejected content."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Our own schema: the long form, the short form of criteria, and faults that name the key."""
+"""The native schema: the long form, the short form of criteria, and errors that name the key."""
 
 import json
 import tomllib

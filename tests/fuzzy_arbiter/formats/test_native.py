@@ -1,4 +1,4 @@
-"""Range normalization, said in the universe."""
+"""Range normalization expressed by the universe."""
 
 from dataclasses import replace
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""One tip for a waiter in every format, as people and other tools write it."""
+"""The tipping example in every format, as users and other tools write it."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Files that we write mean to other tools what they mean to us."""
+"""Written files have the same meaning in other tools."""
 
 import json
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What is written reads as the same system, or is refused by name; no text ends in a traceback."""
+"""Written systems round-trip or are rejected by name; no text ends in a traceback."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Curves against the formulas of their manuals, worked out here."""
+"""Curves against the formulas of their manuals, computed here."""
 
 import math
 import pickle

@@ -1,4 +1,4 @@
-"""Expressions: against Python's own arithmetic on sound ones, and refused otherwise."""
+"""Expressions: valid ones against Python's arithmetic, and rejected ones."""
 
 import math
 

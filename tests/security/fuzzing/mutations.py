@@ -1,4 +1,4 @@
-"""Changes of sound files: of their bytes, and of what stands in them. Each follows from the file and a number alone."""
+"""Mutations of valid files: of their bytes, and of their values."""
 
 from __future__ import annotations
 

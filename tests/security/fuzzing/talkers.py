@@ -1,4 +1,4 @@
-"""Every reader of what comes over a connection or stands on a command line."""
+"""Every reader of data from a connection or from the command line."""
 
 from __future__ import annotations
 

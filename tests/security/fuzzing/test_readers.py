@@ -1,4 +1,4 @@
-"""Every reader takes any change of a sound file, or refuses it in one short printable line that names the file."""
+"""Every reader accepts a mutated file or rejects it in one short printable line that names the file."""
 
 from __future__ import annotations
 

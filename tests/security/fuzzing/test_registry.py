@@ -1,4 +1,4 @@
-"""No reader of the product is forgotten, and each goes through the functions that it is registered for."""
+"""Every reader of the product is registered, and uses its registered functions."""
 
 from __future__ import annotations
 

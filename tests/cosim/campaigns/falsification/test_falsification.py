@@ -1,4 +1,4 @@
-"""``cosim falsify``: from its flags to a folder whose rows can be flown again, whoever flies them."""
+"""``cosim falsify``: from its flags to a folder with reproducible rows."""
 
 import json
 

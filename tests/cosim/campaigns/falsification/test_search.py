@@ -1,4 +1,4 @@
-"""The search for the least cost, beside dice and beside the package's own bookkeeping."""
+"""The search for the least cost against random sampling and the package's own bookkeeping."""
 
 import sys
 

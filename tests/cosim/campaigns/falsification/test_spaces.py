@@ -1,4 +1,4 @@
-"""Scenes as points of a cube: drawn evenly they are those of the generator, and never outside of its family."""
+"""Scenes as points of a cube: uniform points give the generator's distribution within its family."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Probabilities of rare events beside closed forms and plain counting."""
+"""Probabilities of rare events against closed forms and plain counting."""
 
 import json
 

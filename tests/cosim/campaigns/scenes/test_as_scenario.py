@@ -1,4 +1,4 @@
-"""A scored scene, said as a scenario: the readable master goes where the compiled loop goes."""
+"""A scored scene as a scenario: the reference master gives the same run as the compiled loop."""
 
 import numpy as np
 import pytest

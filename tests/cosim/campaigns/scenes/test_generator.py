@@ -1,4 +1,4 @@
-"""``cosim scenes``: the scored scenes, as the generator that defines them prints them (tests/data/ORIGIN.md)."""
+"""``cosim scenes`` against the generator that defines the scored scenes (tests/data/ORIGIN.md)."""
 
 import errno
 import hashlib

@@ -1,4 +1,4 @@
-"""Scenes that are scenarios: conflicts and trials as their pages say, flown by their own rules, refused by name."""
+"""Scenes that are scenarios: documented conflicts and trials, their own rules, and rejected keys."""
 
 import collections
 import json

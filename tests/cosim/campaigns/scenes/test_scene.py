@@ -1,4 +1,4 @@
-"""Scenes: read line by line, refused with the line and the key, and given to the law without what it must not know."""
+"""Scenes: parsed by line, rejected by line and key, and passed to the law without undisclosed conditions."""
 
 import json
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The score of the deployable law over scenes that nobody tuned it on, and beside the laws it is compared with."""
+"""The score of the deployable law over held-out scenes, compared with the baseline laws."""
 
 import msgspec
 import numpy as np

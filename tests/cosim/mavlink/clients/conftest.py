@@ -1,4 +1,4 @@
-"""Real clients: each in an environment of its own, made once and kept in pytest's cache; and the vehicle they meet."""
+"""Real clients in cached environments of their own, and the vehicle that they connect to."""
 
 from __future__ import annotations
 

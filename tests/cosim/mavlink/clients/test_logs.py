@@ -1,4 +1,4 @@
-"""A .tlog of a running vehicle, read by pymavlink's tools and by a decoder of other make."""
+"""A .tlog of a running vehicle, read by pymavlink's tools and by an independent decoder."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""MAVProxy, headless, with its commands on standard input, as a pilot types them."""
+"""MAVProxy, headless, with commands on standard input."""
 
 import contextlib
 import os

@@ -1,4 +1,4 @@
-"""MAVSDK, the present generation and the one before, does what its users do with a running vehicle."""
+"""The current and the previous generation of MAVSDK connected to a running vehicle."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""The command handler: commands change where the vehicle goes, at their step, and can be repeated to the last bit."""
+"""The command handler: commands take effect at their step and replay bit for bit."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The course of a mission: which item follows, and the way from one to another."""
+"""Mission execution: the next item, and the path between items."""
 
 import math
 

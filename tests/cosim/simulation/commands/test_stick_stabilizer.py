@@ -1,4 +1,4 @@
-"""Sticks with help, where the state that they need comes late or is missing for a while."""
+"""Stabilized manual control with late or missing state estimates."""
 
 import numpy as np
 import pytest
