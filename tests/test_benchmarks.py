@@ -116,7 +116,7 @@ def test_figures_have_their_unit(seconds, text):
 
 
 class KnownScene:
-    """A contestant that takes what it is told, and notes when it had its turn."""
+    """A contestant with a given duration that logs its turns."""
 
     def __init__(self, name, log, each=1.0, fails_at=None):
         self.name, self.log, self.each, self.fails_at = name, log, each, fails_at

@@ -4,7 +4,7 @@ import ctypes
 
 
 def ended(thread, seconds=120.0):
-    """Wait for a thread and tell whether it ended by itself; interrupt one that does not."""
+    """Wait for a thread and return whether it ended by itself; interrupt it otherwise."""
     thread.join(seconds)
     if not thread.is_alive():
         return True

@@ -56,8 +56,8 @@ def functions() -> Iterator[griffe.Function]:
     return (what for what in everything() if isinstance(what, griffe.Function))
 
 
-def said(what: griffe.Object) -> str:
-    """A docstring, and those of the functions it leaves the rest to."""
+def docstring_text(what: griffe.Object) -> str:
+    """Return a docstring, with those of the functions that it refers to."""
     words = what.docstring.value if what.docstring else ""
     others = [path for name in ELSEWHERE.findall(words) for path in _paths() if f".{path}".endswith(f".{name}")]
     return "\n".join([words, *(_paths()[path] for path in others)])
@@ -135,7 +135,7 @@ def test_public_docstrings_name_every_parameter():
         for function in [what] if what.is_function else public.members(what) if what.is_class else []:
             if function.is_function:
                 listed = {entry for entry, _ in section(function, Part.parameters)}
-                words = set(re.findall(r"\w+", said(function)))
+                words = set(re.findall(r"\w+", docstring_text(function)))
                 if missing := [p.name for p in parameters(function) if p.name not in (listed or words)]:
                     wrong[function.path] = missing
     assert not wrong, shown(wrong)
@@ -145,7 +145,7 @@ def test_return_values_are_documented():
     wrong = []
     for function in functions():
         kinds = {part.kind for part in function.docstring.parse("numpy")} if function.docstring else set()
-        summary = said(function).partition("\n\n")[0]
+        summary = docstring_text(function).partition("\n\n")[0]
         if any(isinstance(node, ast.Yield | ast.YieldFrom) for node in body(function)):
             context = any("contextmanager" in str(d.value) for d in function.decorators)
             right = context or Part.yields in kinds or summary.startswith("Yield")
@@ -169,7 +169,7 @@ def test_raised_exceptions_are_documented():
         raised = [n.exc for n in own if isinstance(n, ast.Raise) and n.exc and id(n) not in caught]
         names = {ast.unparse(e.func if isinstance(e, ast.Call) else e).split(".")[-1] for e in raised}
         types = {name for name in names if name.isidentifier() and name[0].isupper()} - UNSAID
-        if silent := {name for name in types if name not in said(function)}:
+        if silent := {name for name in types if name not in docstring_text(function)}:
             wrong[function.path] = silent
     assert not wrong, shown(wrong)
 
@@ -180,9 +180,9 @@ def test_physical_quantities_have_documented_units():
     for function in functions():
         entries = dict(section(function, Part.parameters))
         for p in parameters(function):
-            if physical(p.name, p.annotation) and not UNIT.search(entries.get(p.name, said(function))):
-                wrong[f"{function.path}({p.name})"] = entries.get(p.name, said(function))
-        back = " ".join(text for _, text in section(function, Part.returns)) or said(function)
+            if physical(p.name, p.annotation) and not UNIT.search(entries.get(p.name, docstring_text(function))):
+                wrong[f"{function.path}({p.name})"] = entries.get(p.name, docstring_text(function))
+        back = " ".join(text for _, text in section(function, Part.returns)) or docstring_text(function)
         if physical(function.name, function.returns) and not UNIT.search(back):
             wrong[function.path] = back
     assert not wrong, shown(wrong)
@@ -195,7 +195,7 @@ def test_fields_and_properties_that_are_physical_quantities_have_units():
         field = isinstance(attribute, griffe.Attribute) and attribute.parent.is_class
         if field and physical(attribute.name, attribute.annotation):
             about = dict(section(attribute.parent, Part.attributes) + section(attribute.parent, Part.parameters))
-            words = " ".join([said(attribute), comment_on(attribute), about.get(attribute.name, "")])
+            words = " ".join([docstring_text(attribute), comment_on(attribute), about.get(attribute.name, "")])
             if not UNIT.search(words):
                 wrong[attribute.path] = words
     assert not wrong, shown(wrong)

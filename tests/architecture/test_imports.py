@@ -8,7 +8,7 @@ from collections import Counter, defaultdict
 import pytest
 
 from tests.architecture.modules import FILES, PACKAGES, ROOT, imported
-from tests.architecture.rooms import ROOMS, arrows, imports_of, room_of, said_of
+from tests.architecture.rooms import ROOMS, arrows, imports_of, room_of, stated_imports_of
 
 MAY_IMPORT = {
     "fuzzy_arbiter": {"fuzzy_arbiter"},
@@ -105,7 +105,7 @@ def test_imports_have_no_cycles():
 
 @pytest.mark.parametrize("room", ROOMS)
 def test_package_imports_match_its_docstring(room):
-    assert imports_of(room) == said_of(room)
+    assert imports_of(room) == stated_imports_of(room)
 
 
 def test_cosim_subpackages_are_layered():

@@ -21,15 +21,15 @@ def state():
 
 
 def test_function_receives_region_positions_and_velocities():
-    told = []
+    inputs = []
 
     def steer(*arguments):
-        told.extend(arguments)
+        inputs.extend(arguments)
         return np.arange(6.0)
 
     forces = np.zeros(6)
     FunctionLaw(steer).step(state(), GOAL, ROCKS, WEIGHTS, forces)
-    seen, goal, regions, weights = told
+    seen, goal, regions, weights = inputs
     assert forces.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
     assert seen.position.tolist() == [0.0, 0.0, 0.0] and weights.tolist() == [0.75, 0.25]
     # of spheres by hand: |p - c| - r, 2 (p - c), outside of the goal, outside of both others
@@ -43,8 +43,8 @@ def test_function_receives_region_positions_and_velocities():
 
 def test_function_receives_copies_of_its_inputs():
     def careless(state, goal, regions, weights):
-        for told in (*state, *regions, *goal, weights):
-            told[...] = 1
+        for array in (*state, *regions, *goal, weights):
+            array[...] = 1
         return np.zeros(6)
 
     now, weights = state(), WEIGHTS.copy()

@@ -49,7 +49,7 @@ def _solve(work, count, inverse, lower, upper, forces, steps):
     steps[0] = solve(work, count, inverse, lower, upper, forces)
 
 
-def ask(thrusters, rows, right, price, wanted):
+def solve_program(thrusters, rows, right, price, wanted):
     """Return forces, multipliers and steps of our own solver."""
     count, m = rows.shape
     work, forces = empty_workspace(count + 2, m), np.full(m, np.nan)
@@ -78,7 +78,7 @@ def solved_exactly(programs):
         rng = np.random.default_rng(seed)
         for _ in range(programs):
             given = program(rng, kind)
-            ours = ask(*given)
+            ours = solve_program(*given)
             found.append((given, ours, exact_solution(*given, start=ours[1])))
     return found
 
@@ -160,7 +160,7 @@ def test_row_residual_is_accurate_under_cancellation():
 def test_uncontrollable_row_is_paid_by_slack():
     """Of right - price y <= 0 with the least y: right / price, and forces as they were wanted."""
     thrusters, wanted = make_thrusters(MODELS["odin"]), np.linspace(-3.0, 4.0, 8)
-    forces, y, _ = ask(thrusters, np.zeros((1, 8)), np.array([0.5]), np.array([1e-6]), wanted)
+    forces, y, _ = solve_program(thrusters, np.zeros((1, 8)), np.array([0.5]), np.array([1e-6]), wanted)
     assert forces == pytest.approx(wanted)
     assert y[0] == pytest.approx(0.5e6)
 
@@ -168,7 +168,7 @@ def test_uncontrollable_row_is_paid_by_slack():
 def test_weakly_controllable_row_is_partly_paid_by_slack():
     """(right - row u) = price y and u = wanted + H^-1 row y."""
     thrusters, wanted, row = make_thrusters(MODELS["odin"]), np.linspace(-3.0, 4.0, 8), np.full((1, 8), 1e-3)
-    forces, y, _ = ask(thrusters, row, np.array([0.5]), np.array([0.02]), wanted)
+    forces, y, _ = solve_program(thrusters, row, np.array([0.5]), np.array([0.02]), wanted)
     shaped = thrusters.inverse @ row[0]
     expected = (0.5 - row[0] @ wanted) / (row[0] @ shaped + 0.02)
     assert 0.0 < row[0] @ shaped < 0.02
@@ -186,7 +186,7 @@ def test_the_solution_fulfils_the_conditions_of_kuhn_and_tucker(kind):
     rng = np.random.default_rng(100 + KINDS.index(kind))
     for _ in range(1000):
         thrusters, rows, right, price, wanted = given = program(rng, kind)
-        forces, y, steps = ask(*given)
+        forces, y, steps = solve_program(*given)
         count, m = rows.shape
         scale = 1.0 + np.abs(wanted).max()
         assert 0 <= steps <= 3 * (count + 2 * m)
@@ -207,7 +207,7 @@ def test_the_solution_fulfils_the_conditions_of_kuhn_and_tucker(kind):
 def test_unconstrained_desired_force_is_returned_exactly():
     thrusters = make_thrusters(MODELS["odin"])
     wanted = np.linspace(-20.0, 20.0, 8)
-    forces, y, steps = ask(thrusters, np.ones((1, 8)), np.array([-1e3]), np.array([1e-6]), wanted)
+    forces, y, steps = solve_program(thrusters, np.ones((1, 8)), np.array([-1e3]), np.array([1e-6]), wanted)
     assert steps == 0 and not y.any()
     assert np.array_equal(forces, wanted)
 
@@ -217,7 +217,7 @@ def test_the_barrier_of_greater_price_yields_less():
     thrusters = make_thrusters(MODELS["odin"])
     along = thrusters.matrix[0] / 187.5
     price = np.array([1e-3, 1e-5]) / 187.5**2
-    forces, y, _ = ask(thrusters, np.array([along, -along]), np.array([0.2, 0.2]), price, np.zeros(8))
+    forces, y, _ = solve_program(thrusters, np.array([along, -along]), np.array([0.2, 0.2]), price, np.zeros(8))
     yielding = y[:2] * price
     assert yielding[0] / yielding[1] == pytest.approx(100.0, rel=0.02)
     assert yielding == pytest.approx([0.2 - along @ forces, 0.2 + along @ forces], rel=1e-6)
@@ -227,9 +227,9 @@ def test_the_barrier_of_greater_price_yields_less():
 def test_non_finite_rows_are_ignored(bad):
     thrusters = make_thrusters(MODELS["odin"])
     rows, right, price = np.ones((3, 8)) / 187.5, np.full(3, 0.3), np.full(3, 1e-8)
-    alone, _, _ = ask(thrusters, rows[:1], right[:1], price[:1], np.zeros(8))
+    alone, _, _ = solve_program(thrusters, rows[:1], right[:1], price[:1], np.zeros(8))
     rows[1, 3], right[2] = bad, bad
-    forces, _, steps = ask(thrusters, rows, right, price, np.r_[bad, np.zeros(7)])
+    forces, _, steps = solve_program(thrusters, rows, right, price, np.r_[bad, np.zeros(7)])
     assert steps > 0
     assert np.array_equal(forces, alone)
 
@@ -245,7 +245,7 @@ def test_forces_stay_within_limits_for_extreme_numbers():
         rows, wanted = rows * rng.choice(far, (n, 1)), wanted * rng.choice(far, 8)
         with np.errstate(over="ignore", invalid="ignore"):
             right, price = right * rng.choice(far, n), price * rng.choice(far, n)
-            forces, y, steps = ask(thrusters, rows, right, price, wanted)
+            forces, y, steps = solve_program(thrusters, rows, right, price, wanted)
         ended += steps < 0
         assert np.all(forces >= thrusters.lower) and np.all(forces <= thrusters.upper)
         assert np.all(y >= 0.0)

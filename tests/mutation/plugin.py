@@ -18,7 +18,7 @@ _PLAIN_RUN = subprocess.run
 
 
 class Plugin:
-    """Told by pytest what it does."""
+    """Receive pytest's events."""
 
     def __init__(self, note: Path, words: tuple[str, ...], without: tuple[str, ...], seconds: float):
         self.note = note

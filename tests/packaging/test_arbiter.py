@@ -47,10 +47,12 @@ def test_arbiter_wheel_is_complete_and_disjoint_from_the_main_wheel(arbiter_whee
         assert archive.read(next(name for name in archive.namelist() if name.endswith("licenses/LICENSE"))) == (
             (ROOT / "LICENSE").read_bytes()
         )
-        told = message_from_string(archive.read(next(n for n in archive.namelist() if n.endswith("METADATA"))).decode())
-    assert (told["Name"], told["License-Expression"]) == ("fuzzy-arbiter", "BSD-3-Clause")
-    assert [text for text in told.get_all("Requires-Dist") if "extra ==" not in text] == ["numpy>=2.1.3"]
-    assert set(told.get_all("Provides-Extra")) == {"numba", "plot", "skfuzzy", "test"}
+        fields = message_from_string(
+            archive.read(next(n for n in archive.namelist() if n.endswith("METADATA"))).decode()
+        )
+    assert (fields["Name"], fields["License-Expression"]) == ("fuzzy-arbiter", "BSD-3-Clause")
+    assert [text for text in fields.get_all("Requires-Dist") if "extra ==" not in text] == ["numpy>=2.1.3"]
+    assert set(fields.get_all("Provides-Extra")) == {"numba", "plot", "skfuzzy", "test"}
 
 
 def test_readme_examples_need_only_numpy(alone):

@@ -82,14 +82,14 @@ def test_source_distribution_holds_the_build_inputs(dist, tracked):
 
 def test_distribution_metadata_is_complete(unpacked, project):
     (path,) = unpacked.glob("*.dist-info/METADATA")
-    told = message_from_string(path.read_text())
-    assert (told["Name"], told["Version"]) == ("subreach", project["version"])
-    assert told["License-Expression"] == "BSD-3-Clause"
-    assert told["Requires-Python"] == ">=3.11"
-    classifiers = told.get_all("Classifier")
+    metadata = message_from_string(path.read_text())
+    assert (metadata["Name"], metadata["Version"]) == ("subreach", project["version"])
+    assert metadata["License-Expression"] == "BSD-3-Clause"
+    assert metadata["Requires-Python"] == ">=3.11"
+    classifiers = metadata.get_all("Classifier")
     assert {f"Programming Language :: Python :: 3.{minor}" for minor in (11, 12, 13)} <= set(classifiers)
-    assert told.get_all("Project-URL") is None  # there is none yet
-    assert set(told.get_all("Provides-Extra")) == set(project["optional-dependencies"])
+    assert metadata.get_all("Project-URL") is None  # there is none yet
+    assert set(metadata.get_all("Provides-Extra")) == set(project["optional-dependencies"])
 
 
 def test_each_dependency_has_a_lower_bound(project):
@@ -126,17 +126,17 @@ def test_a_checkout_needs_ziglang_for_this_machine_only_without_a_compiler(monke
     monkeypatch.syspath_prepend(str(ROOT))
     import hatch_build
 
-    def asks(what):
+    def build_requirements(what):
         return {text.partition(">")[0] for text in getattr(hatch_build, f"get_requires_for_build_{what}")()}
 
     plant = {"fmpy", "msgspec", "numpy", "platformdirs", "scipy", "tomli-w"}
     monkeypatch.setattr("shutil.which", lambda name: "/usr/bin/cc")
-    assert asks("wheel") == plant
-    assert asks("sdist") == plant | {"ziglang"}
-    assert not asks("editable") & {*plant, "ziglang"}
+    assert build_requirements("wheel") == plant
+    assert build_requirements("sdist") == plant | {"ziglang"}
+    assert not build_requirements("editable") & {*plant, "ziglang"}
     monkeypatch.setattr("shutil.which", lambda name: None)
     monkeypatch.delenv("CC", raising=False)
-    assert asks("wheel") == plant | {"ziglang"}
+    assert build_requirements("wheel") == plant | {"ziglang"}
 
 
 @pytest.mark.parametrize("vehicle", shipped_vehicles())

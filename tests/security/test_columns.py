@@ -47,8 +47,8 @@ READERS = {
 }  # fmt: skip
 
 
-def said_of(act, *arguments):
-    """Return what an act is refused with, "" if it is not."""
+def error_of(act, *arguments):
+    """Return the message of the RunError that a call raises, "" if none."""
     try:
         act(*arguments)
     except RunError as error:
@@ -78,7 +78,7 @@ def test_d6_each_missing_column_is_named(kind, monkeypatch, caplog):
     taken_along = 0
     for name in names:
         caplog.clear()
-        said = said_of(require_columns, scenario, Table([other for other in names if other != name]))
+        said = error_of(require_columns, scenario, Table([other for other in names if other != name]))
         if said:
             assert said == f"{Table.file}: has no column {name!r}, which its scenario calls for"
         else:
@@ -177,7 +177,7 @@ def test_d6_every_column_of_a_file_dropped_singly(lacking, ordered_run, caplog, 
     for name in names:
         caplog.clear()
         folder = lacking(name)
-        if said := said_of(load_run, folder):
+        if said := error_of(load_run, folder):
             refused += 1
             assert said == f"{folder / RECORD}: has no column {name!r}, which its scenario calls for"
         else:

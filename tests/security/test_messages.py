@@ -25,12 +25,16 @@ SHOWN = r"\x1b[31m\x9b2J\u202e"
 
 
 def test_d11_message_sanitizers_of_all_packages_are_identical():
-    def said(module):
+    def sanitizer_source(module):
         functions = [inspect.getsource(getattr(module, name)) for name in ("one_line", "printable", "_cut")]
         patterns = [module._QUOTED.pattern, module._FILE.pattern]
         return functions + patterns + [module.MAX_QUOTED, module.MAX_WORDS, module.MAX_WHERE]
 
-    assert said(controller.errors) == said(fuzzy_arbiter.errors) == said(plant_fmu.errors)
+    assert (
+        sanitizer_source(controller.errors)
+        == sanitizer_source(fuzzy_arbiter.errors)
+        == sanitizer_source(plant_fmu.errors)
+    )
 
 
 @pytest.mark.parametrize("base", BASES)

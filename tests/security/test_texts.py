@@ -40,8 +40,8 @@ def vehicle(path, text):
     load_vehicle(path)
 
 
-def said_of(read, path, text):
-    """Return what is said of a text, "" where it is taken."""
+def error_of(read, path, text):
+    """Return the error message of a text, "" if it is accepted."""
     content = text if isinstance(text, bytes) else text.encode("utf-8", "surrogatepass")
     said = ""
     try:
@@ -74,14 +74,14 @@ BROKEN = {
 @pytest.mark.parametrize("text", BROKEN.values(), ids=BROKEN)
 @pytest.mark.parametrize("read", [scenario, vehicle])
 def test_invalid_files_are_rejected(read, tmp_path, text):
-    assert said_of(read, tmp_path / "it.toml", text)
+    assert error_of(read, tmp_path / "it.toml", text)
 
 
 @pytest.mark.medium(fast=32)
 @pytest.mark.parametrize("text", BROKEN.values(), ids=BROKEN)
 @pytest.mark.parametrize("format", ["toml", "json", "fcl", "fis", "fll"])
 def test_invalid_arbiter_files_are_rejected(tmp_path, text, format):
-    assert said_of(arbiter, tmp_path / f"it.{format}", text)
+    assert error_of(arbiter, tmp_path / f"it.{format}", text)
 
 
 def arbiter(path, text):
@@ -114,7 +114,7 @@ PAPER = tomllib.loads(SCENARIO)
 def test_invalid_scenario_numbers_are_rejected_by_key(tmp_path, value):
     for where in numbers_of(PAPER):
         table = with_value(PAPER, where, value)
-        said = said_of(scenario, tmp_path / "it.toml", tomli_w.dumps(table))
+        said = error_of(scenario, tmp_path / "it.toml", tomli_w.dumps(table))
         key = str(next(part for part in reversed(where) if isinstance(part, str)))
         assert key in said, (where, said)
 
@@ -149,7 +149,7 @@ def test_displayed_texts_reject_terminal_codes(key, text):
 
 @pytest.mark.parametrize("read", [scenario, vehicle])
 def test_key_with_terminal_codes_is_escaped(read, tmp_path):
-    assert r"\x1b[31mred" in said_of(read, tmp_path / "it.toml", b'"\\u001b[31mred" = 1')
+    assert r"\x1b[31mred" in error_of(read, tmp_path / "it.toml", b'"\\u001b[31mred" = 1')
 
 
 @pytest.mark.parametrize("name", ["../../x", "/etc/passwd", "a/b", "con", "a b", "x" * 65, "é", "$(id)", "-o"])
@@ -158,7 +158,7 @@ def test_vehicle_names_reject_special_characters(tmp_path, name):
     from plant_fmu.vehicle import _folder
 
     table = tomllib.loads((_folder() / "odin.toml").read_text(encoding="utf-8"))
-    said = said_of(vehicle, tmp_path / "it.toml", tomli_w.dumps(table | {"name": name}))
+    said = error_of(vehicle, tmp_path / "it.toml", tomli_w.dumps(table | {"name": name}))
     assert "name" in said
 
 
@@ -166,9 +166,9 @@ def test_vehicle_names_reject_special_characters(tmp_path, name):
     "line", [b"[" * 100_000, b'{"seed":' * 50_000, b"\xff", b"{}", b"1", b'{"seed":1' + b"0" * 5000]
 )
 def test_invalid_scenes_and_commands_are_rejected(tmp_path, line):
-    assert said_of(lambda path, text: decode_scene(text), tmp_path, line)
+    assert error_of(lambda path, text: decode_scene(text), tmp_path, line)
     (tmp_path / "log").write_bytes(line + b"\n")
-    assert said_of(lambda path, text: read_log(path), tmp_path / "log", line)
+    assert error_of(lambda path, text: read_log(path), tmp_path / "log", line)
 
 
 # ---- any change of a sound text ----
@@ -182,13 +182,13 @@ NASTY = st.sampled_from(
 @given(st.data())
 def test_any_value_in_a_scenario_is_accepted_or_rejected(tmp_path_factory, data):
     table = with_value(PAPER, data.draw(st.sampled_from(places(PAPER))), data.draw(NASTY))
-    said_of(scenario, tmp_path_factory.getbasetemp() / "it.toml", tomli_w.dumps(table))
+    error_of(scenario, tmp_path_factory.getbasetemp() / "it.toml", tomli_w.dumps(table))
 
 
 @given(st.data())
 def test_any_value_in_a_scene_is_accepted_or_rejected(data):
     table = with_value(SCENE, data.draw(st.sampled_from(places(SCENE))), data.draw(NASTY))
-    said_of(lambda path, text: decode_scene(text), "", json.dumps(table))
+    error_of(lambda path, text: decode_scene(text), "", json.dumps(table))
 
 
 def places(value, where=()):
@@ -210,12 +210,12 @@ TOKENS = st.sampled_from(
 @given(st.data())
 def test_mutated_arbiter_file_is_read_or_rejected(tmp_path_factory, format, data):
     text = changed(ARBITERS[format], data)
-    said_of(arbiter, tmp_path_factory.getbasetemp() / f"it.{format}", text)
+    error_of(arbiter, tmp_path_factory.getbasetemp() / f"it.{format}", text)
 
 
 @given(st.data())
 def test_mutated_scenario_is_read_or_rejected(tmp_path_factory, data):
-    said_of(scenario, tmp_path_factory.getbasetemp() / "it.toml", changed(SCENARIO, data))
+    error_of(scenario, tmp_path_factory.getbasetemp() / "it.toml", changed(SCENARIO, data))
 
 
 def changed(text, data):

@@ -12,12 +12,12 @@ from controller.navigation.measurements import COMPASS, DEPTH_SENSOR, DVL, IMU, 
 MODEL = SensorModel()
 
 
-def told():
+def make_vehicle_state():
     return VehicleState(np.zeros(3), np.zeros(4), np.zeros(6), np.ones(8), np.zeros(12))
 
 
 def level(navigator, time, position=(1.0, 2.0, 5.0), heading=0.4, sensors=range(5)):
-    """Write what sensors of a vehicle at rest tell."""
+    """Write the measurements of a vehicle at rest."""
     values, times = navigator.measurements
     values[0], values[1:4], values[5:8], values[8:11] = position[2], 0.0, (0.0, 0.0, -9.81), 0.0
     values[11], values[12:15] = heading, position
@@ -34,14 +34,14 @@ def rest(navigator, seconds, first=0.0, sensors=range(5)):
 
 @pytest.mark.parametrize("missing", [DEPTH_SENSOR, IMU, COMPASS, USBL])
 def test_state_is_nan_until_every_required_sensor_has_a_sample(missing):
-    navigator = Navigator(MODEL, told())
+    navigator = Navigator(MODEL, make_vehicle_state())
     state = rest(navigator, 0.1, sensors=[sensor for sensor in range(5) if sensor != missing])
     for part in state[:3]:
         assert np.isnan(part).all(), SENSORS[missing]
 
 
 def test_state_of_a_resting_vehicle_is_estimated():
-    state = rest(Navigator(MODEL, told()), 5.0)
+    state = rest(Navigator(MODEL, make_vehicle_state()), 5.0)
     assert state.position == pytest.approx([1.0, 2.0, 5.0], abs=1e-3)
     assert state.velocity_body == pytest.approx(np.zeros(6), abs=1e-3)
     yaw, pitch, roll = Rotation.from_quat(state.quaternion[[1, 2, 3, 0]]).as_euler("ZYX")
@@ -53,7 +53,7 @@ def test_state_of_a_resting_vehicle_is_estimated():
 
 @pytest.mark.parametrize("tilt", [0.0, 1.0, 3.0])
 def test_alignment_works_at_any_attitude(tilt):
-    navigator, turned = Navigator(MODEL, told()), Rotation.from_euler("ZYX", [0.4, 0.3, tilt])
+    navigator, turned = Navigator(MODEL, make_vehicle_state()), Rotation.from_euler("ZYX", [0.4, 0.3, tilt])
     for time in (0.0, 0.5):
         level(navigator, time)
         navigator.measurements.values[5:8] = turned.inv().apply([0.0, 0.0, -9.81])
@@ -63,8 +63,8 @@ def test_alignment_works_at_any_attitude(tilt):
 
 
 def test_long_unmeasured_states_become_nan_and_measured_ones_stay():
-    """DVL and USBL tell nothing any more: velocity and position get lost, depth and attitude do not."""
-    navigator = Navigator(MODEL, told())
+    """DVL and USBL are out: velocity and position become NaN, depth and attitude do not."""
+    navigator = Navigator(MODEL, make_vehicle_state())
     rest(navigator, 3.0)
     lost_velocity = lost_position = None
     for k in range(60):
@@ -82,7 +82,7 @@ def test_long_unmeasured_states_become_nan_and_measured_ones_stay():
 
 
 def test_imu_outage_makes_the_state_nan_and_recovery_realigns():
-    navigator = Navigator(MODEL, told())
+    navigator = Navigator(MODEL, make_vehicle_state())
     rest(navigator, 1.0)
     state = rest(navigator, 2.0, 1.0, sensors=[DEPTH_SENSOR, DVL, COMPASS, USBL])
     assert np.isnan(state.position).all() and np.isnan(state.quaternion).all()
@@ -91,7 +91,7 @@ def test_imu_outage_makes_the_state_nan_and_recovery_realigns():
 
 
 def test_contradicted_first_position_fix_is_rejected():
-    navigator = Navigator(MODEL, told())
+    navigator = Navigator(MODEL, make_vehicle_state())
     for k in range(301):
         level(navigator, 0.01 * k, sensors=[DEPTH_SENSOR, DVL, IMU, COMPASS])
         if k % 100 == 0:
@@ -103,7 +103,7 @@ def test_contradicted_first_position_fix_is_rejected():
 
 def test_a_start_is_between_two_fixes_and_as_uncertain_as_they_are_apart():
     for apart, deviation in ((0.3, np.hypot(0.1, 0.15 / np.sqrt(2.0))), (1.2, np.hypot(0.6, 0.146))):
-        navigator = Navigator(MODEL, told())
+        navigator = Navigator(MODEL, make_vehicle_state())
         for time, north in ((0.0, 1.0), (1.0, 1.0 + apart)):
             level(navigator, time, position=(north, 2.0, 5.0))
             navigator.step(time)
@@ -115,7 +115,7 @@ def test_a_start_is_between_two_fixes_and_as_uncertain_as_they_are_apart():
 
 def test_inconsistent_estimate_is_reset_and_realigned():
     """Its attitude is wrong by 40 degrees, more than the covariance of a start holds: the DVL contradicts for ever."""
-    navigator = Navigator(MODEL, told())
+    navigator = Navigator(MODEL, make_vehicle_state())
     rest(navigator, 0.01)
     rest(navigator, 1.2, first=0.01)
     memory, lost = navigator.memory, []
@@ -138,7 +138,7 @@ def test_filter_is_consistent_on_simulated_motion():
     rng, h, runs = np.random.default_rng(11), 0.01, 30
     nees, nis = [], np.zeros((5, 2))
     for _ in range(runs):
-        state = told()
+        state = make_vehicle_state()
         navigator = Navigator(MODEL, state)
         scale = [*[MODEL.angular_velocity_bias] * 3, *[MODEL.acceleration_bias] * 3, MODEL.heading_bias,
                  MODEL.depth_bias, MODEL.velocity_scale]  # fmt: skip
@@ -165,7 +165,7 @@ def test_filter_is_consistent_on_simulated_motion():
                 values[1:4], times[DVL] = body + rng.normal(size=3) * MODEL.velocity, t[k]
             if k % 10 == 0:
                 values[11], times[COMPASS] = yaw[k] + constants[6] + rng.normal() * MODEL.heading, t[k]
-            if k % 100 == 30 or k == 35:  # told 0.3 s late; the first twice, to be believed
+            if k % 100 == 30 or k == 35:  # 0.3 s late; the first twice, to be accepted
                 values[12:15] = position[k - 30] + rng.normal(size=3) * MODEL.position
                 times[USBL] = t[k] - 0.3
             navigator.step(t[k])

@@ -147,15 +147,15 @@ def test_potential_is_the_integral_of_g_along_the_normal(region, position, inwar
     length = np.linalg.norm(inward)
     assert clearance[0] == pytest.approx(-length)
     expected, _ = quad(lambda t: evaluated([region], position + t * np.array(inward))[0][0] * length, 0.0, 1.0)
-    came = normalized_secondary(g, dg, clearance, np.array([0.7]), GAINS)
-    assert came == pytest.approx(0.7 * (100.0 + 0.08 * 100.0 * 90.0 / 18.8) * expected, rel=1e-9)
+    value = normalized_secondary(g, dg, clearance, np.array([0.7]), GAINS)
+    assert value == pytest.approx(0.7 * (100.0 + 0.08 * 100.0 * 90.0 / 18.8) * expected, rel=1e-9)
 
 
 def test_papers_sum_divides_by_the_squared_full_gradient():
     g, dg, _ = evaluated([Region("s", Sphere((0, 0, 0), 5.0), "out")], (1.0, 2.0, -2.0))
     assert np.sum(dg**2) == pytest.approx(36.0)
-    came = printed_secondary(g, dg, np.array([0.7]), GAINS)
-    assert came == pytest.approx(0.5 * (100.0 + 0.08 * 100.0 * 90.0 / 18.8) * 0.7 * 16.0**2 / 36.0, rel=1e-12)
+    value = printed_secondary(g, dg, np.array([0.7]), GAINS)
+    assert value == pytest.approx(0.5 * (100.0 + 0.08 * 100.0 * 90.0 / 18.8) * 0.7 * 16.0**2 / 36.0, rel=1e-12)
 
 
 def test_satisfied_or_zero_weight_regions_contribute_nothing():

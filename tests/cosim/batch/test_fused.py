@@ -75,7 +75,7 @@ NOISY = [
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("frozen", ["true", "false"])
 def test_noise_and_sensor_gaps_equal_the_master(frozen):
-    # the paper's law, told nothing, asks for nothing that a plant takes: it is told the last values, or does not steer
+    # the paper's law commands NaN without measurements: it gets the last values here, or is not used
     law = "ismail_dunnigan" if frozen == "true" else "pd"
     gap = [] if frozen == "true" else ["sensing.dead_for=0.0"]
     assert_same_flight(scenario_of(law, *BRISK, *NOISY, f"sensing.frozen={frozen}", "limit.force=150.0", *gap))

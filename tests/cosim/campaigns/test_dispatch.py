@@ -26,7 +26,7 @@ class Work:
 
 
 class WorkerPool:
-    """Flies in order of submission; dies of some rows."""
+    """A pool that runs batches in order of submission and crashes on some rows."""
 
     def __init__(self, poison=(), width=4, certain=True):
         self.poison, self.width, self.certain = set(poison), width, certain

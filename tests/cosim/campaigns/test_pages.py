@@ -224,7 +224,7 @@ def test_the_page_of_a_comparison_has_all_laws_in_each_replay(tmp_path, idle):
     runs = runs_of(out / checker.asked[0])
     assert [run["name"] for run in runs] == ["ismail_dunnigan", "idle"]
     assert {p.stem for p in (out / "figures").iterdir()} == {"rates", "distributions", "scenes-ismail_dunnigan-idle"}
-    compare(tmp_path / "s.jsonl", ["ismail_dunnigan", "idle"], out, BRIEF)  # a folder with a page is no stranger
+    compare(tmp_path / "s.jsonl", ["ismail_dunnigan", "idle"], out, BRIEF)  # a folder with a page is accepted
     with pytest.raises(RunError, match=r"compare\.json: cannot be read"):
         write_comparison_page(tmp_path, 1)
 

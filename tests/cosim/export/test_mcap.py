@@ -57,8 +57,8 @@ def read_killed(killed, tmp_path_factory):
     return Read(path)
 
 
-def said(read):
-    """Return where each signal of the record is, as the channels say: group and field by name."""
+def channels_of_signals(read):
+    """Return the group and the field of each signal by name, from the channel metadata."""
     return {
         re.match(r"(.+?) \[[^]]*]: ", text)[1]: (channel.topic.removeprefix("/signals/"), field)
         for channel in read.summary.channels.values()
@@ -70,7 +70,7 @@ def said(read):
 @pytest.mark.parametrize("which", ["run", "killed"])
 def test_every_signal_is_there_to_the_last_bit(which, request):
     read = request.getfixturevalue("read" if which == "run" else "read_killed")
-    record, where = load_record(request.getfixturevalue(which)), said(read)
+    record, where = load_record(request.getfixturevalue(which)), channels_of_signals(read)
     assert where.keys() == record.units.keys()
     for name, (group, field) in where.items():
         got, expected = read.signal(group, field), record[name]

@@ -17,14 +17,14 @@ from cosim.scenario.scenario import load_scenario
 from tests.cosim.live.conftest import ARM, WAIT, same
 
 
-def ask(url, **headers):
+def request(url, **headers):
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     return opener.open(urllib.request.Request(url, headers=headers), timeout=WAIT)
 
 
 def refused(url, status, **headers):
     with pytest.raises(urllib.error.HTTPError) as caught:
-        ask(url, **headers)
+        request(url, **headers)
     caught.value.close()
     assert caught.value.code == status
 
@@ -39,7 +39,7 @@ def closed_with(client):
 
 def test_only_the_page_is_served_and_only_to_own_origin(live):
     running = live(commands=True)
-    with ask(running.url) as page:
+    with request(running.url) as page:
         text = page.read().decode()
         assert page.headers["Content-Type"] == "text/html; charset=utf-8"
         assert "frame-ancestors 'none'" in page.headers["Content-Security-Policy"]
@@ -96,8 +96,8 @@ def test_malformed_requests_do_not_affect_the_run(live, tmp_path, caplog):
             viewer.socket.send(bad)
         for _ in range(11):
             viewer.until("said")
-        assert len(viewer.said("refused")) == 11
-        assert all(said.isprintable() and len(said) < 300 for said in viewer.said("refused"))
+        assert len(viewer.texts_of("refused")) == 11
+        assert all(said.isprintable() and len(said) < 300 for said in viewer.texts_of("refused"))
     with connect(url) as client:  # D4: a text that is no UTF-8, by which WebSocket has a connection fail
         client.socket.sendall(b'\x81\x8f\0\0\0\0{"command":"\xff"}')
         assert closed_with(client) == 1007

@@ -16,10 +16,10 @@ def commanded(viewer, *commands):
     viewer.until("header")
     for command in commands:
         viewer.command(**command)
-    viewer.command(command="set_heading", heading="north")  # is refused, which tells that all before were taken
-    while not viewer.said("refused") or "heading" not in viewer.said("refused")[-1]:
-        viewer.hear()
-    return viewer.said("refused")[:-1]
+    viewer.command(command="set_heading", heading="north")  # its rejection shows that all before were processed
+    while not viewer.texts_of("refused") or "heading" not in viewer.texts_of("refused")[-1]:
+        viewer.receive()
+    return viewer.texts_of("refused")[:-1]
 
 
 @pytest.mark.medium
@@ -43,10 +43,11 @@ def test_commands_are_applied_broadcast_and_reproducible(live, tmp_path):
     assert record.stack([f"ship.shift.{a}" for a in "xyz"])[-1].tolist() == [1.0, 2.0, 0.5]
     log = [json.loads(line)["command"]["command"] for line in (done.folder / "commands.jsonl").read_text().splitlines()]
     assert log == ["set_target", "shift_region", "add_obstacle", "change_setting", "arm"]
-    assert "ship moved by (1, 2, 0.5) m" in other.said("command")
-    assert other.said("command") == viewer.said("command")
+    assert "ship moved by (1, 2, 0.5) m" in other.texts_of("command")
+    assert other.texts_of("command") == viewer.texts_of("command")
     names = [region["name"] for region in other.headers[0]["regions"]]
-    changes = [change for text in other.told("changes") for change in text["changes"]] or other.headers[0]["changes"]
+    received = [change for text in other.messages_of("changes") for change in text["changes"]]
+    changes = received or other.headers[0]["changes"]
     shapes = {names[change["region"]]: change["shape"] for change in changes}
     assert shapes["pile 1"]["radius"] == 0.9 and shapes["seen 1"]["radius"] == 0.3
     drawing = {"centre": [12.0, 2.0, 3.0], "half_axes": (0.4 * np.eye(3)).tolist()}
@@ -88,7 +89,7 @@ def test_without_commands_flag_every_command_is_rejected(live):
         assert viewer.until("header")["run"]["commands"] is False
         viewer.command(**ARM)
         viewer.until("end")
-    assert viewer.said("refused") == ["commands are off: start with --commands"]
+    assert viewer.texts_of("refused") == ["commands are off: start with --commands"]
     assert not (running.end().folder / "commands.jsonl").exists()
 
 
@@ -102,8 +103,8 @@ def test_replayed_run_accepts_no_other_commands(live, tmp_path):
         viewer.until("header")
         viewer.command(command="set_mode", mode="hold")
         viewer.until("end")
-    assert viewer.said("refused") == ["this run repeats the commands of a log and takes no others"]
-    assert "ship moved by (0, 3, 0) m" in viewer.said("command")
+    assert viewer.texts_of("refused") == ["this run repeats the commands of a log and takes no others"]
+    assert "ship moved by (0, 3, 0) m" in viewer.texts_of("command")
     time, shift = viewer.column("time"), viewer.column("ship.shift.y")
     assert np.array_equal(shift, np.where(time < 0.2, 0.0, 3.0))
 
@@ -120,4 +121,4 @@ def test_ground_station_and_viewer_command_the_same_run(live):
             viewer.until("end")
     log = (running.end().folder / "commands.jsonl").read_text()
     assert '"arm"' in log and '"shift_region"' in log
-    assert "Armed" in viewer.said("command") and "ship moved by (0, 1, 0) m" in viewer.said("command")
+    assert "Armed" in viewer.texts_of("command") and "ship moved by (0, 1, 0) m" in viewer.texts_of("command")

@@ -45,7 +45,7 @@ def test_late_viewer_receives_the_history(live):
     running = live(rate=2.0)
     with running.viewer() as early:
         while not early.rows or early.column("time")[-1] < 0.5:
-            early.hear()
+            early.receive()
         with running.viewer() as late:
             late.until("rows")
             assert late.column("time")[0] == 0.0
@@ -75,7 +75,7 @@ def test_reset_starts_a_new_run_for_the_viewers(live):
     running = live(commands=True, await_arm=False, rate=2.0)
     with running.viewer() as viewer:
         while not viewer.rows or viewer.column("time")[-1] < 0.2:
-            viewer.hear()
+            viewer.receive()
         viewer.command(command="reset")
         assert viewer.until("end")["status"] == "reset"
         viewer.until("header")
@@ -83,7 +83,7 @@ def test_reset_starts_a_new_run_for_the_viewers(live):
         assert viewer.column("time")[0] == 0.0
         viewer.command(command="set_mode", mode="hold")
         assert viewer.until("end")["status"] == "completed"
-    assert "Holds its place" in viewer.said("command")
+    assert "Holds its place" in viewer.texts_of("command")
     assert running.end().folder.name == "live-2"
 
 
@@ -106,4 +106,4 @@ def test_late_command_rejection_reaches_the_viewer(live, caplog):
             viewer.command(command="add_obstacle", number=number, position=[1.0, 50.0, 3.0], radius=0.5)
         viewer.command(**ARM)
         viewer.until("end")
-    assert any("no room for obstacle 2" in text for text in viewer.said("warning"))
+    assert any("no room for obstacle 2" in text for text in viewer.texts_of("warning"))

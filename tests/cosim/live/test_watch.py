@@ -126,7 +126,7 @@ def test_a_live_run_is_watched_to_its_end(live):
         viewer.command(**ARM)
         viewer.until("end")
         assert ended(watching)
-    assert seen[-1].ended == ("completed", viewer.told("end")[0]["verdict"])
+    assert seen[-1].ended == ("completed", viewer.messages_of("end")[0]["verdict"])
     assert seen[-1]["time"] == 2.0 and len(seen) > 2
 
 

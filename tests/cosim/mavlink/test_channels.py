@@ -33,7 +33,7 @@ def udp_socket():
     return made
 
 
-def heard(link):
+def received(link):
     return [message for _, message in link.receive(time.perf_counter() + 60.0)]
 
 
@@ -53,7 +53,7 @@ def test_udpout_accepts_only_its_configured_peer():
         assert Station().parse(data)[0].get_type() == "HEARTBEAT"
         stranger.sendto(Station().pack(attitude(1)), address)
         peer.sendto(Station().pack(attitude(2)), address)
-        assert [m.time_boot_ms for m in heard(link)] == [2]
+        assert [m.time_boot_ms for m in received(link)] == [2]
         link.channel.close()
 
 
@@ -62,7 +62,7 @@ def test_udpout_survives_absent_peer_and_late_peer_receives_frames():
     link = link_of(UdpOut(HERE, port))
     for _ in range(50):
         assert tended(link, heartbeat())
-        assert not heard(link)
+        assert not received(link)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as late:
         late.bind((HERE, port))
         late.settimeout(60.0)
@@ -81,7 +81,7 @@ def test_udpin_sends_to_peers_with_accepted_frames():
         other.sendto(Station(254).pack(heartbeat()), to)
         bad.sendto(b"\xfd\xff\x00", to)
         bad.sendto(Station(1, 1).pack(heartbeat()), to)  # as if it were we
-        assert until(lambda: not heard(link) and len(link.channel.peers) == 2)
+        assert until(lambda: not received(link) and len(link.channel.peers) == 2)
         tended(link, attitude(1))
         assert good.recv(1000) == other.recv(1000)
         bad.setblocking(False)
@@ -97,7 +97,7 @@ def test_udp_peers_are_answered_in_their_mavlink_version():
         to = (HERE, link.channel.port)
         old.sendto(old_side.pack(heartbeat(), v1=True), to)
         new.sendto(new_side.pack(heartbeat()), to)
-        assert until(lambda: not heard(link) and len(link.channel.peers) == 2)
+        assert until(lambda: not received(link) and len(link.channel.peers) == 2)
         rates = mavlink.MAVLink_scaled_imu2_message(5, 1, 2, 3, 4, 5, 6, 7, 8, 9, temperature=1234)
         for message in (attitude(1), mavlink.MAVLink_current_mode_message(0, 4, 4), rates):
             link.send(message)
@@ -110,7 +110,7 @@ def test_udp_peers_are_answered_in_their_mavlink_version():
         packet = new.recv(1000)
         assert packet[0] == 0xFD and [m.get_seq() for m in Station().parse(packet)] == [0, 1, 2]
         old.sendto(old_side.pack(heartbeat()), to)  # it can speak the newer one after all
-        heard(link)
+        received(link)
         tended(link, heartbeat())
         assert old.recv(1000)[0] == 0xFD
     link.channel.close()
@@ -121,7 +121,7 @@ def test_tcp_client_is_answered_in_its_mavlink_version():
     (side,) = connected(link.channel)
     side.settimeout(60.0)
     side.sendall(Station().pack(heartbeat(), v1=True))
-    assert until(lambda: heard(link))
+    assert until(lambda: received(link))
     tended(link, attitude(3))
     assert v10.MAVLink(None).parse_buffer(side.recv(1000))[0].time_boot_ms == 3
     side.close()
@@ -132,7 +132,7 @@ def test_peer_count_is_bounded_and_silent_peers_expire():
     link, sockets = link_of(UdpIn(HERE, 0)), [udp_socket() for _ in range(udp.PEERS + 2)]
     for one in sockets:
         one.sendto(Station().pack(heartbeat()), (HERE, link.channel.port))
-    assert len(heard(link)) == len(sockets)  # all are heeded, though not all can be answered
+    assert len(received(link)) == len(sockets)  # all are accepted, though not all can be answered
     assert len(link.channel.peers) == udp.PEERS
     assert link.troubles() == ["2 frames of peers beyond 8"]
     now = time.monotonic()
@@ -193,10 +193,10 @@ def test_server_receives_from_all_clients():
     pieces = Station().pack(attitude(5)), Station(254).pack(attitude(6))
     a.sendall(pieces[0][:20])
     b.sendall(pieces[1][:11])  # streams do not mix
-    assert not heard(link)
+    assert not received(link)
     a.sendall(pieces[0][20:])
     b.sendall(pieces[1][11:])
-    assert sorted(m.time_boot_ms for m in heard(link) + heard(link)) == [5, 6]
+    assert sorted(m.time_boot_ms for m in received(link) + received(link)) == [5, 6]
     for client in (a, b):
         client.close()
     link.channel.close()
@@ -207,7 +207,7 @@ def test_disconnected_client_is_removed():
     for _ in range(3):
         (client,) = connected(link.channel)
         client.close()
-        assert until(lambda: not (heard(link) or link.channel.tend(time.monotonic()) or link.channel.clients))
+        assert until(lambda: not (received(link) or link.channel.tend(time.monotonic()) or link.channel.clients))
     assert link.send(heartbeat())
     link.channel.close()
 
@@ -234,7 +234,7 @@ def test_excess_clients_are_rejected():
     assert link.troubles() == ["1 clients beyond 8 turned away"]
     clients[0].close()
     assert until(
-        lambda: heard(link) or link.channel.tend(time.monotonic()) or len(link.channel.clients) == tcp.CLIENTS - 1
+        lambda: received(link) or link.channel.tend(time.monotonic()) or len(link.channel.clients) == tcp.CLIENTS - 1
     )
     for client in clients:
         client.close()
@@ -346,12 +346,12 @@ def test_tcp_client_reconnects_after_server_restart(monkeypatch):
     tended(link, attitude(1))
     assert frames_of(side.recv(1000))[0].time_boot_ms == 1
     side.sendall(Station().pack(heartbeat()))
-    assert until(lambda: heard(link))
+    assert until(lambda: received(link))
     server.close()
     side.close()
 
     def lost():
-        heard(link)
+        received(link)
         link.channel.tend(time.monotonic())
         return link.channel._stream is None
 
@@ -401,10 +401,10 @@ def test_serial_line_is_bidirectional_and_8_bit_clean():
     every = mavlink.MAVLink_encapsulated_data_message(1, list(range(253)))
     frame = Station().pack(every)
     os.write(ours, b"junk" + frame[:100])
-    assert not heard(link)
+    assert not received(link)
     os.write(ours, frame[100:] + Station().pack(heartbeat()))
     found = []
-    assert until(lambda: found.extend(heard(link)) or len(found) == 2)
+    assert until(lambda: found.extend(received(link)) or len(found) == 2)
     assert [m.get_type() for m in found] == ["ENCAPSULATED_DATA", "HEARTBEAT"]
     link.channel.close()
     os.close(ours)
@@ -442,7 +442,7 @@ def test_serial_device_is_reopened_after_disconnection(tmp_path, caplog):
     os.close(ours)
     path.unlink()
     now = time.monotonic()
-    assert until(lambda: heard(link) or link.channel.tend(now) or link.channel._stream is None)
+    assert until(lambda: received(link) or link.channel.tend(now) or link.channel._stream is None)
     assert not link.send(heartbeat())
     link.channel.tend(now + 2.0)
     assert link.channel._stream is None

@@ -143,7 +143,7 @@ def test_corrupted_frame_is_rejected_and_the_stream_continues():
 
 
 def test_decoder_error_counts_as_malformed():
-    """Flags that nobody knows must not be passed over."""
+    """Unknown incompatibility flags must not be ignored."""
     frame = bytearray(Station().pack(heartbeat()))
     frame[2] = 2
     crc = mavlink.x25crc(bytes(frame[1:-2]) + bytes([mavlink.MAVLink_heartbeat_message.crc_extra])).crc

@@ -70,7 +70,7 @@ def test_with_a_key_only_signed_datagrams_are_accepted():
 
 
 def test_all_valid_frames_in_a_hostile_stream_are_accepted():
-    """Also those behind half a frame, which may be taken for its other half until the checksum tells."""
+    """Also frames after half a frame, which may be taken for its other half until the checksum fails."""
     station = Station()
     data = b"".join(interspersed(5000, 20, station)) + bytes(300)
     reader = StreamReader(open_gate())

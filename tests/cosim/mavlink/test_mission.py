@@ -160,7 +160,7 @@ def test_mission_speed_updates_the_parameter(station):
         station.look(1.0 + item, **{"commands.mode": 3.0, "commands.item": item})
     (value,) = station.send(mavlink.MAVLink_param_request_read_message(1, 1, b"LAW_SPEED", -1))
     assert value.param_value == 0.25
-    assert [m.seq for m in station.wire.of("MISSION_ITEM_REACHED")] == [first(station)]  # nor is it told of
+    assert [m.seq for m in station.wire.of("MISSION_ITEM_REACHED")] == [first(station)]  # nor is it reported
     station.commanded()
     station.send(mavlink.MAVLink_param_set_message(1, 1, b"LAW_SPEED", 1.0, 9))
     assert station.commanded() == [ChangeSetting("law.gains.speed", 1.0)]

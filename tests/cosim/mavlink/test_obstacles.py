@@ -40,7 +40,7 @@ def seen(offset, radius):
     return {"seen 1.shift.x": shift, "seen 1.clearance": math.hypot(*offset) - radius}
 
 
-def asked(station, number=330):
+def request(station, number=330):
     station.wire.clear()
     assert station.command(512, number) == mavlink.MAV_RESULT_ACCEPTED
     return station.wire.of(mavlink.mavlink_map[number].msgname)
@@ -48,7 +48,7 @@ def asked(station, number=330):
 
 def scan(station, time=1.0, **row):
     station.look(time, **row)
-    (message,) = asked(station)
+    (message,) = request(station)
     return list(message.distances)
 
 
@@ -62,7 +62,7 @@ def met(distances):
 def test_obstacle_distance_fields_follow_the_specification():
     stood = station()
     stood.look(12.5)
-    (message,) = asked(stood)
+    (message,) = request(stood)
     assert (message.time_usec, message.increment, message.increment_f, message.angle_offset) == (
         12_500_000,
         5,
@@ -185,7 +185,7 @@ def test_before_the_first_snapshot_only_scenario_obstacles_are_reported():
     stood = station(centre=(0.0, 6.0, 1.0))  # the scenario begins at depth 1
     stood.wait(3.0)  # streams go by the wall clock
     assert stood.wire.of("OBSTACLE_DISTANCE_3D") == []
-    (message,) = asked(stood)
+    (message,) = request(stood)
     assert message.distances[RIGHT] == 500 and message.distances[LEFT] == NOTHING
 
 
@@ -211,9 +211,9 @@ def test_the_nearest_points_are_those_of_the_scan():
     stood = station()
     both = {**attitude(yaw=90.0), **seen((-4.0, 0.0, 0.0), 0.5), "SR1.clearance": 5.0}
     stood.look(1.0, **both)
-    first, second = asked(stood, 11037)
+    first, second = request(stood, 11037)
     assert (first.obstacle_id, second.obstacle_id) == (4, 1)
     assert (first.x, first.y, first.z) == pytest.approx((0.0, 3.5, 0.0), abs=1e-6)
     assert (second.x, second.y, second.z) == pytest.approx((5.0, 0.0, 0.0), abs=1e-6)
-    (message,) = asked(stood)
+    (message,) = request(stood)
     assert message.distances[AHEAD] == 500 and message.distances[RIGHT] == 350

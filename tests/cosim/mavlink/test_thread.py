@@ -33,7 +33,7 @@ from tests.cosim.mavlink.stubs import (
 HERE = "127.0.0.1"
 
 
-class Ear:
+class GroundSocket:
     """A ground station's socket."""
 
     def __init__(self, station=None):
@@ -44,7 +44,7 @@ class Ear:
         self.port = self.socket.getsockname()[1]
         self.station, self.messages = station or Station(), []
 
-    def hear(self):
+    def receive(self):
         while True:
             try:
                 data, self.address = self.socket.recvfrom(2048)
@@ -52,11 +52,11 @@ class Ear:
                 return self.messages
             self.messages += self.station.parse(data)
 
-    def say(self, message):
+    def send(self, message):
         self.socket.sendto(self.station.pack(message), self.address)
 
     def count(self, name):
-        return sum(m.get_type() == name for m in self.hear())
+        return sum(m.get_type() == name for m in self.receive())
 
     def __enter__(self):
         return self
@@ -70,9 +70,9 @@ def row(t):
 
 
 def test_snapshots_are_ordered_copies_every_10_ms():
-    with Ear() as ear:
+    with GroundSocket() as ground:
         vehicle = StubVehicle()
-        links = LinkThread(vehicle, [udp_link(ear.port)], step=1e-3)
+        links = LinkThread(vehicle, [udp_link(ground.port)], step=1e-3)
         links.start()
         shared = row(0.0)
         for k in range(1001):
@@ -80,9 +80,9 @@ def test_snapshots_are_ordered_copies_every_10_ms():
             links.observe(k, shared)
         links.close()
         assert [r[0] for r in vehicle.rows] == pytest.approx(np.arange(101) * 0.01)
-        assert [m.time_boot_ms for m in ear.hear()[:-1]] == [int(t * 1000) for t in np.arange(1001)[::10] * 1e-3]
-        assert ear.messages[-1].get_type() == "HEARTBEAT" and vehicle.closed
-        sequence = [m.get_seq() for m in ear.messages]
+        assert [m.time_boot_ms for m in ground.receive()[:-1]] == [int(t * 1000) for t in np.arange(1001)[::10] * 1e-3]
+        assert ground.messages[-1].get_type() == "HEARTBEAT" and vehicle.closed
+        sequence = [m.get_seq() for m in ground.messages]
         assert all((b - a) % 256 == 1 for a, b in zip(sequence, sequence[1:], strict=False))
 
 
@@ -97,28 +97,28 @@ def test_every_row_of_a_coarse_run_is_observed():
 
 
 def test_requests_are_answered_while_the_simulation_is_paused():
-    with Ear() as ear:
+    with GroundSocket() as ground:
         vehicle = StubVehicle()
-        links = LinkThread(vehicle, [udp_link(ear.port)], step=1e-3)
+        links = LinkThread(vehicle, [udp_link(ground.port)], step=1e-3)
         links.start()
         links.observe(0, row(0.0))
-        assert until(ear.hear)
-        ear.say(heartbeat())
-        assert until(lambda: ear.count("COMMAND_ACK") == 1)
+        assert until(ground.receive)
+        ground.send(heartbeat())
+        assert until(lambda: ground.count("COMMAND_ACK") == 1)
         assert until(lambda: vehicle.ticks > 20)
         links.close()
     assert [m.get_type() for m in vehicle.received] == ["HEARTBEAT"]
 
 
 def test_many_links_at_once_each_with_a_sequence_of_its_own():
-    with Ear() as ear, Ear() as other:
+    with GroundSocket() as ground, GroundSocket() as other:
         server, udp_in = TcpIn(HERE, 0), UdpIn(HERE, 0)
         links = LinkThread(
-            StubVehicle(), [udp_link(ear.port), link_of(udp_in), link_of(server), udp_link(other.port)], step=0.01
+            StubVehicle(), [udp_link(ground.port), link_of(udp_in), link_of(server), udp_link(other.port)], step=0.01
         )
         links.start()
         other.address = (HERE, udp_in.port)
-        other.say(heartbeat())
+        other.send(heartbeat())
         with socket.create_connection((HERE, server.port), 60.0) as client:
             assert until(lambda: server.clients and udp_in.peers)
             for k in range(300):
@@ -129,19 +129,19 @@ def test_many_links_at_once_each_with_a_sequence_of_its_own():
                 data += chunk
         tcp_messages = Station().parse(data)
         assert [m.get_seq() for m in tcp_messages] == [i % 256 for i in range(301)]
-        assert [m.get_seq() for m in ear.hear()] == [i % 256 for i in range(301)]
+        assert [m.get_seq() for m in ground.receive()] == [i % 256 for i in range(301)]
         assert other.count("ATTITUDE") == 600 and other.count("COMMAND_ACK") == 1
 
 
 def test_log_holds_sent_and_accepted_frames(tmp_path):
     path = tmp_path / "dive.tlog"
-    with Ear() as ear:
+    with GroundSocket() as ground:
         vehicle = StubVehicle()
-        links = LinkThread(vehicle, [udp_link(ear.port), link_of(Tlog(str(path)))], step=0.01)
+        links = LinkThread(vehicle, [udp_link(ground.port), link_of(Tlog(str(path)))], step=0.01)
         links.start()
         links.observe(0, row(0.0))
-        assert until(ear.hear)
-        ear.say(heartbeat())
+        assert until(ground.receive)
+        ground.send(heartbeat())
         assert until(lambda: vehicle.received)
         for k in range(1, 1001):  # ten seconds in no time
             links.observe(k, row(k * 0.01))
@@ -176,15 +176,15 @@ class Clumsy(StubVehicle):
 
 
 def test_vehicle_errors_are_logged_once_per_kind_and_isolated(caplog):
-    with Ear() as ear:
+    with GroundSocket() as ground:
         vehicle = Clumsy()
-        links = LinkThread(vehicle, [udp_link(ear.port)], step=0.01)
+        links = LinkThread(vehicle, [udp_link(ground.port)], step=0.01)
         links.start()
         for k in range(50):
             links.observe(k, row(k * 0.01))
-        assert until(lambda: len(vehicle.rows) == 50 and ear.count("ATTITUDE") == 50)
+        assert until(lambda: len(vehicle.rows) == 50 and ground.count("ATTITUDE") == 50)
         for _ in range(5):
-            ear.say(heartbeat())
+            ground.send(heartbeat())
         assert until(lambda: len(vehicle.received) == 5)
         links.close()
     tracebacks = [record.message for record in caplog.records if record.exc_info]
@@ -205,8 +205,8 @@ def test_vehicle_errors_are_logged_once_per_kind_and_isolated(caplog):
 def test_unencodable_messages_are_counted_without_sequence_gap(caplog):
     text = mavlink.MAVLink_statustext_message(6, b"")
     text._text_raw = "letters where bytes belong"
-    with Ear() as ear:
-        link = udp_link(ear.port)
+    with GroundSocket() as ground:
+        link = udp_link(ground.port)
         for bad in (
             attitude(-1),  # struct.error
             attitude(1.5),
@@ -219,7 +219,7 @@ def test_unencodable_messages_are_counted_without_sequence_gap(caplog):
             assert not link.send(bad)
             assert link.send(attitude(1))
         link.channel.close()
-        assert [m.get_seq() for m in ear.hear()] == list(range(7))
+        assert [m.get_seq() for m in ground.receive()] == list(range(7))
     assert link.unencodable == 7
     assert link.troubles() == ["7 messages that could not be encoded"]
     assert len(caplog.records) == 3  # one a kind of message
@@ -228,8 +228,8 @@ def test_unencodable_messages_are_counted_without_sequence_gap(caplog):
 def test_a_budget_thins_streams_before_answers(monkeypatch):
     clock = [100.0]
     monkeypatch.setattr(link_module.time, "monotonic", lambda: clock[0])
-    with Ear() as ear:
-        link = udp_link(ear.port, budget=10_000.0)
+    with GroundSocket() as ground:
+        link = udp_link(ground.port, budget=10_000.0)
         sent = [link.send(odometry(1)) for _ in range(100)]  # 24.5 kB at once
         assert 10 < sent.count(True) < 5000 / 245 and link.dropped == sent.count(False)
         assert all(link.send(mavlink.MAVLink_command_ack_message(1, 0)) for _ in range(20))
@@ -239,7 +239,7 @@ def test_a_budget_thins_streams_before_answers(monkeypatch):
         assert link.has_room() and link.send(odometry(1))
         link.channel.close()
         assert link.troubles() == [f"{link.dropped} messages over the budget"]
-        sequence = [m.get_seq() for m in ear.hear()]
+        sequence = [m.get_seq() for m in ground.receive()]
     assert sequence == list(range(len(sequence)))
 
 
@@ -278,19 +278,19 @@ def test_unstarted_links_are_closed(tmp_path):
 
 
 def test_endpoints_become_links_of_one_signed_vehicle(tmp_path):
-    with Ear(Station(key=KEY)) as ear:
-        texts = [f"udpout:127.0.0.1:{ear.port}", str(tmp_path / "dive.tlog")]
+    with GroundSocket(Station(key=KEY)) as ground:
+        texts = [f"udpout:127.0.0.1:{ground.port}", str(tmp_path / "dive.tlog")]
         links = open_links([parse_endpoint(text) for text in texts], MavlinkOptions(key=KEY, system_id=9))
         assert [link.name for link in links] == texts
         vehicle = StubVehicle()
         running = LinkThread(vehicle, links, step=0.01)
         running.start()
         running.observe(0, row(0.0))
-        assert until(lambda: ear.count("ATTITUDE"))
-        assert ear.messages[0].get_srcSystem() == 9
-        assert ear.station.codec.signing.goodsig_count > 0
-        ear.say(heartbeat())
-        ear.socket.sendto(Station().pack(heartbeat()), ear.address)
+        assert until(lambda: ground.count("ATTITUDE"))
+        assert ground.messages[0].get_srcSystem() == 9
+        assert ground.station.codec.signing.goodsig_count > 0
+        ground.send(heartbeat())
+        ground.socket.sendto(Station().pack(heartbeat()), ground.address)
         assert until(lambda: links[0].counts.unsigned and vehicle.received)
         running.close()
     assert links[0].troubles() == ["1 frames unsigned"]

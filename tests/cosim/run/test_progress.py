@@ -11,12 +11,12 @@ from cosim.run.progress import WORDS, ProgressBar, announce_compilation
 
 
 @pytest.fixture(autouse=True)
-def untold_compiling():
-    """Let compilation be announced, which other tests silence."""
+def compilation_notice():
+    """Leave the notice of a compilation on, which other tests silence."""
 
 
 def compiles():
-    """Say what a library says before it is compiled."""
+    """Log the record that a library emits before it is compiled."""
     logging.getLogger("controller.compiling.first_use").info("compiling")
 
 
@@ -28,14 +28,14 @@ class Terminal(io.StringIO):
 
 
 def test_compilation_is_announced_once_if_it_happens():
-    told = []
-    with announce_compilation(told.append):
-        assert told == []
+    notices = []
+    with announce_compilation(notices.append):
+        assert notices == []
         compiles()
         compiles()
-    assert told == [WORDS]
+    assert notices == [WORDS]
     compiles()
-    assert told == [WORDS]
+    assert notices == [WORDS]
 
 
 def test_cached_function_announces_no_compilation(monkeypatch, tmp_path):
@@ -43,12 +43,12 @@ def test_cached_function_announces_no_compilation(monkeypatch, tmp_path):
 
     monkeypatch.setattr("platformdirs.user_cache_dir", lambda name: str(tmp_path / name))
     text = "void entry(const void *words);\nvoid entry(const void *words) { (void)words; }\n"
-    told = []
+    notices = []
     for expected in ([WORDS], [WORDS, WORDS][:1]):
         library.library_of.cache_clear()
-        with announce_compilation(told.append):
+        with announce_compilation(notices.append):
             library.library_of(text)
-        assert told == expected
+        assert notices == expected
 
 
 def test_compilation_notice_does_not_break_the_progress_bar(monkeypatch):

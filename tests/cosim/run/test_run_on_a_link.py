@@ -21,7 +21,7 @@ SHORT = ["time.duration=3"]
 
 
 class Station:
-    """A ground station that says one thing after the other once it hears the vehicle."""
+    """A ground station that sends its messages in sequence once it receives the vehicle."""
 
     def __init__(self, *says):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

@@ -46,7 +46,7 @@ def test_a_region_at_rest_has_no_shift():
 
 
 class Leader:
-    """Moves a region along a circle, by what it is told of the time."""
+    """Move a region along a circle by the given time."""
 
     def __init__(self, master, name):
         self.master, self.name = master, name
@@ -72,7 +72,7 @@ def test_streamed_region_is_at_its_streamed_position(name):
 
 
 def test_streamed_region_extrapolates_its_velocity():
-    """Before the run, with a velocity: from then on that is its motion; the law is told of it."""
+    """Before the run, with a velocity: from then on that is its motion, which the law receives."""
     told = []
     kept = run(
         "regions.SR2.streamed=true",

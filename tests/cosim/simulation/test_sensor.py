@@ -110,7 +110,7 @@ def test_failed_thruster_gives_zero_after_its_failure_time():
     given, asked = kept["thruster_force[3]"][:-1], kept["thrust[3]"][:-1]
     assert np.abs(given[:100]).min() > 0.0
     assert not given[100:].any()
-    assert np.abs(asked[100:]).max() > 1.0  # and nobody has told the law
+    assert np.abs(asked[100:]).max() > 1.0  # and the failure is not reported to the law
 
 
 def test_reported_failure_reaches_law_and_allocation(spy):
@@ -158,7 +158,7 @@ def test_noise_depends_only_on_the_seed():
 
 
 def test_arbiter_uses_measurements_and_record_holds_true_clearances():
-    """Far noise: the told position is metres off, so that the memberships are those of no true place."""
+    """Large noise: the measured position is metres off, so that memberships differ from the true ones."""
     kept = run("sensing.position_noise=3.0", "law.gains.k_p1=0.001", "arbiter.ramp=1.0")
     p, told = stack(kept, *TRUE[:3]), stack(kept, *SENSED[:3])
     centre = np.array([2.0, 0.0, 1.8])
@@ -169,7 +169,7 @@ def test_arbiter_uses_measurements_and_record_holds_true_clearances():
 
 
 class Still(IsmailDunniganLaw):
-    """Asks for nothing, whatever it is told."""
+    """Command zero for any input."""
 
     def step(self, state, goal, regions, weights, forces):
         self.told.append((state.position.copy(), state.velocity_body.copy()))

@@ -393,7 +393,7 @@ def test_nonempty_folder_is_rejected_before_waiting(tmp_path):
 
 @pytest.mark.slow
 def test_depth_is_held_within_5_cm(serve):
-    """Down to 4 m by pulses of a PID on the depth that is told, and there to stay: the vehicle is 1 N too heavy."""
+    """Down to 4 m by pulses of a PID on the reported depth, and held there: the vehicle is 1 N too heavy."""
     served = serve("time.duration=40.0", record_rate=100.0)
     integral, depth, sinking = 0.0, 0.3, 0.0
     with StandIn(served.address, rate=400) as pilot:

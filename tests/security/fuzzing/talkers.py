@@ -59,7 +59,7 @@ def command(seeds: Seeds) -> Case:
 
 
 class _Connection:
-    """A live view that says what it is told to."""
+    """A live view with given answers."""
 
     def __init__(self, messages: list[str | bytes]) -> None:
         self._messages = messages

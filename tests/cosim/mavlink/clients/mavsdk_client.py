@@ -201,7 +201,7 @@ async def main(address):
         try:
             value = await asyncio.wait_for(work, PATIENCE)
             done[name] = {"value": value, "seconds": round(time.monotonic() - began, 3)}
-        except Exception as error:  # noqa: BLE001  whatever it is, it is told, and the next step is tried
+        except Exception as error:  # noqa: BLE001  any error is reported, and the next step is tried
             text = f"{type(error).__name__}: {error}"
             done[name] = {"error": text, "seconds": round(time.monotonic() - began, 3)}
             if name == "connect":

@@ -29,7 +29,7 @@ LOGS = [
 
 
 class RecordingLink(GroundLink):
-    """Writes all that it hears into a log of its own, as ground stations do."""
+    """Write all received frames into a log, as ground stations do."""
 
     def __init__(self, endpoint, log):
         super().__init__(endpoint)

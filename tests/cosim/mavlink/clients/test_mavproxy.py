@@ -50,7 +50,7 @@ class MavProxy:
         raise AssertionError(f"{pattern!r} was not seen in:\n{self.text[-3000:]}")
 
     def parameters(self, count):
-        """Return the text of the file that it writes after it has told of so many parameters."""
+        """Return the text of the file that it writes after it has listed that many parameters."""
         file, end = self.folder / "mav.parm", time.monotonic() + PATIENCE
         while (text := file.read_text() if file.exists() else "").count("\n") < count and time.monotonic() < end:
             time.sleep(0.05)
