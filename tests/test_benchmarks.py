@@ -28,7 +28,7 @@ from tests.plant_fmu.conftest import STATES
 
 @pytest.fixture
 def here(monkeypatch):
-    """Take the Python of the tests for that of the peers, and install nothing."""
+    """Use the Python of the tests as that of the peers, without installing."""
     monkeypatch.setattr(peer_environment, "install", lambda again=False: pytest.fail("installs"))
     return Environment(sys.executable)
 

@@ -69,7 +69,7 @@ def _paths() -> dict[str, str]:
 
 
 def section(what: griffe.Object, kind: griffe.DocstringSectionKind) -> list[tuple[str, str]]:
-    """Names and all that is said of them, of one section of a docstring."""
+    """Return the names and descriptions of one section of a docstring."""
     parts = what.docstring.parse("numpy") if what.docstring else []
     entries = [entry for part in parts if part.kind is kind for entry in part.value]
     return [
@@ -175,7 +175,7 @@ def test_raised_exceptions_are_documented():
 
 
 def test_physical_quantities_have_documented_units():
-    """Parameters and what comes back: where they are listed, there; else somewhere in the docstring."""
+    """Parameters and return values: in their section if there is one, else anywhere in the docstring."""
     wrong = {}
     for function in functions():
         entries = dict(section(function, Part.parameters))
@@ -209,7 +209,7 @@ def test_unit_check_detects_missing_units():
 
 
 def test_summaries_are_imperative_and_no_parameter_is_described_as_any():
-    """What a function does, not what it is about; properties say what they are."""
+    """Functions begin with an imperative verb; properties may begin with a noun."""
     wrong = {}
     for function in functions():
         words = function.docstring.value if function.docstring else ""

@@ -98,7 +98,7 @@ def test_packages_import_only_allowed_packages():
 
 
 def test_imports_have_no_cycles():
-    """Import cycles, those inside functions left out: Python meets only the others."""
+    """Import cycles, without imports inside functions, which Python resolves late."""
     graph = {module: imported(module, at_once=True) & FILES.keys() for module in FILES}
     graphlib.TopologicalSorter(graph).prepare()  # raises CycleError, which names the ring
 

@@ -151,7 +151,7 @@ def test_adaptive_set_points_cancel_the_net_weight(name, net_weight):
 
 @pytest.mark.medium
 def test_unarbitrated_law_cancels_net_weight_within_its_goal_region():
-    """Its pull ends within the region, wherever it came to rest: there the estimate alone carries the weight."""
+    """Attraction is zero within the region, where the estimate alone balances the weight."""
     law = law_of("unarbitrated", k_p1=100.0, k_v1=150.0, limit=40.0, margin=0.2, **QUICK)
     positions, estimates = fly(law, net_weight=10.0, seconds=200.0)
     assert np.linalg.norm(positions[-500:] - [8.0, 1.0, 3.0], axis=1).max() < 0.5

@@ -39,7 +39,7 @@ def run(capsys, monkeypatch, tmp_path):
 
 @pytest.fixture
 def refused(run, tmp_path):
-    """Run what must be refused: status 2, one line, nothing printed, no file left."""
+    """Run a command that must fail: status 2, a one-line error, no output, no file."""
 
     def call(*words, stdin=""):
         before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}

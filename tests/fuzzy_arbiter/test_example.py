@@ -170,7 +170,7 @@ def test_scikit_fuzzy_error_is_within_the_documented_bound():
 
 
 def changed(what):
-    """The rules of section VI with one thing that formats may not be able to say."""
+    """The rules of section VI with one feature that some formats do not support."""
     system = prioritised(normalization="none")
     a, b, c = (v.terms[1].name for v in system.inputs)
     obstacle, shape, depth = Is("obstacle", a), Is("shape", b), Is("depth", c)

@@ -29,7 +29,7 @@ COPIED = ("controller", "plant_fmu", "fuzzy_arbiter", "cosim", "tests", "example
 
 @dataclass(frozen=True)
 class Result:
-    """What the tests said of a mutant."""
+    """The test result of a mutant."""
 
     key: str
     source: str  # mark of the unchanged source, so that results of an older one are not taken for this one's
@@ -160,7 +160,7 @@ def _work(
 
 
 def _doubt(results: dict[str, Result], copy: Path) -> None:
-    """Run every test that noticed something without any mutant, and mark what it then says no less."""
+    """Run every failing test without any mutant, and mark those that fail all the same."""
     with Server(copy) as server:
         for slow in (False, True):
             given = [r for r in results.values() if r.by and part_of(r.key.partition(" | ")[0]).slow == slow]

@@ -167,7 +167,7 @@ def test_vertical_attitude_is_expressed_by_pitch_and_yaw(make_slave):
 
 
 def test_the_guard_bounds_the_fastest_damping_of_any_mass_matrix(make_slave):
-    """Coupled added mass damps faster than its diagonal tells: such a step is refused, not grown."""
+    """Coupled added mass damps faster than its diagonal suggests: such a step is rejected."""
     coupled = {f"added_mass[{i + 1},{j + 1}]": 0.0 for i in range(6) for j in range(i, 6)}
     coupled |= {f"added_mass[{i},{i}]": 90.0 for i in (1, 2, 3)} | {"added_mass[1,2]": 80.0, "added_mass[2,3]": 80.0}
     coupled |= {"added_mass[1,3]": 80.0, "mass": 10.0, "linear_damping[1]": 1.2e4, "linear_damping[2]": 1.2e4}

@@ -94,7 +94,7 @@ def test_cosine_of_turn_fractions_matches_reference(functions):
 
 @pytest.mark.medium
 def test_atan2_matches_reference(functions):
-    """The C library's is within a unit itself; its sine and cosine undo ours."""
+    """The C library's result is itself within one unit in the last place."""
     atan2 = functions("atan2", 2)
     for y, x in [*ANY.normal(size=(800, 2)), *(ANY.normal(size=(200, 2)) * [1e-9, 1.0])]:
         assert abs(atan2(y, x) - math.atan2(y, x)) <= 3.0 * math.ulp(math.atan2(y, x))

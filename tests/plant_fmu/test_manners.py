@@ -145,7 +145,7 @@ def test_invalid_times_are_rejected(make_slave):
 
 @pytest.mark.parametrize(("start", "stop"), [(math.nan, None), (1.0, 0.5), (0.0, math.nan), (-2e9, None)])
 def test_refused_times_block_initialisation(make_slave, fmi, start, stop):
-    """Until there are others: an importer that overlooks the status must not run at times that were not taken."""
+    """Until valid times are set: an importer that ignores the status must not run at rejected times."""
     slave = make_slave(fmi=fmi)
     if fmi == 2:
         with pytest.raises(FMICallException):

@@ -59,7 +59,7 @@ def test_cvode_ends_where_co_simulation_does(make_slave, fmi, more):
 
 
 def test_a_drifting_current_is_the_same_in_both(make_slave, fmi):
-    """Its knots are time events: the same numbers at the same times, whoever integrates."""
+    """Its knots are time events: the same values at the same times for any integrator."""
     drift = {
         "current_variation.x": 0.3,
         "current_variation.y": 0.2,
@@ -165,7 +165,7 @@ def test_states_may_also_be_set_one_by_one(make_slave, fmi):
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e7])
 def test_invalid_states_are_discarded(make_slave, fmi, value):
-    """The status tells an integrator to try a shorter step; the model stays as it was."""
+    """The status makes an integrator try a shorter step; the model is unchanged."""
     model = make_slave(fmi=fmi, interface="me", logging_on=True).start()
     model.update_discrete()
     model.fmu.enterContinuousTimeMode()

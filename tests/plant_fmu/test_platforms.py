@@ -177,7 +177,7 @@ def test_file_command_recognizes_the_universal_library(all_platforms, tmp_path):
 
 
 def command(platform, tmp_path):
-    """Return what starts a program of a platform here; skip where nothing does."""
+    """Return the emulator of a platform's programs; skip if there is none."""
     if platform == "x86_64-windows":
         wine = shutil.which("wine") or shutil.which("wine64")
         return [wine] if wine else pytest.skip("needs wine to run a Windows library")

@@ -39,7 +39,7 @@ def folder(once):
 
 @pytest.fixture
 def compiled():
-    """Return a function that returns a vehicle's FMU as this machine's compiler makes it, whatever the test patches."""
+    """Return a function that returns a vehicle's FMU as this machine's compiler builds it, regardless of patches."""
     with_compiler = prebuilt.FOLDER, os.environ.get("CC")
 
     def fmu(vehicle, fmi):

@@ -53,7 +53,7 @@ def test_vehicle_parameters_are_physically_valid(name):
 @pytest.mark.parametrize("axis", ["roll", "pitch"])
 @pytest.mark.parametrize("name", ["odin", *(pytest.param(v, marks=pytest.mark.slow) for v in VEHICLES if v != "odin")])
 def test_vehicle_rights_itself(name, axis, make_slave):
-    """Turned by 60 degrees and let go, a vehicle comes back, and its swings die out."""
+    """Released at 60 degrees, a vehicle returns upright, and its oscillation decays."""
     e0, e = Rotation.from_euler("x", 60, degrees=True).as_quat()[[3, 0]]
     slave = make_slave(name).start(**{"quaternion.e0": e0, f"quaternion.e{1 + (axis == 'pitch')}": e})
     angles = []
@@ -122,7 +122,7 @@ def test_rexrov_added_mass_is_as_published():
 
 
 def test_rexrov_added_mass_center_is_above_the_center_of_gravity():
-    """The sign of its coupling terms says whether z is up or down: water is pushed by the hull, about the buoyancy."""
+    """The sign of its coupling terms shows whether z is up or down: added mass acts at the center of buoyancy."""
     vehicle = load_vehicle("rexrov")
     A = vehicle.added_mass
     for z in (A[0, 4] / A[0, 0], -A[1, 3] / A[1, 1]):  # of masses A11, A22 that sit at z

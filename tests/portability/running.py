@@ -20,11 +20,11 @@ FOLDER = ROOT / "build" / "portability"
 
 
 class NotToBeHadError(Exception):
-    """Says why a variant cannot be run here: that is no failure."""
+    """A variant cannot be run here, which is no failure."""
 
 
 class BrokenError(Exception):
-    """Says why a variant that should run here does not come to its tests, or to their end."""
+    """A variant that should run here does not start or finish its tests."""
 
 
 def environment_of(variant: Variant, machine: Machine) -> dict[str, str]:
@@ -97,7 +97,7 @@ def _tested(variant: Variant, python: Path, environment: dict[str, str], tests: 
 
 
 def _ended(command: list[str], environment: dict[str, str], file: object, limit: float) -> bool:
-    """Return whether a command came to its end in time; if not, it and all that it started are ended."""
+    """Return whether a command ended in time; otherwise kill it and its children."""
     process = subprocess.Popen(
         command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stdout=file, stderr=subprocess.STDOUT,
         start_new_session=True,
@@ -181,6 +181,6 @@ def _pyenv() -> Path:
 
 
 def _last(text: str) -> str:
-    """Return the last line that says something."""
+    """Return the last nonempty line."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     return lines[-1] if lines else "nothing"

@@ -30,7 +30,7 @@ SOUND = (
 
 @pytest.fixture(params=["check", "run"])
 def read(request, tmp_path, monkeypatch):
-    """Return a function that opens an FMU that must be refused, and returns what is said."""
+    """Return a function that opens an FMU that must be rejected, and returns the message."""
     scratch = tmp_path / "scratch"
     scratch.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(scratch))
@@ -135,7 +135,7 @@ def test_unbounded_compression_methods_are_rejected(tmp_path, read, method):
 
 
 def test_false_member_size_is_detected(tmp_path, read):
-    """The list says ten bytes, the member unpacks to ten million."""
+    """The directory states ten bytes, and the member unpacks to ten million."""
     zeros = bytes(10_000_000)
     path = archive(tmp_path / "it.fmu", [("resources/zeros", zeros)], compression=zipfile.ZIP_DEFLATED)
     path.write_bytes(path.read_bytes().replace(struct.pack("<I", len(zeros)), struct.pack("<I", 10)))
@@ -297,7 +297,7 @@ def test_only_members_needed_for_a_run_are_extracted(tmp_path):
 
 
 def test_no_binary_of_another_folder_is_loaded(tmp_path):
-    """An identifier that leads out of the FMU would load whatever library lies there."""
+    """An identifier that leads out of the FMU would load a foreign library."""
     with zipfile.ZipFile(cached_fmu(load_vehicle("odin"), 3)) as source:
         description = source.read("modelDescription.xml").decode()
         library = source.read(f"binaries/{fmpy.platform_tuple}/odin{fmpy.sharedLibraryExtension}")

@@ -27,7 +27,7 @@ def scenario():
 
 @contextlib.contextmanager
 def a_full_disk(of, monkeypatch):
-    """Let nothing be written of what is named."""
+    """Make every write of the named functions fail."""
 
     def full(*_, **__):
         raise OSError(errno.ENOSPC, "No space left on device")

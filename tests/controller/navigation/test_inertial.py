@@ -97,7 +97,7 @@ def test_the_covariance_is_propagated_as_by_plain_matrices():
 
 @pytest.mark.medium
 def test_error_growth_matches_the_covariance_transition():
-    """A small error of the start and of each constant, carried on: what the transition of the covariance says."""
+    """A small initial error of each state and constant grows as the transition of the covariance."""
     rng = np.random.default_rng(3)
     for i in range(15):
         right, wrong, error = begun(np.random.default_rng(i)), begun(np.random.default_rng(i)), np.zeros(N_ERRORS)

@@ -45,7 +45,7 @@ class Command:
         )
 
     def end(self):
-        """Leave nothing running."""
+        """Stop all processes."""
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.communicate()

@@ -17,7 +17,7 @@ from tests.cosim.campaigns.scene_data import BRIEF, HARD, results_of, rows, writ
 
 
 class Idle(IsmailDunniganLaw):
-    """Does nothing, well."""
+    """A law that commands zero."""
 
     name = "idle"
 

@@ -254,7 +254,7 @@ def test_numbers_of_tables(x, text):
 @pytest.mark.parametrize("n", [1, 2, 5, 40, 1001, 1000], ids=lambda n: f"{n} numbers")
 @pytest.mark.parametrize("never", [0, 3])
 def test_median_marker_matches_the_table(n, never):
-    """Of an even number of rows the median lies between two, and so does the dot; both leave out what never comes."""
+    """Of an even number of rows the median lies between two, and so does the dot; both exclude NaN."""
     values = np.append(np.random.default_rng(n).exponential(size=n), np.full(never, np.nan))
     (drawn,) = distributions({"effort": {"": values}}, "")
     (axes,) = (axes for axes in drawn.figure.axes if axes.get_visible())

@@ -62,7 +62,7 @@ def test_effects_are_the_first_order_indices_of_ishigami(n, times, within):
 
 @pytest.mark.parametrize("n", [100, 1000])
 def test_non_monotonic_effect_is_detected(n):
-    """Half of the variance of y is that of x², of which a rank correlation sees nothing."""
+    """Half of the variance of y is that of x², which a rank correlation does not detect."""
     rng = np.random.default_rng(4)
     shares, correlations, seen = [], [], []
     for _ in range(100):

@@ -142,7 +142,7 @@ def test_verbose_logs_only_own_packages(tmp_path):
 
 @pytest.mark.slow
 def test_run_works_without_a_writable_cache(tmp_path):
-    """Nothing writable but the run folder: compilation is not kept, the FMU goes with the process."""
+    """Only the run folder is writable: compiled code is not cached, and the FMU is built per process."""
     arguments = ["run", "paper", "--no-report", "--out", str(tmp_path / "run"), *QUICK]
     code = f"""
 import sys

@@ -93,7 +93,7 @@ def test_times_are_simulated_nanoseconds_in_order(read, run):
 
 
 def test_signals_have_no_field_that_plotjuggler_takes_for_a_time_stamp(read):
-    """It reads a field of this name as a number of its own clock, whatever it is."""
+    """PlotJuggler reads a field of this name as a time stamp."""
     for channel in read.summary.channels.values():
         if channel.topic.startswith("/signals/"):
             assert "timestamp" not in channel.metadata
@@ -217,7 +217,7 @@ def test_chosen_signals_leave_the_scene_whole(run, tmp_path):
 
 @pytest.fixture(scope="module")
 def steered(tmp_path_factory):
-    """The folder of a run to which an obstacle comes, and grows, and whose target becomes another."""
+    """Return the folder of a run with an added, growing obstacle and a changed target."""
     commands = {
         20: AddObstacle(7, (5.0, 0.0, 2.0), 0.4),
         40: SetTarget((4.0, -1.0, 2.0), 0.6),

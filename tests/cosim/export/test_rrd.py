@@ -30,7 +30,7 @@ class Read:
         return [(time, value) for time, value in self.columns[at] if value is not None]
 
     def path_of(self, name):
-        """Return the entity of a signal of the record, which says its name."""
+        """Return the entity path of a recorded signal, which contains its name."""
         for path, component in self.columns:
             if component == "names" and self[path, "names"][0][1][0].startswith(f"{name} ["):
                 return path

@@ -376,7 +376,7 @@ pty = pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo-terminals
 
 
 def come_to(terminal, count, station=None):
-    """Return so many messages that come to the other end of a line: a pseudo-terminal takes its time."""
+    """Return the given number of messages from the other end of a line, which may be slow."""
     os.set_blocking(terminal, False)
     station, found = station or Station(), []
 

@@ -20,7 +20,7 @@ HERE = "127.0.0.1"
 
 
 class Script:
-    """A channel on which certain datagrams come."""
+    """A channel that receives given datagrams."""
 
     datagrams = True
 
@@ -99,7 +99,7 @@ def test_hostile_datagrams_leak_no_memory():
 
 
 class Clock:
-    """A clock that goes on by as much at each look, and by what an answer takes."""
+    """A clock that advances by a fixed time at each reading, and by the duration of an answer."""
 
     LOOK, ANSWER = 1e-5, 7e-5  # s
 

@@ -6,7 +6,7 @@ from tests.cosim.mavlink.station import Station
 
 
 def test_log_list_is_empty_and_answered_immediately():
-    """MAVSDK waits 7.5 s where no answer comes."""
+    """MAVSDK waits 7.5 s without an answer."""
     station = Station()
     (entry,) = station.send(mavlink.MAVLink_log_request_list_message(1, 1, 0, 0xFFFF))
     assert (entry.get_type(), entry.num_logs, entry.last_log_num, entry.size) == ("LOG_ENTRY", 0, 0, 0)

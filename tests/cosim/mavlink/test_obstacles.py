@@ -17,7 +17,7 @@ HERE = np.array([1.0, 2.0, 5.0])  # of the station's vehicle [m, NED]
 
 
 def station(centre=(1.0, 8.0, 5.0), radius=1.0, **options):
-    """Return one whose only obstacle is a sphere, 6 m east of the vehicle unless said otherwise."""
+    """Return a station whose only obstacle is a sphere, by default 6 m east of the vehicle."""
     where = f"regions.SR1.shape.centre={list(map(float, centre))}"
     return Station(of=scenario(where, f"regions.SR1.shape.radius={radius}"), **options)
 
@@ -35,7 +35,7 @@ def attitude(roll=0.0, pitch=0.0, yaw=0.0):
 
 
 def seen(offset, radius):
-    """Return what a row has of an obstacle that came while running, so far from the vehicle [m, NED]."""
+    """Return the row values of a dynamic obstacle at an offset from the vehicle [m, NED]."""
     shift = tuple(HERE + offset - PARKED_POSITION)
     return {"seen 1.shift.x": shift, "seen 1.clearance": math.hypot(*offset) - radius}
 

@@ -86,7 +86,7 @@ def test_full_disk_leaves_old_files_unchanged(shipped_run, tmp_path, monkeypatch
 
 
 def changed(folder, shipped, change):
-    """Copy a run with another record, as a kill leaves it: without a summary."""
+    """Copy a run with another record and without a summary, as after a kill."""
     shutil.copytree(shipped, folder)
     table = pq.read_table(folder / RECORD)
     pq.write_table(change(table), folder / RECORD)

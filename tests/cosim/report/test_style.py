@@ -31,7 +31,7 @@ def inspection(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def drifting(tmp_path_factory):
-    """Two buoys that come nearer and then go."""
+    """Two buoys that approach and recede."""
     keys = ["regions.0.velocity=[-4.0,1.3,0]", "regions.1.velocity=[0.0,1.0,0.0]"]
     return story_of(tmp_path_factory.mktemp("runs") / "b", "moving-obstacle", *keys)
 

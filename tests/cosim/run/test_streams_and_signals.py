@@ -199,7 +199,7 @@ def test_D10_under_nohup_a_closed_terminal_stays_ignored():
 
 @pytest.mark.slow
 def test_D10_a_run_whose_terminal_is_closed_is_readable(tmp_path):
-    """The process as a user has it: it leads the session of a terminal, whose other end goes."""
+    """The process leads the session of a terminal whose other end is closed."""
     import fcntl
 
     out = tmp_path / "run"

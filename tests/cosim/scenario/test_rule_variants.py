@@ -73,7 +73,7 @@ def test_path_cost_is_highest_in_regions_of_top_priority():
 
 
 def test_arbiter_file_costs_use_its_own_input_signals(tmp_path):
-    """Of a file by clearances: on the surface presses in full, as far as the universe goes not at all."""
+    """A file over clearances: full membership on the surface, zero at the end of the universe."""
     text = """FUNCTION_BLOCK mine
 VAR_INPUT risers : REAL; below : REAL; END_VAR
 VAR_OUTPUT obstacle : REAL; shape : REAL; depth : REAL; visibility : REAL; END_VAR

@@ -93,7 +93,7 @@ def test_empty_scene_reaches_the_goal():
 @pytest.mark.medium
 @pytest.mark.parametrize("length", [1.0, 5.0])
 def test_nan_measurements_are_bridged_then_the_vehicle_waits(length):
-    """Within `coast` it goes on by its model and stops the vehicle; after it, the thrusters rest until it is back."""
+    """Within `coast` the law propagates its model and stops the vehicle; then thrusts are zero until recovery."""
     flight = fly([ROCK], duration=40.0, spoil=lambda t, s: NOWHERE if 2.0 < t < 2.0 + length else s)
     assert within_limits(flight) and reached(flight)
     assert flight.clearance(ROCK).min() > 0.0
@@ -124,7 +124,7 @@ def test_position_or_velocity_alone_suffices(lost):
 @pytest.mark.medium
 @pytest.mark.parametrize("held", [False, True])
 def test_navigation_at_1_hz_is_slower_but_avoids_obstacles(held):
-    """Between two measurements there is nothing, or the last one again."""
+    """Between two measurements there is NaN, or the last value repeated."""
     last = {}
 
     def spoil(now, state):
@@ -200,7 +200,7 @@ def test_single_outlier_is_rejected():
 @pytest.mark.medium
 @pytest.mark.parametrize(("weights", "kept"), [((1.0, 0.0), 0), ((0.0, 1.0), 1)])
 def test_of_two_conflicting_regions_the_higher_weight_is_satisfied(weights, kept):
-    """North of 1 m and south of 0 m at once: the arbiter's weight says which of them yields."""
+    """North of 1 m and south of 0 m at once: the arbiter's weight determines which of them yields."""
     south = Region("south", HalfSpace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in")
     north = Region("north", HalfSpace((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)), "in")
     flight = fly([south, north], weights=weights)

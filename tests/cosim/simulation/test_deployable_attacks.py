@@ -211,7 +211,7 @@ def test_face_ahead_is_located(shape, at, nearest, velocity, distance, face):
 
 
 def test_gradient_rate_follows_relative_motion():
-    """Side by side with a ball that moves along, nothing turns; against finite differences where it does."""
+    """The rate is zero beside a ball of equal velocity, and matches finite differences otherwise."""
     for own in ((0.0, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, -0.1, 0.05)):
         packed = pack([Region("ball", Sphere((2.0, 0.0, 2.0), 0.5), "out", velocity=own)])
         velocity, sight, n, later = (
@@ -247,7 +247,7 @@ def test_gradient_rate_is_zero_at_a_face_switch():
     ids=["a feature right behind", "an attitude half a turn away"],
 )
 def test_vehicle_turns_from_an_attitude_half_a_turn_away(region):
-    """There the slope is zero: nothing would say which way to turn."""
+    """The gradient is zero there, and gives no direction to turn."""
     flight = fly([region], Region("goal", Sphere((0.0, 0.0, 2.0), 0.5), "in"), duration=20.0)
     north = 1.0 - 2.0 * (flight.quaternion[:, 2] ** 2 + flight.quaternion[:, 3] ** 2)  # of the body's x axis
     assert north[0] > 0.99 and north[-1] < -np.cos(0.4)

@@ -184,7 +184,7 @@ FAMILIES = {"pocket": pocket, "bent pipe": bent_pipe, "rocks": rocks} | {
 
 @pytest.fixture
 def flown(tmp_path):
-    """Return what flies a scenario's text, or its file, and gives the outcome."""
+    """Return a function that runs a scenario's text or file and returns the outcome."""
 
     def fly(scenario):
         file = scenario

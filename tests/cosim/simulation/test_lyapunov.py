@@ -53,7 +53,7 @@ def test_v_of_the_paper_falls_below_zero_without_a_limit():
 
 
 def test_first_value_is_that_of_the_start():
-    """13 f^2 of (32), and Gamma on the restoring parameters: nothing moves yet, the attitude is the desired one."""
+    """13 f^2 of (32), and Gamma on the restoring parameters: the vehicle is at rest in the desired attitude."""
     kept = run("time.duration=0.01", *ALONE)
     phi = load_scenario("paper").true_restoring_parameters
     f = 8.0**2 + 4.0**2 - 0.5**2

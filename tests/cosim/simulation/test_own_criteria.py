@@ -195,7 +195,7 @@ def test_fused_loop_rejects_sampling_engines(own):
 
 
 def test_visibility_criterion_changes_the_motion():
-    """With it the joint comes into view within six seconds, without its pull not at all."""
+    """With the criterion the joint enters the view within six seconds, without its gain never."""
     seen = flown("time.duration=14.0")
     assert (seen["view.clearance"][600:] > 0.0).all()
     assert (Rows(load_scenario(FOUR, ["time.duration=14.0", "regions.view.gain=0"]))["view.clearance"] < -0.4).all()

@@ -38,7 +38,7 @@ def forces(law, outputs):
 @pytest.mark.parametrize("name", BLUEROVS)
 @pytest.mark.parametrize("motor", range(8))
 def test_motor_effects_match_ardusub_factors(name, motor):
-    """As the sign of each factor says; roll and pitch of the horizontal motors are left out by ArduSub."""
+    """By the sign of each factor; ArduSub ignores roll and pitch of the horizontal motors."""
     vehicle = load_vehicle(name)
     pulses = [1500] * 16
     pulses[motor] = 1900

@@ -85,7 +85,7 @@ class Px4:
         return number, struct.unpack(layout, frame[10:-2].ljust(size, b"\0")[:size])
 
     def sensors(self):
-        """What HIL_SENSOR says next; what came before is in `seen`."""
+        """Return the next HIL_SENSOR; earlier messages are in `seen`."""
         while True:
             number, fields = self.message()
             self.seen[number] = fields
@@ -233,7 +233,7 @@ def test_silence_ends_the_run(serve_px4):
 
 @given(st.floats(-500.0, 100.0))
 def test_pressure_round_trips_to_altitude(altitude):
-    """By the exponent of the standard atmosphere as others round it."""
+    """With the rounded exponent of the standard atmosphere in common use."""
     back = (1.0 - (air_pressure(altitude) / 1013.25) ** 0.190263) * 44330.8
     assert back == pytest.approx(altitude, abs=0.05 + 1e-4 * abs(altitude))
 

@@ -67,7 +67,7 @@ def test_each_frame_is_a_step_of_the_plant(serve):
 
 
 def test_imu_at_rest_measures_gravity_and_rangefinder_the_bottom(serve):
-    """Neither weight nor buoyancy, both off by as much: nothing but gravity is left to be felt."""
+    """Weight and buoyancy are off by the same amount: the IMU measures gravity alone."""
     served = serve("time.duration=0.01", "plant.parameters.weight=131.588", "initial.position=[1,2,3]")
     with StandIn(served.address) as pilot:
         said = [pilot.fly(NEUTRAL) for _ in range(12)]
@@ -128,7 +128,7 @@ def test_lowering_motion_is_consistent_with_its_depths():
 
 
 def test_velocity_is_reported_in_ned(serve):
-    """Facing east, and rolled by nothing: forward is east, right is south."""
+    """Heading east without roll: forward is east, right is south."""
     half = 0.5**0.5
     served = serve(
         "time.duration=0.01", f"initial.quaternion=[{half},0,0,{half}]", "initial.velocity=[1.0,0.5,0.25,0,0,0]"
@@ -268,7 +268,7 @@ def test_second_sender_is_rejected_while_the_first_is_active(serve):
 
 @pytest.mark.medium
 def test_autopilot_on_another_port_replaces_a_silent_one(serve, monkeypatch):
-    """With the next count it goes on, as one behind a relay does; with any other it is a new one."""
+    """With the next count the run continues, as behind a relay; any other count starts a new run."""
     monkeypatch.setattr("cosim.sitl.server._PRESENT", 0.05)
     served = serve("time.duration=0.1")
     for first, steps in ((0, 10), (10, 10), (15, 120)):

@@ -47,7 +47,7 @@ def tether(motion):
 
 
 def in_turn(steps, step):
-    """Return the motion where each works on what the others gave after the last step (Jacobi's order)."""
+    """Return the motion with the outputs exchanged after each step (Jacobi's order)."""
     vehicle = of_vehicle(load_vehicle("odin"), {"weight": WEIGHT}, coupled=True)
     rows, force, water, rate, before = [], np.zeros(3), 0j, 0j, 0.0
     with Plant(cached_fmu(vehicle, 2)) as plant:

@@ -42,7 +42,7 @@ def packed(tmp_path_factory):
 
 @pytest.mark.slow
 def test_a_master_with_another_step_is_warned(packed, capfd):
-    """In FMPy, which prints what FMUs say; the scenario has a step of 10 ms, the law a period of 30 ms."""
+    """In FMPy, which prints the log of FMUs; the scenario has a step of 10 ms, the law a period of 30 ms."""
     run_in_fmpy(packed, 20, 0.02)
     warnings = [line for line in capfd.readouterr().out.splitlines() if "late" in line]
     assert len(warnings) == 1

@@ -77,7 +77,7 @@ def test_tiny_degrees_do_not_underflow(implication):
 @settings(max_examples=examples(150), deadline=None)
 @given(st.lists(shapes(), min_size=1, max_size=4), st.data(), st.booleans())
 def test_cuts_of_any_size(terms, data, scaled):
-    """The sweep and its batch at cuts that are next to nothing, alone or beside others."""
+    """The sweep and its batch at tiny cuts, alone or beside others."""
     sizes = st.one_of(st.just(0.0), st.floats(0.0, 1.0), st.floats(-300.0, 0.0).map(lambda x: 10.0**x))
     cuts = [data.draw(sizes) for _ in terms]
     cuts[0] = cuts[0] or 1e-17

@@ -23,7 +23,7 @@ assert files and folders and talkers  # which register
 
 
 def fault_of(case: Case, content: bytes) -> str:
-    """Return what is wrong with how a content is read, "" if nothing is."""
+    """Return the error in reading a content, "" if none."""
     try:
         case.read(content)
     except KINDS as error:

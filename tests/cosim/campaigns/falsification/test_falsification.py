@@ -41,7 +41,7 @@ def varied(objective="clearance", budget=30):
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    """Return a search whose scenes take long enough to come near to something."""
+    """Return a search whose scenes last long enough to approach an obstacle."""
     return run_falsification(search(60, NEARING), tmp_path_factory.mktemp("found") / "out")
 
 
@@ -102,7 +102,7 @@ def test_conflicts_are_searched_for_the_greatest_violation_weighted_by_priority(
 
 
 def interrupt_after(monkeypatch, tables):
-    """Have Ctrl-C come once so many tables are written."""
+    """Raise KeyboardInterrupt after the given number of tables."""
     add, left = CampaignFolder.add, [tables]
 
     def counting(folder, table):

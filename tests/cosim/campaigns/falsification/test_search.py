@@ -13,7 +13,7 @@ DIMENSION = 60
 
 
 class Valley:
-    """Least, 0, in a place of ten coordinates; the others do not count. With some noise."""
+    """A noisy cost with minimum 0 that depends on ten coordinates only."""
 
     def __init__(self, noise=0.0):
         self.place, self.points = np.linspace(0.05, 0.95, 10), []

@@ -157,7 +157,7 @@ def test_scene_uses_its_own_vehicle():
 
 
 def test_arbiter_file_weights_the_criteria_of_any_scene(tmp_path):
-    """The paper's rules, from a file, fly a scene as the scenario's own do; others refuse what they do not know."""
+    """The paper's rules, from a file, give the same run as the scenario's own; others reject unknown criteria."""
     file = tmp_path / "mine.json"
     Arbiter(system=prioritised()).save(file)
     (scene,) = (decode_scene(line.encode()) for line in generate_scenes(1, 3, "hard"))

@@ -139,7 +139,7 @@ def _frozen(value):
 
 @pytest.fixture
 def spied(monkeypatch):
-    """Return a function that flies a scene for half a second, and what the law was made of and given."""
+    """Return a function that runs a scene for half a second and returns the law's arguments and inputs."""
     monkeypatch.setitem(LAWS, "spy", _Spy)
 
     def fly(scene, tell=False):
