@@ -52,7 +52,7 @@ def test_each_benchmark_prints_a_table(name, capsys, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_memory_of_long_runs_is_a_table(capfd, tmp_path):
+def test_long_record_memory_is_printed_as_a_table(capfd, tmp_path):
     work = ["record", "summary", "export csv"]
     main(["long-record", "--rows", "300", "900", "--work", *work, "--folder", str(tmp_path)])
     lines = capfd.readouterr().out.splitlines()
@@ -108,7 +108,7 @@ def test_parts_are_shown_as_multiples_of_their_base():
     ("seconds", "text"),
     [(1.0, "1.00 s"), (0.0123, "12.3 ms"), (4.5678e-6, "4.57 µs"), (250e-9, "250 ns"), (0.9999, "1.00 s")],
 )
-def test_figures_have_their_unit(seconds, text):
+def test_figures_are_printed_with_units(seconds, text):
     assert figure(seconds) == text
 
 
@@ -137,7 +137,7 @@ def test_contestants_alternate_and_a_failure_is_isolated():
     assert "".join(log) == "abcabcab"
 
 
-def test_items_are_counted_for_the_budget():
+def test_item_count_fits_the_time_budget():
     log = []
     count = count_for(KnownScene("a", log, 1e-6), 0.25)
     assert 0.25 <= 1e-6 * count < 1.0

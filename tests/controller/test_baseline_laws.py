@@ -127,7 +127,7 @@ def fly(law, net_weight, seconds, start=(0.0, 0.0, 2.0), regions=(), drag=60.0, 
 
 @pytest.mark.medium
 @pytest.mark.parametrize("name", NAMES)
-def test_each_reaches_a_free_goal_and_stays(name):
+def test_every_law_reaches_a_free_goal_and_stays(name):
     positions, _ = fly(law_of(name), net_weight=0.0, seconds=100.0)
     assert np.linalg.norm(positions[-500:] - [8.0, 1.0, 3.0], axis=1).max() < 0.5
 

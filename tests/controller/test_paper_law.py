@@ -104,7 +104,7 @@ def test_missing_measurement_gives_nan_errors():
     assert np.isnan(secondary_error(np.array([math.nan]), np.ones((1, 3)), np.ones(1))).all()
 
 
-def test_k_q_cancels():
+def test_k_q_has_no_effect():
     taus = []
     for k_q in (0.1, 100.0, 1e5):
         slope = [1.0, 2.0, 3.0]

@@ -252,7 +252,7 @@ def test_forces_stay_within_limits_for_extreme_numbers():
     assert 0 < ended < 50
 
 
-def test_steps_are_negative_where_the_search_was_cut_short(monkeypatch):
+def test_step_count_is_negative_if_the_search_is_truncated(monkeypatch):
     """In plain Python, with one step allowed where four limits are in the way."""
     plain = getattr(solve, "py_func", solve)
     thrusters = make_thrusters(MODELS["odin"])

@@ -140,7 +140,7 @@ def test_incorrect_blocks_fail(text, why, run):
         run(text)
 
 
-def test_a_file_is_there_as_merged(run):
+def test_file_block_is_written_with_its_base_scenario(run):
     folder = run(fence("toml", "[time]\nduration = 5.0", "scenario onto: docking", "file: mine.toml"))
     assert (folder / "mine.toml").read_text().startswith('base = "docking"\n[time]')
 
@@ -190,7 +190,7 @@ def test_values_are_compared_to_their_shown_digits(shown, value, same):
     assert same_value(shown, value) is same
 
 
-def test_only_literals_are_results():
+def test_only_literals_in_comments_are_results():
     assert shown_result("array([1.0, 2.0])") == "array([1.0, 2.0])"
     assert shown_result("inside: (1, 2)") == "(1, 2)"
     assert shown_result("metres") is None

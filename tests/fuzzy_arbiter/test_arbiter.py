@@ -173,7 +173,7 @@ def test_invalid_criteria_are_rejected():
         Arbiter(engine="")
 
 
-def test_normalization():
+def test_normalizations_match_their_formulas():
     inputs = [0.5, 0.25, 0.75]  # h = 1/2, 1/4, 1/2
     assert Arbiter(normalization="none")(inputs) == pytest.approx([1 / 2, (1 + 5 / 32) / 3, 1 / 2])
     assert Arbiter()(inputs) == pytest.approx([1 / 2, 5 / 32, 1 / 2])

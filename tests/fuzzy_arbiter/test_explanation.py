@@ -96,7 +96,7 @@ def test_a_rule_for_two_outputs_decides_both():
     assert [o.runner_up for o in e.outputs] == ["R2", None]  # of lamp_2 both rules conclude the same term
 
 
-def test_weights_of_rules_count():
+def test_rule_weights_scale_strengths():
     e = lamp(("if light is dark then lamp_1 is high with 0.25", "if light is not bright then lamp_1 is low")).explain(
         [0]
     )

@@ -59,7 +59,7 @@ def test_dwell_delays_only_the_release():
     assert firsts(steady(dwell=0.25), [1, 0.5, 0.5, 0.5, 0.2]) == [1, 1, 1, 1, 0]
 
 
-def test_graded_counts_with_its_degree_until_it_enters():
+def test_graded_mode_uses_the_degree_until_the_latch_sets():
     h = steady(graded=True)
     core = Arbiter()
     assert h([0.5, 0.25, 0.0], 0) == core([0.5, 0.25, 0.0])
@@ -68,7 +68,7 @@ def test_graded_counts_with_its_degree_until_it_enters():
     assert h([0.2, 0.25, 0.0], 3) == core([0.2, 0.25, 0.0])
 
 
-def test_settings_of_each_criterion():
+def test_thresholds_can_differ_by_criterion():
     names = ("obstacle", "shape", "depth")
     h = HysteresisArbiter(
         Arbiter(), enter={"obstacle": 0.5, "shape": 0.9, "depth": 1}, release=dict.fromkeys(names, 0.25), dwell=0.0
@@ -82,7 +82,7 @@ def test_settings_of_each_criterion():
     assert h([0, 0, 0], -5.0) == (0, 0, 0)  # the time begins anew
 
 
-def test_criteria_on_measured_places():
+def test_criteria_with_memberships_accept_measured_values():
     near = Criterion("near", on="yes", off="no", membership=falling(1.0, 2.0))  # m
     deep = Criterion("deep", on="yes", off="no", membership=rising(10.0, 12.0))
     h = HysteresisArbiter(Arbiter([near, deep], outside="clip"), enter=1.0, release=0.0)
@@ -120,7 +120,7 @@ def test_terms_can_be_given_explicitly():
     assert turned.active == {"c": True}
 
 
-def test_forty_criteria():
+def test_forty_criteria_are_supported():
     h = HysteresisArbiter(Arbiter([Criterion(f"c{i}") for i in range(40)]), enter=0.75, release=0.25)
     assert sum(h([0.8] * 40, 0.0)) == 1
 

@@ -123,7 +123,7 @@ def test_with_a_default_a_gap_is_no_fault():
 @pytest.mark.medium(fast=8)
 @pytest.mark.parametrize("form", ["hierarchical", "minimal", "conjunctive", "complete"])
 @pytest.mark.parametrize("n", [1, 2, 3, 5])
-def test_all_forms_verify(form, n):
+def test_every_rule_form_verifies(form, n):
     v = verify(prioritised([Criterion(f"c{i}") for i in range(n)], form))
     assert v.ok
     assert verdicts(v) == (True,) * 6
@@ -324,7 +324,7 @@ def test_redundant_rules_are_reported(rules, finding, conjunction):
         assert re.search(finding, text)
 
 
-def test_a_square_is_not_its_root():
+def test_repeated_product_condition_is_not_equal_to_its_factor():
     rules = ["if a is on then y is low", "if b is on and (a is on and a is on) then y is low"]
     found = [f.text for f in verify(system(rules, conjunction="prod")).findings if f.about == "rules"]
     assert len(found) == 1
@@ -358,7 +358,7 @@ def test_tiny_degrees_are_not_lost_in_complements(order):
 
 
 @pytest.mark.slow
-def test_thousands_of_different_weights():
+def test_thousands_of_rule_weights_are_verified():
     rules = tuple(Rule(Is("a", "on"), Is("y", "low"), 0.5 + 0.5 * (i + 1) / 8401) for i in range(8400))
     v = verify(system([*rules, Rule(Is("a", "off"), Is("y", "high"))], "a"))
     assert (v.graded_complete, v.graded_consistent) == (True, True)

@@ -106,14 +106,14 @@ def test_builds_are_reproducible(tmp_path, fmi, compiler, monkeypatch, all_platf
 
 
 @pytest.mark.slow
-def test_command_line_builds(tmp_path, capsys):
+def test_build_command_writes_an_fmu(tmp_path, capsys):
     out = tmp_path / "mine.fmu"
     assert main(["build", "--vehicle", "bluerov2_heavy", "--fmi", "2", "--out", str(out)]) == 0
     assert out.stat().st_size > 10_000
     assert capsys.readouterr().out == f"{out}\n"
 
 
-def test_command_line_lists(capsys):
+def test_list_command_prints_vehicles(capsys):
     assert main(["list"]) == 0
     assert "unsourced" in capsys.readouterr().out
 

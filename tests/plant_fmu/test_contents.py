@@ -111,7 +111,7 @@ def test_page_escapes_special_characters_in_titles(vehicle):
     assert {"a < b & $c", "<script>x</script> ${name}"} <= set(Page(page(odd, 3)).text)
 
 
-def test_licences(vehicle, fmi):
+def test_license_files_are_included(vehicle, fmi):
     made = contents(vehicle, fmi)
     licence = made["documentation/licenses/license.txt"].decode()
     assert licence.startswith((ROOT / "LICENSE").read_text().rstrip())

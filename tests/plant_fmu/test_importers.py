@@ -69,7 +69,7 @@ def test_the_motion_is_in_all_six_degrees_of_freedom(fmu):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["libcosim", "Ecos"])
-def test_co_simulation_agrees(name, fmu):
+def test_co_simulation_results_agree_between_importers(name, fmu):
     if objection := IMPORTER[name].objection(fmu):
         assert (name, fmu.fmi) == ("libcosim", 3), objection
         assert _result(name, fmu.path).status in ("does not apply", "not installed")

@@ -86,7 +86,7 @@ def test_huge_steps_are_refused(make_slave, fmi):
     refused(slave, lambda: slave.fmu.doStep(0.0, 1e9), "substeps")
 
 
-def test_samples_count_as_substeps_do(make_slave, fmi):
+def test_sensor_samples_count_toward_the_substep_limit(make_slave, fmi):
     slave = make_slave(fmi=fmi).start(**{"substep": 1.0, "depth_sensor.rate": 9e3})
     refused(slave, lambda: slave.fmu.doStep(0.0, 200.0), "1.8e+06 substeps", "rates of sensors")
 

@@ -21,7 +21,7 @@ WRENCH = tuple(f"wrench.{a}" for a in "XYZKMN")
 # ---- against FMPy's own calls ----
 
 
-def test_steps_as_fmpy_does(make_plant, make_slave, fmi):
+def test_plant_steps_equal_fmpy_steps(make_plant, make_slave, fmi):
     slave, plant = make_slave("odin", fmi).start(), make_plant("odin", fmi)
     for k in range(100):
         inputs = 20.0 * np.sin(0.1 * k + np.arange(14))

@@ -93,7 +93,7 @@ def test_mutated_record_is_read_or_rejected(tmp_path_factory, data):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="names of files are no bytes here")
-def test_a_folder_whose_name_is_no_utf_8(tmp_path):
+def test_folder_with_a_non_utf8_name_is_rejected(tmp_path):
     folder = tmp_path / os.fsdecode(b"run\xff")
     try:
         folder.mkdir()
@@ -131,7 +131,7 @@ SUMMARIES = {
 
 
 @pytest.mark.parametrize(("key", "values"), SUMMARIES.items(), ids=SUMMARIES)
-def test_d5_a_summary_of_anothers_names_its_key(tmp_path, ordered_run, key, values):
+def test_d5_invalid_summary_value_is_rejected_by_key(tmp_path, ordered_run, key, values):
     folder = tmp_path / "run"
     shutil.copytree(ordered_run, folder)
     sound = json.loads((folder / SUMMARY).read_text())

@@ -101,7 +101,7 @@ def test_contradicted_first_position_fix_is_rejected():
     assert navigator.state.position[1] == pytest.approx(2.0, abs=1e-3)
 
 
-def test_a_start_is_between_two_fixes_and_as_uncertain_as_they_are_apart():
+def test_initial_position_is_the_mean_of_two_fixes_with_their_spread():
     for apart, deviation in ((0.3, np.hypot(0.1, 0.15 / np.sqrt(2.0))), (1.2, np.hypot(0.6, 0.146))):
         navigator = Navigator(MODEL, make_vehicle_state())
         for time, north in ((0.0, 1.0), (1.0, 1.0 + apart)):

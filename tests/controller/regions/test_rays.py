@@ -66,7 +66,7 @@ def out(*shapes):
 
 
 @given(origins, directions, st.floats(0.1, 2.0))
-def test_sphere(origin, way, radius):
+def test_ray_to_sphere_matches_closed_form(origin, way, radius):
     (met,) = rays(out(Sphere((1.0, 2.0, 0.5), radius)), origin, way)
     to_centre = np.array([1.0, 2.0, 0.5]) - origin
     along = to_centre @ way
@@ -80,7 +80,7 @@ def test_sphere(origin, way, radius):
 
 
 @given(origins, directions, directions)
-def test_plane(origin, way, normal):
+def test_ray_to_plane_matches_closed_form(origin, way, normal):
     point = np.array([0.5, -1.0, 2.0])
     (met,) = rays(out(HalfSpace(tuple(point), tuple(normal))), origin, way)
     height, sinking = (origin - point) @ normal, -way @ normal
@@ -93,7 +93,7 @@ def test_plane(origin, way, normal):
 
 
 @given(origins, directions)
-def test_box(origin, way):
+def test_ray_to_box_matches_closed_form(origin, way):
     low, high = np.array([0.0, -0.5, 0.5]), np.array([2.0, 2.5, 1.5])
     (region,) = out(Box((1.0, 1.0, 1.0), (2.0, 3.0, 1.0)))
     (met,) = rays([region], origin, way)
@@ -111,7 +111,7 @@ def test_box(origin, way):
 
 
 @pytest.mark.parametrize("bearing", np.radians(range(0, 360, 15)))
-def test_upright_cylinder(bearing):
+def test_ray_to_cylinder_matches_closed_form(bearing):
     pile = Cylinder((4.0, 0.0, -10.0), (4.0, 0.0, 10.0), 0.65)
     (met,) = rays(out(pile), (0.0, 0.0, 3.0), (math.cos(bearing), math.sin(bearing), 0.0))
     aside, along = 4.0 * abs(math.sin(bearing)), 4.0 * math.cos(bearing)
@@ -183,7 +183,7 @@ def test_level_ray_above_a_shape_misses_it(shape):
     assert (rays(out(shape), (0.0, 0.0, 4.99), *ways) == math.inf).all()
 
 
-def test_along_a_notched_wall_it_ends_too_near_rather_than_too_far():
+def test_ray_along_a_notched_wall_is_conservative():
     wall = Prism(((-50.0, -5.0), (50.0, -5.0), (50.0, 0.0), (40.0, 0.0), (39.0, -1.0), (-50.0, 0.0)), 0.0, 9.0)
     met, closer = rays(out(wall), (42.0, 0.5, 5.0), NORTH, (0.8, -0.6, 0.0))
     assert met > 5.0 and closer == pytest.approx(0.5 / 0.6, abs=1e-3)
@@ -222,7 +222,7 @@ def test_nan_input_gives_nan_ray_distance():
 
 
 @pytest.mark.parametrize("bearing", np.linspace(0.0, 2.0 * np.pi, 9)[:-1])
-def test_a_notched_shape_is_met_from_afar_on_every_side(bearing):
+def test_distant_notched_shape_is_met_from_every_side(bearing):
     """Its circle passes by the rays that cannot meet it, and by no other."""
     origin = np.array([1.5 + 8.0 * np.cos(bearing), 0.9 + 8.0 * np.sin(bearing), 2.0])
     towards = np.array([0.5, 1.0, 2.0]) - origin

@@ -124,7 +124,7 @@ def test_pipes_of_any_bends_have_their_corners_on_the_surface(points, radius):
 
 
 @given(st.lists(st.floats(0.3, 3.0), min_size=3, max_size=9))
-def test_star_shaped_polygons_are_cut_into_triangles_that_fill_them(radii):
+def test_star_shaped_polygons_are_triangulated_completely(radii):
     angles = np.linspace(0.0, math.tau, len(radii), endpoint=False)
     corners = tuple((r * math.cos(a), r * math.sin(a)) for r, a in zip(radii, angles, strict=True))
     mesh = surface_of(Prism(corners, 0.0, 2.0), LIMITS)
@@ -188,7 +188,7 @@ def test_shapes_of_attitude_have_no_surface():
 
 
 @pytest.mark.parametrize("name", [name for name, entry in ENTRIES.items() if entry.half_axes or entry.planes])
-def test_half_axes_and_planes_of_an_entry_are_on_its_surface(name):
+def test_half_axes_and_planes_of_shapes_lie_on_the_surface(name):
     entry = ENTRIES[name]
     shape = entry.example
     if entry.half_axes:

@@ -177,6 +177,6 @@ def test_unsupported_scenarios_are_rejected(change, words):
         FusedFlyer(Variation(load_scenario("paper", [CLOSED, change]), []))
 
 
-def test_the_version_of_the_fmu_cannot_vary_for_one_is_loaded_for_all_rows():
+def test_fmi_version_cannot_vary_between_rows():
     with pytest.raises(RunError, match=r"plant\.fmi varies, expected 3"):
         FusedFlyer(Variation(load_scenario("paper", [CLOSED]), ["plant.fmi"]))

@@ -153,7 +153,7 @@ def test_reused_plant_gives_the_same_run_as_a_new_one(flyer):
     assert again._replace(worst_step=0.0) == fresh._replace(worst_step=0.0)
 
 
-def test_reached_means_inside_for_the_last_seconds_and_reach_time_is_since_when(flyer):
+def test_reached_requires_a_final_stay_and_reach_time_is_its_start(flyer):
     around = replace(PLAIN[0], goal=SphereSpec(PLAIN[0].start, 50.0))  # it starts inside and never leaves
     score, _ = flyer.fly(around)
     assert score.reach_time == 0.0 and not score.reached  # 8 s are less than 10

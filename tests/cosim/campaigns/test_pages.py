@@ -193,7 +193,7 @@ def test_incomplete_campaign_has_no_page(tmp_path, fakes):
 
 
 @pytest.mark.slow
-def test_the_page_of_a_sweep(tmp_path, fakes):
+def test_sweep_page_lists_varied_keys_and_outcomes(tmp_path, fakes):
     run_sweep(paper(), design(40), tmp_path / "out", "choosy")
     checker = check(write_sweep_page(tmp_path / "out", 0))
     assert ["gain k_p1 [N/m3]", "law.gains.k_p1", "10 to 30"] in checker.rows
@@ -247,7 +247,7 @@ def test_text_of_a_page_is_escaped():
 @pytest.mark.parametrize(
     ("x", "text"), [(None, "–"), (-0.12345, "−0.1235"), (34064.2, "34064"), (12.0, "12"), (1.5e12, "1.5e+12")]
 )
-def test_numbers_of_tables(x, text):
+def test_table_numbers_are_formatted(x, text):
     assert number(x) == text
 
 

@@ -110,7 +110,7 @@ def test_noise_exceeds_the_floor_at_the_stated_rate(kind, values):
 
 
 @pytest.mark.medium
-def test_the_floor_is_that_of_the_analysis_of_variance():
+def test_effect_floor_matches_analysis_of_variance():
     rng = np.random.default_rng(7)
     decided = []
     for _ in range(200):
@@ -125,7 +125,7 @@ def test_the_floor_is_that_of_the_analysis_of_variance():
     assert 0.1 < np.mean(decided) < 0.9, "both are asked"
 
 
-def test_the_share_is_the_adjusted_one_of_a_line_in_each_bin():
+def test_effect_share_is_the_adjusted_r_squared_of_binwise_lines():
     rng = np.random.default_rng(8)
     x, y = rng.uniform(size=(2, 100))
     of = np.argsort(np.argsort(x)) // 20

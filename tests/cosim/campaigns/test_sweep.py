@@ -95,7 +95,7 @@ def test_processes_and_executors_give_the_same_rows(tmp_path, fakes):
 
 
 @pytest.mark.medium
-def test_threads_take_turns(tmp_path, fakes, monkeypatch):
+def test_engine_calls_of_threads_are_serialized(tmp_path, fakes, monkeypatch):
     inside, fly = [], Fake.fly
 
     def watched(self, values, seeds):

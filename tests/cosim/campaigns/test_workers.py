@@ -124,7 +124,7 @@ def test_scenes_are_read_from_standard_input(tmp_path, capsys, monkeypatch):
     assert "conditions.tell_failures is True, now False" in capsys.readouterr().err
 
 
-def test_compare_from_the_command_line(tmp_path, capsys):
+def test_compare_command_rejects_invalid_laws(tmp_path, capsys):
     scenes = write(tmp_path / "s.jsonl", HARD[:1])
     assert main(["compare", str(scenes), "--laws", "ismail_dunnigan", "--out", str(tmp_path / "out")]) == 2
     assert "expected two or more" in capsys.readouterr().err

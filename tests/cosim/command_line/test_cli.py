@@ -36,7 +36,7 @@ def test_run_without_out_makes_a_folder_of_its_own(tmp_path, capsys, monkeypatch
     assert folder.name.startswith("paper-")
 
 
-def test_list_and_show(capsys):
+def test_list_and_show_print_scenarios(capsys):
     assert main(["list"]) == 0
     assert "paper-limited" in capsys.readouterr().out
     assert main(["show", "paper", "--set", "limit.force=5"]) == 0
@@ -44,7 +44,7 @@ def test_list_and_show(capsys):
 
 
 @pytest.mark.parametrize("arguments", [["--version"], ["--help"], ["run", "--help"]])
-def test_help_and_version(capsys, arguments):
+def test_help_and_version_exit_with_0(capsys, arguments):
     with pytest.raises(SystemExit) as left:
         main(arguments)
     assert left.value.code == 0
@@ -111,7 +111,7 @@ def test_missing_compiler_gives_one_line_error(tmp_path, capsys, monkeypatch):
 
 
 @pytest.mark.slow
-def test_report_makes_the_report_again(tmp_path, capsys):
+def test_report_command_regenerates_the_report(tmp_path, capsys):
     out = tmp_path / "run"
     assert main(["run", "paper", "--out", str(out), "--no-report", *QUICK]) == 0
     assert not (out / "report.html").exists()

@@ -203,7 +203,7 @@ def test_scenario_and_summary_are_attached(read, run):
     assert '"status": "completed"' in read.attached["summary.json"]
 
 
-def test_chosen_signals_leave_the_scene_whole(run, tmp_path):
+def test_signal_selection_keeps_the_scene_complete(run, tmp_path):
     (path,) = export_run(run, "mcap", tmp_path / "out.mcap", signals=["*.clearance"], every=10)
     read = Read(path)
     assert [t for t in read.messages if t.startswith("/signals/")] == ["/signals/step", "/signals/clearance"]

@@ -206,7 +206,7 @@ def test_heartbeats_are_not_starved_by_other_messages(profile):
 @pytest.mark.parametrize(
     ("profile", "autopilot", "number"), [("ardusub", 3, 4), ("px4", 12, 6 << 16), ("generic", 0, 6 << 16)]
 )
-def test_identity(profile, autopilot, number):
+def test_heartbeat_identifies_the_emulated_autopilot(profile, autopilot, number):
     station = Station(profile)
     station.look()
     station.command(512, 0)

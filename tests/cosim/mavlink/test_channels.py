@@ -511,7 +511,7 @@ def test_tlog_of_a_fast_run_has_no_future_timestamps(tmp_path):
 
 
 @pytest.mark.parametrize(("rate", "seconds"), [(None, 12.0), (10.0, 12.0), (1.0, 0.0), (0.5, 0.0)])
-def test_a_run_gets_ahead_where_it_is_faster_than_the_clock(rate, seconds):
+def test_lead_over_wall_clock_depends_on_duration_and_rate(rate, seconds):
     assert ahead(load_scenario("paper", ["time.duration=12"]), rate) == seconds
 
 

@@ -39,7 +39,7 @@ def test_serial_endpoints_need_no_allow_remote(text, path, baud):
     assert parse_endpoint(text) == Endpoint("serial", text, path=path, baud=baud)
 
 
-def test_a_log_is_a_new_file(tmp_path):
+def test_log_endpoint_requires_a_new_file(tmp_path):
     path = tmp_path / "dive.tlog"
     assert parse_endpoint(str(path)) == Endpoint("tlog", str(path), path=str(path))
     path.touch()

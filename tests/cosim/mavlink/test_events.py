@@ -55,7 +55,7 @@ def test_saturation_is_announced(station):
     assert station.wire.texts == ["Thrust saturated", "Thrust no longer saturated"]
 
 
-def test_armed_disarmed_and_the_bottom(station):
+def test_arming_and_bottom_contact_are_announced(station):
     station.look(1.0, **{"commands.armed": 0.0})
     station.look(1.1)
     station.look(1.2, bottom_contact=1.0)
@@ -156,7 +156,7 @@ def test_loss_timeout_uses_wall_clock_time():
     assert station.commanded() == []
 
 
-def test_time_and_action_are_parameters():
+def test_failsafe_timeout_and_action_are_parameters():
     station = commanding("warn")
     for name, value in ((b"FS_GCS_TIMEOUT", 20.0), (b"FS_GCS_ENABLE", 2.0)):
         station.send(mavlink.MAVLink_param_set_message(1, 1, name, value, 9))

@@ -64,7 +64,7 @@ def client():
     return Client(station)
 
 
-def test_the_file_is_the_list(client):
+def test_parameter_file_equals_the_parameter_list(client):
     decoded = mavftp.MAVFTP.ftp_param_decode(client.whole())
     client.station.send(LIST)
     client.station.wait(0.1)
@@ -74,13 +74,13 @@ def test_the_file_is_the_list(client):
     ]
 
 
-def test_parts_of_the_file(client):
+def test_parameter_file_can_be_read_in_part(client):
     decoded = mavftp.MAVFTP.ftp_param_decode(client.whole(FILE + b"?start=3&count=4&withdefaults=1"))
     whole = mavftp.MAVFTP.ftp_param_decode(client.whole())
     assert [p[:2] for p in decoded.params] == [p[:2] for p in whole.params][3:7]
 
 
-def test_single_reads_and_their_end(client):
+def test_single_reads_return_data_until_end_of_file(client):
     content = client.whole()
     (opened,) = client.request(OPEN, FILE)
     (part,) = client.request(READ, session=opened.session, size=80, offset=40)
@@ -91,12 +91,12 @@ def test_single_reads_and_their_end(client):
     assert (too_long.opcode, too_long.payload[0]) == (NAK, INVALID_SIZE)
 
 
-def test_crc(client):
+def test_file_crc_is_correct(client):
     (reply,) = client.request(CRC, FILE)
     assert struct.unpack("<I", reply.payload)[0] == crc_by_bits(client.whole())
 
 
-def test_folders(client):
+def test_folders_are_listed(client):
     assert client.request(LISTING, b"/")[0].payload == b"D@PARAM\0"
     assert client.request(LISTING, b"@PARAM")[0].payload == f"Fparam.pck\t{len(client.whole())}\0".encode()
     assert client.request(LISTING, b"@PARAM", offset=1)[0].payload[0] == EOF
@@ -119,7 +119,7 @@ def test_write_operations_are_rejected(client, opcode, error):
     assert (reply.opcode, reply.payload[0], reply.req_opcode) == (NAK, error, opcode)
 
 
-def test_sessions_end(client):
+def test_terminated_session_is_invalid(client):
     (opened,) = client.request(OPEN, FILE)
     assert client.request(READ, session=opened.session + 1, size=10)[0].payload[0] == INVALID_SESSION
     for end in (TERMINATE, RESET):

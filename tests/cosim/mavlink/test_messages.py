@@ -45,7 +45,7 @@ def request(station, message_id):
     return [m for m in station.wire.got if m.get_type() != "COMMAND_ACK"]
 
 
-def test_pose(station):
+def test_pose_messages_match_the_snapshot(station):
     (attitude,) = request(station, 30)
     assert (attitude.time_boot_ms, attitude.yaw, attitude.yawspeed) == (12_500, 2.0, pytest.approx(0.03))
     (quaternion,) = request(station, 31)
@@ -64,13 +64,13 @@ def test_pose(station):
     assert math.isnan(odometry.pose_covariance[0]) and odometry.vx == 0.5
 
 
-def test_depth_as_pressure(station):
+def test_depth_is_reported_as_pressure(station):
     (outside,), (inside,) = request(station, 137), request(station, 29)
     assert outside.press_abs == pytest.approx(1013.25 + 1000.0 * 9.80665 * 5.0 / 100.0)
     assert inside.press_abs == pytest.approx(1013.25)
 
 
-def test_thrusters(station):
+def test_actuator_outputs_are_normalized_forces(station):
     (actuators,) = request(station, 375)
     assert actuators.actuator[:4] == [0.5, -1.0, 0.0, 1.0] and actuators.active == 0xFF
 
@@ -120,21 +120,21 @@ def test_sensors_checked_by_mavsdk_are_healthy(station):
     assert status.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_GEOFENCE
 
 
-def test_the_target(station):
+def test_target_messages_match_the_goal(station):
     (target,) = request(station, 85)
     assert (target.coordinate_frame, target.x, target.y, target.z) == (1, 8.0, 0.0, 5.0)
     (nav,) = request(station, 62)
     assert nav.wp_dist == round(math.hypot(7.0, 2.0)) and nav.target_bearing == round(math.degrees(math.atan2(-2, 7)))
 
 
-def test_weights_and_estimates_by_name(station):
+def test_weights_and_estimates_are_sent_as_named_values(station):
     values = {m.name: m.value for m in request(station, 251)}
     assert values["w_obstacle"] == pytest.approx(0.7) and values["phi4"] == 4.0 and values["goal_clear"] == -3.0
     assert values["qp_slack"] == 0.25 and values["clearance"] == 2.0 and values["thrust"] == 1.0
     assert all(len(name) <= 10 for name in values)
 
 
-def test_arrays(station):
+def test_debug_arrays_hold_weights_clearances_and_thrusts(station):
     arrays = {m.array_id: m for m in request(station, 350)}
     assert {i: m.name for i, m in arrays.items()} == {
         1: "weights",
@@ -201,7 +201,7 @@ def test_initial_position_is_reported_before_the_first_step():
     assert (local.x, local.y, local.z) == (1.0, 2.0, 3.0)
 
 
-def test_origin_and_home():
+def test_global_origin_and_home_can_be_set():
     station = Station()
     station.look()
     replies = station.send(mavlink.MAVLink_set_gps_global_origin_message(1, 470_000_000, 80_000_000, 12_000))
@@ -230,7 +230,7 @@ def ecef(latitude, longitude, altitude):
 
 @pytest.mark.parametrize("latitude", [-80.0, -33.0, 0.0, 55.9097, 70.0])
 @pytest.mark.parametrize("offset", [(100.0, 0.0, 0.0), (0.0, 100.0, 5.0), (-70.0, 70.0, 30.0)])
-def test_the_local_frame_against_the_ellipsoid(latitude, offset):
+def test_local_frame_matches_the_ellipsoid(latitude, offset):
     frame = LocalFrame(latitude, 179.9999)
     north, east, down = offset
     here, there = ecef(latitude, 179.9999, 0.0), ecef(*frame.to_global(offset))
@@ -265,7 +265,7 @@ def test_out_of_range_values_are_clamped_to_the_field():
     make("ACTUATOR_OUTPUT_STATUS", 0, 0, [1.0]).pack(coder)
 
 
-def test_numbers_of_the_link():
+def test_link_numbers_are_rounded_clamped_and_wrapped():
     assert [whole(x) for x in (1.4, math.nan, math.inf, -2.0, 3)] == [1, None, None, -2, 3]
     assert float32(math.inf) == float32(1e300) == pytest.approx(3.4028234e38) and float32(-0.5) == -0.5
     assert wrapped(2**32 * 1000 + 5000) == 5 and wrapped(2**32 + 7, 1) == 7

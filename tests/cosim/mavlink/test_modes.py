@@ -44,7 +44,7 @@ def test_arm_and_disarm_commands_are_applied(station):
         ]),
     ],
 )  # fmt: skip
-def test_each_profile_has_its_numbers(profile, numbers, mode):
+def test_mode_numbers_follow_the_profile(profile, numbers, mode):
     station = Station(profile)
     station.look()
     upload(station)
@@ -118,7 +118,7 @@ def test_available_modes_list_settable_modes(station):
 
 
 @pytest.mark.parametrize("armed", [0.0, 1.0])
-def test_base_mode_is_a_real_ardusubs(armed):
+def test_base_mode_equals_that_of_ardusub(armed):
     """ArduSub's base_mode(): stabilised and manual input in all modes, guided where it finds its own way."""
     station = Station("ardusub")
     for number, guided in ((0, 0), (2, 0), (3, 8), (4, 8), (9, 0), (16, 8), (19, 0)):

@@ -76,7 +76,7 @@ def test_obstacle_distance_fields_follow_the_specification():
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_it_is_streamed_once_a_second(profile):
+def test_obstacle_distance_is_streamed_at_1_hz(profile):
     stood = station(profile=profile)
     stood.look(0.0)
     stood.wire.clear()

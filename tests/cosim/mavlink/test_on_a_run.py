@@ -42,7 +42,7 @@ def flight():
         yield Flight(master)
 
 
-def test_disarm_and_arm(flight):
+def test_disarming_stops_thrusters_and_arming_resumes(flight):
     flight.fly(0.5)
     flight.command(400, 0.0)
     flight.fly(0.5)
@@ -83,7 +83,7 @@ def test_position_setpoint_is_reached(flight):
     assert np.linalg.norm([position.x - 1.5, position.y - 0.5, position.z - 1.0]) < 0.51
 
 
-def test_parameters_take_effect(flight):
+def test_parameter_changes_take_effect_in_the_run(flight):
     flight.fly(0.1)
     for name, value in ((b"LAW_SPEED", 0.7), (b"SR1_RADIUS", 0.4), (b"THR_MAX_1", 20.0), (b"GOAL_RADIUS", 0.8)):
         flight.send(mavlink.MAVLink_param_set_message(1, 1, name, value, 9))
@@ -114,7 +114,7 @@ def test_manual_control_moves_the_vehicle(flight):
 
 
 @pytest.mark.medium
-def test_a_mission_of_regions(flight):
+def test_uploaded_mission_is_completed(flight):
     flight.fly(0.1)
     places = [(0.6, 0.0, 1.0), (1.2, 0.4, 1.2)]
     flight.send(mavlink.MAVLink_mission_count_message(1, 1, 3, 0))

@@ -128,7 +128,7 @@ def test_the_frame_is_that_of_the_vehicle():
 
 @pytest.mark.medium(fast=6)
 @pytest.mark.parametrize("name", list_scenarios())
-def test_no_setting_is_hidden_by_a_name_that_stations_look_for(name):
+def test_parameter_names_do_not_collide_with_station_parameters(name):
     keys = [setting.key for setting in LiveSettings(scenario(name=name))]
     taken = set(parameter_names(keys).values())
     for profile in ("ardusub", "px4"):
@@ -152,7 +152,7 @@ def test_request_during_a_listing_restarts_it(station):
     assert {v.param_index for v in station.wire.of("PARAM_VALUE")} == set(range(count))
 
 
-def test_read_by_name_and_by_index(station):
+def test_parameter_is_readable_by_name_and_by_index(station):
     (value,) = read(station, "GOAL_RADIUS")
     (same,) = read(station, "", value.param_index)
     assert (value.param_id, value.param_value) == (same.param_id, same.param_value) == ("GOAL_RADIUS", 0.5)
@@ -229,7 +229,7 @@ def test_full_queue_leaves_the_value_unchanged(station):
     assert read(station, "GOAL_RADIUS")[0].param_value == 256.0
 
 
-def test_speed_is_a_parameter(station):
+def test_speed_command_sets_the_speed_parameter(station):
     assert station.command(178, 1.0, 0.6) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command(178, 1.0, -1.0) == mavlink.MAV_RESULT_ACCEPTED  # as it is
     assert station.command(178, 1.0, NAN) == mavlink.MAV_RESULT_DENIED
@@ -253,7 +253,7 @@ def crc_by_bits(data):
 
 
 @given(st.binary(max_size=60))
-def test_crc(data):
+def test_crc32_matches_bitwise_reference(data):
     assert bare_crc32(data) == crc_by_bits(data)
     assert bare_crc32(data[3:], bare_crc32(data[:3])) == crc_by_bits(data)
 
@@ -283,7 +283,7 @@ def test_px4_parameter_hash_identifies_the_list():
 
 @settings(max_examples=examples(200))
 @given(st.floats(width=32, allow_nan=False, allow_infinity=False))
-def test_shortest_is_the_same_float32(value):
+def test_shortest_decimal_round_trips_as_float32(value):
     short = shortest(value)
     assert struct.pack("<f", short) == struct.pack("<f", value)
     assert significant(short) <= significant(value)

@@ -197,7 +197,7 @@ RAW = bytes(range(128, 160))
         (bytes(32), bytes(32)),
     ],
 )
-def test_key_files(tmp_path, content, key):
+def test_key_files_are_read(tmp_path, content, key):
     assert read_key(key_file(tmp_path, content)) == key
 
 

@@ -133,7 +133,7 @@ def test_seventeen_messages_at_50_hertz_are_accepted(station):
     assert all(counts[mavlink.mavlink_map[i].msgname] == 100 for i in ids)
 
 
-def test_version_and_banner(station):
+def test_version_and_banner_are_sent_on_request(station):
     assert station.command(520, 1.0) == ACCEPTED and station.command(42428) == ACCEPTED
     (version,) = station.wire.of("AUTOPILOT_VERSION")
     assert version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT

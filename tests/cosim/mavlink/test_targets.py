@@ -55,7 +55,7 @@ def test_setpoint_frames_are_converted(station, frame, position):
     assert command.position == pytest.approx(position)
 
 
-def test_with_velocity_and_yaw(station):
+def test_setpoint_velocity_and_yaw_are_applied(station):
     station.send(local(mask=WITH_VELOCITY, speed=(0.1, 0.2, 0.0)))
     station.send(local(mask=POSITION & ~1024, yaw=1.0, place=(1.0, 1.0, 1.0)))
     aim, other, face = station.commanded()
@@ -81,7 +81,7 @@ def test_invalid_setpoint_is_rejected_with_one_text(station, message):
     assert len([t for t in station.wire.texts if t.startswith("Refused")]) == 1
 
 
-def test_set_points_count_while_the_region_is_to_be_reached(station):
+def test_setpoints_are_applied_only_in_reach_mode(station):
     station.look(2.0, **{"commands.mode": 1.0})
     station.send(local())
     assert station.commanded() == []
@@ -94,7 +94,7 @@ def velocity(going, frame=1, mask=0b110111000111, **more):
     return local(frame, mask, (0.0, 0.0, 0.0), going, **more)
 
 
-def test_a_velocity_without_a_position_travels_from_here_until_it_ends(station):
+def test_velocity_setpoint_moves_the_target_from_the_current_position_until_timeout(station):
     """MAVSDK's set_velocity_ned, sent again at 20 Hz, and then no more."""
     for _ in range(20):
         station.send(velocity((0.2, 0.0, -0.1)))
@@ -138,7 +138,7 @@ def test_attitude_target_is_rejected_with_text(station):
     assert "Refused: attitude set-points" in "".join(station.wire.texts)
 
 
-def test_a_set_point_before_its_mode_is_no_warning_and_counts_with_it(station):
+def test_setpoint_streamed_before_its_mode_is_applied_on_mode_change(station):
     """PX4's pattern: stream set-points, then switch to offboard."""
     station.look(2.0, **{"commands.mode": 1.0})
     station.wire.clear()
@@ -190,7 +190,7 @@ def test_excess_status_texts_are_queued(station):
     assert station.wire.texts == [f"text {k}" for k in range(30)]
 
 
-def test_targets_above_water_or_outside_their_region_are_followed_with_a_warning():
+def test_targets_above_water_or_outside_a_region_are_accepted_with_a_warning():
     kept_in = scenario(name="harbour")
     station = Station("ardusub", of=kept_in)
     station.look()
@@ -215,14 +215,14 @@ def test_invalid_speeds_are_rejected_with_text(speed):
     assert station.commanded() == []
 
 
-def test_speeds_of_the_protocol(station):
+def test_speed_command_values_follow_the_protocol(station):
     assert terminal_speed(load_vehicle("bluerov2_heavy")) == pytest.approx(0.85, abs=0.01)  # 13.7 v + 141 v² = 113 N
     for asked, key in ((-1.0, None), (0.2, 0.2), (-2.0, station.autopilot._context.scenario.law.gains.speed)):
         assert station.command(178, 0.0, asked) == mavlink.MAV_RESULT_ACCEPTED
         assert [c.value for c in station.commanded()] == ([] if key is None else [key])
 
 
-def test_the_same_set_point_counts_again_after_another_mode(station):
+def test_repeated_setpoint_is_applied_again_after_a_mode_change(station):
     station.send(local())
     station.look(2.0, **{"commands.mode": 1.0})
     station.look(3.0)
@@ -242,19 +242,19 @@ def where(position):
 
 
 @pytest.mark.parametrize("frame", [0, 3, 5, 6])
-def test_set_points_on_the_globe(station, frame):
+def test_global_setpoints_are_converted_to_local(station, frame):
     station.send(globe(frame, where((30.0, -20.0, 4.0))))
     (command,) = station.commanded()
     assert command.position == pytest.approx((30.0, -20.0, 4.0), abs=0.02)
 
 
-def test_other_frames_on_the_globe(station):
+def test_unsupported_global_frames_are_ignored(station):
     for frame in (1, 11):
         station.send(globe(frame, where((30.0, -20.0, 4.0))))
     assert station.commanded() == []
 
 
-def test_reposition(station):
+def test_reposition_moves_the_target(station):
     x, y, z = where((30.0, -20.0, 4.0))
     assert station.command_int(REPOSITION, 0, (-1.0, 1.0, 0.0, 0.5), x, y, z) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command(REPOSITION, -1.0, 1.0, 0.0, NAN, x / 1e7, y / 1e7, z) == mavlink.MAV_RESULT_ACCEPTED
@@ -267,7 +267,7 @@ def test_reposition(station):
     assert station.command_int(REPOSITION, 0, (-1, 1, 0, NAN), 0, 0, 0.0) == mavlink.MAV_RESULT_DENIED
 
 
-def test_reposition_without_a_place_holds_this_one(station):
+def test_reposition_without_a_position_holds_the_current_one(station):
     assert station.command(REPOSITION, -1.0, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED  # QGroundControl's pause for PX4
     assert station.command(REPOSITION, -1.0, 1.0, 0.0, 0.5) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command(REPOSITION, -1.0, 1.0, 0.0, NAN, NAN, NAN, -2.0) == mavlink.MAV_RESULT_ACCEPTED
@@ -398,7 +398,7 @@ def test_reported_obstacle_becomes_a_region(station, frame, position):
     assert (command.number, command.radius) == (1, 0.5) and command.position == pytest.approx(position)
 
 
-def test_the_body_frame_leans_with_the_body(station):
+def test_body_frame_offsets_follow_the_full_attitude(station):
     quaternion = from_axis_angle(np.array([0.0, 1.0, 0.0]), math.pi / 2)  # nose up: ahead is up
     station.look(2.0, **{"quaternion.e0": tuple(quaternion)})
     station.send(obstacle(frame=12, place=(2.0, 0.0, 0.0)))

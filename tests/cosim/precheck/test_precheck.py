@@ -58,7 +58,7 @@ def test_every_shipped_scenario_is_checkable(name):
 
 
 @pytest.mark.medium
-def test_properties_of_the_papers_vehicle(paper):
+def test_properties_1_to_3_and_12_are_evaluated_for_the_papers_vehicle(paper):
     assert [paper[name].status for name in ("Property 1", "Property 2", "Property 3", "(12)")] == [
         "holds", "holds", "note", "holds",
     ]  # fmt: skip
@@ -72,7 +72,7 @@ def test_check_uses_the_plant_parameters(paper):
     assert of_law(*drag)["Property 3"].status == "holds"
 
 
-def test_conditions_of_the_paper(paper):
+def test_gain_conditions_38_and_45_are_evaluated_for_the_paper(paper):
     first = paper["(38) 1, 2"]
     assert first.status == "fails"
     assert first.numbers["position_have"] == pytest.approx(0.04, abs=0.001)
@@ -106,7 +106,7 @@ def test_following_the_advice_satisfies_the_conditions(paper, finding, key):
     assert of_law(f"law.gains.{key}={1.05 * value}")[finding].status == "fails"
 
 
-def test_advice_on_attitude():
+def test_attitude_gain_advice_satisfies_the_condition():
     heavy = of_law("law.gains.sigma_a=50")
     assert heavy["(38) 1, 2"].numbers["greatest_gradient"] == 0.0
     value = float(re.search(r"sigma_a to ([0-9.]+[0-9])", heavy["(38) 1, 2"].advice)[1])
@@ -167,7 +167,7 @@ def test_overlaps_of_keep_out_regions_are_measured(paper):
     assert "overlaps" not in of_regions("regions.SR2.shape.centre=[2,0,9]", "regions.SR1.shape.centre=[2,9,9]")
 
 
-def test_current_that_is_too_strong():
+def test_excessive_current_fails_with_the_admissible_speed():
     found = of_thrust("plant.current=[2.0,0.0,0.0]")["holding still"]
     assert found.status == "fails"
     # 76.4 N against 48 N s2/m2
@@ -212,7 +212,7 @@ def test_moving_regions_are_checked_at_time_zero():
     assert "at time 0" in found["goal and regions"].text
 
 
-def test_no_regions():
+def test_scenario_without_regions_has_a_free_path():
     found = of_regions("regions=[]", "intersection=[]")
     assert "goal and regions" not in found and found["way"].status == "holds"
 
@@ -233,7 +233,7 @@ def test_passed_check_exits_with_0(capsys):
 
 
 @pytest.mark.slow
-def test_command_as_json(capsys):
+def test_check_command_prints_json(capsys):
     assert main(["check", "paper", "--set", CLOSED, "--set", "law.gains.sigma_p=0", "--json"]) == 1
     result = json.loads(capsys.readouterr().out)
     assert result["holds"] is False and result["law"] == "ismail_dunnigan"

@@ -28,7 +28,7 @@ def test_directions_are_26_unit_vectors_with_names_of_their_own():
     # four horizontal thrusters at 45 degrees, four vertical ones, of 27 N each
     [("north", 4 * 27.0 / math.sqrt(2.0)), ("south-west", 54.0), ("down", 108.0), ("up", 108.0)],
 )
-def test_greatest_force(direction, expected):
+def test_greatest_force_matches_the_thruster_geometry(direction, expected):
     assert greatest_force(ODIN, np.array(DIRECTIONS[direction]), NOTHING, ALL) == pytest.approx(expected)
 
 
@@ -50,7 +50,7 @@ def margin(current, weight=ODIN.weight, quaternion=LEVEL, vehicle=ODIN):
 
 
 @pytest.mark.medium
-def test_still_water():
+def test_margin_in_still_water_is_the_full_force():
     m = margin(STILL)
     assert m.drag == 0.0 and m.excess_weight == pytest.approx(-2.0)
     assert m.thrust.force == pytest.approx(54.0) == m.left.force  # 2 N of 108 N leave the horizontal as it is
@@ -59,7 +59,7 @@ def test_still_water():
 
 
 @pytest.mark.medium
-def test_current_takes_its_drag():
+def test_current_reduces_the_margin_by_its_drag():
     """48 N s2/m2 at 0.4 m/s from the south: 7.68 N, of which 1/sqrt(2) along the weak diagonal."""
     m = margin([0.4, 0.0, 0.0])
     assert m.drag == pytest.approx(7.68)

@@ -65,7 +65,7 @@ def test_settled_means_inside_for_the_last_ten_seconds(shipped_run):
     assert early["reached"] and early["settle_time"] == pytest.approx(13.87, abs=0.1) and not early["settled"]
 
 
-def test_spans():
+def test_spans_of_a_boolean_signal_are_found():
     time = np.arange(6) * 0.5
     assert spans(np.array([0, 1, 1, 0, 0, 1], bool), time) == [(0.5, 1.5), (2.5, 2.5)]
     assert spans(np.array([1, 1, 1, 1, 1, 1], bool), time) == [(0.0, 2.5)]
@@ -187,7 +187,7 @@ def test_interrupt_before_the_first_step_leaves_no_folder(tmp_path, monkeypatch)
     assert not (tmp_path / "run").exists()
 
 
-def test_no_record_is_a_clear_error(tmp_path):
+def test_missing_or_damaged_record_is_rejected(tmp_path):
     with pytest.raises(RunError, match="no record"):
         load_record(tmp_path)
     (tmp_path / "record.parquet").write_bytes(b"PAR1 and then nothing")

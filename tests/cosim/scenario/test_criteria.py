@@ -214,7 +214,7 @@ def test_every_format_is_read(own, suffix):
         ('criteria=[{name="obstacle"},{name="depth"},{name="shape"}]', "mine.toml has no output 'shape'"),
     ],
 )
-def test_faults_of_inputs_and_outputs_are_named(own, change, words):
+def test_invalid_inputs_and_outputs_are_rejected_by_name(own, change, words):
     with pytest.raises(ScenarioError) as caught:
         load_scenario(own, [change])
     assert words in str(caught.value) and "\n" not in str(caught.value)
@@ -230,7 +230,7 @@ def test_faults_of_inputs_and_outputs_are_named(own, change, words):
         ('  "if distance is far and soon is later then obstacle is low",\n', "", "output 'obstacle' has no default"),
     ],
 )  # fmt: skip
-def test_faults_of_the_file_are_named(own, old, new, words):
+def test_invalid_arbiter_files_are_rejected_by_name(own, old, new, words):
     text = RULES.replace(old, new)
     if "deep" in new:
         text = text.replace('name = "depth"', 'name = "deep"')

@@ -47,7 +47,7 @@ def test_without_an_arbiter_all_weights_are_1():
 
 
 @pytest.mark.parametrize("variant", ["ordered", "reversed", "crisp", "none"])
-def test_variants_have_the_closed_form(variant):
+def test_rule_variants_use_the_closed_form_engine(variant):
     assert Arbiter(system=rules_by_order(variant, FOUR, 101)).engine == "closed"
 
 

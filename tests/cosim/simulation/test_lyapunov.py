@@ -103,7 +103,7 @@ def test_recording_lyapunov_changes_no_other_column(shipped_run):
         assert np.array_equal(without[name], with_v[name]), name
 
 
-def test_summary_counts_rises():
+def test_summary_counts_increases_of_v():
     signals = {"time": np.arange(6) * 0.5, "lyapunov.rate": np.zeros(6)}
     signals |= {
         "lyapunov.printed": np.array([5.0, 4.0, 4.0, 4.5, 4.6, 1.0]),
@@ -124,7 +124,7 @@ def test_summary_counts_rises():
 
 
 @pytest.mark.slow
-def test_report_draws_v(tmp_path):
+def test_report_plots_the_lyapunov_function(tmp_path):
     scenario = load_scenario("paper", [*QUICK, "time.duration=0.4"])
     done = run_scenario(scenario, tmp_path / "run")
     assert done.summary["lyapunov"]["primary"]["first_negative"] == pytest.approx(0.03, abs=0.002)

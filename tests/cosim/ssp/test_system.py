@@ -272,7 +272,7 @@ def test_step_that_does_not_divide_a_period_is_rejected(tmp_path, capsys):
 # ---- the command ----
 
 
-def test_the_command_writes_it(tmp_path, capsys, monkeypatch):
+def test_package_command_writes_the_system(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["package", str(ALL_SHAPES), "--to", "ssp"]) == 0
     assert capsys.readouterr().out == "all-shapes.ssp\n"

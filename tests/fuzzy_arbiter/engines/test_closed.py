@@ -39,7 +39,7 @@ def criteria(n):
     return [Criterion(f"c{i}") for i in range(n)]
 
 
-def test_it_is_the_exact_centroid_on_100_000_inputs():
+def test_closed_form_equals_exact_centroid_on_100_000_inputs():
     """The joined triangles integrated over their knots in extended precision, without the closed form."""
     inputs = np.random.default_rng(5).random((100_000, 3))
     x = inputs.astype(np.longdouble)
@@ -63,7 +63,7 @@ def test_it_is_the_exact_centroid_on_100_000_inputs():
 @pytest.mark.medium
 @settings(max_examples=examples(60), deadline=None)
 @given(st.lists(st.fractions(0, 1, max_denominator=64), min_size=1, max_size=5))
-def test_it_is_the_centroid_by_definition_in_rational_numbers(memberships):
+def test_closed_form_equals_rational_centroid(memberships):
     system = prioritised(criteria(len(memberships)))
     inputs = [float(m) for m in memberships]
     exact = [float(w) for w in reference.weights(system, inputs)]
@@ -117,7 +117,7 @@ def test_a_centroid_beyond_both_ends_is_clipped():
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("height", [1e-2, 1e-4, 1e-6])
-def test_terms_of_very_different_areas(height):
+def test_terms_of_very_different_areas_are_exact(height):
     """Where the area is a millionth of what it was, and C(h) a million times as steep."""
     plateau, low_triangle = Shape(((0, 1),)), Shape(((0.6, 0), (0.7, height), (0.8, 0)))
     narrow = triangle(0.7 - height, 0.7, 0.7 + height)
@@ -145,7 +145,7 @@ def test_piecewise_evaluation_is_exact_next_to_breakpoints(height):
             assert engine.weights([h])[0] == pytest.approx(exact, abs=16 * EPS)
 
 
-def test_the_number_of_pieces():
+def test_number_of_cubic_pieces_is_minimal():
     """One cubic for the full triangles, also for trapezoids that meet there; three for the asymmetric pair."""
 
     def count(low, high):
@@ -171,7 +171,7 @@ def test_equivalent_rule_forms_give_the_same_weights(n):
     (1, "hierarchical", 2), (3, "hierarchical", 8), (10, "hierarchical", 29),
     (3, "minimal", 6), (3, "conjunctive", 9), (3, "complete", 24), (5, "complete", 160),
 ])  # fmt: skip
-def test_the_number_of_rules(n, form, count):
+def test_number_of_rules_follows_the_form(n, form, count):
     assert len(prioritised(criteria(n), form).rules) == count
 
 
@@ -206,7 +206,7 @@ def test_any_clauses_of_complementary_cuts_have_a_closed_form():
     assert np.abs(arbiter.batch(x) - [arbiter(row) for row in x.tolist()]).max() <= EPS
 
 
-def test_criteria_with_memberships_of_their_own():
+def test_criteria_with_custom_memberships_have_a_closed_form():
     hot = Criterion("temperature", on="hot", off="fine", membership=rising(24.0, 30.0))
     near = Criterion("wall", on="near", off="far", membership=falling(0.0, 0.5))
     arbiter = Arbiter([near, hot], outside="clip")
@@ -297,7 +297,7 @@ def test_weights_rise_smoothly():
     assert max(slopes[0], slopes[-1]) < 0.01
 
 
-def test_a_shape_with_a_plateau_below_one():
+def test_shape_with_a_plateau_below_one_is_exact():
     low, high = Shape(((0, 0.5), (0.5, 0.5), (1, 0))), Shape(((0, 0), (0.5, 0.25), (1, 1)))
     output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
     arbiter = Arbiter(criteria(2), weight=output)

@@ -33,7 +33,7 @@ EPS = np.finfo(float).eps
 @pytest.mark.medium
 @settings(max_examples=examples(150), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(systems(), st.data())
-def test_it_is_the_exact_centroid_of_any_system(system, data):
+def test_centroid_is_exact_for_any_system(system, data):
     inputs = [data.draw(st.floats(0.0, 1.0)) for _ in system.inputs]
     exact = reference.centroids(system, inputs)
     arbiter = Arbiter(system=system, engine="exact")
@@ -42,7 +42,7 @@ def test_it_is_the_exact_centroid_of_any_system(system, data):
     assert np.array_equal(arbiter.batch([inputs])[0], arbiter(inputs), equal_nan=True)
 
 
-def test_the_tipping_answer():
+def test_tipping_example_is_exact():
     """Of scikit-fuzzy's example, whose exact centroid is 12118694/610275."""
     poor, middling, good = triangle(0, 0, 5), triangle(0, 5, 10), triangle(5, 10, 10)
     words = (Term("poor", poor), Term("average", middling), Term("good", good))
@@ -76,7 +76,7 @@ def test_tiny_degrees_do_not_underflow(implication):
 
 @settings(max_examples=examples(150), deadline=None)
 @given(st.lists(shapes(), min_size=1, max_size=4), st.data(), st.booleans())
-def test_cuts_of_any_size(terms, data, scaled):
+def test_cuts_of_any_size_are_exact(terms, data, scaled):
     """The sweep and its batch at tiny cuts, alone or beside others."""
     sizes = st.one_of(st.just(0.0), st.floats(0.0, 1.0), st.floats(-300.0, 0.0).map(lambda x: 10.0**x))
     cuts = [data.draw(sizes) for _ in terms]
@@ -99,7 +99,7 @@ def test_single_symmetric_term_has_its_center_at_any_cut(cut):
     assert arbiter.batch([[cut]])[0].tolist() == list(arbiter([cut]))
 
 
-def test_lines_whose_slopes_differ_by_less_than_rounding():
+def test_nearly_parallel_lines_are_exact():
     almost = Shape(((0, 1), (1, 1e-20)))
     output = Output("y", (0, 1), (Term("a", falling(0, 1)), Term("b", almost), Term("c", rising(0, 1))))
     inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)

@@ -44,7 +44,7 @@ def test_every_mavsdk_step_completes(flown):
     assert {name: done["error"] for name, done in flown.items() if "error" in done and name != "commands"} == {}
 
 
-def test_health_is_all_ok(flown):
+def test_mavsdk_reports_healthy(flown):
     assert value(flown, "health") is True
 
 

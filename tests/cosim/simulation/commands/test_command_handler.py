@@ -282,7 +282,7 @@ def test_gain_change_reaches_a_law_activated_later(fly):
     assert run.master.law.gains.speed == 0.2
 
 
-def test_gains_and_limits_of_the_direct_wrench(fly):
+def test_force_limit_and_region_gain_change_during_a_run(fly):
     run = fly(
         {500: [ChangeSetting("limit.force", 20.0), ChangeSetting("regions.SR1.gain", 3.0)]},
         "time.duration=1",
