@@ -289,7 +289,7 @@ def test_cached_fmu_is_reused_for_its_compiler_or_without_one(tmp_path, monkeypa
         cached_fmu(load_vehicle("odin"), 3)
 
 
-def test_overlong_text_leaves_no_partial_text(tmp_path, monkeypatch, capsys):
+def test_parameter_file_on_a_full_disk_leaves_no_partial_file(tmp_path, monkeypatch, capsys):
     """The disk is full when the last byte comes."""
 
     def full(source, target):
