@@ -30,7 +30,7 @@ SHIFT = 0.9, -1.6, 1.9
 # ---- clocks ----
 
 
-def test_the_quickest_answer_gives_the_offset():
+def test_clock_offset_uses_the_fastest_answer():
     sync = ClockSync()
     assert math.isnan(sync.offset)
     for sent, took, skew in ((10.0, 0.100, 0.03), (11.0, 0.004, 0.0), (12.0, 0.060, -0.02)):
@@ -41,7 +41,7 @@ def test_the_quickest_answer_gives_the_offset():
     assert sync.offset == pytest.approx(3.0, abs=1e-6)
 
 
-def test_an_autopilot_that_starts_again_has_another_offset_at_once():
+def test_autopilot_restart_resets_the_clock_offset():
     sync = ClockSync()
     for sent, boot in ((10.0, 500.0), (11.0, 501.0), (12.0, 0.5)):
         sync.take(round(boot * 1e9), sync.request(sent - 0.005), sent + 0.005)
@@ -67,7 +67,7 @@ def reported(position, geodetic=None, depth=None, heard=0.0, state=None):
     return state
 
 
-def test_the_frame_follows_from_globe_and_pressure():
+def test_frame_offset_is_derived_from_global_position_and_pressure():
     origin = (55.9097, -3.3203)
     alignment, frame, state = FrameAlignment(SceneOrigin(geodetic=origin)), LocalFrame(*origin), None
     true = np.array([3.0, -2.0, 4.0])
@@ -79,7 +79,7 @@ def test_the_frame_follows_from_globe_and_pressure():
     assert alignment.to_scene(state.position) == pytest.approx(true, abs=0.02)
 
 
-def test_positions_that_do_not_agree_give_no_frame():
+def test_inconsistent_positions_give_no_frame_offset():
     origin, rng = (55.9097, -3.3203), np.random.default_rng(1)
     alignment, frame, state = FrameAlignment(SceneOrigin(geodetic=origin)), LocalFrame(*origin), None
     for k in range(60):
@@ -113,7 +113,7 @@ VECTORED_6DOF = np.array(
 @pytest.mark.parametrize(
     "wrench", [(113, 0, 0, 0, 0, 0), (28, 28, 0, 0, 0, 0), (28, -20, 10, 0, 0, 1), (0, 0, -40, 2, 2, 0)]
 )
-def test_an_ardusub_makes_of_the_sticks_the_wrench_that_they_were_made_for(wrench):
+def test_ardusub_motor_mix_realizes_the_desired_wrench(wrench):
     """It adds the sticks in each motor, and its force goes with the square; our thrusters push the other way."""
     scale = scale_of(HEAVY, ARDUSUB, 0.5)
     sticks = scale.sticks(0.25 * np.array(wrench, dtype=float))
@@ -124,7 +124,7 @@ def test_an_ardusub_makes_of_the_sticks_the_wrench_that_they_were_made_for(wrenc
 
 
 @pytest.mark.parametrize("profile", ["px4", "generic"])
-def test_sticks_give_the_wrench_that_they_were_made_for(profile):
+def test_manual_control_realizes_the_desired_wrench(profile):
     """Through the vehicle's own service for sticks, whose parts of the greatest wrench the pilot's gain scales."""
     station = Station(profile, of=scenario("vehicle='bluerov2_heavy'", name="pipe-inspection"))
     station.look(1.0, **{"commands.mode": 0.0})
@@ -136,7 +136,7 @@ def test_sticks_give_the_wrench_that_they_were_made_for(profile):
     assert 0.5 * np.array(command.wrench) / np.diag(scale.efforts) == pytest.approx(wrench, rel=0.02)
 
 
-def test_a_velocity_leads_by_the_acceleration_that_the_wrench_gives():
+def test_velocity_setpoint_leads_by_the_desired_acceleration():
     def asked_for(force, speed):
         state = reported((0.0, 0.0, 0.0))
         state.velocity[:] = speed, 0.0, 0.0
@@ -153,7 +153,7 @@ def test_a_velocity_leads_by_the_acceleration_that_the_wrench_gives():
 
 
 @pytest.mark.parametrize(("gain", "lag", "push"), [(1.0, 3.0, 0.0), (0.41, 1.55, -0.05), (0.65, 0.8, 0.06)])
-def test_a_velocity_loop_of_another_gain_and_lag_does_what_the_wrench_asks_for(gain, lag, push):
+def test_velocity_lead_compensates_unknown_gain_and_lag(gain, lag, push):
     """A speed is kept through a loop that is not the assumed one, with a current; without the observer it is not."""
     lead, state, period, wanted = VelocityLead(HEAVY, 2.0, 0.5), reported((0.0, 0.0, 0.0)), 0.02, 0.25
     for _ in range(1500):
@@ -165,7 +165,7 @@ def test_a_velocity_loop_of_another_gain_and_lag_does_what_the_wrench_asks_for(g
     assert state.velocity[0] == pytest.approx(wanted, abs=0.005)
 
 
-def test_a_way_without_a_fix_is_reckoned():
+def test_distance_without_a_fix_is_accumulated():
     """Of 3 m north and 4 m down the horizontal part, and only while the estimate says that it is relative."""
     relative, absolute = 8, 24  # flags of EKF_STATUS_REPORT and ESTIMATOR_STATUS
     alignment, state = FrameAlignment(SceneOrigin(surveyed=SHIFT)), ReportedState((255, 191))
@@ -188,7 +188,7 @@ def seen(**values):
 
 
 @pytest.mark.parametrize("condition", CONDITIONS, ids=lambda condition: condition.name)
-def test_each_condition_ends_steering_beyond_its_limit_alone(condition):
+def test_steering_ends_only_beyond_a_condition_limit(condition):
     supervisor = Supervisor()
     assert supervisor.update(seen()) == "steering"
     at_limit = Observation(0.0, True, True, True, True, {condition.name: condition.limit})
@@ -200,7 +200,7 @@ def test_each_condition_ends_steering_beyond_its_limit_alone(condition):
     assert supervisor.update(seen()) == "steering" and supervisor.reason == ""
 
 
-def test_the_way_to_steering_goes_step_by_step():
+def test_supervisor_states_advance_in_order():
     supervisor, nothing = Supervisor(), Observation(0.0, False, False, False, False, {})
     known = {"has_state": True}
     expected = [
@@ -222,13 +222,13 @@ def test_the_way_to_steering_goes_step_by_step():
         (254, 1, 300, 500, True),
     ],
 )
-def test_deflected_sticks_of_somebody_else_are_a_pilots(system, component, x, z, counts):
+def test_deflected_foreign_sticks_count_as_a_pilot(system, component, x, z, counts):
     state = reported((0.0, 0.0, 0.0))
     state.take(system, component, mavlink.MAVLink_manual_control_message(1, x, 0, z, 0, 0), 5.0)
     assert (state.pilot_at == 5.0) == counts
 
 
-def test_overridden_channels_are_a_pilots_too():
+def test_rc_override_counts_as_a_pilot():
     state = reported((0.0, 0.0, 0.0))
     pulses = [0, 0xFFFF, 1500, 1500, 1700, 0, 0, 0]
     state.take(255, 190, mavlink.MAVLink_rc_channels_override_message(1, 1, *pulses), 6.0)
@@ -247,7 +247,7 @@ def decoded(message):
     return found
 
 
-def test_failsafe_parameters_are_asked_for_until_they_come_or_for_three_seconds():
+def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
     failsafes = Failsafes("ardusub")
     assert not failsafes.is_read(0.0)
     asked = [len(failsafes.wanted(0.25 * k)) for k in range(9)]
@@ -263,7 +263,7 @@ def test_failsafe_parameters_are_asked_for_until_they_come_or_for_three_seconds(
     assert silent.startswith("not answered by the autopilot: FS_PILOT_INPUT,")
 
 
-def test_nothing_that_follows_is_warned_about_and_a_deaf_autopilot_is_known():
+def test_missing_failsafe_and_ignored_station_are_reported():
     failsafes = Failsafes("ardusub")
     for name in ("FS_PILOT_INPUT", "FS_GCS_ENABLE"):
         failsafes.take(decoded(value_of(name, 0.0)))
@@ -273,14 +273,14 @@ def test_nothing_that_follows_is_warned_about_and_a_deaf_autopilot_is_known():
     assert failsafes.deaf_to(250) == "" and "SYSID_MYGCS is 250" in failsafes.deaf_to(255)
 
 
-def test_whole_numbers_of_a_px4_come_as_bits():
+def test_px4_integer_parameters_are_decoded_from_bits():
     failsafes = Failsafes("px4")
     (bits,) = struct.unpack("<f", struct.pack("<i", 3))
     failsafes.take(decoded(value_of("NAV_RCL_ACT", bits, kind=6)))
     assert failsafes.values == {"NAV_RCL_ACT": 3.0}
 
 
-def test_the_clock_of_a_simulated_autopilot_goes_as_fast_as_it_is_said_to():
+def test_simulated_autopilot_clock_runs_at_the_given_speedup():
     with NetworkLink(parse_endpoint("udpout:127.0.0.1:14598"), speedup=5.0) as link:
         before, wall = link.clock(), time.monotonic()
         link.receive(0.1)  # a fiftieth of a second of the wall's
