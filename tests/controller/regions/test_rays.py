@@ -128,7 +128,7 @@ def test_ray_to_cylinder_matches_closed_form(bearing):
 @each_shape
 @settings(max_examples=examples(60), deadline=None)
 @given(origins, directions)
-def test_ray_distance_matches_dense_sampling(shape, origin, way):
+def test_a_ray_ends_where_walking_along_it_ends(shape, origin, way):
     (region,) = regions = out(shape)
     (met,) = rays(regions, origin, way)
     steps = np.arange(0.0, 15.0, 0.01)
@@ -143,7 +143,7 @@ def test_ray_distance_matches_dense_sampling(shape, origin, way):
 
 
 @given(origins, directions)
-def test_nearest_region_ends_the_ray(origin, way):
+def test_the_first_of_several_regions_ends_it(origin, way):
     together = out(*CONVEX[:1], *CONVEX[3:], *BENT)
     alone = [rays([region], origin, way)[0] for region in together]
     assert rays(together, origin, way)[0] == pytest.approx(min(alone), abs=1e-9)
