@@ -1,6 +1,6 @@
 """Co-simulation of an underwater vehicle that reaches a region while it respects others.
 
-These names are what a script or a notebook needs; each is imported when it is first asked for.
+These names are for scripts and notebooks; each is imported at its first use.
 
 Examples
 --------
@@ -74,7 +74,7 @@ __all__ = [
     "vary_from",
 ]
 
-_HOMES = {
+_EXPORTS = {
     "campaigns": {"Campaign", "Comparison", "Design", "Sweep", "compare", "run_campaign", "run_sweep", "vary_from"},
     "campaigns.scenes.flyer": {"SceneFlyer"},
     "campaigns.scenes.generator": {"generate_scenes"},
@@ -101,9 +101,9 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> object:
-    for home, names in _HOMES.items():
+    for module, names in _EXPORTS.items():
         if name in names:
-            return getattr(importlib.import_module(f"{__name__}.{home}"), name)
+            return getattr(importlib.import_module(f"{__name__}.{module}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -1,18 +1,18 @@
-"""What can go wrong between a scenario and its run."""
+"""Errors of this package."""
 
 
 class CosimError(Exception):
     """Base of all errors of this package; its text is one line meant for the user."""
 
     def __str__(self) -> str:
-        """Return the line."""
-        from plant_fmu.errors import one_line  # with it comes the plant, which takes time to load
+        """Return the text on one line."""
+        from plant_fmu.errors import one_line  # imported here, since it imports the plant, which is slow to load
 
         return one_line(super().__str__())
 
 
 class ScenarioError(CosimError):
-    """A scenario that is unknown, or a key in it that cannot be."""
+    """A scenario that is unknown, or has an invalid key or value."""
 
 
 class RunError(CosimError):
@@ -24,7 +24,7 @@ class TelemetryError(CosimError):
 
 
 class CommandError(CosimError):
-    """A command to a running vehicle that cannot be followed."""
+    """A command to a running vehicle that is invalid."""
 
 
 class ExportError(CosimError):
@@ -32,7 +32,7 @@ class ExportError(CosimError):
 
 
 class ImportLogError(CosimError):
-    """A log of a vehicle that cannot be read as a run."""
+    """A vehicle's log that cannot be imported as a run."""
 
 
 class IdentificationError(CosimError):

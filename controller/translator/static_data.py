@@ -95,7 +95,21 @@ def array_data(array: np.ndarray, name: str, qualifier: str = "static") -> str:
     return f"{qualifier} {kind.item.c} {name}[] = {{{numbers}}};"  # type: ignore[union-attr]
 
 
+class Expression(int):
+    """An integer that C works out, such as the address of a function."""
+
+    text: str
+
+    def __new__(cls, text: str) -> Expression:
+        """Return the integer of a C expression; in Python it is 0."""
+        made = super().__new__(cls, 0)
+        made.text = text
+        return made
+
+
 def _number(x: Any) -> str:
+    if isinstance(x, Expression):
+        return x.text
     if isinstance(x, bool | np.bool_):
         return "true" if x else "false"
     if isinstance(x, np.uint64):

@@ -1,4 +1,4 @@
-"""How the fused loop calls C functions by address: those of an FMI 3.0 FMU, the law, and the clock."""
+"""Calls of C functions by address in the fused loop: those of an FMI 3.0 FMU, and the clock."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from controller.translator.foreign import BOOL, DOUBLE, INT, POINTER, SIZE, call_c
 from plant_fmu.running.native import Native
 
-_WARNING = 1  # the highest status that is no failure
-_ENDED = 1  # place among the results of fmi3DoStep of terminateSimulation
+_WARNING = 1  # the highest status that is not a failure
+_ENDED = 1  # index of terminateSimulation in the results of fmi3DoStep
 
 # arguments of the C functions
 _TRANSFER = (POINTER, POINTER, SIZE, POINTER, SIZE)  # fmi3SetFloat64, fmi3GetFloat64
@@ -21,22 +21,22 @@ _CLOCK_GETTIME, _QUERY_COUNTER = (INT, POINTER), (POINTER,)
 
 
 def fmi_set(native: Native) -> bool:
-    """Send the inputs, and return whether the FMU took them."""
+    """Set the inputs; return True unless the FMU fails."""
     references, values, n = native.input_references, native.inputs, native.inputs.size
     return call_c(native.set_values, _TRANSFER, native.instance, references, n, values, n) <= _WARNING
 
 
 def fmi_get(native: Native) -> bool:
-    """Read the outputs, and return whether the FMU gave them."""
+    """Get the outputs; return True unless the FMU fails."""
     references, values, n = native.output_references, native.outputs, native.outputs.size
     return call_c(native.get_values, _TRANSFER, native.instance, references, n, values, n) <= _WARNING
 
 
 def fmi_do_step(native: Native, now: float, step: float) -> bool:
-    """Step from `now` [s] by `step` [s], and return whether the FMU did, and does not ask to end the simulation.
+    """Step from `now` [s] by `step` [s]; return True unless the FMU fails or ends the simulation.
 
-    What it returns by pointer, three of them Booleans of one byte, goes to places of eight bytes each. No state before
-    the step will be restored.
+    The results by pointer, three of them Booleans of one byte, are stored in elements of eight bytes. The FMU may
+    discard its state before the step.
     """
     out = native.results
     status = call_c(native.do_step, _DO_STEP, native.instance, now, step, True, out, out[1:], out[2:], out[3:])
@@ -49,7 +49,7 @@ class Clock:
     Attributes
     ----------
     numbers : ndarray of int64, shape (3,)
-        Address of the C function, its first argument (negative: none), ticks a second.
+        Address of the C function, its first argument (negative: none), ticks per second.
     """
 
     def __init__(self) -> None:
@@ -66,7 +66,7 @@ class Clock:
 
 
 def seconds(clock: NDArray[np.int64], workspace: NDArray[np.int64]) -> float:
-    """Return the time [s] of a `Clock`'s numbers; `workspace`, shape (2,), is what the C function fills."""
+    """Read a clock [s], given by the numbers of a `Clock`; the C function fills `workspace`, shape (2,)."""
     if clock[1] < 0:
         call_c(clock[0], _QUERY_COUNTER, workspace)
         return float(workspace[0]) / float(clock[2])

@@ -1,4 +1,4 @@
-"""What a flight in the fused loop is made of, and what it fills."""
+"""Inputs, workspace and outputs of a flight in the fused loop."""
 
 from __future__ import annotations
 
@@ -19,41 +19,41 @@ Array = NDArray[np.float64]
 
 
 class FlightConfig(NamedTuple):
-    """What a flight is made of, beside law and plant."""
+    """Configuration of a flight, beside law and plant."""
 
     goal: PackedRegions
     regions: PackedRegions
     criteria: NDArray[np.int64]  # (n,) of each region
     priorities: Array  # (n,) of each region, for the score alone
-    inputs: PackedInputs  # what the arbiter decides by
+    inputs: PackedInputs  # of the arbiter
     step: float  # s, of the plant
     steps: int  # of the plant
     control_every: int  # plant steps
     arbiter_every: int  # plant steps
-    moving: bool  # whether any region moves
-    goal_places: Array  # (p, 3) m, NED: how far the goal is from where the scenario has it at its next places, in turn
-    goal_stay: int  # plant steps that the vehicle has to stay within it before it goes on
-    exact: bool  # what is measured is the truth
-    noise: Array  # (control steps, 6) added to position and linear velocity, anew at each of them; (0, 6) if exact
-    dead_from: float  # s, when position and linear velocity are lost
+    moving: bool  # True if any region moves
+    goal_places: Array  # (p, 3) m, NED: shifts of the goal to its next positions, in turn
+    goal_stay: int  # plant steps that the vehicle has to stay in the goal before it moves to its next position
+    exact: bool  # True if law and arbiter receive the true state
+    noise: Array  # (control steps, 6) m, m/s: added to position and linear velocity; (0, 6) if exact
+    dead_from: float  # s, time at which position and linear velocity are lost
     dead_until: float  # s
-    frozen: bool  # their last values are held in that time; otherwise they are NaN
-    through_sensors: bool  # the state that is given is the navigation filter's estimate
-    sensors: SensorModel  # what that knows of them
-    outage_steps: NDArray[np.int64]  # (o,) plant steps before which a sensor's probability of loss changes, in order
-    outage_sensors: NDArray[np.int64]  # (o,) whose
-    outage_losses: Array  # (o,) to what
+    frozen: bool  # True: their last values are held meanwhile; False: they are NaN
+    through_sensors: bool  # True: the law receives the navigation filter's estimate
+    sensors: SensorModel  # the filter's model of the sensors
+    outage_steps: NDArray[np.int64]  # (o,) plant steps before which a sensor's loss probability changes, in order
+    outage_sensors: NDArray[np.int64]  # (o,) index of the sensor
+    outage_losses: Array  # (o,) new loss probability
     failed: NDArray[np.int64]  # (f,) thrusters that fail, from 0, in the order of their failures
-    failure_steps: NDArray[np.int64]  # (f,) plant steps before which they do
-    remaining: Array  # (f,) effectiveness that is left; NaN of one that is stuck at its last force
-    tell: bool  # whether the law is told
-    thrusters: int  # that carry the wrench; 0: it acts on the body directly
-    bound: int  # place of the law's bound of the clearances among its reports, -1: it gives none
-    clock: NDArray[np.int64]  # of `native.Clock`; (0,) if the law is not to be timed
+    failure_steps: NDArray[np.int64]  # (f,) plant steps before which they fail
+    remaining: Array  # (f,) remaining effectiveness; NaN for a thruster that is stuck at its last force
+    tell: bool  # True if failures are reported to the law
+    thrusters: int  # number of thrusters that give the wrench; 0: it acts on the body directly
+    bound: int  # index of the law's bound of the clearances in its report, -1: it has none
+    clock: NDArray[np.int64]  # of `c_calls.Clock`; (0,) if the law is not timed
 
 
 class Allocator(NamedTuple):
-    """Arguments of `controller.allocation.allocate`, one stage after another as thrusters are told to have failed."""
+    """Arguments of `controller.allocation.allocate`, with a stage for each number of reported failures."""
 
     inverse: Array  # (stages, m, 6)
     lower: Array  # (stages, m)
@@ -62,28 +62,28 @@ class Allocator(NamedTuple):
 
 
 class BoundLaw(NamedTuple):
-    """A law as the loop calls it: a function of C, with its arguments, of which some are the loop's own."""
+    """A law for the loop: a C function with its arguments, some of which belong to the loop."""
 
     address: int
     words: int
-    is_wrench: bool  # what it gives; the forces of the thrusters otherwise
+    is_wrench: bool  # True: it gives a wrench; False: thruster forces
     estimate: Array  # (4,) in its memory
-    expected: Array  # (6,) likewise, of the next step: m, NED, and m/s, body
-    report: Array  # (r,) likewise
+    expected: Array  # (6,) in its memory, prediction for the next step: m, NED, and m/s, body
+    report: Array  # (r,) in its memory
 
 
 class BoundArbiter(NamedTuple):
-    """An arbiter as the loop calls it: a function of C, with the workspace's signals and weights as its arguments."""
+    """An arbiter for the loop: a C function with the workspace's signals and weights as its arguments."""
 
     address: int
     words: int
 
 
 class Workspace(NamedTuple):
-    """Where a flight is computed."""
+    """Arrays of a flight in progress."""
 
-    state: VehicleState  # as it is told
-    arbiter_state: VehicleState  # what the arbiter decides by
+    state: VehicleState  # measured, for the law
+    arbiter_state: VehicleState  # for the arbiter
     measurements: Measurements
     navigation: NavigationMemory
     now: Array  # (1,) s
@@ -91,29 +91,29 @@ class Workspace(NamedTuple):
     by_criterion: Array  # (criteria,) weights
     weights: Array  # (n,)
     clearances: Array  # (n,) true ones
-    seen: Array  # (n,) those that the arbiter is told
+    seen: Array  # (n,) those at the arbiter's pose
     goal_clearance: Array  # (1,) m or rad
     wrench: Array  # (6,) N, N m, body frame
     before: Array  # (i,) inputs of the step before
-    stuck: Array  # (i,) inputs of thrusters that are stuck, NaN of others
+    stuck: Array  # (i,) inputs of stuck thrusters, NaN for others
     at: Array  # (3,)
     ticks: NDArray[np.int64]  # (2,)
 
 
 def make_workspace(setup: FlightConfig, criteria: int, inputs: int, thrusters: int) -> Workspace:
-    """Return the workspace of a flight.
+    """Make the workspace of a flight.
 
     Parameters
     ----------
     setup : FlightConfig
         Of the flight.
     criteria, inputs, thrusters : int
-        How many there are.
+        Number of criteria, plant inputs and thrusters.
 
     Returns
     -------
     Workspace
-        All zero, all thrusters healthy.
+        With zeros, and all thrusters healthy.
     """
     n = setup.criteria.size
     return Workspace(
@@ -137,32 +137,34 @@ def make_workspace(setup: FlightConfig, criteria: int, inputs: int, thrusters: i
 
 
 class FlightMetrics(NamedTuple):
-    """What a flight came to. Steps are those of the plant; -1: there was none."""
+    """Metrics of a flight. Steps are those of the plant, -1 for none."""
 
-    first_inside: float  # step at which it was inside the goal region first, at the last of its places
-    last_entered: float  # step since when it was inside the last time
-    inside: bool  # it still was at the end
-    least_clearance: float  # m, of all hard regions of place; negative: violated; inf: there is none
-    least_angle: float  # rad, the same of hard regions of attitude
+    first_inside: float  # first step inside the goal region at the last of its positions
+    last_entered: float  # first step of the last visit of the goal
+    inside: bool  # True if inside at the end
+    least_clearance: float  # m, least over hard regions in space; negative: violated; inf: there is none
+    least_angle: float  # rad, the same for hard regions of attitude
     goal_clearance: float  # m, greatest
     effort: float  # N s, integral of the magnitude of the force on the body
     thrust_effort: float  # N s, sum over thrusters of the integral of the given force's magnitude
-    thrust_variation: float  # N, sum of the changes of what is commanded, from 0 on
+    thrust_variation: float  # N, sum of the absolute changes of the commands, from 0 on
     max_force: float  # N, on the body
     max_speed: float  # m/s, over ground
-    worst_step: float  # s of the wall clock, the longest that law and allocation took
-    failed_step: float  # that the FMU refused
-    bound_excess: float  # m, by which a clearance was below the law's bound, greatest; -inf: no bound
-    weighted_violation: float  # m s, rad s: integral of how deep each region is violated, times its priority, summed
+    worst_step: float  # s of the wall clock, longest time of law and allocation in a step
+    failed_step: float  # step in which the FMU failed
+    bound_excess: float  # m, greatest excess of the law's bound over a clearance; -inf: no bound
+    weighted_violation: float  # m s, rad s: sum over regions of priority times the integral of the violation depth
 
 
 class FlightOutputs(NamedTuple):
-    """What a flight fills."""
+    """Outputs of a flight."""
 
     metrics: Array  # (15,) in the order of `FlightMetrics`
-    estimate: Array  # (4,) that the last decision rests on
-    trace: Array  # (control steps, 17 + c + i + r), or (0, 0) if none is kept; a row: time, true position, quaternion
+    estimate: Array  # (4,) used in the last control step
+    trace: Array  # (control steps, 17 + c + i + r), or (0, 0) for none; a row: time, true position, quaternion
     # and velocity, position as measured, the weights of the c criteria, the i inputs, the law's r reports
+    reasons: Array  # (control steps, 12 + n + c + m + f), or (0, 0); a row: clearances of the goal and the n regions, c
+    # memberships, m inputs of the rules, the estimate, the wrench that is allocated, the goal's place, and f forces
 
 
 SENSOR_OUTPUTS = (
@@ -178,5 +180,5 @@ PLANT_OUTPUTS = (
 
 
 def find_bound(diagnostics: Sequence[Diagnostic]) -> int:
-    """Return the place of a law's bound of the clearances among its reports, -1 if it gives none."""
+    """Return the index of the bound of the clearances in a law's report, -1 if it has none."""
     return next((place for place, diagnostic in enumerate(diagnostics) if diagnostic.name == "bound"), -1)

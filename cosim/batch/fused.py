@@ -1,4 +1,4 @@
-"""Flights by the fused loop: the vehicle's own FMU, stepped in C by the functions of the master."""
+"""Flights by the fused loop: the vehicle's FMU, stepped in C with the functions of the master."""
 
 from __future__ import annotations
 
@@ -45,18 +45,18 @@ _NONE = Allocator(np.zeros((1, 0, 6)), np.zeros((1, 0)), np.zeros((1, 0)), False
 
 
 class FusedFlyer:
-    """Flies variations of a scenario one after the other, with one plant that is reset in between.
+    """Flies variations of a scenario one after the other, with one plant that is reset before each.
 
     Parameters
     ----------
     variation : Variation
-        What is flown. Any law, shape, actuation, noise, failure.
+        The variation, with any built-in law, shape, actuation, noise and failures.
 
     Raises
     ------
     RunError
-        If the scenario has what the loop does not: commands from outside, an engine of the arbiter that samples, the
-        order of Jacobi, FMI 2.0.
+        If the scenario has features that the loop lacks: commands, a sampling engine of the arbiter, Jacobi order, FMI
+        2.0, or a custom law.
     BuildError, PlantError
         If there is no FMU of the vehicle.
     """
@@ -77,14 +77,14 @@ class FusedFlyer:
         Parameters
         ----------
         values : ndarray, shape (rows, keys)
-            Of the keys that vary, in their units.
+            Values of the keys that vary, in their units.
         seeds : ndarray of int, shape (rows,)
-            Of what is random.
+            Seed of each row.
 
         Returns
         -------
         Flown
-            What came of each row.
+            Outcome of each row, or the reason why it was refused.
         """
         outcomes, refused = nothing(len(seeds)), {}
         for row, (of_row, seed) in enumerate(zip(values, seeds, strict=True)):
@@ -103,17 +103,17 @@ class FusedFlyer:
         scenario : Scenario
             From `Variation.scenario`.
         trace : bool
-            Whether to keep what happened, see `cosim.batch.fused_loop`.
+            Return a trace, see `cosim.batch.fused_loop`.
 
         Returns
         -------
         ndarray of OUTCOME, shape (), and ndarray
-            What it came to, and the trace, shape (0, 0) if none is kept.
+            The outcome, and the trace, shape (0, 0) without one.
 
         Raises
         ------
         PlantError
-            If the plant cannot be as the scenario has it. The flyer can go on with another one.
+            If the plant refuses the scenario. The flyer can then fly another one.
         """
         metrics, setup, native, estimate, rows = fly_scenario(self._plant, scenario, trace)
         return _outcome(metrics, setup, native, estimate), rows
@@ -131,16 +131,16 @@ class FusedFlyer:
         self.close()
 
 
-def require_fused(scenario: Scenario) -> None:
-    """Raise `RunError` for the first key of a scenario by which the fused loop cannot fly it."""
+def require_fused(scenario: Scenario, what: str = "flights without a record") -> None:
+    """Raise `RunError` for the first key of a scenario that the fused loop does not support; `what` needs the loop."""
     for key, (received, expected) in _fixed(scenario).items():
         if received != expected:
             way = f", such as by --set {key}={expected}" if isinstance(expected, str) else ""
-            raise RunError(f"{key} is {received!r}, expected {expected!r} for flights without a record{way}")
+            raise RunError(f"{key} is {received!r}, expected {expected!r} for {what}{way}")
 
 
 def _fixed(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
-    """Return of each key that cannot be otherwise what it is, and what it has to be."""
+    """Return the present and the required value of each key that has to have a fixed value."""
     return {
         "arbiter.engine": (scenario.arbiter.engine, Arbiter(system=scenario.rules.system).engine),
         "master.order": (scenario.master.order, "gauss-seidel"),
@@ -152,7 +152,7 @@ def _fixed(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
 def fly_scenario(
     plant: Plant, scenario: Scenario, trace: bool = False, clock: NDArray[np.int64] = _NO_CLOCK
 ) -> tuple[FlightMetrics, FlightConfig, Native, Array, Array]:
-    """Fly a scenario by the plant of its vehicle, which is reset before.
+    """Reset a plant, and fly a scenario with it.
 
     Parameters
     ----------
@@ -161,34 +161,27 @@ def fly_scenario(
     scenario : Scenario
         With nothing that `FusedFlyer` refuses.
     trace : bool
-        Whether to keep what happened.
+        Return a trace.
     clock : ndarray of int
-        Of `Clock`, if the law is to be timed.
+        Numbers of a `Clock`, to time the law; empty for no timing.
 
     Returns
     -------
     FlightMetrics, FlightConfig, Native, ndarray, ndarray
-        What it came to, of what it was made, the plant at its end, the last estimate, shape (4,), and the trace, shape
-        (0, 0) if none is kept.
+        Metrics, configuration, the plant at the end, the last estimate, shape (4,), and the trace, shape (0, 0) without
+        one.
 
     Raises
     ------
     PlantError
-        If the plant cannot be as the scenario has it.
+        If the plant refuses the scenario.
     """
     law = law_of(scenario)
     n, through = scenario.vehicle.n_thrusters, scenario.actuation.through == "thrusters"
     plant.reset()
     plant.set(start_values(scenario))
     plant.initialise()
-    if through:
-        inputs = tuple(f"thrust[{i + 1}]" for i in range(n))
-        forces = (*(f"thruster_force[{i + 1}]" for i in range(n)), *(f"actuation.{axis}" for axis in "XYZ"))
-    else:
-        inputs = tuple(f"wrench.{axis}" for axis in "XYZKMN")
-        forces = tuple(f"actuator.wrench.{axis}" for axis in "XYZ")  # states: they cost no evaluation
-    through_sensors = scenario.sensing.through == "sensors"
-    native = plant.native(inputs, (*PLANT_OUTPUTS, *forces, *(SENSOR_OUTPUTS if through_sensors else ())))
+    native = plant.native(*exchanged_variables(scenario))
     names = [f"thrust_effectiveness[{i + 1}]" for i in range(n)]
     effectiveness = plant.native(names, ())
     effectiveness.inputs[:] = [plant[name] for name in names] if scenario.failures else 1.0
@@ -198,28 +191,53 @@ def fly_scenario(
     allocator = failure_stages(scenario, setup) if through else _NONE
     decisions = -(-scenario.steps // scenario.control_every)
     criteria, rules = len(scenario.criteria), scenario.rules
-    rows = np.zeros((decisions, 17 + criteria + len(inputs) + law.report.size) if trace else (0, 0))
-    workspace = make_workspace(setup, criteria, len(inputs), n)
+    inputs = native.inputs.size
+    rows = np.zeros((decisions, 17 + criteria + inputs + law.report.size) if trace else (0, 0))
+    workspace = make_workspace(setup, criteria, inputs, n)
     metrics, estimate = fly_law(setup, native, effectiveness, losses, allocator, law, rules.system, workspace, rows)
     return metrics, setup, native, estimate, rows
 
 
-def configure_flight(scenario: Scenario, thrusters: int, clock: NDArray[np.int64] = _NO_CLOCK) -> FlightConfig:
-    """Return what a flight of a scenario is made of.
+def exchanged_variables(scenario: Scenario) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names of the plant's variables that the loop exchanges with it in each step.
 
     Parameters
     ----------
     scenario : Scenario
         What is flown.
+
+    Returns
+    -------
+    tuple of str, tuple of str
+        Inputs and outputs, in the order of the buffers of the loop's plant.
+    """
+    if scenario.actuation.through == "thrusters":
+        n = scenario.vehicle.n_thrusters
+        inputs = tuple(f"thrust[{i + 1}]" for i in range(n))
+        forces = (*(f"thruster_force[{i + 1}]" for i in range(n)), *(f"actuation.{axis}" for axis in "XYZ"))
+    else:
+        inputs = tuple(f"wrench.{axis}" for axis in "XYZKMN")
+        forces = tuple(f"actuator.wrench.{axis}" for axis in "XYZ")  # states: they cost no evaluation
+    sensed = SENSOR_OUTPUTS if scenario.sensing.through == "sensors" else ()
+    return inputs, (*PLANT_OUTPUTS, *forces, *sensed)
+
+
+def configure_flight(scenario: Scenario, thrusters: int, clock: NDArray[np.int64] = _NO_CLOCK) -> FlightConfig:
+    """Make the configuration of a flight from a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
     thrusters : int
-        That carry the wrench; 0 where it acts on the body directly.
+        Number of thrusters that give the wrench; 0 if it acts on the body directly.
     clock : ndarray of int, optional
-        Of `Clock`, if the law is to be timed.
+        Numbers of a `Clock`, to time the law.
 
     Returns
     -------
     FlightConfig
-        Its regions are where they are at time 0.
+        With the regions at time 0.
     """
     sensing, step = scenario.sensing, scenario.time.step
     decisions = -(-scenario.steps // scenario.control_every)
@@ -267,19 +285,19 @@ def configure_flight(scenario: Scenario, thrusters: int, clock: NDArray[np.int64
 
 
 def failure_stages(scenario: Scenario, setup: FlightConfig) -> Allocator:
-    """Return what allocation goes by, a stage for each number of failures that have been reported.
+    """Return the arguments of the allocation for each number of reported failures.
 
     Parameters
     ----------
     scenario : Scenario
-        Of the vehicle and its limits.
+        With the vehicle and its limits.
     setup : FlightConfig
-        Of the scenario's failures.
+        With the scenario's failures.
 
     Returns
     -------
     Allocator
-        The first stage is of no failure.
+        The first stage is without failures.
     """
     vehicle, limits = scenario.vehicle, scenario.actuation.limits
     health, stages = np.ones(vehicle.n_thrusters), []

@@ -1,7 +1,7 @@
-"""The fused loop: a flight from start to end as C, stepping the FMU through its functions.
+"""The fused loop: a whole flight in C, which steps the FMU through its functions.
 
-The stages are those of `cosim.simulation.master`, by the same functions: measure, regions, arbiter, law, allocation,
-FMU; then the marks that the flight gets, of the true motion at every plant step.
+The stages are those of `cosim.simulation.master`, with the same functions: measure, regions, arbiter, law, allocation,
+FMU. The metrics of the flight are computed from the true motion at every plant step.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from plant_fmu.running.native import Native
 Array = NDArray[np.float64]
 
 _SPHERE, _ATTITUDE = Sphere.kind, FIRST_OF_ATTITUDE
-_LAW = (POINTER,)  # what a law's function is given
+_LAW = (POINTER,)  # arguments of a law's function
 
 
 def fly(  # noqa: C901 - one loop, as a whole
@@ -57,25 +57,25 @@ def fly(  # noqa: C901 - one loop, as a whole
     Parameters
     ----------
     setup : FlightConfig
-        What is flown.
+        Configuration of the flight.
     native : Native
         The plant: inputs are the thrust commands, or the wrench; outputs `PLANT_OUTPUTS`, then the thrusters'
-        forces if they are used, then the force on the body, its three components; through sensors, `SENSOR_OUTPUTS`.
+        forces if they are used, then the three components of the force on the body; through sensors, `SENSOR_OUTPUTS`.
     effectiveness : Native
-        The same plant: inputs are the thrusters' effectivenesses, as they are before anything fails.
+        The same plant: inputs are the thrusters' effectivenesses before any failure.
     losses : Native
-        The same plant: inputs are the sensors' probabilities of loss, `LOSSES`, as they are before any outage.
+        The same plant: inputs are the sensors' loss probabilities `LOSSES` before any outage.
     allocator : Allocator
-        For a wrench that thrusters carry.
+        For a wrench that thrusters give.
     law : BoundLaw
         Bound to the workspace's state and weights, to goal and regions of the setup, and to the plant's inputs as its
-        forces; to the workspace's wrench if thrusters carry that.
+        forces, or to the workspace's wrench if thrusters give it.
     arbiter : BoundArbiter
         Bound to the workspace's inputs of the rules and weights of the criteria.
     workspace : Workspace
-        Of `make_workspace`, anew for each flight.
+        From `make_workspace`, a new one for each flight.
     out : FlightOutputs
-        Of the whole flight, or up to where the FMU failed.
+        Receives the results of the flight, up to a failure of the FMU.
     """
     m, n, inputs = setup.thrusters, setup.regions.kinds.size, native.inputs
     state, weights, clearances, seen = workspace.state, workspace.weights, workspace.clearances, workspace.seen
@@ -97,7 +97,7 @@ def fly(  # noqa: C901 - one loop, as a whole
         if refused >= 0:
             break
         now = k * setup.step
-        # what fails
+        # failures and outages
         while failures < setup.failed.size and k == setup.failure_steps[failures]:
             j, remaining = setup.failed[failures], setup.remaining[failures]
             if remaining >= 0.0:
@@ -115,7 +115,7 @@ def fly(  # noqa: C901 - one loop, as a whole
             outages += 1
             if not fmi_set(losses):
                 refused = k
-        # marks
+        # metrics
         if setup.moving or k == 0:
             _move(setup, now)
         if place > 0:
@@ -158,13 +158,13 @@ def fly(  # noqa: C901 - one loop, as a whole
             _navigate(setup, now, native.outputs[16 + m :], workspace)
         elif not setup.exact or controls or arbitrates:
             _measure(setup, k, now, native.outputs, state)
-        # regions and arbiter: while the position is lost there is nothing to decide by, and the last weights hold
+        # regions and arbiter: while the position is lost, the last weights hold
         if arbitrates and _is_finite(state.position):
-            told_clearances = clearances
+            arbiter_clearances = clearances
             write_arbiter_state(state, law.expected, arbiter_state)
             if not setup.exact:
                 _clearances(setup.regions, arbiter_state.position, arbiter_state.quaternion, seen, workspace.at)
-                told_clearances = seen
+                arbiter_clearances = seen
             workspace.now[0] = now
             compute_inputs(
                 setup.inputs,
@@ -172,7 +172,7 @@ def fly(  # noqa: C901 - one loop, as a whole
                 setup.regions,
                 arbiter_state,
                 workspace.now,
-                told_clearances,
+                arbiter_clearances,
                 workspace.signals,
             )
             call_c(arbiter.address, _LAW, arbiter.words)
@@ -181,7 +181,7 @@ def fly(  # noqa: C901 - one loop, as a whole
         # law and allocation
         if controls:
             started = seconds(setup.clock, workspace.ticks) if timed else 0.0
-            steers = not setup.through_sensors or workspace.navigation.started[0] > 0.0  # else nothing is known to
+            steers = not setup.through_sensors or workspace.navigation.started[0] > 0.0  # there is a state estimate
             if steers:
                 call_c(law.address, _LAW, law.words)
                 bound = law.report[setup.bound] if setup.bound >= 0 else np.nan
@@ -192,6 +192,8 @@ def fly(  # noqa: C901 - one loop, as a whole
                 allocate(allocator.inverse[known_failures], lower, upper, allocator.direction, workspace.wrench, inputs)
             if timed:
                 worst = max(worst, seconds(setup.clock, workspace.ticks) - started)
+            if out.reasons.shape[0]:
+                _give_reasons(out.reasons[k // setup.control_every], out.estimate, place, workspace)
             if out.trace.shape[0]:
                 _trace(out.trace[k // setup.control_every], now, native, state.position, by_criterion, law.report)
             for j in range(inputs.size):
@@ -206,6 +208,10 @@ def fly(  # noqa: C901 - one loop, as a whole
         if not (fmi_do_step(native, now, setup.step) and fmi_get(native)):
             refused = k
             break
+        if controls and out.reasons.shape[0]:
+            given = native.outputs[13 : 16 + m]
+            for j in range(given.size):
+                out.reasons[k // setup.control_every, out.reasons.shape[1] - given.size + j] = given[j]
         for j in range(m):
             thrust_effort += abs(native.outputs[13 + j]) * setup.step
         x, y, z = native.outputs[13 + m], native.outputs[14 + m], native.outputs[15 + m]
@@ -221,7 +227,7 @@ def fly(  # noqa: C901 - one loop, as a whole
 
 
 def _measure(setup: FlightConfig, k: int, now: float, true_state: Array, state: VehicleState) -> None:
-    """Write what is told at plant step `k` as `sensing.Sensor` does."""
+    """Write the measured state at plant step `k` as `simulation.sensor.Sensor` does."""
     for i in range(4):
         state.quaternion[i] = true_state[3 + i]
     for i in range(3):
@@ -255,7 +261,7 @@ def _is_finite(position: Array) -> bool:
 
 
 def _move(setup: FlightConfig, now: float) -> None:
-    """Put all regions where they are at a time [s]."""
+    """Move all regions to their positions at a time [s]."""
     for regions in (setup.goal, setup.regions):
         for i in range(regions.kinds.size):
             for axis in range(3):
@@ -274,7 +280,7 @@ def _clearances(
 
 
 def _least(clearance: float, least: float) -> float:
-    """Return the lesser of two numbers; what is no number stays."""
+    """Return the lesser of two numbers, NaN if one of them is."""
     return clearance if clearance < least or np.isnan(clearance) else least
 
 
@@ -289,6 +295,17 @@ def _trace(row: Array, now: float, native: Native, position: Array, weights: Arr
     row[17 + c + m :] = report
 
 
+def _give_reasons(row: Array, estimate: Array, place: int, workspace: Workspace) -> None:
+    n, c, m = workspace.clearances.size, workspace.signals.memberships.size, workspace.signals.inputs.size
+    row[0] = workspace.goal_clearance[0]
+    row[1 : 1 + n] = workspace.clearances
+    row[1 + n : 1 + n + c] = workspace.signals.memberships
+    row[1 + n + c : 1 + n + c + m] = workspace.signals.inputs
+    row[1 + n + c + m : 5 + n + c + m] = estimate
+    row[5 + n + c + m : 11 + n + c + m] = workspace.wrench
+    row[11 + n + c + m] = place
+
+
 def fly_law(
     setup: FlightConfig,
     native: Native,
@@ -300,28 +317,28 @@ def fly_law(
     workspace: Workspace,
     trace: Array,
 ) -> tuple[FlightMetrics, Array]:
-    """Fly by a law, compiled, as `fly` says.
+    """Compile `fly`, and fly with a law.
 
     Parameters
     ----------
     setup, native, effectiveness, losses, allocator, workspace
         As for `fly`.
     law : CompiledLaw
-        Anew for each flight.
+        A new one for each flight.
     rules : System
-        By which the arbiter weighs the workspace's inputs.
+        Rules of the arbiter, for the workspace's inputs.
     trace : ndarray
         As of `FlightOutputs`.
 
     Returns
     -------
     FlightMetrics, ndarray, shape (4,)
-        What it came to, and the estimate at its end.
+        Metrics of the flight, and its last estimate.
 
     Raises
     ------
     CompilationError
-        If the loop or the law is to be compiled, and there is no compiler.
+        If the loop or the law has to be compiled, and there is no compiler.
     """
     is_wrench = law.output == "wrench"
     forces = workspace.wrench if setup.thrusters and is_wrench else native.inputs
@@ -330,7 +347,7 @@ def fly_law(
     bound = BoundLaw(decide.address, decide.words, is_wrench, law.estimate, expected, law.report)
     weigh = BoundRules(rules, workspace.signals.inputs, workspace.by_criterion)
     arbiter = BoundArbiter(weigh.address, weigh.words)
-    out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), np.zeros(4), trace)
+    out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), np.zeros(4), trace, np.zeros((0, 0)))
     BoundCall(fly, (setup, native, effectiveness, losses, allocator, bound, arbiter, workspace, out)).call()
     decide.raise_error()
     weigh.raise_error()

@@ -1,7 +1,7 @@
-"""Flights side by side: several vehicles in the lanes of the machine's vectors, plant, law and arbiter in C.
+"""Flights in parallel SIMD lanes: plant, law and arbiter in C, with a vehicle in each lane of a vector register.
 
-There is no FMU in the loop. The mathematics of the plant is compiled a second time from the FMU's own sources, so that
-each lane gets the numbers that the FMU would give.
+There is no FMU in the loop. The plant is compiled again from the sources of the FMU, so that each lane gives the
+FMU's results.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _SAME = _MARKS[_MARKS.index("weighted_violation") : _MARKS.index("stopped")]  # 
 
 
 class Batch(ctypes.Structure):
-    """Of csrc/lanes.h."""
+    """The struct of csrc/lanes.h."""
 
     _fields_ = (
         *((name, ctypes.c_int) for name in (
@@ -46,18 +46,18 @@ class Batch(ctypes.Structure):
 
 
 class LanesFlyer:
-    """Flies variations of a scenario, as many side by side as the machine has lanes.
+    """Flies variations of a scenario in parallel, as many as the machine has lanes.
 
     Parameters
     ----------
     variation : Variation
-        What is flown: by the paper's law, criteria and closed arbiter, any shapes, by wrench or thrusters, without
-        noise, failures and commands.
+        The variation: with the paper's law and criteria, the closed engine, any shapes, wrench or thrusters, and
+        without noise, failures and commands.
 
     Raises
     ------
     RunError
-        If the scenario, or a key that varies, is of what the lanes do not have; the fused loop has it.
+        If the scenario, or a key that varies, needs a feature that only the fused loop has.
     BuildError
         If there is no C compiler for the library.
     """
@@ -74,7 +74,7 @@ class LanesFlyer:
         self._describe()
 
     def _describe(self) -> None:
-        """Fill in what is the same for all rows."""
+        """Set the fields that are the same for all rows."""
         base, rows, b = self.variation.base, self._rows, self._batch
         packed, thrusters = pack(rows.regions), base.actuation.through == "thrusters"
         b.width, b.n_reals, b.n_integers = rows.base.size, len(rows.reals), len(rows.integers)
@@ -98,7 +98,7 @@ class LanesFlyer:
                 self._point(name, np.ascontiguousarray(numbers, dtype=float))
 
     def _point(self, name: str, numbers: NDArray[Any]) -> None:
-        """Let the batch point to an array, which stays."""
+        """Store an array, and set the batch's pointer to it."""
         self._kept[name] = numbers
         setattr(self._batch, name, numbers.ctypes.data)
 
@@ -108,14 +108,14 @@ class LanesFlyer:
         Parameters
         ----------
         values : ndarray, shape (rows, keys)
-            Of the keys that vary, in their units.
+            Values of the keys that vary, in their units.
         seeds : ndarray of int, shape (rows,)
-            Of what is random, which is nothing here; checked all the same.
+            Seed of each row; it is checked, but has no effect, since lanes have no noise.
 
         Returns
         -------
         Flown
-            What came of each row.
+            Outcome of each row, or the reason why it was refused.
         """
         outcomes = nothing(len(seeds))
         rows, refused = self._rows.fill(
@@ -129,7 +129,7 @@ class LanesFlyer:
         return Flown(outcomes, dict(sorted(refused.items())))
 
     def _fly_rows(self, rows: Array) -> tuple[Array, list[str]]:
-        """Return the marks of the rows, shape (rows, marks), and why the plant refused them, "" where it did not."""
+        """Fly rows; return their metrics, shape (rows, metrics), and the plant's reasons for refusing them or ""."""
         n, b = len(rows), self._batch
         n_regions = b.n_regions
         b.n_rows, b.moving = n, bool(rows[:, rows.shape[1] - 3 * n_regions :].any())
@@ -142,7 +142,7 @@ class LanesFlyer:
         return metrics, [reason.decode("utf-8", "replace") for reason in refusals.tolist()]
 
     def _outcomes(self, metrics: Array) -> Outcomes:
-        """Return the outcomes that marks come to."""
+        """Convert metrics to outcomes."""
         step, steps = self._batch.step, self._batch.steps
         by_name = dict(zip(_MARKS, metrics.T, strict=True))
 

@@ -1,4 +1,4 @@
-"""Libraries compiled for this very machine, and that of one vehicle's lanes: plant, paper's law and arbiter."""
+"""Libraries compiled for this machine's processor, and the lanes of a vehicle: plant, paper's law and arbiter."""
 
 from __future__ import annotations
 
@@ -26,31 +26,31 @@ from plant_fmu.errors import BuildError
 from plant_fmu.vehicle import Vehicle
 from plant_fmu.vehicle_component import of_vehicle
 
-_TOKEN = "lanes"  # noqa: S105 -- no secret: there is no description that the library could go with
-_NARROW = ("-Wno-psabi",)  # nothing but this library calls its functions with vectors
-_FMI = ("fmi3.c", "fmi3_unsupported.c")  # nor an importer
+_TOKEN = "lanes"  # noqa: S105 -- not a secret: instantiation token, which no model description repeats
+_NARROW = ("-Wno-psabi",)  # only this library calls its functions with vectors
+_FMI = ("fmi3.c", "fmi3_unsupported.c")  # left out, since there is no importer
 
-# as many as one register holds, where that is at least four: with fewer, half the vectors take as long
+# lanes per register, but at least four: vectors of two lanes take as long as those of four
 _WIDTH = """#ifdef __AVX512F__
 #define LANES 8
 #else
 #define LANES 4
 #endif
 """
-_OF_PLANT = ("plant.c", "actuators.c", "environment.c", "elementary.c")  # what a step of it needs
+_OF_PLANT = ("plant.c", "actuators.c", "environment.c", "elementary.c")  # sources that a step needs
 
 
 @functools.cache
 def lanes_library(vehicle: Vehicle, flags: tuple[str, ...] = (), beside: Path | None = None) -> ctypes.CDLL:
-    """Return the library of a vehicle, compiled first where it is not in the cache.
+    """Load the lanes library of a vehicle; compile it if it is not in the cache.
 
     Parameters
     ----------
     vehicle : Vehicle
         The vehicle.
     flags : tuple of str, optional
-        For the compiler, after its own: to measure what they change. Those that let it round otherwise, such as
-        ``-ffp-contract=fast``, give up the bits that lanes have in common with the FMU.
+        Further compiler flags, for measurements. With flags that change rounding, such as ``-ffp-contract=fast``, the
+        results differ from the FMU's in the last bits.
     beside : Path, optional
         One more C file for the lanes.
 
@@ -72,20 +72,20 @@ def lanes_library(vehicle: Vehicle, flags: tuple[str, ...] = (), beside: Path | 
 def machine_library(
     kind: str, name: str, files: Mapping[str, bytes], sources: Iterable[str], flags: Sequence[str] = ()
 ) -> ctypes.CDLL:
-    """Return a library for this very machine's processor, compiled first where it is not in the cache.
+    """Load a library for this machine's processor; compile it if it is not in the cache.
 
     Parameters
     ----------
     kind : str
         Folder of the user's cache.
     name : str
-        Beginning of the file's name; a digest of all that the library is made from follows.
+        Beginning of the file's name, which a digest of all inputs of the compiler follows.
     files : mapping of str to bytes
         C files and headers, by names relative to one folder.
     sources : iterable of str
-        Which of them are compiled.
+        Names of the files to compile.
     flags : sequence of str, optional
-        For the compiler, after its own.
+        Further compiler flags.
 
     Returns
     -------
@@ -119,14 +119,14 @@ def machine_library(
 
 
 def _files(vehicle: Vehicle, beside: Path | None = None) -> dict[str, bytes]:
-    """Return the C files: of one vehicle in ``one/``, of several in ``many/``, and what compiles the latter."""
+    """Return the C files: for one vehicle in ``one/``, for several in ``many/``, and wrappers that compile those."""
     component = of_vehicle(vehicle)
     sources, own = c_sources(component, 3), _own("cosim/batch/csrc")
     for name in _FMI:
         del sources[name]
     one = {**sources, component.header: header(component, _TOKEN).encode(), "start.c": own["start.c"]}
     one |= {"lanes.h": own["lanes.h"], "arbiter.c": to_c(Arbiter().system).encode()}
-    lanes = replace(component, name=f"{vehicle.name}_lanes")  # the names that its functions begin with
+    lanes = replace(component, name=f"{vehicle.name}_lanes")  # prefix of its functions
     many = {name: text for name, text in sources.items() if name.endswith(".h") or name in _OF_PLANT}
     many |= law_sources() | {name: text for name, text in own.items() if name != "start.c"}
     many |= {component.header: header(lanes, _TOKEN).encode(), "width.h": _WIDTH.encode()}
@@ -145,12 +145,12 @@ def _own(folder: str) -> dict[str, bytes]:
 
 
 def _tuned(compiler: Sequence[str]) -> tuple[str, ...]:
-    """Return the flags that let a compiler use all that this machine's processor can."""
+    """Return the compiler flags that enable all instructions of this machine's processor."""
     return ("-mcpu=native",) if "ziglang" in compiler else ("-march=native",)
 
 
 def _machine(compiler: Sequence[str], flags: Sequence[str]) -> str:
-    """Return what the compiler says of itself and of the processor: code for another one might not run here."""
+    """Return the macros that the compiler predefines, which identify it and the processor's instructions."""
     try:
         said = subprocess.run(  # noqa: S603 -- the compiler that the user has, and flags of ours
             [*compiler, *flags, "-dM", "-E", "-x", "c", os.devnull], capture_output=True, text=True, check=True

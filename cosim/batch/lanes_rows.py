@@ -20,7 +20,7 @@ from plant_fmu.variables import Variable, variables
 Array = NDArray[np.float64]
 
 _PARAMETERS = "plant.parameters."
-# of what may vary: all that a row holds; and the seed, since nothing in a lane is random
+# keys that may vary: those in a row; and the seed, which has no effect in lanes
 _VARIED = (
     "initial.",
     "goal.",
@@ -32,33 +32,33 @@ _VARIED = (
     "arbiter.ramp",
     "sensing.seed",
 )
-# parameters that let clocks run in the plant
+# parameters that start clocks in the plant
 _CLOCKED = ("depth_sensor.rate", "dvl.rate", "imu.rate", "compass.rate", "usbl.rate", "current_variation.")
-# numbers that are not checked each by itself: of a unit quaternion, and of shapes whose points must not meet
+# numbers that are checked together: of a unit quaternion, and of shapes whose points must not coincide
 _JOINT = ("initial.quaternion.", "law.desired_quaternion.")
 _JOINT_SHAPES = (Pipe, Prism)
 _PAPER = "the paper's"
-_SEEDS = (0, 2**31 - 1)  # that the plant takes
+_SEEDS = (0, 2**31 - 1)  # range of the plant's seed
 
 
 class Rows:
-    """What the rows of a variation hold, and which of them can be.
+    """Rows of numbers for a variation, and the checks of their values.
 
-    A number that stands in the row as it stands in the scenario is put there for many rows at once. Such numbers are
-    checked each by itself, by the scenario's own check: whatever lies between two numbers that it has taken, it takes.
-    All other rows are made one by one.
+    A value that is copied unchanged from the scenario into the row is written for many rows at once. Such values are
+    checked one by one by the scenario's own checks, which accept all values between two accepted ones. All other rows
+    are made from their scenario, one by one.
 
     Parameters
     ----------
     variation : Variation
-        What is flown.
+        The variation.
 
     Attributes
     ----------
     reals, integers : tuple of Variable
-        Of the plant, whose start values a row begins with.
+        Variables of the plant, with whose start values a row begins.
     regions : tuple of Region
-        The goal and the others, as the base has them.
+        The goal and the other regions of the base.
     base : ndarray, shape (width,)
         The row of the base: start values, desired attitude, gains of the law, ramp, gains of the regions, numbers of
         the shapes (the goal's first), velocities of the regions (the goal's first).
@@ -66,7 +66,7 @@ class Rows:
     Raises
     ------
     RunError
-        If a key is none that a row holds.
+        If a key is not part of a row.
     """
 
     def __init__(self, variation: Variation) -> None:
@@ -109,19 +109,19 @@ class Rows:
         return np.concatenate([np.asarray(part, dtype=float) for part in parts])
 
     def fill(self, values: Array, seeds: NDArray[np.int64]) -> tuple[Array, dict[int, str]]:
-        """Return the rows of a batch.
+        """Make the rows of a batch.
 
         Parameters
         ----------
         values : ndarray, shape (rows, keys)
-            Of the keys that vary.
+            Values of the keys that vary.
         seeds : ndarray of int, shape (rows,)
-            Of each row.
+            Seed of each row.
 
         Returns
         -------
         ndarray, shape (rows, width), and dict
-            The rows, and why the scenario refuses some of them; what stands in those means nothing.
+            The rows, and by index the reasons for refusing some of them; those have undefined contents.
         """
         rows = np.tile(self.base, (len(seeds), 1))
         refused: dict[int, str] = {}
@@ -139,10 +139,10 @@ class Rows:
             refused.setdefault(at, f"seed is {seeds[at]}, expected a whole number from {_SEEDS[0]} to {_SEEDS[1]}")
         return rows, refused
 
-    # ---- which rows need no check of their own ----
+    # ---- rows that need no own check ----
 
     def _between(self, values: Array, seeds: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return for each row whether all its numbers lie between such as the scenario has taken."""
+        """Return a mask of the rows whose values are all between accepted ones; check extremes beyond those."""
         if len(self._direct) < len(self._slots) or not len(seeds):
             return np.zeros(len(seeds), np.bool_)
         columns = np.column_stack([values, seeds.astype(float)])
@@ -155,7 +155,7 @@ class Rows:
         return np.asarray(within.all(axis=1), np.bool_)
 
     def _takes(self, i: int, value: float) -> bool:
-        """Return whether the scenario takes a number, all others being those of the base."""
+        """Return True if the scenario accepts a value of key `i`, with all others as in the base."""
         values = [*self._base_values(), 0.0]
         values[i] = value
         try:
@@ -168,9 +168,9 @@ class Rows:
         return [float(self.variation.number(key)) for key in self.variation.keys]
 
     def _slot(self, i: int) -> int:
-        """Return where in a row the number of a key stands as it is; -1: it does not, or is not checked by itself."""
+        """Return the index in a row to which the value of a key is copied; -1 if there is none, or for joint checks."""
         key = self.variation.keys[i]
-        whole = not isinstance(self.variation.number(key), float)  # fractions are refused, which no range says
+        whole = not isinstance(self.variation.number(key), float)  # fractions are invalid, which no range expresses
         if whole or key.startswith(_JOINT) or self._is_joint(key):
             return -1
         values = self._base_values()
@@ -185,7 +185,7 @@ class Rows:
         return -1
 
     def _is_joint(self, key: str) -> bool:
-        """Return whether a number of a shape is checked together with others of it."""
+        """Return True if a number of a shape is checked together with others."""
         first, _, rest = key.partition(".")
         if first == "goal":
             return isinstance(self.regions[0].shape, _JOINT_SHAPES)
@@ -203,7 +203,7 @@ def regions_of(scenario: Scenario) -> tuple[Region, ...]:
 
 
 def require_lanes(scenario: Scenario) -> None:
-    """Raise `RunError` for the first key of a scenario by which the lanes cannot fly it."""
+    """Raise `RunError` for the first key of a scenario that the lanes do not support."""
     s = scenario
     clocks = [name for name, value in s.plant.parameters.items() if name.startswith(_CLOCKED) and value]
     for key, received, expected in (
@@ -242,6 +242,6 @@ def _require_variable(key: str, clocked: tuple[str, ...]) -> None:
 
 
 def _others(value: float) -> Iterator[float]:
-    """Yield numbers that differ from one, of which a check may take some."""
+    """Yield values that differ from `value`, some of which may be valid."""
     tried = (1.0, 100.0) if math.isinf(value) else (value * 1.0078125, value * 0.9921875, value + 0.5, value - 0.5)
     yield from (other for other in tried if other != value)

@@ -1,4 +1,4 @@
-"""What a flight comes to, in one row of numbers; each is defined as in the summary of a recorded run."""
+"""Outcome of a flight as one row of numbers, which are defined as in the summary of a recorded run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# of each field: its type, its unit, what it is
+# type, unit and description of each field
 FIELDS: dict[str, tuple[type, str, str]] = {
     "reached": (np.bool_, "", "Was inside the goal region at some step"),
     "reach_time": (np.float64, "s", "When it first was; none: never"),
@@ -45,16 +45,16 @@ class Flown:
     """A batch of flights."""
 
     outcomes: Outcomes  # (rows,)
-    refused: dict[int, str] = field(default_factory=dict)  # row in the batch → why scenario or plant refused it
+    refused: dict[int, str] = field(default_factory=dict)  # by row in the batch: why scenario or plant refused it
 
 
 def nothing(rows: int) -> Outcomes:
-    """Return the outcomes of flights that have not taken place: false, and no numbers.
+    """Make empty outcomes: false and NaN.
 
     Parameters
     ----------
     rows : int
-        How many.
+        Number of rows.
 
     Returns
     -------

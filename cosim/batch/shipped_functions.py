@@ -1,4 +1,4 @@
-"""All functions of the package that are run as C, compiled ahead for where there is no compiler."""
+"""Compiles all functions that run as C ahead of time, for machines without a compiler."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, nat
 from plant_fmu.running.native import Native
 from plant_fmu.vehicle import load_vehicle
 
-_VEHICLE = "bluerov2_heavy"  # any: a function is the same for all
+_VEHICLE = "bluerov2_heavy"  # the functions do not depend on the vehicle
 _PERIOD = 0.02  # s
 _INTEGERS, _FLAT, _TABLE = np.zeros(1, np.int64), np.zeros(1), np.zeros((1, 3))
 
 
 def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]:
-    """Yield each function, with arguments of the types that it is called with."""
+    """Yield each function with arguments of the types with which it is called."""
     goal, regions = (pack([Region(name, Sphere((0.0, 0.0, 0.0), 1.0), "in")]) for name in ("goal", "region"))
     state = VehicleState(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(6), np.ones(1))
     yield navigate, (empty_measurements(), _FLAT, SensorModel(), empty_memory(), state)
@@ -87,14 +87,14 @@ def _of_flight(goal: PackedRegions, regions: PackedRegions) -> tuple[Any, ...]:
         False, False, SensorModel(), _INTEGERS, _INTEGERS, _FLAT, _INTEGERS, _INTEGERS, _FLAT, False, 1, -1,
         Clock().numbers,
     )  # fmt: skip
-    out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), _FLAT, np.zeros((0, 0)))
+    out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), _FLAT, np.zeros((0, 0)), np.zeros((0, 0)))
     law, allocator = BoundLaw(0, 0, True, _FLAT, _FLAT, _FLAT), Allocator(np.zeros((1, 1, 6)), _TABLE, _TABLE, True)
     arbiter = BoundArbiter(0, 0)
     return setup, native, native, native, allocator, law, arbiter, make_workspace(setup, 3, 1, 1), out
 
 
 def shipped_texts() -> dict[str, str]:
-    """Return the C of each function, and of the paper's arbiter, by the name of its file."""
+    """Return the C source of each function, and of the paper's arbiter, by the name of its file."""
     texts = {
         f"{function.__module__.rpartition('.')[2]}_{function.__name__}": c_text(function, arguments)
         for function, arguments in shipped_functions()
@@ -103,14 +103,14 @@ def shipped_texts() -> dict[str, str]:
 
 
 def write_libraries(platforms: str, folder: Path) -> None:
-    """Compile all of them.
+    """Compile all functions.
 
     Parameters
     ----------
     platforms : str
         ``all``, by the compiler of the ziglang package, or ``native``, by any.
     folder : Path
-        Where they go, each into the folder of its platform.
+        Output folder, with a subfolder for each platform.
 
     Raises
     ------
@@ -140,12 +140,12 @@ def _written(text: str, folder: Path) -> Path:
 def _compile(source: Path, folder: Path, platform: Platform, compiler: list[str]) -> None:
     library = folder / platform.name / f"{source.stem}{platform.suffix}"
     compile_file(source, library, compiler)
-    library.with_suffix(".lib").unlink(missing_ok=True)  # which Windows would link with
+    library.with_suffix(".lib").unlink(missing_ok=True)  # import library for linking on Windows
     checksum_path(library).write_text(digest_of(library.read_bytes()))
 
 
 def write_sources(folder: Path) -> None:
-    """Write the C of each into a folder, which is made if it is not there."""
+    """Write the C source of each function into a folder, which is created if needed."""
     folder.mkdir(parents=True, exist_ok=True)
     for stem, text in shipped_texts().items():
         (folder / f"{stem}.c").write_text(text, encoding="utf-8")

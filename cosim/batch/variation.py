@@ -1,4 +1,4 @@
-"""Which numbers of a scenario vary, and the scenario that any choice of them makes."""
+"""Variation of numbers of a scenario, and the scenario for given values."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from cosim.scenario.scenario import Scenario, validate_scenario
 from cosim.scenario.toml_file import place_of
 from plant_fmu.errors import PlantFmuError
 
-_SEEDS = ("sensing.seed", "plant.parameters.seed")  # what the seed of a row becomes
+_SEEDS = ("sensing.seed", "plant.parameters.seed")  # keys that get the seed of a row
 
 
 class Variation:
-    """A scenario of which some numbers vary. It can be pickled.
+    """A scenario of which some numbers vary. It is picklable.
 
     Parameters
     ----------
     scenario : Scenario
-        What stays.
+        The base scenario.
     keys : sequence of str
-        Of numbers, with dots as in ``--set``: items of lists go by index, regions by name as well; such as
+        Keys of numbers, with dots as in ``--set``: items of lists by index, regions also by name; such as
         ``"initial.position.0"``, ``"regions.SR1.gain"``, ``"law.gains.k_p1"``, ``"plant.parameters.weight"``.
 
     Attributes
     ----------
     base : Scenario
-        What stays.
+        The base scenario.
     keys : tuple of str
         In the order of their values.
 
     Raises
     ------
     ScenarioError
-        If a key is unknown, comes twice, or what it names is no number.
+        If a key is unknown, given twice, or not one of a number.
     """
 
     def __init__(self, scenario: Scenario, keys: Sequence[str]) -> None:
@@ -52,7 +52,7 @@ class Variation:
         self._seeds = tuple(seed for seed in _SEEDS if seed not in self.keys and self._has(seed))
 
     def number(self, key: str) -> Any:
-        """Return what the scenario has at a key, its defaults included.
+        """Return the base's value of a key, defaults included.
 
         Parameters
         ----------
@@ -61,8 +61,8 @@ class Variation:
 
         Returns
         -------
-        float, or whatever stands there
-            In the key's own unit.
+        float, text, list or table
+            In the key's unit.
 
         Raises
         ------
@@ -72,14 +72,14 @@ class Variation:
         return value_at(self.base.table, key, self.base.vehicle)
 
     def scenario(self, values: Sequence[float], seed: int) -> Scenario:
-        """Return the scenario that values and a seed make.
+        """Make the scenario for values and a seed.
 
         Parameters
         ----------
         values : sequence of float
             One for each key, in its unit.
         seed : int
-            Of the noise that is measured, and of the plant's random parts.
+            Of the measurement noise and the plant's random parts.
 
         Returns
         -------
@@ -89,7 +89,7 @@ class Variation:
         Raises
         ------
         ScenarioError
-            If a value cannot be; it names the key.
+            If a value is invalid; it names the key.
         """
         table = _copy(self.base.table)
         changes = dict(self._changes(values, seed))
@@ -106,7 +106,7 @@ class Variation:
             raise ScenarioError(str(error)) from error
 
     def overrides(self, values: Sequence[float], seed: int) -> list[str]:
-        """Return what makes the same scenario of the base, as ``--set`` takes it.
+        """Return the overrides for ``--set`` that make the same scenario from the base.
 
         Parameters
         ----------
@@ -137,7 +137,7 @@ class Variation:
 
 
 def _as(like: float | int, value: float, key: str) -> float | int:
-    """Return a value as a whole number where the key holds one; numbers of shapes may be written so, but are none."""
+    """Convert a value to int if the key has one; numbers of shapes may be written as int, but are floats."""
     if isinstance(like, float) or key.startswith("goal.") or ".shape." in key:
         return value
     if not (math.isfinite(value) and value == round(value)):
@@ -146,7 +146,7 @@ def _as(like: float | int, value: float, key: str) -> float | int:
 
 
 def _copy(value: Any) -> Any:
-    """Return a table of its own, with lists for what a scenario keeps as tuples."""
+    """Copy a table, with lists instead of tuples."""
     if isinstance(value, dict):
         return {key: _copy(item) for key, item in value.items()}
     return [_copy(item) for item in value] if isinstance(value, list | tuple) else value

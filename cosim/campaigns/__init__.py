@@ -1,6 +1,6 @@
 """Many runs, resumable and on many cores.
 
-Scenes flown by one law or by several, or one scenario with numbers of it varied. Public: `run_campaign`, `compare`,
+Scenes flown by one law or by several, or one scenario with varied numbers. Public: `run_campaign`, `compare`,
 `run_sweep`, `vary_from`.
 
 Imports: controller, io, plant_fmu, report, run, scenario.
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Campaign", "Comparison", "Design", "Sweep", "Vary", "compare", "run_campaign", "run_sweep", "vary_from"]
 
-# imported when asked for: a scene's text needs nothing of what flies it
-_HOMES = {
+# imported at the first use: reading a scene's text does not need the code that flies it
+_EXPORTS = {
     "campaign": {"Campaign", "run_campaign"},
     "comparison": {"Comparison", "compare"},
     "sweep": {"Sweep", "run_sweep"},
@@ -27,7 +27,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> object:
-    for home, names in _HOMES.items():
+    for module, names in _EXPORTS.items():
         if name in names:
-            return getattr(importlib.import_module(f"{__name__}.{home}"), name)
+            return getattr(importlib.import_module(f"{__name__}.{module}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

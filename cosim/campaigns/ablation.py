@@ -1,4 +1,4 @@
-"""What the parts of the deployable law are worth: the same scenes flown with all of it, and without one part each."""
+"""Ablation of the deployable law: the same scenes flown with the whole law, and without one of its parts each."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from plant_fmu.toml_tables import hint
 LAW, WHOLE = "deployable", "whole"
 NUMBERS = "ablation.json"
 PAGE = "ablation.html"
-_ZERO = 1e-9  # of a bound that must be above 0
+_ZERO = 1e-9  # for a bound that must be above 0
 
 
 class Variant(NamedTuple):
     """The law without a part."""
 
-    what: str  # in words
+    what: str  # description
     gains: Mapping[str, float] = {}
     arbiter: RuleVariant = "ordered"
 
@@ -55,7 +55,7 @@ VARIANTS: dict[str, Variant] = {
 
 @dataclass(frozen=True)
 class Ablation:
-    """Where it was written, and what it came to."""
+    """Folder and results of an ablation."""
 
     folder: Path
     campaigns: dict[str, Campaign]  # by variant, the whole law first
@@ -71,22 +71,22 @@ def ablate(
     workers: int = 1,
     progress: bool = False,
 ) -> Ablation:
-    r"""Fly the same scenes by the deployable law, and by it without one part each.
+    r"""Fly the same scenes with the deployable law, and without one of its parts each.
 
     Parameters
     ----------
     scenes : Path
-        A file of one JSON object a line, ``-`` for standard input.
+        A file with one JSON object per line, ``-`` for standard input.
     out : Path
-        A folder that does not exist, is empty, or holds an ablation of the same scenes: it goes on.
+        A folder that does not exist, is empty, or holds an ablation of the same scenes, which is continued.
     variants : sequence of str
-        Of `VARIANTS`.
+        Names from `VARIANTS`.
     conditions : Conditions, optional
-        How scenes are flown; the arbiter is the variant's.
+        Conditions of the flights; the arbiter is the variant's.
     settings : sequence of str
-        ``key=value``, gains of all variants.
+        ``key=value`` for gains of all variants.
     workers : int
-        Processes.
+        Number of processes.
     progress : bool
         Show a bar for each variant, if there is a terminal.
 
@@ -98,9 +98,9 @@ def ablate(
     Raises
     ------
     RunError
-        If there is no such variant, or the folder holds something else or cannot be written.
+        If there is no such variant, or the folder holds other files or cannot be written.
     Exception
-        Whatever `run_campaign` raises.
+        All errors of `run_campaign`.
 
     Examples
     --------
@@ -149,7 +149,7 @@ def ablate(
 
 
 def _beside(whole: Results, results: Results) -> dict[str, Any]:
-    """Return what a variant comes to beside the whole law, over all scenes and by their kinds."""
+    """Compare a variant with the whole law, over all scenes and by their kinds."""
     every = np.ones(len(results), dtype=bool)
     return _numbers(whole, results, every) | {
         "kinds": {name: _numbers(whole, results, of) for name, of in scene_kinds(results).groups()}
@@ -157,7 +157,7 @@ def _beside(whole: Results, results: Results) -> dict[str, Any]:
 
 
 def _numbers(whole: Results, results: Results, of: Facts) -> dict[str, Any]:
-    """Return the numbers of some scenes; ratios and differences are of the whole law to this variant."""
+    """Compare on scenes `of`; ratios and differences are of the whole law to this variant."""
     theirs, mine = completed(results)[of], completed(whole)[of]
     violation = {name: rows.number("weighted_violation", absent=np.nan)[of] for name, rows in
                  ((WHOLE, whole), ("variant", results))}  # fmt: skip

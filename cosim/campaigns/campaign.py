@@ -1,4 +1,4 @@
-"""A campaign from its scenes to its folder: fly what is not flown yet, join, summarise."""
+"""A campaign of scenes: fly the scenes that are left, join the rows, and write the summary."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from cosim.io.strict_json import json_text
 
 @dataclass(frozen=True)
 class Campaign:
-    r"""Where a campaign was written, and what it came to.
+    r"""Folder, rows and summary of a campaign.
 
     Examples
     --------
@@ -37,7 +37,7 @@ class Campaign:
     folder: Path
     results: Results
     summary: dict[str, Any]
-    flown: int  # scenes, by this call; the rest had been flown before
+    flown: int  # number of scenes flown by this call
 
 
 def run_campaign(
@@ -50,25 +50,25 @@ def run_campaign(
     executor: Executor | None = None,
     progress: bool = False,
 ) -> Campaign:
-    r"""Fly every scene of a file by a law, or those that are left, and write results and summary.
+    r"""Fly the scenes of a file by a law, skipping finished ones, and write results and summary.
 
     Parameters
     ----------
     scenes : Path or SceneStore
-        A file of one JSON object a line, ``-`` for standard input; or scenes that are read already.
+        A file with one JSON object per line, ``-`` for standard input; or scenes that are read already.
     law : str
         One of those in `controller.LAWS`.
     out : Path
-        A folder that does not exist, is empty, or holds the same campaign: as a whole, which writes its summary again,
-        or as a part, which goes on.
+        A folder that does not exist, is empty, or holds the same campaign. A complete one gets its summary again, a
+        partial one is continued.
     conditions : Conditions, optional
-        How scenes are flown; default: as they are scored.
+        Conditions of the flights; default: those of the score.
     gains : NamedTuple, optional
         Of the law; default: its own.
     workers : int
-        Processes. Rows are the same for any number, but for `worst_step_time`.
+        Number of processes. The rows do not depend on it, except for `worst_step_time`.
     executor : concurrent.futures.Executor, optional
-        That flies the scenes, in the place of processes of our own.
+        Flies the scenes, instead of processes started here.
     progress : bool
         Show a bar, if there is a terminal.
 
@@ -80,16 +80,16 @@ def run_campaign(
     Raises
     ------
     ScenarioError
-        If the scenes cannot be read, or a seed comes twice.
+        If the scenes cannot be read, or two have the same seed.
     RunError
-        If there is no such law, the folder holds something else or cannot be written, or processes die whatever they
-        fly.
+        If there is no such law, the folder holds something else or cannot be written, or processes crash with any
+        scene.
     LawError
-        If the law cannot work with the gains.
+        If the law refuses the gains.
     BuildError, PlantError
         If there is no FMU of the vehicle.
     KeyboardInterrupt
-        After Ctrl-C; what is done is kept.
+        After Ctrl-C; finished scenes are kept.
 
     Examples
     --------

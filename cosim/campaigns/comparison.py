@@ -1,4 +1,4 @@
-"""Several laws on the same scenes: campaigns side by side, and two laws at a time on what one of them completes."""
+"""Comparison of several laws on the same scenes, each in a campaign, and in pairs on the scenes that one completes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from cosim.report.report import FIGURES
 
 @dataclass(frozen=True)
 class Comparison:
-    r"""Where a comparison was written, and what it came to.
+    r"""Folder and results of a comparison.
 
     Examples
     --------
@@ -59,18 +59,18 @@ def compare(
     Parameters
     ----------
     scenes : Path
-        A file of one JSON object a line, ``-`` for standard input.
+        A file with one JSON object per line, ``-`` for standard input.
     laws : sequence of str
         Two or more of those in `controller.LAWS`.
     out : Path
-        A folder that does not exist, is empty, or holds a comparison of the same scenes; each law has the folder of a
-        campaign in it, which goes on as that of a campaign does.
+        A folder that does not exist, is empty, or holds a comparison of the same scenes. It has the folder of a
+        campaign for each law, which is continued.
     conditions : Conditions, optional
-        How scenes are flown; default: as they are scored.
+        Conditions of the flights; default: those of the score.
     gains : mapping from str to NamedTuple, optional
         By law; default: its own.
     workers : int
-        Processes.
+        Number of processes.
     progress : bool
         Show a bar for each law, if there is a terminal.
 
@@ -84,7 +84,7 @@ def compare(
     RunError
         If the laws cannot be compared, or the folder holds something else or cannot be written.
     Exception
-        Whatever `run_campaign` raises.
+        All errors of `run_campaign`.
 
     Examples
     --------
@@ -141,8 +141,8 @@ def pair(one: str, results: Results, other: str, others: Results) -> dict[str, A
     Returns
     -------
     dict
-        How many scenes these are, how many of them the other law completes as well, and over all of them the medians of
-        both of reach time [s], where what is never reached counts as taking for ever, and of effort [N s].
+        Number of these scenes, how many of them the other law completes too, and for both laws the medians over these
+        scenes of reach time [s], infinite where the goal is not reached, and of effort [N s].
     """
     at = completed(results)
     return {
@@ -170,8 +170,8 @@ def difference(one: str, results: Results, other: str, others: Results) -> dict[
     Returns
     -------
     dict
-        What `paired` says of the scenes that they complete, and over those that both do the median of the first one's
-        reach time [s] and effort [N s] less the other's.
+        Result of `paired` for the completed scenes, and over those that both complete the medians of the differences,
+        the first less the second, of reach time [s] and effort [N s].
     """
     mine, theirs = completed(results), completed(others)
     both = mine & theirs
@@ -186,12 +186,12 @@ def difference(one: str, results: Results, other: str, others: Results) -> dict[
 
 
 def completed(results: Results) -> Any:
-    """Return which scenes were reached without a violation, bool, shape (scenes,)."""
+    """Return a mask of the scenes that were reached without a violation, bool, shape (scenes,)."""
     return results["reached"] & ~results["violation"]
 
 
 def refuse_strangers(out: Path, own: set[str], what: str) -> None:
-    """Raise `RunError` if a folder holds anything but its own names and what pages leave; `what` it should hold."""
+    """Raise `RunError` if a folder holds files other than `own` and those of pages; `what` names the expected kind."""
     if out.is_dir():
         known = {*own, *(f".{name}" for name in own), FIGURES, WORST}
         strange = sorted(p.name for p in out.iterdir() if p.name not in known and not p.name.startswith(f".{FIGURES}"))

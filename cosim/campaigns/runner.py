@@ -1,4 +1,4 @@
-"""From the work of a campaign to the joined rows in its folder: fly what is not flown yet, and join."""
+"""Runs the work of a campaign: flies the rows that are left, and joins them in its folder."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from cosim.run.progress import ProgressBar
 
 log = logging.getLogger(__name__)
 
-_TOLD = 3  # refused rows that are told of one by one
+_MAX_WARNINGS = 3  # refused rows that are logged one by one
 
 
 @dataclass(frozen=True)
 class Done:
-    """What there is of a campaign when all rows are."""
+    """Results of a complete campaign."""
 
     results: Results
-    flown: int  # rows, by this call; the rest had been flown before
+    flown: int  # number of rows flown by this call
 
 
 def carry_out(
@@ -50,34 +50,34 @@ def carry_out(
     Parameters
     ----------
     work : Work
-        What is flown.
+        The work of the campaign.
     out : Path
-        A folder that does not exist, is empty, or holds the same campaign, as a whole or as a part.
+        A folder that does not exist, is empty, or holds the same campaign, complete or partial.
     workers : int
-        Processes, 1 for this one alone; or how much the executor does at the same time.
+        Number of processes, 1 for this one only; or number of batches that the executor flies at the same time.
     executor : concurrent.futures.Executor, optional
-        That flies it, in the place of processes of our own.
+        Flies the rows, instead of processes started here.
     progress : bool
         Show a bar, if there is a terminal.
     conclude : callable
-        Writes what follows from the results, while the folder is still ours.
+        Writes further results while the folder is locked.
 
     Returns
     -------
     Done
-        With a row for each of the work.
+        With all rows of the work.
 
     Raises
     ------
     RunError
-        If the folder holds something else or cannot be written, processes die whatever they fly, or a script calls this
-        unguarded, so that its processes would.
+        If the folder holds something else or cannot be written, processes crash with any row, or a script calls this
+        without a guard, so that each process would call it again.
     Exception
-        What the task raises if it cannot be flown at all.
+        Errors of the task that prevent all flights.
     KeyboardInterrupt
-        After Ctrl-C; what is done is kept.
+        After Ctrl-C; finished rows are kept.
     """
-    if getattr(multiprocessing.current_process(), "_inheriting", False):  # what multiprocessing itself asks
+    if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing itself checks
         raise RunError(
             "a process that starts reads the script again, and came to this call; "
             "expected it below: if __name__ == '__main__':"
@@ -107,7 +107,7 @@ def carry_out(
 def _flown(
     work: Work, folder: CampaignFolder, workers: int, executor: Executor | None, progress: bool
 ) -> Iterator[Any]:
-    """Yield the rows that are not in the folder yet, and say how it goes."""
+    """Fly the rows that are not in the folder yet, yield their tables, and show progress."""
     left = np.ones(len(work), dtype=bool)
     keys = folder.keys()
     rows = work.rows_of(keys)
@@ -125,12 +125,12 @@ def _flown(
             yield table
             bar.update(len(table))
             refused = warn_refused(table, refused)
-    if refused > _TOLD:
+    if refused > _MAX_WARNINGS:
         log.warning("%d %ss were refused; why is in their column 'refused'", refused, work.unit)
 
 
 def open_pool(task: Task, workers: int, executor: Executor | None = None) -> WorkerPool:
-    """Return who flies: this process, processes of our own, or an executor."""
+    """Open the worker pool: this process, worker processes, or an executor."""
     if executor is not None:
         from cosim.campaigns.workers.cluster import Cluster, is_cluster
 
@@ -139,16 +139,16 @@ def open_pool(task: Task, workers: int, executor: Executor | None = None) -> Wor
 
 
 def warn_refused(table: Any, before: int) -> int:
-    """Log why the first rows were refused, and return how many there are now."""
+    """Log the reasons of the first refused rows; return the number of refused rows so far."""
     rows = table.filter(pc.is_valid(table["refused"]))
-    for row in rows.slice(0, max(0, _TOLD - before)).to_pylist():
+    for row in rows.slice(0, max(0, _MAX_WARNINGS - before)).to_pylist():
         key = table.schema.names[0]
         log.warning("%s %d: refused: %s", key, row[key], row["refused"])
     return before + len(rows)
 
 
 def progress_bar(work: Work, done: int, progress: bool) -> ProgressBar:
-    """Return a bar over the rows of a work, some of which are done."""
+    """Create a progress bar over the rows of a work, `done` of which are finished."""
     return ProgressBar(
         progress, total=len(work), initial=done, desc=work.name, unit=work.unit,
         bar_format="{desc} {percentage:3.0f}%|{bar}| {n}/{total} [{elapsed}<{remaining}, {rate_fmt}]",

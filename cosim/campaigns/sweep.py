@@ -1,4 +1,4 @@
-"""A sweep from its scenario to its folder: many rows, each with numbers of its own."""
+"""A sweep: a scenario flown with many rows of varied numbers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from cosim.scenario.scenario import Scenario
 
 @dataclass(frozen=True)
 class Sweep:
-    """Where a sweep was written, and what it came to.
+    """Folder, rows and summary of a sweep.
 
     Examples
     --------
@@ -36,7 +36,7 @@ class Sweep:
     folder: Path
     results: Results
     summary: dict[str, Any]
-    flown: int  # rows, by this call; the rest had been flown before
+    flown: int  # number of rows flown by this call
 
 
 def run_sweep(
@@ -48,43 +48,43 @@ def run_sweep(
     executor: Executor | None = None,
     progress: bool = False,
 ) -> Sweep:
-    """Fly a scenario with every row of a design, or with those that are left, and write results and summary.
+    """Fly a scenario with the rows of a design, skipping finished ones, and write results and summary.
 
     Parameters
     ----------
     scenario : Scenario
-        What stays.
+        The base scenario.
     design : Design
-        What varies.
+        The values that vary.
     out : Path
-        A folder that does not exist, is empty, or holds the same sweep: as a whole, which writes its summary again,
-        or as a part, which goes on.
+        A folder that does not exist, is empty, or holds the same sweep. A complete one gets its summary again, a
+        partial one is continued.
     engine : str
-        ``"fused"``, the compiled loop around the FMU; or ``"lanes"``, several vehicles side by side without one.
+        ``"fused"``, the compiled loop around the FMU; or ``"lanes"``, several vehicles in parallel without an FMU.
     workers : int
-        Processes; rows are the same for any number. Of an executor: how much it does at the same time.
+        Number of processes, which does not change the rows. With an executor: number of batches at the same time.
     executor : concurrent.futures.Executor, optional
-        That flies the rows, in the place of processes of our own, such as ``Client(...).get_executor()`` of Dask. It
-        is not closed. Threads take turns.
+        Flies the rows, instead of processes started here, such as ``Client(...).get_executor()`` of Dask. It is not
+        closed. Its threads take turns.
     progress : bool
         Show a bar, if there is a terminal.
 
     Returns
     -------
     Sweep
-        With every row.
+        With all rows.
 
     Raises
     ------
     ScenarioError
-        If a key is unknown, or what it names is no number.
+        If a key is unknown, or not one of a number.
     RunError
-        If the engine cannot fly the scenario, the folder holds something else or cannot be written, or processes die
-        whatever they fly.
+        If the engine does not support the scenario, the folder holds something else or cannot be written, or processes
+        crash with any row.
     BuildError, PlantError
         If there is no FMU of the vehicle.
     KeyboardInterrupt
-        After Ctrl-C; what is done is kept.
+        After Ctrl-C; finished rows are kept.
 
     Examples
     --------

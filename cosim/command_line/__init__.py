@@ -1,6 +1,6 @@
 """The ``cosim`` command.
 
-A file holds one verb, or a few that belong together. It alone prints.
+Each module holds one verb, or a few related ones. No other package prints.
 
 Imports: campaigns, campaigns.falsification, campaigns.pages, campaigns.reruns, campaigns.scenes, campaigns.sweeps,
 campaigns.workers, companion, controller, export, identification, identification.excitation, io, live, live.watching,

@@ -55,7 +55,7 @@ def _add_scenes(verb: argparse.ArgumentParser, arbiter: bool = True) -> None:
     )  # fmt: skip
     verb.add_argument("--workers", type=WORKERS, default=1, metavar="N", help="processes (default: 1)")
     add_replays(verb)
-    verb.add_argument("--tell-failures", action="store_true", help="tell the law which thruster fails, and when")
+    verb.add_argument("--tell-failures", action="store_true", help="report failing thrusters to the law")
     verb.add_argument(
         "--sensing", choices=("state", "sensors"), default="state",
         help="what the law is given: the state with the scenes' noise, or what a navigation filter makes of IMU, DVL, "
@@ -71,7 +71,7 @@ def _add_scenes(verb: argparse.ArgumentParser, arbiter: bool = True) -> None:
 
 
 def add_replays(verb: argparse.ArgumentParser) -> None:
-    """Add the flag that says how many of the worst are shown."""
+    """Add the flag for the number of worst rows with replays."""
     verb.add_argument(
         "--replays", type=whole(0, 1000), default=3, metavar="N",
         help="the worst that are flown again to be seen in the browser (default: 3; of each law that is compared)",
@@ -153,14 +153,14 @@ def ablate(options: argparse.Namespace) -> int:
 
 
 def resumable(run: Callable[[], None], out: Path) -> int:
-    """Run, and say after Ctrl-C or a kill that what is done is kept.
+    """Run a campaign; after Ctrl-C or a kill, print that finished rows are kept.
 
     Parameters
     ----------
     run : callable
-        What can be gone on with.
+        The campaign, which can be continued.
     out : Path
-        Where what is done is kept.
+        Its folder.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 """The ``cosim`` command.
 
-Nothing heavy is imported before a verb needs it, so that help comes at once and Ctrl-C is heeded from the start.
+Slow imports are delayed until a verb needs them, so that help is fast and Ctrl-C works from the start.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _EPILOG = """examples:
 """
 
 
-# flags that stand before the verb or behind it
+# flags that are accepted before and after the verb
 _EVERYWHERE = {
     ("-v", "--verbose"): "log what happens inside",
     ("-q", "--quiet"): "no progress, and no words on what happened: paths, errors and what was asked for alone",
@@ -50,7 +50,7 @@ _EVERYWHERE = {
 
 
 class _Version(argparse.Action):
-    """Prints the version; finding it takes longer than all else that help needs."""
+    """Prints the version, which is looked up only then, since the lookup is slow."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         from importlib import metadata
@@ -64,10 +64,10 @@ class _Version(argparse.Action):
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line, as all other errors."""
+    """Parser that prints its errors in one line, as all other errors."""
 
     def print_help(self, file: Any = None) -> None:
-        """Print it; argparse itself would pass over output that fails."""
+        """Print the help; argparse itself ignores output errors."""
         print(self.format_help(), end="", file=file)
 
     def error(self, message: str) -> NoReturn:
@@ -80,7 +80,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 class _Lines(logging.Formatter):
-    """Makes one line of each message; what was raised stands below it."""
+    """Formats each message as one line, with a traceback below it."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:
         from plant_fmu.errors import printable
@@ -152,14 +152,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 1 where a check fails; 2 where the user must mend something; 130 after Ctrl-C, SIGTERM or SIGHUP; 141 if
-        nobody reads the output.
+        0; 1 if a check fails; 2 after an error of the user; 130 after Ctrl-C, SIGTERM or SIGHUP; 141 if the reader of
+        the output has closed it.
     """
     return run_guarded(lambda: _run(sys.argv[1:] if arguments is None else arguments))
 
 
 def _run(arguments: Sequence[str]) -> int:
-    """Run the verb, and say in one line what the user must mend."""
+    """Run the verb, and print an error of the user in one line."""
     parser = _parser()
     if not arguments:
         parser.print_help(sys.stderr)
@@ -176,13 +176,13 @@ def _run(arguments: Sequence[str]) -> int:
                 stack.enter_context(announce_compilation(tell))
         try:
             return _VERBS[options.verb](options)
-        except _mendable() as error:
+        except _user_errors() as error:
             tell(str(error))
             return FAULT
 
 
-def _mendable() -> tuple[type[Exception], ...]:
-    """Return the errors that the user can mend; a package that is not loaded has raised none."""
+def _user_errors() -> tuple[type[Exception], ...]:
+    """Return the types of errors by the user, of the packages that are loaded."""
     return tuple(
         getattr(sys.modules[f"{package}.errors"], name)
         for package, name in _ERRORS.items()
@@ -251,7 +251,7 @@ _ERRORS = {
     "fuzzy_arbiter": "ArbiterError",
     "plant_fmu": "PlantFmuError",
 }
-_LIGHT = {"completion", "help", "list", "scenes"}  # verbs that need next to nothing
+_LIGHT = {"completion", "help", "list", "scenes"}  # verbs without slow imports
 _VERBS = {
     "run": run.run,
     "watch": watch.watch,

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 from pathlib import Path
 from typing import Any
 
 from cosim.command_line.link_flags import origin
+from cosim.command_line.live_flag import add_live_flag, open_live
 from cosim.command_line.numbers import number, whole
 from cosim.command_line.process import INTERRUPTED, tell
 from cosim.command_line.results import print_run
 from cosim.mavlink.wire.options import PROFILES
 
 _COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
-_STEER_BY = ("sticks", "wrench", "velocity")
+_STEER_BY, _STICKS_BY = ("sticks", "wrench", "velocity", "attitude"), ("manual-control", "rc-override")
 
 
 def add_verb(verbs: Any) -> None:
@@ -36,7 +38,11 @@ def add_verb(verbs: Any) -> None:
     verb.add_argument(
         "--steer-by", choices=_STEER_BY, default="sticks",
         help="sticks: surge, sway, heave and yaw while the autopilot keeps level; wrench: all six axes in manual mode; "
-        "velocity: set-points (default: sticks)",
+        "velocity: set-points; attitude: set-points, with forces (default: sticks)",
+    )  # fmt: skip
+    verb.add_argument(
+        "--sticks-by", choices=_STICKS_BY, default="manual-control",
+        help="message that carries sticks; the pilot gain does not scale rc-override (default: manual-control)",
     )  # fmt: skip
     where = verb.add_mutually_exclusive_group()
     where.add_argument(
@@ -93,6 +99,7 @@ def add_verb(verbs: Any) -> None:
     )  # fmt: skip
     verb.add_argument("--allow-remote", action="store_true", help="let the link leave this machine")
     verb.add_argument("--signing-key", type=Path, metavar="FILE", help="sign with the key in this file")
+    add_live_flag(verb, "show the flight in browsers while it goes on")
     verb.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: runs/SCENARIO-TIME)")
     verb.add_argument("--no-report", action="store_true", help="leave out the report, its figures and the replay")
 
@@ -113,13 +120,15 @@ def companion(options: argparse.Namespace) -> int:
         raise TelemetryError(f"endpoint {options.endpoint!r}: expected a network or a serial device, not a file")
     scene = SceneOrigin(options.scene_origin, options.surveyed_origin, options.surface_pressure, options.water_density)
     chosen = CompanionOptions(
-        options.profile, options.steer_by, scene, options.dry_run, options.arm, options.pilot_gain,
+        options.profile, options.steer_by, options.sticks_by, scene, options.dry_run, options.arm, options.pilot_gain,
         options.velocity_lag, options.vertical_lag, options.reckoning_error, options.least_battery, options.timeout,
     )  # fmt: skip
     scenario = load_scenario(options.scenario, options.overrides)
     key = read_key(options.signing_key) if options.signing_key else None
-    with NetworkLink(endpoint, key, (options.system_id, _COMPONENT), options.speedup) as link:
+    with contextlib.ExitStack() as stack:
+        link = stack.enter_context(NetworkLink(endpoint, key, (options.system_id, _COMPONENT), options.speedup))
         companion = Companion(scenario, link, chosen)
+        live = open_live(options, stack)
         untold = [companion.session.failsafes]
 
         def show(state: str, missing: str) -> None:
@@ -128,7 +137,7 @@ def companion(options: argparse.Namespace) -> int:
                     tell(line)
             tell(state.replace("_", " ") + ("" if missing == "nothing" else f", waits for {missing}"))
 
-        run = companion.run(options.out, not options.no_report, show)
+        run = companion.run(options.out, not options.no_report, show, live)
     print_run(options, run, not options.no_report)
     return INTERRUPTED if run.summary["status"] == "interrupted" else 0
 

@@ -13,7 +13,7 @@ _EPILOG = """to keep it:
   cosim completion zsh > ~/.zfunc/_cosim    # a folder of fpath
   cosim completion fish > ~/.config/fish/completions/cosim.fish
 """
-_FOLDERS = {"DIR", "RUN", "RUN|URL"}  # what flags and words call a folder
+_FOLDERS = {"DIR", "RUN", "RUN|URL"}  # metavars of folders
 _SCENARIOS = {
     "bash": """_cosim_scenarios() {{
   compgen -W "{names}" -- "$1"
@@ -39,7 +39,7 @@ def add_verb(verbs: Any, parser: argparse.ArgumentParser) -> None:
     verbs : argparse subparsers
         Of the command.
     parser : argparse.ArgumentParser
-        The command's own, whose verbs are completed.
+        Parser of the command, whose verbs are completed.
     """
     completion = verbs.add_parser(
         "completion", help="print a script that lets a shell complete this command",

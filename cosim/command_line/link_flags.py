@@ -1,4 +1,4 @@
-"""Flags of the verbs that are a MAVLink vehicle: where it is seen, as what, and whom it heeds."""
+"""Flags of the verbs that act as a MAVLink vehicle: endpoints, profile, and accepted senders."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def add_link_flags(parser: argparse.ArgumentParser, commands: bool = False, requ
     parser : argparse.ArgumentParser
         Of the verb.
     commands : bool
-        Whether what the verb runs can be commanded at all.
+        Add the flags for commands.
     required : bool
-        Whether there must be an endpoint.
+        Require an endpoint.
     """
     usual = MavlinkOptions()
     parser.add_argument(
@@ -43,10 +43,10 @@ def add_link_flags(parser: argparse.ArgumentParser, commands: bool = False, requ
     parser.add_argument("--allow-remote", action="store_true", help="let the link leave this machine")
     parser.add_argument(
         "--signing-key", type=Path, metavar="FILE",
-        help="sign with the key in this file, and heed nothing that is not signed with it",
+        help="sign with the key in this file, and accept only messages signed with it",
     )  # fmt: skip
     parser.add_argument(
-        "--allow-system", type=_systems, metavar="ID[,ID]", help="heed these system ids alone (default: all)"
+        "--allow-system", type=_systems, metavar="ID[,ID]", help="accept these system ids alone (default: all)"
     )
     parser.add_argument(
         "--system-id", type=_SYSTEM, default=usual.system_id, metavar="N",
@@ -63,7 +63,9 @@ def add_link_flags(parser: argparse.ArgumentParser, commands: bool = False, requ
 
 
 def _add_command_flags(parser: argparse.ArgumentParser, usual: MavlinkOptions) -> None:
-    parser.add_argument("--commands", action="store_true", help="heed commands; without it, the link only shows")
+    parser.add_argument(
+        "--commands", action="store_true", help="accept commands; without it, the link only sends telemetry"
+    )
     parser.add_argument("--await-arm", action="store_true", help="nothing moves before the vehicle is armed")
     parser.add_argument(
         "--link-loss", choices=LOSS_ACTIONS,
@@ -76,25 +78,25 @@ def _add_command_flags(parser: argparse.ArgumentParser, usual: MavlinkOptions) -
 
 
 def links_from(options: argparse.Namespace) -> tuple[list[Endpoint], MavlinkOptions]:
-    """Return what the flags say.
+    """Return endpoints and options from the flags.
 
     Parameters
     ----------
     options : argparse.Namespace
-        Of a verb that has the flags.
+        Of a verb with the flags.
 
     Returns
     -------
     list of Endpoint
-        Where the vehicle is to be seen; nothing is opened yet.
+        Endpoints of the links, not opened yet.
     MavlinkOptions
-        As what, and whom it heeds.
+        Profile, keys, accepted senders and failsafe.
 
     Raises
     ------
     TelemetryError
-        If an endpoint is none, or leaves this machine without leave, the key cannot be read, or a flag stands without
-        the one that it needs.
+        If an endpoint is invalid, or reaches other machines without --allow-remote, the key cannot be read, or a flag
+        is given without another one that it requires.
     """
     from cosim.mavlink.wire.endpoint import parse_endpoint
     from cosim.mavlink.wire.signing import read_key
@@ -120,7 +122,7 @@ def _systems(text: str) -> frozenset[int]:
 
 
 def origin(text: str) -> tuple[float, float]:
-    """Return latitude and longitude [deg] that a flag names; argparse.ArgumentTypeError if it names none."""
+    """Parse latitude and longitude [deg] of a flag; raise an argparse.ArgumentTypeError if invalid."""
     try:
         latitude, longitude = (float(part) for part in text.split(","))
     except ValueError:

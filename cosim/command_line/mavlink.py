@@ -19,7 +19,7 @@ from cosim.mavlink.wire.options import PROFILES
 
 _REDRAW, _SNAPSHOT = 0.25, 1.0  # s
 _ONCE = 2.0  # s of listening, for one picture
-_WIDE = 160  # characters of a line, where there is no terminal
+_WIDE = 160  # characters of a line without a terminal
 _HIDE, _SHOW, _CLEAR, _HOME, _END_OF_LINE, _BELOW = "\x1b[?25l", "\x1b[?25h", "\x1b[2J", "\x1b[H", "\x1b[K", "\x1b[J"
 
 
@@ -61,7 +61,10 @@ def _add_ground(verb: argparse.ArgumentParser, where: str, number: str | None) -
     verb.add_argument("endpoint", metavar="ENDPOINT", nargs=number, help=where)
     verb.add_argument("--allow-remote", action="store_true", help="let the link leave this machine")
     verb.add_argument(
-        "--signing-key", type=Path, metavar="FILE", help="sign with the key in this file, and hear nothing else"
+        "--signing-key",
+        type=Path,
+        metavar="FILE",
+        help="sign with the key in this file, and accept only messages signed with it",
     )
 
 
@@ -97,7 +100,7 @@ def listen(options: argparse.Namespace) -> int:
 
 @contextlib.contextmanager
 def _screen(live: bool) -> Any:
-    """Give a function that shows lines: in the place of those before on a terminal, else behind them."""
+    """Yield a function that shows lines: on a terminal it replaces the earlier ones, else it appends."""
     if not live:
         yield _print
         return

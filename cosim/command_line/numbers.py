@@ -1,4 +1,4 @@
-"""Numbers as flags take them: within bounds, or refused in one line."""
+"""Types of flags that take numbers within bounds."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 import math
 from collections.abc import Callable
 
-_SHOWN = 40  # characters of what is refused
+_SHOWN = 40  # greatest number of characters of a refused text in the message
 
 
 def whole(low: int, high: int) -> Callable[[str], int]:
@@ -15,12 +15,12 @@ def whole(low: int, high: int) -> Callable[[str], int]:
     Parameters
     ----------
     low, high : int
-        The least and the greatest, at least 0.
+        Least and greatest value, at least 0.
 
     Returns
     -------
     callable
-        Parses a text, as `argparse` calls it.
+        Parser of a text, for `argparse`.
     """
 
     def parse(text: str) -> int:
@@ -38,12 +38,12 @@ def number(low: float, high: float) -> Callable[[str], float]:
     Parameters
     ----------
     low, high : float
-        The least and the greatest.
+        Least and greatest value.
 
     Returns
     -------
     callable
-        Parses a text, as `argparse` calls it.
+        Parser of a text, for `argparse`.
     """
 
     def parse(text: str) -> float:
@@ -59,7 +59,7 @@ def number(low: float, high: float) -> Callable[[str], float]:
 
 
 def rate(text: str) -> float:
-    """Parse a rate in simulated seconds a second; ``max`` is infinity."""
+    """Parse a rate in simulated seconds per second; ``max`` is infinity."""
     try:
         return math.inf if text == "max" else number(1e-3, 1e6)(text)
     except argparse.ArgumentTypeError as error:

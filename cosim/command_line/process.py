@@ -1,4 +1,4 @@
-"""The process of a command: what ends it, who reads it, and its exit status."""
+"""The process of a command: signals, output and exit status."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from collections.abc import Callable, Iterator
 from threading import current_thread, main_thread
 from types import FrameType
 
-FAULT, INTERRUPTED, NO_READER = 2, 130, 141  # the last two as a shell has them of SIGINT and SIGPIPE
+FAULT, INTERRUPTED, NO_READER = 2, 130, 141  # the last two as in shells for SIGINT and SIGPIPE
 
-_KILLS = ("SIGTERM", "SIGHUP")  # the second where the terminal goes; Windows has none
+_KILLS = ("SIGTERM", "SIGHUP")  # the second when the terminal closes; Windows does not have it
 
 
 def run_guarded(run: Callable[[], int]) -> int:
-    """Run a command and turn what ends it into one line and an exit status.
+    """Run a command, and convert signals and output errors to one line and an exit status.
 
     Parameters
     ----------
@@ -27,9 +27,10 @@ def run_guarded(run: Callable[[], int]) -> int:
     Returns
     -------
     int
-        That status; 2 if output or a file fails, 130 after Ctrl-C, SIGTERM or SIGHUP, 141 if nobody reads the output.
+        The command's status; 2 after an error of output or a file, 130 after Ctrl-C, SIGTERM or SIGHUP, 141 if the
+        reader of the output has closed it.
     """
-    if sys.stdout is None:  # closed by whoever started this: the next file that is opened would take its place
+    if sys.stdout is None:  # closed by the parent: the next file that is opened would get its descriptor
         tell("standard output is closed; expected it open, such as on /dev/null")
         return FAULT
     try:
@@ -53,18 +54,17 @@ def run_guarded(run: Callable[[], int]) -> int:
 
 
 def tell(what: str) -> None:
-    """Say in one line on standard error what the user must know; nothing where that is closed or gone."""
-    if sys.stderr is not None:  # else `print` would take standard output
+    """Print a line for the user on standard error; ignore it if that is closed."""
+    if sys.stderr is not None:  # for None `print` would use standard output
         with contextlib.suppress(OSError):
             print(f"cosim: {what}", file=sys.stderr, flush=True)
 
 
 @contextlib.contextmanager
 def kills_interrupt() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP end what is done as Ctrl-C does, so that a killed run is readable.
+    """Raise KeyboardInterrupt at SIGTERM and SIGHUP as at Ctrl-C, so that a killed run stays readable.
 
-    The first one does; those that follow are ignored, as a closed terminal sends several. Under ``nohup`` SIGHUP stays
-    ignored.
+    Only the first signal raises it, since a closed terminal sends several. Under ``nohup`` SIGHUP stays ignored.
     """
     with contextlib.ExitStack() as stack:
         numbers = _catchable(_KILLS)
@@ -81,7 +81,7 @@ def kills_interrupt() -> Iterator[None]:
 
 @contextlib.contextmanager
 def signals_held() -> Iterator[None]:
-    """Let Ctrl-C and kills wait until libraries are loaded: within its own C, NumPy makes an ImportError of them."""
+    """Delay Ctrl-C and kills until libraries are loaded, since NumPy's import converts them to an ImportError."""
     received: list[int] = []
     with contextlib.ExitStack() as stack:
         for number in _catchable(("SIGINT", *_KILLS)):
@@ -93,7 +93,7 @@ def signals_held() -> Iterator[None]:
 
 
 def _catchable(names: tuple[str, ...]) -> list[signal.Signals]:
-    """Return those signals that this thread may handle, and that nobody has had ignored."""
+    """Return the signals that this thread may handle and that are not ignored."""
     if current_thread() is not main_thread():
         return []
     numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
@@ -110,18 +110,18 @@ def _flush() -> None:
 
 
 def _is_unread() -> bool:
-    """Return whether whoever read the output has gone, rather than who is at the end of another pipe."""
+    """Return True if the reader of standard output has closed it, rather than that of another pipe."""
     if not hasattr(select, "poll"):  # on Windows
         return True
     try:
         poll = select.poll()
         poll.register(sys.stdout.fileno(), 0)
-    except OSError:  # it is none of the system's
+    except OSError:  # it has no descriptor
         return False
     return any(event & (select.POLLERR | select.POLLHUP) for _, event in poll.poll(0))
 
 
 def _drop_output() -> None:
-    """Let what is left of the output go nowhere, else the interpreter fails again to write it at its end."""
+    """Redirect the remaining output to the null device, so that the interpreter's final flush does not fail."""
     with contextlib.suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -35,6 +35,10 @@ def add_verbs(verbs: Any) -> None:
         help="file to write (default: replay.html, in the folder of a single run, or here for several)",
     )  # fmt: skip
     replay.add_argument("--title", help="of the page (default: the scenario's)")
+    replay.add_argument(
+        "--interactive", action="store_true",
+        help="let the page fly its run again, with a goal, regions, a current, noise, gains that its reader changes",
+    )  # fmt: skip
 
 
 def _formats(text: str) -> list[str]:
@@ -46,7 +50,7 @@ def _formats(text: str) -> list[str]:
 
 
 def report(options: argparse.Namespace) -> int:
-    """Run ``cosim report``: one bad folder does not keep the others from theirs."""
+    """Run ``cosim report``; continue with the other folders after an invalid one."""
     from controller import ControllerError
     from cosim.errors import CosimError
     from cosim.results.wording import verdict
@@ -71,5 +75,5 @@ def replay(options: argparse.Namespace) -> int:
     """Run ``cosim replay``."""
     from cosim.replay.pages import replay as write
 
-    print(write(options.folders, options.out, options.title))
+    print(write(options.folders, options.out, options.title, options.interactive))
     return 0

@@ -1,4 +1,4 @@
-"""What a command prints of what it has done: words, which ``--quiet`` leaves out, and paths."""
+"""Output of a command about its results: texts, which ``--quiet`` suppresses, and paths."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ if TYPE_CHECKING:
 
 
 def say(options: argparse.Namespace, *lines: str) -> None:
-    """Print words on what happened, unless the user wants none."""
+    """Print lines unless ``--quiet`` is given."""
     if not options.quiet:
         for line in lines:
             print(line, flush=True)
 
 
 def print_run(options: argparse.Namespace, run: Run, report: bool = True) -> None:
-    """Print what a run came to, and where to look.
+    """Print the outcome of a run, and the paths of its report and replay.
 
     Parameters
     ----------
     options : argparse.Namespace
         Of the verb.
     run : Run
-        Done or interrupted.
+        Completed or interrupted.
     report : bool
-        Whether it has a report and a replay.
+        True if it has a report and a replay.
     """
     from cosim.results.wording import verdict
 

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim.command_line.link_flags import add_link_flags, links_from
+from cosim.command_line.live_flag import add_live_flag, open_live
 from cosim.command_line.numbers import rate
-from cosim.command_line.process import INTERRUPTED, tell
+from cosim.command_line.process import INTERRUPTED
 from cosim.command_line.results import print_run
 from cosim.errors import TelemetryError
-from cosim.live.address import HOST, PORT, parse_live
 
 if TYPE_CHECKING:
     from cosim.mavlink.setup import Mavlink
@@ -45,11 +45,7 @@ def add_verb(verbs: Any) -> None:
         "--replay-commands", dest="commands_log", type=Path, metavar="FILE",
         help="repeat what an earlier run was commanded: its commands.jsonl, with its scenario.toml",
     )  # fmt: skip
-    run.add_argument(
-        "--live", nargs="?", const="", metavar="[HOST:]PORT",
-        help="show the run in browsers while it goes on, and take their commands with --commands "
-        f"(default: {HOST}:{PORT}, or another port if that is taken)",
-    )  # fmt: skip
+    add_live_flag(run, "show the run in browsers while it goes on, and take their commands with --commands")
     add_link_flags(run, commands=True)
 
 
@@ -65,18 +61,12 @@ def run(options: argparse.Namespace) -> int:
         overrides.append("commands.enabled=true")
     if options.await_arm:
         overrides.append("commands.await_arm=true")
-    address = None if options.live is None else parse_live(options.live, options.allow_remote)
     mavlink = _mavlink(options)
     scenario = load_scenario(options.scenario, overrides)
-    usual = 1.0 if options.commands or address else math.inf
+    usual = 1.0 if options.commands or options.live is not None else math.inf
     most = usual if options.rate is None else options.rate
     with contextlib.ExitStack() as stack:
-        live = None
-        if address is not None:
-            from cosim.live.view import LiveView
-
-            live = stack.enter_context(LiveView(address))
-            tell(f"the run is shown at {live.url}")
+        live = open_live(options, stack)
         done = run_scenario(
             scenario, options.out, mavlink, None if most == math.inf else most,
             progress=not options.quiet,
@@ -100,7 +90,7 @@ def _json(run: Run) -> str:
 
 
 def _mavlink(options: argparse.Namespace) -> Mavlink | None:
-    """Return what the flags say of the link, None if there is to be none."""
+    """Return the MAVLink setup from the flags, None without endpoints."""
     if not options.mavlink:
         for flag in ("signing_key", "allow_system"):
             if getattr(options, flag):

@@ -9,7 +9,7 @@ from typing import Any
 from cosim.command_line.numbers import whole
 from cosim.errors import ScenarioError
 
-_MOST = 10**7  # scenes; more than a month of flights
+_MOST = 10**7  # scenes, whose flights take more than a month
 
 
 def add_verb(verbs: Any) -> None:

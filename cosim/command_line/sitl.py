@@ -57,7 +57,7 @@ def add_verbs(verbs: Any) -> None:
     )  # fmt: skip
     sitl.add_argument(
         "--dvl", type=number(0.1, 100.0), metavar="HZ",
-        help="tell it there, so many times a simulated second, the velocity over ground: VISION_POSITION_DELTA",
+        help="send it the velocity over ground so many times a simulated second: VISION_POSITION_DELTA",
     )  # fmt: skip
     sitl.add_argument(
         "--dvl-latency", type=number(0.0, 10.0), default=0.1, metavar="S", help="of those messages (default: 0.1)"
@@ -107,13 +107,13 @@ def _check(options: argparse.Namespace) -> None:
     from cosim.errors import RunError
 
     if options.dvl is not None and options.autopilot is None:
-        raise RunError("--dvl: nobody to tell it; expected --autopilot ENDPOINT too")
+        raise RunError("--dvl: has no receiver; expected --autopilot ENDPOINT too")
     if options.autopilot is not None and options.backend == "px4":
         raise RunError("--autopilot: supported with --backend ardupilot alone")
 
 
 def _autopilot_link(options: argparse.Namespace) -> AutopilotLink | None:
-    """Return the link to the autopilot's own port, if one is named."""
+    """Open the link to a port of the autopilot, None if none is given."""
     from cosim.mavlink.wire.endpoint import parse_endpoint
     from cosim.sitl.autopilot_link import AutopilotLink, DvlOptions
 
@@ -129,7 +129,7 @@ def _code(runs: list[Run]) -> int:
 
 
 def _address(host: str, port: int, allow_remote: bool) -> tuple[str, int]:
-    """Return the address to bind, if it may be."""
+    """Resolve the address to bind; raise a RunError if other machines reach it and `allow_remote` is False."""
     from cosim.errors import RunError
 
     try:

@@ -10,7 +10,7 @@ from typing import Any
 
 from cosim.command_line.numbers import rate
 
-_WIDE = 120  # characters of a line, where there is no terminal
+_WIDE = 120  # characters of a line without a terminal
 
 
 def add_verb(verbs: Any) -> None:
@@ -42,7 +42,7 @@ def watch(options: argparse.Namespace) -> int:
 
     class Screen(Console):
         def on_broken_pipe(self) -> None:
-            raise  # noqa: PLE0704 - it is called where that is handled, and would end the process with 1
+            raise  # noqa: PLE0704 - called in the handler of that error; rich would exit with status 1
 
     terminal = sys.stdout.isatty()
     console = Screen(width=None if terminal else _WIDE, highlight=False)
@@ -57,6 +57,6 @@ def watch(options: argparse.Namespace) -> int:
                 if live is not None:
                     live.update(picture(look, console.width, console.height, ascii_only), refresh=True)
     finally:
-        if last is not None:  # what was seen last stays on the terminal
+        if last is not None:  # the last picture stays on the terminal
             console.print(picture(last, console.width, None, ascii_only))
     return 0

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,38 +13,44 @@ from controller.laws.deployable.gains import SPREADS
 from controller.regions.region_set import of_attitude
 from cosim.companion.link import AutopilotLink
 from cosim.companion.options import CompanionOptions
-from cosim.companion.outputs import FASTEST, SteerBy
+from cosim.companion.outputs import SteerBy, uses_sticks
 from cosim.companion.remote_vehicle import RemoteVehicle
 from cosim.companion.safety import State
 from cosim.companion.session import AutopilotSession
+from cosim.companion.set_points import FASTEST
 from cosim.companion.warm_up import warm_up
 from cosim.errors import RunError
+from cosim.mavlink.wire.options import ProfileName
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import Run
+from cosim.results.wording import verdict
 from cosim.run.run_folder import claim, conclude
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import SecondaryRegion
-from cosim.simulation.master import Master
+from cosim.simulation.master import Master, Observer
+
+if TYPE_CHECKING:  # websockets wait until a flight is shown
+    from cosim.live.view import LiveView
 
 _RELEASE = 2.0  # s at the most, that letting go takes at the end
+_NO_COMMANDS = "a companion's page shows alone: take over at the autopilot's ground station"
 _STEADY = 0.1  # m, of drift between two sources, up to which it is their noise
 
 
 # the autopilot has the thrusters: what one of them does is not what the law asked of it
 _NOT_ISOLATED = {"law.gains.failure_threshold": 0.0}
+# its attitude loop takes care of moments
+_NOT_TURNED = _NOT_ISOLATED | {"law.gains.adaptation": 0.0, "law.gains.moment_bound": 1e-3}
+_NOT_LIFTED = {"law.gains.restoring_drift": 0.0, "law.gains.restoring_bound": 1e-3}  # its depth loop, of weight
 # its velocity loop takes care of weight, moments, current and lag: what the law would find out of them is not so
-_NOT_ESTIMATED = _NOT_ISOLATED | {
-    "law.gains.effectiveness_estimation": 0.0,
-    "law.gains.lag_bound": 0.0,
-    "law.gains.adaptation": 0.0,
-    "law.gains.restoring_drift": 0.0,
-    "law.gains.restoring_bound": 1e-3,
-    "law.gains.moment_bound": 1e-3,
-    "law.gains.current_bound": 1e-3,
-}
+_NOT_ESTIMATED = (
+    _NOT_TURNED
+    | _NOT_LIFTED
+    | {"law.gains.effectiveness_estimation": 0.0, "law.gains.lag_bound": 0.0, "law.gains.current_bound": 1e-3}
+)
 
 
-def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks") -> Scenario:
+def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks", profile: ProfileName = "ardusub") -> Scenario:
     """Return a scenario as the companion flies it: a step is a control period, and the state is what is reported.
 
     Parameters
@@ -51,7 +58,9 @@ def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks") -> Scena
     scenario : Scenario
         As it is simulated.
     steer_by : str
-        What the autopilot gets: ``sticks``, ``wrench`` or ``velocity``.
+        What the autopilot gets: ``sticks``, ``wrench``, ``velocity`` or ``attitude``.
+    profile : str
+        Which autopilot it is.
 
     Raises
     ------
@@ -67,6 +76,8 @@ def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks") -> Scena
     arbiter = max(1, round(scenario.time.arbiter / period)) * period
     duration = max(1, round(scenario.time.duration / period)) * period
     gains: dict[str, float] = _NOT_ISOLATED
+    if steer_by == "attitude":
+        gains = _NOT_TURNED | (_NOT_LIFTED if profile == "ardusub" else {})
     if steer_by == "velocity":
         gains = _NOT_ESTIMATED | {"law.gains.speed": min(getattr(scenario.law.gains, "speed", FASTEST), FASTEST)}
     return scenario.replace(
@@ -124,7 +135,7 @@ class Companion:
     """
 
     def __init__(self, scenario: Scenario, link: AutopilotLink, options: CompanionOptions) -> None:
-        self.scenario = scenario_to_steer(scenario, options.steer_by)
+        self.scenario = scenario_to_steer(scenario, options.steer_by, options.profile)
         self._options = options
         self.session = AutopilotSession(link, self.scenario.vehicle, options)
         self._reported = ("", "")
@@ -132,7 +143,11 @@ class Companion:
         self._hard = np.array(hard, dtype=int)
 
     def run(
-        self, out: Path | None = None, report: bool = True, on_state: Callable[[State, str], None] | None = None
+        self,
+        out: Path | None = None,
+        report: bool = True,
+        on_state: Callable[[State, str], None] | None = None,
+        live: LiveView | None = None,
     ) -> Run:
         """Wait until the vehicle can be steered, steer it for the scenario's time, and let go.
 
@@ -144,6 +159,8 @@ class Companion:
             Write report and figures too.
         on_state : callable, optional
             Called with each new state, and with what it waits for.
+        live : LiveView, optional
+            Shows the flight while it goes on, from before steering begins; it takes no commands.
 
         Returns
         -------
@@ -160,8 +177,17 @@ class Companion:
             If Ctrl-C came before steering began.
         """
         warm_up(self.scenario, self._options)
+
+        def tell(state: State, missing: str) -> None:
+            if on_state is not None:
+                on_state(state, missing)
+            if live is not None:
+                live.say(state.replace("_", " ") + ("" if missing == "nothing" else f", waits for {missing}"))
+
         with Master(self.scenario, plant=RemoteVehicle(self.scenario, self.session)) as master:
-            self.prepare(on_state)
+            if live is not None:
+                live.begin(self.scenario, master.signals.columns, _NO_COMMANDS)
+            self.prepare(tell)
             folder = claim(out, self.scenario)
             try:
                 recorder = Recorder(folder.path, master.signals.columns)
@@ -170,14 +196,17 @@ class Companion:
                 raise
             started = time.perf_counter()
             try:
-                status = self._steer(master, recorder, on_state)
+                status = self._steer(master, [recorder] if live is None else [recorder, live], tell)
             finally:
                 self.session.release(_RELEASE)
                 wall_time = time.perf_counter() - started
                 kept = folder.keep(recorder)
             if not kept:
                 raise RunError(f"{folder.path}: ended before the first step")
-            return conclude(folder.path, self.scenario, status, wall_time, report)
+            run = conclude(folder.path, self.scenario, status, wall_time, report)
+            if live is not None:
+                live.end(status, verdict(run.summary))
+            return run
 
     def prepare(self, on_state: Callable[[State, str], None] | None = None) -> None:
         """Exchange messages until the vehicle can be steered; RunError if that takes longer than the options allow.
@@ -198,17 +227,18 @@ class Companion:
         """RunError if the autopilot would not take our sticks."""
         o, session = self._options, self.session
         deaf = session.failsafes.deaf_to(session.identity[0])
-        if deaf and o.steer_by != "velocity" and not o.dry_run:
+        if deaf and uses_sticks(o.profile, o.steer_by) and not o.dry_run:
             raise RunError(f"{deaf}; expected the same number, or --steer-by velocity")
 
-    def _steer(self, master: Master, recorder: Recorder, on_state: Callable[[State, str], None] | None) -> str:
+    def _steer(self, master: Master, observers: Sequence[Observer], on_state: Callable[[State, str], None]) -> str:
         session = self.session
         clearances = master.signals.view("goal.clearance", len(self.scenario.regions) + 1)
         master.plant.initialise()
         try:
             for k in range(self.scenario.steps + 1):
                 master.step(k, session)
-                recorder.observe(k, master.row)
+                for observer in observers:
+                    observer.observe(k, master.row)
                 master.environment.doubt_positions(self._doubt() / SPREADS)
                 violated = clearances[self._hard]
                 session.outside = float(max(0.0, -np.nanmin(violated))) if np.isfinite(violated).any() else 0.0

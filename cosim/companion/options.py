@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from cosim.companion.frame_alignment import SceneOrigin
 from cosim.companion.outputs import SteerBy
+from cosim.companion.sticks import SticksBy
 from cosim.mavlink.wire.options import ProfileName
 
 
@@ -21,7 +22,9 @@ class CompanionOptions:
     """
 
     profile: ProfileName = "ardusub"
-    steer_by: SteerBy = "sticks"  # sticks: surge, sway, heave, yaw in STABILIZE; wrench: all six in MANUAL; velocity
+    # sticks: surge, sway, heave, yaw in STABILIZE; wrench: all six in MANUAL; velocity; attitude, with forces
+    steer_by: SteerBy = "sticks"
+    sticks_by: SticksBy = "manual-control"
     origin: SceneOrigin = field(default_factory=SceneOrigin)
     dry_run: bool = False  # compute and record, and send nothing
     arm: bool = False  # arm the vehicle; otherwise that is the pilot's

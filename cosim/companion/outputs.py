@@ -1,220 +1,183 @@
-"""How the law's wrench reaches an autopilot: as sticks, or as a velocity."""
+"""How the law's wrench reaches an autopilot: what each takes, and the messages of a step."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any, Literal, get_args
 
 import numpy as np
 
-from controller.quaternion import rotation_matrix
+from cosim.companion.set_points import TurnLead, VelocityLead, attitude_target, velocity_target
+from cosim.companion.sticks import SticksBy, channels_override, channels_released, manual_control, scale_of
 from cosim.companion.vehicle_state import ReportedState
-from cosim.mavlink.vehicle.profile import Profile
-from cosim.simulation.commands.command_handler import greatest_wrench
+from cosim.errors import RunError
+from cosim.mavlink.vehicle.profile import PROFILES, Profile
+from cosim.mavlink.wire.options import ProfileName
 from cosim.simulation.commands.commands import Mode
-from cosim.simulation.commands.stick_stabilizer import YAW_RATE
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
-SteerBy = Literal["sticks", "wrench", "velocity"]
+SteerBy = Literal["sticks", "wrench", "velocity", "attitude"]
 STEER_BY: tuple[SteerBy, ...] = get_args(SteerBy)
-STEERED_IN: dict[SteerBy, Mode] = {"sticks": "stabilize", "wrench": "manual", "velocity": "reach"}
+_STEERED_IN: dict[SteerBy, Mode] = {"sticks": "stabilize", "wrench": "manual", "velocity": "reach", "attitude": "reach"}
 
-_FULL = 1000.0
-_PITCH, _ROLL = 1, 2  # enabled_extensions
-_VELOCITY_ONLY, _YAW_RATE_IGNORED = 0b010111000111, 1 << 11  # type_mask
-_LOCAL_NED = 1
-_MOSTLY = 0.6  # of the greatest part that a thruster has in an axis, from which on it works for that axis
-_YAW_LAG = 0.3  # s, of an autopilot's rate loop
-FASTEST = 0.5  # m/s, of the law that steers by velocity: a loop that it asks through brakes later than thrusters do
-_FASTEST_ASKED, _FASTEST_TURN = 0.8, 0.6  # m/s, rad/s, that are asked for
-_OBSERVED = 1.5  # rad/s, of both poles of the observer of what a velocity loop does beside its lag
+_PX4_REFUSES: dict[str, str] = {
+    "wrench": "its sticks have no roll and pitch beside surge and sway; expected sticks or attitude",
+    "velocity": "its uuv_pos_control follows positions alone; expected sticks or attitude",
+    "rc-override": "it gives channels a meaning by its own RC_MAP_*, and none for surge; expected manual-control",
+}
+_CENTERED_FOR = 0.2  # s, for which overridden channels rest in the middle before they are given back
 _NEUTRAL: Array = np.zeros(6)
 
 
-@dataclass(frozen=True)
-class StickScale:
-    """What full sticks give.
+def require_taken(profile: ProfileName, steer_by: SteerBy, sticks_by: SticksBy) -> None:
+    """Raise where an autopilot does not take what it is to be steered by.
+
+    Raises
+    ------
+    RunError
+        That says why not, and what it takes.
+    """
+    for flag, value in (("--steer-by", steer_by), ("--sticks-by", sticks_by)):
+        if profile == "px4" and value in _PX4_REFUSES:
+            raise RunError(f"{flag} {value}: a PX4 does not take it: {_PX4_REFUSES[value]}")
+    if sticks_by == "rc-override" and not uses_sticks(profile, steer_by):
+        raise RunError(f"--sticks-by {sticks_by}: no sticks are sent with --steer-by {steer_by}, expected none")
+
+
+def uses_sticks(profile: ProfileName, steer_by: SteerBy) -> bool:
+    """Return whether sticks are sent: an ArduSub's also beside attitudes, for it has no other force along them."""
+    return steer_by in ("sticks", "wrench") or (steer_by == "attitude" and profile == "ardusub")
+
+
+def steered_in(profile: ProfileName, steer_by: SteerBy) -> Mode:
+    """Return the mode in which an autopilot takes what it is steered by."""
+    return "depth_hold" if steer_by == "attitude" and profile == "ardusub" else _STEERED_IN[steer_by]
+
+
+class Output:
+    """Makes the messages that ask an autopilot for a wrench, and notes what is in them.
+
+    Parameters
+    ----------
+    mavlink : module
+        The dialect.
+    vehicle : Vehicle
+        Whose model and limits count.
+    profile : str
+        Which autopilot it is.
+    steer_by, sticks_by : str
+        What it gets.
+    pilot_gain : float
+        Part of the greatest wrench that full sticks give.
+    lags : (float, float)
+        Of its velocity loop [s], horizontally and vertically.
 
     Attributes
     ----------
-    efforts : ndarray, shape (n, 6)
-        Each thruster's part of its greatest force for a wrench along or about each body axis [1/N, 1/(N m)].
-    mixer : ndarray, shape (n, 6)
-        What a full stick of each axis, at a gain of 1, asks of each thruster: 1, 0 or -1 of its greatest force. Of an
-        autopilot that allocates forces by itself, both are of axes instead of thrusters.
-    gain : float
-        The pilot's: what scales the sticks of surge, sway, heave and yaw.
-    scales_all : bool
-        Whether it scales those of roll and pitch, too.
-    quadratic : bool
-        Whether a thruster's force goes with the square of what the autopilot asks of it.
-    yaw_inertia : float
-        With the added one [kg m2].
+    sticks, velocity, attitude : ndarray, shape (6,), (3,), (4,)
+        As asked for last: -1 to 1, [m/s, NED], a quaternion; zero where they are not.
+
+    Raises
+    ------
+    RunError
+        If the autopilot does not take that.
     """
 
-    efforts: Array
-    mixer: Array
-    gain: float
-    scales_all: bool
-    quadratic: bool
-    yaw_inertia: float
-
-    def sticks(self, wrench: Array) -> Array:
-        """Return the sticks that ask for a wrench, shape (6,), X Y Z K M N from -1 to 1.
-
-        An autopilot adds what all sticks ask of a thruster, and where its force goes with the square, it goes with the
-        square of that sum. So each thruster's force is turned into what it is to be asked for, and that into sticks.
-
-        Parameters
-        ----------
-        wrench : ndarray, shape (6,)
-            [N, N m], body frame; what is not finite asks for nothing.
-        """
-        share = self.efforts @ np.where(np.isfinite(wrench), wrench, 0.0)
-        if self.quadratic:
-            share = np.copysign(np.sqrt(np.abs(share)), share)
-        asked = np.linalg.lstsq(self.mixer, share, rcond=None)[0]
-        asked[[0, 1, 2, 5]] /= self.gain
-        if self.scales_all:
-            asked[3:5] /= self.gain
-        clipped: Array = np.clip(asked, -1.0, 1.0)
-        return clipped
-
-    def yaw_rate_stick(self, moment: float, rate: float) -> float:
-        """Return the yaw stick by which an autopilot that keeps a rate of turn does what a moment would.
-
-        Parameters
-        ----------
-        moment : float
-            About the body's vertical axis [N m].
-        rate : float
-            Of turn now [rad/s].
-        """
-        asked = rate + _YAW_LAG * moment / self.yaw_inertia
-        return min(max(asked / (self.gain * YAW_RATE), -1.0), 1.0) if math.isfinite(asked) else 0.0
-
-
-def scale_of(vehicle: Vehicle, profile: Profile, gain: float) -> StickScale:
-    """Return what full sticks give of a vehicle.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Its thrusters' limits count, and as ArduSub the curve of its table ``autopilot``.
-    profile : Profile
-        Which autopilot it is.
-    gain : float
-        The pilot's, above 0 to 1.
-    """
-    reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
-    table = vehicle.autopilot
-    quadratic = profile.name == "ardusub" and table is not None and table.curve == "quadratic"
-    yaw_inertia = float(vehicle.inertia[2, 2] + vehicle.added_mass[5, 5])
-    if profile.name != "ardusub":  # it brings each axis to the thrusters by itself
-        share = np.diag(np.divide(1.0, reach, out=np.zeros(6), where=reach > 0.0))
-        return StickScale(share, np.eye(6), gain, True, quadratic, yaw_inertia)
-    matrix = vehicle.thruster_matrix
-    mixer = np.where(np.abs(matrix) > _MOSTLY * np.abs(matrix).max(axis=1, keepdims=True), np.sign(matrix), 0.0).T
-    most = 0.5 * (vehicle.thrust_max - vehicle.thrust_min)
-    made = (matrix * most) @ mixer  # by full sticks, one axis a column, with what comes along in others
-    return StickScale(mixer @ np.linalg.pinv(made), mixer, gain, False, quadratic, yaw_inertia)
-
-
-def manual_control(mavlink: Any, system: int, profile: Profile, sticks: Array, all_axes: bool) -> Any:
-    """Return MANUAL_CONTROL; roll and pitch are in it where `all_axes` are steered."""
-    surge, sway, heave, roll, pitch, yaw = sticks.tolist()
-    center = profile.centred_stick
-    x, y, r = (round(_FULL * part) for part in (surge, sway, yaw))
-    z = round(center - (_FULL - center) * heave)
-    message = mavlink.MAVLink_manual_control_message(system, x, y, z, r, 0)
-    if all_axes:
-        message.enabled_extensions = _PITCH | _ROLL
-        full = profile.full_tilt_stick
-        message.s, message.t = round(full * pitch), round(full * roll)
-    return message
-
-
-def neutral(mavlink: Any, system: int, profile: Profile) -> Any:
-    """Return MANUAL_CONTROL with all sticks at rest."""
-    return manual_control(mavlink, system, profile, _NEUTRAL, all_axes=False)
-
-
-class VelocityLead:
-    """Turns a wrench into the velocity that an inner loop is to be asked for.
-
-    A first-order loop accelerates by (asked - v) / lag + d. So v + lag (a - d) asks for the acceleration a that the
-    wrench would give the vehicle, by its mass, added mass and damping. A Luenberger observer finds d, of which current,
-    drag and a loop without integral action are parts, from what was asked for and what the velocity did.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Whose model counts.
-    lag, vertical_lag : float
-        Of the autopilot's velocity loop [s], horizontally and vertically.
-    """
-
-    def __init__(self, vehicle: Vehicle, lag: float, vertical_lag: float) -> None:
-        self._mass: Array = vehicle.mass + np.diag(vehicle.added_mass)[:3]
-        self._linear, self._quadratic = vehicle.linear_damping[:3], vehicle.quadratic_damping[:3]
-        self._lag: Array = np.array([lag, lag, vertical_lag])
-        self._yaw_inertia = float(vehicle.inertia[2, 2] + vehicle.added_mass[5, 5])
-        self._asked: Array | None = None  # last [m/s, NED]
-        self._expected: Array = np.zeros(3)  # velocity as the observer has it
-        self._beside: Array = np.zeros(3)  # d [m/s2]
+    def __init__(
+        self,
+        mavlink: Any,
+        vehicle: Vehicle,
+        profile: ProfileName,
+        steer_by: SteerBy,
+        sticks_by: SticksBy,
+        pilot_gain: float,
+        lags: tuple[float, float],
+    ) -> None:
+        require_taken(profile, steer_by, sticks_by)
+        self._mavlink, self._steer_by, self._sticks_by = mavlink, steer_by, sticks_by
+        self._profile: Profile = PROFILES[profile]
+        self._uses_sticks = uses_sticks(profile, steer_by)
+        self._scale = scale_of(vehicle, self._profile, pilot_gain, sticks_by)
+        self._turn, self._lead = TurnLead(vehicle), VelocityLead(vehicle, *lags)
+        self._overridden = False  # channels are, and were not given back
+        self.sticks, self.velocity, self.attitude = np.zeros(6), np.zeros(3), np.zeros(4)
 
     def restart(self) -> None:
-        """Forget what the loop does: something else steers."""
-        self._asked, self._beside = None, np.zeros(3)
+        """Forget what the autopilot's loops do: something else steers."""
+        self._lead.restart()
 
-    def yaw_rate(self, wrench: Array, state: ReportedState) -> float:
-        """Return the rate of yaw [rad/s], of at most 0.6 rad/s, by which a rate loop turns as the wrench would."""
-        asked = float(state.rates[2]) + _YAW_LAG * float(wrench[5]) / self._yaw_inertia
-        return min(max(asked, -_FASTEST_TURN), _FASTEST_TURN) if math.isfinite(asked) else 0.0
+    def clear(self) -> None:
+        """Note that nothing is asked for."""
+        self.sticks[:], self.velocity[:], self.attitude[:] = 0.0, 0.0, 0.0
 
-    def velocity(self, wrench: Array, state: ReportedState, period: float) -> Array:
-        """Return the velocity [m/s, NED], shape (3,), of at most 0.8 m/s.
+    def messages(self, wrench: Array, state: ReportedState, period: float) -> Sequence[Any]:
+        """Return what asks for a wrench, shape (6,) [N, N m], body frame, a `period` [s] after the last one."""
+        system = state.system or 0
+        match self._steer_by:
+            case "velocity":
+                self.velocity[:] = self._lead.velocity(wrench, state, period)
+                turn = self._turn.yaw_rate(wrench, state) if self._profile.name == "ardusub" else None
+                return (velocity_target(self._mavlink, system, self.velocity, turn),)
+            case "attitude":
+                self.attitude[:] = self._turn.attitude(wrench, state)
+                return self._attitude(wrench, state, period)
+            case "sticks":
+                self.sticks[:] = self._scale.sticks(wrench)
+                self.sticks[3:5] = 0.0  # the autopilot keeps the vehicle level
+                self.sticks[5] = self._scale.yaw_rate_stick(self._turn.yaw_rate(wrench, state))
+            case "wrench":
+                self.sticks[:] = self._scale.sticks(wrench)
+        return (self._sticks(system),)
 
-        Parameters
-        ----------
-        wrench : ndarray, shape (6,)
-            [N, N m], body frame; what is not finite asks for nothing.
-        state : ReportedState
-            Of the vehicle now.
-        period : float
-            Since the last call [s].
+    def still(self, state: ReportedState) -> Sequence[Any]:
+        """Return what asks for no motion, before the mode is on in which that counts."""
+        self.clear()
+        system = state.system or 0
+        if self._uses_sticks:
+            return (self._sticks(system),)
+        if self._steer_by == "attitude":
+            return (attitude_target(self._mavlink, system, state.quaternion, np.zeros(3)),)
+        turn = 0.0 if self._profile.name == "ardusub" else None
+        return (velocity_target(self._mavlink, system, self.velocity, turn),)
+
+    def released(self, state: ReportedState, since: float) -> Sequence[Any]:
+        """Return what lets go of the sticks, `since` seconds after that began.
+
+        Channels that are overridden rest in the middle first, for an ArduSub without a radio keeps what it heard last;
+        then they are given back, once.
         """
-        speed = state.velocity_body[:3]
-        force = np.where(np.isfinite(wrench[:3]), wrench[:3], 0.0)
-        drag = (self._linear + self._quadratic * np.abs(speed)) * speed
-        wanted = rotation_matrix(state.quaternion) @ ((force - drag) / self._mass)
-        self._observe(state.velocity, period)
-        asked: Array = state.velocity + self._lag * (wanted - self._beside)
-        length = float(np.linalg.norm(asked))
-        if not math.isfinite(length):
-            self.restart()
-            return np.zeros(3)
-        self._asked = asked * min(1.0, _FASTEST_ASKED / length) if length > 0.0 else asked
-        return self._asked
+        self.clear()
+        if not self._uses_sticks:
+            return ()
+        system = state.system or 0
+        if self._sticks_by == "manual-control" or (self._overridden and since < _CENTERED_FOR):
+            return (self._sticks(system),)
+        if self._overridden:
+            self._overridden = False
+            return (channels_released(self._mavlink, system),)
+        return ()
 
-    def _observe(self, velocity: Array, period: float) -> None:
-        if self._asked is None:
-            self._expected = velocity.copy()
-            return
-        error = velocity - self._expected
-        acceleration = (self._asked - self._expected) / self._lag + self._beside
-        self._expected = self._expected + period * (acceleration + 2.0 * _OBSERVED * error)
-        most = _FASTEST_ASKED / self._lag
-        self._beside = np.clip(self._beside + period * _OBSERVED**2 * error, -most, most)
+    @property
+    def releases_for(self) -> float:
+        """For how long sticks are released before others steer [s]; an ArduSub keeps the last ones for seconds."""
+        return 0.0 if self._sticks_by == "manual-control" else 2.0 * _CENTERED_FOR
 
+    def _attitude(self, wrench: Array, state: ReportedState, period: float) -> Sequence[Any]:
+        """Return the attitude with forces; an ArduSub's are sticks ahead and aside, and one for a rate of depth."""
+        system, level = state.system or 0, wrench.copy()
+        level[3:] = 0.0
+        if not self._uses_sticks:
+            force = np.clip(self._scale.efforts @ level, -1.0, 1.0)[:3]
+            return (attitude_target(self._mavlink, system, self.attitude, force),)
+        rate_down = float(self._lead.velocity(wrench, state, period)[2])
+        level[2] = 0.0
+        self.sticks[:] = self._scale.sticks(level)
+        self.sticks[2:] = self._scale.climb_stick(rate_down), 0.0, 0.0, 0.0
+        return attitude_target(self._mavlink, system, self.attitude, None), self._sticks(system)
 
-def velocity_target(mavlink: Any, system: int, velocity: Array, yaw_rate: float | None) -> Any:
-    """Return SET_POSITION_TARGET_LOCAL_NED with a velocity [m/s, NED] and a rate of yaw [rad/s], if there is one."""
-    x, y, z = velocity.tolist()
-    mask = _VELOCITY_ONLY | (_YAW_RATE_IGNORED if yaw_rate is None else 0)
-    zeros = (0.0,) * 3
-    return mavlink.MAVLink_set_position_target_local_ned_message(
-        0, system, 1, _LOCAL_NED, mask, *zeros, x, y, z, *zeros, 0.0, yaw_rate or 0.0
-    )
+    def _sticks(self, system: int) -> Any:
+        if self._sticks_by == "manual-control":
+            return manual_control(self._mavlink, system, self._profile, self.sticks, self._steer_by == "wrench")
+        self._overridden = True
+        return channels_override(self._mavlink, system, self.sticks)

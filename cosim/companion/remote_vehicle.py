@@ -34,6 +34,7 @@ _SENT = (  # in the step
     Channel("companion.round_trip", "s", "Of the quickest TIMESYNC of late"),
     *(Channel(f"stick.{f}", "", "Stick that was sent, -1 to 1, along or about a body axis") for f in "XYZKMN"),
     *(Channel(f"velocity_target.{a}", "m/s", "Velocity that was asked for, NED") for a in "xyz"),
+    *(Channel(f"attitude_target.{a}", "rad", "Attitude that was asked for") for a in ("roll", "pitch", "yaw")),
 )
 _FIRST_SENT = "thruster_force[1]"  # outputs before it stand for the beginning of a step, from it on for its end
 
@@ -132,7 +133,8 @@ class RemoteVehicle:
             (*at, *reported.position, *reported.velocity, session.alignment.drift, session.alignment.reckoned),
         )
         self._write("companion.state", (state, reason, session.lateness, reported.sync.round_trip))
-        self._write("stick.X", (*session.sticks, *session.velocity))
+        output = session.output
+        self._write("stick.X", (*output.sticks, *output.velocity, *euler_of(output.attitude.tolist())))
 
     def _write_forces(self) -> None:
         """Write what the autopilot's servo outputs ask of the thrusters [N], and the wrench that they make."""

@@ -14,14 +14,7 @@ from cosim.companion.failsafes import Failsafes
 from cosim.companion.frame_alignment import FrameAlignment
 from cosim.companion.link import AutopilotLink
 from cosim.companion.options import CompanionOptions
-from cosim.companion.outputs import (
-    STEERED_IN,
-    VelocityLead,
-    manual_control,
-    neutral,
-    scale_of,
-    velocity_target,
-)
+from cosim.companion.outputs import Output, steered_in
 from cosim.companion.safety import Observation, State, Supervisor
 from cosim.companion.vehicle_state import RATES, ReportedState
 from cosim.mavlink.vehicle.profile import PROFILES
@@ -63,10 +56,15 @@ class AutopilotSession:
         Which autopilot it is.
     failsafes : Failsafes
         Its own, as its parameters say.
-    sticks, velocity : ndarray, shape (6,), (3,)
-        As sent last, -1 to 1 and [m/s, NED], or in a dry run as they would be; else zero.
+    output : Output
+        What is sent, or in a dry run would be.
     lateness : float
         By which the last step began too late [s].
+
+    Raises
+    ------
+    RunError
+        If the autopilot does not take what it is to be steered by.
     """
 
     exhausted = False
@@ -75,20 +73,21 @@ class AutopilotSession:
         self._link, self._options = link, options
         self._mavlink: Any = dialect()
         self.profile = PROFILES[options.profile]
-        self._scale = scale_of(vehicle, self.profile, options.pilot_gain)
-        self._lead = VelocityLead(vehicle, options.velocity_lag, options.vertical_lag)
-        self._mode = self.profile.numbers[STEERED_IN[options.steer_by]]
+        self.output = Output(
+            self._mavlink, vehicle, options.profile, options.steer_by, options.sticks_by, options.pilot_gain,
+            (options.velocity_lag, options.vertical_lag),
+        )  # fmt: skip
+        self._steered_in = steered_in(options.profile, options.steer_by)
+        self._mode = self.profile.numbers[self._steered_in]
         self.reported = ReportedState(link.identity)
         self.alignment = FrameAlignment(options.origin)
         self.failsafes = Failsafes(options.profile)
         self.supervisor = Supervisor(options.dry_run)
-        self.sticks: Array = np.zeros(6)
-        self.velocity: Array = np.zeros(3)
         self.lateness = self.outside = 0.0  # s; m, by which hard regions are violated
         self._taken_over = False
         self._law_works = False  # as the master was commanded last
         self._sent_at: dict[str, float] = {}
-        self._held_at = 0.0
+        self._held_at, self._lets_go_until = 0.0, -math.inf
         self._rivals: set[int] = set()  # components of other stations with our system id
 
     def clock(self) -> float:
@@ -125,9 +124,9 @@ class AutopilotSession:
         if state != before:
             self._held_at = now
             self._tell(state)
-            self._lead.restart()
-            if (before, state) == ("steering", "pilot") and self._options.steer_by != "velocity":
-                self._release_sticks()  # once: an ArduSub keeps the last ones for seconds
+            self.output.restart()
+            if before in ("engaging", "steering") and state == "pilot":
+                self._lets_go_until = now + self.output.releases_for
         self._ask(now)
         self._act(state, now, wrench, until - due)
         while True:
@@ -141,11 +140,18 @@ class AutopilotSession:
 
     def release(self, seconds: float) -> None:
         """Let go: hold the place and release the sticks, for so many seconds or until the mode is on."""
-        if self.supervisor.state not in ("engaging", "steering", "held"):
+        state, begun = self.supervisor.state, self._link.clock()
+        if state in ("engaging", "steering", "held"):
+            self.supervisor.state, self.supervisor.reason = "held", self.supervisor.reason or "end"
+            self._held_at = begun
+            until, waits = begun + self.output.releases_for, begun + seconds
+        elif state == "pilot":
+            until = waits = self._lets_go_until
+        else:
             return
-        self.supervisor.state, self.supervisor.reason = "held", self.supervisor.reason or "end"
-        begun = self._held_at = self._link.clock()
-        while self._link.clock() - begun < seconds and self.reported.mode != self.profile.numbers["hold"]:
+        while self._link.clock() <= until or (
+            self._link.clock() < waits and self.reported.mode != self.profile.numbers["hold"]
+        ):
             now = self._link.clock()
             self.exchange(np.zeros(6), now, now + 0.05)
 
@@ -219,48 +225,35 @@ class AutopilotSession:
                 self._command(m.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate)
 
     def _act(self, state: State, now: float, wrench: Array, period: float) -> None:
-        self.sticks[:], self.velocity[:] = 0.0, 0.0
+        output, messages = self.output, ()  # type: Output, Sequence[Any]
+        if state == "steering":
+            messages = output.messages(wrench, self.reported, period)
+        elif state == "dry_run":
+            output.messages(wrench, self.reported, period)
+        else:
+            output.clear()
         if state == "disarmed" and self._options.arm and self._due("arm", 1.0, now):
             self._command(self._mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         elif state == "engaging":
             self.supervisor.asked_for_mode(now)
-            self._send_mode(STEERED_IN[self._options.steer_by], now)
-            self._link.send(self._output(np.zeros(6), period, still=True))
-        elif state == "steering":
-            self._link.send(self._output(wrench, period))
-        elif state == "dry_run":
-            self._output(wrench, period)
-        elif state == "held" and self.reported.system is not None:
-            self._hold(now)
+            self._send_mode(self._steered_in, now)
+            messages = output.still(self.reported)
+        elif state == "held" and self.reported.system is not None and not self._options.dry_run:
+            messages = self._hold(now)
+        elif state == "pilot" and now <= self._lets_go_until:
+            messages = output.released(self.reported, now - self._held_at)
+        for message in messages:
+            self._link.send(message)
 
-    def _output(self, wrench: Array, period: float, still: bool = False) -> Any:
-        """Return the message that asks for a wrench, and note what is in it."""
-        m, system = self._mavlink, self.reported.system or 0
-        if self._options.steer_by == "velocity":
-            turn = 0.0 if self.profile.name == "ardusub" else None
-            if not still:
-                self.velocity[:] = self._lead.velocity(wrench, self.reported, period)
-                turn = None if turn is None else self._lead.yaw_rate(wrench, self.reported)
-            return velocity_target(m, system, self.velocity, turn)
-        all_axes = self._options.steer_by == "wrench"
-        self.sticks[:] = self._scale.sticks(wrench)
-        if not all_axes:
-            self.sticks[3:5] = 0.0  # the autopilot keeps the vehicle level
-            rate = 0.0 if still else float(self.reported.rates[2])
-            self.sticks[5] = self._scale.yaw_rate_stick(float(wrench[5]), rate)
-        return manual_control(m, system, self.profile, self.sticks, all_axes)
-
-    def _release_sticks(self) -> None:
-        self._link.send(neutral(self._mavlink, self.reported.system or 0, self.profile))
-
-    def _hold(self, now: float) -> None:
-        """Release the sticks, and ask for the hold mode, or where that is refused for the depth to be held."""
-        if self.reported.mode == self.profile.numbers["hold"]:
-            return
-        self._release_sticks()
-        refused = now - self._held_at > _FALLBACK
-        if not (refused and self.reported.mode == self.profile.numbers["depth_hold"]):
+    def _hold(self, now: float) -> Sequence[Any]:
+        """Ask for the hold mode, or where that is refused for the depth to be held; return what releases the sticks."""
+        since, modes = now - self._held_at, self.profile.numbers
+        if self.reported.mode == modes["hold"] and since > self.output.releases_for:
+            return ()
+        refused = since > _FALLBACK
+        if self.reported.mode != modes["depth_hold" if refused else "hold"]:
             self._send_mode("depth_hold" if refused else "hold", now)
+        return self.output.released(self.reported, since)
 
     def _send_mode(self, mode: Mode, now: float) -> None:
         if self._due("mode", _REPEAT, now):

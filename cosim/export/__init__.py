@@ -1,6 +1,6 @@
 """A run in the formats of other tools.
 
-A format is a module of `formats`, which imports what it needs when it is asked for. Public: `export_run`.
+A format is a module of `formats`, which imports its dependencies at its first use. Public: `export_run`.
 
 Imports: controller, io, plant_fmu, replay, results, scenario, simulation.
 """

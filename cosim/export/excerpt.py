@@ -1,4 +1,4 @@
-"""What of a run is exported: which of its signals, at which of its steps."""
+"""Selection of the signals and steps of a run for export."""
 
 from __future__ import annotations
 
@@ -18,36 +18,36 @@ from cosim.results.record import Rows
 from cosim.results.run_result import SCENARIO, Run, load_run
 from cosim.simulation.signals import Array, Column
 
-_ROUNDING = 1e-6  # of a period; a time that is short of a tick by no more has reached it
+_ROUNDING = 1e-6  # of a period, tolerance of the comparison of times and ticks
 
 
 @dataclass(frozen=True)
 class Excerpt:
-    """A run, and what of it is exported."""
+    """A run with the selection of its signals and steps."""
 
     run: Run
-    picked: tuple[int, ...]  # places of the signals in a row of the record, rising, `time` always among them
-    every: int  # one step of so many, from the first one on,
-    rate: float | None = None  # or as many steps a simulated second [Hz]
+    picked: tuple[int, ...]  # indices of the signals in a row of the record, rising, `time` included
+    every: int  # every how many steps one is exported, from the first one on
+    rate: float | None = None  # Hz, steps per simulated second instead of `every`
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """The signals, in the order of the record."""
+        """Columns of the selected signals, in the order of the record."""
         return tuple(self.run.record.columns[i] for i in self.picked)
 
     @property
     def scenario_text(self) -> str:
-        """The scenario as it stands in the run folder."""
+        """Text of the scenario file in the run folder."""
         return (self.run.folder / SCENARIO).read_text(encoding="utf-8")
 
     @property
     def summary_text(self) -> str:
-        """The summary as JSON, null where a number is none."""
+        """The summary as JSON, with null for NaN and infinity."""
         return json_text(self.run.summary)
 
     @cached_property
     def count(self) -> int:
-        """How many steps are exported."""
+        """Number of exported steps."""
         return sum(len(block) for block in self.blocks(["time"]))
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Rows]:
@@ -66,7 +66,7 @@ class Excerpt:
             first += len(block)
 
     def take(self, steps: NDArray[np.intp], names: Sequence[str]) -> Rows:
-        """Return some of the exported steps, rising, from 0."""
+        """Return a selection of the exported steps; `steps` are indices among them, rising, from 0."""
         found: list[Rows] = []
         first = 0
         for block in self.blocks(names):
@@ -75,12 +75,12 @@ class Excerpt:
         return Rows(found[0].columns, {name: np.concatenate([rows[name] for rows in found]) for name in names})
 
     def signal(self, name: str) -> Array:
-        """Return any signal of the record at all exported steps."""
+        """Return a signal of the record at all exported steps, shape (count,)."""
         return np.concatenate([block[name] for block in self.blocks([name])])
 
 
 def excerpt_of(folder: Path, signals: Sequence[str] = (), every: int = 1, rate: float | None = None) -> Excerpt:
-    """Return what of a run is exported.
+    """Select signals and steps of a run for export.
 
     Parameters
     ----------
@@ -89,21 +89,21 @@ def excerpt_of(folder: Path, signals: Sequence[str] = (), every: int = 1, rate: 
     signals : sequence of str
         Names or patterns such as ``*.clearance``; none for all.
     every : int
-        One step of so many.
+        Export one of every so many steps.
     rate : float, optional
-        Steps a simulated second [Hz] in the place of `every`; all where the record has fewer.
+        Steps per simulated second [Hz] instead of `every`; all steps if the record has fewer.
 
     Returns
     -------
     Excerpt
-        With the time, whatever the patterns are.
+        Includes the time with any patterns.
 
     Raises
     ------
     RunError
         If the folder holds no run that can be read.
     ExportError
-        If a pattern fits no signal.
+        If a pattern matches no signal.
     """
     run = load_run(folder)
     names = [column.name for column in run.record.columns]
@@ -112,7 +112,7 @@ def excerpt_of(folder: Path, signals: Sequence[str] = (), every: int = 1, rate: 
 
 
 def _fitting(pattern: str, names: Sequence[str]) -> list[str]:
-    # a name is taken as it is first: the brackets of thrust[1] would mean something else in a pattern
+    # exact names first: in a pattern, the brackets of thrust[1] would be a character class
     fitting = [name for name in names if name == pattern] or [name for name in names if fnmatchcase(name, pattern)]
     if not fitting:
         near = difflib.get_close_matches(pattern, names, n=3, cutoff=0.0)

@@ -1,4 +1,4 @@
-"""A run folder into a file of another format, which appears whole or not at all."""
+"""Export of a run folder to a file of another format, written atomically."""
 
 from __future__ import annotations
 
@@ -39,24 +39,24 @@ def export_run(
     signals : sequence of str
         Names or patterns of signals; none for all.
     every : int
-        One step of so many.
+        Export one of every so many steps.
     rate : float, optional
-        Steps a simulated second [Hz] in the place of `every`.
+        Steps per simulated second [Hz] instead of `every`.
     force : bool
-        Replace what is there.
+        Replace existing files.
 
     Returns
     -------
     list of Path
-        The files: that of the format, then what stands beside it.
+        The file of the format, then its second file if it has one.
 
     Raises
     ------
     RunError
         If the folder holds no run that can be read.
     ExportError
-        If the format is unknown, cannot hold what was asked for or needs what is not installed, a pattern fits no
-        signal, or a file is in the way or of the run itself.
+        If the format is unknown, too small for the data or needs a package that is not installed, a pattern matches no
+        signal, or a file exists or belongs to the run itself.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The entry of a format of other tools: all that the software knows of it, in one place."""
+"""Description of an export format."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from cosim.export.excerpt import Excerpt
 
 @dataclass(frozen=True)
 class Format:
-    """What a module of `cosim.export.formats` says of its format, as ``FORMAT``.
+    """Description of a format, which each module of `cosim.export.formats` has as ``FORMAT``.
 
     Parameters
     ----------
     write : callable
-        Writes an excerpt of a run into a file, and returns the paths of what it wrote, that file first. It imports
-        what the base installation does not bring.
+        Writes an excerpt of a run into a file, and returns the paths of the written files, that file first. It imports
+        packages that are not in the base installation.
     needs : tuple of str
-        What that is, as requirements of pip.
+        These packages, as pip requirements.
     beside : str
-        Ending of a second file, in the place of the suffix.
+        Suffix of a second file; empty for none.
     whole : bool
-        Whether it has signals and rates of its own, and takes no choice of them.
+        True if the format defines its own signals and rates, which cannot be selected.
     """
 
     write: Callable[[Excerpt, Path], list[Path]]

@@ -21,34 +21,34 @@ from cosim.export.scene import BODY, HULL_COLOUR, NED, OPAQUE, PLACE, THRUST_COL
 from cosim.replay.events import Event
 from cosim.simulation.signals import Array
 
-MAP = "map"  # z upwards, as Foxglove draws
+MAP = "map"  # z upwards, as in Foxglove
 _HALF_TURN = (0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0)  # about north-east: (north, east, down) to (east, north, up)
 _LETTERS = 14.0  # pixels
 _LINE = 2.0  # pixels
-_ARROW = 2.0  # radii of the hull that an arrow of the greatest thrust is long
+_ARROW = 2.0  # hull radii, length of the arrow of the greatest thrust
 
 
 def moment(nanoseconds: int) -> Timestamp:
-    """Return a time."""
+    """Convert a time [ns] to a Foxglove timestamp."""
     return Timestamp(seconds=nanoseconds // 10**9, nanos=nanoseconds % 10**9)
 
 
 def upright() -> FrameTransforms:
-    """Return the transform that shows the world upright, at time 0."""
+    """Return the transform from NED to the map frame, at time 0."""
     message = FrameTransforms()
     _add_transform(message, moment(0), MAP, NED, (0.0, 0.0, 0.0), _HALF_TURN)
     return message
 
 
 def frame_of(solid: Solid) -> str:
-    """Return the frame that a region's numbers are in; one that moves has a frame of its own."""
+    """Return the frame of a region's coordinates; a moving region has its own frame."""
     return f"region {solid.name}" if solid.moves else solid.frame
 
 
 def frames(
     time: Timestamp, position: Sequence[float], quaternion: Sequence[float], moved: dict[str, Sequence[float]]
 ) -> FrameTransforms:
-    """Return where the vehicle, and what moves, is.
+    """Return the transforms of the vehicle and of the moving regions.
 
     Parameters
     ----------
@@ -57,12 +57,12 @@ def frames(
     position, quaternion : sequence of float
         Of the vehicle [m, NED].
     moved : dict
-        By frame: how far it has moved [m, NED].
+        Shift of each moving frame [m, NED].
 
     Returns
     -------
     FrameTransforms
-        All of them, since a viewer that jumps in time sees the last message alone.
+        All of them, since after a jump in time a viewer reads the last message only.
     """
     message = FrameTransforms()
     _add_transform(message, time, NED, PLACE, position, (1.0, 0.0, 0.0, 0.0))
@@ -85,16 +85,16 @@ def regions(solids: Sequence[Solid], time: Timestamp, active: int) -> SceneUpdat
     Parameters
     ----------
     solids : sequence of Solid
-        As they are then.
+        The regions at that time.
     time : Timestamp
         Simulated.
     active : int
-        Which of them the arbiter gives way to.
+        Index of the active region, to which the arbiter gives priority.
 
     Returns
     -------
     SceneUpdate
-        All of them, since a viewer that jumps in time sees the last message alone.
+        All of them, since after a jump in time a viewer reads the last message only.
     """
     message = SceneUpdate()
     for i, solid in enumerate(solids):
@@ -109,7 +109,7 @@ def regions(solids: Sequence[Solid], time: Timestamp, active: int) -> SceneUpdat
 
 
 def vehicle(scene: Scene) -> SceneUpdate:
-    """Return the hull and its thrusters' lines of action, in the body, and the whole way as a line."""
+    """Return the hull and the thrusters' lines of action in the body frame, and the path of the run as a line."""
     message = SceneUpdate()
     entity = message.entities.add(frame_id=BODY, id="vehicle", frame_locked=True)
     ball = entity.spheres.add()
@@ -134,7 +134,7 @@ def vehicle(scene: Scene) -> SceneUpdate:
 
 
 def said(time: Timestamp, event: Event) -> Log:
-    """Return an event in words."""
+    """Return a log message for an event."""
     level = Log.WARNING if event.kind in ("violation", "failure", "saturation") else Log.INFO
     return Log(timestamp=time, level=level, message=event.text, name=event.kind)
 
@@ -169,7 +169,7 @@ def _draw(entity: SceneEntity, solid: Solid, active: bool) -> None:
 
 
 def _label_place(solid: Solid) -> Array:
-    """Return a place above a region, or at the end of the axis of one of attitude."""
+    """Return the position of a region's label: above it, or at the end of the axis of an attitude region."""
     vertices = solid.mesh.vertices
     if of_attitude(solid.shape):
         return np.asarray(vertices[-1])
@@ -218,10 +218,10 @@ def _turn_from_z(direction: Array) -> list[float]:
 
 
 def _shortest_turn(start: Array, direction: Array) -> list[float]:
-    """Return the quaternion of the shortest turn of a unit vector into a direction."""
+    """Return the quaternion of the shortest rotation of a unit vector into a direction."""
     end = direction / np.linalg.norm(direction)
     halfway = start + end
-    if np.linalg.norm(halfway) < 1e-9:  # half a turn, about anything across
+    if np.linalg.norm(halfway) < 1e-9:  # half a turn, about any perpendicular axis
         return [0.0, *np.roll(start, 1).tolist()]
     halfway /= np.linalg.norm(halfway)
     return [float(start @ halfway), *np.cross(start, halfway).tolist()]

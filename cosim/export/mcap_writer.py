@@ -1,6 +1,6 @@
-"""MCAP, in Protobuf: every signal for PlotJuggler and Foxglove, and the scene in Foxglove's own messages.
+"""MCAP with Protobuf: every signal for PlotJuggler and Foxglove, and the scene in Foxglove's messages.
 
-Times are those of the simulation, in nanoseconds from 0, so that runs lie over each other.
+Times are simulated ones, in nanoseconds from 0, so that runs can be compared.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
     Parameters
     ----------
     excerpt : Excerpt
-        What is written; the scene is there whatever its signals are.
+        The run with the selected signals; the scene is always written.
     path : Path
         The file.
 
     Returns
     -------
     list of Path
-        It alone.
+        The file.
     """
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=_CHUNK)
@@ -80,7 +80,7 @@ def _write_messages(writer: Writer, excerpt: Excerpt) -> None:
 
 
 def _tables(writer: Writer, excerpt: Excerpt) -> list[tuple[int, list[int]]]:
-    """Return a channel for each group of signals, and where in a row of the record they are."""
+    """Register a channel for each group of signals; return channels and indices in a row of the record."""
     tables = []
     groups = grouped(excerpt.columns)
     for name, members in zip(legal(groups), groups.values(), strict=True):
@@ -109,16 +109,16 @@ class _Drawing:
         ):
             self._channels[topic] = writer.register_channel(topic, "protobuf", register_schema(writer, kind))
         self._solids = [*scene.solids]
-        self._drawn: int | None = None  # the region that was drawn as active
+        self._drawn: int | None = None  # index of the region that is shown as active
         self._changes, self._events = deque(scene.changes), deque(events_of(run, scene.log))
 
     def begin(self) -> None:
-        """Write what stays."""
+        """Write the static messages."""
         self._send("/tf_static", 0, foxglove.upright())
         self._send("/vehicle/model", 0, foxglove.vehicle(self._scene))
 
     def of(self, block: Array) -> Callable[[int, int], None]:
-        """Return what writes the scene of a row of a block, at a time [ns]."""
+        """Return a function that writes the scene of a row of a block, given its index and time [ns]."""
         scene = self._scene
         known = [bool(np.isfinite(row).all()) for row in block[:, scene.places(POSITION + QUATERNION)]]
         positions = block[:, scene.places(POSITION)].tolist()
@@ -128,7 +128,7 @@ class _Drawing:
 
         def draw(i: int, time: int) -> None:
             at = foxglove.moment(time)
-            if known[i]:  # else the vehicle stays where it was seen last
+            if known[i]:  # otherwise the vehicle keeps its last pose
                 shifts = {frame: rows[i] for frame, rows in moved.items()}
                 self._send("/tf", time, foxglove.frames(at, positions[i], quaternions[i], shifts))
                 self._send("/vehicle/pose", time, foxglove.pose(at, positions[i], quaternions[i]))
@@ -142,7 +142,7 @@ class _Drawing:
         return draw
 
     def _changed(self, time: int) -> bool:
-        """Let the changes come that are due, and return whether any is."""
+        """Apply the changes that are due; return True if there was one."""
         due = False
         while self._changes and self._changes[0][0] * 1e9 <= time:
             _, i, self._solids[i] = self._changes.popleft()
@@ -150,7 +150,7 @@ class _Drawing:
         return due
 
     def end(self) -> None:
-        """Write the events behind the last exported step, which may be short of that of the run."""
+        """Write the events after the last exported step."""
         for event in self._events:
             time = round(event.time * 1e9)
             self._send("/log", time, foxglove.said(foxglove.moment(time), event))

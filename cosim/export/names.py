@@ -1,4 +1,4 @@
-"""Names of signals as other formats allow them."""
+"""Valid names of signals in other formats."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ _ELEMENT = re.compile(r"(.+)\[(\d+)\]")
 
 
 def legal(names: Iterable[str], longest: int = 63) -> list[str]:
-    """Return names of ASCII letters, digits and underscores that begin with a letter, no two of them alike.
+    """Convert names to unique ones of ASCII letters, digits and underscores that begin with a letter.
 
     Parameters
     ----------
     names : iterable of str
-        Any, such as ``thrust[1]``.
+        Names such as ``thrust[1]``.
     longest : int
-        Most letters of a name; 63 is what MATLAB allows.
+        Greatest length of a name; MATLAB's is 63.
 
     Returns
     -------
     list of str
-        As like the names as they can be, such as ``thrust_1``.
+        Similar names, such as ``thrust_1``.
     """
     made: dict[str, None] = {}
     for name in names:
@@ -39,10 +39,10 @@ def legal(names: Iterable[str], longest: int = 63) -> list[str]:
 
 
 def grouped(columns: Sequence[Column]) -> dict[str, dict[str, int]]:
-    """Return which signals belong together.
+    """Group signals that belong together.
 
     ``position.x`` is ``x`` of the group ``position``, ``thrust[1]`` is ``1`` of ``thrust``, and the clearance of the
-    region A is ``A`` of ``clearance``; those that stand alone are in the group ``step``.
+    region A is ``A`` of ``clearance``; single signals are in the group ``step``.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def grouped(columns: Sequence[Column]) -> dict[str, dict[str, int]]:
     Returns
     -------
     dict
-        By group, then by the name within it: the place of the column.
+        Index of the column by group and name in the group.
     """
     groups: dict[str, dict[str, int]] = {}
     for i, column in enumerate(columns):

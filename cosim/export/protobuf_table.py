@@ -1,4 +1,4 @@
-"""Rows of numbers as Protobuf messages, many at a time."""
+"""Vectorized encoding of rows of numbers as Protobuf messages."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ _FIXED_64 = 1  # wire type of a double
 
 
 def numbers_schema(package: str, message: str, fields: Sequence[str]) -> bytes:
-    """Return the schema of a message of doubles, as a serialised ``FileDescriptorSet``.
+    """Make the schema of a message of doubles, a serialised ``FileDescriptorSet``.
 
     Parameters
     ----------
     package, message : str
-        Its name is the two with a dot between them.
+        Parts of the message's full name.
     fields : sequence of str
         Numbered from 1.
 
     Returns
     -------
     bytes
-        As MCAP has it for messages of Protobuf.
+        In the form that MCAP requires for Protobuf.
     """
     file = FileDescriptorProto(name=f"{package}/{message}.proto", package=package, syntax="proto3")
     described = file.message_type.add(name=message)
@@ -42,7 +42,7 @@ def numbers_schema(package: str, message: str, fields: Sequence[str]) -> bytes:
 def numbers_messages(rows: Array) -> Iterator[bytes]:
     """Yield each row as a message of `numbers_schema`.
 
-    A field is its key and the eight bytes of its number, so that all rows are laid out as one array.
+    A field consists of its key and the eight bytes of its number, so all messages have one layout, a structured array.
 
     Parameters
     ----------

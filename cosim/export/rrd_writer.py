@@ -1,6 +1,6 @@
 """RRD, Rerun's recordings: every signal as a series over simulated time, and the scene in three dimensions.
 
-Series are of doubles; what is drawn in space is of single precision, since Rerun has no other.
+Series are of doubles; the scene is of single precision, the only one that Rerun has for it.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ from cosim.simulation.signals import Array
 TIMELINE = "sim_time"  # s
 SIGNALS, WORLD, EVENTS = "signals", "world", "events"
 _FRAMES = {NED: f"{WORLD}/regions", PLACE: f"{WORLD}/place", BODY: f"{WORLD}/place/body"}
-_CHARTS = ("clearance", "weight", "command", "thruster_force", "estimate")  # groups that are shown at first
-_FAINT, _BRIGHT = 110, 255  # of the line of a region that is not, and is, active
-_THIN, _THICK = 1.0, 2.5  # pixels of that line, which Rerun has as radii below 0
+_CHARTS = ("clearance", "weight", "command", "thruster_force", "estimate")  # groups in the default layout
+_FAINT, _BRIGHT = 110, 255  # opacity of the lines of inactive and active regions
+_THIN, _THICK = 1.0, 2.5  # pixels, width of these lines; Rerun reads negative radii as pixels
 _ARROWS = 20.0  # Hz
-_ARROW = 4.0  # radii of the hull that an arrow of the greatest thrust is long
+_ARROW = 4.0  # hull radii, length of the arrow of the greatest thrust
 
 
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
@@ -50,14 +50,14 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
     Parameters
     ----------
     excerpt : Excerpt
-        What is written; the scene is there whatever its signals are.
+        The run with the selected signals; the scene is always written.
     path : Path
         The file.
 
     Returns
     -------
     list of Path
-        It alone.
+        The file.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
         sender.send_rows()
         sender.send_events()
         recording.flush()
-    except RuntimeError as error:  # as Rerun tells of a disk that is full
+    except RuntimeError as error:  # raised by Rerun when the disk is full
         raise ExportError(f"--to rrd: {path.name} cannot be written: {error}") from error
     finally:
         recording.disconnect()
@@ -84,21 +84,21 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
 
 
 def _layout(excerpt: Excerpt) -> rrb.Blueprint:
-    """Return how the recording is shown at first: the scene, and charts beside it."""
+    """Return the default layout: the scene, and charts beside it."""
     there = [name for name in _CHARTS if name in grouped(excerpt.columns)]
     charts = [rrb.TimeSeriesView(origin=rr.new_entity_path([SIGNALS, name]), name=name) for name in there]
     texts = rrb.Tabs(
         rrb.TextLogView(origin=EVENTS, name=EVENTS),
         *(rrb.TextDocumentView(origin=name, name=name) for name in ("summary", "scenario")),
     )
-    # the first two always, the others behind each other
+    # the first two charts separately, the others in tabs
     column = rrb.Vertical(*charts[:2], *([rrb.Tabs(*charts[2:])] if charts[2:] else []), texts)
     scene = rrb.Spatial3DView(origin=WORLD, name="scene")
     return rrb.Blueprint(rrb.Horizontal(scene, column, column_shares=[3, 2]), collapse_panels=True)
 
 
 class _Sender:
-    """Sends a run: what stays, then its rows block by block, then what happened."""
+    """Sends a run: static data, then its rows block by block, then its events."""
 
     def __init__(self, recording: rr.RecordingStream, excerpt: Excerpt) -> None:
         self._recording, self._excerpt, self._scene = recording, excerpt, Scene(excerpt)
@@ -119,7 +119,7 @@ class _Sender:
             self._stay(name, rr.TextDocument(f"```{kind}\n{text}\n```", media_type=rr.MediaType.MARKDOWN))
 
     def send_names(self) -> None:
-        """Send what every signal is."""
+        """Send name and unit of every signal."""
         for group, members in grouped(self._excerpt.columns).items():
             for name, i in members.items():
                 column = self._excerpt.columns[i]
@@ -128,7 +128,7 @@ class _Sender:
                 self._series[path] = column.name
 
     def send_vehicle(self) -> None:
-        """Send hull and the whole way."""
+        """Send the hull and the path of the run."""
         scene = self._scene
         self._stay(WORLD, rr.ViewCoordinates.FRD)  # north, east, down
         hull = rr.Ellipsoids3D(half_sizes=[[scene.hull_radius] * 3], colors=[HULL_COLOUR])
@@ -147,7 +147,7 @@ class _Sender:
             self._lines.append((i, solid, self._send_shapes(place, shapes)))
 
     def send_rows(self) -> None:
-        """Send every signal as a series, and how the scene moves."""
+        """Send every signal as a series, and the motion of the scene."""
         began, tick, before = None, -1.0, None
         for block in self._excerpt.blocks():
             time = block["time"]
@@ -160,7 +160,7 @@ class _Sender:
             active = np.array(self._scene.active(block.numbers()))
             self._send_activity(time, active, before)
             tick, before = ticks[-1], active[-1]
-            self._recording.flush()  # else all that is not on disk yet would wait in memory
+            self._recording.flush()  # bounds the memory of data that is not written yet
 
     def _send_pose(self, block: Rows) -> None:
         position, e = block.stack(POSITION), block.stack(QUATERNION)
@@ -193,7 +193,7 @@ class _Sender:
                 self._send(time[changes], path, kind.columns(**_look(kind, solid.colour, now[changes])))
 
     def _send_shapes(self, place: str, shapes: list[tuple[float, Solid]]) -> dict[str, Any]:
-        """Send what a region is, and from when; return its kinds of drawing by their paths."""
+        """Send the shapes of a region over time; return the types of its drawings by path."""
         kinds: dict[str, Any] = {}
         before = None
         for time, solid in shapes:
@@ -201,14 +201,14 @@ class _Sender:
             path = f"{place}/{type(drawn).__name__}"
             kinds[path] = type(drawn)
             self._recording.set_time(TIMELINE, duration=time)
-            if before not in (None, path):  # a region of another kind stands there now
+            if before not in (None, path):  # the type of the shape has changed
                 self._recording.log(before, rr.Clear(recursive=False))
             self._recording.log(path, drawn, strict=True)
             before = path
         return kinds
 
     def send_events(self) -> None:
-        """Send what happened, in words."""
+        """Send the events as log texts."""
         for event in events_of(self._excerpt.run, self._scene.log):
             level = "WARN" if event.kind in ("violation", "failure", "saturation") else "INFO"
             self._recording.set_time(TIMELINE, duration=event.time)
@@ -224,7 +224,7 @@ class _Sender:
 
 
 def _drawn(solid: Solid) -> Any:
-    """Return a region as Rerun draws it; what changes with activity is sent over time."""
+    """Return the Rerun archetype of a region; attributes that depend on activity are sent over time."""
     shape, label = solid.shape, {"labels": [solid.label]}
     if isinstance(shape, Sphere):
         return rr.Ellipsoids3D.from_fields(half_sizes=[[shape.radius] * 3], centers=[shape.centre], **label)
@@ -241,7 +241,7 @@ def _drawn(solid: Solid) -> Any:
 
 
 def _look(kind: Any, colour: tuple[int, int, int], active: NDArray[np.bool_]) -> dict[str, Any]:
-    """Return what tells a region that is active from one that is not, for each of some changes."""
+    """Return the attributes that show whether a region is active, for each change of activity."""
     if kind is rr.Mesh3D:
         return {"albedo_factor": [(*colour, round(255 * OPAQUE[bool(now)])) for now in active]}
     width = "line_radii" if kind is rr.Ellipsoids3D else "radii"

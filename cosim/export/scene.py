@@ -1,4 +1,4 @@
-"""What a viewer in three dimensions draws of a run: regions in their colours, the vehicle, and the way it took."""
+"""Scene of a run for three-dimensional viewers: regions in their colours, the vehicle, and its path."""
 
 from __future__ import annotations
 
@@ -21,40 +21,40 @@ from cosim.replay.steering import changes_of, log_of
 from cosim.scenario.colours import colours_of_regions
 from cosim.simulation.signals import Array
 
-NED, PLACE, BODY = "ned", "place", "body"  # the world; the vehicle's place, not turned; the vehicle
+NED, PLACE, BODY = "ned", "place", "body"  # frames: world; at the vehicle, parallel to the world; body
 POSITION = ("position.x", "position.y", "position.z")
 QUATERNION = ("quaternion.e0", "quaternion.e1", "quaternion.e2", "quaternion.e3")
 HULL_COLOUR, TRAIL_COLOUR, THRUST_COLOUR = (240, 228, 66), (140, 140, 140), (204, 121, 167)
-OPAQUE = {False: 0.25, True: 0.75}  # of a region that is not, and is, active
-_MARGIN = 1.0  # m, about all that is seen
-_SIGHT = 5.0  # radii of the hull that a shape of attitude is drawn long
+OPAQUE = {False: 0.25, True: 0.75}  # opacity by activity of the region
+_MARGIN = 1.0  # m, around path and bounded regions
+_SIGHT = 5.0  # hull radii, length of the drawing of an attitude region
 _TRAIL = 2000  # points
 
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A region as it is drawn."""
+    """A region with its drawing."""
 
     name: str
-    label: str  # what is asked of it, too
+    label: str  # name and side to keep
     colour: tuple[int, int, int]
     shape: Shape
     mesh: Mesh
-    frame: str  # that its numbers are in
-    moves: bool  # by the columns of its shift
+    frame: str  # of its coordinates
+    moves: bool  # True if the record has its shift
 
 
 @dataclass(frozen=True, eq=False)
 class Thruster:
-    """An arrow of a vehicle, in its body."""
+    """A thruster in the body frame."""
 
     position: Array  # (3,) m
-    direction: Array  # (3,) of one newton
-    most: float  # N
+    direction: Array  # (3,) of positive force
+    most: float  # N, greatest force
 
 
 class Scene:
-    """What is drawn of a run.
+    """The scene of a run.
 
     Parameters
     ----------
@@ -64,11 +64,11 @@ class Scene:
     Attributes
     ----------
     solids : tuple of Solid
-        The goal, then the regions in their order, as they are at first.
+        The goal, then the regions in their order, at the start.
     changes : tuple of (float, int, Solid)
-        When [s] which of them becomes what.
-    log : sequence of (int, Order)
-        What the run was commanded.
+        Changes of them: time [s], index, and new solid.
+    log : sequence of (int, Command)
+        The run's log of commands, by step.
     hull_radius : float
         [m].
     thrusters : tuple of Thruster
@@ -89,7 +89,7 @@ class Scene:
         self.log = log_of(excerpt.run)
         begun = [excerpt.run.planned.goal, *(r.region.shape for r in scenario.regions)]
         later = [(c["time"], c["region"], _shape(c["shape"])) for c in changes_of(excerpt.run, self.log)]
-        # an obstacle that may come has its numbers from where it waits, far away
+        # the shapes of free obstacle slots are at the parked position, far away
         waiting = {i + 1 for i, secondary in enumerate(scenario.regions) if secondary.is_dynamic}
         waiting |= set() if scenario.has_goal else {0}
         all_shapes = [*enumerate(begun), *((i, shape) for _, i, shape in later)]
@@ -102,11 +102,11 @@ class Scene:
         self._clearances = self.places([f"{solid.name}.clearance" for solid in self.solids[1:]])
 
     def places(self, names: Sequence[str]) -> list[int]:
-        """Return where signals are in a row of the record."""
+        """Return the indices of signals in a row of the record."""
         return [self._at[name] for name in names]
 
     def active(self, rows: Array) -> list[int]:
-        """Return which of the solids the arbiter gives way to at each row of the record."""
+        """Return the index of the active solid at each row of the record, 0 for the goal."""
         weights, clearances = rows[:, self._weights], rows[:, self._clearances]
         goal, *velocity = self.places(RESTS_ON)
         resting = rests(rows[:, goal], rows[:, velocity])
@@ -114,11 +114,11 @@ class Scene:
         return [int(i) for i in active]
 
     def shifts(self, solid: Solid) -> list[int]:
-        """Return where the shift of a solid that moves is in a row of the record."""
+        """Return the indices of the shift of a moving solid in a row of the record."""
         return self.places([f"{solid.name}.shift.{axis}" for axis in "xyz"])
 
     def trail(self) -> Array:
-        """Return the way that the vehicle took, as few enough points for a line, shape (n, 3) [m, NED]."""
+        """Return the path of the vehicle, thinned to at most 2000 points, shape (n, 3) [m, NED]."""
         n = self._excerpt.count
         way = self._excerpt.take(np.unique(np.linspace(0, n - 1, min(n, _TRAIL)).astype(int)), POSITION).numbers()
         return way[np.isfinite(way).all(axis=1)]
@@ -138,7 +138,7 @@ class Scene:
         )
 
     def _limits(self, shapes: list[Shape]) -> Bounds:
-        """Return the corners of an upright box about the way and all regions that end somewhere."""
+        """Return the corners of a bounding box of the path and the bounded regions, with a margin."""
         way = self.trail()
         points = [way.min(axis=0), way.max(axis=0)] if len(way) else [np.zeros(3)]
         bounds = [corner for shape in shapes for corner in shape.bounds()]
@@ -154,7 +154,7 @@ class Scene:
             return sector(shape.camera_position, shape.camera_axis, shape.half_angle, reach)
         if not isinstance(shape, Orientation):
             raise ExportError(f"shape {name_of(shape)!r} has no picture, expected orientation or visibility")
-        # the vehicle's bow must be within it
+        # sector in which the direction of the bow has to be
         e = np.array(shape.quaternion) / np.linalg.norm(shape.quaternion)
         return sector((0.0, 0.0, 0.0), rotation_matrix(e)[:, 0].tolist(), shape.tolerance, reach)
 
@@ -165,5 +165,5 @@ def _rgb(colour: str) -> tuple[int, int, int]:
 
 
 def _shape(numbers: dict[str, Any]) -> Shape:
-    """Return the shape that its numbers say."""
+    """Make a shape from its table."""
     return SHAPES[numbers["kind"]](**{key: value for key, value in numbers.items() if key not in ("kind", "drawing")})

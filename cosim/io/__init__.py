@@ -1,7 +1,6 @@
 """Files, JSON, and addresses.
 
-Files that appear whole or not at all, JSON that any reader takes, and network addresses with a check whether other
-machines reach them.
+Atomic writes of files, strict JSON without NaN, and network addresses with a check whether they are loopback ones.
 
 Imports: nothing.
 """

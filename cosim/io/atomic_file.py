@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, by way of one that nobody else has and no link stands for."""
+"""Atomic writes: a temporary file of a random name, which replaces the target once it is complete."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from typing import BinaryIO
 
 @contextmanager
 def atomic_file(path: Path) -> Iterator[BinaryIO]:
-    """Open a file that takes its place once the block has ended well.
+    """Open a temporary file that replaces `path` once the block has ended without an error.
 
-    What is written meanwhile has a name that cannot be foreseen, and is new: a link that somebody left in a folder is
-    not followed, and two processes do not write into one file.
+    The temporary file is new and has a random name: a link in a shared folder is not followed, and two processes do not
+    write into one file.
 
     Parameters
     ----------
     path : Path
-        The file; what was there is replaced, a link itself rather than what it leads to.
+        The file. An existing one is replaced; a link is replaced itself, not its target.
 
     Yields
     ------
     binary file
-        To be written.
+        The temporary file, open for writing.
 
     Raises
     ------
     FileExistsError
-        If it is there and is no file, such as a folder or a device.
+        If `path` exists and is not a file, such as a folder or a device.
     OSError
-        If it cannot be written; nothing is left then.
+        If the file cannot be written; the temporary file is removed.
     """
     if path.exists() and not path.is_file():
         raise FileExistsError(errno.EEXIST, "exists and is no file", str(path))
@@ -46,14 +46,14 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
 
 
 def write_atomic(path: Path, content: bytes | str) -> Path:
-    """Write a file whole or not at all.
+    """Write a file atomically: an error leaves the old one.
 
     Parameters
     ----------
     path : Path
-        The file; what was there is replaced.
+        The file; an existing one is replaced.
     content : bytes or str
-        All of it; text becomes UTF-8.
+        The content; text is encoded as UTF-8.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The number of the form in which runs and campaigns are kept, so that a folder of another version is named as such."""
+"""Format number of the folders of runs and campaigns, by which a folder of another version is refused."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ from pathlib import Path
 
 from cosim.errors import RunError
 
-FORMAT = 2  # since 1, columns, commands and the paper's law have other names
+FORMAT = 2  # in format 1, columns, commands and the paper's law had other names
 
 
 def require_format(where: Path, found: object) -> None:
-    """Refuse what was written in another form.
+    """Raise a RunError for a file of another format.
 
     Parameters
     ----------
     where : Path
-        File that says its form.
+        The file.
     found : object
-        What it says; None, as format 1 had it, for nothing.
+        Its format number; None for a file without one, which is format 1.
 
     Raises
     ------
     RunError
-        If it is not `FORMAT`.
+        If the number is not `FORMAT`.
     """
     if found == FORMAT:
         return

@@ -1,4 +1,4 @@
-"""Addresses that a user names, and whether other machines see them."""
+"""Network addresses of hosts, and whether they are loopback addresses."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ import socket
 
 
 def resolved(host: str) -> tuple[str, bool]:
-    """Return the address of a host.
+    """Resolve a host to its IPv4 address.
 
     Parameters
     ----------
     host : str
-        A name, or an address.
+        Name or address.
 
     Returns
     -------
     str
-        Its IPv4 address.
+        The IPv4 address.
     bool
-        Whether it is of this machine alone.
+        True if it is a loopback address, which other machines do not reach.
 
     Raises
     ------
     OSError
-        If it is not known.
+        If the host is not known.
     """
     try:
         address = str(socket.getaddrinfo(host, None, socket.AF_INET)[0][4][0])
-    except UnicodeError as error:  # a name that no server could be asked for
+    except UnicodeError as error:  # a name that no DNS query can hold
         raise OSError(str(error)) from error
     return address, ipaddress.ip_address(address).is_loopback

@@ -1,4 +1,4 @@
-"""JSON that any reader takes: what is no number is null, since the format has no word for it."""
+"""Strict JSON: NaN and infinity are written as null, since the format has no tokens for them."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from cosim.errors import RunError
 
 
 def nan_to_none(value: Any) -> Any:
-    """Return a value with None for each number that is none.
+    """Replace NaN and infinity by None.
 
     Parameters
     ----------
     value : Any
-        Of texts, numbers, booleans, lists, tuples and dicts.
+        Text, number, boolean, None, or list, tuple or dict of these.
 
     Returns
     -------
     Any
-        The same, tuples as lists.
+        The value with the replacements, tuples as lists.
     """
     if isinstance(value, dict):
         return {key: nan_to_none(item) for key, item in value.items()}
@@ -33,7 +33,7 @@ def nan_to_none(value: Any) -> Any:
 
 
 def json_text(value: Any) -> str:
-    """Return a value as JSON for people and programs, indented.
+    """Format a value as indented JSON.
 
     Parameters
     ----------
@@ -43,14 +43,14 @@ def json_text(value: Any) -> str:
     Returns
     -------
     str
-        With null for each number that is none, and a newline at its end.
+        With null for NaN and infinity, and a newline at its end.
     """
     return json.dumps(nan_to_none(value), indent=2, allow_nan=False) + "\n"
 
 
 @contextlib.contextmanager
 def understood(file: Path) -> Iterator[None]:
-    """Refuse a file of JSON in whose table something is not as it is looked for within the block.
+    """Convert errors of the block by missing keys or wrong types in a JSON file to a RunError.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def understood(file: Path) -> Iterator[None]:
     Raises
     ------
     RunError
-        In the place of what a key that is missing, or a value of another type, brings about.
+        For a key that is missing, or a value of a wrong type or out of range.
     """
     try:
         yield
@@ -69,7 +69,7 @@ def understood(file: Path) -> Iterator[None]:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Return a table that was written as JSON.
+    """Read a JSON file that holds an object.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def read_json(path: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        As it was written.
+        The object.
 
     Raises
     ------

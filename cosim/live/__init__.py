@@ -1,4 +1,4 @@
-"""A run that is watched while it goes on.
+"""Live view of a run.
 
 A server shows the run in browsers and takes commands from them. Public: `LiveView`.
 

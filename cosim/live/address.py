@@ -1,4 +1,4 @@
-"""Where a live view is served, and who may come there."""
+"""Address of the live view, and a check that requests come from its own page."""
 
 from __future__ import annotations
 
@@ -12,40 +12,40 @@ from cosim.errors import TelemetryError
 from cosim.io.network_address import resolved
 
 HOST, PORT = "127.0.0.1", 8765
-_OWN = frozenset({"127.0.0.1", "localhost", "::1"})
+_LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 _EXPECTED = "expected HOST:PORT or PORT, such as 8765"
 
 
 @dataclass(frozen=True)
 class LiveAddress:
-    """Where a live view is served."""
+    """Address at which a live view is served."""
 
     host: str = HOST  # as the user named it
     ip: str = HOST
     port: int = PORT  # 0 for any free one
-    insisted: bool = False  # on the port; otherwise another one does where it is taken
-    loopback: bool = True  # of this machine alone
+    insisted: bool = False  # True: only this port; False: any free port if it is in use
+    loopback: bool = True  # not reached by other machines
 
 
 def parse_live(text: str, allow_remote: bool = False) -> LiveAddress:
-    """Return the address that a user names.
+    """Parse the address of a live view.
 
     Parameters
     ----------
     text : str
-        ``HOST:PORT`` or ``PORT``; empty for the usual one.
+        ``HOST:PORT`` or ``PORT``; empty for the default.
     allow_remote : bool
-        Whether other machines may come.
+        Allow an address that other machines reach.
 
     Returns
     -------
     LiveAddress
-        Nothing is opened yet.
+        The socket is not opened yet.
 
     Raises
     ------
     TelemetryError
-        If it is none, or leaves this machine without leave.
+        If the text is not an address, or other machines reach it and `allow_remote` is False.
     """
     if not text:
         return LiveAddress()
@@ -62,28 +62,28 @@ def parse_live(text: str, allow_remote: bool = False) -> LiveAddress:
     return LiveAddress(host, ip, int(number), True, loopback)
 
 
-def stranger(address: LiveAddress, host: str | None, origin: str | None) -> str | None:
-    """Return why a request is not ours, None if it is.
+def foreign_origin(address: LiveAddress, host: str | None, origin: str | None) -> str | None:
+    """Return the reason why a request is of foreign origin, None if it comes from the view's own page.
 
-    A page of another site may make its user's browser speak to this machine, also by a name that its owner lets point
-    here. The browser tells both: the name that was asked for, and the site of the page.
+    A page of another site can make a browser connect to this machine, directly or by DNS rebinding. The browser sends
+    the requested name in ``Host``, and the site of the page in ``Origin``.
 
     Parameters
     ----------
     address : LiveAddress
-        Where it came.
+        Address that received the request.
     host : str or None
-        Its header ``Host``.
+        Header ``Host`` of the request.
     origin : str or None
-        Its header ``Origin``, which browsers alone send.
+        Header ``Origin`` of the request, which only browsers send.
 
     Returns
     -------
     str or None
-        One line.
+        One line for the response.
     """
     name = _name(host or "")
-    known = name in _OWN or name == address.host.lower()
+    known = name in _LOOPBACK_NAMES or name == address.host.lower()
     if not address.loopback:
         known = known or name == socket.gethostname().lower() or _is_ip(name)
     if not known:
@@ -107,12 +107,12 @@ def _is_ip(name: str) -> bool:
 
 
 def bound(address: LiveAddress) -> socket.socket:
-    """Return a socket that is bound to an address; to a free port where the usual one is taken.
+    """Open a socket at an address; at a free port if the default one is in use.
 
     Raises
     ------
     TelemetryError
-        If it cannot be.
+        If the socket cannot be opened.
     """
     for port in (address.port,) if address.insisted else (address.port, 0):
         # a port in TIME_WAIT may be taken again; on Windows the option would let others take one that is in use

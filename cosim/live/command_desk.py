@@ -1,4 +1,4 @@
-"""What viewers order: read, checked, and given to the run, or refused with the reason."""
+"""Commands from viewers: decoded, checked, and submitted to the run or rejected with a reason."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ _decoder = msgspec.json.Decoder(Command)
 
 
 class CommandDesk:
-    """Takes the commands of all viewers of one run.
+    """Submits the commands of all viewers to one run.
 
     Parameters
     ----------
     scenario : Scenario
-        What is run.
+        The scenario of the run.
     queue : CommandQueue or str
-        Where commands go, or why there are none.
+        Queue of the run, or the reason why commands are rejected.
     has_come : callable
-        Tells of the name of an obstacle that may come whether it is there.
+        Returns True if the obstacle slot of that name holds an obstacle.
 
     Attributes
     ----------
     settings : LiveSettings
-        The numbers as they are once all commands are followed.
+        The settings once all queued commands are applied.
     """
 
     def __init__(self, scenario: Scenario, queue: CommandQueue | str, has_come: Callable[[str], bool]) -> None:
@@ -45,17 +45,17 @@ class CommandDesk:
         self._comes = {secondary.region.name for secondary in scenario.regions if secondary.is_dynamic}
 
     def take(self, message: str | bytes) -> str | None:
-        """Give the run what a viewer sent.
+        """Submit a viewer's message to the run.
 
         Parameters
         ----------
         message : str or bytes
-            A command, as the log of commands has it.
+            A command as JSON, as in the log of commands.
 
         Returns
         -------
         str or None
-            Why it is refused; None where the next step follows it.
+            Reason for rejecting it; None if the next step applies it.
         """
         if isinstance(self._queue, str):
             return self._queue
@@ -74,12 +74,12 @@ class CommandDesk:
         return None
 
     def follow(self, command: Command) -> None:
-        """Note a command that the run follows, whoever gave it.
+        """Update the settings by a command that the run applies, from any source.
 
         Raises
         ------
         CommandError
-            If it changes what cannot be changed.
+            If it changes a setting that does not exist, or to a value out of range.
         """
         if isinstance(command, ChangeSetting):
             self.settings.change(command.key, command.value)

@@ -1,4 +1,4 @@
-"""What a live run was so far: every row that is new, and enough of the old ones for who comes late."""
+"""Rows of a live run: all recent ones, and a thinned selection of old ones for viewers that connect late."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ import numpy as np
 from cosim.simulation.signals import Array
 
 _BYTES = 8_000_000  # of old rows
-_NEW = 256  # rows of which none is left out
+_NEW = 256  # recent rows, which are all kept
 
 
 class History:
-    """Rows of a run, of which the old ones are thinned so that they never take more than a bounded room.
+    """Rows of a run, of which the old ones are thinned to bound the memory.
 
     Parameters
     ----------
     columns : int
-        Of a row.
+        Number of columns of a row.
     most : int, optional
-        Old rows that are kept; default: what a few megabytes hold.
+        Bound of the number of old rows; default: as many as fit into 8 MB.
 
     Attributes
     ----------
     count : int
-        Rows that ever came; a row's number is the count when it came.
+        Number of rows added so far; a row's number is the count after adding it.
     """
 
     def __init__(self, columns: int, most: int | None = None) -> None:
@@ -35,11 +35,11 @@ class History:
         self._old: Array = np.empty((most, columns))
         self._numbers = np.zeros(most, dtype=np.int64)
         self._kept = 0
-        self._stride = 1  # of the rows that become old ones, every so many stay
+        self._stride = 1  # every how many of the old rows one is kept
         self._new: deque[Array] = deque()
 
     def add(self, row: Array) -> None:
-        """Take the next row, shape (columns,)."""
+        """Add the next row, shape (columns,)."""
         self._new.append(row)
         self.count += 1
         if len(self._new) > _NEW:
@@ -59,21 +59,21 @@ class History:
         self._kept += 1
 
     def since(self, number: int, most: int) -> tuple[Array, int]:
-        """Return what came behind a row.
+        """Return the rows after a row.
 
         Parameters
         ----------
         number : int
-            Of that row; 0 for all.
+            Number of that row; 0 for all.
         most : int
-            Rows at once; ask again for those behind.
+            Greatest number of rows to return; further calls return those behind.
 
         Returns
         -------
         ndarray, shape (rows, columns)
-            In their order.
+            In the order of adding.
         int
-            Number of the last one, or `number` if there is none.
+            Number of the last returned row, or `number` if there is none.
         """
         first_new = self.count - len(self._new)  # rows up to this number are old
         if number < first_new:

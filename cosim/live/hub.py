@@ -1,4 +1,4 @@
-"""What is known of the run that is shown, and told to each viewer at its own pace. No sockets; one thread."""
+"""State of the run that is shown, and the messages for each viewer at its own pace. No sockets; one thread."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from cosim.simulation.signals import Array, Column
 log = logging.getLogger(__name__)
 
 _ROWS = 512  # of a message
-_SAID = 50  # texts that who comes late still gets
+_SAID = 50  # newest texts, which are kept for viewers that connect late
 
 
 @dataclass
 class Cursor:
-    """What a viewer has been told."""
+    """Position of a viewer: counts of rows, texts and changes that were sent to it."""
 
     run: int = -1
     row: int = 0
@@ -47,31 +47,31 @@ class Hub:
     Attributes
     ----------
     run : int
-        Which run it is, from 0; -1 before the first.
+        Number of the run, from 0; -1 before the first.
     desk : CommandDesk
-        Takes what viewers order.
+        Takes the commands of viewers.
     """
 
     def __init__(self) -> None:
         self.run = -1
         self.desk: CommandDesk | None = None
         self._texts: list[str] = []
-        self._dropped = 0  # texts that are kept no more
+        self._dropped = 0  # number of texts that were discarded
         self._last: Array | None = None
 
     def begin(self, run: int, scenario: Scenario, columns: Sequence[Column], queue: CommandQueue | str) -> None:
-        """Show another run from now on.
+        """Begin showing another run.
 
         Parameters
         ----------
         run : int
-            Its number.
+            Number of the run.
         scenario : Scenario
-            What is run.
+            The scenario of the run.
         columns : sequence of Column
-            Of its rows.
+            Columns of its rows.
         queue : CommandQueue or str
-            Where commands go, or why there are none.
+            Queue for commands, or the reason why they are rejected.
         """
         self.run = run
         self._viewing = Viewing(scenario, columns)
@@ -83,14 +83,14 @@ class Hub:
         self._middle, self._target_radius = shape_center(scenario.goal), 0.0
         self._regions = ["goal", *(secondary.region.name for secondary in scenario.regions)]
         self._slots = ObstacleSlots(scenario.commands.obstacles)
-        self._came = [secondary.region.name for secondary in scenario.regions if secondary.is_dynamic]  # by slot
+        self._slot_names = [secondary.region.name for secondary in scenario.regions if secondary.is_dynamic]  # by slot
         self._history = History(len(self._viewing.columns))
         self._texts, self._dropped, self._last = [], 0, None
         self.desk = CommandDesk(scenario, queue, self._has_come)
 
     @property
     def picked(self) -> list[int]:
-        """Columns of the run's rows that are shown."""
+        """Indices of the columns of the run's rows that are shown."""
         return self._viewing.picked
 
     def _has_come(self, region: str) -> bool:
@@ -98,10 +98,10 @@ class Hub:
             return False
         return any(self._last[self._names[f"{region}.shift.{axis}"]] for axis in "xyz")
 
-    # ---- what happens ----
+    # ---- updates from the run ----
 
     def show(self, picked: Sequence[Array]) -> None:
-        """Take rows of the run, each of the columns `picked`; one that says nothing new is left out."""
+        """Add rows of the run, each of the columns `picked`; a row equal to the one before it is skipped."""
         for row in self._viewing.extended(np.array(picked)):
             if self._last is None or not np.array_equal(row, self._last, equal_nan=True):
                 self._history.add(row)
@@ -111,15 +111,15 @@ class Hub:
                     self._change("goal", float(row[0]))
 
     def show_commands(self, k: int, commands: Sequence[Command]) -> None:
-        """Tell of the commands that step `k` follows, and of the regions that they change."""
+        """Show the commands that step `k` applies, and the regions that they change."""
         time = k * self._step
         for command in commands:
-            if not isinstance(command, ManualControl):  # which come all the time
+            if not isinstance(command, ManualControl):  # these arrive continually
                 self.say(command_words(command), "command", time)
             try:
                 self._follow(command, time)
             except CommandError as error:
-                log.debug("%s", error)  # which the command handler tells
+                log.debug("%s", error)  # the command handler warns of it
 
     def _follow(self, command: Command, time: float) -> None:
         assert self.desk is not None
@@ -130,14 +130,14 @@ class Hub:
                 if region is not None:
                     self._change(region, time)
             case AddObstacle():
-                name = self._came[self._slots.take(command.number)]
+                name = self._slot_names[self._slots.take(command.number)]
                 self._change(name, time, Sphere(PARKED_POSITION, command.radius))
-                self._header["changes"][-1]["number"] = command.number  # by which it is moved and forgotten
+                self._header["changes"][-1]["number"] = command.number  # for commands that move or remove it
             case RemoveObstacle():
                 self._slots.leave(command.number)
 
     def _change(self, name: str, time: float, shape: Shape | None = None) -> None:
-        """Note another shape or gain of a region; default: as the settings have it."""
+        """Record a changed shape or gain of a region; default: those of the settings."""
         assert self.desk is not None
         settings, index = self.desk.settings, self._regions.index(name)
         if name == "goal" and self._target_radius > 0.0:
@@ -147,30 +147,30 @@ class Hub:
         self._header["changes"].append({"time": time, "region": index, "shape": drawn, "gain": gain})
 
     def say(self, text: str, kind: str = "info", time: float | None = None) -> None:
-        """Tell all viewers something; `kind` is info, order or warning, `time` simulated [s]."""
-        self._tell(text_of("said", kind=kind, text=text, time=time))
+        """Show a `text` to all viewers; `kind` is info, command or warning, `time` simulated [s]."""
+        self._add_text(text_of("said", kind=kind, text=text, time=time))
 
     def end(self, status: str, verdict: str) -> None:
-        """Tell how the run ended."""
+        """Show the `status` and `verdict` of a run that has ended."""
         self._header |= {"status": status, "verdict": verdict}
-        self._tell(text_of("end", status=status, verdict=verdict))
+        self._add_text(text_of("end", status=status, verdict=verdict))
 
-    def _tell(self, text: str) -> None:
+    def _add_text(self, text: str) -> None:
         self._texts.append(text)
         if len(self._texts) > _SAID:
             self._texts.pop(0)
             self._dropped += 1
 
-    # ---- what a viewer is told ----
+    # ---- messages for viewers ----
 
-    def told_all(self, cursor: Cursor) -> bool:
-        """Return whether a viewer knows all."""
+    def is_up_to_date(self, cursor: Cursor) -> bool:
+        """Return True if all rows, texts and changes were sent to a viewer."""
         return (cursor.run, cursor.row, cursor.change, cursor.text) == (
             self.run, self._history.count, len(self._header["changes"]), self._dropped + len(self._texts),
         )  # fmt: skip
 
     def next_for(self, cursor: Cursor) -> str | bytes | None:
-        """Return the next message for a viewer, and note that it is told; None if there is nothing new."""
+        """Return the next message for a viewer, and advance its cursor; None if there is nothing new."""
         if self.run < 0:
             return None
         if cursor.run != self.run:

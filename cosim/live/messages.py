@@ -1,4 +1,4 @@
-"""What a live view is told: texts of JSON, and rows of numbers."""
+"""Messages to viewers: texts of JSON, and rows of numbers."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from cosim.simulation.signals import Array
 
 
 def text_of(kind: str, /, **fields: Any) -> str:
-    """Return a message of a kind; ``type`` is its first key."""
+    """Format a JSON message; its first key ``type`` is `kind`."""
     return json.dumps({"type": kind, **fields}, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
 
 
 def bytes_of(rows: Array) -> bytes:
-    """Return rows one behind the other, as little-endian float64."""
+    """Serialize rows in order as little-endian float64."""
     return np.ascontiguousarray(rows, dtype="<f8").tobytes()
 
 
 def rows_of(message: bytes, columns: int) -> Array:
-    """Return the rows of a message, shape (rows, columns).
+    """Parse the rows of a message, shape (rows, columns).
 
     Raises
     ------
     ValueError
-        If they are not whole.
+        If the last row is incomplete.
     """
     rows: Array = np.frombuffer(message, dtype="<f8").reshape(-1, columns)
     return rows

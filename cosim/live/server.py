@@ -1,4 +1,4 @@
-"""The page over HTTP and the run over a WebSocket, on one port, for viewers of whom none can hold up another."""
+"""Server of the live view: page over HTTP and run over WebSocket on one port; no viewer can block another."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from cosim.live.address import LiveAddress, stranger
+from cosim.live.address import LiveAddress, foreign_origin
 from cosim.live.command_desk import LONGEST
 from cosim.live.hub import Cursor, Hub
 from cosim.live.messages import text_of
@@ -27,14 +27,14 @@ log = logging.getLogger(__name__)
 
 PATH = "/ws"
 VIEWERS = 16  # at once
-CONNECTIONS = 4 * VIEWERS  # at once; further ones would take the files away that the run writes
-_LOOKING = 1.0 / 30.0  # s, after which rows are looked for while somebody watches
-_IDLING = 0.25  # s, the same while nobody does
-_ORDERS = 20  # a second that a viewer may give in the long run
-_AT_ONCE = 40  # and in a burst
-_PATIENCE = 60  # messages beyond that, after which a viewer is shut out
-_SILENCE = 20.0  # s, after which a viewer that answers nothing is gone
-_FAREWELL = 2.0  # s, that closing waits for viewers who were not told all yet
+CONNECTIONS = 4 * VIEWERS  # at once; more could use up the file descriptors that the run needs
+_PERIOD = 1.0 / 30.0  # s between polls for new rows while there are viewers
+_IDLE_PERIOD = 0.25  # s, the same without viewers
+_COMMAND_RATE = 20  # 1/s, sustained rate of commands of a viewer
+_BURST = 40  # commands in a burst
+_MAX_EXCESS = 60  # messages beyond these limits, after which a viewer is disconnected
+_PING_PERIOD = 20.0  # s, also the time after which a viewer that does not answer is disconnected
+_FLUSH_TIME = 2.0  # s, for which closing waits until all messages are sent
 
 _HEADERS = {
     "Content-Type": "text/html; charset=utf-8",
@@ -42,7 +42,7 @@ _HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",
-    # one file that asks for nothing but its connection, and stands in no other page
+    # the page is one file that loads nothing but its connection, and must not be framed
     "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "img-src data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
 }
@@ -51,42 +51,42 @@ _HEADERS = {
 async def serve(
     listening: socket.socket, address: LiveAddress, hub: Hub, take_rows: Callable[[], None], closing: threading.Event
 ) -> None:
-    """Serve viewers until it is to close.
+    """Serve viewers until `closing` is set.
 
     Parameters
     ----------
     listening : socket
         Bound and listening.
     address : LiveAddress
-        What it is bound to.
+        Address of the socket.
     hub : Hub
-        What is shown.
+        State of the run that is shown.
     take_rows : callable
-        Brings the hub what is new.
+        Passes new rows to the hub.
     closing : threading.Event
-        Set when it is to end.
+        Set to end the server.
     """
     viewers = _Viewers(address, hub, replay_page([], "Live run").encode())
     quiet = logging.getLogger(f"{__name__}.connections")
-    quiet.setLevel(logging.CRITICAL + 1)  # garbage on the port is no news
+    quiet.setLevel(logging.CRITICAL + 1)  # invalid requests to the port are not logged
     async with serve_websockets(
         viewers.show, sock=listening, process_request=viewers.answer, compression=None, max_size=LONGEST, max_queue=4,
-        open_timeout=5.0, ping_interval=_SILENCE, ping_timeout=_SILENCE, close_timeout=1.0, server_header=None,
-        logger=quiet, create_connection=_few(CONNECTIONS),
+        open_timeout=5.0, ping_interval=_PING_PERIOD, ping_timeout=_PING_PERIOD, close_timeout=1.0, server_header=None,
+        logger=quiet, create_connection=_limited_connections(CONNECTIONS),
     ):  # fmt: skip
         while not closing.is_set():
             take_rows()
             viewers.wake()
-            await asyncio.sleep(_LOOKING if viewers.cursors else _IDLING)
+            await asyncio.sleep(_PERIOD if viewers.cursors else _IDLE_PERIOD)
         take_rows()
-        until = time.monotonic() + _FAREWELL
+        until = time.monotonic() + _FLUSH_TIME
         while viewers.behind and time.monotonic() < until:
             viewers.wake()
-            await asyncio.sleep(_LOOKING)
+            await asyncio.sleep(_PERIOD)
 
 
-def _few(most: int) -> type[ServerConnection]:
-    """Return connections of whom no more than so many are open at once: who comes then is cut off."""
+def _limited_connections(most: int) -> type[ServerConnection]:
+    """Return a class of connections that aborts new ones while `most` are open."""
     made: set[ServerConnection] = set()
 
     class Connection(ServerConnection):
@@ -104,7 +104,7 @@ def _few(most: int) -> type[ServerConnection]:
 
 
 class _Viewers:
-    """All that are connected."""
+    """All connected viewers."""
 
     def __init__(self, address: LiveAddress, hub: Hub, page: bytes) -> None:
         self.cursors: list[Cursor] = []
@@ -113,23 +113,23 @@ class _Viewers:
         self._failures: Counter[str] = Counter()
 
     def wake(self) -> None:
-        """Let all look whether there is something new for them."""
+        """Wake the tasks of all viewers, which send new messages."""
         self._news.set()
         self._news = asyncio.Event()
 
     @property
     def behind(self) -> bool:
-        """Whether somebody was not told all yet."""
-        return any(not self._hub.told_all(cursor) for cursor in self.cursors)
+        """Whether messages for some viewer are not sent yet."""
+        return any(not self._hub.is_up_to_date(cursor) for cursor in self.cursors)
 
     def answer(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer a plain request, or refuse one; None lets it become a WebSocket."""
+        """Answer an HTTP request with the page or an error; return None to open a WebSocket."""
         hosts, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
         if len(hosts) != 1 or len(origins) > 1:
             return connection.respond(HTTPStatus.BAD_REQUEST, "one header Host is expected\n")
-        why = stranger(self._address, hosts[0], origins[0] if origins else None)
-        if why is not None:
-            return connection.respond(HTTPStatus.FORBIDDEN, f"{why}\n")
+        reason = foreign_origin(self._address, hosts[0], origins[0] if origins else None)
+        if reason is not None:
+            return connection.respond(HTTPStatus.FORBIDDEN, f"{reason}\n")
         path = request.path.split("?")[0]
         if path == PATH:
             if len(self.cursors) >= VIEWERS:
@@ -141,27 +141,27 @@ class _Viewers:
         return Response(HTTPStatus.OK, HTTPStatus.OK.phrase, headers, self._page)
 
     async def show(self, connection: ServerConnection) -> None:
-        """Show a viewer the run, and take its commands, until it goes."""
+        """Send the run to a viewer, and take its commands, until it disconnects."""
         cursor = Cursor()
         self.cursors.append(cursor)
-        telling = asyncio.create_task(self._tell(connection, cursor))
+        sending = asyncio.create_task(self._send_news(connection, cursor))
         try:
             await self._accept(connection)
         except ConnectionClosed:
             log.debug("a viewer has gone")
-        except Exception as error:  # broad: whatever one viewer brings about, the others go on
+        except Exception as error:  # broad: an error of one viewer must not end the others
             if self._is_new(error):
                 log.exception("a viewer was lost")
         finally:
-            telling.cancel()
+            sending.cancel()
             self.cursors.remove(cursor)
 
-    async def _tell(self, connection: ServerConnection, cursor: Cursor) -> None:
+    async def _send_news(self, connection: ServerConnection, cursor: Cursor) -> None:
         try:
             while True:
                 news = self._news
                 while (message := self._hub.next_for(cursor)) is not None:
-                    await connection.send(message)  # waits while the viewer takes nothing
+                    await connection.send(message)  # waits while the viewer's buffer is full
                 await news.wait()
         except ConnectionClosed:
             log.debug("a viewer has gone")
@@ -171,24 +171,24 @@ class _Viewers:
             await connection.close(1011)
 
     async def _accept(self, connection: ServerConnection) -> None:
-        """Take commands, no faster than a person gives them."""
-        allowance, then, hasty = float(_AT_ONCE), time.monotonic(), 0
+        """Take commands at a limited rate (token bucket)."""
+        allowance, then, excess = float(_BURST), time.monotonic(), 0
         async for message in connection:
             now = time.monotonic()
-            allowance, then = min(_AT_ONCE, allowance + _ORDERS * (now - then)), now
-            hasty = 0 if allowance == _AT_ONCE else hasty
+            allowance, then = min(_BURST, allowance + _COMMAND_RATE * (now - then)), now
+            excess = 0 if allowance == _BURST else excess
             if allowance < 1.0:
-                hasty += 1
-                if hasty > _PATIENCE:
+                excess += 1
+                if excess > _MAX_EXCESS:
                     await connection.close(1008, "too many messages")
                     return
-                await asyncio.sleep(1.0 / _ORDERS)  # what comes meanwhile waits at the sender's
+                await asyncio.sleep(1.0 / _COMMAND_RATE)  # further messages wait at the sender
             allowance -= 1.0
-            why = "the run has not begun" if self._hub.desk is None else self._hub.desk.take(message)
-            if why is not None:
-                await connection.send(text_of("said", kind="refused", text=why, time=None))
+            reason = "the run has not begun" if self._hub.desk is None else self._hub.desk.take(message)
+            if reason is not None:
+                await connection.send(text_of("said", kind="refused", text=reason, time=None))
 
     def _is_new(self, error: Exception) -> bool:
-        """Return whether it is the first of its kind: the others are not told."""
+        """Return True for the first error of its type; later ones are not logged."""
         self._failures[type(error).__name__] += 1
         return self._failures[type(error).__name__] == 1

@@ -1,4 +1,4 @@
-"""The observer that shows a run to viewers, and the thread in which they are served."""
+"""The observer that shows a run to viewers, and the thread of their server."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ from cosim.simulation.signals import Array, Column
 log = logging.getLogger(__name__)
 
 PERIOD = 1.0 / 30.0  # s of the wall clock, between rows that are shown
-_WAITING = 256  # rows that wait for the thread at the most; when it falls behind, the oldest go
+_WAITING = 256  # greatest number of rows in the queue to the thread; beyond it the oldest are dropped
 _CLOSING = 3.0  # s
 
 
 class LiveView:
-    """Observer that copies some rows for viewers, who are served in a thread of its own.
+    """Observer that copies some rows for viewers, which another thread serves.
 
-    Only the commands of viewers reach the stepper, through the queue. No error here reaches it.
+    The run receives nothing from here but commands, through the queue. Errors here do not affect it.
 
     Parameters
     ----------
     address : LiveAddress
-        Where to serve.
+        Address of the server.
 
     Attributes
     ----------
     url : str
-        Of the page.
+        URL of the page.
 
     Raises
     ------
@@ -64,19 +64,19 @@ class LiveView:
         self._thread = threading.Thread(target=self._live, name="live view", daemon=True)
         self._warnings = _Warnings(self)
 
-    # ---- called by whoever runs the run ----
+    # ---- called in the thread of the run ----
 
     def begin(self, scenario: Scenario, columns: Sequence[Column], queue: CommandQueue | str) -> None:
-        """Show another run from now on.
+        """Begin showing another run.
 
         Parameters
         ----------
         scenario : Scenario
-            What is run.
+            The scenario of the run.
         columns : sequence of Column
-            Of its rows.
+            Columns of its rows.
         queue : CommandQueue or str
-            Where commands go, or why there are none.
+            Queue for commands, or the reason why they are rejected.
         """
         self._run += 1
         hub = self._hub
@@ -93,27 +93,27 @@ class LiveView:
         self._picked, self._due, self._last = np.array(hub.picked), 0.0, scenario.steps
 
     def observe(self, k: int, row: Array) -> None:
-        """Copy what is shown of the row of step `k`, where one is due."""
+        """Copy the shown columns of the row of step `k`, if a copy is due."""
         now = time.perf_counter()
         if now >= self._due or k == self._last:
             self._due = now + PERIOD
             self._rows.append((self._run, row[self._picked]))
 
     def show_commands(self, k: int, commands: Sequence[Command]) -> None:
-        """Tell of commands that step `k` follows."""
+        """Show the commands that step `k` applies."""
         self._call(self._hub.show_commands, k, commands)
 
     def say(self, text: str, kind: str = "info") -> None:
-        """Tell all viewers a `text`; its `kind` is info, order or warning."""
+        """Show a `text` to all viewers; its `kind` is info, command or warning."""
         self._call(self._hub.say, text, kind)
 
     def end(self, status: str, verdict: str) -> None:
-        """Tell how the run ended: its `status` and the `verdict` on it."""
+        """Show the `status` and `verdict` of a run that has ended."""
         self._call(self._take_rows)
         self._call(self._hub.end, status, verdict)
 
     def close(self) -> None:
-        """Let viewers have what they were not told yet, for a bounded time, and end. May be called twice."""
+        """Send the remaining messages, for a bounded time, and close the server. May be called twice."""
         logging.getLogger("cosim").removeHandler(self._warnings)
         if not self._started:
             self._serve.close()
@@ -134,23 +134,23 @@ class LiveView:
     # ---- in the thread ----
 
     def _call(self, work: Callable[..., object], *arguments: Any) -> None:
-        """Let the thread do something."""
+        """Schedule a call in the thread."""
         try:
             self._loop.call_soon_threadsafe(work, *arguments)
         except RuntimeError:  # the thread has failed, which was logged
-            log.debug("nobody is served any more")
+            log.debug("the view is closed")
 
     def _live(self) -> None:
         asyncio.set_event_loop(self._loop)
         try:
             self._loop.run_until_complete(self._serve)
-        except Exception:  # broad: whatever ends the view, the run goes on
+        except Exception:  # broad: an error of the view must not end the run
             log.exception("the live view has ended, the run goes on")
         finally:
             self._loop.close()
 
     def _take_rows(self) -> None:
-        """Hand the hub what the stepper has copied."""
+        """Pass the copied rows to the hub."""
         rows = []
         while self._rows:
             run, row = self._rows.popleft()
@@ -161,7 +161,7 @@ class LiveView:
 
 
 class _Warnings(logging.Handler):
-    """Shows viewers what the terminal is warned of, such as a command that could not be followed."""
+    """Shows logged warnings to viewers, such as a rejected command."""
 
     def __init__(self, view: LiveView) -> None:
         super().__init__(logging.WARNING)

@@ -1,7 +1,7 @@
 """Logs of vehicles as runs.
 
-A reader in `formats` puts what a log says on disk; clocks are aligned, held values and bursts undone, gaps marked; rows
-of a record are made of that. Public: `import_log`.
+A reader in `formats` writes the samples of a log to disk; clocks are aligned, held values and bursts undone, gaps
+marked; the result becomes rows of a record. Public: `import_log`.
 
 Imports: controller, io, plant_fmu, results, run, scenario, simulation, simulation.commands.
 """

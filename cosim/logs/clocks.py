@@ -10,18 +10,18 @@ from cosim.simulation.signals import Array
 
 _BACK = 1.0  # s; a step back by more is a jump, not a message out of order
 _AHEAD = 3600.0  # s; a step ahead by more is a jump, not a pause
-_PAUSE = 1.0  # s, that stands for a jump, of which nobody knows how long it took
-_WINDOW = 60.0  # s of the vehicle's clock, of which the quickest message counts
-_MOST_DRIFT = 5e-4  # of a clock; a fit that says more is of something else
+_PAUSE = 1.0  # s, assumed duration of a jump
+_WINDOW = 60.0  # s of the vehicle's clock, in which only the message of least delay is used
+_MOST_DRIFT = 5e-4  # relative drift above which a fit is discarded
 
 
 class Clock:
-    """Turns a clock that jumps into times that rise; each jump becomes a pause of one second.
+    """Convert readings of a clock that jumps to rising times; each jump becomes a pause of one second.
 
     Attributes
     ----------
     jumps : list of (float, float)
-        When [s, as turned], and by how much [s] the clock jumped.
+        Converted time [s] and size [s] of each jump.
     """
 
     def __init__(self) -> None:
@@ -29,7 +29,7 @@ class Clock:
         self._shift, self._last = 0.0, math.nan
 
     def time(self, said: float) -> float:
-        """Return the time [s] for what the clock says [s]; call it in the order of the log."""
+        """Return the time [s] of a clock reading [s]; call it in the order of the log."""
         time = said + self._shift
         by = time - self._last
         if by < -_BACK or by > _AHEAD:
@@ -41,7 +41,7 @@ class Clock:
         return time
 
     def times(self, said: Array) -> Array:
-        """Return the times [s] for what the clock says [s], shape (n,)."""
+        """Return the times [s] of clock readings [s], shape (n,)."""
         turned: Array = np.asarray(said, float) + self._shift
         first = 0
         known = np.flatnonzero(np.isfinite(turned))
@@ -63,25 +63,25 @@ class Clock:
 
 
 class VehicleClock:
-    """Puts stamps of the vehicle's own clock on the clock of the log's writer.
+    """Convert stamps of the vehicle's own clock to the clock of the log's writer.
 
-    A message is late, never early: of each minute, the quickest message tells how far the clocks are apart. A line
-    through these also tells the drift. A stamp that steps back means that the vehicle began anew.
+    A message is late, never early: in each minute, the message of least delay gives the offset of the clocks. A line
+    through these gives the drift. A stamp that steps back is a restart of the vehicle.
     """
 
     def __init__(self) -> None:
         self._last = -math.inf
         self._restarts: list[float] = []  # on the writer's clock
-        self._offsets: list[dict[int, tuple[float, float]]] = [{}]  # by start of the vehicle and minute
+        self._offsets: list[dict[int, tuple[float, float]]] = [{}]  # by restart of the vehicle and minute
         self._lines: list[tuple[float, float]] | None = None
 
     @property
     def restarts(self) -> list[float]:
-        """When the vehicle's clock began anew [s]."""
+        """Times of restarts of the vehicle's clock [s]."""
         return self._restarts
 
     def put(self, stamp: float, written: float) -> None:
-        """Take a stamp [s] and when it was written [s], in the order of the log."""
+        """Add a stamp [s] and its time of writing [s], in the order of the log."""
         if stamp < self._last - _BACK:
             self._restarts.append(written)
             self._offsets.append({})
@@ -93,7 +93,7 @@ class VehicleClock:
             minutes[minute] = (stamp, offset)
 
     def times(self, stamps: Array, written: Array) -> Array:
-        """Return times [s] on the writer's clock, shape (n,), of stamps [s]; of NaN, when it was written."""
+        """Return times [s] on the writer's clock, shape (n,), of stamps [s]; for NaN, the time of writing."""
         if self._lines is None:
             self._lines = [_line(minutes) for minutes in self._offsets]
         lines = np.array(self._lines)
@@ -101,12 +101,12 @@ class VehicleClock:
         return np.where(np.isnan(stamps), written, stamps * (1.0 + drift) + offset)
 
     def words(self) -> str:
-        """Return how the clocks were aligned, in a sentence; empty where no stamp came."""
+        """Return a sentence about the alignment of the clocks; empty without stamps."""
         if not any(self._offsets):
             return ""
         drift = _line(self._offsets[0])[0]
-        told = f", drift {drift * 1e6:+.0f} ppm" if drift else ""
-        return f"the vehicle's clock is put on that of the log's writer by its quickest message of each minute{told}"
+        drifts = f", drift {drift * 1e6:+.0f} ppm" if drift else ""
+        return f"the vehicle's clock is put on that of the log's writer by its quickest message of each minute{drifts}"
 
 
 def _line(minutes: dict[int, tuple[float, float]]) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Column maps: TOML files that say which columns or fields are what, in which unit and frame."""
+"""Column maps: TOML files that assign columns or fields to quantities, with units and frames."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Body = Literal["FRD", "FLU", "RFU"]
 
 @dataclass(frozen=True)
 class TimeColumn:
-    """Where times stand."""
+    """Column and unit of times."""
 
     column: str
     unit: Literal["s", "ms", "us", "ns", "iso8601"] = "s"
@@ -32,16 +32,16 @@ class TimeColumn:
 
 @dataclass(frozen=True)
 class MappedQuantity:
-    """Where a quantity stands, and how."""
+    """Columns, unit and frame of a quantity."""
 
     columns: tuple[str, ...] = ()
     unit: str | None = None  # default: the one of SI
     topic: str = ""  # of a bag
     time: TimeColumn | None = None  # default: that of the map
-    euler: str = ""  # of angles: their axes in the order of the columns; capital letters: about the body as turned
-    quaternion: Literal["wxyz", "xyzw"] = "wxyz"  # where the scalar part stands
+    euler: str = ""  # axes of Euler angles in the order of the columns; capital letters: about rotated body axes
+    quaternion: Literal["wxyz", "xyzw"] = "wxyz"  # order of the components
     inverse: bool = False  # the attitude is from world to body
-    sign: Literal[1, -1] = 1  # -1 for a depth or an altitude that is counted the other way
+    sign: Literal[1, -1] = 1  # -1 for a depth or an altitude of the opposite direction
     world: World | None = None  # default: that of the map
     body: Body | None = None  # default: that of the map
 
@@ -74,28 +74,28 @@ class ColumnMap:
 
     @property
     def quantities(self) -> dict[str, MappedQuantity]:
-        """What is mapped, by the name of the quantity."""
+        """Mapped quantities, by name."""
         found = {name: getattr(self, name, None) for name in QUANTITIES}
         return {name: mapped for name, mapped in found.items() if mapped is not None}
 
     def time_of(self, name: str) -> TimeColumn | None:
-        """Return where the times of a quantity stand."""
+        """Return the time column of a quantity, or None if it has none."""
         mapped = self.quantities[name]
         return mapped.time or self.time
 
     def put(self, contents: LogContents, name: str, times: Array, values: Array) -> None:
-        """Put samples of a quantity, as its columns have them, into the contents of a log.
+        """Convert samples of a quantity from the map's unit and frame, and add them to the contents of a log.
 
         Parameters
         ----------
         contents : LogContents
-            Receives them in SI units, NED and FRD.
+            Receives the samples in SI units, NED and FRD.
         name : str
-            Of the quantity.
+            Name of the quantity.
         times : ndarray, shape (n,)
-            [s].
+            Times of the samples [s].
         values : ndarray, shape (n, columns)
-            In the map's unit and frame.
+            Samples in the map's unit and frame.
         """
         mapped = self.quantities[name]
         source = contents.source(name, source_name(mapped), QUANTITIES[name].size or len(mapped.columns))
@@ -115,7 +115,7 @@ class ColumnMap:
 
 
 def source_name(mapped: MappedQuantity) -> str:
-    """Return what a report calls the columns of a quantity."""
+    """Return the name of a quantity's columns in a report."""
     shown = ", ".join(mapped.columns[:3]) + (" ..." if len(mapped.columns) > 3 else "")
     return f"{mapped.topic}: {shown}" if mapped.topic else shown
 
@@ -162,12 +162,12 @@ def read_map(path: Path) -> ColumnMap:
     Returns
     -------
     ColumnMap
-        Checked.
+        The validated map.
 
     Raises
     ------
     ImportLogError
-        If it cannot be read, or a key is unknown, missing or cannot be.
+        If it cannot be read, or a key is unknown, missing or invalid.
     """
     try:
         columns = decode(read_toml(path), ColumnMap)

@@ -1,4 +1,4 @@
-"""What a log says of commands, as forces of the vehicle's thrusters or as a wrench on its body."""
+"""Convert a log's commands to forces of the vehicle's thrusters, or to a wrench on its body."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from plant_fmu.autopilot import Autopilot, effort_of_pulse
 from plant_fmu.t200 import VOLTAGES, force_of_pulse
 
 CURVES = ("linear", "quadratic", "t200")
-PILOT_GAIN = 0.5  # part of the greatest wrench that full sticks give, as ArduSub has it at the start
+PILOT_GAIN = 0.5  # ratio of the greatest wrench at full sticks, ArduSub's default
 _MOTORS = 33  # SERVOn_FUNCTION of the first motor
 _MOST_MOTORS = 8
 _NEUTRAL = 1500.0  # us, of a T200
@@ -25,19 +25,19 @@ _NEUTRAL = 1500.0  # us, of a T200
 
 @dataclass(frozen=True)
 class Commands:
-    """How the commands of a log become forces.
+    """Conversion of a log's commands to forces.
 
     Attributes
     ----------
     quantity : str
-        Which of the log's commands they are.
+        Quantity of the commands.
     through : str
         ``thrusters`` or ``wrench``.
     forces : callable
-        From commands as the log has them and voltages [V], shapes (n, size) and (n,), to forces of the thrusters [N],
+        Function from the log's commands and voltages [V], shapes (n, size) and (n,), to forces of the thrusters [N],
         shape (n, thrusters), or wrenches [N, N m], shape (n, 6).
     words : str
-        The same in a sentence.
+        Description in a sentence.
     """
 
     quantity: str
@@ -49,25 +49,25 @@ class Commands:
 def commands_of(
     topic: Topic, vehicle: Vehicle, curve: str | None, voltage: str, parameters: Mapping[str, float]
 ) -> Commands:
-    """Return how the commands of a topic become forces.
+    """Return the conversion of a topic's commands to forces.
 
     Parameters
     ----------
     topic : Topic
-        Of one of `cosim.logs.quantities.COMMANDS`.
+        Topic of one of `cosim.logs.quantities.COMMANDS`.
     vehicle : Vehicle
-        Whose thrusters they are.
+        Vehicle with the thrusters.
     curve : str or None
         One of `CURVES`, from pulse to force; None for that of the vehicle's table ``autopilot``.
     voltage : str
-        In words, where the voltage is from; empty where nothing tells it.
+        Source of the voltage in words; empty without one.
     parameters : mapping of str to float
-        Of the autopilot: which output drives which motor, and which way it turns.
+        Parameters of the autopilot, with the motors of outputs and their directions.
 
     Raises
     ------
     ImportLogError
-        If the vehicle cannot be the one of the log, or what is needed is missing.
+        If the vehicle does not fit the log, or its table ``autopilot`` or the voltage is missing.
     """
     n = vehicle.n_thrusters
     if topic.quantity == "wrench":
@@ -114,7 +114,7 @@ def _of_pulses(
     used = np.array([float(channel > 0) for channel in channels])
     if (curve or table.curve) == "t200":
         if not voltage:
-            raise ImportLogError("--curve t200 needs the voltage, expected --voltage V: the log does not tell it")
+            raise ImportLogError("--curve t200 needs the voltage, expected --voltage V: the log does not have it")
 
         def thrust(values: Array, volts: Array) -> Array:
             pulses = np.where(values[:, places] <= 0.0, _NEUTRAL, values[:, places])  # 0: the output is off
@@ -142,7 +142,7 @@ def _of_pulses(
 def channels_of(table: Autopilot, vehicle: Vehicle, parameters: Mapping[str, float]) -> tuple[int, ...]:
     """Return the servo output of each thruster, from 1; 0 for none.
 
-    The autopilot's own parameters are believed before the vehicle's file.
+    The autopilot's own parameters take precedence over the vehicle's file.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""From the frames and units of a log to SI, NED and FRD."""
+"""Convert frames and units of a log to SI, NED and FRD."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BODIES = {  # from the named body frame to FRD
     "FLU": np.diag([1.0, -1.0, -1.0]),
     "RFU": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
 }
-UNITS = {  # of what SI has, by the unit that it becomes
+UNITS = {  # factors to SI units, by the SI unit
     "m": {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048},
     "m/s": {"m/s": 1.0, "cm/s": 0.01, "mm/s": 0.001, "knot": 1852.0 / 3600.0},
     "rad": {"rad": 1.0, "deg": math.pi / 180.0},
@@ -42,34 +42,34 @@ def quaternions_of_angles(angles: Array, order: str) -> Array:
     Parameters
     ----------
     angles : ndarray, shape (n, 3)
-        [rad], in the order of the letters.
+        Angles [rad], in the order of the axes.
     order : str
-        Three axes. Capital letters: each turns about the body as turned so far, such as ``ZYX`` for yaw, pitch, roll.
-        Small letters: each turns about the world.
+        Three axes. Capital letters: rotations about body axes (intrinsic), such as ``ZYX`` for yaw, pitch, roll.
+        Small letters: rotations about world axes (extrinsic).
 
     Returns
     -------
     ndarray, shape (n, 4)
-        From body to world, scalar first.
+        Quaternions from body to world, scalar first.
     """
     x, y, z, w = Rotation.from_euler(order, angles).as_quat().T
     return np.column_stack([w, x, y, z])
 
 
 def turn_quaternions(quaternions: Array, world: str, body: str) -> Array:
-    """Return attitudes between other frames as attitudes from FRD to NED.
+    """Convert attitudes between other frames to attitudes from FRD to NED.
 
     Parameters
     ----------
     quaternions : ndarray, shape (n, 4)
-        From the body frame `body` to the world frame `world`, scalar first.
+        Quaternions from the body frame `body` to the world frame `world`, scalar first.
     world, body : str
-        Of `WORLDS` and `BODIES`.
+        Names in `WORLDS` and `BODIES`.
 
     Returns
     -------
     ndarray, shape (n, 4)
-        From FRD to NED, scalar first.
+        Quaternions from FRD to NED, scalar first.
     """
     e0, e1, e2, e3 = quaternions.T
     R = Rotation.from_quat(np.column_stack([e1, e2, e3, e0]))
@@ -88,7 +88,7 @@ def euler_zyx(quaternions: Array) -> Array:
 
 
 def rotate_to_body(quaternions: Array, vectors: Array) -> Array:
-    """Return vectors of the world in the body frame, shape (n, 3), by quaternions from body to world, shape (n, 4)."""
+    """Rotate vectors from world to body, shape (n, 3), by quaternions from body to world, shape (n, 4)."""
     w, r = quaternions[:, :1], -quaternions[:, 1:]
     t = 2.0 * np.cross(r, vectors)
     turned: Array = vectors + w * t + np.cross(r, t)
@@ -96,7 +96,7 @@ def rotate_to_body(quaternions: Array, vectors: Array) -> Array:
 
 
 def quaternion_of_angles(roll: float, pitch: float, yaw: float) -> Sequence[float]:
-    """Return the unit quaternion of roll, pitch and yaw [rad], scalar first; of one sample, without arrays."""
+    """Return the unit quaternion of roll, pitch and yaw [rad], scalar first, for one sample."""
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)

@@ -38,7 +38,7 @@ from plant_fmu import Vehicle, load_vehicle
 from plant_fmu.errors import printable
 from plant_fmu.installing import install_hint
 
-_KEPT = ("goal", "regions", "criteria", "arbiter", "intersection", "title")  # of a scenario that judges a log
+_KEPT = ("goal", "regions", "criteria", "arbiter", "intersection", "title")  # keys of a scenario that apply to a log
 _UNREAD = 12  # kinds of messages that a report names
 
 
@@ -63,39 +63,39 @@ def import_log(
     log : str or Path
         ``.bin``, ``.tlog``, ``.ulg``, ``.csv``, ``.parquet`` or ``.mcap``.
     vehicle : str or Path
-        A shipped vehicle or a TOML file: whose thrusters the commands drive.
+        A shipped vehicle or a TOML file, with the thrusters that the commands drive.
     out : str or Path, optional
         The run folder; it must not exist, or be empty. Default: a new one below ``runs``.
     scenario : str or Path, optional
-        Its goal and regions judge the log. Default: none.
+        Scenario whose goal and regions are evaluated along the log. Default: none.
     columns : str or Path, optional
         The column map that ``.csv``, ``.parquet`` and ``.mcap`` need.
     rate : float, optional
-        Rows a second [Hz]. Default: the least of 5, 10, 20, 25, 50, 100 and 200 that no state or command exceeds.
+        Rows per second [Hz]. Default: the least of 5, 10, 20, 25, 50, 100 and 200 that no state or command exceeds.
     curve : str, optional
         From pulse to force: ``linear``, ``quadratic`` or ``t200``. Default: that of the vehicle's table ``autopilot``.
     voltage : float, optional
-        Of the thrusters' supply [V], in the place of what the log says.
+        Supply voltage of the thrusters [V], instead of the log's.
     report : bool
         Write report and replay.
     overwrite : bool
-        Replace a run that `out` holds.
+        Replace a run in `out`.
     moved : callable
-        Gets how much of the log has been read, 0 to 1.
+        Receives the fraction of the log read so far, 0 to 1.
 
     Returns
     -------
     Run
-        Its status is ``"imported"``.
+        The run, with status ``"imported"``.
 
     Raises
     ------
     ImportLogError
-        If the log cannot be read, is of another vehicle, or lacks what is needed. No folder is left.
+        If the log cannot be read, is of another vehicle, or lacks required data. No folder is left.
     RunError
         If the folder cannot be written.
     ScenarioError, VehicleError
-        If scenario or vehicle cannot be.
+        If scenario or vehicle is invalid.
 
     Examples
     --------
@@ -170,7 +170,7 @@ def _require_vehicle(contents: LogContents, vehicle: Vehicle) -> None:
 
 @dataclass(frozen=True)
 class _Wanted:
-    """What the caller asked for."""
+    """Arguments of `import_log`."""
 
     vehicle: str
     scenario: str | Path | None
@@ -183,16 +183,16 @@ class _Wanted:
 
 
 def _write(path: Path, contents: LogContents, scratch: Path, vehicle: Vehicle, wanted: _Wanted) -> Run:
-    """Write what a log says as a run folder."""
+    """Write the contents of a log as a run folder."""
     topics, clock = select_topics(contents, scratch)
     command = next((topics[name] for name in COMMANDS if name in topics), None)
     for name in COMMANDS:
         if name in topics and topics[name] is not command:
             contents.unread[f"{topics[name].name} ({name})"] += topics.pop(name).count
     start, end = span_of(topics)
-    told = f"the voltage of {topics['voltage'].name}" if "voltage" in topics else ""
-    told = f"{wanted.voltage:g} V" if wanted.voltage else told
-    commands = commands_of(command, vehicle, wanted.curve, told, contents.parameters) if command else None
+    supply = f"the voltage of {topics['voltage'].name}" if "voltage" in topics else ""
+    supply = f"{wanted.voltage:g} V" if wanted.voltage else supply
+    commands = commands_of(command, vehicle, wanted.curve, supply, contents.parameters) if command else None
     hertz = wanted.rate or rate_of(topics)
     steps = max(1, math.floor((end - start) * hertz + 1e-6))
     if steps >= MAX_ROWS:
@@ -226,7 +226,7 @@ def _write(path: Path, contents: LogContents, scratch: Path, vehicle: Vehicle, w
 
 
 def _scenario(path: Path, vehicle: Vehicle, wanted: _Wanted, through: str, steps: int, step: float) -> Scenario:
-    """Return the scenario of a log's run: the vehicle, and what it is judged by."""
+    """Return the scenario of a log's run: the vehicle, with goal and regions of the given scenario."""
     table: dict[str, Any] = {"title": f"Imported from {printable(path.name)}"[:200]}
     if wanted.scenario is not None:
         given = load_scenario(wanted.scenario, ["commands.enabled=false"]).table
@@ -243,7 +243,7 @@ def _scenario(path: Path, vehicle: Vehicle, wanted: _Wanted, through: str, steps
 
 
 def _from_first(scenario: Scenario, rows: Array, names: list[str]) -> Scenario:
-    """Return a scenario that starts where the log does, as far as its first rows know it."""
+    """Return a scenario with the initial position and attitude of the log, if its first rows have them."""
     initial = scenario.initial
     for key, columns in (
         ("position", [f"position.{a}" for a in "xyz"]),
@@ -266,19 +266,19 @@ def _facts(
     path: Path, contents: LogContents, topics: Mapping[str, Topic], commands: Commands | None, clock: VehicleClock,
     hertz: float, start: float,
 ) -> LogFacts:  # fmt: skip
-    """Return what a reader must know of where the run is from."""
+    """Return the facts about the log that the run records."""
     remarks = list(contents.remarks)
     if clock.words():
         remarks.append(f"Clocks: {clock.words()}.")
     return LogFacts(
         printable(path.name), path.stat().st_size, start, hertz, commands.words if commands else "",
-        tuple(_told(topic, start) for topic in topics.values()),
+        tuple(_topic_facts(topic, start) for topic in topics.values()),
         {printable(name): count for name, count in contents.unread.most_common()},
         tuple(printable(remark) for remark in remarks),
     )  # fmt: skip
 
 
-def _told(topic: Topic, start: float) -> TopicFacts:
+def _topic_facts(topic: Topic, start: float) -> TopicFacts:
     gaps = tuple((begin - start, end - start) for begin, end in topic.gaps[:_UNREAD])
     return TopicFacts(
         topic.quantity, printable(topic.name), topic.count, topic.rate, topic.longest, topic.gap_count, gaps,

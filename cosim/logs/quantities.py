@@ -1,4 +1,4 @@
-"""What a log may say of a vehicle: each quantity with its components, units and greatest plausible size."""
+"""Quantities of a log: components, units and greatest plausible values."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ Kind = Literal["state", "command", "sensor", "voltage"]
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity as every reader gives it: SI units, world frame NED, body frame FRD.
+    """A quantity of a log, in SI units, world frame NED, body frame FRD.
 
     Attributes
     ----------
     name : str
-        As in a column map.
+        Name in a column map.
     size : int
-        How many components; 0 for one of each thruster.
+        Number of components; 0 for one per thruster.
     unit : str
-        Of each component.
+        Unit of each component.
     kind : str
         States are interpolated, commands and the voltage are held, sensors are held until the next sample.
     most : float
-        Greatest size of a component that can be right, beyond which the units are wrong.
+        Greatest plausible magnitude of a component; a greater one indicates wrong units.
     frame : str
-        ``world``, ``body`` or empty: what a column map's frames turn.
+        ``world``, ``body`` or empty: frame that a column map converts.
     what : str
-        In words.
+        Description in words.
     """
 
     name: str
@@ -66,4 +66,4 @@ QUANTITIES = {
         Quantity("voltage", 1, "V", "voltage", 1000.0, "", "voltage of the thrusters' supply"),
     )
 }
-COMMANDS = ("thrust", "pulses", "effort", "wrench", "sticks")  # the first that a log has is taken
+COMMANDS = ("thrust", "pulses", "effort", "wrench", "sticks")  # in order of preference

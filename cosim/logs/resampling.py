@@ -1,4 +1,4 @@
-"""Samples at the times of rows: interpolated where they are states, held where they are not, NaN in gaps."""
+"""Resample topics at the times of rows: states interpolated, others held, NaN in gaps."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from cosim.logs.spool import BLOCK
 from cosim.logs.topics import Topic
 from cosim.simulation.signals import Array
 
-_EXACT = 1e-6  # s; of seconds since 1970 a float64 holds a quarter of that
+_EXACT = 1e-6  # s; the resolution of float64 is a quarter of that for seconds since 1970
 
 
 class TopicReader:
-    """Reads a topic forward, a window at a time, and keeps no more of it than that.
+    """Read a topic forward, and keep only the present window in memory.
 
     Parameters
     ----------
     topic : Topic
-        To be read.
+        Topic to read.
     """
 
     def __init__(self, topic: Topic) -> None:
@@ -39,7 +39,7 @@ class TopicReader:
     def window(self, start: float, end: float) -> tuple[Array, Array]:
         """Return times [s] and components from the last sample before `start` to the first one after `end`.
 
-        Each call begins no earlier than the one before.
+        The `start` must not decrease between calls.
         """
         while self._more and not (len(self._rows) and self._rows[-1, 0] > end):
             block = np.fromfile(self._file, count=BLOCK * self._width).reshape(-1, self._width)
@@ -51,7 +51,7 @@ class TopicReader:
         return self._rows[:last, 0], self._rows[:last, 1:]
 
     def interpolated(self, at: Array) -> Array:
-        """Return the components at times (rising, shape (n,)) between samples, shape (n, size); NaN in gaps."""
+        """Interpolate the components at rising times, shape (n,); return shape (n, size), NaN in gaps."""
         times, values = self.window(float(at[0]), float(at[-1]))
         result = np.full((len(at), self.topic.size), np.nan)
         if not len(times):
@@ -65,7 +65,7 @@ class TopicReader:
         part = np.where(on, 0.0, (at - times[i]) / span)[:, None]
         good = inside | on
         a, b = values[i], values[j]
-        if self.topic.quantity == "attitude":  # the shorter way; between close samples a chord is the arc
+        if self.topic.quantity == "attitude":  # the shorter rotation; normalized linear interpolation of close samples
             b = np.where((a * b).sum(axis=1, keepdims=True) < 0.0, -b, b)
         mixed = a + part * (b - a)
         if self.topic.quantity == "attitude":
@@ -74,7 +74,7 @@ class TopicReader:
         return result
 
     def held(self, at: Array) -> tuple[Array, Array]:
-        """Return the last sample's components and time at times (rising), shapes (n, size) and (n,); NaN in gaps."""
+        """Return components and time of the last sample at rising times, shapes (n, size) and (n,); NaN in gaps."""
         times, values = self.window(float(at[0]), float(at[-1]))
         result, when = np.full((len(at), self.topic.size), np.nan), np.full(len(at), np.nan)
         if not len(times):

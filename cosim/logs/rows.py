@@ -1,4 +1,4 @@
-"""From the topics of a log to rows of a record, block by block."""
+"""Convert the topics of a log to rows of a record, block by block."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cosim.simulation.signals import Array, Column
 BLOCK = 4096  # rows that are made at once
 _POSITION, _QUATERNION = [f"position.{a}" for a in "xyz"], [f"quaternion.e{i}" for i in range(4)]
 _WRENCH = "XYZKMN"
-_SENSORS = {  # quantity: columns, and that of the time of the sample
+_SENSORS = {  # quantity: columns, and name of the sensor's time column
     "depth": (("measured.depth",), "depth_sensor"),
     "dvl": (tuple(f"measured.velocity.{a}" for a in "uvw"), "dvl"),
     "altitude": (("measured.altitude",), "dvl"),
@@ -31,20 +31,20 @@ _SENSORS = {  # quantity: columns, and that of the time of the sample
 
 
 class RowMaker:
-    """Makes the rows of a record from topics.
+    """Make the rows of a record from topics.
 
     Parameters
     ----------
     scenario : Scenario
-        Of the run: its vehicle, and the regions to judge by.
+        Scenario of the run, with its vehicle and regions.
     columns : list of Column
-        Of the record.
+        Columns of the record.
     topics : mapping of str to Topic
-        By quantity.
+        Topics by quantity.
     commands : Commands or None
-        What the log's commands are, as forces.
+        Conversion of the log's commands to forces.
     voltage : float
-        [V] where no topic tells it; NaN for none.
+        Supply voltage [V]; NaN for that of the topic ``voltage``, if there is one.
     start : float
         Time [s] of the first row, on the clock of the topics.
     """
@@ -63,7 +63,7 @@ class RowMaker:
         self._at = {column.name: i for i, column in enumerate(columns)}
         self._stack = contextlib.ExitStack()
         self._readers = {name: self._stack.enter_context(TopicReader(topic)) for name, topic in topics.items()}
-        self._judge = _Judge(scenario, self._at) if scenario.has_goal or scenario.regions else None
+        self._region_columns = _RegionColumns(scenario, self._at) if scenario.has_goal or scenario.regions else None
 
     def __enter__(self) -> RowMaker:
         return self
@@ -94,8 +94,8 @@ class RowMaker:
                 if quantity == "altitude":
                     put(["altitude"], values)
         self._put_commands(put, at)
-        if self._judge is not None:
-            self._judge.put(rows)
+        if self._region_columns is not None:
+            self._region_columns.put(rows)
         return rows
 
     def _put_motion(self, put: Callable[..., None], at: Array) -> None:
@@ -145,8 +145,8 @@ class RowMaker:
         put(["allocation_saturated"], saturated.max(axis=1, keepdims=True, initial=0.0))
 
 
-class _Judge:
-    """Evaluates the goal and the regions of a scenario at the poses of rows."""
+class _RegionColumns:
+    """Evaluate the goal and the regions of a scenario at the poses of rows."""
 
     def __init__(self, scenario: Scenario, at: Mapping[str, int]) -> None:
         names = [*(["goal"] if scenario.has_goal else []), *(s.region.name for s in scenario.regions)]
@@ -163,7 +163,7 @@ class _Judge:
         self._time = at["time"]
 
     def put(self, rows: Array) -> None:
-        """Write values, clearances and shifts into rows; NaN where the pose is not known."""
+        """Write values, clearances and shifts into rows; NaN where the pose is unknown."""
         known = np.asarray(np.isfinite(rows[:, [*self._position, *self._quaternion]]).all(axis=1))
         still = np.zeros(6)
         for k, row in enumerate(rows):

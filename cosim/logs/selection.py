@@ -1,4 +1,4 @@
-"""Which sources of a log a run is made of, on one clock, and over which time."""
+"""Select the sources, the clock and the time span of a log for a run."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ from cosim.logs.spool import LogContents, Source
 from cosim.logs.topics import Topic, clean
 from cosim.simulation.signals import Array
 
-RATES = (5, 10, 20, 25, 50, 100, 200)  # Hz, one of which the rows have unless another is asked for
-_MOTION = ("attitude", "position", "depth")  # of which a log must have one
-_SEA_LEVEL, _SPECIFIC = 101325.0, 9800.0  # Pa, Pa/m: as ArduPilot turns pressure into depth
-_EDGE = 5.0  # s, at the start and at the end, in which not all of the motion may be known
+RATES = (5, 10, 20, 25, 50, 100, 200)  # Hz, default rates of rows
+_MOTION = ("attitude", "position", "depth")  # a log must have at least one
+_SEA_LEVEL, _SPECIFIC = 101325.0, 9800.0  # Pa, Pa/m: ArduPilot's conversion of pressure to depth
+_EDGE = 5.0  # s, at start and end, that may be cut where part of the motion is unknown
 
 
 def select_topics(contents: LogContents, scratch: Path) -> tuple[dict[str, Topic], VehicleClock]:
-    """Select what a run is made of.
+    """Select the best source of each quantity, and convert it to a topic.
 
     Parameters
     ----------
     contents : LogContents
-        Of the log. Receives as not read what is there twice, and remarks.
+        Contents of the log. Receives further sources of a quantity as unread, and remarks.
     scratch : Path
         Folder for the topics' files.
 
     Returns
     -------
     dict of str to Topic, VehicleClock
-        By quantity; and the clock by which their times are.
+        Topics by quantity; and the vehicle's clock, which gave their times.
 
     Raises
     ------
     ImportLogError
-        If nothing tells of the motion.
+        If the log has no motion.
     """
     clock = _vehicle_clock(contents)
     topics: dict[str, Topic] = {}
@@ -66,7 +66,7 @@ def select_topics(contents: LogContents, scratch: Path) -> tuple[dict[str, Topic
 
 
 def span_of(topics: Mapping[str, Topic]) -> tuple[float, float]:
-    """Return when the rows begin and end [s]: where all of the motion is known, unless that would cost seconds."""
+    """Return start and end [s] of the rows: where all of the motion is known, unless that cuts 5 s or more."""
     motion = [topics[name] for name in _MOTION if name in topics]
     starts, ends = [topic.start for topic in motion], [topic.end for topic in motion]
     start = max(starts) if max(starts) - min(starts) < _EDGE else min(starts)
@@ -75,10 +75,10 @@ def span_of(topics: Mapping[str, Topic]) -> tuple[float, float]:
 
 
 def _vehicle_clock(contents: LogContents) -> VehicleClock:
-    """Return the vehicle's clock, by all stamps in the order in which they were written."""
+    """Return the vehicle's clock, fitted to the stamps of the source with most samples."""
     clock = VehicleClock()
     stamped = [source for source in contents.sources.values() if next(_stamps(source), None) is not None]
-    if stamped:  # the source with the most stamps tells: others are of the same clock
+    if stamped:  # others are of the same clock
         best = max(stamped, key=lambda source: source.count)
         for block in _stamps(best):
             for stamp, written in block.tolist():
@@ -96,7 +96,7 @@ def _stamps(source: Source) -> Iterator[Array]:
 
 
 def _depth_of_pressure(contents: LogContents, topics: dict[str, Topic], clock: VehicleClock, scratch: Path) -> None:
-    """Turn pressure into depth as the autopilot does, where no depth is there itself."""
+    """Convert pressure to depth as the autopilot does, if the log has no depth."""
     if "pressure" not in topics:
         return
     pressure = topics.pop("pressure")
@@ -118,7 +118,7 @@ def _depth_of_pressure(contents: LogContents, topics: dict[str, Topic], clock: V
 
 
 def rate_of(topics: Mapping[str, Topic]) -> float:
-    """Return the least rate that no state or command exceeds."""
+    """Return the least rate [Hz] of `RATES` that no state or command exceeds."""
     fast = max((t.rate for t in topics.values() if QUANTITIES[t.quantity].kind in ("state", "command")), default=0.0)
     fast = fast or max(topic.rate for topic in topics.values())
     return float(next((rate for rate in RATES if rate >= 0.98 * fast), RATES[-1]))

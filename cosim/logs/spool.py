@@ -1,4 +1,4 @@
-"""Samples of a log on disk, one file for each source, so that memory stays as it is however long the log is."""
+"""Samples of a log on disk, one file for each source, so that memory is independent of the log's length."""
 
 from __future__ import annotations
 
@@ -15,16 +15,15 @@ from cosim.errors import ImportLogError
 from cosim.logs.quantities import QUANTITIES
 from cosim.simulation.signals import Array
 
-BLOCK = 2**15  # samples that are looked at together
+BLOCK = 2**15  # samples that are processed together
 _WAITING = 2**14  # numbers of a source in memory before they go to disk
 
 
 @dataclass
 class Source:
-    """What one message or column of a log says of one quantity, in a file: two times, then the components.
+    """Samples of one quantity from one message or column, in a file: two times, then the components.
 
-    The first time [s] is the stamp of whoever measured, NaN where there is none. The second one is when the log's
-    writer got it.
+    The first time [s] is the stamp of the sender, NaN without one. The second one is the time of writing.
     """
 
     quantity: str
@@ -32,11 +31,11 @@ class Source:
     path: Path
     size: int  # components
     count: int = 0
-    broken: int = 0  # samples with a number that is none
+    broken: int = 0  # samples with a number that is not finite
     _waiting: array[float] = field(default_factory=lambda: array("d"))
 
     def put(self, stamp: float, written: float, values: Sequence[float]) -> None:
-        """Append a sample; one with a number that is none is counted and left out."""
+        """Append a sample; one with a number that is not finite is counted and left out."""
         if not (math.isfinite(written) and all(map(math.isfinite, values))):
             self.broken += 1
             return
@@ -46,7 +45,7 @@ class Source:
             self.flush()
 
     def put_many(self, written: Array, values: Array) -> None:
-        """Append samples with one time: shapes (n,) and (n, size)."""
+        """Append samples without stamps: times of writing and values, shapes (n,) and (n, size)."""
         known = np.isfinite(written) & np.isfinite(values).all(axis=1)
         self.broken += int(np.count_nonzero(~known))
         rows = np.column_stack([np.full(len(written), np.nan), written, values])[known]
@@ -56,7 +55,7 @@ class Source:
         self.count += len(rows)
 
     def flush(self) -> None:
-        """Write what waits."""
+        """Write the buffer to disk."""
         if self._waiting:
             with self.path.open("ab") as file:
                 self._waiting.tofile(file)
@@ -74,31 +73,31 @@ class Source:
 
 
 class LogContents:
-    """What a reader finds in a log.
+    """Contents of a log, filled by a reader.
 
     Parameters
     ----------
     folder : Path
-        For the files of the samples.
+        Folder for the files of samples.
 
     Attributes
     ----------
     sources : dict
-        By quantity and name.
+        Sources by quantity and name.
     parameters : dict of str to float
-        Of the autopilot, where the log has them.
+        Parameters of the autopilot, if the log has them.
     frame : str
-        What the log calls the arrangement of the thrusters; empty where it does not say.
+        Name of the thruster arrangement in the log; empty if unknown.
     autopilot : str
-        Who flew, such as ``ardupilot``; empty where the log does not say.
+        Name of the autopilot, such as ``ardupilot``; empty if unknown.
     kind : str
-        What it is of, where that is no underwater vehicle.
+        Kind of vehicle, if it is not an underwater vehicle; else empty.
     unread : Counter
-        Messages, topics or columns of which nothing is made, and how often each comes.
+        Counts of unused messages, topics or columns.
     remarks : list of str
-        What a reader of the run must know.
+        Remarks for the reader of the run.
     preferences : dict
-        Of a quantity, the names of sources, the first one first.
+        Names of sources in order of preference, by quantity.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -113,16 +112,16 @@ class LogContents:
         self.preferences: dict[str, tuple[str, ...]] = {}
 
     def source(self, quantity: str, name: str, size: int | None = None) -> Source:
-        """Return the source of a name for a quantity, new where there is none.
+        """Return the source of a name for a quantity; create it if there is none.
 
         Parameters
         ----------
         quantity : str
             One of `QUANTITIES`.
         name : str
-            Of the message, topic or columns.
+            Name of the message, topic or columns.
         size : int, optional
-            How many components; default: as the quantity has.
+            Number of components; default: the quantity's.
 
         Raises
         ------
@@ -143,7 +142,7 @@ class LogContents:
         self.source(quantity, name, len(values)).put(stamp, written, values)
 
     def best(self, quantity: str) -> Source | None:
-        """Return the source to take for a quantity: the preferred one, else the one with the most samples."""
+        """Return the source to use for a quantity: the preferred one, else the one with most samples, or None."""
         found = {name: s for (q, name), s in self.sources.items() if q == quantity and s.count}
         preferred = next((name for name in self.preferences.get(quantity, ()) if name in found), None)
         if preferred is not None:

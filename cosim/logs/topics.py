@@ -1,4 +1,4 @@
-"""Samples made fit for use: in the order of time, without repeats of held values, bursts spread, gaps counted."""
+"""Clean samples: in the order of time, without repeats of held values, bursts spread, gaps counted."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ Convert = Callable[[Array], Array]
 _EDGES = np.logspace(-6, 5, 4401)  # s, of a histogram of periods; neighbors differ by 0.6 %
 _AROUND = 8  # bins to either side of the median whose mean is the period
 _GAP_PERIODS, _LEAST_GAP = 3.0, 0.3  # a pause of more periods, and seconds, is a gap
-_LISTED = 100  # gaps that are named
-_RUNS, _REGULAR = 10, 0.6  # runs of equal values from which on, and part of them alike, by which values count as held
+_LISTED = 100  # gaps that are listed
+_RUNS, _REGULAR = 10, 0.6  # least runs of equal values, and fraction of alike lengths, for values to count as held
 _LONGEST_RUN = 1000  # samples
-_QUICK, _BURSTING = 0.2, 0.3  # part of the mean period, and of all samples that follow so quickly, of bursts
+_QUICK, _BURSTING = 0.2, 0.3  # fraction of the mean period, and of samples closer than it, that define bursts
 
 
 @dataclass
 class Topic:
-    """A quantity of a log, ready to be read: its file has a time [s] and the components of each sample."""
+    """A cleaned quantity of a log: its file has a time [s] and the components of each sample."""
 
     quantity: str
     name: str  # of its source
@@ -38,47 +38,47 @@ class Topic:
     start: float = 0.0  # s
     end: float = 0.0  # s
     period: float = 0.0  # s, median
-    held: int = 0  # repeats of a value that were left out
+    held: int = 0  # repeats of a held value that were removed
     burst: int = 0  # samples whose time was spread
-    late: int = 0  # samples that were left out because a later one had come
-    broken: int = 0  # samples with a number that is none
+    late: int = 0  # samples out of order that were removed
+    broken: int = 0  # samples with a number that is not finite
     gap_count: int = 0
     gaps: list[tuple[float, float]] = field(default_factory=list)  # s, begin and end of the longest ones
 
     @property
     def longest(self) -> float:
-        """The longest pause [s] that is no gap."""
+        """Longest time between samples [s] that is not a gap."""
         return max(_GAP_PERIODS * self.period, _LEAST_GAP)
 
     @property
     def rate(self) -> float:
-        """Samples a second [Hz]."""
+        """Samples per second [Hz]."""
         return 1.0 / self.period if self.period else 0.0
 
 
 def clean(source: Source, times: Callable[[Array, Array], Array], convert: Convert | None, folder: Path) -> Topic:
-    """Return a source's samples as a topic.
+    """Clean a source's samples, and write them as a topic.
 
     Parameters
     ----------
     source : Source
-        As read.
+        Source of the samples.
     times : callable
-        From stamps and times of writing, each of shape (n,), to times [s].
+        Function from stamps and times of writing, each of shape (n,), to times [s].
     convert : callable, optional
-        From components as read to those of the topic, shape (n, size) both.
+        Function from components of the source to those of the topic, shape (n, size) both.
     folder : Path
-        For the topic's file.
+        Folder for the topic's file.
 
     Returns
     -------
     Topic
-        At least one sample.
+        Topic with at least one sample.
 
     Raises
     ------
     ImportLogError
-        If a component is so great that its unit or frame must be wrong.
+        If a component exceeds its greatest plausible value.
     """
     topic = Topic(source.quantity, source.name, folder / f"{source.quantity}.topic", 0, broken=source.broken)
     stretch, bursts = _survey(source, times)
@@ -148,7 +148,7 @@ def _timed(source: Source, times: Callable[[Array, Array], Array]) -> Iterator[t
 
 
 def _survey(source: Source, times: Callable[[Array, Array], Array]) -> tuple[int, float]:
-    """Return how many samples a value is held for, 1 for not at all; and the mean period [s] of bursts, 0 for none."""
+    """Return the number of samples for which a value is held, 1 for none; and the mean period [s] of bursts, or 0."""
     runs: NDArray[np.int64] = np.zeros(_LONGEST_RUN + 1, np.int64)
     steps_all, run = _Periods(), 1
     previous, last, counted = np.full(source.size, np.nan), np.nan, 0
@@ -173,7 +173,7 @@ def _survey(source: Source, times: Callable[[Array, Array], Array]) -> tuple[int
 
 
 def _comes_in_groups(source: Source, times: Callable[[Array, Array], Array], apart: float) -> bool:
-    """Return whether most samples have neighbors, where groups are so far apart [s]: a quick phase is no burst."""
+    """Return True if most groups, more than `apart` [s] from each other, have several samples: these are bursts."""
     groups = alone = 0
     last = -np.inf
     for at, _ in _timed(source, times):
@@ -185,7 +185,7 @@ def _comes_in_groups(source: Source, times: Callable[[Array, Array], Array], apa
 
 
 def _held_for(runs: NDArray[np.int64]) -> int:
-    """Return how many samples a value is held for, by how often runs of each length come; 1 where it is not."""
+    """Return the number of samples for which a value is held, from counts of run lengths; 1 if it is not held."""
     total = int(runs.sum())
     if total < _RUNS:
         return 1
@@ -195,19 +195,19 @@ def _held_for(runs: NDArray[np.int64]) -> int:
 
 
 def _fresh(values: Array, previous: Array, repeats: int, stretch: int) -> tuple[NDArray[np.bool_], int]:
-    """Return which samples are new: those that differ from the one before, and each of so many that are equal."""
+    """Return a mask of new samples, (n,), and the age of the last: new are changes, and each `stretch`-th repeat."""
     if stretch <= 1:
         return np.ones(len(values), bool), 0
     same = (values == np.vstack([previous, values[:-1]])).all(axis=1)
     index = np.arange(len(values))
-    began = np.maximum.accumulate(np.where(same, -1 - repeats, index))  # where the run of equal values began
+    began = np.maximum.accumulate(np.where(same, -1 - repeats, index))  # start of the run of equal values
     age = index - began
     fresh: NDArray[np.bool_] = age % stretch == 0
     return fresh, int(age[-1])
 
 
 def _spread(samples: Iterator[tuple[Array, Array]], period: float, topic: Topic) -> Iterator[tuple[Array, Array]]:
-    """Spread samples that came in bursts evenly: the last one of a burst is on time, the others were kept back."""
+    """Spread samples of bursts evenly in time: the last one of a burst is on time, the others were delayed."""
     at, values = np.empty(0), None
     before = np.nan
     for more_at, more_values in samples:
@@ -227,7 +227,7 @@ def _evenly(at: Array, before: float, period: float, topic: Topic) -> Array:
     sizes = np.diff(ends, prepend=-1)
     since = np.diff(at[ends], prepend=before)
     with np.errstate(invalid="ignore"):
-        spacing = np.where(since < 2.0 * sizes * period, since / sizes, period)  # none of the first one: NaN
+        spacing = np.where(since < 2.0 * sizes * period, since / sizes, period)  # NaN for the first one
     back = np.repeat(ends, sizes) - np.arange(len(at))
     topic.burst += int(np.count_nonzero(back))
     evened: Array = np.repeat(at[ends], sizes) - back * np.repeat(spacing, sizes)

@@ -1,4 +1,4 @@
-"""The vehicle's side of MAVLink: what it says, and what it does about what comes. No sockets, no threads."""
+"""The vehicle's side of MAVLink: outgoing messages, and handling of received ones. No sockets, no threads."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from cosim.mavlink.events import Events
 from cosim.mavlink.messages import status
 from cosim.mavlink.messages.streams import Streams
 from cosim.mavlink.messages.table import HEARTBEAT
+from cosim.mavlink.services.attitude_targets import AttitudeTargets
 from cosim.mavlink.services.commands import Commands
 from cosim.mavlink.services.ftp import FileServer
 from cosim.mavlink.services.gcs_failsafe import GcsFailsafe
@@ -39,20 +40,20 @@ _SECOND = 1_000_000
 class Autopilot:
     """The running co-simulation as a MAVLink vehicle.
 
-    Streams go by simulated time, and so does the time since boot, to which only the time is added for which arming was
-    awaited. The watch over stations goes by the wall clock, and so do the streams while simulated time stands still.
-    Nothing that comes raises. Whoever drives it calls it from one thread.
+    Streams follow simulated time. So does the time since boot, plus the wall time spent waiting for arming. Timeouts of
+    ground stations follow the wall clock, and so do the streams while simulated time stands still.
+    No received message raises. All methods are called from one thread.
 
     Parameters
     ----------
     scenario : Scenario
-        What is run.
+        The scenario of the run.
     columns : sequence of Column
-        Of the rows that it observes.
+        Columns of the observed rows.
     options : MavlinkOptions
-        As whom it shows itself, and whom it heeds.
+        Identity, profile, and accepted systems.
     commands : CommandQueue or None
-        Where commands go; with None, or commands off, it is read-only.
+        Queue that receives the commands; with None, or commands off, the vehicle is read-only.
     live : bool
         False for a recorded run, which takes no commands.
     """
@@ -74,6 +75,7 @@ class Autopilot:
             Requests(context, self._streams),
             Modes(context),
             targets,
+            AttitudeTargets(context),
             Obstacles(context),
             Manual(context),
             parameters,
@@ -88,16 +90,16 @@ class Autopilot:
         self._handlers: dict[str, Handler] = {}
         for service in self._services:
             self._handlers.update(service.messages)
-        self._clock_us = 0  # of the streams: it only goes on
+        self._clock_us = 0  # of the streams; never decreases
         self._last_us: int | None = None  # simulated time of the last snapshot
-        self._awaiting = False  # arming, before anything moves
+        self._awaiting = False  # waiting for arming: simulated time is still 0
         self._moved = False  # a snapshot came since the last tick
         self._moved_at = -math.inf
         self._beaten_at: dict[MessageSink, float] = {}
         self._ticked: float | None = None
 
     def attach(self, link: MessageSink) -> None:
-        """Begin to stream on a link."""
+        """Start streaming on a link."""
         self._context.links.append(link)
         self._streams[link] = Streams(self._context, link, self._clock_us)
         for line in banner(self._context):
@@ -105,13 +107,13 @@ class Autopilot:
                 link.send(message)
 
     def observe(self, row: Array) -> None:
-        """Take the next snapshot, and send what is due by simulated time.
+        """Update from the next snapshot, and send the messages that are due by simulated time.
 
         Parameters
         ----------
         row : ndarray, shape (n,)
-            Of a step, in the order of the columns; its first number is simulated time [s]. One that is earlier than
-            the one before begins another run.
+            Row of a step, in the order of the columns; its first number is simulated time [s]. A time earlier than
+            the last one starts a new run.
         """
         context = self._context
         context.look(row)
@@ -141,14 +143,14 @@ class Autopilot:
             streams.advance(self._clock_us)
 
     def receive(self, link: MessageSink, message: Any, now: float) -> None:
-        """Heed a message.
+        """Pass a message to its handler, if it comes from an allowed system and targets this vehicle.
 
         Parameters
         ----------
         link : MessageSink
-            That it came on.
+            Link of the message.
         message : MAVLink_message
-            Decoded, and accepted: its checksum, and its signature where one is asked for, are right.
+            Decoded message whose checksum, and signature where required, are valid.
         now : float
             The wall clock, ``time.monotonic()`` [s].
         """
@@ -167,7 +169,7 @@ class Autopilot:
             handler(sender, message)
 
     def tick(self, now: float) -> None:
-        """Do what goes by the wall clock; to be called every 20 ms, or more often.
+        """Run timeouts and streams of the wall clock; call it at least every 20 ms.
 
         Parameters
         ----------
@@ -196,7 +198,7 @@ class Autopilot:
                 streams.send(HEARTBEAT)
 
     def close(self, now: float) -> None:
-        """Say goodbye: that it ends, and a last heartbeat, in standby."""
+        """Send a status text that the run has ended, and a last heartbeat in standby."""
         context = self._context
         context.now = now
         context.say(f"The {'run' if context.live else 'recording'} has ended", context.mavlink.MAV_SEVERITY_NOTICE)

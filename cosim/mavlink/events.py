@@ -1,4 +1,4 @@
-"""What is worth a line of text: changes from one snapshot to the next."""
+"""Status texts for events: changes from one snapshot to the next."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.vehicle.view import View
 from cosim.simulation.commands.mission_executor import way
 
-_MARGIN = 0.01  # m or rad: a region is entered or left once its surface is that far behind
-_RELEASED = 1_000_000  # µs of simulated time without a limit, until the thrusters are said to be free
+_MARGIN = 0.01  # m or rad past a region's surface, beyond which it counts as entered or left
+_RELEASED = 1_000_000  # µs of simulated time without saturation, before its end is reported
 _EVERY = 2.0  # s of the wall clock, between two texts of a kind
 
 
 class Events:
-    """Compares snapshots.
+    """Compare snapshots, and send status texts of the changes.
 
     Parameters
     ----------
     context : VehicleContext
-        That sends them as status texts.
+        The vehicle, which sends the texts.
     """
 
     def __init__(self, context: VehicleContext) -> None:
@@ -28,14 +28,14 @@ class Events:
         self.restart()
 
     def restart(self) -> None:
-        """Forget everything; the next snapshot is the first."""
+        """Reset; the next snapshot is the first."""
         self._before: View | None = None
         self._fine: list[bool] = []
         self._saturated = False
-        self._cut_us = 0  # when a limit cut something last
+        self._cut_us = 0  # time of the last saturation
 
     def watch(self) -> None:
-        """Compare the vehicle's snapshot with the one before."""
+        """Compare the vehicle's snapshot with the last one."""
         context, view = self._context, self._context.view
         before = self._before
         self._before = view
@@ -61,7 +61,7 @@ class Events:
             self._watch_course(before.item, view.item)
 
     def _watch_course(self, before: int, now: int) -> None:
-        """Tell of the items that were gone through; those without a place were not reached but done."""
+        """Report the mission items that were passed; items without a position are not reported."""
         passed = way(self._context.course, before, now) if before >= 0 else None
         for item in [before, *passed[:-1]] if passed else []:
             self._reached_item(item)
@@ -78,13 +78,13 @@ class Events:
         m = self._context.mavlink
         for i, clearance in enumerate(view.clearances):
             fine = self._fine[i]
-            # once the surface is a margin behind; NaN changes nothing
+            # hysteresis of a margin about the surface; NaN changes nothing
             now_fine = not clearance < -_MARGIN if fine else clearance > _MARGIN
             if now_fine == fine:
                 continue
             self._fine[i] = now_fine
             if i == 0:
-                self._tell_of_target(view, now_fine)
+                self._report_target(view, now_fine)
                 continue
             region = self._context.scenario.regions[i - 1].region
             what = "Attitude" if of_attitude(region.shape) else "Region"
@@ -93,7 +93,7 @@ class Events:
             severity = m.MAV_SEVERITY_INFO if now_fine else m.MAV_SEVERITY_WARNING
             self._context.say(text if now_fine else f"{text}: keep {region.keep}", severity, text, _EVERY)
 
-    def _tell_of_target(self, view: View, inside: bool) -> None:
+    def _report_target(self, view: View, inside: bool) -> None:
         context = self._context
         last = view.item == len(context.plan) - 1 and view.mode == "mission"
         context.say("Target reached" if inside else "Target left", None, f"target {inside}", _EVERY)

@@ -1,4 +1,4 @@
-"""A recorded run as a MAVLink vehicle: the same autopilot and the same links, fed from the record."""
+"""A recorded run as a MAVLink vehicle: the same autopilot and links, with the record as input."""
 
 from __future__ import annotations
 
@@ -28,38 +28,38 @@ _MOST_QUEUED = SNAPSHOTS // 2
 
 @dataclass(frozen=True)
 class Replayed:
-    """How streaming a record went."""
+    """Result of streaming a record."""
 
     simulated: float  # s
     wall: float  # s
-    troubles: list[str]  # what was lost or refused, in words
+    troubles: list[str]  # texts about lost or refused frames
 
 
 def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions, rate: float | None = 1.0) -> Replayed:
-    """Stream a recorded run as if it took place now; nothing can be commanded of it.
+    """Stream a recorded run as a running vehicle that accepts no commands.
 
     Parameters
     ----------
     folder : Path
-        The run folder, of a run that was finished, interrupted or killed.
+        Folder of a finished, interrupted or killed run.
     endpoints : sequence of Endpoint
-        Where to.
+        Endpoints of the links.
     options : MavlinkOptions
-        As what vehicle.
+        Identity and profile.
     rate : float, optional
-        Simulated seconds a second; None: as fast as the links send, and nothing is left out.
+        Simulated seconds per second of the wall clock; None: as fast as the links send, without omissions.
 
     Returns
     -------
     Replayed
-        What went out.
+        Simulated and wall time, and troubles of the links.
 
     Raises
     ------
     RunError
-        If the folder holds no run that can be read.
+        If the folder holds no readable run.
     ScenarioError
-        If its scenario is none.
+        If its scenario is invalid.
     TelemetryError
         If a link cannot be opened.
     """
@@ -67,7 +67,7 @@ def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions,
         raise RunError(f"{folder}: holds no run ({SCENARIO} is missing)")
     scenario, record = load_scenario(folder / SCENARIO, imported=True), load_record(folder)
     require_columns(scenario, record)
-    known = set(names_of(scenario))  # what else a record has could stand between what is read side by side
+    known = set(names_of(scenario))  # further columns could separate columns that are read as one slice
     columns = [column for column in record.columns if column.name in known or column.name.startswith("law.")]
     autopilot = Autopilot(scenario, columns, options, commands=None, live=False)
     thread = LinkThread(autopilot, open_links(endpoints, options), scenario.time.step, ahead(scenario, rate))
@@ -90,7 +90,7 @@ def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions,
 
 
 def _rows(record: Record, every: int, names: Sequence[str]) -> Iterator[tuple[int, Array]]:
-    """Yield each row that the links look at, and its step."""
+    """Yield the step and row of every `every`-th step."""
     first = 0
     for rows in record.blocks(names):
         block = rows.numbers()

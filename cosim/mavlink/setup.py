@@ -1,4 +1,4 @@
-"""A run's MAVLink side, from what the user says to a running link."""
+"""The MAVLink links of a run, from the user's options to a link thread."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cosim.simulation.signals import Column
 
 @dataclass(frozen=True)
 class Mavlink:
-    """Where a run is to be a MAVLink vehicle, and how.
+    """Endpoints and options of a run's MAVLink links.
 
     Examples
     --------
@@ -38,18 +38,18 @@ class Mavlink:
         Parameters
         ----------
         scenario : Scenario
-            What is run.
+            The scenario of the run.
         columns : sequence of Column
-            Of its rows.
+            Columns of its rows.
         commands : CommandQueue or None
-            Where commands go; None heeds none.
+            Queue that receives the commands; None accepts none.
         rate : float or None
-            Simulated seconds a second at the most; None for as many as can be.
+            Most simulated seconds per second of the wall clock; None for no limit.
 
         Returns
         -------
         LinkThread
-            Not started yet.
+            The thread, not started.
 
         Raises
         ------
@@ -62,5 +62,5 @@ class Mavlink:
 
 
 def ahead(scenario: Scenario, rate: float | None) -> float:
-    """Return by how much simulated time may get ahead of the wall clock [s], at a rate; None for any."""
+    """Return the most by which simulated time can lead the wall clock [s]; `rate` None is no limit."""
     return scenario.time.duration if rate is None or rate > 1.0 else 0.0

@@ -1,8 +1,8 @@
-"""The thread that all links live in, and the little that the stepper does for it.
+"""The thread of all links, and the observer that passes snapshots to it.
 
-The stepper and this thread share one interpreter, which only one of them holds at a time. So the thread works in slices
-of well under a millisecond, between which it sleeps: the stepper never waits for longer than a slice, and what a peer
-sends beyond what fits in the slices is lost in the kernel, at no cost. Nobody wakes the thread; it looks by itself.
+The stepper and this thread share one interpreter lock. So the thread works in slices of well under a millisecond,
+between which it sleeps: the stepper never waits for longer than a slice. Input beyond the capacity of the slices is
+lost in the kernel. The thread polls; no event wakes it.
 """
 
 from __future__ import annotations
@@ -22,66 +22,66 @@ from cosim.simulation.signals import Array
 
 log = logging.getLogger(__name__)
 
-SNAPSHOT_PERIOD = 0.01  # s, simulated: the fastest that a stream can be
-SNAPSHOTS = 8192  # that wait at the most; when the thread falls behind, the oldest go
-_PERIOD = 0.02  # s, after which it looks again where there was nothing to do: each look costs the stepper 0.1 ms
-_RUSHING = 0.2  # s, the same in a run that is so much faster than real time that its stepper can hardly ever pause
-_MANY = 2500  # snapshots a second of the wall clock that tell of such a run: 25 times real time
-_SOON = 0.004  # s, the same while somebody speaks, who may wait for an answer
-_TALKING = 0.1  # s, for which somebody is taken to speak after what was heeded last
+SNAPSHOT_PERIOD = 0.01  # s, simulated: the shortest period of a stream
+SNAPSHOTS = 8192  # queued at most; a full queue drops the oldest
+_PERIOD = 0.02  # s, polling period while idle: each poll delays the stepper by 0.1 ms
+_RUSHING = 0.2  # s, polling period in a run much faster than real time, whose stepper hardly ever pauses
+_MANY = 2500  # snapshots per second of the wall clock that mark such a run: 25 times real time
+_SOON = 0.004  # s, polling period during a conversation, in which a peer may wait for an answer
+_TALKING = 0.1  # s after the last accepted message, during which a conversation lasts
 _RECEIVING = 0.2e-3  # s, of a slice, for all links together
 _SENDING = 0.5e-3  # s, of a slice
-_REST_RECEIVING = 19  # times as long as it received it rests: a flood gets a twentieth of the time
-_REST_SENDING = 3  # times as long as it sent
-_LONGEST_REST = 0.05  # s; where a slice took long it was the stepper's, which loads what it calls before its first step
-_DRAINING = 2.0  # s, that closing waits for what is queued
-_CLOSING = 4.0  # s, that closing waits at all
+_REST_RECEIVING = 19  # ratio of rest to receiving: a flood gets a twentieth of the time
+_REST_SENDING = 3  # ratio of rest to sending
+_LONGEST_REST = 0.05  # s; long slices come from the stepper, which loads libraries before its first step
+_DRAINING = 2.0  # s, that closing waits for the queue
+_CLOSING = 4.0  # s, that closing waits in total
 
 
 class Vehicle(Protocol):
-    """The vehicle's side of the protocol; it does no input or output of its own."""
+    """The vehicle's side of the protocol, without input or output of its own."""
 
     def attach(self, link: MessageSink) -> None:
-        """Begin to stream on a link."""
+        """Start streaming on a link."""
         ...
 
     def observe(self, row: Array) -> None:
-        """Take the next snapshot, a row of the run's signals, and send what is due by its time."""
+        """Update from the next snapshot, a row of the run's signals, and send messages due by its time."""
         ...
 
     def receive(self, link: MessageSink, message: Any, now: float) -> None:
-        """Take a message that came on a link, at monotonic time `now` [s]."""
+        """Handle a message received on a link, at monotonic time `now` [s]."""
         ...
 
     def tick(self, now: float) -> None:
-        """Send what is due by the wall clock."""
+        """Send messages due by the wall clock."""
         ...
 
     def close(self, now: float) -> None:
-        """Say goodbye."""
+        """Send the last messages."""
         ...
 
 
 class LinkThread:
-    """Observer that shows the run on links, from a thread of its own, which `start` begins.
+    """Observer that streams the run on links, from its own thread, started by `start`.
 
     Parameters
     ----------
     vehicle : Vehicle
-        Sends and answers; it is called in the thread only.
+        The vehicle; its methods are called only in the thread.
     links : sequence of Link
-        Closed with the thread.
+        Links, which are closed with the thread.
     step : float
         Step of the run [s].
     ahead : float
-        By how much simulated time may get ahead of the wall clock [s]; logs begin earlier by that.
+        Most by which simulated time can lead the wall clock [s]; logs start earlier by that.
 
     Attributes
     ----------
     dropped : int
-        Snapshots that were overtaken by newer ones.
+        Snapshots dropped from a full queue.
     failures : dict of str to int
-        Errors in the vehicle's side, which cost no more than what raised them.
+        Count of each kind of error in the vehicle's side; the thread continues after them.
     """
 
     def __init__(self, vehicle: Vehicle, links: Sequence[Link], step: float, ahead: float = 0.0) -> None:
@@ -95,21 +95,21 @@ class LinkThread:
         self._queue: deque[Array] = deque(maxlen=SNAPSHOTS)
         self._closing = threading.Event()
         self._next_tick = 0.0
-        self._first: float | None = None  # s, monotonic, when the first snapshot of time 0 came
-        self._waited = 0.0  # s, from then to the last one: for how long arming was awaited
-        self._looked = time.perf_counter()  # s, when nothing was left to do before
+        self._first: float | None = None  # s, monotonic, reception of the first snapshot of time 0
+        self._waited = 0.0  # s, from then to the last one: time of waiting for arming
+        self._looked = time.perf_counter()  # s, end of the last work
         self._shown = 0  # snapshots since then
-        self._heard = -math.inf  # s, monotonic, when something was heeded last
+        self._heard = -math.inf  # s, monotonic, time of the last accepted message
         self.dropped = 0
         self.failures: dict[str, int] = Counter()
         self._thread = threading.Thread(target=self._live, name="mavlink", daemon=True)
 
     def start(self) -> None:
-        """Begin to send and receive."""
+        """Start the thread."""
         self._thread.start()
 
     def observe(self, k: int, row: Array) -> None:
-        """Queue a copy of the row of step `k`, where one is due."""
+        """Queue a copy of the row of step `k`, if a snapshot is due."""
         if k % self._every:
             return
         self.dropped += len(self._queue) == SNAPSHOTS
@@ -117,11 +117,11 @@ class LinkThread:
 
     @property
     def waiting(self) -> int:
-        """Snapshots that are queued; more than `SNAPSHOTS` never are."""
+        """Number of queued snapshots, at most `SNAPSHOTS`."""
         return len(self._queue)
 
     def close(self) -> None:
-        """Send what is queued, within a bounded time, say goodbye, end the thread, and warn of what was lost."""
+        """Send queued snapshots within a bounded time, close vehicle and links, end the thread, and log losses."""
         if self._closing.is_set():
             return
         self._closing.set()
@@ -137,7 +137,7 @@ class LinkThread:
             log.warning("MAVLink: %s", "; ".join(troubles))
 
     def troubles(self) -> list[str]:
-        """Return what was lost or refused, and how often, in words."""
+        """Return a text for each kind of loss or refusal, with its count."""
         found = [f"{self.dropped} snapshots dropped"] if self.dropped else []
         found += [f"{n} times {what}" for what, n in self.failures.items()]
         return found + [f"{link.name}: {', '.join(link.troubles())}" for link in self._links if link.troubles()]
@@ -148,7 +148,7 @@ class LinkThread:
         for link in self._links:
             self._guard("attach", self._vehicle.attach, link)
         while not self._closing.is_set():
-            time.sleep(self._turn())  # and not on an event: that gives the interpreter up several times
+            time.sleep(self._turn())  # not an event, which releases the interpreter lock several times
         deadline = time.perf_counter() + _DRAINING
         while self._send_queued(time.perf_counter() + _SENDING) and time.perf_counter() < deadline:
             self._tend(time.monotonic())
@@ -157,7 +157,7 @@ class LinkThread:
         self._close_links()
 
     def _turn(self) -> float:
-        """Do a slice of each kind of work; return for how long to rest [s]."""
+        """Run a slice of each kind of work; return the time to rest [s]."""
         began = time.perf_counter()
         for link in self._links:
             self._guard("receive", self._receive, link, time.perf_counter() + _RECEIVING / len(self._links))
@@ -191,11 +191,11 @@ class LinkThread:
             self._guard("receive", self._vehicle.receive, link, message, self._heard)
 
     def _send_queued(self, until: float) -> bool:
-        """Show the vehicle snapshots until a moment of `time.perf_counter`; return whether some are left."""
+        """Pass snapshots to the vehicle until a time of `time.perf_counter`; return True if some are left."""
         while self._queue:
             row = self._queue.popleft()
             self._shown += 1
-            if not row[0] > 0.0:  # where it comes again, arming is awaited
+            if not row[0] > 0.0:  # time 0 repeats while the run waits for arming
                 now = time.monotonic()
                 self._first = now if self._first is None else self._first
                 self._waited = now - self._first
@@ -207,10 +207,10 @@ class LinkThread:
         return bool(self._queue)
 
     def _guard(self, what: str, work: Callable[..., object], *arguments: Any) -> None:
-        """Call something; an error in it is told once a kind and counted, and the links live on."""
+        """Call a function; log the first error of each kind, count all, and continue."""
         try:
             work(*arguments)
-        except Exception as error:  # broad: whatever one message brings about, the links go on for everybody else
+        except Exception as error:  # broad: an error from one message must not stop the links
             kind = f"{type(error).__name__} in {what}"
             if not self.failures[kind]:
                 log.exception("MAVLink: %s", kind)

@@ -1,4 +1,4 @@
-"""A calibration, not a finding: the force limit and lag that bring the paper's window about.
+"""Calibration of force limit and lag to the paper's window; it is not a finding.
 
 The paper says when the vehicle is inside the intersection of its regions, but not what its actuators give. Here both
 ends of that window are fitted by least squares over a limit on the body force, followed by a first-order lag.
@@ -29,7 +29,7 @@ _MISSED = 10.0  # s, residual of a path that misses the overlap
 
 @dataclass(frozen=True)
 class Fit:
-    """The fitted actuators, and what they bring about."""
+    """The fitted limit and lag, and the window that they give."""
 
     force: float  # N
     time_constant: float  # s
@@ -38,7 +38,7 @@ class Fit:
 
 
 class _Overlap:
-    """Observer that finds when the vehicle enters and leaves the overlap of regions, between the steps."""
+    """Observer that interpolates the times at which the vehicle enters and leaves the overlap of regions."""
 
     def __init__(self, signals: Signals, names: list[str]) -> None:
         self._at = [signals.index(f"{name}.clearance") for name in names]
@@ -57,12 +57,12 @@ class _Overlap:
 
 
 def window(scenario: Scenario, force: float, time_constant: float) -> tuple[float, float]:
-    """Return when the vehicle enters and leaves the overlap under a limit and a lag.
+    """Return the times [s] at which the vehicle enters and leaves the overlap with a limit and a lag.
 
     Parameters
     ----------
     scenario : Scenario
-        All but the limit is taken from it.
+        The scenario; its limit is replaced.
     force : float
         Limit on the body force [N].
     time_constant : float
@@ -71,7 +71,7 @@ def window(scenario: Scenario, force: float, time_constant: float) -> tuple[floa
     Returns
     -------
     (float, float)
-        [s], interpolated between steps; NaN where it does not happen within some seconds.
+        Entry and exit [s], interpolated between steps; NaN for one that does not happen in the first 6 s.
     """
     step = scenario.time.step
     steps = round(_DURATION / step)
@@ -99,7 +99,7 @@ def calibrate(scenario: Scenario) -> Fit:
     Returns
     -------
     Fit
-        The least squares over a grid of starts, refined.
+        The best point of a grid, refined by least squares.
 
     Raises
     ------

@@ -20,26 +20,26 @@ from cosim.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
 
-_ROOM = 3.0  # m, about start and regions, in which points and ways are sought
-_MOST_ROOM = 1e5  # m
+_MARGIN = 3.0  # m, margin around start and regions of the box that is searched
+_MAX_MARGIN = 1e5  # m
 
 
 def region_findings(scenario: Scenario) -> Iterator[Finding]:
-    """Yield what stands in the way of satisfying the regions, as they are at time 0.
+    """Yield the findings on whether the regions can be satisfied, at their positions at time 0.
 
     Parameters
     ----------
     scenario : Scenario
-        What is checked.
+        The scenario to check.
 
     Yields
     ------
     Finding
-        Start; goal with all regions; regions among each other; overlaps to be decided; way.
+        Start; goal with all regions; regions together; overlaps of regions to keep out of; path.
     """
     goal, start = scenario.goal_region, scenario.initial.position
     regions = [secondary.region for secondary in scenario.regions]
-    placed = [region for region in regions if not of_attitude(region.shape)]  # the others close no place
+    placed = [region for region in regions if not of_attitude(region.shape)]  # attitude limits exclude no position
     low, high = _box(goal, placed, start)
     moving = " Some move: this is how they are at time 0." if scenario.moving else ""
     violated = [region for region in regions if _clearance(region, scenario) < 0.0]
@@ -53,14 +53,14 @@ def region_findings(scenario: Scenario) -> Iterator[Finding]:
 
 
 def _box(goal: Region, regions: Sequence[Region], start: tuple[float, float, float]) -> tuple[Array, Array]:
-    """Return a box that holds the start, what has an end, and something of whatever is to be kept within."""
-    room = _ROOM
+    """Return the corners of a box with the start, all bounded regions, and a point of each region to stay within."""
+    margin = _MARGIN
     while True:
-        low, high = box_about([goal, *regions], [start], room)
+        low, high = box_about([goal, *regions], [start], margin)
         wanted = [goal, *(region for region in regions if region.keep == "in")]
-        if room > _MOST_ROOM or all(search([region], low, high, tolerance=room).found for region in wanted):
+        if margin > _MAX_MARGIN or all(search([region], low, high, tolerance=margin).found for region in wanted):
             return low, high
-        room *= 2.0
+        margin *= 2.0
 
 
 def _clearance(region: Region, scenario: Scenario) -> float:
@@ -88,7 +88,7 @@ def _start(region: Region, scenario: Scenario) -> Finding:
 
 
 def _common(goal: Region, regions: Sequence[Region], low: Array, high: Array, moving: str) -> Iterator[Finding]:
-    """Yield whether goal and regions have a common point, and which regions alone leave none in the goal."""
+    """Yield findings on a common point of goal and regions, and on regions that exclude the whole goal."""
     if not regions:
         return
     box = box_within(goal, low, high)
@@ -111,7 +111,7 @@ def _mend(goal: Region, regions: Sequence[Region], box: tuple[Array, Array]) -> 
     for region in regions:
         alone = search([goal, region], *box)
         if not alone.found:
-            # one step of that length leads into the goal, and one back to where the region was violated by as much
+            # half of it reaches the goal, the other half satisfies the region, which was violated by as much
             enough = -2.0 * alone.depth
             advice.append(
                 f"{region.name} alone leaves nothing of the goal: move one of them, or relax {region.name} by "
@@ -121,7 +121,7 @@ def _mend(goal: Region, regions: Sequence[Region], box: tuple[Array, Array]) -> 
 
 
 def _between(regions: Sequence[Region], low: Array, high: Array) -> Iterator[Finding]:
-    """Yield where shapes to be kept out of overlap: there the arbiter has to choose."""
+    """Yield a note on overlaps of the shapes to keep out of, where the arbiter has to choose."""
     inside = [Region(r.name, r.shape, "in") for r in regions if r.keep == "out"]
     pairs, numbers = [], {}
     for one, other in itertools.combinations(inside, 2):
@@ -138,7 +138,7 @@ def _between(regions: Sequence[Region], low: Array, high: Array) -> Iterator[Fin
 
 
 def _way(scenario: Scenario, kept: Sequence[Region], left_out: Sequence[str]) -> Finding:
-    """Return whether the deployable law's search finds a way that satisfies all regions, or else the hard ones."""
+    """Search a path by the deployable law's planner that satisfies all regions, or else the hard ones."""
     but = f", {', '.join(left_out)} left aside (violated at the start)" if left_out else ""
     soft = [region.name for region in kept if not region.hard]
     way = _search(scenario, kept)

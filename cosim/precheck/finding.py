@@ -1,4 +1,4 @@
-"""One thing that a check has found."""
+"""One finding of a check."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ Number = float | bool | str | None
 
 @dataclass(frozen=True)
 class Finding:
-    """What was looked at, how it stands, and what would mend it."""
+    """A checked condition, its status, and advice on how to fulfil it."""
 
     topic: Literal["vehicle", "law", "regions", "thrust"]
     name: str  # such as "Property 1" or "(38)"
-    status: Status  # a note is worth knowing, and no fault
-    text: str  # what was found, with its figures
-    advice: str = ""  # what to change, with figures; empty unless it fails
+    status: Status  # a note is information, not a failure
+    text: str  # result, with numbers
+    advice: str = ""  # proposed change, with numbers; empty unless it fails
     numbers: Mapping[str, Number] = field(default_factory=dict)
 
 
 def status(holds: bool) -> Status:
-    """Return the status of what holds or fails."""
+    """Return the status for a condition that holds or fails."""
     return "holds" if holds else "fails"

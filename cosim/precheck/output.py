@@ -19,7 +19,7 @@ _WIDTH = 110
 
 
 def check_text(check: Check) -> str:
-    """Return a check as text: what was found by topic, then the verdict.
+    """Format a check as text: findings by topic, then the verdict.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def _verdict(check: Check) -> list[str]:
 
 
 def check_json(check: Check) -> str:
-    """Return a check as JSON; what is infinite is a null.
+    """Format a check as JSON, with null for NaN and infinity.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What can be said of a scenario before it is run: vehicle, gains, regions, thrusters."""
+"""Checks of a scenario without running it: vehicle, gains, regions, thrusters."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ def check_scenario(scenario: Scenario) -> Check:
     Parameters
     ----------
     scenario : Scenario
-        With any law; (31)-(45) are of the printed one, and passed over for others.
+        With any law; (31)-(45) are checked for the paper's law only.
 
     Returns
     -------
     Check
-        Of the true vehicle, and of regions as they are at time 0.
+        Of the true vehicle, and of the regions at time 0.
 
     Raises
     ------

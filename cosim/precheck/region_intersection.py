@@ -1,8 +1,7 @@
-"""Whether regions can be satisfied together: a common point, or the certificate that there is none.
+"""Intersection of regions: a common point, or the certificate that there is none.
 
-The signed distance to a region changes by at most a metre a metre, and so does the greatest of several. A box whose
-centre is further from satisfying all than its half diagonal holds no common point: boxes are halved until a point is
-found, or none is left.
+Signed distances are Lipschitz with constant 1, and so is their maximum. A box holds no common point if the distance at
+its centre exceeds its half diagonal. Boxes are halved until a common point is found, or no box is left.
 """
 
 from __future__ import annotations
@@ -21,31 +20,31 @@ from controller.regions.region_set import clearances_at
 Array = NDArray[np.float64]
 Vector3 = tuple[float, float, float]
 
-TOLERANCE = 0.01  # m, to which the common depth is known
+TOLERANCE = 0.01  # m, of the common depth
 _MOST_BOXES = 400_000  # in one round of halving
 
 
 @dataclass(frozen=True)
 class Overlap:
-    """What is known of a common point of some regions."""
+    """Result of a search for a common point of regions."""
 
-    point: Vector3  # m, NED: where the regions are satisfied best
-    depth: float  # m, least clearance there: how far within all of them; negative by how much the worst is violated
-    at_most: float  # m, certified bound of that depth anywhere in the box that was searched
+    point: Vector3  # m, NED: the point of greatest depth that was found
+    depth: float  # m, least clearance there over the regions; negative if one is violated
+    at_most: float  # m, certified upper bound of the depth in the searched box
 
     @property
     def found(self) -> bool:
-        """Whether the point satisfies all."""
+        """Whether the point satisfies all regions."""
         return self.depth >= 0.0
 
     @property
     def excluded(self) -> bool:
-        """Whether no point of the box does, certainly."""
+        """Whether it is certain that no point of the box satisfies all regions."""
         return self.at_most < 0.0
 
 
 def common_depth(points: Array, regions: Sequence[Region]) -> Array:
-    """Return the least clearance over regions, shape (m,) [m]: above 0 inside all that is to be satisfied.
+    """Return the least clearance over regions, shape (m,) [m]: above 0 where all are satisfied.
 
     Parameters
     ----------
@@ -59,7 +58,7 @@ def common_depth(points: Array, regions: Sequence[Region]) -> Array:
 
 
 def search(regions: Sequence[Region], low: Array, high: Array, tolerance: float = TOLERANCE) -> Overlap:
-    """Find where regions are satisfied best, in a box.
+    """Find the point of a box with the greatest common depth of regions.
 
     Parameters
     ----------
@@ -68,12 +67,12 @@ def search(regions: Sequence[Region], low: Array, high: Array, tolerance: float 
     low, high : ndarray, shape (3,)
         Corners of the box [m, NED], finite.
     tolerance : float
-        How well the depth shall be known [m]; not so well where too many boxes would be needed.
+        Accuracy of the depth [m]; the search ends before if it needs too many boxes.
 
     Returns
     -------
     Overlap
-        With `depth` and `at_most` no further apart than the tolerance, as a rule.
+        With `at_most` - `depth` at most `tolerance`, unless the search ended before.
     """
     half = 0.5 * (np.asarray(high, dtype=float) - low)
     centres = (np.asarray(low, dtype=float) + half)[None, :]
@@ -100,7 +99,7 @@ def search(regions: Sequence[Region], low: Array, high: Array, tolerance: float 
 
 
 def _polished(regions: Sequence[Region], point: Array, depth: float, low: Array, high: Array) -> tuple[Array, float]:
-    """Climb from a point to where the least clearance is greater, without gradients: it has edges."""
+    """Improve a point by Nelder-Mead, since the least clearance is not smooth; return point and depth."""
     done = minimize(
         lambda p: -float(common_depth(p[None, :], regions)[0]), point, method="Nelder-Mead",
         bounds=list(zip(low, high, strict=True)), options={"xatol": 1e-5, "fatol": 1e-6, "maxiter": 300},
@@ -109,16 +108,16 @@ def _polished(regions: Sequence[Region], point: Array, depth: float, low: Array,
 
 
 def box_about(regions: Sequence[Region], points: Sequence[Vector3], room: float) -> tuple[Array, Array]:
-    """Return the corners of a box that holds points and the finite bounds of regions, with room about them.
+    """Return the corners of a box that holds points and the finite bounds of regions, with a margin.
 
     Parameters
     ----------
     regions : sequence of Region
-        Any; what has no end is left out.
+        May be empty; infinite bounds are ignored.
     points : sequence of tuple of float
         At least one [m, NED].
     room : float
-        [m].
+        Margin [m].
 
     Returns
     -------
@@ -134,6 +133,6 @@ def box_about(regions: Sequence[Region], points: Sequence[Vector3], room: float)
 
 
 def box_within(region: Region, low: Array, high: Array) -> tuple[Array, Array]:
-    """Return the box cut to the bounds of a region that is kept within, which must meet it."""
+    """Return the intersection of a box and the bounds of a region, which must overlap."""
     lowest, highest = np.array(region.shape.bounds())
     return np.maximum(low, np.minimum(lowest, high)), np.minimum(high, np.maximum(highest, low))

@@ -1,4 +1,4 @@
-"""What regions are at one pose."""
+"""Values of regions at one pose."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 def evaluated(
     regions: Sequence[Region], position: Sequence[float] | Array, quaternion: Sequence[float]
 ) -> tuple[Array, Array, Array]:
-    """Return what regions are at a pose, as they are at time 0.
+    """Evaluate regions at a pose, at their positions at time 0.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Properties 1-3 of the vehicle, and the gain conditions of the paper's law: where in the state space they hold."""
+"""Properties 1-3 of the vehicle, and the gain conditions of the paper's law with the part of space where they hold."""
 
 from __future__ import annotations
 
@@ -35,18 +35,18 @@ from fuzzy_arbiter import Arbiter
 Array = NDArray[np.float64]
 
 _ROUNDING = 1e-9  # of the greatest element
-_SAMPLES = 50  # velocities and attitudes at which a property is looked at
-_LEVEL = (1.0, 0.0, 0.0, 0.0)  # a goal does not ask for attitude
-_STEP = 1e-4  # m, by which e_p is differentiated
+_SAMPLES = 50  # velocities and attitudes at which a property is checked
+_LEVEL = (1.0, 0.0, 0.0, 0.0)  # a goal does not depend on attitude
+_STEP = 1e-4  # m, for the central differences of e_p
 
 
 def vehicle_findings(scenario: Scenario) -> Iterator[Finding]:
-    """Yield whether the true vehicle has Properties 1-3, and restoring forces that are linear in phi (12).
+    """Yield the findings on Properties 1-3 of the true vehicle, and on its restoring forces, linear in phi (12).
 
     Parameters
     ----------
     scenario : Scenario
-        What is checked.
+        The scenario to check.
 
     Yields
     ------
@@ -99,12 +99,12 @@ def _damping(model: Model, velocities: Array) -> Finding:
 
 
 def start_weights(scenario: Scenario) -> Array:
-    """Return the weight of each secondary region at the start, shape (n,), as the master's first step has it.
+    """Return the weight of each secondary region in the master's first step, shape (n,).
 
     Parameters
     ----------
     scenario : Scenario
-        What is checked.
+        The scenario to check.
 
     Raises
     ------
@@ -124,12 +124,12 @@ def start_weights(scenario: Scenario) -> Array:
 
 
 def gain_findings(scenario: Scenario, weights: Array) -> Iterator[Finding]:
-    """Yield whether (38) and (45) hold at the start of a scenario with the paper's law, and where else.
+    """Yield the findings on (38) and (45) at the start, and on where else they hold, for the paper's law.
 
     Parameters
     ----------
     scenario : Scenario
-        Its law is the printed one.
+        With the paper's law.
     weights : ndarray, shape (n,)
         Of each secondary region at the start, from the arbiter.
 
@@ -210,7 +210,7 @@ def _secondary(model: Model, gains: Gains, weights: Array, scenario: Scenario) -
     names = ", ".join(region.name for region, on in zip(regions, active, strict=True) if on)
     at_start = f"Active at the start: {names} ({_pair(fit)})." if names else "No region is active at the start."
     limits = {}
-    for region in regions:  # alone and fully weighted: where its gradient would be too great
+    for region in regions:  # alone and with weight 1: bound of its gradient
         if region.gain > 0.0:
             one = secondary_fit(model.mass, np.ones(1), np.array([region.gain / gains.k_q]), gains)
             limits[region.name] = math.sqrt(one.have / one.need) if one.need else math.inf
@@ -275,7 +275,7 @@ def _distance(scenario: Scenario) -> float:
 
 
 def _greatest_sigma(test: Callable[[float], float]) -> float | None:
-    """Return the sigma above which a test fails, None if it fails for the least ones too."""
+    """Return the sigma at which a test changes from above 0 to below, None if it fails at 0 already."""
     if test(0.0) <= 0.0:
         return None
     upper = 1e-6
@@ -285,7 +285,7 @@ def _greatest_sigma(test: Callable[[float], float]) -> float | None:
 
 
 def _below(bound: float) -> str:
-    """Return a number just below a bound, in three digits."""
+    """Format a bound, rounded down to three digits."""
     if bound <= 0.0:
         return "0"
     unit = 10.0 ** (math.floor(math.log10(bound)) - 2)

@@ -1,4 +1,4 @@
-"""Whether the thrusters of a scenario's vehicle can hold it still, and give what the law asks for."""
+"""Thrust findings: whether the thrusters can keep the vehicle still, and give the first force of the law."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ _ROUNDING = 1e-6  # N, of the linear programs
 
 
 def thrust_findings(scenario: Scenario) -> Iterator[Finding]:
-    """Yield what the thrusters give, beside what holding still in the current takes, whole and with one lost.
+    """Yield the findings on thrust left beside station keeping in the current, with all thrusters and with one lost.
 
     Parameters
     ----------
     scenario : Scenario
-        What is checked.
+        The scenario to check.
 
     Yields
     ------
     Finding
-        Holding still; one thruster lost, unless already the first fails for all.
+        Holding still; one thruster lost, unless the first one fails.
     """
     vehicle, phi = true_vehicle(scenario), scenario.true_restoring_parameters
     quaternion, current = np.array(scenario.law.desired_quaternion), np.array(scenario.plant.current)
@@ -76,7 +76,7 @@ def _force(margin: Margin | None) -> float | None:
 
 
 def _mend_current(scenario: Scenario) -> str:
-    """Say how much of the current could be held."""
+    """Return advice on the greatest current in which the vehicle can be kept still."""
     vehicle, phi = true_vehicle(scenario), scenario.true_restoring_parameters
     quaternion, current = np.array(scenario.law.desired_quaternion), np.array(scenario.plant.current)
 
@@ -91,19 +91,19 @@ def _mend_current(scenario: Scenario) -> str:
 
 
 def asked_finding(scenario: Scenario, weights: Array) -> Finding:
-    """Hold the force that the paper's law asks for first against what the thrusters can give in that direction.
+    """Compare the first force of the paper's law with the greatest force of the thrusters in that direction.
 
     Parameters
     ----------
     scenario : Scenario
-        Its law is the printed one.
+        With the paper's law.
     weights : ndarray, shape (n,)
         Of each secondary region at the start, from the arbiter.
 
     Returns
     -------
     Finding
-        Of the body force alone, no moment beside it.
+        Of the body force alone, at zero moment.
     """
     gains, initial, vehicle = scenario.law.gains, scenario.initial, true_vehicle(scenario)
     (f,), (slope,), _ = evaluated([scenario.goal_region], initial.position, initial.quaternion)
@@ -128,7 +128,7 @@ def asked_finding(scenario: Scenario, weights: Array) -> Finding:
         text += f" In this scenario the wrench acts on the body directly, with {limit}."
     advice = ""
     if asked > given:
-        # what pulls to the goal is all but all of it, and is proportional to k_p1
+        # nearly all of it is attraction to the goal, which is proportional to k_p1
         k_p1 = gains.k_p1 * given / asked
         advice = f"Lower law.gains.k_p1 to about {k_p1:.2g}, start nearer, or take a law with a bounded attraction."
     return Finding(

@@ -1,4 +1,4 @@
-"""What the thrusters give in each direction of the world, and what is left of it in current and against buoyancy."""
+"""Thrust margins: force of the thrusters in each direction, and what is left beside current and net buoyancy."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ DIRECTIONS: dict[str, tuple[float, float, float]] = {
 
 @dataclass(frozen=True)
 class Margin:
-    """Force in one direction, no moment beside it."""
+    """Force in one direction at zero moment."""
 
     direction: str  # one of DIRECTIONS
     force: float  # N
@@ -37,18 +37,18 @@ class Margin:
 
 @dataclass(frozen=True)
 class ThrustMargin:
-    """What the thrusters of a vehicle at rest can give, the attitude kept."""
+    """Forces that the thrusters of a vehicle at rest can give while its attitude is kept."""
 
     hold: tuple[float, ...]  # (6,) N, N m, body frame: against current, weight and buoyancy
     drag: float  # N, of the current
     excess_weight: float  # N, W - B
-    thrust: Margin | None  # least over the directions, with nothing to be held; None if they cannot give nothing
-    left: Margin | None  # least over the directions beside `hold`; None if that alone is out of reach
-    left_without: tuple[Margin | None, ...]  # the same with each thruster lost
+    thrust: Margin | None  # least over the directions, without `hold`; None if the limits exclude a zero wrench
+    left: Margin | None  # least over the directions beside `hold`; None if `hold` alone is not feasible
+    left_without: tuple[Margin | None, ...]  # `left` with each thruster lost
 
 
 def greatest_force(vehicle: Vehicle, direction_body: Array, hold: Array, alive: Array) -> float | None:
-    """Return the greatest force in a direction, beside a wrench that is held, by a linear program.
+    """Return the greatest force in a direction beside a constant wrench, by a linear program.
 
     Parameters
     ----------
@@ -57,14 +57,14 @@ def greatest_force(vehicle: Vehicle, direction_body: Array, hold: Array, alive: 
     direction_body : ndarray, shape (3,)
         Unit vector, body frame.
     hold : ndarray, shape (6,)
-        Wrench that the thrusters give all the while [N, N m].
+        Constant wrench that the thrusters give too [N, N m].
     alive : ndarray of bool, shape (n,)
-        Which thrusters give force.
+        True for thrusters that work.
 
     Returns
     -------
     float or None
-        [N], no moment beside that of `hold`; None if `hold` is out of reach.
+        [N], at the moment of `hold`; None if `hold` is not feasible.
     """
     matrix = np.column_stack([vehicle.thruster_matrix, -np.r_[direction_body, 0.0, 0.0, 0.0]])
     bounds = [*zip(vehicle.thrust_min * alive, vehicle.thrust_max * alive, strict=True), (0.0, None)]
@@ -73,12 +73,12 @@ def greatest_force(vehicle: Vehicle, direction_body: Array, hold: Array, alive: 
 
 
 def held_wrench(model: Model, quaternion: Array, current: Array) -> Array:
-    """Return the wrench that keeps a vehicle at rest in a current, shape (6,) [N, N m], body frame: (11) with nu = 0.
+    """Return the wrench that keeps a vehicle at rest in a current, (6,) [N, N m], body frame: (11) with nu = 0.
 
     Parameters
     ----------
     model : Model
-        Its `mass` is the added mass alone: what turns a body in a stream (Munk's moment).
+        Its `mass` is the added mass alone, which causes Munk's moment.
     quaternion : ndarray, shape (4,)
         Attitude, from body to world.
     current : ndarray, shape (3,)
@@ -92,12 +92,12 @@ def held_wrench(model: Model, quaternion: Array, current: Array) -> Array:
 
 
 def thrust_margin(vehicle: Vehicle, phi: Array, quaternion: Array, current: Array) -> ThrustMargin:
-    """Return what the thrusters can give, and what is left when the vehicle holds still.
+    """Return the forces that the thrusters can give, and those left while the vehicle is kept still.
 
     Parameters
     ----------
     vehicle : Vehicle
-        The true one.
+        The true vehicle.
     phi : ndarray, shape (4,)
         Its restoring parameters [N, N m] (12).
     quaternion : ndarray, shape (4,)
@@ -136,14 +136,14 @@ def least_left(vehicle: Vehicle, phi: Array, quaternion: Array, current: Array) 
 
 
 def _added(vehicle: Vehicle, phi: Array) -> Model:
-    """Return what `held_wrench` reads of a vehicle."""
+    """Return the model for `held_wrench`: added mass, damping, and phi."""
     return Model(
         np.array(vehicle.added_mass), np.array(vehicle.linear_damping), np.array(vehicle.quadratic_damping), phi
     )
 
 
 def _least(vehicle: Vehicle, quaternion: Array, hold: Array, alive: Array) -> Margin | None:
-    """Return the direction in which the least force is left, None if `hold` is out of reach."""
+    """Return the direction and force of the least margin, None if `hold` is not feasible."""
     to_body = rotation_matrix(quaternion).T
     worst: Margin | None = None
     for name, direction in DIRECTIONS.items():

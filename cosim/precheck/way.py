@@ -1,4 +1,4 @@
-"""Whether there is a way from the start into the goal: by the very search that the deployable law flies with."""
+"""Search of a path from the start into the goal, by the path planner of the deployable law."""
 
 from __future__ import annotations
 
@@ -19,56 +19,56 @@ from cosim.precheck.region_intersection import Vector3, common_depth
 
 Array = NDArray[np.float64]
 
-SEARCH_TIME = 120.0  # s of flight, for which is searched at most
+SEARCH_TIME = 120.0  # s of flight time, greatest duration of the search
 PERIOD = 0.02  # s
 _SEED = 1
-_SAMPLE = 0.02  # m, between the places of a path at which its clearance is measured
+_SAMPLE = 0.02  # m, between the points of a path at which its clearance is evaluated
 
 
 @dataclass(frozen=True)
 class Way:
-    """A path that was found, or the search that found none."""
+    """Result of a search: a path, or none."""
 
-    corners: tuple[Vector3, ...]  # m, NED: the start, corners, and an end in the goal; empty if none was found
-    clearance: float  # m, the least that it keeps, of all regions; negative if none was found
-    searched: float  # s of flight, the law's, that the search took
+    corners: tuple[Vector3, ...]  # m, NED: start, corners, and an end in the goal; empty if no path was found
+    clearance: float  # m, least clearance of all regions along the path; 0 or negative if none was found
+    searched: float  # s of flight time that the search took
 
     @property
     def found(self) -> bool:
-        """Whether there is one."""
+        """Whether a path was found."""
         return len(self.corners) > 0
 
     @property
     def length(self) -> float:
-        """Its length [m]."""
+        """Length of the path [m], infinite if there is none."""
         return float(np.linalg.norm(np.diff(self.corners, axis=0), axis=1).sum()) if self.found else math.inf
 
 
 def path_limits(gains: DeployableGains) -> PathLimits:
-    """Return what a path keeps of regions that are known exactly."""
+    """Return the limits of paths around regions that are known exactly."""
     return PathLimits(gains.clearance, gains.margin, gains.speed, gains.depth)
 
 
 def find_way(regions: Sequence[Region], goal: Region, start: Vector3, gains: DeployableGains, duration: float) -> Way:
-    """Search a path from a start into the goal that satisfies regions all along, as they are at time 0.
+    """Search a path from a start into the goal that satisfies regions throughout, at their positions at time 0.
 
     Parameters
     ----------
     regions : sequence of Region
-        All of them count, hard or soft.
+        Treated as hard ones.
     goal : Region
-        Where the path shall end.
+        Region in which the path ends.
     start : tuple of float
         [m, NED].
     gains : DeployableGains
-        Of the law: what the path shall keep clear.
+        Gains of the law, with the clearance of paths.
     duration : float
-        For which the law would search at most [s].
+        Bound of the search in flight time [s].
 
     Returns
     -------
     Way
-        With the path if there is one.
+        With the path if one was found.
     """
     at_rest = [dataclasses.replace(region, hard=True, velocity=(0.0, 0.0, 0.0)) for region in regions]
     plan, place = empty_plan(len(at_rest), _SEED), np.array(start, dtype=float)
@@ -91,7 +91,7 @@ def find_way(regions: Sequence[Region], goal: Region, start: Vector3, gains: Dep
 
 
 def _samples(points: Array) -> Array:
-    """Return places along a polyline, its corners included."""
+    """Return points along a polyline, its corners included, shape (m, 3) [m, NED]."""
     legs = [
         a + (b - a) * np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(b - a) / _SAMPLE))[:, None]
         for a, b in zip(points[:-1], points[1:], strict=True)

@@ -1,4 +1,4 @@
-"""Which region matters, as the weights and memberships of a record say."""
+"""The active region of each row, from weights and memberships."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from cosim.simulation.signals import Array
 
 RESTS_ON = ("goal.clearance", "velocity.u", "velocity.v", "velocity.w")  # signals that `rests` needs
 _SLOW = 0.02  # m/s over ground
-_LEADS = 0.5  # weight from which on a criterion leads though the vehicle rests in the goal
+_LEADS = 0.5  # weight from which a criterion is active even if the vehicle rests in the goal
 
 
 def rests(goal: Array, velocity: Array) -> NDArray[np.bool_]:
-    """Return where a vehicle rests in the goal region: it is slower than 0.02 m/s there.
+    """Return a mask of the rows in which the vehicle rests in the goal region: slower than 0.02 m/s.
 
     Parameters
     ----------
     goal : ndarray, shape (rows,)
         Clearance of the goal [m].
     velocity : ndarray, shape (rows, 3)
-        Over ground [m/s], in any frame.
+        Velocity over ground [m/s], in any frame.
 
     Returns
     -------
     ndarray of bool, shape (rows,)
-        False where a number is missing.
+        True where it rests; False where a number is missing.
     """
     slow: NDArray[np.bool_] = np.linalg.norm(velocity, axis=1) < _SLOW
     return slow & (goal >= 0.0)
@@ -36,27 +36,27 @@ def rests(goal: Array, velocity: Array) -> NDArray[np.bool_]:
 def active_regions(
     criteria: Sequence[int], memberships: Array, weights: Array, clearances: Array, resting: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """Return which region the arbiter gives way to.
+    """Return the active region of each row.
 
-    It is the most pressing region, that of the least clearance, of the criterion with the greatest weight. It is the
-    goal where that criterion asks for no attention; also where the vehicle rests in the goal region, the criterion
-    weighs less than 0.5, and its region is respected.
+    It is the most critical region, that of the least clearance, of the criterion with the greatest weight. It is the
+    goal if the membership of that criterion is 0; also if the vehicle rests in the goal region, the criterion weighs
+    less than 0.5, and its region is satisfied.
 
     Parameters
     ----------
     criteria : sequence of int
-        Place of the criterion of each of the n secondary regions.
+        Index of the criterion of each of the n secondary regions.
     memberships, weights : ndarray, shape (rows, criteria)
-        Of each criterion.
+        Memberships and weights of the criteria.
     clearances : ndarray, shape (rows, n)
-        Of the secondary regions [m or rad].
+        Clearances of the secondary regions [m or rad].
     resting : ndarray of bool, shape (rows,)
-        From `rests`.
+        Mask of `rests`.
 
     Returns
     -------
     ndarray, shape (rows,)
-        0 for the goal, i + 1 for the secondary region i.
+        Index of the region: 0 for the goal, i + 1 for the secondary region i.
     """
     rows = np.arange(len(weights))
     criterion = np.argmax(np.where(np.isnan(weights), -np.inf, weights), axis=1)
@@ -64,7 +64,7 @@ def active_regions(
     if not of.size:
         return np.zeros(len(rows))
     belongs = of[None, :] == criterion[:, None]
-    pressing = np.where(belongs & ~np.isnan(clearances), clearances, np.inf)
-    asked = (memberships[rows, criterion] > 0.0) & np.isfinite(pressing).any(axis=1)
-    asked &= ~resting | (weights[rows, criterion] >= _LEADS) | (pressing.min(axis=1) < 0.0)
-    return np.where(asked, np.argmin(pressing, axis=1) + 1, 0).astype(float)
+    critical = np.where(belongs & ~np.isnan(clearances), clearances, np.inf)
+    asked = (memberships[rows, criterion] > 0.0) & np.isfinite(critical).any(axis=1)
+    asked &= ~resting | (weights[rows, criterion] >= _LEADS) | (critical.min(axis=1) < 0.0)
+    return np.where(asked, np.argmin(critical, axis=1) + 1, 0).astype(float)

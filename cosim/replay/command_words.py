@@ -1,4 +1,4 @@
-"""Commands in plain words, few enough to be read."""
+"""Texts of commands, limited in number."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from cosim.simulation.commands.commands import (
     ManualControl,
     RemoveObstacle,
     Reset,
+    SetAttitude,
     SetCurrentItem,
     SetHeading,
     SetMission,
@@ -24,7 +25,7 @@ from cosim.simulation.commands.commands import (
     ShiftRegion,
 )
 
-_TOLD = 3  # commands of one moment that are told each
+_LISTED = 3  # commands of one moment that are listed
 _MODES = {
     "manual": "Steered by hand",
     "hold": "Holds its place",
@@ -37,25 +38,25 @@ _MODES = {
 
 
 def command_events(log: Sequence[tuple[int, Command]], step: float, most: int) -> list[tuple[float, str]]:
-    """Return when commands were given, and which.
+    """Return times and texts of the commands, grouped by moments.
 
     Parameters
     ----------
-    log : sequence of (int, Order)
-        Steps, and commands that were taken at them.
+    log : sequence of (int, Command)
+        Steps, and the commands applied at them.
     step : float
-        [s].
+        Step of the run [s].
     most : int
-        Moments; commands that follow each other closely are told together where there are more.
+        Moments at most; beyond that, commands close in time share a moment.
 
     Returns
     -------
     list of (float, str)
-        Times [s] of the first order of each moment, and words for all of its.
+        Time [s] of the first command of each moment, and a text of all its commands.
     """
     steps = sorted({k for k, _ in log})
     gaps = [later - earlier for earlier, later in zip(steps, steps[1:], strict=False)]
-    # commands that are no farther apart than this are of one moment
+    # commands at most this many steps apart share a moment
     apart = sorted(gaps)[len(steps) - most - 1] if len(steps) > most else 0
     begins = [k for k, gap in zip(steps, [apart + 1, *gaps], strict=False) if gap > apart]
     words: dict[int, list[str]] = {k: [] for k in begins}
@@ -65,23 +66,23 @@ def command_events(log: Sequence[tuple[int, Command]], step: float, most: int) -
 
 
 def _joined(words: Sequence[str]) -> str:
-    kinds = list(dict.fromkeys(words))  # sticks say the same many times
-    more = f"; {len(kinds) - _TOLD} more commands" if len(kinds) > _TOLD else ""
-    return "Commanded: " + "; ".join(kinds[:_TOLD]) + more
+    kinds = list(dict.fromkeys(words))  # the texts of sticks repeat
+    more = f"; {len(kinds) - _LISTED} more commands" if len(kinds) > _LISTED else ""
+    return "Commanded: " + "; ".join(kinds[:_LISTED]) + more
 
 
 def command_words(command: Command) -> str:
-    """Return what a command asks for.
+    """Format a command as text.
 
     Parameters
     ----------
     command : Command
-        What is put into words.
+        Command to format.
 
     Returns
     -------
     str
-        Such as ``Target at (7, 0, 4) m``.
+        Text such as ``Target at (7, 0, 4) m``.
     """
     match command:
         case Arm():
@@ -95,6 +96,8 @@ def command_words(command: Command) -> str:
             return f"Heading {math.degrees(command.heading) % 360.0:.0f}°"
         case ManualControl():
             return "Sticks moved"
+        case SetAttitude():
+            return "Attitude given" if command.quaternion is not None else "Attitude free"
         case AddObstacle():
             return f"Obstacle {command.number} at {_place(command.position)}, radius {command.radius:.3g} m"
         case RemoveObstacle():

@@ -1,4 +1,4 @@
-"""What happened in a run, in plain words and at its times: the marks on a view's time line."""
+"""Events of a run with times and texts: the marks on a view's time line."""
 
 from __future__ import annotations
 
@@ -20,39 +20,39 @@ from cosim.results.wording import IMPORTED
 from cosim.scenario.sensor_suite import SENSOR_NAMES
 from cosim.simulation.signals import Array
 
-_MOST = 12  # events of a kind; what comes closer together than that allows is told as one
+_MOST = 12  # events of a kind at most; beyond that, the closest ones are joined
 
-_BACK = 0.1  # s; a region that is given way to again after less was not left
+_BACK = 0.1  # s; a shorter absence of the active region is ignored
 
 
 @dataclass(frozen=True)
 class Event:
-    """One mark."""
+    """A mark on the time line."""
 
     time: float  # s
-    kind: str  # order, goal, violation, active, failure, saturation or end
+    kind: str  # command, goal, violation, active, failure, saturation or end
     text: str
-    until: float | None = None  # s, of what lasts
+    until: float | None = None  # s, end of an event with a duration
 
 
 def events_of(run: Run, log: Log) -> list[Event]:
-    """Return what happened in a run, in the order of time; few enough to be read.
+    """Return the events of a run in the order of time, limited in number.
 
     Parameters
     ----------
     run : Run
-        What is replayed.
-    log : sequence of (int, Order)
-        What it was commanded.
+        The run.
+    log : sequence of (int, Command)
+        Its log of commands.
 
     Returns
     -------
     list of Event
-        The last one is the end of the run.
+        Events; the last one is the end of the run.
     """
     step, rows = run.scenario.time.step, len(run.record)
-    # a killed run has logged commands of rows that it did not save; a reset comes behind the last row
-    log = [(min(k, rows - 1), order) for k, order in log if k <= rows]
+    # a killed run has logged commands of rows that it did not save; a reset comes after the last row
+    log = [(min(k, rows - 1), command) for k, command in log if k <= rows]
     commands = [Event(time, "command", text) for time, text in command_events(log, step, _MOST)]
     found = [
         *commands,
@@ -97,17 +97,17 @@ def _violations(run: Run) -> Iterator[Event]:
 
 
 def turns_of(run: Run) -> list[tuple[float, int]]:
-    """Return when the arbiter gave way to another region and which, the goal being 0; of many turns the longest.
+    """Return times and indices of the active region's changes, 0 for the goal; of many changes the longest.
 
     Parameters
     ----------
     run : Run
-        Finished, interrupted or killed.
+        A finished, interrupted or killed run.
 
     Returns
     -------
     list of (float, int)
-        Time [s] and region; the first is what was so at first.
+        Time [s] and region; the first entry is the region at the start.
     """
     return _turns(_takeovers(run))
 
@@ -123,7 +123,7 @@ def _active(run: Run) -> Iterator[Event]:
 
 
 def _takeovers(run: Run) -> Iterator[tuple[float, int]]:
-    """Yield when another region takes over and which, the goal being 0; first what is so at first."""
+    """Yield time and index of the active region's changes, 0 for the goal; first those of the first row."""
     regions, before = run.scenario.regions, -1
     memberships, weights = (
         [f"{of}.{name}" for name in run.scenario.criterion_names] for of in ("membership", "weight")
@@ -177,27 +177,27 @@ def _end(run: Run) -> Event:
 
 
 class _Few:
-    """Finds when a condition holds, and joins those spans that are nearest to each other until there are few enough."""
+    """Find the spans in which a condition holds, and join the closest ones until there are few enough."""
 
     def __init__(self, most: int) -> None:
-        self._most, self._apart = most, -math.inf  # what is no farther apart than that, is one
+        self._most, self._apart = most, -math.inf  # s, spans at most this far apart are joined
         self._all, self._joined = Spans(), list[Span]()
 
     def add(self, flags: Flags, time: Array, signal: Array | None = None) -> None:
-        """Take the next rows, as of `Spans`."""
+        """Add the next rows, as in `Spans`."""
         self._join(self._all.add(flags, time, signal))
 
     def found(self) -> list[Span]:
-        """Return the spans, once all rows have come."""
+        """Return the spans, after all rows were added."""
         self._join([self._all.open] if self._all.open else [])
         return self._joined
 
     def lasts(self, span: Span) -> bool:
-        """Return whether a span is open to the end."""
+        """Return True if a span lasts to the end of the run."""
         return span is self._all.open
 
     def lasting(self, span: Span) -> str:
-        """Return how long a span lasted, in words."""
+        """Format the end of a span as text."""
         return "to the end" if self.lasts(span) else f"until {span.end:.3f} s"
 
     def _join(self, more: list[Span]) -> None:
@@ -217,7 +217,7 @@ class _Few:
 
 
 def _turns(takeovers: Iterator[tuple[float, int]]) -> list[tuple[float, int]]:
-    """Return the takeovers that last long enough; of many only those that last longest."""
+    """Return the changes that last long enough; of many only those that last longest."""
     longest = heapq.nsmallest(_MOST, _lasting(takeovers))
     found: list[tuple[float, int]] = []
     for _, time, active in sorted(longest, key=lambda of: of[1]):
@@ -227,7 +227,7 @@ def _turns(takeovers: Iterator[tuple[float, int]]) -> list[tuple[float, int]]:
 
 
 def _lasting(takeovers: Iterator[tuple[float, int]]) -> Iterator[tuple[float, float, int]]:
-    """Yield minus for how long, when, and which region took over; one that is back at once was hardly away."""
+    """Yield negative duration [s], time [s] and region of each change; absences shorter than `_BACK` are ignored."""
     kept: tuple[float, int] | None = None
     first = True
     for (time, active), (then, back) in pairwise(chain(takeovers, [(math.inf, -1)])):

@@ -1,4 +1,4 @@
-"""What a view must know of a run before its first row: regions, vehicle, rules, in words and numbers JSON knows."""
+"""The header of a run for a view: regions, vehicle, rules and signals, as plain values for JSON."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from plant_fmu.thruster_lines import thruster_lines
 VERSION = 1  # of the format
 OF_ATTITUDE = ("orientation", "visibility")  # shapes that the page draws at the vehicle
 _LEAST_ROOM = 5.0  # m
-_DIGITS = 6  # of coordinates in m
-_SEA_WATER = 1026.0 * 9.81  # N/m3; only for the size of a hull that no vehicle's file tells
+_DIGITS = 6  # decimals of coordinates in m
+_SEA_WATER = 1026.0 * 9.81  # N/m3; for the size of a hull without a radius in the vehicle's file
 
 
 def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = False) -> dict[str, Any]:
-    """Return what a view must know of a run before its first row.
+    """Return the header of a run, which a view needs before its first row.
 
     Parameters
     ----------
     scenario : Scenario
-        What is run.
+        Scenario of the run.
     columns : sequence of Column
-        Of the rows that a view gets, in their order.
+        Columns of the view's rows, in their order.
     commands : bool
-        Whether the viewer may order things.
+        True if the viewer may send commands.
 
     Returns
     -------
     dict
-        Of texts, numbers, booleans, lists and dicts.
+        Texts, numbers, booleans, lists and dicts.
     """
     limits, colours = limits_of(scenario), colours_of_regions(scenario)
     return {
@@ -65,7 +65,7 @@ def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = Fa
 
 
 def rules_of(system: System) -> list[dict[str, str]]:
-    """Return the rules of an arbiter: label, text, and words that are short enough for a view."""
+    """Return the rules of an arbiter: label, text, and a short form for a view."""
     return [
         {"label": f"R{i + 1}", "text": str(rule), "words": _words(str(rule))} for i, rule in enumerate(system.rules)
     ]
@@ -80,14 +80,14 @@ def shape_of(shape: Shape, limits: Bounds) -> dict[str, Any]:
     Parameters
     ----------
     shape : Shape
-        Of a region.
+        Shape of a region.
     limits : Bounds
-        Where a mesh is cut that has no end [m, NED].
+        Box at which an unbounded mesh is cut [m, NED].
 
     Raises
     ------
     RegionError
-        If it is of attitude, and none that the page knows.
+        If the page has no drawing of the shape.
     """
     kind = name_of(shape)
     known = {"kind": kind, **dataclasses.asdict(shape)}  # type: ignore[call-overload]
@@ -95,7 +95,7 @@ def shape_of(shape: Shape, limits: Bounds) -> dict[str, Any]:
 
 
 def limits_of(scenario: Scenario) -> Bounds:
-    """Return the corners of a box about the start and all regions that end somewhere, with as much room about them."""
+    """Return the corners of a box about the start and all bounded regions, with a border of its size, 5 m at least."""
     goal = [scenario.goal_region] if scenario.has_goal else []
     regions = [*goal, *(secondary.region for secondary in scenario.regions if not secondary.is_dynamic)]
     corners = [np.array(corner) for region in regions for corner in region.shape.bounds()]
@@ -108,8 +108,8 @@ def limits_of(scenario: Scenario) -> Bounds:
 def _drawing(shape: Shape, limits: Bounds) -> dict[str, Any]:
     entry = shape_entry(shape)
     if entry.half_axes is not None:
-        centre, axes = entry.half_axes(shape)
-        return {"centre": centre.tolist(), "half_axes": axes.tolist()}
+        center, axes = entry.half_axes(shape)
+        return {"centre": center.tolist(), "half_axes": axes.tolist()}
     if entry.planes is not None:
         return {"planes": [{"point": p.tolist(), "normal": n.tolist()} for p, n in entry.planes(shape)]}
     mesh = surface_of(shape, limits)
@@ -126,7 +126,7 @@ def _region(scenario: Scenario, index: int, limits: Bounds) -> dict[str, Any]:
         "hard": region.hard,
         "gain": region.gain,
         "moves": region.name in scenario.moving,
-        # is there only while it is shifted; so is, never, the goal of a log that has none
+        # present only while it is shifted; never, for the missing goal of a log
         "comes": secondary.is_dynamic if secondary else not scenario.has_goal,
         "unit": "rad" if of_attitude(region.shape) else "m",  # of its clearance
         "shape": shape_of(region.shape, limits),
@@ -141,10 +141,10 @@ def _words(rule: str) -> str:
 
 
 def _vehicle(vehicle: Vehicle) -> dict[str, Any]:
-    """Return the vehicle as it is drawn: a hull of its size where the file tells one, arrows at its thrusters.
+    """Return the vehicle's drawing: a hull by its radius, or else by its buoyancy, and arrows at its thrusters.
 
-    A vehicle's file has no places of thrusters, but the wrench of each: an arrow stands at the point of its line of
-    action that is nearest to the body origin.
+    A vehicle's file has the wrench of each thruster, but no position: an arrow is at the point of its line of action
+    that is nearest to the body origin.
     """
     radius = vehicle.hull_radius or (0.75 * vehicle.buoyancy / (_SEA_WATER * np.pi)) ** (1.0 / 3.0)
     thrusters = []

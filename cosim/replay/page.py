@@ -1,4 +1,4 @@
-"""The page of one or several runs: one HTML file that needs nothing else."""
+"""The page of one or several runs: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -23,66 +23,79 @@ _PLAYER = (
     "stage.js", "head.js", "keys.js", "page.js",
 )  # fmt: skip
 _LIVE = ("things.js", "ghost.js", "dragging.js", "command_panel.js", "live.js")
-_SCRIPTS = ("data.js", *SCENE_SCRIPTS, *_PLAYER, *_LIVE, "main.js")
+_FLYING = ("flight.js", "outcome.js", "saving.js", "what_if_panel.js", "what_if.js")
+_SCRIPTS = ("data.js", *SCENE_SCRIPTS, *_PLAYER, *_LIVE, *_FLYING, "main.js")
+_WORKER = "flier.js"
 _STYLES = ("style.css", "stage.css", "charts.css", "panel.css", "transport.css", "layout.css", "live.css")
 
 _COMMENT = re.compile(
     r"^[ ]*(?:/\*.*?\*/|//[^\n]*)?\n", re.DOTALL | re.MULTILINE
-)  # on lines of its own, or an empty line
+)  # on its own lines; and empty lines, which are removed as well
 
-_MARK = '<script type="application/json" id="runs">'  # where the data of a page begins
+_MARK = '<script type="application/json" id="runs">'  # start of the data in a page
 
 
-def replay_page(runs: Sequence[dict[str, Any]], title: str) -> str:
+def replay_page(runs: Sequence[dict[str, Any]], title: str, flight: dict[str, Any] | None = None) -> str:
     """Return the page of some runs.
 
     Parameters
     ----------
     runs : sequence of dict
-        Traces as JSON knows them; none for a live page, which is told of its run over its connection.
+        Traces as plain values; none for a live page, which receives its run over its connection.
     title : str
         Of the page.
+    flight : dict, optional
+        What the page needs to fly its one run again, from `cosim.replay.interactive.data.flight_data`.
 
     Returns
     -------
     str
-        HTML.
+        The page as HTML.
     """
     assets = resources.files("cosim.replay") / "assets"
     style, script = (
         "".join(_COMMENT.sub("", (assets / name).read_text(encoding="utf-8")) for name in names)
         for names in (_STYLES, _SCRIPTS)
     )
-    # "</script" would end the element that it stands in, and "<!--" with "<script" would keep it from ending
-    data = json.dumps(list(runs), separators=(",", ":"), allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
+    worker = _COMMENT.sub("", (assets / _WORKER).read_text(encoding="utf-8")) if flight else ""
     return Template((assets / "page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(title),
         style=style,
-        runs=data,
+        runs=_embedded(list(runs)),
+        flight=_embedded(flight),
+        flier=worker,
         script=script,
     )
 
 
-def write_page(path: Path, runs: Sequence[dict[str, Any]], title: str) -> Path:
+def _embedded(data: Any) -> str:
+    """Return data as JSON in an element: "</script" would end that, and "<!--" with "<script" keep it from ending."""
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
+    return text.replace("<", "\\u003c")
+
+
+def write_page(path: Path, runs: Sequence[dict[str, Any]], title: str, flight: dict[str, Any] | None = None) -> Path:
     """Write the page of some runs.
 
     Parameters
     ----------
     path : Path
-        The file; it appears only when it is whole.
+        The file, which is written atomically.
     runs : sequence of dict
         As for `replay_page`.
     title : str
         Of the page.
+    flight : dict, optional
+        As for `replay_page`.
 
     Returns
     -------
     Path
         The file.
     """
-    return write_atomic(path, replay_page(runs, title))
+    return write_atomic(path, replay_page(runs, title, flight))
 
 
 def is_page(path: Path) -> bool:
-    """Return whether it is a file, and a page of this kind: a pipe would be waited for."""
+    """Return True if a path is a regular file with a page of this kind; a pipe, which would block, is not read."""
     return path.is_file() and _MARK in path.read_text(encoding="utf-8", errors="replace")

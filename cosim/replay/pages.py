@@ -6,22 +6,26 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from cosim.errors import RunError
+from cosim.replay.interactive.data import flight_data
 from cosim.replay.page import is_page, write_page
 from cosim.replay.trace import trace_of
+from cosim.replay.viewing import Viewing
 from cosim.results.run_result import REPLAY, Run, load_run
 
 
-def write_replay(run: Run, out: Path | None = None, title: str | None = None) -> Path:
+def write_replay(run: Run, out: Path | None = None, title: str | None = None, interactive: bool = False) -> Path:
     """Write the page of one run.
 
     Parameters
     ----------
     run : Run
-        What is replayed.
+        The run.
     out : Path, optional
         The file; default: ``replay.html`` in the run folder.
     title : str, optional
         Of the page; default: the scenario's.
+    interactive : bool
+        Whether the page can fly the run again, with other numbers.
 
     Returns
     -------
@@ -31,12 +35,17 @@ def write_replay(run: Run, out: Path | None = None, title: str | None = None) ->
     Raises
     ------
     RunError
-        If its log of commands cannot be read.
+        If its log of commands cannot be read, or the page is to fly what it cannot.
+    BuildError, TranslationError, UnsupportedError
+        If it is to fly, and there is no compiler for WebAssembly, or a law or the arbiter's rules have no C.
     """
-    return write_page(out or run.folder / REPLAY, [trace_of(run).as_json()], title or run.scenario.title)
+    flight = flight_data(run, Viewing(run.scenario, run.record.columns).columns) if interactive else None
+    return write_page(out or run.folder / REPLAY, [trace_of(run).as_json()], title or run.scenario.title, flight)
 
 
-def replay(folders: Sequence[Path], out: Path | None = None, title: str | None = None) -> Path:
+def replay(
+    folders: Sequence[Path], out: Path | None = None, title: str | None = None, interactive: bool = False
+) -> Path:
     """Write the page of runs that are done, were interrupted, or were killed.
 
     Parameters
@@ -47,6 +56,8 @@ def replay(folders: Sequence[Path], out: Path | None = None, title: str | None =
         The file; default: ``replay.html``, in the folder of a single run, or in the current one.
     title : str, optional
         Of the page; default: that of the scenario; of several runs `joint_title`.
+    interactive : bool
+        Whether the page can fly its one run again, with other numbers.
 
     Returns
     -------
@@ -57,17 +68,19 @@ def replay(folders: Sequence[Path], out: Path | None = None, title: str | None =
     ------
     RunError
         If a folder holds no run that can be read, or is named twice, or the file is something else, or cannot be
-        written.
+        written; or if the page is to fly what it cannot.
     ScenarioError
-        If the scenario of a run is none.
+        If the scenario of a run is invalid.
     """
     names = _names(folders)
+    if interactive and len(folders) > 1:
+        raise RunError(f"{len(folders)} runs, expected one for a page that flies")
     file = out or (folders[0] / REPLAY if len(folders) == 1 else Path(REPLAY))
     try:
         if file.exists() and not is_page(file):
             raise RunError(f"{file}: exists and is no replay; expected a new file")
         if len(folders) == 1:
-            return write_replay(load_run(folders[0]), file, title)
+            return write_replay(load_run(folders[0]), file, title, interactive)
         traces, titles = [], {}
         for folder, name in zip(folders, names, strict=True):
             run = load_run(folder)
@@ -79,17 +92,17 @@ def replay(folders: Sequence[Path], out: Path | None = None, title: str | None =
 
 
 def joint_title(titles: Mapping[str, str]) -> str:
-    """Return the title of several runs: each title once, before the names of those that have it.
+    """Return the title of several runs: each title once, before the names of its runs.
 
     Parameters
     ----------
     titles : mapping from str to str
-        Of the scenarios, by the name of the run.
+        Titles of the scenarios, by the name of the run.
 
     Returns
     -------
     str
-        Such as ``Docking: a, b; Docking (changed: time.duration = 5 s): c``.
+        Title such as ``Docking: a, b; Docking (changed: time.duration = 5 s): c``.
     """
     return "; ".join(
         f"{title}: {', '.join(n for n in titles if titles[n] == title)}" for title in dict.fromkeys(titles.values())
@@ -97,7 +110,7 @@ def joint_title(titles: Mapping[str, str]) -> str:
 
 
 def _names(folders: Sequence[Path]) -> list[str]:
-    """Return the shortest ends of the folders' paths that tell them apart."""
+    """Return the shortest ends of the folders' paths that distinguish them."""
     paths = [folder.resolve() for folder in folders]
     for i, path in enumerate(paths):
         if path in paths[:i]:

@@ -1,4 +1,4 @@
-"""Which rows of a record a page has: few enough to be small, and all that a reader looks for."""
+"""Select the rows of a record for a page: a limited number, with extremes and events."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from cosim.simulation.signals import Array
 _BYTES = 400_000  # of numbers, for the first minute
 _BYTES_A_MINUTE = 150_000  # for each further one
 _MOST_BYTES = 6_000_000
-_PARTS = 100  # of the run at the most, from each of which the extremes are kept
-_OF_EXTREMES = 0.5  # share of the rows that they may take
+_PARTS = 100  # most parts of the run, from each of which the extremes are kept
+_OF_EXTREMES = 0.5  # most of the rows for extremes
 
 
 def sampled_rows(
     record: Rows, columns: int, telling: Iterable[Sequence[Array]], signals: int, moments: NDArray[np.intp]
 ) -> NDArray[np.intp]:
-    """Return the rows that a page has: evenly spaced ones, and the extremes between them of what tells the story.
+    """Return the rows of a page: evenly spaced ones, extremes of the main signals, and events.
 
     Parameters
     ----------
     record : Rows
-        Of the run, with its ``time`` [s].
+        Record of the run, with its ``time`` [s].
     columns : int
-        That the page has of each row.
+        Number of columns of the page.
     telling : iterable of sequence of ndarray
         Signals whose extremes are kept, block by block of the record.
     signals : int
-        How many these are.
+        Number of these signals.
     moments : ndarray of int
-        Steps at which something happened: they are kept, and the ones before them.
+        Steps of events, which are kept with the steps before them.
 
     Returns
     -------
     ndarray of int
-        Rising; the first and the last step among them.
+        Rising steps, including the first and the last.
     """
     n = len(record)
     minutes = (record.value("time", -1) - record.value("time", 0)) / 60.0

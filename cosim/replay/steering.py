@@ -1,4 +1,4 @@
-"""What commands made of the regions on the way: their shapes and gains, from the log of commands and the record."""
+"""Shapes and gains of the regions that commands changed, from the log of commands and the record."""
 
 from __future__ import annotations
 
@@ -33,42 +33,42 @@ from cosim.simulation.commands.sources import read_log
 from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array
 
-Log = Sequence[tuple[int, Command]]  # step that took it, and what was commanded
+Log = Sequence[tuple[int, Command]]  # steps, and the commands applied at them
 
-_SAME = 1e-6  # m; radii from a record that are nearer to each other are equal, but for rounding
+_SAME = 1e-6  # m; closer radii of a record are equal up to rounding
 
 
 def log_of(run: Run) -> Log:
-    """Return what a run was commanded.
+    """Read the log of commands of a run.
 
     Parameters
     ----------
     run : Run
-        What is replayed.
+        The run.
 
     Returns
     -------
-    sequence of (int, Order)
-        Steps, and commands that were taken at them; none where nothing could be commanded.
+    sequence of (int, Command)
+        Steps, and the commands applied at them; empty for a run without commands.
 
     Raises
     ------
     RunError
-        If there is a log that cannot be read.
+        If the log cannot be read.
     """
     file = run.folder / COMMANDS_LOG
     return read_log(file) if run.scenario.commands.enabled and file.exists() else ()
 
 
 def changes_of(run: Run, log: Log) -> list[dict[str, Any]]:
-    """Return how regions changed on the way, beside their motion.
+    """Return the changes of regions during a run, except their motion.
 
     Parameters
     ----------
     run : Run
-        What is replayed.
-    log : sequence of (int, Order)
-        From `log_of`.
+        The run.
+    log : sequence of (int, Command)
+        Log of `log_of`.
 
     Returns
     -------
@@ -88,42 +88,42 @@ def changes_of(run: Run, log: Log) -> list[dict[str, Any]]:
 
 
 class _Changes:
-    """Follows the changes that were commanded, at once or by items of a mission, on settings of its own."""
+    """Replay the commanded changes, immediate or by items of a mission, on its own settings."""
 
     def __init__(self, run: Run) -> None:
         self._step = run.scenario.time.step
         self._limits = limits_of(run.scenario)
         self._settings = LiveSettings(run.planned)
-        self._middle = shape_center(run.planned.goal)
+        self._center = shape_center(run.planned.goal)
         self._index = {"goal": 0, **{r.region.name: i + 1 for i, r in enumerate(run.scenario.regions)}}
         self._gains = [run.scenario.goal_region.gain, *(r.region.gain for r in run.scenario.regions)]
         self._last_row = len(run.record) - 1
         self._changed, self._was = _steps_of(run.record)
         self._items: tuple[MissionItem, ...] = ()
-        self._at = -1  # item of the mission, as far as its commands were followed
+        self._at = -1  # item of the mission whose commands were applied last
 
     def of(self, log: Log) -> Iterator[dict[str, Any]]:
-        """Yield what changes, step by step."""
+        """Yield the changes, step by step."""
         commanded = {k: [command for _, command in group] for k, group in groupby(log, key=lambda entry: entry[0])}
         for k in sorted({*commanded, *self._changed.tolist()}):
             commands = commanded.get(k, [])
-            # the last command, such as a reset, may have come after the last row
+            # the last command, such as a reset, may be after the last row
             row = min(k, self._last_row)
             radius, in_mission, item = self._at_row(row)
             by_mission = self._by_mission(commands, int(item) if in_mission else None)
-            touched = {name for command in (*commands, *by_mission) if (name := self._follow(command))}
+            touched = {name for command in (*commands, *by_mission) if (name := self._apply(command))}
             if radius != self._at_row(row - 1)[0] if row else radius > 0.0:
                 touched.add("goal")
             for name in sorted(touched, key=self._index.__getitem__):
                 yield self._change(name, k, float(radius))
 
     def _at_row(self, row: int) -> Array:
-        """Return the target's radius, whether a mission is flown, and its item, shape (3,)."""
+        """Return the target's radius, 1 or 0 for a mission, and its item, shape (3,)."""
         found: Array = self._was[np.searchsorted(self._changed, row, "right") - 1]
         return found
 
     def _by_mission(self, commands: Iterable[Command], now: int | None) -> Iterator[Command]:
-        """Yield the commands of the items that begin in a step, at an item or outside of a mission."""
+        """Yield the commands of the items that start in a step; `now` is the item, None outside a mission."""
         begun = False
         for command in commands:
             if isinstance(command, SetMission):
@@ -138,8 +138,8 @@ class _Changes:
             yield from self._items[item].commands
         self._at = now
 
-    def _follow(self, command: Command) -> str | None:
-        """Take a change, and return the region that has it; None if none has, or it was refused then too."""
+    def _apply(self, command: Command) -> str | None:
+        """Apply a change, and return the name of its region; None if it has none, or the change is refused."""
         if not isinstance(command, ChangeSetting):
             return None
         region = self._settings.region_of(command.key)
@@ -153,12 +153,12 @@ class _Changes:
     def _change(self, name: str, k: int, target_radius: float) -> dict[str, Any]:
         shape: Shape = self._settings.shapes[name]
         if name == "goal" and target_radius > 0.0:
-            shape = Sphere(self._middle, target_radius)
+            shape = Sphere(self._center, target_radius)
         return _changed(k * self._step, self._index[name], shape, self._gains[self._index[name]], self._limits)
 
 
 def _sizes(run: Run, index: int, secondary: SecondaryRegion) -> Iterator[dict[str, Any]]:
-    """Yield the sizes with which an obstacle came, each at its time."""
+    """Yield the changes of an obstacle's radius."""
     before, limits = -np.inf, limits_of(run.scenario)
     for times, radii in radii_of(run.record, secondary.region.name):
         fresh = np.abs(np.diff(radii, prepend=before)) > _SAME
@@ -169,7 +169,7 @@ def _sizes(run: Run, index: int, secondary: SecondaryRegion) -> Iterator[dict[st
 
 
 def _steps_of(record: Rows) -> tuple[NDArray[np.intp], Array]:
-    """Return the rows at which target or mission change, the first among them, and what they are from there on."""
+    """Return the rows at which target or mission change, with the first, and their new values, shape (n, 3)."""
     first, rows, values, before = 0, [], [], np.full((1, 3), np.nan)
     for block in record.blocks(["target.radius", "commands.mode", "commands.item"]):
         item = block["commands.item"]

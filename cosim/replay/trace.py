@@ -1,4 +1,4 @@
-"""The trace of a run: what a page shows of it, taken from scenario, record and summary."""
+"""The trace of a run: header and rows of its page, from scenario, record and summary."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ _FORCE = [f"command.{axis}" for axis in "XYZ"]
 
 @dataclass(frozen=True)
 class Trace:
-    """What a page shows of a run."""
+    """Header and rows of a page."""
 
     header: dict[str, Any]
     rows: Array  # (n, columns), equal to the record to the last bit
-    steps: NDArray[np.intp]  # (n,) where in the record they are
+    steps: NDArray[np.intp]  # (n,) their indices in the record
 
     def as_json(self) -> dict[str, Any]:
-        """Return the header with the numbers packed into it.
+        """Return the header with the packed numbers.
 
-        The numbers are float64, little-endian, one column behind the other; of these bytes first all the first ones,
-        then all the second ones and so on, so that they deflate well; then raw deflate, and base64.
+        The numbers are float64, little-endian, column by column. Their bytes are ordered by planes, all first bytes,
+        then all second ones and so on, which compresses better; then raw deflate, and base64.
 
         Returns
         -------
         dict
-            As JSON knows it.
+            Plain values for JSON.
         """
         numbers = np.ascontiguousarray(self.rows.T, dtype="<f8")
         planes = np.ascontiguousarray(numbers.view(np.uint8).reshape(-1, 8).T).tobytes()
@@ -54,17 +54,17 @@ class Trace:
 
 
 def trace_of(run: Run) -> Trace:
-    """Return what a page shows of a run.
+    """Return the trace of a run.
 
     Parameters
     ----------
     run : Run
-        What is replayed.
+        The run.
 
     Returns
     -------
     Trace
-        Of few enough rows for a page.
+        Trace with a limited number of rows.
 
     Raises
     ------
@@ -83,10 +83,10 @@ def trace_of(run: Run) -> Trace:
     names = [record.columns[i].name for i in viewing.picked]
     picked, missing = _read(record, names, steps)
     rows, columns = viewing.extended(picked), viewing.columns
-    if scenario.log:  # what no log tells, such as weights, is not shown as a gap
-        told = [i for i in range(len(columns)) if i >= len(names) or missing[i] < len(record)]
-        rows, columns = rows[:, told], tuple(columns[i] for i in told)
-    # the goal's shape at the start: what it came to stands in the changes
+    if scenario.log:  # signals that a log never has, such as weights, are not shown as gaps
+        kept = [i for i in range(len(columns)) if i >= len(names) or missing[i] < len(record)]
+        rows, columns = rows[:, kept], tuple(columns[i] for i in kept)
+    # the goal's shape at the start; later ones are in the changes
     begun = dataclasses.replace(scenario, goal=run.planned.goal)
     header = header_of(begun, columns) | {
         "verdict": verdict(summary),
@@ -104,7 +104,7 @@ def trace_of(run: Run) -> Trace:
 
 
 def _read(record: Rows, names: Sequence[str], steps: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
-    """Read some rows of some signals; return them, and how many numbers of each signal are missing in all rows."""
+    """Read some rows of some signals; return them, and the count of missing numbers of each signal in all rows."""
     rows, missing, first = [], np.zeros(len(names), np.intp), 0
     for block in record.blocks(names):
         within = steps[(steps >= first) & (steps < first + len(block))] - first
@@ -115,5 +115,5 @@ def _read(record: Rows, names: Sequence[str], steps: NDArray[np.intp]) -> tuple[
 
 
 def _telling(rows: Rows, clearances: Sequence[str]) -> list[Array]:
-    """Return the signals whose extremes a page must not miss."""
+    """Return the signals whose extremes a page keeps: the length of the commanded force, and clearances."""
     return [np.linalg.norm(rows.stack(_FORCE), axis=1), *(rows[name] for name in clearances)]

@@ -1,4 +1,4 @@
-"""From the rows of a run to those that a view gets: what it draws, and what it says of the arbiter's reasons."""
+"""Convert the rows of a run to those of a view: drawn columns, active region, and firing strengths of rules."""
 
 from __future__ import annotations
 
@@ -11,27 +11,28 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array, Column
 from fuzzy_arbiter.engines.firing import Firing
 
-_DRAWN = (  # beginnings of the names of what a view draws
+_DRAWN = (  # prefixes of the columns that a view draws
     "time", "position.", "quaternion.", "velocity.", "attitude.", "membership.", "weight.", "arbiter.", "estimate.",
     "command.", "thruster_force[", "actuation.", "commands.", "target.", "wrench_saturated", "allocation_saturated",
+    "autopilot.", "companion.", "stick.", "velocity_target.",
 )  # fmt: skip
 _DRAWN_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")
 
 
 class Viewing:
-    """Picks what a view draws from rows of a run, and adds which region is active and how strongly each rule fires.
+    """Select the columns that a view draws, and add the active region and the firing strength of each rule.
 
     Parameters
     ----------
     scenario : Scenario
-        What is run.
+        Scenario of the run.
     columns : sequence of Column
-        Of its rows.
+        Columns of its rows.
 
     Attributes
     ----------
     columns : tuple of Column
-        Of a view's rows: picked ones in their order, then ``active``, then ``rule.R1`` and so on.
+        Columns of a view's rows: picked ones in their order, then ``active``, then ``rule.R1`` and so on.
     """
 
     def __init__(self, scenario: Scenario, columns: Sequence[Column]) -> None:
@@ -44,7 +45,7 @@ class Viewing:
         self._goal, *self._velocity = (drawn.index(name) for name in RESTS_ON)
         self._clearances = [drawn.index(f"{secondary.region.name}.clearance") for secondary in scenario.regions]
         system = scenario.rules.system
-        self._inputs = self._memberships  # of the rules
+        self._inputs = self._memberships  # inputs of the rules
         if scenario.arbiter.file:
             self._inputs = [drawn.index(f"arbiter.{signal.name}") for signal in scenario.rules.inputs]
         self._firing, rules = Firing(system), system.rules
@@ -56,17 +57,17 @@ class Viewing:
         )
 
     def extended(self, picked: Array) -> Array:
-        """Return rows of a view.
+        """Return the rows of a view.
 
         Parameters
         ----------
         picked : ndarray, shape (rows, picked columns)
-            Of the columns `picked`.
+            Rows with the columns `picked`.
 
         Returns
         -------
         ndarray, shape (rows, columns)
-            With activity and strengths; NaN where an input of the rules is no number.
+            Rows with active region and strengths; NaN where an input of the rules is not finite.
         """
         memberships = picked[:, self._memberships]
         weights, clearances = picked[:, self._weights], picked[:, self._clearances]
@@ -74,7 +75,7 @@ class Viewing:
         active = active_regions(self._criteria, memberships, weights, clearances, resting)
         inputs = picked[:, self._inputs]
         numbers = np.isfinite(inputs).all(axis=1)
-        active[np.isnan(picked[:, self._weights]).all(axis=1)] = np.nan  # nobody says whom the arbiter gives way to
+        active[np.isnan(picked[:, self._weights]).all(axis=1)] = np.nan  # unknown without weights
         strengths = np.full((len(picked), len(self.columns) - len(self.picked) - 1), np.nan)
         if numbers.any():
             strengths[numbers] = np.column_stack(

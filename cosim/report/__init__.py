@@ -1,6 +1,6 @@
 """The report of a run.
 
-Sentences, tables and figures as one HTML file, as PDF, or as pictures. Public: `write_report`.
+Sentences, tables and figures as one HTML file, and figures as SVG and PNG. Public: `write_report`.
 
 Imports: controller, replay, results, scenario, simulation.
 """

@@ -1,4 +1,4 @@
-"""What a report says, whatever it is written as: sentences, tables in plain words, and how to repeat the run."""
+"""Contents of a report, independent of its format: sentences, tables, and commands that repeat the run."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import Sensing
 from cosim.simulation.signals import Array
 
-_TURNS = 6  # of a criterion that a table names
+_TURNS = 6  # greatest number of spans that a table lists for a criterion
 
 
 @dataclass(frozen=True)
 class Contents:
-    """All of a report but its figures."""
+    """Contents of a report without its figures."""
 
     title: str
     asked: str
     verdict: str
     remarks: tuple[str, ...]
-    claims: Table | None  # beside the paper's
+    claims: Table | None  # comparison with the paper's
     regions: Table | None
     numbers: tuple[Table, ...]
     setting: Table
-    scenario: str  # the file, with what stands in lists of numbers in one line
+    scenario: str  # text of the scenario file
     repeat: tuple[str, ...]  # commands
-    repeats: str  # what they do
-    files: tuple[tuple[str, str], ...]  # in the run folder, and what each is
+    repeats: str  # description of the commands
+    files: tuple[tuple[str, str], ...]  # name and description of files in the run folder
 
 
 def contents_of(run: Run) -> Contents:
-    """Return what the report of a run says.
+    """Make the contents of a run's report.
 
     Parameters
     ----------
@@ -133,14 +133,14 @@ def _regions(run: Run) -> Table | None:
 
 
 class _Violation:
-    """Gathers when a region's clearance is least, and how long it is violated, block by block."""
+    """Finds the time of a region's least clearance and the duration of its violations, block by block."""
 
     def __init__(self) -> None:
         self._least, self.worst_at = math.inf, math.nan  # s
         self._spans, self._ended = Spans(), 0.0
 
     def add(self, time: Array, clearance: Array) -> None:
-        """Take the next rows."""
+        """Add the next rows."""
         known = np.where(np.isnan(clearance), np.inf, clearance)
         at = int(np.argmin(known))
         if known[at] < self._least:
@@ -148,13 +148,13 @@ class _Violation:
         self._ended += sum(span.end - span.start for span in self._spans.add(clearance < 0.0, time))
 
     def lasting(self) -> float | None:
-        """Return for how long the region was violated [s], None if it never was."""
+        """Return the total duration of violations of the region [s], None if there were none."""
         still = self._spans.open
         return self._ended + (still.end - still.start if still else 0.0) if self._least < 0.0 else None
 
 
 def _criteria(run: Run) -> Table | None:
-    """Return when the arbiter gave way to regions of each criterion, and why this asks."""
+    """Return a table with the membership functions of each criterion and the spans in which it was active."""
     scenario = run.scenario
     if not scenario.regions or scenario.log:
         return None
@@ -269,12 +269,12 @@ def _setting(run: Run) -> Table:
         ("planned for [s], in steps of [s]", f"{s.time.duration:g}, {s.time.step:g}"),
         ("start: north, east, down [m]", ", ".join(number(x, 6) for x in s.initial.position)),
         ("current: north, east, down [m/s]", ", ".join(number(x, 6) for x in s.plant.current)),
-        ("what the law is told", _told(s.sensing)),
+        ("state for the law", _state_for_law(s.sensing)),
     ]
     if math.isfinite(s.limit.force) or s.limit.time_constant > 0.0:
         rows.append(("limit on the force [N], lag [s]", f"{s.limit.force:g}, {s.limit.time_constant:g}"))
     if s.failures:
-        rows.append(("failures", f"{len(s.failures)}, {'told' if s.tell_failures else 'not told'} to the law"))
+        rows.append(("failures", f"{len(s.failures)}, {'reported' if s.tell_failures else 'not reported'} to the law"))
     if s.outages:
         rows.append(
             ("outages of sensors", ", ".join(f"{o.sensor} {o.time:g} to {o.time + o.duration:g} s" for o in s.outages))
@@ -285,7 +285,7 @@ def _setting(run: Run) -> Table:
 
 
 def _weighed(scenario: Scenario) -> str:
-    """Return how the criteria are weighed."""
+    """Describe the rules that weigh the criteria."""
     if scenario.arbiter.file:
         inputs = ", ".join(f"{signal.name} ({signal.what})" for signal in scenario.rules.inputs)
         return f"the rules of {scenario.arbiter.file}, of {inputs}"
@@ -295,14 +295,14 @@ def _weighed(scenario: Scenario) -> str:
     return ramp if scenario.has_paper_criteria else f"{', '.join(scenario.criterion_names)}, in this order"
 
 
-def _told(sensing: Sensing) -> str:
+def _state_for_law(sensing: Sensing) -> str:
     if sensing.through == "sensors":
-        return "what the navigation filter makes of the sensors"
+        return "estimate of the navigation filter from the sensors"
     return "the true state" if sensing.exact else "position and velocity with noise or gaps"
 
 
 def _repeating(run: Run) -> tuple[tuple[str, ...], str]:
-    """Return the commands that repeat a run, and what they do."""
+    """Return the commands that repeat a run, and their description."""
     again = ("cosim report . --format html,png", "cosim replay .")
     if run.scenario.log:
         return again, f"The run is imported from {run.scenario.log}: it cannot be repeated, but be shown again."

@@ -13,14 +13,14 @@ from cosim.results.run_result import REPLAY
 
 
 def html_report(contents: Contents, about: str, figures: Sequence[tuple[str, str, str]]) -> str:
-    """Return the page.
+    """Make the HTML page of a report.
 
     Parameters
     ----------
     contents : Contents
-        What it says.
+        Contents of the report.
     about : str
-        The run in a line below the title.
+        Line below the title, which describes the run.
     figures : sequence of (str, str, str)
         Name, caption and SVG of each.
 
@@ -67,7 +67,7 @@ def _table(table: Table, name: str) -> str:
     )
     kind = name if table.head else f"{name} pairs"
     above = f"<thead><tr>{head}</tr></thead>" if head else ""
-    # what is wider than a phone scrolls by itself, also by the keyboard
+    # a wide table scrolls in its own box, also by keyboard
     return (
         f'<div class="wide" tabindex="0" role="region" aria-label="{html.escape(table.title)}"><table class="{kind}">'
         f"{above}<tbody>\n{rows}\n</tbody></table></div>"

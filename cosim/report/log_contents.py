@@ -1,4 +1,4 @@
-"""What a report says of a run that was imported from a log: where its signals are from, and what is missing."""
+"""Contents of a report on a run that was imported from a log: sources of its signals, and gaps."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts, load_log_facts
 from cosim.results.run_result import Run
 from cosim.results.wording import number
 
-_NAMED = 12  # kinds of messages of which nothing was made, and gaps, that a table names
+_NAMED = 12  # greatest number of unused kinds of messages, and of gaps, that a table lists
 
 
 def log_remarks(run: Run) -> tuple[str, ...]:
-    """Return what a reader must know before trusting an imported run; nothing of others."""
+    """Return remarks on the reliability of an imported run; none for other runs."""
     facts = _facts(run)
     return facts.remarks if facts else ()
 
 
 def log_tables(run: Run) -> tuple[Table, ...]:
-    """Return the tables of where an imported run's signals are from, and where they have gaps; none of others."""
+    """Return tables of the sources and the gaps of an imported run's signals; none for other runs."""
     facts = _facts(run)
     if facts is None:
         return ()
     rows = tuple(
         (
             t.quantity, t.source, str(t.samples), number(t.rate, 3), str(t.gaps),
-            number(max((end - begin for begin, end in t.longest_gaps), default=0.0), 3), _mended(t),
+            number(max((end - begin for begin, end in t.longest_gaps), default=0.0), 3), _repairs(t),
         )
         for t in facts.topics
     )  # fmt: skip
@@ -41,7 +41,7 @@ def log_tables(run: Run) -> tuple[Table, ...]:
 
 
 def effort_of_log(summary: dict[str, Any]) -> Table:
-    """Return what the commands of a log ask for."""
+    """Return a table of the forces that the commands of a log ask for."""
     rows = (
         ("greatest force that the commands ask for, norm [N]", number(summary["max_force_asked"], 4)),
         ("greatest force within the thrusters' limits, norm [N]", number(summary["max_force"], 4)),
@@ -52,7 +52,7 @@ def effort_of_log(summary: dict[str, Any]) -> Table:
 
 
 def setting_of_log(run: Run) -> Table:
-    """Return what an imported run is of."""
+    """Return a table of log, vehicle, rates and unused messages of an imported run."""
     s, facts = run.scenario, _facts(run)
     unread = facts.unread if facts else {}
     shown = ", ".join(list(unread)[:_NAMED])
@@ -68,8 +68,8 @@ def setting_of_log(run: Run) -> Table:
     return Table("Import", (), rows, (1.0, 2.4))
 
 
-def _mended(topic: TopicFacts) -> str:
-    """Return what had to be mended in the samples of a topic."""
+def _repairs(topic: TopicFacts) -> str:
+    """Describe the repairs of the samples of a topic."""
     words = (
         (topic.held, "repeats of held values left out"),
         (topic.bursts, "samples of bursts spread"),

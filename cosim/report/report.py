@@ -21,7 +21,7 @@ FORMATS = ("html", "png")
 def write_report(run: Run, formats: Collection[str] = ("html",)) -> list[Path]:
     """Write the report of a run into its folder.
 
-    All is written beside what is there, and put in its place when all is done.
+    All files are written to a temporary folder, and replace the old ones at the end.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def write_report(run: Run, formats: Collection[str] = ("html",)) -> list[Path]:
     list of Path
         The files, the figures last.
     """
-    # Matplotlib takes as long to import as all else together
+    # importing Matplotlib takes as long as all other imports together
     from cosim.report.figures.sampled_rows import story_of
 
     scratch = Path(tempfile.mkdtemp(prefix=".report-", dir=run.folder))
@@ -50,7 +50,7 @@ def write_report(run: Run, formats: Collection[str] = ("html",)) -> list[Path]:
 
 
 def _with_figures(run: Run, data: FigureData, formats: Collection[str], folder: Path) -> list[Path]:
-    """Write the figures, and the page that holds them."""
+    """Write the figures, and the page with them."""
     from cosim.report.figures.figures import drawings
 
     (folder / FIGURES).mkdir()
@@ -68,7 +68,7 @@ def _with_figures(run: Run, data: FigureData, formats: Collection[str], folder: 
 
 
 def about(run: Run) -> str:
-    """Return the run in a line."""
+    """Describe the run in a line."""
     s = run.scenario
     if s.log:
         return f"A log of {s.vehicle.title}, imported from {s.log}."

@@ -1,4 +1,4 @@
-"""A table of a report: texts in rows."""
+"""Tables of a report."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Table:
-    """Texts in rows."""
+    """A table of texts."""
 
     title: str
     head: tuple[str, ...]  # empty for a table of names and values

@@ -1,4 +1,4 @@
-"""Pages put together piece by piece: one HTML file that opens without a network, with its figures."""
+"""Builder of pages: one HTML file with its figures, which opens without a network."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from cosim.report.report import FIGURES
 
-if TYPE_CHECKING:  # Matplotlib takes as long to import as all else together
+if TYPE_CHECKING:  # importing Matplotlib takes as long as all other imports together
     from cosim.report.figures.style import NamedFigure
 
 _PAGE = Template("""<!DOCTYPE html>
@@ -57,22 +57,22 @@ class Html(str):
 
 
 def code(text: str) -> Html:
-    """Return a piece of text as code."""
+    """Format text as code."""
     return Html(f"<code>{html.escape(text)}</code>")
 
 
 def link(where: str, text: str) -> Html:
-    """Return a link to a place relative to the page."""
+    """Format a link; `where` is relative to the page."""
     return Html(f'<a href="{html.escape(where)}">{html.escape(text)}</a>')
 
 
 def wall(text: str) -> Html:
-    """Return what the wall clock says, which no repetition gives again."""
+    """Mark text that depends on the wall clock, which repetitions do not reproduce."""
     return Html(f'<span class="wall">{html.escape(text)}</span>')
 
 
 def number(x: float | None, digits: int = 4) -> str:
-    """Return a number as tables have it, a dash where there is none."""
+    """Format a number for tables, a dash for None."""
     if x is None:
         return "–"
     text = f"{x:.0f}" if 10**digits <= abs(x) < 1e9 else f"{x:.{digits}g}"
@@ -80,14 +80,14 @@ def number(x: float | None, digits: int = 4) -> str:
 
 
 def interval(rate: dict[str, Any]) -> str:
-    """Return a rate of `cosim.campaigns.analysis.statistics.rate` with its interval."""
+    """Format a rate of `cosim.campaigns.analysis.statistics.rate` with its interval."""
     if rate["share"] is None:
         return "–"
     return f"{100 * rate['share']:.1f} % ({100 * rate['low']:.1f} to {100 * rate['high']:.1f})"
 
 
 class Page:
-    """A page that is put together piece by piece.
+    """A page that is built piece by piece.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Page:
         self._pieces: list[str] = []
 
     def verdict(self, text: str) -> None:
-        """Add the sentence that says what came of it."""
+        """Add the sentence with the result."""
         self._pieces.append(f'<p class="verdict">{_escaped(text)}</p>')
 
     def heading(self, text: str) -> None:
@@ -136,7 +136,7 @@ class Page:
 
 
 def write_figures(folder: Path, drawings: Iterable[NamedFigure]) -> dict[str, Html]:
-    """Write figures as SVG and PNG below a folder, in the place of those that were there.
+    """Write figures as SVG below a folder, and replace those of an earlier page.
 
     Parameters
     ----------
@@ -148,12 +148,12 @@ def write_figures(folder: Path, drawings: Iterable[NamedFigure]) -> dict[str, Ht
     Returns
     -------
     dict of str to Html
-        By name: the figure with its caption, for the page.
+        HTML of each figure with its caption, by name.
 
     Raises
     ------
     OSError
-        If they cannot be written; what was there stays then.
+        If they cannot be written; the earlier figures stay.
     """
     import matplotlib as mpl
 
@@ -161,7 +161,7 @@ def write_figures(folder: Path, drawings: Iterable[NamedFigure]) -> dict[str, Ht
 
     scratch = Path(tempfile.mkdtemp(prefix=f".{FIGURES}-", dir=folder))
     try:
-        with mpl.rc_context(STYLE):  # while they are made, and while they are written
+        with mpl.rc_context(STYLE):  # applies while figures are drawn and written
             shown = {drawing.name: inline_figure(drawing, scratch) for drawing in drawings}
         scratch.chmod(0o755)
         shutil.rmtree(folder / FIGURES, ignore_errors=True)
@@ -173,7 +173,7 @@ def write_figures(folder: Path, drawings: Iterable[NamedFigure]) -> dict[str, Ht
 
 
 def inline_figure(drawing: NamedFigure, folder: Path) -> Html:
-    """Return a figure with its caption as HTML, once it is written into a folder."""
+    """Write a figure into a folder, and return it as HTML with its caption."""
     svg = drawing.write(folder)
     caption = html.escape(drawing.caption)
     inline = svg[svg.index("<svg") :].replace("<svg", f'<svg role="img" aria-label="{caption}"', 1)

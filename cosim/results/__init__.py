@@ -1,7 +1,7 @@
-"""What a run leaves.
+"""Results of a run.
 
-The record of signals and its writer, the summary that is computed from it, what the paper claims beside it, and
-sentences that say what happened. Public: `load_record`, `Record`, `Recorder`.
+The record of signals and its writer, the summary that is computed from it, a comparison with the paper's claims, and
+the wording of a run's outcome. Public: `load_record`, `Record`, `Recorder`.
 
 Imports: controller, io, plant_fmu, scenario, simulation.
 """

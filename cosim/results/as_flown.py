@@ -1,4 +1,4 @@
-"""What was there of what commands can bring about: obstacles that came, and the target in the end."""
+"""The scenario as flown: with the obstacles that commands added, and with the last target."""
 
 from __future__ import annotations
 
@@ -16,23 +16,25 @@ from cosim.simulation.signals import Array
 
 
 def scenario_as_flown(scenario: Scenario, record: Rows) -> Scenario:
-    """Return the scenario with those obstacles that came in, at their size, and with the target as it was in the end.
+    """Return the scenario with the obstacles that were added, at their last size, and with the last target.
 
     Parameters
     ----------
     scenario : Scenario
-        What was run.
+        The scenario of the run.
     record : Rows
-        What it left.
+        Record of the run.
 
     Returns
     -------
     Scenario
-        The same one, where nothing could be commanded.
+        The same scenario if commands were not enabled.
     """
     if not scenario.commands.enabled:
         return scenario
-    regions = tuple(region for region in (_came(region, record) for region in scenario.regions) if region is not None)
+    regions = tuple(
+        region for region in (_region_as_flown(region, record) for region in scenario.regions) if region is not None
+    )
     goal, radius = scenario.goal, record.value("target.radius", -1)
     if radius > 0.0:
         goal = Sphere(shape_center(goal), radius)
@@ -40,19 +42,19 @@ def scenario_as_flown(scenario: Scenario, record: Rows) -> Scenario:
 
 
 def radii_of(record: Rows, name: str) -> Iterator[tuple[Array, Array]]:
-    """Yield times [s] and radii [m] of an obstacle at the rows that tell its size, block by block.
+    """Yield times [s] and radii [m] of an obstacle at the rows from which its radius follows, block by block.
 
     Parameters
     ----------
     record : Rows
         Of the run.
     name : str
-        Of a region that can come.
+        Of a dynamic region.
 
     Yields
     ------
     (ndarray, ndarray)
-        Of the same shape; none of where it has not come, or the pose is none.
+        Of the same shape; without rows before the obstacle was added, or with a NaN pose.
     """
     place, shift = ([f"{of}.{axis}" for axis in "xyz"] for of in ("position", f"{name}.shift"))
     for block in record.blocks(["time", *place, *shift, f"{name}.clearance"]):
@@ -62,8 +64,8 @@ def radii_of(record: Rows, name: str) -> Iterator[tuple[Array, Array]]:
         yield block["time"][known], radii[known]
 
 
-def _came(secondary: SecondaryRegion, record: Rows) -> SecondaryRegion | None:
-    """Return a region at its size, None for an obstacle that never came, or of which no row tells the size."""
+def _region_as_flown(secondary: SecondaryRegion, record: Rows) -> SecondaryRegion | None:
+    """Return a region at its last size; None for an obstacle that was never added, or whose radius is not known."""
     if not secondary.is_dynamic:
         return secondary
     radius = None

@@ -1,4 +1,4 @@
-"""Which rows of a long run tell most of it: where signals are least and greatest, part by part."""
+"""Rows of a long run at which signals have their minima and maxima, part by part."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ def extreme_rows(blocks: Iterable[Sequence[Array]], signals: int, edges: NDArray
     blocks : iterable of sequence of ndarray
         The signals, each of shape (rows,), block by block of the run.
     signals : int
-        How many they are.
+        Number of signals.
     edges : ndarray of int, shape (parts + 1,)
         The first row of each part and the one behind the last, rising.
 
     Returns
     -------
     ndarray of int
-        Rising. None of a signal in a part in which it has no finite number.
+        Rising. A signal without a finite value in a part contributes no row there.
     """
     found = _Extremes(len(edges) - 1, signals)
     first = 0
@@ -46,12 +46,12 @@ class _Extremes:
     """The least and the greatest of each signal in each part."""
 
     def __init__(self, parts: int, signals: int) -> None:
-        self._bounds = np.full((2, parts, signals), np.inf)  # of the greatest, minus it
+        self._bounds = np.full((2, parts, signals), np.inf)  # minima, and negated maxima
         self.rows = np.full((2, parts, signals), -1, np.intp)
         self.finite = np.zeros((parts, signals), dtype=bool)
 
     def add(self, of: tuple[int, int], signal: Array, first: int) -> None:
-        """Take the next rows of one signal in one part."""
+        """Update the extremes of one signal in one part by its next rows."""
         missing = np.isnan(signal)
         self.finite[of] |= np.isfinite(signal).any()
         for which, signed in enumerate((signal, -signal)):
@@ -62,14 +62,14 @@ class _Extremes:
 
 
 def even_edges(rows: int, parts: int) -> NDArray[np.intp]:
-    """Return where parts of a run begin, and its end; the first ones are a row longer where not all can be as long.
+    """Return the edges of parts of equal length of a run; the first parts are one row longer if needed.
 
     Parameters
     ----------
     rows : int
-        Of the run.
+        Number of rows of the run.
     parts : int
-        At least one.
+        Number of parts, at least one.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def even_edges(rows: int, parts: int) -> NDArray[np.intp]:
 
 
 def rows_at(rows: Rows, times: Sequence[float]) -> NDArray[np.intp]:
-    """Return the first row at or after each time, as many as there are rows for one that is behind the end.
+    """Return the index of the first row at or after each time; the number of rows for a time after the end.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where the signals of an imported run are from: its file ``import.json``."""
+"""Sources of the signals of an imported run: its file ``import.json``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ IMPORT = "import.json"
 
 @dataclass(frozen=True)
 class TopicFacts:
-    """A quantity of a log: where it stands, how often it comes, and what had to be mended."""
+    """A quantity of a log: its source, its sample rate, and repairs of its samples."""
 
     quantity: str
     source: str  # message, topic or columns
@@ -24,28 +24,28 @@ class TopicFacts:
     longest: float  # s, between samples: a longer pause is a gap
     gaps: int
     longest_gaps: tuple[tuple[float, float], ...]  # s of the run, begin and end of some
-    held: int  # repeats of a held value that were left out
-    bursts: int  # samples that came in bursts, and whose times were spread
-    late: int  # samples that were left out because a later one had come
-    broken: int  # samples with a number that is none
+    held: int  # repeats of a held value that were dropped
+    bursts: int  # samples that arrived in bursts, and whose times were spread
+    late: int  # samples that were dropped because they arrived after a later one
+    broken: int  # samples with NaN or infinity
 
 
 @dataclass(frozen=True)
 class LogFacts:
-    """What a reader must know of an imported run."""
+    """Facts about the log of an imported run."""
 
     log: str  # name of the file
     bytes: int
     start: float  # s, of the first row on the log's clock
     rate: float  # Hz, of the rows
-    commands: str  # how they became forces, in words; empty where there are none
+    commands: str  # how they were converted to forces, in words; empty without commands
     topics: tuple[TopicFacts, ...]
-    unread: dict[str, int]  # messages, topics or columns of which nothing was made, and how often each comes
+    unread: dict[str, int]  # number of samples by message, topic or column that was not used
     remarks: tuple[str, ...]
 
 
 def load_log_facts(folder: Path) -> LogFacts:
-    """Read where the signals of an imported run are from.
+    """Load the facts about the log of an imported run.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def load_log_facts(folder: Path) -> LogFacts:
     Returns
     -------
     LogFacts
-        As `cosim.import_log` found them.
+        As `cosim.import_log` wrote them.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What V of the paper's law's analysis did in a run."""
+"""Summary of the Lyapunov function V of the paper's law in a run."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from cosim.results.record import Rows
 from cosim.simulation.lyapunov_signals import FORMS
 from cosim.simulation.signals import Array
 
-ROUNDING = 1e-12  # of the greatest |V| of a run: a smaller rise between two steps is none
+ROUNDING = 1e-12  # of the greatest |V| of a run: a smaller rise between two steps does not count
 
 
 def summarise_lyapunov(record: Rows) -> dict[str, Any] | None:
-    """Return what V did in a run.
+    """Summarise V over a run.
 
     Parameters
     ----------

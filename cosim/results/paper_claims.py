@@ -1,4 +1,4 @@
-"""What the paper states, beside what a run gave, and why they differ."""
+"""The paper's claims beside the results of a run, and reasons for differences."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ class Claim:
 
 
 def paper_claims(scenario: Scenario, summary: dict[str, Any]) -> list[Claim]:
-    """Return the paper's statements beside this run.
+    """Return the paper's claims beside the results of this run.
 
     Parameters
     ----------
     scenario : Scenario
-        What was run.
+        The scenario of the run.
     summary : dict
-        What it came to.
+        Its summary.
 
     Returns
     -------
     list of Claim
-        Every word about this run follows from its numbers.
+        Statements about this run are generated from its summary.
     """
     return [
         _reaching(summary),

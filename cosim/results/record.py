@@ -1,4 +1,4 @@
-"""The record of a run, read: a Parquet file with a column for each signal and its unit in the metadata."""
+"""Reads the record of a run: a Parquet file with a column for each signal and its unit in the metadata."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from cosim.errors import RunError
 from cosim.io.format_number import require_format
 from cosim.simulation.signals import Array, Column
 
-MAX_ROWS = 100_000_001  # of a run of as many steps as a scenario may have
+MAX_ROWS = 100_000_001  # of a run with the greatest number of steps of a scenario
 RECORD = "record.parquet"
-PARTS = "record.parts"  # what a killed run leaves
-_DIGITS = 9  # of a format's number
+PARTS = "record.parts"  # folder of the parts of a run that is under way or was killed
+_DIGITS = 9  # greatest number of digits of a format number
 _BLOCK = 10_000  # rows that are read at once
-_SMALL = 2**23  # numbers of a record that is read as a whole,
-_KEPT = 24  # and signals that a larger one keeps in memory
+_SMALL = 2**23  # numbers; a record of at most so many is read as a whole
+_KEPT = 24  # signals of a larger record that are kept in memory
 
 
 class Rows:
@@ -32,7 +32,7 @@ class Rows:
     Parameters
     ----------
     columns : sequence of Column
-        What the signals are.
+        Columns of the signals.
     arrays : mapping of str to ndarray of shape (rows,)
         The signals, by the names of the columns.
 
@@ -50,7 +50,7 @@ class Rows:
         self._arrays = arrays
 
     def __len__(self) -> int:
-        """Return how many rows there are."""
+        """Return the number of rows."""
         return len(self[next(iter(self.units))])
 
     def __getitem__(self, name: str) -> Array:
@@ -71,7 +71,7 @@ class Rows:
         Parameters
         ----------
         names : sequence of str, optional
-            Which signals; default: all.
+            Names of the signals; default: all.
 
         Raises
         ------
@@ -85,14 +85,14 @@ class Rows:
             yield Rows(columns, {c.name: self[c.name][first : first + _BLOCK] for c in columns})
 
     def take(self, rows: Sequence[int] | NDArray[np.intp], names: Sequence[str] | None = None) -> Rows:
-        """Return some rows alone.
+        """Return a selection of rows.
 
         Parameters
         ----------
         rows : sequence of int
             Rising, from 0.
         names : sequence of str, optional
-            Which signals; default: all.
+            Names of the signals; default: all.
 
         Raises
         ------
@@ -105,7 +105,7 @@ class Rows:
         return Rows(columns, {column.name: self[column.name][np.asarray(rows, np.intp)] for column in columns})
 
     def value(self, name: str, row: int) -> float:
-        """Return the number that a signal (`name`) has at a row (`row`: from 0, or from -1 backwards)."""
+        """Return the value of signal `name` at `row`, from 0, or from -1 backwards."""
         return float(self.take([row % len(self)], [name])[name][0])
 
     def _columns_of(self, names: Sequence[str] | None) -> tuple[Column, ...]:
@@ -119,15 +119,15 @@ class Rows:
 
 
 class Record(Rows):
-    """A run's signals, each an array over its steps, read from the files when they are asked for.
+    """A run's signals, each an array over its steps, read from the files at their first use.
 
-    A small record is held in memory as a whole. Of a larger one take blocks, or some rows: one signal of it may be more
-    than memory holds.
+    A small record is kept in memory as a whole. Read a larger one by `blocks` or `take`: a single signal may exceed the
+    memory.
 
     Parameters
     ----------
     files : sequence of Path
-        Parquet files of one schema, one behind the other.
+        Parquet files of one schema, in the order of their rows.
 
     Attributes
     ----------
@@ -169,10 +169,10 @@ class Record(Rows):
         self._kept: OrderedDict[str, Array] = OrderedDict()
         super().__init__(columns[0], self._kept)
         self._count = rows
-        self._small = rows * len(self.columns) <= _SMALL  # one signal takes a tenth of the time that all take
+        self._small = rows * len(self.columns) <= _SMALL  # reading one signal takes a tenth of the time of all
 
     def __len__(self) -> int:
-        """Return how many rows there are."""
+        """Return the number of rows."""
         return self._count
 
     def __getitem__(self, name: str) -> Array:
@@ -191,7 +191,7 @@ class Record(Rows):
         return self._kept[name]
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Rows]:
-        """Yield all rows in their order, in blocks that fit into memory, of all signals or of those by `names`."""
+        """Yield all rows in order, in blocks that fit into memory, of all signals or of those in `names`."""
         if self._small:
             yield from super().blocks(names)
             return
@@ -201,7 +201,7 @@ class Record(Rows):
                 yield from _batches(parquet, columns, range(parquet.num_row_groups))
 
     def take(self, rows: Sequence[int] | NDArray[np.intp], names: Sequence[str] | None = None) -> Rows:
-        """Return some rows (`rows`: rising, from 0) alone, of all signals or of those by `names`."""
+        """Return a selection of `rows` (rising, from 0), of all signals or of those in `names`."""
         if self._small and self._kept:
             return super().take(rows, names)
         columns, rows = self._columns_of(names), np.asarray(rows, np.intp)
@@ -233,12 +233,12 @@ def load_record(folder: Path) -> Record:
     Returns
     -------
     Record
-        All that was written.
+        All rows that were written.
 
     Raises
     ------
     RunError
-        If there is none, or it cannot be read.
+        If the folder holds no record, or it cannot be read.
     """
     require_utf8(folder)
     files = [folder / RECORD] if (folder / RECORD).exists() else part_files(folder)
@@ -256,8 +256,8 @@ def _column_of(field: pa.Field) -> Column:
 
 
 def _read(file: Path, names: list[str]) -> dict[str, list[Array]]:
-    """Return the pieces of each signal."""
-    with _opened(file) as parquet:  # pq.read_table takes three times as long to begin
+    """Read the chunks of each signal."""
+    with _opened(file) as parquet:  # pq.read_table has three times the overhead
         table = parquet.read(names)
         return {name: [_numbers(chunk) for chunk in table[name].chunks] for name in names}  # not to_numpy, as above
 
@@ -283,10 +283,10 @@ def _numbers(column: pa.Array) -> Array:
 
 @contextlib.contextmanager
 def _opened(file: Path) -> Iterator[Any]:
-    """Open a Parquet file; what cannot be read of it is one error, whoever has made it."""
+    """Open a Parquet file; convert all errors of reading it to a RunError."""
     require_utf8(file)
     try:
-        # read ahead, all that was read of a file would stay in memory until it is closed
+        # with pre_buffer all that was read of a file would stay in memory until it is closed
         with pq.ParquetFile(file, pre_buffer=False) as parquet:
             yield parquet
     except (OSError, pa.ArrowException, UnicodeDecodeError, TypeError, BufferError, KeyError) as error:
@@ -294,7 +294,7 @@ def _opened(file: Path) -> Iterator[Any]:
 
 
 def require_utf8(path: Path) -> None:
-    """Refuse a place that Parquet's library cannot be told of.
+    """Raise a RunError for a path that is not UTF-8, which Parquet's library does not support.
 
     Parameters
     ----------
@@ -304,7 +304,7 @@ def require_utf8(path: Path) -> None:
     Raises
     ------
     RunError
-        If its name is no UTF-8.
+        If its name is not UTF-8.
     """
     try:
         str(path).encode()
@@ -314,7 +314,7 @@ def require_utf8(path: Path) -> None:
 
 
 def _require_numbers(file: Path, schema: pa.Schema, rows: int) -> None:
-    """Refuse a table that is no record, or brings one to too many rows: a few bytes could say what no memory holds."""
+    """Raise a RunError if a schema is not a record's, or `rows` exceeds the bound, since a small file can claim any."""
     odd = next((field.name for field in schema if field.type != pa.float64()), None)
     if odd is not None:
         raise RunError(f"{file}: column {odd[:80]!r} is no number, expected the record of a run")
@@ -325,7 +325,7 @@ def _require_numbers(file: Path, schema: pa.Schema, rows: int) -> None:
 
 
 def _format_of(schema: pa.Schema) -> int | str | None:
-    """Return the number of its format as a table says it, 1 for one with names of that; None if nothing tells."""
+    """Return the format number in a schema; without one, 1 if it has columns of format 1, else None."""
     said = (schema.metadata or {}).get(b"format", b"").decode("utf-8", "replace")
     if not said:
         return 1 if any(name.startswith("helm.") for name in schema.names) else None
@@ -333,5 +333,5 @@ def _format_of(schema: pa.Schema) -> int | str | None:
 
 
 def part_files(folder: Path) -> list[Path]:
-    """Return the parts that a run has left in its folder, in their order."""
+    """Return the Parquet files of the parts in a run's folder, in order."""
     return sorted((folder / PARTS).glob("*.parquet"))

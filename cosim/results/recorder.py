@@ -1,4 +1,4 @@
-"""The record of a run, written: a Parquet file, and until it is whole, parts that can be read as well."""
+"""Writes the record of a run: a Parquet file, and until it is complete, parts that can be read as well."""
 
 from __future__ import annotations
 
@@ -16,69 +16,67 @@ from cosim.io.format_number import FORMAT
 from cosim.results.record import PARTS, RECORD, part_files
 from cosim.simulation.signals import Array, Column
 
-_WHOLE = "whole"  # among the parts, what a finished run makes of its rows
+_WHOLE = "whole"  # name of the complete record while it is written in the folder of the parts
 _PART_SECONDS = 1.0  # of the wall clock, after which a part is written even if it is small
-_PART_NUMBERS = 2**23  # in a part at the most, unless another number of rows is asked for: 64 MiB
-_GROUP = 10_000  # rows that go into the whole at once, at the most;
-_DOUBLED = (
-    100  # after so many groups twice as many: whoever reads the record has a kilobyte of each signal of each group
-)
-_BLOCK = 250  # rows that wait to be turned into columns: as many as a processor's caches hold
-# measured: bytes of a float64 column compress best when they are split by place, and dictionaries only cost
+_PART_NUMBERS = 2**23  # greatest number of values in a part, 64 MiB, unless `rows_per_part` is given
+_GROUP = 10_000  # greatest number of rows in the first row groups
+_DOUBLED = 100  # groups after which their size doubles, since a reader needs a kilobyte per group and signal
+_BLOCK = 250  # rows that are buffered before they are transposed to columns: they fit into processor caches
+# measured: float64 columns compress best with byte stream split; dictionaries only cost time
 _WRITING = {"compression": "zstd", "use_dictionary": False, "use_byte_stream_split": True, "write_statistics": False}
 
 
 class Recorder:
-    """Observer that writes each step's row, in parts that a killed run leaves readable.
+    """Observer that records each step's row, in parts that stay readable after a kill.
 
     Parameters
     ----------
     folder : Path
         The run folder.
     columns : sequence of Column
-        Of the rows that will come.
+        Columns of the rows.
     rows_per_part : int, optional
-        The most in a part. One is written when there are about as many, or a second of the wall clock has passed.
-        Default: as many as take 64 MiB.
+        Greatest number of rows in a part. A part is written at about so many rows, or after a second of the wall
+        clock. Default: as many as take 64 MiB.
 
     Attributes
     ----------
     rows : int
-        That have come.
+        Number of observed rows.
     """
 
-    # Ctrl-C may come at every call. So that an interrupted run has each row once, what says where a row stands is
-    # changed by assignments alone, side by side; and what was interrupted is done again.
+    # Ctrl-C may interrupt every call. So that the record has each row once, the bookkeeping is changed by single
+    # assignment statements, and interrupted operations are repeated.
 
     def __init__(self, folder: Path, columns: Sequence[Column], rows_per_part: int | None = None) -> None:
         self._folder, self._schema = folder, _schema(columns)
         self._rows_per_part = rows_per_part or max(1, _PART_NUMBERS // len(columns))
         block = min(_BLOCK, self._rows_per_part)
         self._block: Array = np.empty((block, len(columns)))
-        self._rows = [row.data for row in self._block]  # copied to in half the time of an array's row
+        self._rows = [row.data for row in self._block]  # memoryviews: copying takes half the time of arrays
         self._filled = 0
-        self._group = min(_GROUP, self._rows_per_part) // block * block  # rows that go into the whole at once,
-        self._largest = max(self._group, (self._rows_per_part - block) // 2 // block * block)  # the most of them,
-        self._groups = 0  # and how often some did
+        self._group = min(_GROUP, self._rows_per_part) // block * block  # rows of a row group
+        self._largest = max(self._group, (self._rows_per_part - block) // 2 // block * block)  # bound of `_group`
+        self._groups = 0  # number of complete groups
         self._columns: Array = np.empty((len(columns), self._group))
-        self._turned = 0  # rows of the present group, which stand in the columns;
-        self._saved = 0  # and how many of these are in a part already
-        self._unsaved: list[pa.Table] = []  # of earlier groups, what is in no part
+        self._turned = 0  # rows of the present group, in `_columns`
+        self._saved = 0  # how many of these are in a part already
+        self._unsaved: list[pa.Table] = []  # rows of earlier groups that are in no part
         self._parts = 0
         (folder / PARTS).mkdir()
-        self._whole: pq.ParquetWriter | None = None  # what the record will be, begun with its first group
-        self._sound = True  # it has all earlier groups; not so once a write was cut off
-        self._whole_is_there = False  # in its place
+        self._whole: pq.ParquetWriter | None = None  # writer of the complete record, opened with the first group
+        self._sound = True  # True: `_whole` has all earlier groups; False after an interrupted write
+        self._whole_is_there = False  # True once the complete record is at its final path
         self._due = time.monotonic() + _PART_SECONDS
         self.rows = 0
 
     def observe(self, k: int, row: Array) -> None:
-        """Keep the row of step `k`, shape (columns,) of float64.
+        """Record the row of step `k`, shape (columns,) of float64.
 
         Raises
         ------
         OSError, pyarrow.ArrowException
-            If rows that came before cannot be written. They are kept, and tried again with the next.
+            If earlier rows cannot be written. They are kept, and written again with the next row.
         """
         if self._filled == len(self._rows) or time.monotonic() > self._due:
             self._turn()
@@ -87,9 +85,9 @@ class Recorder:
         self.rows += 1
 
     def close(self) -> None:
-        """Write what is left, and put the whole in the place of its parts; if that fails, these have all.
+        """Write the remaining rows, and replace the parts by the complete record.
 
-        May be called again then.
+        After an error the parts hold all rows, and it may be called again.
         """
         if not self._whole_is_there:
             try:
@@ -102,7 +100,7 @@ class Recorder:
     # ---- from rows to columns ----
 
     def _turn(self) -> None:
-        """Turn the rows of the block into columns, and write what is due."""
+        """Transpose the rows of the block to columns, and write the group or part that is due."""
         self._turn_block()
         if self._turned == self._group:
             self._end_group()
@@ -117,8 +115,8 @@ class Recorder:
         self._turned, self._filled = n, 0
 
     def _table(self, first: int) -> pa.Table:
-        """Return the present group from one of its rows on; the columns stay the table's."""
-        # not pa.array: that imports pandas where it is installed, for nothing
+        """Return the rows of the present group from `first` on, as a table that shares the memory of the columns."""
+        # not pa.array, which imports pandas where it is installed
         arrays = [
             pa.Array.from_buffers(pa.float64(), self._turned - first, [None, pa.py_buffer(column)])
             for column in self._columns[:, first : self._turned]
@@ -126,7 +124,7 @@ class Recorder:
         return pa.Table.from_arrays(arrays, schema=self._schema)
 
     def _end_group(self) -> None:
-        """Write the present group into the whole, and begin another one."""
+        """Write the present group into the complete record, and begin the next one."""
         group, groups, sound = self._table(0), self._groups + 1, self._sound
         rows = min(2 * self._group, self._largest) if groups % _DOUBLED == 0 else self._group
         unsaved, room = [*self._unsaved, group.slice(self._saved)], np.empty((len(self._columns), rows))
@@ -139,7 +137,7 @@ class Recorder:
     # ---- from columns to files ----
 
     def _save(self) -> None:
-        """Write a part of what is in none."""
+        """Write a part with the unsaved rows."""
         tables = [*self._unsaved, self._table(self._saved)]
         if _rows(tables):
             self._write_part(tables)
@@ -147,7 +145,7 @@ class Recorder:
         self._due = time.monotonic() + _PART_SECONDS
 
     def _rescue(self) -> None:
-        """Write parts of what is in none, in place of the whole, as far as the disk has room."""
+        """Discard the complete record, and write the unsaved rows as parts, as far as the disk has room."""
         self._drop_whole()
         self._turn_block()
         while self._unsaved:
@@ -172,9 +170,9 @@ class Recorder:
         self._whole.write_table(table)
 
     def _conclude(self) -> None:
-        """Finish the whole, and put it in its place."""
+        """Finish the complete record, and move it to its final path."""
         self._turn_block()
-        sound, self._sound = self._sound, False  # unless this ends well, it is begun anew
+        sound, self._sound = self._sound, False  # after an error here the record is written from the parts
         if not sound:
             self._append_parts()
         elif self._turned:
@@ -185,7 +183,7 @@ class Recorder:
         self._whole_is_there = True
 
     def _append_parts(self) -> None:
-        """Begin the whole anew, with all parts: Ctrl-C or a full disk came in the middle of it."""
+        """Write the complete record again from all parts, after Ctrl-C or a full disk interrupted it."""
         self._drop_whole()
         self._save()
         tables: list[pa.Table] = []

@@ -12,32 +12,32 @@ from cosim.simulation.columns import names_of
 
 log = logging.getLogger(__name__)
 
-_TAKEN_ALONG = ("law.", "sensed.", "water_velocity.")  # beginnings of names of what is exported, and nothing is made of
-_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")  # a region may have any of those names
-_NAMED = 3  # columns in a message
+_OPTIONAL = ("law.", "sensed.", "water_velocity.")  # prefixes of columns that are only exported
+_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")  # needed, also if a region's name has such a prefix
+_NAMED = 3  # greatest number of columns named in a message
 
 
 def require_columns(scenario: Scenario, record: Record) -> None:
-    """Refuse a record that lacks what its scenario calls for; warn where nothing is made of what it lacks.
+    """Raise a RunError if a record lacks columns of its scenario; warn if it lacks optional ones.
 
     Parameters
     ----------
     scenario : Scenario
-        What was run.
+        The scenario of the run.
     record : Record
-        What it left; it may have more columns.
+        Record of the run; it may have more columns.
 
     Raises
     ------
     RunError
-        With the names of some columns that are missing, or stand in another order.
+        With the names of some columns that are missing, or in another order.
     """
     expected, found = names_of(scenario), list(record.units)
     missing = [name for name in expected if name not in record.units]
-    needed = [name for name in missing if not _is_taken_along(name)]
+    needed = [name for name in missing if not _is_optional(name)]
     if needed:
         raise RunError(f"{record.file}: has no {_listed(needed)}, which its scenario calls for")
-    # what is read side by side, or as the first one, counts on the order
+    # code that reads neighbouring columns, or the first one, relies on the order
     here = [found[0], *(name for name in found if name in expected)]
     there = [expected[0], *(name for name in expected if name in record.units)]
     odd = next((name for name, other in zip(here, there, strict=True) if name != other), None)
@@ -47,8 +47,8 @@ def require_columns(scenario: Scenario, record: Record) -> None:
         log.warning("%s: has no %s: what is made of it does without", record.file, _listed(missing))
 
 
-def _is_taken_along(name: str) -> bool:
-    return name.endswith(".value") or (name.startswith(_TAKEN_ALONG) and not name.endswith(_OF_REGIONS))
+def _is_optional(name: str) -> bool:
+    return name.endswith(".value") or (name.startswith(_OPTIONAL) and not name.endswith(_OF_REGIONS))
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""A run as it stands in its folder, whether it was finished, interrupted or killed."""
+"""A run in its folder, finished, interrupted or killed."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ COMMANDS_LOG = "commands.jsonl"
 REPORT = "report.html"
 REPLAY = "replay.html"
 
-_LONGEST = 1e12  # s, of the wall clock
+_LONGEST = 1e12  # s, bound of a plausible wall-clock time
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,24 +48,24 @@ class Run:
     """
 
     folder: Path
-    planned: Scenario  # as its file has it, with the law that flew it
+    planned: Scenario  # from its file, with the law that flew it
     scenario: Scenario  # as flown: with the obstacles that were added, and with the last target
-    record: Record  # signals over time, read when they are asked for
+    record: Record  # signals over time, read at their first use
     summary: dict[str, Any]
 
     def files(self) -> dict[str, Path]:
-        """Return those files of the run that exist, by what they are."""
+        """Return the existing files of the run, by kind."""
         named = {"scenario": SCENARIO, "record": RECORD, "summary": SUMMARY, "report": REPORT, "replay": REPLAY}
         named |= {"commands": COMMANDS_LOG, "import": IMPORT}
         return {what: self.folder / name for what, name in named.items() if (self.folder / name).exists()}
 
     def table(self) -> Any:
-        """Return the record as a table of Arrow.
+        """Return the record as an Arrow table.
 
         Returns
         -------
         pyarrow.Table
-            A row a step, a column a signal; each field's metadata has its ``unit``.
+            A row per step, a column per signal; each field's metadata has its ``unit``.
         """
         import pyarrow as pa
 
@@ -76,12 +76,12 @@ class Run:
         return pa.table([self.record[field.name] for field in fields], schema=pa.schema(fields))
 
     def frame(self) -> Any:
-        """Return the record as a data frame of pandas.
+        """Return the record as a pandas data frame.
 
         Returns
         -------
         pandas.DataFrame
-            A row a step, a column a signal.
+            A row per step, a column per signal.
 
         Raises
         ------
@@ -102,7 +102,7 @@ class Run:
         *signals : str
             Names, or patterns such as ``"weight.*"``. Default: the clearance of the goal and of each region.
         ax : matplotlib.axes.Axes, optional
-            Where to draw; default: new axes.
+            Axes to draw into; default: new ones.
 
         Returns
         -------
@@ -129,7 +129,7 @@ class Run:
         return ax
 
     def replay(self) -> Path:
-        """Return the page in which the run can be seen again.
+        """Return the path of the replay page.
 
         Returns
         -------
@@ -139,7 +139,7 @@ class Run:
         Raises
         ------
         RunError
-            If the run was made without it.
+            If the run has no replay.
         """
         if "replay" not in self.files():
             raise RunError(f"{self.folder}: has no {REPLAY}; `cosim replay {self.folder}` writes it")
@@ -158,7 +158,7 @@ class Run:
 
 
 def load_run(path: Path) -> Run:
-    """Open a run that is done, was interrupted, or was killed.
+    """Open a run that was completed, interrupted or killed.
 
     Parameters
     ----------
@@ -168,14 +168,14 @@ def load_run(path: Path) -> Run:
     Returns
     -------
     Run
-        Its summary is made anew from its record.
+        With a summary that is computed from its record.
 
     Raises
     ------
     RunError
         If the folder holds no run that can be read.
     ScenarioError
-        If its scenario is none.
+        If its scenario is invalid.
 
     Examples
     --------
@@ -194,10 +194,10 @@ def load_run(path: Path) -> Run:
 
 
 def _concluded(file: Path, scenario: Scenario) -> tuple[Scenario, str, float | None]:
-    """Return the scenario by who flew it, how that ended, and what it took [s], as the summary has them."""
+    """Return the scenario with the law in the summary, the run's status, and its wall time [s]."""
     before = read_json(file)
     name, law, status = (_text(file, before, key) for key in ("scenario", "law", "status"))
-    # an autopilot flies in the law's place, but nothing of it could be commanded
+    # an external autopilot may have flown instead of the law, but only in runs without commands
     if law != scenario.law.name and (law in LAWS or scenario.commands.enabled):
         raise RunError(f"{file}: law is {law!r}, expected {scenario.law.name!r} as in {SCENARIO}")
     took = before.get("wall_time")
@@ -208,7 +208,7 @@ def _concluded(file: Path, scenario: Scenario) -> tuple[Scenario, str, float | N
 
 
 def _text(file: Path, summary: dict[str, Any], key: str) -> str:
-    """Return a text of a summary, which a terminal will only show."""
+    """Return a text of a summary, without characters that could control a terminal."""
     if key not in summary:
         raise RunError(f"{file}: {key} is missing, expected the summary of a run")
     if not isinstance(summary[key], str):
@@ -217,18 +217,18 @@ def _text(file: Path, summary: dict[str, Any], key: str) -> str:
 
 
 def open_run(path: Path, scenario: Scenario, status: str, wall_time: float | None) -> Run:
-    """Return a run of which is known how it ended.
+    """Open a run whose status and wall time are known.
 
     Parameters
     ----------
     path : Path
         The run folder.
     scenario : Scenario
-        What was run.
+        The scenario of the run.
     status : str
-        How it ended.
+        As for `summarise`.
     wall_time : float or None
-        What the stepping took [s].
+        Wall-clock time of the stepping [s].
 
     Returns
     -------

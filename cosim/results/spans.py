@@ -1,4 +1,4 @@
-"""When a condition held in a run, found block by block."""
+"""Time spans of a run in which a condition holds, found block by block."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ Flags = NDArray[np.bool_]
 
 @dataclass
 class Span:
-    """A time for which a condition held."""
+    """A time span in which a condition holds."""
 
-    start: float  # s, the first instant in
-    end: float  # s, the first instant out; the last one of all while the condition still holds
-    least: float = np.nan  # of a signal meanwhile
+    start: float  # s, first instant at which it holds
+    end: float  # s, first instant at which it no longer holds; while it holds, the last instant so far
+    least: float = np.nan  # least value of a signal in the span
 
 
 class Spans:
-    """Finds when a condition holds, from one block of rows to the next.
+    """Finds the spans in which a condition holds, from one block of rows to the next.
 
     Attributes
     ----------
     open : Span or None
-        The one that has not ended.
+        The span that has not ended.
     """
 
     def __init__(self) -> None:
         self.open: Span | None = None
 
     def add(self, flags: Flags, time: Array, signal: Array | None = None) -> list[Span]:
-        """Take the next rows, and return the spans that end among them.
+        """Add the next rows, and return the spans that end in them.
 
         Parameters
         ----------
@@ -43,7 +43,7 @@ class Spans:
         time : ndarray, shape (rows,)
             [s].
         signal : ndarray, shape (rows,), optional
-            Of which each span gets the least.
+            Signal whose least value each span gets.
         """
         ended = []
         edges = np.flatnonzero(np.diff(flags, prepend=self.open is not None)).tolist()
@@ -63,7 +63,7 @@ class Spans:
 
 
 def spans(flags: Flags, time: Array) -> list[tuple[float, float]]:
-    """Return when a condition held, as pairs of the first instant in and the first out.
+    """Return the spans in which a condition holds, from the first instant in to the first one out.
 
     Parameters
     ----------

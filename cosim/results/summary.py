@@ -1,4 +1,4 @@
-"""What a run comes to: numbers from its record alone."""
+"""The summary of a run: numbers that are computed from its record alone."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from cosim.results.spans import Span, Spans
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
-SETTLED_FOR = 10.0  # s, that the vehicle must be inside at the end
+SETTLED_FOR = 10.0  # s, least time in the goal at the end of a run that counts as settled
 
-_ADDED = 2**18  # numbers that are added up at once
+_ADDED = 2**18  # numbers that are summed at once
 
 _FORCE = [f"actuation.{axis}" for axis in "XYZ"]
 _ASKED = [f"command.{axis}" for axis in "XYZ"]
@@ -27,25 +27,25 @@ _ESTIMATE = [f"estimate.phi{i}" for i in range(1, 5)]
 
 
 def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | None) -> dict[str, Any]:
-    """Return the summary of a run.
+    """Summarise a run.
 
     Parameters
     ----------
     scenario : Scenario
-        What was run.
+        The scenario of the run.
     record : Rows
-        What it left, at least one row.
+        Record of the run, with at least one row.
     status : str
         ``"completed"``, ``"interrupted"``, ``"killed"``, or ``"failed: ..."``.
     wall_time : float or None
-        What the stepping took [s], if that is known.
+        Wall-clock time of the stepping [s], if it is known.
 
     Returns
     -------
     dict
-        Ready for JSON; times in s, lengths in m, forces in N. Clearances are distances to a region's surface where that
-        was then, or angles [rad] for regions of attitude; positive where it is respected, negative where it is violated
-        (inside a region that is to be kept out of).
+        For JSON; times in s, lengths in m, forces in N. Clearances are distances to the surface of a region at its
+        position at that time, or angles [rad] for regions of attitude; positive where it is respected, negative where
+        it is violated (inside a region to keep out of).
 
     Raises
     ------
@@ -56,10 +56,10 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
     """
     names = [secondary.region.name for secondary in scenario.regions]
     begun = record.take(range(min(2, len(record))), ["time", *(f"{name}.clearance" for name in names)])
-    # of the record, which may be thinned out
+    # of the record, which may have fewer rows than the run had steps
     period = float(begun["time"][1] - begun["time"][0]) if len(begun) > 1 else scenario.time.step
     course = _Course(names, scenario, record, period)
-    with np.errstate(over="ignore", invalid="ignore"):  # of a damaged record: a norm too great is infinite
+    with np.errstate(over="ignore", invalid="ignore"):  # a damaged record: norms that overflow are infinite
         for block in record.blocks(course.signals):
             course.add(block)
     visits, last = course.visits, course.last
@@ -107,7 +107,7 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
 
 
 class _Course:
-    """What a summary needs of a record, gathered block by block."""
+    """Data for a summary, collected from a record block by block."""
 
     def __init__(self, names: Sequence[str], scenario: Scenario, record: Rows, period: float) -> None:
         self._clearances = [f"{name}.clearance" for name in names]
@@ -120,30 +120,30 @@ class _Course:
             *self._weights, *self._flags, *(["goal.place"] if scenario.goal_then else []),
         ]  # fmt: skip
         self._last_place = len(scenario.goal_then)
-        # rows that come; the last row of a whole run decides, but acts no more
+        # rows with acting forces that are left: the forces of a complete run's last row do not act
         self._acting = math.ceil(scenario.steps / max(1, round(period / scenario.time.step)))
-        # extremes are of the numbers that there are: fmin and fmax pass over what is none
+        # fmin and fmax ignore NaN
         self.least: dict[str, float] = {}
         self.greatest: dict[str, float] = {}
         self.force, self.violation, self.saturated = _Sum(), _Sum(), 0
         self._priorities = np.array([secondary.priority for secondary in scenario.regions])
         self.inside, self._overlap = Spans(), Spans()
-        self._visits: list[Span] = []  # the first and the last that ended
+        self._visits: list[Span] = []  # the first and the last visit of the goal that ended
         self._windows: list[Span] = []
         self.last: dict[str, float] = {}
 
     @property
     def visits(self) -> list[Span]:
-        """The first and the last times within the goal."""
+        """The first and the last span within the goal."""
         return [*self._visits, *([self.inside.open] if self.inside.open else [])]
 
     @property
     def windows(self) -> list[Span]:
-        """All times within the overlap of the regions."""
+        """All spans within the overlap of the regions."""
         return [*self._windows, *([self._overlap.open] if self._overlap.open else [])]
 
     def add(self, block: Rows) -> None:
-        """Take the next rows."""
+        """Add the next rows."""
         time, goal = block["time"], block["goal.clearance"]
         if self._last_place:
             goal = np.where(block["goal.place"] == self._last_place, goal, np.nan)
@@ -180,7 +180,7 @@ class _Course:
 
 
 class _Sum:
-    """A sum that does not depend on the blocks in which numbers come: of so many at once, as NumPy adds them up."""
+    """A sum that does not depend on block sizes: NumPy sums a fixed count of numbers at once."""
 
     def __init__(self) -> None:
         self._waiting: Array = np.empty(_ADDED)
@@ -196,5 +196,5 @@ class _Sum:
                 self._total, self._filled = self.total(), 0
 
     def total(self) -> float:
-        """Return the sum of all numbers that came."""
+        """Return the sum of all added numbers."""
         return self._total + float(self._waiting[: self._filled].sum())

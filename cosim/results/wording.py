@@ -1,4 +1,4 @@
-"""What a run was asked and what happened, in sentences."""
+"""Sentences about a run: its task and its outcome."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ IMPORTED = "imported"  # the status of a log's run
 
 
 def newtons(force: float) -> str:
-    """Return a force [N] in four digits, such as ``26.82 kN``.
+    """Format a force [N] with four digits, such as ``26.82 kN``.
 
     Parameters
     ----------
@@ -29,12 +29,12 @@ def newtons(force: float) -> str:
 
 
 def asked(scenario: Scenario) -> str:
-    """Return what the vehicle was asked to do, in a sentence.
+    """Describe the task of the vehicle in a sentence.
 
     Parameters
     ----------
     scenario : Scenario
-        What is run.
+        The scenario of the run.
 
     Returns
     -------
@@ -57,12 +57,12 @@ def asked(scenario: Scenario) -> str:
 
 
 def kind_of(shape: Shape) -> str:
-    """Return what a shape is called, such as ``depth band``.
+    """Return the name of a shape, such as ``depth band``.
 
     Parameters
     ----------
     shape : Shape
-        What is named.
+        The shape.
 
     Returns
     -------
@@ -73,19 +73,19 @@ def kind_of(shape: Shape) -> str:
 
 
 def number(value: float, digits: int) -> str:
-    """Return a number as it is read.
+    """Format a number for readers.
 
     Parameters
     ----------
     value : float
-        What is written.
+        The number.
     digits : int
         Significant digits.
 
     Returns
     -------
     str
-        With a true minus sign; ``no number`` where it is none.
+        With the sign U+2212 for minus; ``no number`` for NaN and infinity.
     """
     if not math.isfinite(value):
         return "no number"
@@ -95,12 +95,12 @@ def number(value: float, digits: int) -> str:
 
 
 def verdict(summary: dict[str, Any]) -> str:
-    """Return what happened, in a sentence or two.
+    """Describe the outcome of a run in a few sentences.
 
     Parameters
     ----------
     summary : dict
-        What the run came to.
+        Summary of the run.
 
     Returns
     -------
@@ -142,7 +142,7 @@ def verdict(summary: dict[str, Any]) -> str:
 
 
 def _of_commands(summary: dict[str, Any]) -> str:
-    """Return what the commands of a log ask for."""
+    """Describe the forces that the commands of a log ask for."""
     force = summary["max_force_asked"]
     if not math.isfinite(force):
         return " It has no commands."
@@ -150,7 +150,7 @@ def _of_commands(summary: dict[str, Any]) -> str:
 
 
 def _broken(summary: dict[str, Any], name: str) -> str:
-    """Return by how much a region was violated."""
+    """Describe how deep a region was violated."""
     remarks = ["soft"] if name not in summary["hard"] else []
     remarks += ["where it starts"] if name in summary["violated_at_start"] else []
     depth, unit = -summary["min_clearance"][name], summary["clearance_unit"][name]

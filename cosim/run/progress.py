@@ -1,4 +1,4 @@
-"""Progress on standard error: a bar, and a line where something is compiled first."""
+"""Progress on standard error: a bar, and a line when code is compiled at its first use."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ WORDS = "compiling the law and what it needs (first use)"
 
 
 class ProgressBar:
-    """A bar, if there is a terminal.
+    """Progress bar, shown if standard error is a terminal.
 
     Parameters
     ----------
     shown : bool
-        Whether there is to be one at all.
+        False: never show it.
     bar_format : str
         As for tqdm.
     **options
@@ -30,15 +30,15 @@ class ProgressBar:
         self._bar = tqdm(bar_format=bar_format, disable=None if shown and sys.stderr else True, **options)
 
     def update(self, n: float) -> None:
-        """Move it on by so much."""
+        """Advance the bar by `n`."""
         self._bar.update(n)
 
     def update_to(self, n: float) -> None:
-        """Move it on to a place, to its end at the most."""
+        """Advance the bar to `n`, at most to its total."""
         self._bar.update(min(n, self._bar.total) - self._bar.n)
 
     def close(self) -> None:
-        """Leave it as it is. May be called twice."""
+        """End the bar, and leave it as it is. May be called twice."""
         self._bar.close()
 
     def __enter__(self) -> ProgressBar:
@@ -49,28 +49,28 @@ class ProgressBar:
 
 
 class _Notice(logging.Handler):
-    """Says once that something is compiled."""
+    """Shows one notice at the first compilation."""
 
     def __init__(self, tell: Callable[[str], None]) -> None:
         super().__init__()
-        self._tell, self._announced = tell, False
+        self._show, self._announced = tell, False
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Say it, beside a bar if there is one."""
+        """Show the notice once; a progress bar is redrawn below it."""
         if not self._announced:
             self._announced = True
             with tqdm.external_write_mode(file=sys.stderr):
-                self._tell(WORDS)
+                self._show(WORDS)
 
 
 @contextlib.contextmanager
 def announce_compilation(tell: Callable[[str], None]) -> Iterator[None]:
-    """Say once if something is compiled within a block.
+    """Show one notice if code is compiled within a block.
 
     Parameters
     ----------
     tell : callable
-        Says a line.
+        Shows a line to the user.
     """
     notice, logger = _Notice(tell), logging.getLogger("controller.compiling.first_use")
     before = logger.level

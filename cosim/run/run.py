@@ -23,17 +23,17 @@ from cosim.simulation.master import Master, Observer
 from cosim.simulation.signals import Array
 from plant_fmu import PlantError
 
-if TYPE_CHECKING:  # pymavlink and websockets wait until a run is shown
+if TYPE_CHECKING:  # pymavlink and websockets are imported only for runs that need them
     from cosim.live.view import LiveView
     from cosim.mavlink.setup import Mavlink
     from cosim.mavlink.thread import LinkThread
 
-_PROGRESS_STEPS = 200  # times that the bar moves
+_PROGRESS_STEPS = 200  # updates of the bar
 
 
 @dataclass(frozen=True)
 class _Together:
-    """Observer that stands for several."""
+    """Observer that passes each row to several observers."""
 
     observers: Sequence[Observer]
 
@@ -43,7 +43,7 @@ class _Together:
 
 
 class _Progress:
-    """Observer that moves a bar on a terminal, and is quiet elsewhere."""
+    """Observer that updates a progress bar on a terminal."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._every = max(1, scenario.steps // _PROGRESS_STEPS)
@@ -75,37 +75,37 @@ def run_scenario(
 ) -> Run:
     """Run a scenario and write its folder.
 
-    A command to reset ends the run and begins it again, in a folder of its own.
+    A command to reset ends the run and begins another one in a new folder.
 
     Parameters
     ----------
     scenario : Scenario
-        What to run.
+        The scenario of the run.
     out : str or Path, optional
-        The run folder; it must not exist, or be empty. Default: a new one below ``runs``. After a reset it is the same
-        name with a number.
+        The run folder; it must not exist, or be empty. Default: a new one below ``runs``. Runs after a reset add a
+        number to the name.
     mavlink : Mavlink, optional
-        Where to be a MAVLink vehicle.
+        MAVLink setup of the run as a vehicle; default: no link.
     rate : float, optional
-        Simulated seconds a wall-clock second at the most.
+        Greatest number of simulated seconds per wall-clock second; default: no limit.
     progress : bool
         Show a bar, if there is a terminal.
     report : bool
         Write the report and its figures.
     commands_log : Path, optional
-        The log of an earlier run, whose commands are repeated; then none are taken from the link or from viewers.
+        Log of commands of an earlier run, which is replayed; link and viewers then cannot send commands.
     live : LiveView, optional
-        Shows the run while it goes on, and takes commands if the scenario's commands are enabled.
+        Shows the run in browsers, and takes their commands if the scenario's commands are enabled.
     law : Law, optional
-        One's own, such as a `FunctionLaw`, in the place of the scenario's. The run folder says where it is from, and
-        cannot hold it: the run is repeated from where the law is.
+        Custom law, such as a `FunctionLaw`, instead of the scenario's. The run folder holds its name, not its code:
+        repeating the run needs the law again.
     overwrite : bool
-        Replace a run that `out` holds; a folder that holds anything else is refused.
+        Replace the run in `out`; a folder with any other content is refused.
 
     Returns
     -------
     Run
-        The last one. Its ``status`` is ``"completed"``, or ``"interrupted"`` after Ctrl-C, which leaves a readable run.
+        The last run. Its ``status`` is ``"completed"``, or ``"interrupted"`` after Ctrl-C, which leaves a readable run.
 
     Raises
     ------
@@ -114,13 +114,13 @@ def run_scenario(
     TelemetryError
         If the link cannot be opened.
     ScenarioError
-        If the scenario asks for what a law of one's own has not.
+        If the scenario needs a feature that a custom law lacks.
     BuildError, LawError, DefinitionError
         If plant, law or arbiter cannot be set up.
     LawError
-        If a law of one's own returns no forces; what was recorded until then is left readable.
+        If a custom law returns no forces; the record until then stays readable.
     PlantError
-        If the FMU refuses the scenario, or fails in a step; what was recorded until then is left readable.
+        If the FMU refuses the scenario, or fails in a step; the record until then stays readable.
 
     Examples
     --------
@@ -171,7 +171,7 @@ def run_scenario(
 
 
 def _desk(scenario: Scenario, recorded: ReplayedCommands | None, queue: CommandQueue) -> CommandQueue | str:
-    """Return where viewers' commands go, or why there are none."""
+    """Return the queue for viewers' commands, or the reason why they are refused."""
     if recorded:
         return "this run repeats the commands of a log and takes no others"
     return queue if scenario.commands.enabled else "commands are off: start with --commands"
@@ -194,7 +194,7 @@ def _step(
     rate: float | None,
     progress: bool,
 ) -> tuple[str, float, PlantError | LawError | None]:
-    """Step through the run and close its record; return how it ended, what it took [s], and why it failed."""
+    """Step through the run and close its record; return status, wall time [s] and error."""
     status = "completed"
     failure: PlantError | LawError | None = None
     recorder: Recorder | None = None

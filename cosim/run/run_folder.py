@@ -1,4 +1,4 @@
-"""Run folders: claimed by one run, concluded with summary, report and replay, or left as if nothing had been."""
+"""Run folders: claim one for a run, write summary, report and replay, or remove it if nothing was recorded."""
 
 from __future__ import annotations
 
@@ -29,25 +29,25 @@ class RunFolder:
     """A folder that belongs to one run."""
 
     path: Path
-    created: bool  # by the run, not by its user
+    created: bool  # True if the run made the folder, False if it existed and was empty
 
     def keep(self, recorder: Recorder | None) -> bool:
-        """Close the record of a run; take all away where there is nothing to read, or room for nothing.
+        """Close the record of a run; without any rows, remove all files of the run.
 
         Parameters
         ----------
         recorder : Recorder or None
-            Of the run, if it came so far.
+            Of the run; None if it failed before recording.
 
         Returns
         -------
         bool
-            Whether the folder holds a record.
+            True if the folder holds a record.
 
         Raises
         ------
         OSError
-            If the record cannot be written; what parts of it there are stay.
+            If the record cannot be written; parts that were written stay.
         """
         if recorder is None or not recorder.rows:
             self.discard()
@@ -61,31 +61,31 @@ class RunFolder:
         return True
 
     def discard(self) -> None:
-        """Take away all that a run without a record has made. May be called twice."""
+        """Remove all files of a run without a record. May be called twice."""
         for name in (SCENARIO, VEHICLE_COPY, COMMANDS_LOG, IMPORT, RECORD):
             (self.path / name).unlink(missing_ok=True)
         shutil.rmtree(self.path / PARTS, ignore_errors=True)
         if self.created:
-            with contextlib.suppress(OSError):  # its user has put something there
+            with contextlib.suppress(OSError):  # the folder is not empty: its user has put files there
                 self.path.rmdir()
 
 
 def claim(out: Path | None, scenario: Scenario, overwrite: bool = False) -> RunFolder:
-    """Make the folder of a run and put the scenario into it.
+    """Create the folder of a run and write the scenario into it.
 
     Parameters
     ----------
     out : Path or None
-        A folder that does not exist or is empty; None for a new one of a name of its own below ``runs``.
+        A folder that does not exist or is empty; None for a new one below ``runs``, named by scenario and time.
     scenario : Scenario
-        What will be run.
+        The scenario of the run.
     overwrite : bool
-        Remove the run that the folder holds.
+        Remove an earlier run from the folder.
 
     Returns
     -------
     RunFolder
-        No other run has it.
+        Claimed: other runs refuse it.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def claim(out: Path | None, scenario: Scenario, overwrite: bool = False) -> RunF
                 file.write(scenario.toml(VEHICLE_COPY if scenario.vehicle_file else None))
             if scenario.vehicle_file:
                 shutil.copyfile(scenario.vehicle_file, path / VEHICLE_COPY)
-        except FileExistsError as error:  # another run came in between
+        except FileExistsError as error:  # another run has claimed the folder meanwhile
             raise RunError(f"{path}: is taken by another run") from error
         except BaseException:
             folder.discard()
@@ -121,7 +121,7 @@ def claim(out: Path | None, scenario: Scenario, overwrite: bool = False) -> RunF
 
 
 def _remove_run(path: Path) -> None:
-    """Remove what a run has made in its folder, and raise a RunError if the folder holds anything else."""
+    """Remove the files of a run from its folder; raise a RunError if the folder holds any other file."""
     made = {SCENARIO, VEHICLE_COPY, COMMANDS_LOG, IMPORT, RECORD, PARTS, SUMMARY, REPORT, REPLAY, FIGURES}
     odd = sorted(file.name for file in path.iterdir() if file.name not in made and not file.match("report*.*"))
     if odd or not (path / SCENARIO).is_file():
@@ -154,11 +154,11 @@ def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | Non
     path : Path
         The run folder.
     scenario : Scenario
-        What was run.
+        The scenario of the run.
     status : str
-        How it ended.
+        ``completed``, ``interrupted``, ``reset``, or ``failed:`` with the error.
     wall_time : float or None
-        What the stepping took [s].
+        Wall-clock time of the stepping [s].
     report : bool
         Write the report with its figures and the replay too.
 
@@ -178,26 +178,26 @@ def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | Non
 
 
 def report_again(path: Path, formats: Collection[str] = ("html",)) -> tuple[dict[str, Any], list[Path]]:
-    """Write summary and report of a run that is done, was interrupted, or was killed.
+    """Write summary and report of a run that was completed, interrupted or killed.
 
     Parameters
     ----------
     path : Path
         The run folder.
     formats : collection of str
-        What to write the report as, as in `write_report`; with ``html`` the replay comes too.
+        Formats of the report, as in `write_report`; ``html`` includes the replay.
 
     Returns
     -------
     dict, list of Path
-        The summary, and the files that were written, the report first.
+        The summary, and the written files, the report first.
 
     Raises
     ------
     RunError
         If the folder holds no run that can be read, or cannot be written.
     ScenarioError
-        If its scenario is none.
+        If its scenario is invalid.
     """
     run = load_run(path)
     try:

@@ -1,4 +1,4 @@
-"""The rules that weigh a scenario's criteria: by their order, or of a file whose inputs are named signals."""
+"""The arbiter's rules of a scenario: by the order of the criteria, or from a file whose inputs are named signals."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MAX_INPUTS = 32
 
 Kind = Literal["given", "time", "depth", "speed", "membership", "clearance", "closing_speed", "approach_time"]
 VEHICLE: dict[str, str] = {"time": "s", "depth": "m", "speed": "m/s"}  # signals of the vehicle, and their units
-OF_REGIONS: dict[str, tuple[str, str]] = {  # of a region, or the goal; the second unit is that of regions of attitude
+OF_REGIONS: dict[str, tuple[str, str]] = {  # signals of a region or the goal; second: unit for regions of attitude
     "clearance": ("m", "rad"),
     "closing_speed": ("m/s", "rad/s"),
     "approach_time": ("s", "s"),
@@ -32,31 +32,31 @@ OF_REGIONS: dict[str, tuple[str, str]] = {  # of a region, or the goal; the seco
 
 @dataclass(frozen=True)
 class InputSignal:
-    """What an input of the rules gets."""
+    """Source of an input of the rules."""
 
     name: str  # of the input
     kind: Kind
-    of: int = 0  # criterion; or region, 0 for the goal
+    of: int = 0  # index of the criterion; or of the region, 0 for the goal
     unit: str = ""
-    course: tuple[tuple[float, float], ...] = ()  # s, value: of a given one; straight between, held beyond
-    what: str = ""  # in words
+    course: tuple[tuple[float, float], ...] = ()  # s, value: points of a given signal, linear between, constant beyond
+    what: str = ""  # description
 
 
 @dataclass(frozen=True)
 class ArbiterRules:
-    """How criteria are weighed."""
+    """Rules by which the criteria get their weights."""
 
     system: System  # one output for each criterion, in their order
     inputs: tuple[InputSignal, ...]  # one for each input
 
 
 def read_rules(setup: ArbiterSetup) -> ArbiterSetup:
-    """Return the setup with the text of its file, which is read unless it is there, and the file's own name.
+    """Return the setup with the text of its rule file, read if missing, and the file's name without folder.
 
     Raises
     ------
     ScenarioError
-        If there is no such file, or it is no text for people.
+        If there is no such file, or it is not a text of rules.
     """
     if not setup.file:
         if setup.text:
@@ -75,7 +75,7 @@ def read_rules(setup: ArbiterSetup) -> ArbiterSetup:
 
 def _text(path: Path) -> str:
     try:
-        if path.exists() and not path.is_file():  # to open a pipe would wait for its other end
+        if path.exists() and not path.is_file():  # opening a pipe would block
             raise ScenarioError(f"arbiter.file: {path} is a folder, a pipe or a device, expected a file")
         with path.open("rb") as file:
             return file.read(4 * MAX_TEXT + 1).decode("utf-8").removeprefix("\ufeff").replace("\r\n", "\n")
@@ -88,21 +88,21 @@ def _text(path: Path) -> str:
 def check_rules(
     setup: ArbiterSetup, criteria: tuple[CriterionSetup, ...], regions: Sequence[SecondaryRegion]
 ) -> ArbiterRules:
-    """Return the rules of an arbiter whose file has been read.
+    """Return the checked rules of an arbiter, whose file has been read.
 
     Parameters
     ----------
     setup : ArbiterSetup
-        Of `read_rules`.
+        From `read_rules`.
     criteria : tuple of CriterionSetup
-        Each needs a weight.
+        The criteria, each of which needs an output.
     regions : sequence of SecondaryRegion
-        That signals may be of.
+        Regions that signals may refer to.
 
     Raises
     ------
     ScenarioError
-        If an input has no signal, a criterion no output, or a weight may be none.
+        If an input has no signal, a criterion has no output, or an output may be without a value.
     """
     if not setup.file:
         if setup.inputs:
@@ -134,7 +134,7 @@ def check_rules(
 
 @functools.lru_cache(maxsize=8)
 def _system(file: str, text: str, criteria: tuple[str, ...], points: int) -> System:
-    """Return the system of a file: its outputs in the order of the criteria, its inputs clipped."""
+    """Parse the system of a file; sort its outputs in the order of the criteria, and clip its inputs."""
     try:
         system = reads(text, Path(file).suffix.lower().removeprefix("."))
         if len(system.inputs) > MAX_INPUTS:
@@ -158,7 +158,7 @@ def _system(file: str, text: str, criteria: tuple[str, ...], points: int) -> Sys
 
 
 def _require_weights(file: str, system: System) -> None:
-    """Refuse a system of which some output may be outside [0, 1], or none at all."""
+    """Raise a ScenarioError if an output may be outside [0, 1], or may have no value."""
     for output in system.outputs:
         low, high = output.universe
         if system.normalization == "none" and not 0.0 <= low < high <= 1.0:
@@ -175,12 +175,12 @@ def _require_weights(file: str, system: System) -> None:
 
 
 def _always_fires(arbiter: Arbiter) -> bool:
-    """Return whether it is proved that each output has a rule that fires, for all inputs."""
+    """Return True if it is proved that for all inputs each output has a rule that fires."""
     if arbiter.engine == "closed":
         return True
     try:
         return bool(arbiter.verify().graded_complete)
-    except ArbiterError:  # of terms that no proof is known of
+    except ArbiterError:  # terms that the proof does not cover
         return False
 
 
@@ -226,7 +226,7 @@ def _require_known(name: str, known: dict[str, Any], key: str, value: str, what:
 
 
 def _course(value: Any, key: str) -> tuple[tuple[float, float], ...]:
-    """Return the course of a given signal: a number for all times, or points of time [s] and value."""
+    """Parse the course of a given signal: a constant, or points of time [s] and value."""
     points = value if isinstance(value, list | tuple) else [[0.0, value]]
     good = bool(points) and all(isinstance(point, list | tuple) and len(point) == 2 for point in points)
     if not (good and all(_is_finite(x) for point in points for x in point)):

@@ -1,4 +1,4 @@
-"""What was changed in a scenario since its title was written, and the title that says so."""
+"""Changes of a scenario since its title was written, and the title that lists them."""
 
 from __future__ import annotations
 
@@ -14,27 +14,26 @@ from plant_fmu.errors import one_line
 from plant_fmu.toml_tables import hint
 from plant_fmu.vehicle import Vehicle
 
-# what no title speaks of: the texts beside it, what is recorded and reported, what may be commanded from outside;
-# seeds, and the text of a file that has a name
+# keys that no title lists: texts, recording, reporting and commands; seeds, and the text of a named file
 _BESIDE = ("title", "changed", "compare", "intersection", "record", "commands")
 _SILENT = ("sensing.seed", "plant.parameters.seed", "arbiter.text")
 _NAMED = 3  # changes that a title spells out
 
 
 def changed_keys(before: dict[str, Any], after: dict[str, Any], vehicle: Vehicle) -> tuple[str, ...]:
-    """List the keys in which a scenario differs from another, without those that no title speaks of.
+    """List the keys in which a scenario differs from another, without those that no title lists.
 
     Parameters
     ----------
     before, after : dict
         Tables of scenarios, defaults filled in.
     vehicle : Vehicle
-        Of the latter.
+        Vehicle of `after`.
 
     Returns
     -------
     tuple of str
-        With dots, as ``--set`` takes them; where lists or shapes are of another kind, the key of the whole.
+        With dots, as for ``--set``; the key of the whole list or shape if its length or type differs.
     """
     known = known_parameters(vehicle)
     one, other = (
@@ -42,7 +41,7 @@ def changed_keys(before: dict[str, Any], after: dict[str, Any], vehicle: Vehicle
         for table in (before, after)
     )
     law = other["law"]["name"]
-    if law in LAWS and law != one["law"]["name"]:  # its own gains are no change of those of the law before
+    if law in LAWS and law != one["law"]["name"]:  # gains are compared with the new law's defaults
         one["law"] = one["law"] | {"gains": LAWS[law].gains_type()._asdict()}
     return joined((), differing_keys(one, other))
 
@@ -52,15 +51,15 @@ def differing_keys(before: Any, after: Any, path: str = "") -> Iterator[str]:
 
     Parameters
     ----------
-    before, after : dict, or what stands at a key of one
+    before, after : dict, or a value in one
         Of tables, lists, texts and numbers.
     path : str
-        Key that leads there.
+        Key of `before` and `after`.
 
     Yields
     ------
     str
-        With dots; items of lists by name where they have one.
+        With dots; items of lists by name if they have one.
     """
     if isinstance(before, dict) and isinstance(after, dict):
         if before.get("type") == after.get("type") and (not path or before.keys() <= after.keys()):
@@ -82,14 +81,14 @@ def differing_keys(before: Any, after: Any, path: str = "") -> Iterator[str]:
 
 
 def joined(before: Sequence[str], more: Iterable[str]) -> tuple[str, ...]:
-    """Return keys and more of them, each once, without those that no title speaks of.
+    """Join two lists of keys, each key once, without those that no title lists.
 
     Parameters
     ----------
     before : sequence of str
-        The first ones.
+        The first keys.
     more : iterable of str
-        The others.
+        Further keys.
 
     Returns
     -------
@@ -101,20 +100,20 @@ def joined(before: Sequence[str], more: Iterable[str]) -> tuple[str, ...]:
 
 
 def value_at(table: dict[str, Any], key: str, vehicle: Vehicle) -> Any:
-    """Return what a scenario has at a key.
+    """Return the value of a scenario's key.
 
     Parameters
     ----------
     table : dict
         Of the scenario, defaults filled in.
     key : str
-        As ``--set`` takes it.
+        As for ``--set``.
     vehicle : Vehicle
         Of the scenario.
 
     Returns
     -------
-    float, or whatever stands there
+    float, text, list or table
         In the key's own unit.
 
     Raises
@@ -132,7 +131,7 @@ def value_at(table: dict[str, Any], key: str, vehicle: Vehicle) -> Any:
 
 
 def shown_title(table: dict[str, Any], vehicle: Vehicle, law: str) -> str:
-    """Return the title of a scenario, with what was changed since it was written, and whose law flies if none of ours.
+    """Return the title of a scenario with the changes since it was written, and the law if it is not a built-in one.
 
     Parameters
     ----------
@@ -141,7 +140,7 @@ def shown_title(table: dict[str, Any], vehicle: Vehicle, law: str) -> str:
     vehicle : Vehicle
         Of the scenario.
     law : str
-        That flies it.
+        Name of the law that flies it.
 
     Returns
     -------
@@ -157,7 +156,7 @@ def shown_title(table: dict[str, Any], vehicle: Vehicle, law: str) -> str:
 
 
 def _setting(table: dict[str, Any], key: str, vehicle: Vehicle) -> str:
-    """Return a key with its value and unit; the key alone where the value is a table, a list of such, or gone."""
+    """Format a key with its value and unit; the key alone if the value is a table, a list of tables, or missing."""
     try:
         value = vehicle.name if key == "vehicle" else value_at(table, key, vehicle)
     except ScenarioError:

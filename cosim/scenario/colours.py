@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from cosim.scenario.scenario import Scenario
 
 GOAL_COLOUR = "#009E73"  # Okabe and Ito's
-_WIDEST = 50.0 / 360.0  # turns of hue between a criterion's colour and that of a region of it
-# the regions of a criterion, in turn: part of the way to the hue that is farthest, lightness added, part of saturation
+_WIDEST = 50.0 / 360.0  # turns, greatest difference of hue between a criterion's colour and its regions'
+# for the regions of a criterion in turn: fraction of the greatest hue difference, added lightness, saturation factor
 _SHADES = (
     (0.0, 0.0, 1.0),
     (0.8, -0.08, 0.85),
@@ -29,7 +29,7 @@ def colours_of_regions(scenario: Scenario) -> list[str]:
     Parameters
     ----------
     scenario : Scenario
-        Whose regions they are.
+        The scenario with the regions.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def _shade(colour: str, others: Sequence[str], place: int) -> str:
     if place == 0:
         return colour
     (part, lighter, full), (hue, lightness, saturation) = _SHADES[place], _hls(colour)
-    # to either side as far as half the way to the next colour, and to the wider side
+    # at most half the hue difference to the next colour, on the side where that is farther
     apart = [(_hls(other)[0] - hue) % 1.0 for other in others]
     up, down = min(apart), min(1.0 - turn for turn in apart)
     wide = min(_WIDEST, 0.5 * up) if up > down else -min(_WIDEST, 0.5 * down)

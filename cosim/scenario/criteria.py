@@ -1,4 +1,4 @@
-"""The criteria of a scenario, in the order of their priority: what pages, columns and the arbiter know of them."""
+"""The criteria of a scenario in the order of their priority: names, colours and membership functions."""
 
 from __future__ import annotations
 
@@ -18,35 +18,35 @@ from fuzzy_arbiter.shapes import Membership
 from plant_fmu.toml_tables import hint
 
 Quantity = Literal["ramp", "clearance", "angle", "approach_time"]
-QUANTITIES: dict[str, str] = {  # what a membership may be of, and the unit that its numbers are in
+QUANTITIES: dict[str, str] = {  # argument of a membership function, and its unit
     "ramp": "m, rad",
     "clearance": "m",
     "angle": "rad",
     "approach_time": "s",
 }
 MAX_CRITERIA = 16
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,23}")  # part of a column's name, and a variable in every format of rules
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,23}")  # valid in column names, and as a variable in all formats of rules
 _COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
-# of criteria without one: Okabe and Ito's purple, then muted ones of Tol's
+# for criteria without a colour: Okabe and Ito's purple, then muted ones of Tol's
 _COLOURS = ("#CC79A7", "#882255", "#44AA99", "#999933", "#332288", "#88CCEE", "#AA4499", "#117733")
 _PAPER = {criterion.name: criterion for criterion in SECTION_VI}
 
 
 @dataclass(frozen=True)
 class Reason:
-    """Why a criterion may ask for attention: how far a region is, or how soon it will be met."""
+    """One membership function of a criterion, of a region's distance or its time to contact."""
 
     quantity: Quantity
-    term: Membership | None  # degree by the quantity; None for a ramp
+    term: Membership | None  # membership function of the quantity; None for a ramp
     ramp: float | None = None  # m or rad, width of a ramp; None for the arbiter's
 
     def is_of(self, region: SecondaryRegion) -> bool:
-        """Return whether it is of such a region: a clearance is of regions in space, an angle of those of attitude."""
+        """Return True if it applies to a region: clearance to regions in space, angle to those of attitude."""
         other = "clearance" if of_attitude(region.region.shape) else "angle"
         return self.quantity != other
 
     def words(self, width: float) -> str:
-        """Return it in words; `width` is that of the arbiter's ramp [m or rad]."""
+        """Describe it in words; `width` is that of the arbiter's ramp [m or rad]."""
         if self.term is None:
             return f"within {width if self.ramp is None else self.ramp:g} m or rad"
         unit = QUANTITIES[self.quantity]
@@ -55,27 +55,27 @@ class Reason:
 
 @dataclass(frozen=True)
 class CriterionSetup:
-    """What regions may ask attention for."""
+    """A checked criterion."""
 
     name: str
     colour: str  # #RRGGBB
-    reasons: tuple[Reason, ...]  # the strongest counts
+    reasons: tuple[Reason, ...]  # the greatest membership is used
 
     @property
     def fuzzy(self) -> Criterion:
-        """The same as an input of an arbiter, which is the degree itself."""
+        """The criterion as an input of an arbiter, whose value is the membership."""
         return _PAPER.get(self.name) or Criterion(self.name, on="pressing", off="satisfied")
 
 
 def check_criteria(
     entries: tuple[CriterionEntry, ...],
 ) -> tuple[tuple[CriterionEntry, ...], tuple[CriterionSetup, ...]]:
-    """Return the entries with what was left out filled in, and the criteria, the first in priority first.
+    """Check the criteria; return the entries with defaults filled in, and the criteria by descending priority.
 
     Raises
     ------
     ScenarioError
-        At the first key that cannot be.
+        At the first invalid key.
     """
     if not 1 <= len(entries) <= MAX_CRITERIA:
         raise ScenarioError(f"criteria: {len(entries)} came, expected 1 to {MAX_CRITERIA}")
@@ -124,7 +124,7 @@ def _reasons(membership: dict[str, Any], key: str) -> Iterator[Reason]:
 
 
 def check_criteria_of_regions(regions: Sequence[SecondaryRegion], criteria: Sequence[CriterionSetup]) -> None:
-    """Raise `ScenarioError` unless each region has a criterion, and this has a reason that is of it."""
+    """Raise `ScenarioError` unless each region has a criterion with a reason that applies to it."""
     known = {criterion.name: criterion for criterion in criteria}
     for region in regions:
         key, name = f"regions.{region.region.name}.criterion", region.criterion

@@ -1,10 +1,10 @@
-"""What a path through a soft region costs: by the arbiter, which is asked which of two criteria it would give up.
+"""Costs of paths through soft regions, computed from the arbiter's preference between pairs of criteria.
 
-A planner chooses between regions that are far from each other, and from the vehicle: the weights of the moment say
-nothing of that. So the arbiter is asked beforehand: of each pair of criteria that have soft regions, both press in
-full, and nothing else does. The share of a criterion is the mean, over the pairs that it is in, of its part of the two
-weights. A metre of path through a region, half a metre deep, costs `_EQUAL` m at a share of one half, which is what
-all get where the arbiter prefers none, and a factor `_PREFERRED` more, or less, at a share of 1, or 0.
+A planner chooses between regions that are far from each other and from the vehicle, for which the present weights do
+not hold. So the arbiter is evaluated beforehand for each pair of criteria with soft regions: both have membership 1,
+all others 0. The share of a criterion is the mean over its pairs of its part of the two weights. A metre of path
+through a region, half a metre deep, costs `_EQUAL` m at share 1/2, the share of all criteria without preference. At
+share 1 it costs `_PREFERRED` times as much, at share 0 as much less.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ _PREFERRED = 5.0
 def with_crossing_costs(
     regions: tuple[SecondaryRegion, ...], criteria: Sequence[str], rules: ArbiterRules, depth: float
 ) -> tuple[SecondaryRegion, ...]:
-    """Return regions with what a path through each costs, where it is soft.
+    """Return the regions with the crossing costs of the soft ones.
 
     Parameters
     ----------
     regions : tuple of SecondaryRegion
         Of the scenario.
     criteria : sequence of str
-        Their names, the first in priority first.
+        Names of the criteria, by descending priority.
     rules : ArbiterRules
-        That weigh them.
+        Rules that weigh the criteria.
     depth : float
-        Of the vehicle at the start [m], for rules that ask for it; its speed is 0, the time 0.
+        Of the vehicle at the start [m], for rules with this input; speed and time are 0.
     """
     soft = {r.criterion for r in regions if not r.region.hard and not of_attitude(r.region.shape)}
     if not soft:
@@ -87,7 +87,7 @@ def _input(
     of_regions: Sequence[str],
     depth: float,
 ) -> float:
-    """Return what an input gets while two criteria press in full, and the vehicle is at rest; `far` is its greatest."""
+    """Return the value of an input while the criteria `pressing` have membership 1; `far` is its upper bound."""
     if signal.kind == "membership":
         return float(criteria[signal.of] in pressing)
     if signal.kind in ("clearance", "approach_time"):  # 0: on the surface

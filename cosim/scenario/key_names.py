@@ -1,4 +1,4 @@
-"""Keys of a scenario in words, with their units, for tables and figures."""
+"""Names of a scenario's keys in words, with their units, for tables and figures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from plant_fmu.vehicle import Vehicle
 
 PARAMETERS = "plant.parameters."
 
-_WORDS = {  # where the parts of the key would not do
+_WORDS = {  # for keys whose parts make no clear name
     "time.duration": "duration",
     "time.step": "time step",
     "time.control": "control period",
@@ -36,14 +36,14 @@ _WORDS = {  # where the parts of the key would not do
     "commands.hold_radius": "radius held in",
     "commands.surface_depth": "depth when surfaced",
 }
-_AXES = {3: "xyz", 4: "wxyz", 6: "uvwpqr"}  # by how many there are
+_AXES = {3: "xyz", 4: "wxyz", 6: "uvwpqr"}  # by the length of the vector
 
 
 class KeyName(NamedTuple):
-    """What a key is called."""
+    """Name of a key in words, and its unit."""
 
     words: str
-    unit: str  # "" for a pure number, and where none is known
+    unit: str  # "" for a pure number, or if it is not known
 
     @property
     def label(self) -> str:
@@ -52,12 +52,12 @@ class KeyName(NamedTuple):
 
 
 def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
-    """Return what a key of a scenario is called.
+    """Return the name of a scenario's key.
 
     Parameters
     ----------
     key : str
-        With dots, as ``--set`` takes it; the scenario has it.
+        With dots, as for ``--set``; a key of the scenario.
     table : dict
         Of the scenario, defaults filled in.
     vehicle : Vehicle
@@ -99,7 +99,7 @@ def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
 
 
 def _of_region(name: str, region: dict[str, Any], path: list[str]) -> KeyName:
-    """Return what a key of a region is called: of its shape, or one of its own."""
+    """Return the name of a key of a region or of its shape."""
     if path[0] == "shape" and len(path) > 1:
         _, key, *places = path
         value, unit = region["shape"].get(key), unit_of_shape(region["shape"]["type"], key)

@@ -1,4 +1,4 @@
-"""What the keys of a scenario mean, and in which unit: for the reference, and for comments in a scenario's file."""
+"""Meanings and units of a scenario's keys: for the reference, and for comments in a scenario's file."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from plant_fmu.vehicle import Vehicle
 
 
 class Key(NamedTuple):
-    """What a key means, in Markdown."""
+    """Unit and meaning of a key, in Markdown."""
 
     unit: str
     meaning: str  # in a few words
-    more: str = ""  # what the reference says besides
+    more: str = ""  # addition for the reference
     default: str = ""  # in words, unless the tables have it as a value
 
 
-# by the path to the key; regions[] stands for each of them
+# by the path to the key; regions[] means each region
 KEYS = {
     "vehicle": Key("", "a shipped vehicle, or a TOML file beside the file that names it", " (with `--set`: here)"),
     "title": Key("", "one line for the report, at most 200 characters", default="the name"),
@@ -38,7 +38,7 @@ KEYS = {
     ),
     "compare": Key("", '`"paper"` puts the paper\'s claims beside the run'),
     "intersection": Key("", "names of the regions, to be kept out of, whose overlap is reported", default="all"),
-    "tell_failures": Key("", "law and allocation are told when a thruster fails"),
+    "tell_failures": Key("", "law and allocation are informed when a thruster fails"),
     "time.duration": Key("s", "of the run"),
     "time.step": Key("s", "co-simulation step; the other periods are whole multiples"),
     "time.control": Key("s", "period of the law", default="the step"),
@@ -47,7 +47,7 @@ KEYS = {
     "plant.current": Key("m/s", "velocity of the water, north east down"),
     "plant.substep": Key("s", "greatest integration step"),
     "plant.parameters": Key(
-        "", "parameters of the FMU over those of the vehicle, such as `mass` or `r_G.z`", "; the controller is not told"
+        "", "parameters of the FMU over those of the vehicle, such as `mass` or `r_G.z`", "; not for the law"
     ),
     "initial.position": Key("m", "north east down"),
     "initial.quaternion": Key("", "body to world, scalar first"),
@@ -56,7 +56,7 @@ KEYS = {
     "goal.velocity": Key("m/s", "as of a region", ", below", default="0 0 0"),
     "goal.streamed": Key("", "as of a region", ", below", default="false"),
     "goal.then": Key("m", "middles of the goal, north east down, where it is next in turn", ", below", default="none"),
-    "goal.stay": Key("s", "how long the vehicle is within the goal before the goal goes on", default="5"),
+    "goal.stay": Key("s", "time within the goal before the goal moves to its next place", default="5"),
     "law.name": Key(
         "", "one of `controller.LAWS`",
         "; naming another one than the base drops the base's gains. In the folder of a run that "
@@ -101,12 +101,12 @@ KEYS = {
         "", "`state`, with noise on position and velocity, or `sensors`",
         ": what the navigation filter makes of them, see [navigation.md](navigation.md)",
     ),
-    "sensing.position_noise": Key("m", "standard deviation of each told coordinate"),
-    "sensing.velocity_noise": Key("m/s", "the same of each told linear velocity, body frame"),
+    "sensing.position_noise": Key("m", "standard deviation of each measured coordinate"),
+    "sensing.velocity_noise": Key("m/s", "the same of each measured linear velocity, body frame"),
     "sensing.seed": Key("", "of the noise"),
-    "sensing.dead_from": Key("s", "when told position and linear velocity are lost"),
+    "sensing.dead_from": Key("s", "when measured position and linear velocity are lost"),
     "sensing.dead_for": Key("s", "for how long"),
-    "sensing.frozen": Key("", "in that time the last values are told again, instead of NaN"),
+    "sensing.frozen": Key("", "in that time the last values are held, instead of NaN"),
     "master.order": Key(
         "", "`gauss-seidel`, or `jacobi`: each part on what all had put out a step before",
         ", see [The order of a step](#the-order-of-a-step)",
@@ -120,7 +120,7 @@ KEYS = {
     ),
     "commands.await_arm": Key("", "nothing moves before it is armed", "; `--await-arm` sets it"),
     "commands.obstacles": Key("", "spheres to be kept out of that may come in while it runs; 100 at most"),
-    "commands.obstacle_radius": Key("m", "of one whose size is not told"),
+    "commands.obstacle_radius": Key("m", "of one whose size is not given"),
     "commands.obstacle_gain": Key("N", "of each, per unit of g"),
     "commands.hold_radius": Key("m", "of the sphere that the vehicle holds in, and surfaces in"),
     "commands.surface_depth": Key("m", "of that sphere's centre when it surfaces"),
@@ -129,7 +129,7 @@ KEYS = {
     "failures[].thruster": Key("", "from 1"),
     "failures[].time": Key("s", "from when on it fails"),
     "failures[].effectiveness": Key("", "part of its force that is left, 0 to 1"),
-    "failures[].stuck": Key("", "it goes on with the force that was commanded last"),
+    "failures[].stuck": Key("", "it keeps the force that was commanded last"),
     "outages": Key("", "times in which a sensor gives no samples; where sensing is through `sensors`", default="none"),
     "outages[].sensor": Key("", "`depth_sensor`, `dvl`, `imu`, `compass` or `usbl`"),
     "outages[].time": Key("s", "when it begins"),
@@ -140,8 +140,8 @@ KEYS = {
     "regions[].keep": Key("", "`in` or `out`"),
     "regions[].gain": Key("", "alpha of section VII"),
     "regions[].shape": Key("", "a shape", ", below"),
-    "regions[].velocity": Key("m/s", "north east down; the law is told"),
-    "regions[].streamed": Key("", "moved from outside while the run goes on", ", below"),
+    "regions[].velocity": Key("m/s", "north east down; the law receives it"),
+    "regions[].streamed": Key("", "moved from outside during the run", ", below"),
     "regions[].deviation": Key(
         "m", "standard deviation of its place, or three: north, east, down", ": margins of the deployable law grow"
     ),
@@ -166,27 +166,27 @@ def unit_of_shape(kind: str, key: str) -> str:
     Parameters
     ----------
     kind : str
-        Of shape, such as ``"sphere"``.
+        Type of the shape, such as ``"sphere"``.
     key : str
         Such as ``"radius"``.
 
     Returns
     -------
     str
-        Empty where it has none.
+        Empty if it has none.
     """
     return ENTRIES[kind].units.get(key, "") if kind in ENTRIES else ""
 
 
 def comments(law: str, vehicle: Vehicle) -> dict[str, str]:
-    """Return what is said of each key in a file: its unit and its meaning, as plain text.
+    """Return the comment for each key of a file: its unit and its meaning, as plain text.
 
     Parameters
     ----------
     law : str
-        Whose gains there are; what is said of them stands beside them in its source.
+        Name of the law; the comments on its gains are read from its source.
     vehicle : Vehicle
-        Whose FMU has the parameters of the plant.
+        The FMU's vehicle, with the parameters of the plant.
 
     Returns
     -------
@@ -212,7 +212,7 @@ def unit_of_gain(law: str, gain: str) -> str:
     Returns
     -------
     str
-        Empty where it has none, or none is known.
+        Empty if it has none, or if it is not known.
     """
     unit = _UNIT.match(_gain_comments(law).get(gain, ""))
     return unit[0] if unit else ""
@@ -225,5 +225,5 @@ def _comment(unit: str, meaning: str) -> str:
 def _gain_comments(law: str) -> dict[str, str]:
     try:
         return dict(_GAIN.findall(inspect.getsource(LAWS[law].gains_type)))
-    except (KeyError, OSError):  # a law of one's own; no source
+    except (KeyError, OSError):  # a custom law, or no source
         return {}

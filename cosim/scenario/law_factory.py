@@ -1,4 +1,4 @@
-"""The law of a scenario, and a law of one's own in its place."""
+"""The built-in law of a scenario, and custom laws instead of it."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from cosim.scenario.vehicle_model import vehicle_model
 
 
 def law_of(scenario: Scenario) -> CompiledLaw:
-    """Return a scenario's law, with a memory of its own.
+    """Create a scenario's law, with its own memory.
 
     Parameters
     ----------
     scenario : Scenario
-        Which law, with which gains, for which vehicle.
+        With the law's name, gains and vehicle.
 
     Returns
     -------
     CompiledLaw
-        It knows the vehicle's nominal numbers: what the scenario changes in the plant is not told.
+        With the vehicle's nominal model: it does not receive changes of the plant by the scenario.
 
     Raises
     ------
     LawError
         If it cannot be set up.
     RunError
-        If it is a law of one's own.
+        If it is a custom law.
     """
     require_builtin_law(scenario)
     return LAWS[scenario.law.name].for_vehicle(
@@ -45,7 +45,7 @@ def law_of(scenario: Scenario) -> CompiledLaw:
 
 
 def require_builtin_law(scenario: Scenario) -> None:
-    """Raise `RunError` if a scenario's law is one's own, which its file names but cannot hold."""
+    """Raise `RunError` if a scenario's law is a custom one, whose code is not in its file."""
     if scenario.law.own:
         raise RunError(
             f"law.name is {scenario.law.name!r}, a law of one's own, which no file holds: expected a run from Python, "
@@ -54,26 +54,26 @@ def require_builtin_law(scenario: Scenario) -> None:
 
 
 def with_custom_law(law: Law, scenario: Scenario) -> Scenario:
-    """Return a scenario as a law of one's own flies it.
+    """Return a scenario with a custom law.
 
     Parameters
     ----------
     law : Law
-        In the place of the scenario's.
+        The custom law.
     scenario : Scenario
         With any law.
 
     Returns
     -------
     Scenario
-        With the place that the law is from as ``law.name``, and no gains.
+        With the source of the law as ``law.name``, and no gains.
 
     Raises
     ------
     LawError
-        If it is no law, such as a function that no `FunctionLaw` is made of.
+        If it does not implement `controller.Law`, such as a plain function.
     ScenarioError
-        If the scenario asks for what goes with shipped laws alone, or for a wrench where the law drives thrusters.
+        If the scenario needs a built-in law, or applies a wrench while the law drives thrusters.
     """
     if getattr(law, "output", None) not in get_args(Output) or not callable(getattr(law, "step", None)):
         raise LawError(f"law is {qualified_name(law)}, expected a FunctionLaw, or what else fulfils controller.Law")

@@ -1,4 +1,4 @@
-"""Terms by which a criterion asks for attention: straight ones, curves and formulas."""
+"""Membership functions of criteria: piecewise linear ones, curves and formulas."""
 
 from __future__ import annotations
 
@@ -16,36 +16,36 @@ from fuzzy_arbiter.terms.kinds import KINDS
 from fuzzy_arbiter.terms.parser import Node
 from fuzzy_arbiter.terms.values import Formula
 
-_REACH = 1000.0  # m, rad or s: as far as a formula has to give degrees
-MAX_WAITING = 32  # numbers of a formula that wait for others
+_REACH = 1000.0  # m, rad or s: bound of the arguments for which a formula must give degrees
+MAX_WAITING = 32  # stack depth of a formula
 FUNCTIONS = (
     *("+", "-", "*", "/", "^", "pow", "~", "abs", "sqrt", "exp", "log", "cos", "sin", "tan"),
     *("min", "max", "lt", "le", "gt", "ge", "eq", "neq"),
 )
-"""What curves and formulas may consist of, in the words of `fuzzy_arbiter`'s expressions; ``~`` is a sign."""
+"""Functions in curves and formulas, named as in `fuzzy_arbiter`'s expressions; ``~`` is the unary minus."""
 
 
 def read_term(data: Any, of_time: bool, where: str) -> Membership:
-    """Return a term as `fuzzy_arbiter` reads it of its own files.
+    """Parse a term as in the files of `fuzzy_arbiter`.
 
     Parameters
     ----------
     data : object
-        Points, or a table of a kind and its numbers.
+        Points, or a table with a kind and its numbers.
     of_time : bool
-        Whether it is of the time to contact, which is never below 0.
+        True if its argument is the time to contact, which is never below 0.
     where : str
-        Its key, for the fault.
+        Its key, for error messages.
 
     Returns
     -------
     Membership
-        A `Shape`, a `Curve` or a `Formula`, without jumps as far as is known.
+        A `Shape`, a `Curve` or a `Formula`; shapes and curves do not jump.
 
     Raises
     ------
     ScenarioError
-        If it is none, jumps, or consists of what a run has not.
+        If it is invalid, a curve that jumps, or has functions that runs do not support.
     """
     return _read(json.dumps(data, default=str), of_time, where)
 
@@ -85,7 +85,7 @@ def _is_curve(data: Any) -> bool:
 
 
 def pieces_of(term: Membership) -> list[tuple[float, Node]]:
-    """Return where each piece of a curve or formula ends, and its arithmetic on ``x``; nothing of another term."""
+    """Return the end and the expression in ``x`` of each piece of a curve or formula; an empty list for others."""
     if isinstance(term, Curve):
         return list(zip(term.ends, term.trees, strict=True))
     return [(float("inf"), term.expression(["x"]).tree)] if isinstance(term, Formula) else []
@@ -100,14 +100,14 @@ def _waiting(tree: Node) -> int:
 
 
 def term_in_words(term: Membership, unit: str) -> str:
-    """Return a term as a reader wants it.
+    """Describe a term in words.
 
     Parameters
     ----------
     term : Membership
-        Of `read_term`.
+        From `read_term`.
     unit : str
-        Of its places.
+        Unit of its argument.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Rules that weigh criteria by their order, and what they are compared with: reversed, crisp, and no arbiter at all."""
+"""Rules by the order of the criteria, and variants for comparison: reversed, crisp, and without an arbiter."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from cosim.scenario.criteria import CriterionSetup
 from fuzzy_arbiter import Rule, Shape, System, Term, Variable, prioritised
 
 RuleVariant = Literal["ordered", "reversed", "crisp", "none"]
-_ON = Shape(((0.5 - 1e-9, 0.0), (0.5 + 1e-9, 1.0)))  # either or, but without a jump
+_ON = Shape(((0.5 - 1e-9, 0.0), (0.5 + 1e-9, 1.0)))  # crisp, but continuous
 _OFF = Shape(((0.5 - 1e-9, 1.0), (0.5 + 1e-9, 0.0)))
 
 
 @functools.lru_cache(maxsize=16)
 def rules_by_order(variant: RuleVariant, criteria: tuple[CriterionSetup, ...], points: int) -> System:
-    """Return the system that weighs criteria by their order.
+    """Make the fuzzy system that weighs criteria by their order.
 
     Parameters
     ----------
     variant : {"ordered", "reversed", "crisp", "none"}
-        As section VI of the paper weighs its three; with the last first; with memberships of 0 or 1, the nearer one;
-        or each by its input alone, which is for inputs of 1: all weights are 1 then.
+        ``ordered`` as in section VI of the paper; ``reversed`` with the order reversed; ``crisp`` with memberships
+        rounded to 0 or 1; ``none`` with each weight by its own input, which is the constant 1.
     criteria : tuple of CriterionSetup
-        The first in priority first.
+        By descending priority.
     points : int
         Samples of the outputs, for engines that sample.
 
     Returns
     -------
     System
-        Its inputs are named like the criteria; its outputs are their weights, in their order.
+        With an input named like each criterion, and its weight as output, in the order of the criteria.
     """
     fuzzy = [criterion.fuzzy for criterion in criteria]
     if variant == "reversed":

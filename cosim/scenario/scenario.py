@@ -1,4 +1,4 @@
-"""Scenarios: one TOML file holds everything a run depends on."""
+"""Scenarios: one TOML file holds everything that a run depends on."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class Scenario:
 
     name: str
     vehicle: Vehicle
-    vehicle_file: Path | None  # where it came from, unless shipped
+    vehicle_file: Path | None  # file of the vehicle; None for a shipped one
     time: Time
     steps: int  # of the plant
     control_every: int  # steps
@@ -92,8 +92,8 @@ class Scenario:
     initial: Initial
     law: LawSetup
     arbiter: ArbiterSetup
-    criteria: tuple[CriterionSetup, ...]  # the first in priority first
-    rules: ArbiterRules  # that weigh them
+    criteria: tuple[CriterionSetup, ...]  # by descending priority
+    rules: ArbiterRules  # rules that weigh the criteria
     limit: Limit
     actuation: Actuation
     sensing: Sensing
@@ -102,26 +102,26 @@ class Scenario:
     master: MasterSetup
     record: RecordSetup
     commands: Commands
-    tell_failures: bool  # the law is told of them when they happen
+    tell_failures: bool  # the law receives them when they happen
     goal: Shape  # the primary region, kept within, at time 0
     goal_velocity: Vector3  # m/s, NED
-    goal_streamed: bool  # moved from outside while the run goes on
-    goal_then: tuple[Vector3, ...]  # m, NED: where its middle is next, in turn
-    goal_stay: float  # s within it, before it goes on
+    goal_streamed: bool  # moved from outside during the run
+    goal_then: tuple[Vector3, ...]  # m, NED: next positions of its centre, in turn
+    goal_stay: float  # s, time within the goal before it moves to the next position
     regions: tuple[SecondaryRegion, ...]
     intersection: tuple[int, ...]  # indices of the regions whose overlap the summary reports
-    compare: str  # the claims that the report holds the run against
-    table: dict[str, Any]  # as in the file, defaults filled in
+    compare: str  # the claims with which the report compares the run
+    table: dict[str, Any]  # table of the file with defaults filled in
 
     def toml(self, vehicle: str | None = None, commented: bool = False) -> str:
-        """Format the scenario as the file that repeats it.
+        """Format the scenario as a TOML file.
 
         Parameters
         ----------
         vehicle : str, optional
             Another name for the vehicle's file.
         commented : bool
-            Say behind each key in which unit it is, and what it means.
+            Add a comment with unit and meaning to each key.
 
         Returns
         -------
@@ -134,22 +134,22 @@ class Scenario:
         )
 
     def replace(self, changes: Mapping[str, Any]) -> Scenario:
-        """Make a scenario in which some keys have other values.
+        """Return a scenario with other values of some keys.
 
         Parameters
         ----------
         changes : mapping of str to value
-            By key, with dots between its parts, as ``--set`` has them; regions go by index or by name.
+            By key, with dots between its parts, as for ``--set``; regions by index or by name.
 
         Returns
         -------
         Scenario
-            Checked as any other; its title says what was changed.
+            The checked scenario; its title lists the changes.
 
         Raises
         ------
         ScenarioError
-            If a key is unknown, or a value cannot be.
+            If a key is unknown, or a value is invalid.
 
         Examples
         --------
@@ -172,23 +172,23 @@ class Scenario:
 
     @property
     def title(self) -> str:
-        """The title of the file, and what was changed since it was written."""
+        """The title of the file, with the changes since it was written."""
         return shown_title(self.table, self.vehicle, self.law.name)
 
     @property
     def criterion_names(self) -> tuple[str, ...]:
-        """Names of the criteria, the first in priority first."""
+        """Names of the criteria, by descending priority."""
         return tuple(criterion.name for criterion in self.criteria)
 
     @property
     def criterion_places(self) -> tuple[int, ...]:
-        """Of each secondary region the place of its criterion among all."""
+        """Index of the criterion of each secondary region."""
         names = self.criterion_names
         return tuple(names.index(secondary.criterion) for secondary in self.regions)
 
     @property
     def has_paper_criteria(self) -> bool:
-        """Whether the criteria are the paper's three, weighed by its rules, with one ramp for all."""
+        """Whether criteria and rules are the paper's, with one ramp for all criteria."""
         return not self.arbiter.file and self.arbiter.rules == "ordered" and self.criteria == PAPER
 
     @property
@@ -198,25 +198,25 @@ class Scenario:
 
     @property
     def has_goal(self) -> bool:
-        """Whether there is a goal to judge by: a log may have come without one."""
+        """Whether there is a goal: an imported log may have none."""
         return bool(self.table["goal"])
 
     @property
     def goal_region(self) -> Region:
-        """The goal as a region among others."""
+        """The goal as a region."""
         return Region("goal", self.goal, "in", self.goal_velocity)
 
     @property
     def moving(self) -> tuple[str, ...]:
-        """Names of the regions, goal included, that may be elsewhere than where the scenario has them."""
+        """Names of the regions, goal included, that may move away from their position in the scenario."""
         goal = ("goal",) if self.goal_streamed or self.goal_then or any(self.goal_velocity) else ()
-        commanded = self.commands.enabled  # to be anywhere, what is at a place at all
+        commanded = self.commands.enabled  # commands can move all regions in space
         regions = [s for s in self.regions if s.moves or (commanded and not isinstance(s.region.shape, Orientation))]
         return (*goal, *(secondary.region.name for secondary in regions))
 
     @property
     def true_restoring_parameters(self) -> NDArray[np.float64]:
-        """Phi of (12), shape (4,) [N, N m]: of the vehicle with the parameters that the plant is given over its own."""
+        """Phi of (12), shape (4,) [N, N m], of the vehicle with the scenario's `plant.parameters`."""
         v, over = self.vehicle, self.plant.parameters
         r_G, r_B = (
             np.array([over.get(f"{name}.{axis}", value) for axis, value in zip("xyz", values, strict=True)])
@@ -233,9 +233,9 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = (), impor
     name_or_file : str or Path
         Such as ``"paper"`` or ``"mine.toml"``.
     overrides : sequence of str
-        ``key=value``, with dots between the keys and a TOML value; regions go by index or by name.
+        ``key=value``, with dots between the keys and a TOML value; regions by index or by name.
     imported : bool
-        Allow that of a run that was imported from a log, which can be looked at and not be run.
+        Allow the scenario of a run that was imported from a log, which cannot be run.
 
     Returns
     -------
@@ -245,7 +245,7 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = (), impor
     Raises
     ------
     ScenarioError
-        If there is no such scenario, a key is unknown, missing or mistyped, or a value cannot be.
+        If there is no such scenario, a key is unknown or missing, or a value is invalid.
 
     Examples
     --------
@@ -264,7 +264,7 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = (), impor
         for change in overrides:
             override(table, change)
         require_modest(table)
-        if table.get("title") != titled.get("title"):  # it is of what has been set beside it
+        if table.get("title") != titled.get("title"):  # a new title covers all changes so far
             table.pop("changed", None)
             titled = table
         scenario = validate_scenario(table, name)
@@ -276,10 +276,10 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = (), impor
 
 
 def _with_changes(scenario: Scenario, table: dict[str, Any], titled: dict[str, Any]) -> Scenario:
-    """Return a scenario that says in which keys its table differs from the one that its title was written for."""
+    """Return the scenario with the list of keys in which its table differs from the one that has its title."""
     try:
         before = validate_scenario(titled, scenario.name)
-    except (PlantFmuError, ControllerError, ScenarioError):  # it is no scenario yet: what makes it one is changed too
+    except (PlantFmuError, ControllerError, ScenarioError):  # an incomplete base: keys that complete it are changes too
         keys: Iterable[str] = differing_keys(titled, table)
     else:
         keys = changed_keys(before.table, scenario.table, scenario.vehicle)
@@ -287,16 +287,16 @@ def _with_changes(scenario: Scenario, table: dict[str, Any], titled: dict[str, A
 
 
 def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None = None) -> Scenario:
-    """Turn the table of a scenario's file into a scenario.
+    """Make a scenario from the table of its file.
 
     Parameters
     ----------
     table : dict
-        As in the file; its ``plant.parameters`` are joined to flat keys in place.
+        Table of the file; its ``plant.parameters`` are changed in place to flat keys.
     name : str
-        The scenario's.
+        Name of the scenario.
     vehicle : Vehicle, optional
-        What its ``vehicle`` names, if that is loaded already.
+        The vehicle, if it is loaded already.
 
     Returns
     -------
@@ -306,7 +306,7 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
     Raises
     ------
     ScenarioError, PlantFmuError, ControllerError
-        At the first key that cannot be right.
+        At the first invalid key.
     """
     plant = table.get("plant")
     if isinstance(plant, dict) and isinstance(plant.get("parameters"), dict):
@@ -319,15 +319,15 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
     regions = check_regions(file.regions)
     criterion_entries, criteria = check_criteria(file.criteria)
     overlapping = check_intersection(file.intersection, regions)
-    seen = check_commands(file.commands, file.record, file.law.name, tuple(r.region.name for r in regions))
-    check_criteria_of_regions(regions + seen, criteria)
+    slots = check_commands(file.commands, file.record, file.law.name, tuple(r.region.name for r in regions))
+    check_criteria_of_regions(regions + slots, criteria)
     arbiter = read_rules(file.arbiter)
     rules = check_rules(arbiter, criteria, regions)
     vehicle_file = Path(file.vehicle) if file.vehicle.endswith(".toml") else None
     vehicle = vehicle or load_vehicle(vehicle_file or file.vehicle)
     check_parameters(file.plant.parameters, vehicle)
     regions = with_crossing_costs(regions, tuple(c.name for c in criteria), rules, file.initial.position[2])
-    law = check_law(file.law, file.actuation.through, vehicle, time.control, len(regions) + len(seen))
+    law = check_law(file.law, file.actuation.through, vehicle, time.control, len(regions) + len(slots))
     check_failures(file.failures, file.actuation.through, vehicle)
     check_outages(file.outages, file.sensing.through)
     check_record(file.record, law, regions)
@@ -369,7 +369,7 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
         goal_streamed=motion.streamed or file.commands.enabled,
         goal_then=motion.then,
         goal_stay=motion.stay,
-        regions=regions + seen,
+        regions=regions + slots,
         intersection=overlapping,
         compare=file.compare,
         table=msgspec.to_builtins(dataclasses.asdict(filled)),

@@ -1,8 +1,8 @@
-"""The sensors of a vehicle that navigates by them: figures of data sheets, as parameters of the FMU.
+"""Sensors for navigation: numbers from data sheets, as parameters of the FMU.
 
-`DATA_SHEETS` is what the plant has unless a scenario's ``plant.parameters`` say otherwise; the navigation filter is
-given the standard deviations that the plant then has, and those from which constant errors are drawn. A number that no
-data sheet says is called assumed.
+The plant uses `DATA_SHEETS` unless a scenario's ``plant.parameters`` override them. The navigation filter receives the
+plant's standard deviations, and those from which the constant errors are drawn. A number without a data sheet is marked
+as assumed.
 """
 
 from __future__ import annotations
@@ -57,19 +57,19 @@ _ROUNDING = 1e-6  # of a step
 
 
 def sensor_parameters(seed: int, over: Mapping[str, float]) -> dict[str, float]:
-    """Return the FMU's parameters of all sensors, by name: data sheets, and constant errors drawn from the seed.
+    """Return the FMU's sensor parameters by name: from data sheets, with constant errors drawn from the seed.
 
     Parameters
     ----------
     seed : int
         Of the constant errors and of all noise.
     over : mapping of str to float
-        Parameters that go before them.
+        Parameters that override them.
 
     Returns
     -------
     dict of str to float
-        SI units; with those of `over`.
+        SI units; includes `over`.
     """
     draw = np.random.default_rng([seed, _STREAM]).standard_normal(9)
     names = (
@@ -84,19 +84,19 @@ def sensor_parameters(seed: int, over: Mapping[str, float]) -> dict[str, float]:
 
 
 def scenario_sensors(scenario: Scenario) -> dict[str, float]:
-    """Return the FMU's parameters of all sensors of a scenario, by name; none if its sensing is not through them."""
+    """Return the FMU's sensor parameters of a scenario by name; empty unless it senses through sensors."""
     if scenario.sensing.through != "sensors":
         return {}
     return sensor_parameters(scenario.sensing.seed, {k: float(v) for k, v in scenario.plant.parameters.items()})
 
 
 def sensor_model(parameters: Mapping[str, float]) -> SensorModel:
-    """Return what the navigation filter is given of the sensors: their noise, and how large constant errors may be.
+    """Return the navigation filter's model of the sensors: deviations of noise and of constant errors.
 
     Parameters
     ----------
     parameters : mapping of str to float
-        Of `sensor_parameters`; of no sensors, noise is that of `SensorModel`.
+        From `sensor_parameters`; a missing one has the default of `SensorModel`.
     """
     usual = SensorModel()
     return _CONSTANT._replace(
@@ -113,14 +113,14 @@ def sensor_model(parameters: Mapping[str, float]) -> SensorModel:
 def outage_schedule(
     outages: Iterable[Outage], parameters: Mapping[str, float], step: float
 ) -> list[tuple[int, int, float]]:
-    """Return when a sensor's probability of loss changes.
+    """Return the changes of the sensors' loss probabilities over time.
 
     Parameters
     ----------
     outages : iterable of Outage
-        Outages.
+        The outages of the scenario.
     parameters : mapping of str to float
-        With the probabilities that are so otherwise.
+        With the loss probabilities outside of outages.
     step : float
         Of the plant [s].
 

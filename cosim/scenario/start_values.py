@@ -1,4 +1,4 @@
-"""What a scenario tells the plant before it starts."""
+"""Parameters and start values of the FMU in a scenario."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from cosim.scenario.sensor_suite import scenario_sensors
 
 
 def start_values(scenario: Scenario) -> dict[str, float]:
-    """Return what the FMU is told before initialisation.
+    """Return the parameters and start values that the FMU gets before initialisation.
 
     Parameters
     ----------
     scenario : Scenario
-        What is run.
+        The scenario of the run.
 
     Returns
     -------
     dict of str to float
-        Parameters and start values by name.
+        By the names of the FMU's variables.
     """
     initial, plant, limit = scenario.initial, scenario.plant, scenario.limit
     values = {"substep": plant.substep, "wrench_time_constant": limit.time_constant}

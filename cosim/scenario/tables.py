@@ -1,4 +1,4 @@
-"""The tables of a scenario: as they stand in its file, and as they are once checked."""
+"""The tables of a scenario: as in its file, and checked."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Vector3 = tuple[float, float, float]
 Vector4 = tuple[float, float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
 
-PARKED_POSITION: Vector3 = (0.0, 0.0, -1e5)  # m, NED: where obstacles are that have not come
+PARKED_POSITION: Vector3 = (0.0, 0.0, -1e5)  # m, NED: position of free obstacle slots
 
 
 # ---- the same in the file and checked ------------------------------------------------------------------------------
@@ -20,7 +20,7 @@ PARKED_POSITION: Vector3 = (0.0, 0.0, -1e5)  # m, NED: where obstacles are that 
 
 @dataclass(frozen=True)
 class PlantSetup:
-    """How the plant is run."""
+    """Setup of the plant."""
 
     fmi: Literal[2, 3] = 3
     current: Vector3 = (0.0, 0.0, 0.0)  # m/s, of the water, world frame
@@ -39,20 +39,20 @@ class Initial:
 
 @dataclass(frozen=True)
 class ArbiterSetup:
-    """How memberships, or the signals that a file asks for, become weights."""
+    """Setup of the arbiter, which computes weights from memberships or other signals."""
 
     engine: Literal["closed", "exact", "grid", "skfuzzy"] = "closed"
     ramp: float = 0.2  # m (rad for regions of attitude), width over which a membership falls from 1 to 0 outside
     points: int = 101  # of the output universe, for grid and skfuzzy
-    rules: Literal["ordered", "reversed", "crisp", "none"] = "ordered"  # by which criteria are weighed, without a file
-    file: str = ""  # of a system that fuzzy_arbiter reads; else the criteria are weighed by their order
-    text: str = ""  # what stands in it
-    inputs: dict[str, Any] = field(default_factory=dict)  # of that system: the signal, number or course that each gets
+    rules: Literal["ordered", "reversed", "crisp", "none"] = "ordered"  # rule variant without a file
+    file: str = ""  # rule file in a format of fuzzy_arbiter; empty: rules by the order of the criteria
+    text: str = ""  # content of the file
+    inputs: dict[str, Any] = field(default_factory=dict)  # signal, number or course of each input of the file's rules
 
 
 @dataclass(frozen=True)
 class Limit:
-    """Of the direct body wrench: first the limit, then the lag."""
+    """Limit of the direct body wrench, followed by a lag."""
 
     force: float = math.inf  # N, on the norm of the body force; its direction is kept, the moment left alone
     time_constant: float = 0.0  # s
@@ -60,7 +60,7 @@ class Limit:
 
 @dataclass(frozen=True)
 class Actuation:
-    """What carries the law's wrench to the body."""
+    """Path of the law's wrench to the body."""
 
     through: Literal["wrench", "thrusters"] = "wrench"
     limits: Literal["direction", "per-thruster"] = "direction"  # how thruster forces are brought within limits
@@ -68,12 +68,12 @@ class Actuation:
 
 @dataclass(frozen=True)
 class Failure:
-    """A thruster that gives less force, or always the same, from some time on."""
+    """A thruster that gives less force, or a constant one, from some time on."""
 
     thruster: int  # from 1
     time: float  # s
-    effectiveness: float = 0.0  # part of its force that is left
-    stuck: bool = False  # it keeps the force that was commanded last
+    effectiveness: float = 0.0  # remaining fraction of its force
+    stuck: bool = False  # True: it keeps the force that was commanded last
 
     @property
     def is_total(self) -> bool:
@@ -83,7 +83,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class Outage:
-    """A time in which a sensor gives no samples."""
+    """A period in which a sensor gives no samples."""
 
     sensor: Literal["depth_sensor", "dvl", "imu", "compass", "usbl"]
     time: float  # s, when it begins
@@ -92,61 +92,61 @@ class Outage:
 
 @dataclass(frozen=True)
 class Sensing:
-    """What law and arbiter are given: the state, or what a navigation filter makes of the plant's sensors.
+    """Source of the state for law and arbiter: the plant's state, or a navigation filter with the plant's sensors.
 
-    Of the state, position and linear velocity may have noise; attitude and body rates are exact.
+    The plant's position and linear velocity may have noise; its attitude and body rates are exact.
     """
 
     through: Literal["state", "sensors"] = "state"
     position_noise: float = 0.0  # m, standard deviation of each coordinate, white, drawn anew at each control step
     velocity_noise: float = 0.0  # m/s, the same of each linear velocity
     seed: int = 0
-    dead_from: float = math.inf  # s, when both are lost
-    dead_for: float = 0.0  # s, for how long
-    frozen: bool = False  # the last values are held in that time; otherwise they are NaN
+    dead_from: float = math.inf  # s, time at which both are lost
+    dead_for: float = 0.0  # s, duration of the loss
+    frozen: bool = False  # True: the last values are held meanwhile; False: they are NaN
 
     @property
     def exact(self) -> bool:
-        """Whether what is told is the truth."""
+        """Whether law and arbiter receive the true state."""
         noisy = self.position_noise > 0.0 or self.velocity_noise > 0.0 or self.through == "sensors"
         return not noisy and (self.dead_for == 0.0 or self.dead_from == math.inf)
 
 
 @dataclass(frozen=True)
 class Commands:
-    """What the running vehicle takes from outside."""
+    """Setup of commands to the running vehicle."""
 
     enabled: bool = False
-    await_arm: bool = False  # nothing moves before it is armed
-    obstacles: int = 8  # spheres that may come in while it runs
-    obstacle_radius: float = 0.5  # m, of one whose size is not told
+    await_arm: bool = False  # True: the run starts once the vehicle is armed
+    obstacles: int = 8  # number of obstacle slots
+    obstacle_radius: float = 0.5  # m, of obstacles without a given size
     obstacle_gain: float = 100.0  # N per unit of g
-    hold_radius: float = 0.3  # m, of the sphere that is held in, and surfaced in
-    surface_depth: float = 0.5  # m, of its centre when surfacing
-    pilot_gain: float = 0.5  # part of the greatest wrench that full sticks give
+    hold_radius: float = 0.3  # m, of the target sphere in modes hold and surface
+    surface_depth: float = 0.5  # m, depth of its centre in mode surface
+    pilot_gain: float = 0.5  # fraction of the greatest wrench at full stick
 
 
 @dataclass(frozen=True)
 class MasterSetup:
-    """In which order a step calls its parts."""
+    """Order in which a step calls its parts."""
 
-    # gauss-seidel: each sees what the one before gave in this step; jacobi: what all had given at the step's beginning
+    # gauss-seidel: each part uses outputs of this step; jacobi: all parts use outputs of the step before
     order: Literal["gauss-seidel", "jacobi"] = "gauss-seidel"
 
 
 @dataclass(frozen=True)
 class RecordSetup:
-    """What a run records beyond its signals."""
+    """Optional signals of the record."""
 
     lyapunov: bool = False  # V of (31) and its rate, with the paper's law
 
 
-# ---- as they stand in the file -------------------------------------------------------------------------------------
+# ---- as in the file ------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class TimeEntry:
-    """Periods, those that are left out filled in later."""
+    """Periods; defaults depend on the step."""
 
     duration: float  # s
     step: float = 0.001  # s
@@ -156,7 +156,7 @@ class TimeEntry:
 
 @dataclass(frozen=True)
 class LawEntry:
-    """Name and gains before anybody knows whether they go together."""
+    """Name and gains of the law, not checked yet."""
 
     name: str = "ismail_dunnigan"
     desired_quaternion: Vector4 = (1.0, 0.0, 0.0, 0.0)
@@ -165,15 +165,15 @@ class LawEntry:
 
 @dataclass(frozen=True)
 class CriterionEntry:
-    """A criterion: what regions may ask attention for."""
+    """A criterion for which regions are weighed."""
 
     name: str
-    order: int | None = None  # the least comes first; default: its place in the list
-    colour: str = ""  # #RRGGBB; default: one that no other has
-    membership: dict[str, Any] = field(default_factory=dict)  # reasons to ask; default: the arbiter's ramp
+    order: int | None = None  # the least comes first; default: its index in the list, from 1
+    colour: str = ""  # #RRGGBB; default: an unused one
+    membership: dict[str, Any] = field(default_factory=dict)  # by quantity; default: the arbiter's ramp
 
 
-# section VI of the paper; the colours are Okabe and Ito's, which colour-blind people can tell apart
+# section VI of the paper; the colours are Okabe and Ito's, which are safe for colour blindness
 PAPER_CRITERIA = (
     CriterionEntry("obstacle", 1, "#D55E00"),
     CriterionEntry("shape", 2, "#E69F00"),
@@ -191,10 +191,10 @@ class RegionEntry:
     gain: float
     shape: dict[str, Any]
     velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
-    streamed: bool = False  # moved from outside while the run goes on
-    hard: bool = True  # must not be violated, for laws that tell hard regions from soft ones
-    deviation: float | tuple[float, float, float] = 0.0  # m, of its place, standard: in any direction, or each of NED
-    priority: float = 1.0  # by which its violation counts in the score; no law is given it
+    streamed: bool = False  # moved from outside during the run
+    hard: bool = True  # must not be violated, for laws that distinguish hard and soft regions
+    deviation: float | tuple[float, float, float] = 0.0  # m, standard, of its position: in any direction, or for NED
+    priority: float = 1.0  # factor of its violation in the score; laws do not receive it
 
 
 @dataclass(frozen=True)
@@ -204,7 +204,7 @@ class File:
     vehicle: str
     time: TimeEntry
     initial: Initial
-    goal: dict[str, Any] = field(default_factory=dict)  # none only where a log came without one
+    goal: dict[str, Any] = field(default_factory=dict)  # empty only for an imported log without a goal
     title: str = ""
     log: str = ""  # name of the file that the run was imported from
     changed: tuple[str, ...] = ()  # keys, since the title was written
@@ -227,7 +227,7 @@ class File:
 
 
 def is_own(law: str) -> bool:
-    """Return whether this is the name of a law of one's own: where it is from, such as ``mine.py:steer``."""
+    """Return True if this is the name of a custom law, its source, such as ``mine.py:steer``."""
     return ":" in law
 
 
@@ -245,34 +245,34 @@ class Time:
 
 
 class NoGains(NamedTuple):
-    """What a scenario can say of the gains of a law of one's own."""
+    """Gains of a custom law in a scenario: none."""
 
 
 @dataclass(frozen=True)
 class LawSetup:
-    """Which law, with which gains."""
+    """Name, desired attitude and gains of the law."""
 
-    name: str  # one of controller.LAWS; with a colon: where a law of one's own is from, such as mine.py:steer
+    name: str  # one of controller.LAWS; with a colon: source of a custom law, such as mine.py:steer
     desired_quaternion: Vector4  # attitude to be kept, from body to world, scalar first
-    gains: Any  # of that law's gains_type; none for a law of one's own
+    gains: Any  # of that law's gains_type; `NoGains` for a custom law
 
     @property
     def own(self) -> bool:
-        """Whether it is a law of one's own, which no file can hold."""
+        """Whether it is a custom law, whose code is not in the file."""
         return is_own(self.name)
 
 
 @dataclass(frozen=True)
 class SecondaryRegion:
-    """A region and the criterion it belongs to."""
+    """A region and its criterion."""
 
     region: Region
-    criterion: str  # the name of one of the scenario's
-    streamed: bool = False  # moved from outside while the run goes on
-    is_dynamic: bool = False  # stands for an obstacle that may come in while the run goes on
-    priority: float = 1.0  # by which its violation counts in the score
+    criterion: str  # name of a criterion of the scenario
+    streamed: bool = False  # moved from outside during the run
+    is_dynamic: bool = False  # slot for an obstacle that commands may add during the run
+    priority: float = 1.0  # factor of its violation in the score
 
     @property
     def moves(self) -> bool:
-        """Whether it may be elsewhere than where the scenario has it."""
+        """Whether it may move away from its position in the scenario."""
         return self.streamed or any(self.region.velocity)

@@ -1,4 +1,4 @@
-"""Scenario files as tables: where they are, how one is laid over another, how a key is set from the command line."""
+"""Scenario files as tables: finding and reading them, merging one into its base, and setting keys."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from cosim.errors import ScenarioError
 
-_SHOWN = 80  # characters of what is absurdly long
+_SHOWN = 80  # greatest number of characters quoted in a message
 
 
 def list_scenarios() -> list[str]:
@@ -26,7 +26,7 @@ def list_scenarios() -> list[str]:
 
 
 def shipped_titles() -> dict[str, str]:
-    """Return the title of each scenario that comes with the package, without checking the rest of it."""
+    """Return the titles of the shipped scenarios by name, without checking their files."""
     texts = {name: (_folder() / f"{name}.toml").read_text(encoding="utf-8") for name in list_scenarios()}
     return {name: tomllib.loads(text)["title"] for name, text in texts.items()}
 
@@ -36,39 +36,39 @@ def _folder() -> resources.abc.Traversable:
 
 
 class ScenarioTable(NamedTuple):
-    """What a scenario's file says, laid over its base."""
+    """Table of a scenario's file, merged into that of its base."""
 
     table: dict[str, Any]
     name: str  # of the scenario
-    titled: dict[str, Any]  # the scenario whose title it has: itself, or the base that the title came with
+    titled: dict[str, Any]  # table of the scenario whose title it has: its own, or that of a base
 
 
 def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | None = None) -> ScenarioTable:
-    """Read a scenario, laid over that of its ``base``.
+    """Read the table of a scenario, and merge it into that of its ``base``.
 
     Parameters
     ----------
     name_or_file : str
         A shipped name, or a file ending in .toml.
     seen : tuple of str
-        The scenarios that lead here as bases.
+        Scenarios that have this one as a base.
     beside : Path, optional
-        Folder that a file is looked for in.
+        Folder of a relative path.
 
     Returns
     -------
     ScenarioTable
-        Nothing in it is checked yet.
+        Not checked yet.
 
     Raises
     ------
     ScenarioError
-        If a base is unknown, or its own.
+        If a base is unknown, or a base of itself.
     TableError
         If a file cannot be read.
     """
     from plant_fmu.errors import printable
-    from plant_fmu.toml_tables import hint, read_toml  # NumPy and FMPy come with it, which `cosim list` does not need
+    from plant_fmu.toml_tables import hint, read_toml  # imports NumPy and FMPy, which `cosim list` does not need
 
     path = Path(name_or_file)
     if path.suffix == ".toml":
@@ -76,7 +76,7 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
         table, name, folder = read_toml(path), printable(path.stem), path.parent
         name_or_file = str(path.resolve())
         vehicle = table.get("vehicle")
-        if isinstance(vehicle, str) and vehicle.endswith(".toml"):  # beside the file that names it
+        if isinstance(vehicle, str) and vehicle.endswith(".toml"):  # relative to the file that names it
             table["vehicle"] = str(folder / vehicle)
         arbiter = table.get("arbiter")
         if isinstance(arbiter, dict) and not arbiter.get("text"):
@@ -101,7 +101,7 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
         arbiter = table.get("arbiter")
         if isinstance(arbiter, dict) and "file" in arbiter:
             _name_rules(below)
-        if "title" in table:  # it is of what the file says, whatever was changed before
+        if "title" in table:  # a new title covers all changes of the base
             below.pop("changed", None)
         over, table = table, _merge(below, table)
         if "title" not in over and "title" in below:
@@ -110,7 +110,7 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
 
 
 def _name_law(table: dict[str, Any], name: object) -> None:
-    """Name the law of a scenario; gains belong to a law, so that those of another one go with its name."""
+    """Set the law's name in a table, and drop the gains of another law."""
     law = table.setdefault("law", {})
     if isinstance(law, dict) and law.get("name", "ismail_dunnigan") != name:
         law.pop("gains", None)
@@ -118,7 +118,7 @@ def _name_law(table: dict[str, Any], name: object) -> None:
 
 
 def _name_rules(table: dict[str, Any]) -> None:
-    """Drop what is of the arbiter's file in a scenario, which gets another one."""
+    """Drop text and inputs of the arbiter's file, which is to be replaced."""
     arbiter = table.get("arbiter")
     if isinstance(arbiter, dict):
         arbiter.pop("text", None)
@@ -139,15 +139,15 @@ def override(table: dict[str, Any], text: str) -> None:
     Parameters
     ----------
     table : dict
-        A scenario's.
+        Table of a scenario.
     text : str
-        ``key=value``, with dots between the keys and a TOML value, or a bare word; items of lists go by index or name.
+        ``key=value``, with dots between the keys and a TOML value, or a bare word; items of lists by index or name.
         Another ``law.name`` drops the gains of the law before, another ``arbiter.file`` its inputs.
 
     Raises
     ------
     ScenarioError
-        If there is no such place.
+        If the table has no place for such a key.
     """
     from plant_fmu.errors import TableError
     from plant_fmu.toml_tables import MAX_DEPTH, require_modest
@@ -180,17 +180,17 @@ def set_key(table: dict[str, Any], key: str, value: Any) -> None:
     Parameters
     ----------
     table : dict
-        A scenario's.
+        Table of a scenario.
     key : str
-        With dots between its parts; items of lists go by index or name. Another ``law.name`` drops the gains of the law
+        With dots between its parts; items of lists by index or name. Another ``law.name`` drops the gains of the law
         before, another ``arbiter.file`` its inputs.
     value : object
-        Of a type that TOML has.
+        Of a type of TOML.
 
     Raises
     ------
     ScenarioError
-        If there is no such place.
+        If the table has no place for such a key.
     """
     *path, last = key.strip().split(".")
     if key.strip() == "law.name":
@@ -216,7 +216,7 @@ def _short(text: str) -> str:
 
 
 def _index(items: list[Any], part: str, key: str) -> int:
-    """Return the place in a list that a number or an item's name means."""
+    """Return the index of an item of a list, given its name or index as text."""
     names = [item.get("name") for item in items if isinstance(item, dict)]
     if part in names:
         return names.index(part)
@@ -229,19 +229,19 @@ def _index(items: list[Any], part: str, key: str) -> int:
 
 
 def flat(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Join nested keys with dots, as TOML nests ``r_G.z = 0.1`` where the FMU's parameter has that name.
+    """Join nested keys with dots, since TOML nests ``r_G.z = 0.1``, the name of a parameter of the FMU.
 
     Parameters
     ----------
     table : dict
-        Of tables and values.
+        Nested tables and values.
     prefix : str
-        Before every key.
+        Prefix of every key.
 
     Returns
     -------
     dict
-        Of values.
+        Values by flat key.
     """
     joined: dict[str, Any] = {}
     for key, value in table.items():
@@ -250,19 +250,19 @@ def flat(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def place_of(table: dict[str, Any], key: str) -> tuple[Any, Any]:
-    """Return the table or list that holds a key, and the key's place in it.
+    """Return the table or list that holds a key, and the name or index in it.
 
     Parameters
     ----------
     table : dict
         Of a scenario.
     key : str
-        With dots; items of lists go by index or name.
+        With dots; items of lists by index or name.
 
     Returns
     -------
     dict or list, str or int
-        Where the value stands.
+        Container, and name or index of the value in it.
 
     Raises
     ------

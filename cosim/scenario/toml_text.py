@@ -1,4 +1,4 @@
-"""A scenario as the text of its file: a line a key, a vector in one line, and if wanted what each key means."""
+"""Formats a scenario as the text of its file: a line for each key, with optional comments on the meaning of keys."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import tomli_w
 
 from cosim.scenario.keys import unit_of_shape
 
-_WIDE = 100  # characters of a value in one line
-_INLINE = ("shape", "membership")  # tables in one line, if they fit
-_COMMENT_AT = 40  # column that comments begin at, where the value leaves room
+_WIDE = 100  # greatest number of characters of a value in one line
+_INLINE = ("shape", "membership")  # tables that are written in one line if they fit
+_COMMENT_AT = 40  # column at which comments begin, after a shorter line
 
 
 def scenario_text(table: Mapping[str, Any], said: Mapping[str, str]) -> str:
@@ -20,15 +20,15 @@ def scenario_text(table: Mapping[str, Any], said: Mapping[str, str]) -> str:
     Parameters
     ----------
     table : mapping
-        As in the file, with every default filled in.
+        Table of the file with defaults filled in.
     said : mapping of str to str
-        What to write behind keys, by their paths, as `cosim.scenario.keys.comments` returns it; units of shapes are
-        written, too. If empty, there are no comments.
+        Comments by the path of their key, as `cosim.scenario.keys.comments` returns them; units of shapes are added.
+        If empty, there are no comments.
 
     Returns
     -------
     str
-        That reads back as the table.
+        TOML that reads back as the table.
     """
     return "\n".join(_lines(table, said)) + "\n"
 
@@ -36,7 +36,7 @@ def scenario_text(table: Mapping[str, Any], said: Mapping[str, str]) -> str:
 def _lines(table: Mapping[str, Any], said: Mapping[str, str], head: str = "", path: str = "") -> Iterator[str]:
     """Yield the lines of a table: its values, then the tables in it, then its lists of tables.
 
-    What is said of keys goes by their path, in which a list of tables stands once for all of them.
+    In the paths of comments, a list of tables has one entry for all of its items.
     """
     values, tables, lists = [], [], []
     for key, value in table.items():
@@ -57,7 +57,7 @@ def _lines(table: Mapping[str, Any], said: Mapping[str, str], head: str = "", pa
         yield from _lines(inner, said, f"{head}{_key(key)}.", f"{path}{key}.")
     for key, several in lists:
         for i, one in enumerate(several):
-            known = {} if i else said  # what the first has need not be explained again
+            known = {} if i else said  # only the first item gets comments
             yield ""
             yield _with(f"[[{head}{_key(key)}]]", known.get(f"{path}{key}", ""))
             yield from _lines(one, known, f"{head}{_key(key)}.", f"{path}{key}[].")
@@ -81,7 +81,7 @@ def _key(key: str) -> str:
 
 
 def _value(value: Any) -> str:
-    """Return a value as TOML: in one line, or a list that is too long for that with a line for each item."""
+    """Format a value as TOML: in one line, or a long list with a line for each item."""
     if isinstance(value, Mapping):
         inner = ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items())
         return f"{{ {inner} }}" if inner else "{}"

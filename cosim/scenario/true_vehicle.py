@@ -1,4 +1,4 @@
-"""The vehicle as the plant has it: its file, with the scenario's `plant.parameters` laid over."""
+"""The vehicle as simulated: that of its file, with the scenario's `plant.parameters`."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ _SYMMETRIC = ("added_mass", "inertia")
 
 
 def true_vehicle(scenario: Scenario) -> Vehicle:
-    """Return the vehicle with the parameters that the plant is given over its own.
+    """Return the vehicle with the scenario's `plant.parameters`.
 
-    Thrusters' limits are multiplied by their effectiveness, so that one that is failed from the start has none.
+    Thrusters' limits are multiplied by their effectiveness, so that one that is failed from the start gives no force.
 
     Parameters
     ----------
     scenario : Scenario
-        Whose plant has numbers of its own.
+        With `plant.parameters`.
 
     Returns
     -------
     Vehicle
-        Numbers that the FMU itself might still refuse.
+        Not checked: the FMU may still refuse its numbers.
     """
     vehicle, over = scenario.vehicle, scenario.plant.parameters
     changed: dict[str, float | Array] = {}
@@ -55,17 +55,17 @@ def true_vehicle(scenario: Scenario) -> Vehicle:
 
 
 def true_model(scenario: Scenario) -> Model:
-    """Return what the stability analysis takes for the vehicle: the true one.
+    """Return the model of the true vehicle for the stability analysis.
 
     Parameters
     ----------
     scenario : Scenario
-        Whose plant has numbers of its own.
+        With `plant.parameters`.
 
     Returns
     -------
     Model
-        In still water.
+        For still water.
     """
     vehicle = true_vehicle(scenario)
     return Model(
@@ -77,7 +77,7 @@ def true_model(scenario: Scenario) -> Model:
 
 
 def _place(name: str) -> tuple[str, tuple[int, ...]]:
-    """Return which attribute of a vehicle a parameter of the FMU stands for, and which element of it."""
+    """Split a parameter's name into the attribute of a vehicle and the index of the element."""
     indexed = _INDEXED.fullmatch(name)
     if indexed:
         return indexed[1], tuple(int(i) - 1 for i in indexed.groups()[1:] if i is not None)

@@ -1,4 +1,4 @@
-"""The checks of a scenario's tables: each names the first key that cannot be right."""
+"""Checks of a scenario's tables: each error names the first invalid key."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ ROUNDING = 1e-6  # of one period, within which periods count as multiples
 MAX_STEPS = 100_000_000
 MAX_POINTS = 100_001
 MAX_TEXT = 200  # characters
-MAX_SEEN = 100  # obstacles that may come in
+MAX_SEEN = 100  # obstacle slots
 REGION_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,39}")  # a column of the record, a label of figures
 
-# parameters of the FMU that have a key of their own in a scenario
+# parameters of the FMU for which a scenario has other keys
 _OWN_KEYS = {
     "wrench_force_limit": "limit.force",
     "wrench_time_constant": "limit.time_constant",
@@ -59,16 +59,16 @@ _OWN_KEYS = {
 
 @dataclass(frozen=True)
 class GoalMotion:
-    """What stands beside the keys of the goal's shape."""
+    """Keys of the goal beside those of its shape."""
 
     velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
     streamed: bool = False
-    then: tuple[Vector3, ...] = ()  # m, NED: where its middle is next, in turn
-    stay: float = 5.0  # s within it, before it goes on
+    then: tuple[Vector3, ...] = ()  # m, NED: next positions of its centre, in turn
+    stay: float = 5.0  # s, time within the goal before it moves to the next position
 
 
 def check_texts(file: File) -> None:
-    """Raise `ScenarioError` unless a terminal only shows, and does not obey, the texts that come to it."""
+    """Raise `ScenarioError` unless the texts are one printable line, without control characters for terminals."""
     texts = (("title", file.title), ("log", file.log), ("law.name", file.law.name))
     for key, text in (*texts, *(("changed", key) for key in file.changed)):
         good = text.isprintable() and len(text) <= MAX_TEXT
@@ -76,7 +76,7 @@ def check_texts(file: File) -> None:
 
 
 def check_numbers(file: File) -> None:
-    """Raise `ScenarioError` unless the numbers that stand alone are within their ranges."""
+    """Raise `ScenarioError` unless the numbers outside of goal, regions and lists are within their ranges."""
     limit, arbiter = file.limit, file.arbiter
     _require(file.plant.substep > 0.0, "plant.substep", file.plant.substep, "above 0 s")
     _require(limit.force >= 0.0, "limit.force", limit.force, "0 N or above (inf for none)")
@@ -114,7 +114,7 @@ def _check_sensing(sensing: Sensing) -> None:
 
 
 def check_failures(failures: tuple[Failure, ...], through: str, vehicle: Vehicle) -> None:
-    """Raise `ScenarioError` unless the failures are of thrusters that the run drives."""
+    """Raise `ScenarioError` unless the failures are of thrusters that the run uses."""
     if failures and through != "thrusters":
         raise ScenarioError("failures are given, expected none with actuation.through = 'wrench': no thruster is used")
     for i, failure in enumerate(failures):
@@ -129,7 +129,7 @@ def check_failures(failures: tuple[Failure, ...], through: str, vehicle: Vehicle
 
 
 def check_outages(outages: tuple[Outage, ...], through: str) -> None:
-    """Raise `ScenarioError` unless the run uses the sensors, and each outage comes after the last one of its sensor."""
+    """Raise `ScenarioError` unless the run uses sensors, and outages of one sensor do not overlap."""
     if outages and through != "sensors":
         raise ScenarioError("outages are given, expected none with sensing.through = 'state': no sensor is used")
     ends: dict[str, float] = {}
@@ -143,7 +143,7 @@ def check_outages(outages: tuple[Outage, ...], through: str) -> None:
 
 
 def check_record(record: RecordSetup, law: LawSetup, regions: tuple[SecondaryRegion, ...]) -> None:
-    """Raise `ScenarioError` unless what is recorded is defined for the law and the regions."""
+    """Raise `ScenarioError` unless the recorded signals are defined for the law and the regions."""
     if not record.lyapunov:
         return
     _require(law.name == "ismail_dunnigan", "record.lyapunov", "true", "false: V of (31) is the paper's law's")
@@ -154,9 +154,9 @@ def check_record(record: RecordSetup, law: LawSetup, regions: tuple[SecondaryReg
 def check_commands(
     commands: Commands, record: RecordSetup, law: str, names: tuple[str, ...]
 ) -> tuple[SecondaryRegion, ...]:
-    """Return the regions that stand for obstacles that may come in, none where commands are not enabled."""
+    """Check the commands; return the regions of the obstacle slots, none if commands are not enabled."""
     if not commands.enabled:
-        _require(not commands.await_arm, "commands.await_arm", "true", "false without commands.enabled: nobody arms")
+        _require(not commands.await_arm, "commands.await_arm", "true", "false without commands.enabled: no way to arm")
         return ()
     _require(not record.lyapunov, "record.lyapunov", "true", "false with commands.enabled: V is of one target")
     _require(not is_own(law), "commands.enabled", "true", f"false: nothing of {law} can be commanded from outside")
@@ -167,22 +167,22 @@ def check_commands(
     for key, greatest in (("obstacle_gain", math.inf), ("surface_depth", 1e3), ("pilot_gain", 1.0)):
         value = getattr(commands, key)
         _require(0.0 <= value <= greatest and value < math.inf, f"commands.{key}", value, f"0 to {greatest:g}")
-    seen = [f"seen {i}" for i in range(1, commands.obstacles + 1)]
-    for name in seen:
+    slots = [f"seen {i}" for i in range(1, commands.obstacles + 1)]
+    for name in slots:
         _require(name not in names, f"regions.{name}.name", "used", "another one: obstacles that come in have it")
     far = Sphere(PARKED_POSITION, commands.obstacle_radius)
     return tuple(
         SecondaryRegion(
             Region(name, far, "out", gain=commands.obstacle_gain), "obstacle", streamed=True, is_dynamic=True
         )
-        for name in seen
+        for name in slots
     )
 
 
 def check_goal(file: File) -> tuple[Shape, GoalMotion]:
-    """Return the goal's shape, and how it moves; ScenarioError if that cannot be.
+    """Check the goal; return its shape and motion, or raise a ScenarioError.
 
-    The run of a log may have none: then it is a sphere far away that nothing shows or judges by.
+    The run of a log may have no goal: then it is a sphere far away, which no figure or summary uses.
     """
     table = file.goal
     if not table and file.log:
@@ -194,7 +194,7 @@ def check_goal(file: File) -> tuple[Shape, GoalMotion]:
     _require(not of_attitude(shape), "goal.type", repr(table["type"]), "a shape in space")
     motion = decode({key: table[key] for key in beside if key in table}, GoalMotion, "goal")
     _require(all(map(math.isfinite, motion.velocity)), "goal.velocity", motion.velocity, "finite numbers")
-    Region("goal", shape, "in", motion.velocity)  # says now what it cannot be
+    Region("goal", shape, "in", motion.velocity)  # raises an error if invalid
     _require(0.0 <= motion.stay < math.inf, "goal.stay", motion.stay, "a finite number, 0 s or above")
     for i, place in enumerate(motion.then):
         _require(all(map(math.isfinite, place)), f"goal.then.{i}", place, "finite numbers")
@@ -209,7 +209,7 @@ def check_goal(file: File) -> tuple[Shape, GoalMotion]:
 
 
 def check_regions(entries: tuple[RegionEntry, ...]) -> tuple[SecondaryRegion, ...]:
-    """Return the secondary regions."""
+    """Check the regions; return the secondary regions."""
     names = [entry.name for entry in entries]
     regions = []
     for entry in entries:
@@ -229,9 +229,9 @@ def check_regions(entries: tuple[RegionEntry, ...]) -> tuple[SecondaryRegion, ..
 
 
 def check_intersection(wanted: tuple[str, ...], regions: tuple[SecondaryRegion, ...]) -> tuple[int, ...]:
-    """Return the indices of the regions whose overlap is reported: those that are named, else all to be kept out of.
+    """Return the indices of the regions whose overlap is reported: those that are named, else all to keep out of.
 
-    A ScenarioError if one is not there.
+    Raise a ScenarioError if a name is unknown.
     """
     kept_out = {r.region.name: i for i, r in enumerate(regions) if r.region.keep == "out"}
     _require(len(set(wanted)) == len(wanted), "intersection", f"{list(wanted)}", "each name once")
@@ -242,7 +242,7 @@ def check_intersection(wanted: tuple[str, ...], regions: tuple[SecondaryRegion, 
 
 
 def check_parameters(given: dict[str, float | bool], vehicle: Vehicle) -> None:
-    """Raise `ScenarioError` unless the FMU has these parameters, and the scenario no key for them."""
+    """Raise `ScenarioError` unless the FMU has these parameters, and no other key of the scenario sets them."""
     known = known_parameters(vehicle)
     for name in given:
         if name not in known:
@@ -253,13 +253,13 @@ def check_parameters(given: dict[str, float | bool], vehicle: Vehicle) -> None:
 
 @functools.lru_cache(maxsize=8)
 def known_parameters(vehicle: Vehicle) -> dict[str, float]:
-    """Return the start values of the FMU's parameters that a scenario has no key of its own for, by name."""
+    """Return the start values by name of the FMU's parameters that no other key of a scenario sets."""
     parameters = [v for v in variables(vehicle) if v.role == "parameter"]
     return {v.name: v.start for v in parameters if v.name.partition(".")[0] not in _OWN_KEYS}
 
 
 def check_time(entry: TimeEntry) -> Time:
-    """Return the periods, those left out filled in."""
+    """Check the periods, and fill in the defaults [s]."""
     for key in ("duration", "step", "control", "arbiter"):
         value = getattr(entry, key)
         _require(value is None or 0.0 < value < math.inf, f"time.{key}", value, "above 0 s")
@@ -267,12 +267,12 @@ def check_time(entry: TimeEntry) -> Time:
 
 
 def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_regions: int) -> LawSetup:
-    """Return the law's name and gains, once the law has taken them and its period [s]; of one's own the name is all.
+    """Check name, gains and period [s] of a built-in law by setting it up; of a custom law check the name only.
 
     Raises
     ------
     ScenarioError
-        If there is no such law, or it does not take them.
+        If there is no such law, or it has no such gains.
     """
     if is_own(entry.name):
         if entry.gains:
@@ -298,7 +298,7 @@ def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_
 
 
 def steps_per_period(key: str, period: float, step: float) -> int:
-    """Return how many steps [s] a period [s] takes; it must be a whole number."""
+    """Return the number of steps of length `step` [s] in a `period` [s], which must be a whole multiple."""
     ratio = period / step if period / step < MAX_STEPS + 1 else math.inf
     _require(ratio < math.inf, key, f"{period} s, {period / step:.3g} steps", f"at most {MAX_STEPS} steps")
     n = round(ratio)

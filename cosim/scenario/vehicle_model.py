@@ -1,4 +1,4 @@
-"""What a law is told of a vehicle."""
+"""The model of a vehicle that a law receives."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from plant_fmu.vehicle import Vehicle
 
 
 def vehicle_model(vehicle: Vehicle) -> VehicleModel:
-    """Return the nominal numbers of a vehicle that a law may know: not weight, buoyancy, nor their centres.
+    """Return a vehicle's nominal model for a law, without weight, buoyancy and their centres.
 
     Parameters
     ----------
     vehicle : Vehicle
-        As its file has it.
+        The vehicle of its file.
 
     Returns
     -------
     VehicleModel
-        With the centre of gravity taken to be the origin.
+        With the centre of gravity at the origin.
     """
     rigid_mass = np.zeros((6, 6))
     rigid_mass[:3, :3] = vehicle.mass * np.eye(3)

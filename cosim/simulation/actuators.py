@@ -1,4 +1,4 @@
-"""From what is asked for to the inputs of the plant: thruster allocation, limits, and thrusters that fail."""
+"""From the commanded wrench to the inputs of the plant: thruster allocation, limits, and thruster failures."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from cosim.simulation.signals import Array, Signals
 from cosim.simulation.stepped_plant import SteppedPlant
 
 MAX_WRENCH = (
-    1e5  # N, N m: more is not asked of the plant in a run that can be sent anywhere, where a law might ask for any
+    1e5  # N, N m: bound of the wrench in runs with commands, where a far target makes some laws ask for any force
 )
 
 
 class Actuators:
-    """Brings a wrench, or thruster forces, to the plant.
+    """Writes a wrench, or thruster forces, to the plant's inputs.
 
     Parameters
     ----------
     scenario : Scenario
-        What is run.
+        The scenario of the run.
     plant : SteppedPlant
-        Whose thrusters fail, and are limited.
+        Receives the inputs, and the parameters of thrusters that fail or are limited.
     signals : Signals
-        Whose row holds what is asked for, and the inputs.
+        Their row holds the commanded wrench and the inputs.
 
     Attributes
     ----------
     command : ndarray, shape (6,)
-        Wrench that is asked for [N, N m], body frame.
+        Commanded wrench [N, N m], body frame.
     thrusts : ndarray, shape (m,)
-        Thruster forces that are asked for [N].
+        Commanded thruster forces [N].
     health : ndarray, shape (m,)
-        Of the thrusters as far as the law is told: 1 working, 0 failed.
+        Health of the thrusters as reported to the law: 1 working, 0 failed.
     """
 
     def __init__(self, scenario: Scenario, plant: SteppedPlant, signals: Signals) -> None:
@@ -43,10 +43,10 @@ class Actuators:
         vehicle = scenario.vehicle
         self._bounded = scenario.commands.enabled
         self.command = signals.view("command.X", 6)
-        self._cut = signals.view("allocation_saturated", 1)
+        self._saturated = signals.view("allocation_saturated", 1)
         inputs = signals.view("thrust[1]", len(plant.inputs))
         self.thrusts, self._wrench = inputs[: vehicle.n_thrusters], inputs[vehicle.n_thrusters :]
-        # views of their memory, which are copied in a third of the time of arrays
+        # memoryviews: copying one takes a third of the time of copying an array
         self._asked, self._given = self.command.data, self._wrench.data
         self._decided, self._sent = inputs.data, plant.inputs.values.data
         self._delayed = np.zeros(inputs.size).data if scenario.master.order == "jacobi" else None
@@ -56,7 +56,7 @@ class Actuators:
         self._allocate_to_the_healthy()
 
     def fail(self, failure: Failure) -> None:
-        """Let a thruster fail now, and report it if failures are reported and it no longer follows its command."""
+        """Fail a thruster now; if the scenario reports failures and it is a total one, set its health to 0."""
         if failure.stuck:
             self._stuck[failure.thruster - 1] = float(self._plant.inputs.values[failure.thruster - 1])
         else:
@@ -66,7 +66,7 @@ class Actuators:
             self._allocate_to_the_healthy()
 
     def limit(self, parameter: str, value: float) -> None:
-        """Set a limit of the plant, such as ``thrust_max[1]``, and keep to it; the law is not told."""
+        """Set a limit of the plant, such as ``thrust_max[1]``, and allocate within it; the law does not receive it."""
         self._plant.set({parameter: value})
         kind, _, rest = parameter.partition("[")
         if kind in self._limits:
@@ -74,16 +74,16 @@ class Actuators:
             self._allocate_to_the_healthy()
 
     def allocate(self) -> None:
-        """Bring the wrench `command` to the plant's inputs."""
+        """Allocate the wrench `command` to the plant's inputs."""
         if self.allocation is None:
             self._given[:] = self._asked
             if self._bounded:
-                self._cut[0] = saturate(self._wrench)
+                self._saturated[0] = saturate(self._wrench)
         else:
-            self._cut[0] = self.allocation(self.command, self.thrusts)
+            self._saturated[0] = self.allocation(self.command, self.thrusts)
 
     def apply_thrusts(self) -> None:
-        """Bring the forces `thrusts` to the plant's inputs, and write the wrench that they amount to."""
+        """Apply the forces `thrusts` as the plant's inputs, and write their wrench into `command`."""
         product(self._scenario.vehicle.thruster_matrix, self.thrusts, self.command)
 
     def write_inputs(self) -> None:
@@ -109,7 +109,7 @@ class Actuators:
 
 
 def saturate(wrench: Array) -> bool:
-    """Scale a wrench in place until force and moment are at most `MAX_WRENCH`; 0 where they are no numbers.
+    """Scale force and moment of a wrench in place to at most `MAX_WRENCH`; set them to 0 if they are not finite.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def saturate(wrench: Array) -> bool:
     Returns
     -------
     bool
-        Whether anything was changed.
+        True if the wrench was changed.
     """
     changed = False
     for part in (wrench[:3], wrench[3:]):

@@ -1,4 +1,4 @@
-"""What the arbiter decides by, made of clearances and the measured state: for the master and the fused loop."""
+"""Inputs of the arbiter, computed from clearances and the measured state: for the master and the fused loop."""
 
 from __future__ import annotations
 
@@ -22,53 +22,53 @@ from cosim.simulation.signals import Array
 
 _KINDS = ("membership", "clearance", "closing_speed", "approach_time", "depth", "speed", "time", "given")
 _MEMBERSHIP, _CLEARANCE, _CLOSING_SPEED, _APPROACH_TIME, _DEPTH, _SPEED, _TIME, _GIVEN = range(len(_KINDS))
-_AHEAD = 1e-5  # s, over which a closing speed is taken: rounding makes 1e-9 m/s of it, a curved surface as much
+_AHEAD = 1e-5  # s, of the difference quotient of a closing speed: errors by rounding and by curvature are 1e-9 m/s
 
 
 class PackedInputs(NamedTuple):
-    """What each of the m inputs of the arbiter's rules gets; no rows where they are the memberships as they stand."""
+    """Source of each of the m inputs of the arbiter's rules; no rows where the inputs are the memberships."""
 
     memberships: PackedMemberships
     kinds: NDArray[np.int64]  # (m,) in the order of `_KINDS`
     places: NDArray[np.int64]  # (m,) criterion, or region: 0 the goal
-    upper: Array  # (m,) end of the universe: of what is never met, or no number
+    upper: Array  # (m,) upper end of the universe, also the value of an input that is infinite or NaN
     offsets: NDArray[np.int64]  # (m + 1,) into the courses
     times: Array  # s: of the points of given signals, one course behind the other
     values: Array  # of these points
-    of_goal: bool  # whether any is of the goal
-    by_speed: bool  # whether any, or any membership, asks how fast a region comes nearer
+    of_goal: bool  # True if an input is of the goal
+    by_speed: bool  # True if an input or a membership needs closing speeds
 
 
 class ArbiterSignals(NamedTuple):
-    """What is worked out of it, n regions beside the goal."""
+    """Output of `compute_inputs` for the goal and n regions."""
 
     memberships: Array  # (criteria,)
     inputs: Array  # (m,)
     goal_clearance: Array  # (1,) m
-    closing_speeds: Array  # (n + 1,) m/s or rad/s, the goal's first; above 0 where the region comes nearer
-    approach_times: Array  # (n,) s, 0 where violated, inf where it is not met
+    closing_speeds: Array  # (n + 1,) m/s or rad/s, the goal's first; above 0 where the clearance shrinks
+    approach_times: Array  # (n,) s, 0 where violated, inf where the clearance does not shrink
 
 
 def pack_inputs(
     regions: Sequence[SecondaryRegion], criteria: Sequence[CriterionSetup], rules: ArbiterRules, ramp: float
 ) -> PackedInputs:
-    """Return what an arbiter decides by.
+    """Pack the inputs of an arbiter into arrays.
 
     Parameters
     ----------
     regions : sequence of SecondaryRegion
         Of the scenario.
     criteria : sequence of CriterionSetup
-        Theirs.
+        Criteria of these regions.
     rules : ArbiterRules
-        That weigh them.
+        The arbiter's rules.
     ramp : float
-        Of memberships that have no reason of their own [m or rad].
+        Ramp of the memberships whose criterion has none of its own [m or rad].
 
     Returns
     -------
     PackedInputs
-        Its ramps may be set.
+        With ramps that `Arbitration.set_ramp` may change.
     """
     signals, system = rules.inputs, rules.system
     memberships = pack_memberships(regions, criteria, ramp)
@@ -89,28 +89,28 @@ def pack_inputs(
 
 
 def empty_signals(packed: PackedInputs, n_regions: int, n_criteria: int) -> ArbiterSignals:
-    """Return room for what `compute_inputs` works out; nothing is met at first."""
+    """Return signals for `compute_inputs` to fill: zeros, and infinite approach times."""
     memberships = np.zeros(n_criteria)
     inputs = np.zeros(packed.kinds.size) if packed.kinds.size else memberships
     return ArbiterSignals(memberships, inputs, np.zeros(1), np.zeros(n_regions + 1), np.full(n_regions, np.inf))
 
 
 def empty_state() -> VehicleState:
-    """Return room for what `write_arbiter_state` writes."""
+    """Return a state of zeros for `write_arbiter_state` to fill."""
     return VehicleState(np.zeros(3), np.zeros(4), np.zeros(6), np.zeros(0))
 
 
 def write_arbiter_state(measured: VehicleState, expected: Array, out: VehicleState) -> None:
-    """Write the state that the arbiter decides by: its noise would be that of the weights, and of the thrust.
+    """Write the state that the arbiter uses: the law's prediction, which has less noise than the measurement.
 
     Parameters
     ----------
     measured : VehicleState
-        Now. Attitude and rates are taken from it, and all else where the law expects nothing.
+        Measured state. Attitude and rates come from it; position and velocity where the prediction is NaN.
     expected : ndarray, shape (6,)
-        What the law expected of now, as `CompiledLaw.expected`.
+        The law's prediction for this step, as `CompiledLaw.expected`.
     out : VehicleState
-        Receives pose and velocity; no numbers where no position is measured.
+        Receives pose and velocity; NaN where no position is measured.
     """
     for i in range(3):
         known = expected[i] == expected[i] and measured.position[i] == measured.position[i]
@@ -130,22 +130,22 @@ def compute_inputs(
     clearances: Array,
     signals: ArbiterSignals,
 ) -> None:
-    """Write memberships, and what the inputs of the arbiter's rules get.
+    """Compute the memberships and the inputs of the arbiter's rules.
 
     Parameters
     ----------
     packed : PackedInputs
-        What they get.
+        Sources of the inputs.
     goal, regions : PackedRegions
-        The goal alone, and the n regions, where they are now.
+        The goal alone, and the n regions, at their present positions.
     state : VehicleState
-        Of the vehicle.
+        State of the vehicle.
     now : ndarray, shape (1,)
         Time [s].
     clearances : ndarray, shape (n,)
         Of the regions at that pose [m or rad].
     signals : ArbiterSignals
-        Filled.
+        Receives the result.
     """
     if packed.of_goal:
         signals.goal_clearance[0] = clearance_of_pose(goal, 0, state.position, state.quaternion, zeros(3))
@@ -159,7 +159,7 @@ def compute_inputs(
     compute_memberships(packed.memberships, clearances, signals.approach_times, signals.memberships)
     for k in range(packed.kinds.size):
         x = _input(packed, k, state, now[0], clearances, signals)
-        signals.inputs[k] = x if x <= packed.upper[k] else packed.upper[k]  # what is no number too
+        signals.inputs[k] = x if x <= packed.upper[k] else packed.upper[k]  # NaN too
 
 
 def _input(
@@ -185,7 +185,7 @@ def _input(
 
 
 def _given(packed: PackedInputs, k: int, now: float) -> float:
-    """Return what a given signal is at a time [s]: straight between its points, held beyond them."""
+    """Return the value of a given signal at a time [s]: linear between its points, constant beyond them."""
     first, end = packed.offsets[k], packed.offsets[k + 1]
     value: float = packed.values[first]
     for i in range(first + 1, end):
@@ -197,7 +197,7 @@ def _given(packed: PackedInputs, k: int, now: float) -> float:
 
 
 def _approach_time(clearance: float, speed: float) -> float:
-    """Return when a region is met [s] if the clearance shrinks on as fast as now: 0 where violated, inf for never."""
+    """Return the time to contact [s] at constant closing speed: 0 where violated, inf where there is none."""
     time: float = 0.0
     if clearance > 0.0:
         time = clearance / speed if speed > 0.0 else math.inf
@@ -205,7 +205,7 @@ def _approach_time(clearance: float, speed: float) -> float:
 
 
 def _closing_speed(regions: PackedRegions, i: int, state: VehicleState, clearance: float) -> float:
-    """Return how fast the clearance of a region shrinks [m/s or rad/s], by the motion of vehicle and region."""
+    """Return the closing speed of a region [m/s or rad/s]: the rate at which its clearance shrinks."""
     ahead, turned, room, omega = zeros(3), zeros(4), zeros(3), zeros(3)
     u, v, w = state.velocity_body[0], state.velocity_body[1], state.velocity_body[2]
     rows = rotation_rows(state.quaternion)

@@ -1,4 +1,4 @@
-"""The arbiter within a run: clearances and the state in, memberships and weights out, into the row of the step."""
+"""The arbiter in a run: from clearances and state to memberships and weights in the row of the step."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ from fuzzy_arbiter import Arbiter
 
 
 class Arbitration:
-    """Decides by the regions and the state; arrays are read and written in place.
+    """Computes memberships and weights from regions and state; reads and writes its arrays in place.
 
     Parameters
     ----------
     scenario : Scenario
-        Its criteria, and what its rules get.
+        Its criteria and the inputs of its rules.
     arbiter : Arbiter
-        Of these rules.
+        With the scenario's rules.
     measured : VehicleState
-        As the law is given it.
+        The state that the law receives.
     now : ndarray, shape (1,)
         Time [s].
     clearances : ndarray, shape (n,)
         Of each region at the pose of `state` [m], or [rad] of attitude.
     memberships, weights : ndarray, shape (criteria,)
-        Receive those of each criterion.
+        Receive membership and weight of each criterion.
     inputs : ndarray, shape (m,), optional
-        Receives those of the rules.
+        Receives the inputs of the rules.
 
     Attributes
     ----------
     state : VehicleState
-        What it decides by.
+        The state that the arbiter uses.
     region_weights : ndarray, shape (n,)
         Weight of the criterion of each region.
     """
@@ -68,31 +68,31 @@ class Arbitration:
         self._packed = packed
         self._signals: ArbiterSignals = empty_signals(packed, len(scenario.regions), memberships.size)
         self._compute, self._write_state = CompiledFunction(compute_inputs), CompiledFunction(write_arbiter_state)
-        self._weighed: list[float] | None = None  # inputs that the weights are of
+        self._weighed: list[float] | None = None  # inputs from which the present weights were computed
 
     def set_ramp(self, width: float) -> None:
-        """Let memberships that have no reason of their own reach 0 at another clearance [m or rad]."""
+        """Set the ramp [m or rad] of the memberships whose criterion has none of its own."""
         memberships = self._packed.memberships
         memberships.ramps[memberships.follows] = width
 
     def observe(self, expected: Array) -> None:
-        """Write the state that is decided by: what the law expected, shape (6,), or what is measured."""
+        """Write `state`: from the law's prediction `expected`, shape (6,), or the measurement where that is NaN."""
         self._write_state(self._measured, expected, self.state)
 
     def decide(self, goal: PackedRegions, regions: PackedRegions) -> None:
-        """Write the memberships and the weights, by goal and regions where they are now."""
+        """Compute memberships and weights from goal and regions at their present positions."""
         inputs = self._update(goal, regions)
-        # the same inputs have the same weights, which stand in the row still
+        # the same inputs give the same weights, which are still in the row
         if inputs != self._weighed:
             self._weighed = inputs
             self._weigh(inputs)
 
     def weigh(self) -> None:
-        """Write the weights of what was worked out last."""
+        """Compute the weights from the last inputs."""
         self._weigh(self._signals.inputs.tolist())
 
     def update(self, goal: PackedRegions, regions: PackedRegions) -> None:
-        """Write the memberships, by goal and regions where they are now, and leave the weights as they are."""
+        """Compute the memberships from goal and regions at their present positions; do not change the weights."""
         self._update(goal, regions)
 
     def _update(self, goal: PackedRegions, regions: PackedRegions) -> list[float]:

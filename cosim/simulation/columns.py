@@ -24,7 +24,7 @@ def columns_of(scenario: Scenario, plant: SteppedPlant, law: Law) -> list[Column
     Parameters
     ----------
     scenario : Scenario
-        What is run.
+        The scenario of the run.
     plant : SteppedPlant
         Its outputs, flags and inputs are columns.
     law : Law
@@ -40,12 +40,12 @@ def columns_of(scenario: Scenario, plant: SteppedPlant, law: Law) -> list[Column
 
 
 def names_of(scenario: Scenario) -> list[str]:
-    """Return the names of the columns of a run, without the reports of a law that is not shipped.
+    """Return the names of the columns of a run, without the diagnostics of a custom law.
 
     Parameters
     ----------
     scenario : Scenario
-        What is run.
+        The scenario of the run.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def names_of(scenario: Scenario) -> list[str]:
 
 
 def columns_without_plant(scenario: Scenario) -> list[Column]:
-    """Return the columns of a run as `columns_of` does, from the vehicle's table of variables and a shipped law.
+    """Return the columns of a run as `columns_of` does, from the vehicle's table of variables and a built-in law.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def _columns(
 
 
 def _rules(scenario: Scenario) -> Iterator[Column]:
-    """Yield what the arbiter decides by, where that is not the memberships alone."""
+    """Yield the columns of the arbiter's inputs, where these are not the memberships alone."""
     if scenario.arbiter.file:
         for signal in scenario.rules.inputs:
             yield Column(f"arbiter.{signal.name}", signal.unit, f"Input {signal.name} of the arbiter: {signal.what}")
@@ -136,18 +136,18 @@ def _sensed(scenario: Scenario) -> Iterator[Column]:
     if scenario.sensing.exact:
         return
     for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
-        yield Column(f"sensed.{axis}", "m", f"Position {where} that the law is told")
+        yield Column(f"sensed.{axis}", "m", f"Position {where} for the law")
     for i, name in enumerate("uvwpqr"):
-        yield Column(f"sensed.{name}", "m/s" if i < 3 else "rad/s", f"Velocity {name} that the law is told, body frame")
+        yield Column(f"sensed.{name}", "m/s" if i < 3 else "rad/s", f"Velocity {name} for the law, body frame")
     if scenario.sensing.through == "state":
         return
     for i in range(4):
-        yield Column(f"sensed.e{i}", "", f"Attitude that the law is told, unit quaternion, part {i}")
+        yield Column(f"sensed.e{i}", "", f"Attitude for the law, unit quaternion, part {i}")
     for name, unit in (("position", "m"), ("velocity", "m/s"), ("attitude", "rad")):
         for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
-            yield Column(f"deviation.{name}.{axis}", unit, f"Standard deviation of the told {name}, {where}")
+            yield Column(f"deviation.{name}.{axis}", unit, f"Standard deviation of the sensed {name}, {where}")
     for name in "pqr":
-        yield Column(f"deviation.rate.{name}", "rad/s", f"Standard deviation of the told rate {name}, body frame")
+        yield Column(f"deviation.rate.{name}", "rad/s", f"Standard deviation of the sensed rate {name}, body frame")
 
 
 def _ordered(scenario: Scenario) -> Iterator[Column]:

@@ -1,4 +1,4 @@
-"""Rules of an arbiter as a function of C, for loops that are run as C themselves."""
+"""Rules of an arbiter as a C function, for loops that run as C themselves."""
 
 from __future__ import annotations
 
@@ -28,29 +28,29 @@ void entry(const void *words)
 
 
 def rules_text(system: System) -> str:
-    """Return the C of rules, as their library is compiled from it, with ``entry``."""
+    """Return the C source of rules with the function ``entry``, from which their library is compiled."""
     return to_c(dataclasses.replace(system, name="rules")) + _ENTRY
 
 
 class BoundRules:
-    """Rules with their inputs and outputs, which stay alive as long as it does.
+    """Rules bound to their input and output arrays, which it keeps alive.
 
     Parameters
     ----------
     system : System
-        Whose inputs clip, and whose outputs all have a rule that fires or a default.
+        The rules. Inputs clip, and each output has a rule that fires for any input, or a default.
     inputs, outputs : ndarray
         C-contiguous; the outputs are filled with what the arbiter's exact engine gives, to the last bit.
 
     Attributes
     ----------
     address, words : int
-        Of the C function ``void (*)(const void *)``, and of what it is given.
+        Addresses of the C function ``void (*)(const void *)`` and of its argument.
 
     Raises
     ------
     CompilationError
-        If it has to be compiled, and there is no compiler.
+        If the library has to be compiled and there is no compiler.
     """
 
     def __init__(self, system: System, inputs: Array, outputs: Array) -> None:
@@ -67,13 +67,13 @@ class BoundRules:
             self.address = ctypes.cast(entry, ctypes.c_void_p).value or 0
 
     def raise_error(self) -> None:
-        """Raise what they raised when they were called by their address, if Python runs them and they did."""
+        """Raise the error of the last call by address, if the rules run in Python and raised one."""
         if isinstance(self._kept, BoundCall):
             self._kept.raise_error()
 
 
 class _Interpreted:
-    """The same in Python."""
+    """The rules in Python."""
 
     def __init__(self, system: System) -> None:
         self._arbiter = Arbiter(system=system)

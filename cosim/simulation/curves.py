@@ -1,4 +1,4 @@
-"""Membership functions that are not straight, as programs of a stack machine: for master and fused loop."""
+"""Curved membership functions as programs of a stack machine: for the master and the fused loop."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from fuzzy_arbiter.terms.parser import Node
 _WORDS = ("number", "x", *FUNCTIONS)
 _NUMBER, _X, _ADD, _SUBTRACT, _MULTIPLY, _DIVIDE, _POWER, _POW, _NEGATE, _ABS, _SQRT, _EXP, _LOG = range(13)
 _COS, _SIN, _TAN, _MIN, _MAX, _LT, _LE, _GT, _GE, _EQ, _NEQ = range(13, len(_WORDS))
-_LARGEST = 709.78  # what exp has a finite value of
+_LARGEST = 709.78  # largest argument at which exp is finite
 
 
 class PackedCurves(NamedTuple):
-    """The curves of r terms, in pieces; a term that is none has no pieces."""
+    """The curves of r terms, in pieces; a ramp has no pieces."""
 
     offsets: NDArray[np.int64]  # (r + 1,) into the pieces
     ends: Array  # m, rad or s: where each piece ends, the last of a term at infinity
@@ -37,12 +37,12 @@ def pack_curves(terms: Sequence[Membership | None]) -> PackedCurves:
     Parameters
     ----------
     terms : sequence of Membership or None
-        Of which only these have pieces; None is a ramp.
+        Terms; None for a ramp, which has no pieces.
 
     Returns
     -------
     PackedCurves
-        In their order.
+        In the order of the terms.
     """
     pieces = [pieces_of(term) if term else [] for term in terms]
     programs = [_program(tree) for of in pieces for _, tree in of]
@@ -56,7 +56,7 @@ def pack_curves(terms: Sequence[Membership | None]) -> PackedCurves:
 
 
 def _program(tree: Node) -> list[tuple[int, float]]:
-    """Return a tree's words, arguments before their function."""
+    """Return the program of an expression tree in postfix order."""
     if isinstance(tree, float):
         return [(_NUMBER, tree)]
     if isinstance(tree, str):
@@ -65,21 +65,21 @@ def _program(tree: Node) -> list[tuple[int, float]]:
 
 
 def curve_degree(packed: PackedCurves, k: int, x: float) -> float:
-    """Return the degree of a term at a place, as `fuzzy_arbiter` does: of a jump the greater one, within [0, 1].
+    """Return the degree of a term at `x` in [0, 1], as `fuzzy_arbiter` does: at a jump the greater one.
 
     Parameters
     ----------
     packed : PackedCurves
         Of the terms.
     k : int
-        Which, one that has pieces.
+        Index of a term that has pieces.
     x : float
-        Place [m, rad or s].
+        Argument [m, rad or s].
 
     Returns
     -------
     float
-        NaN where there is none.
+        NaN at NaN.
     """
     piece, last = packed.offsets[k], packed.offsets[k + 1] - 1
     while piece < last and x > packed.ends[piece]:
@@ -113,7 +113,7 @@ def _value(packed: PackedCurves, piece: int, x: float) -> float:
 
 
 def _of_one(word: int, a: float) -> float:
-    """Return a function of one number, as IEEE 754 has it, where Python raises."""
+    """Apply a function of one number with the results of IEEE 754 where Python raises."""
     value: float = math.nan
     if word == _NEGATE:
         value = -a
@@ -131,7 +131,7 @@ def _of_one(word: int, a: float) -> float:
 
 
 def _of_two(word: int, a: float, b: float) -> float:
-    """Return a function of two numbers, likewise."""
+    """Apply a function of two numbers, likewise."""
     value: float = 0.0
     if word == _ADD:
         value = a + b

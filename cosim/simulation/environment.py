@@ -1,4 +1,4 @@
-"""The goal and the regions of a run: where each is now, and what they say of a pose."""
+"""The goal and the regions of a run: their present positions, and their evaluation at a pose."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ _ROUNDING = 1e-6  # of a step
 
 @dataclass(frozen=True)
 class _Target:
-    """A region to be reached."""
+    """A target region."""
 
     packed: PackedRegions  # of this region alone
-    middle: Array  # (3,) m, NED: of its shape as packed
-    origin: Array  # (3,) m, NED: how far it would have been from there at time 0, had it always moved as it does now
+    middle: Array  # (3,) m, NED: centre of its shape as packed
+    origin: Array  # (3,) m, NED: its shift from there, extrapolated to time 0 at its present velocity
     radius: float  # m, of a sphere; 0 for the shape of the scenario's goal
 
 
 class RegionEvaluation(NamedTuple):
-    """What goal and n regions say of a pose; the goal's come first."""
+    """Values of goal and n regions at a pose; the goal's come first."""
 
     values: Array  # (n + 1,) g
     gradients: Array  # (n + 1, 3) of g by position, world frame
@@ -43,24 +43,24 @@ class RegionEvaluation(NamedTuple):
 
 
 class RegionPlaces(NamedTuple):
-    """All that is evaluated, where it is now."""
+    """Goal and regions at their present positions."""
 
     goal: PackedRegions
     regions: PackedRegions
 
 
 class RegionEnvironment:
-    """Goal and regions, moved by their velocities, or from outside where the scenario calls them streamed.
+    """Goal and regions, moved by their velocities, or by `move` where the scenario has ``streamed = true``.
 
     Parameters
     ----------
     scenario : Scenario
-        Which regions.
+        With the regions.
 
     Attributes
     ----------
     regions : PackedRegions
-        The n secondary ones, where they are now.
+        The n secondary regions at their present positions.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -78,25 +78,25 @@ class RegionEnvironment:
             region.region.name for region in scenario.regions if region.streamed and not region.is_dynamic
         ]
         self._moving = [self._names.index(name) for name in scenario.moving]
-        self._seen = [i for i, region in enumerate(scenario.regions) if region.is_dynamic]
-        # m, NED: where each would have been at time 0, had it always moved as it does now
+        self._dynamic = [i for i, region in enumerate(scenario.regions) if region.is_dynamic]
+        # m, NED: shift of each region, extrapolated to time 0 at its present velocity
         self._origins: Array = np.zeros((len(secondary), 3))
         self._evaluate_places = CompiledFunction(evaluate_places)
 
     @property
     def goal(self) -> PackedRegions:
-        """The region to be reached alone, where it is now."""
+        """The target region alone, at its present position."""
         return self._target.packed
 
     def update_positions(self, time: float, shifts: Array) -> None:
-        """Put all regions where they are at a time.
+        """Move all regions to their positions at a time.
 
         Parameters
         ----------
         time : float
             [s].
         shifts : ndarray, shape (moving regions, 3)
-            Receives how far each moving one is from where the scenario has it [m, NED].
+            Receives the shift of each moving region from its place in the scenario [m, NED].
         """
         if not self._moving:
             return
@@ -107,21 +107,21 @@ class RegionEnvironment:
             shifts[i] = self.regions.shifts[at - 1] if at else self.target - self._middle
 
     def doubt_positions(self, deviation: float) -> None:
-        """Let every region's place be uncertain by a standard deviation [m] more, so that margins are wider."""
+        """Add a standard deviation [m] to the position uncertainty of every region, which widens the margins."""
         np.hypot(self._deviations, deviation, out=self.regions.deviations)
 
     def empty_evaluation(self, values: Array, clearances: Array) -> RegionEvaluation:
-        """Return room for what `evaluate` finds.
+        """Return an evaluation for `evaluate` to fill.
 
         Parameters
         ----------
         values, clearances : ndarray, shape (n + 1,)
-            That are to be part of it.
+            Arrays that become part of it.
 
         Returns
         -------
         RegionEvaluation
-            All else zero.
+            With zeros in the other arrays.
         """
         n = len(self._names)
         return RegionEvaluation(values, np.zeros((n, 3)), np.zeros((n, 3)), clearances)
@@ -132,21 +132,21 @@ class RegionEnvironment:
         Parameters
         ----------
         state : VehicleState
-            Its position and attitude count.
+            Its position and attitude are used.
         evaluation : RegionEvaluation
-            Receives what they say.
+            Receives the values.
         """
         self._evaluate_places(self._places, state, evaluation)
 
     def advance_goal(self, clearance: float, place: Array) -> None:
-        """Let the goal go on to its next place, from the next step on, once the vehicle has stayed in it long enough.
+        """Move the goal to its next place, from the next step on, once the vehicle has stayed in it long enough.
 
         Parameters
         ----------
         clearance : float
             Of the goal at the true position, once a step [m].
         place : ndarray, shape (1,)
-            Receives which place it is at, from 0; of a goal that stays where it is, shape (0,).
+            Receives the index of the goal's place, from 0; shape (0,) for a goal with one place.
         """
         place[:] = self._place
         if self._place == len(self._then):
@@ -159,9 +159,9 @@ class RegionEnvironment:
     # ---- moved from outside ----
 
     def move(self, name: str, displacement: Array, velocity: Array, time: float) -> None:
-        """Say where a streamed region is at a time, and how it goes on from there, as `Master.move_region` says.
+        """Set position and velocity of a streamed region at a time [s], as described in `Master.move_region`.
 
-        A RunError if it is none that can be moved, or a number is not finite.
+        Raise a RunError if the region is not streamed, or a number is not finite.
         """
         if name not in self._streamed:
             known = ", ".join(self._streamed) or "none"
@@ -171,22 +171,22 @@ class RegionEnvironment:
             raise RunError(f"region {name!r}: moved to {to} m at {going} m/s, expected three finite numbers each")
         at = self._names.index(name)
         if at:
-            self._carry(at - 1, to, going, time)
+            self._set_motion(at - 1, to, going, time)
         else:
             self._reached.packed.velocities[0] = going
             self._reached.origin[:] = to - going * time
 
-    def _carry(self, i: int, displacement: Array, velocity: Array, time: float) -> None:
+    def _set_motion(self, i: int, displacement: Array, velocity: Array, time: float) -> None:
         self.regions.velocities[i] = velocity
         self._origins[i] = displacement - velocity * time
 
     def add_obstacle(self, slot: int, position: Vector3, radius: float, velocity: Vector3, time: float) -> None:
-        """Put an obstacle that came while running somewhere.
+        """Place an obstacle in a slot.
 
         Parameters
         ----------
         slot : int
-            Which of them, from 0.
+            Slot for dynamic obstacles, from 0.
         position : tuple of float
             Of its centre [m, NED].
         radius : float
@@ -196,27 +196,27 @@ class RegionEnvironment:
         time : float
             [s].
         """
-        i = self._seen[slot]
+        i = self._dynamic[slot]
         self._reshape(self.regions, i, Sphere(PARKED_POSITION, radius))
-        self._carry(i, np.subtract(position, PARKED_POSITION), np.array(velocity), time)
+        self._set_motion(i, np.subtract(position, PARKED_POSITION), np.array(velocity), time)
 
     def remove_obstacle(self, slot: int) -> None:
-        """Take an obstacle away that came while running; `slot` counts them from 0."""
-        self._carry(self._seen[slot], np.zeros(3), np.zeros(3), 0.0)
+        """Remove the obstacle in a slot, from 0."""
+        self._set_motion(self._dynamic[slot], np.zeros(3), np.zeros(3), 0.0)
 
     def shift_region(self, name: str, by: Vector3) -> None:
-        """Move a region, also of an obstacle that came, by so much [m, NED] from where it is.
+        """Move a region, or an obstacle, by a displacement [m, NED].
 
         Raises
         ------
         CommandError
-            If there is no such region, it is at no place, or it is an obstacle that has not come.
+            If there is no such region, it cannot be moved, or it is an obstacle slot that is free.
         """
         movable = [self._names[at] for at in self._moving if at]
         if name not in movable:
             raise CommandError(f"region is {name!r}, expected one of {', '.join(movable) or 'none'}")
         i = self._names.index(name) - 1
-        if i in self._seen and not self._origins[i].any():
+        if i in self._dynamic and not self._origins[i].any():
             raise CommandError(f"region is {name!r}: no such obstacle has come")
         self._origins[i] += by
 
@@ -224,24 +224,24 @@ class RegionEnvironment:
 
     @property
     def target(self) -> Array:
-        """Middle of the region to be reached, shape (3,) [m, NED]."""
+        """Centre of the target region, shape (3,) [m, NED]."""
         middle: Array = self._target.middle + self.goal.shifts[0]
         return middle
 
     @property
     def target_radius(self) -> float:
-        """Radius of the region to be reached [m], 0 if it has the shape of the scenario's goal."""
+        """Radius of the target region [m], 0 if it has the shape of the scenario's goal."""
         return self._target.radius
 
     def set_target(
         self, position: Vector3, radius: float | None, velocity: Vector3 = _AT_REST, time: float = 0.0
     ) -> None:
-        """Put the region to be reached somewhere.
+        """Set position, shape and velocity of the target region.
 
         Parameters
         ----------
         position : tuple of float
-            Of its middle [m, NED].
+            Of its centre [m, NED].
         radius : float or None
             Of a sphere [m]; None for the shape of the scenario's goal.
         velocity : tuple of float
@@ -252,22 +252,22 @@ class RegionEnvironment:
         target = self._new_target(radius, position)
         target.packed.velocities[0] = velocity
         target.origin[:] -= np.multiply(velocity, time)
-        self._head_for(target)
+        self._use_target(target)
 
     def save_target(self) -> None:
-        """Remember the present target, for `restore_target`."""
+        """Save the present target for `restore_target`."""
         self._reached = self._target
 
     def restore_target(self) -> None:
-        """Go back to the target that was remembered last; the scenario's goal, if none was."""
-        self._head_for(self._reached)
+        """Restore the target that was saved last; the scenario's goal, if none was."""
+        self._use_target(self._reached)
 
-    def _head_for(self, target: _Target) -> None:
+    def _use_target(self, target: _Target) -> None:
         self._target = target
         self._places = self._places._replace(goal=target.packed)
 
     def _new_target(self, radius: float | None, position: Vector3) -> _Target:
-        """Return a target at rest with its middle at a position, as a sphere or in the shape of the scenario's goal."""
+        """Return a target at rest with its centre at a position, a sphere or with the shape of the scenario's goal."""
         if radius is None:
             origin = np.subtract(position, self._middle)
             return _Target(pack([self._goal_region]), np.array(self._middle), origin, 0.0)
@@ -277,11 +277,11 @@ class RegionEnvironment:
     # ---- changed from outside ----
 
     def set_gain(self, name: str, gain: float) -> None:
-        """Give a secondary region another gain."""
+        """Set the gain of a secondary region."""
         self.regions.gains[self._names.index(name) - 1] = gain
 
     def set_shape(self, name: str, shape: Shape) -> None:
-        """Give a region, or ``"goal"``, another shape of the same kind and size."""
+        """Set the shape of a region, or of ``"goal"``, to one of the same kind with as many numbers."""
         at = self._names.index(name)
         if at:
             self._reshape(self.regions, at - 1, shape)
@@ -297,19 +297,19 @@ class RegionEnvironment:
 
 
 def evaluate_places(places: RegionPlaces, state: VehicleState, found: RegionEvaluation) -> None:
-    """Evaluate the goal into the first places, and the regions into those behind, in one call."""
+    """Evaluate the goal into the first elements, and the regions into those behind, in one call."""
     p, e, g, c = state.position, state.quaternion, found.values, found.clearances
     evaluate_packed(places.goal, p, e, g[:1], found.gradients[:1], found.rotation_gradients[:1], c[:1])
     evaluate_packed(places.regions, p, e, g[1:], found.gradients[1:], found.rotation_gradients[1:], c[1:])
 
 
 def stay_steps(scenario: Scenario) -> int:
-    """Return for how many steps the vehicle has to stay within the goal before that goes on."""
+    """Return the number of steps that the vehicle has to stay in the goal before the goal moves to its next place."""
     return math.ceil(scenario.goal_stay / scenario.time.step - _ROUNDING)
 
 
 def shape_center(shape: Shape) -> Vector3:
-    """Return the point that moves with a shape, by which targets are placed.
+    """Return the centre of a shape, the point by which targets are placed.
 
     Parameters
     ----------
@@ -319,7 +319,7 @@ def shape_center(shape: Shape) -> Vector3:
     Returns
     -------
     tuple of float
-        The middle of its upright box [m, NED]; along an axis on which it has one end, that end, and 0 where none.
+        Centre of its bounding box [m, NED]; along an axis with one finite bound that bound, and 0 with none.
     """
     middle = [0.0, 0.0, 0.0]
     for axis, (low, high) in enumerate(zip(*shape.bounds(), strict=True)):

@@ -26,7 +26,7 @@ _STEP = 1e-4  # m, by which the errors are differentiated along the motion
 
 
 def lyapunov_columns(scenario: Scenario) -> list[Column]:
-    """Return the columns of V and its rate, none unless the scenario records them."""
+    """Return the columns of V and its rate; empty unless the scenario records them."""
     if not scenario.record.lyapunov:
         return []
     return [
@@ -43,7 +43,7 @@ class LyapunovSignals:
     Parameters
     ----------
     scenario : Scenario
-        Its law is the printed one.
+        With the paper's law.
     state : VehicleState
         The true state, read at each `write`.
     goal, regions : PackedRegions

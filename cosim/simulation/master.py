@@ -1,7 +1,7 @@
-"""The co-simulation master: one step of plant, arbiter and controller, from measuring to publishing.
+"""The co-simulation master: steps plant, arbiter and controller, and publishes their signals.
 
-Read `Master.run` from top to bottom: each stage is one call. Observers see the row of signals when a step is done; they
-copy what they keep, and cannot change it.
+`Master.run` loops over the steps; `Master.step` does one, with a call for each stage. After each step the observers
+receive the row of signals, which is read-only, and which the next step overwrites.
 """
 
 from __future__ import annotations
@@ -34,40 +34,40 @@ from cosim.simulation.stepped_plant import SteppedPlant
 from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant
 
-_LONGEST_SLEEP = 3600.0  # s
-_MADE_UP = 0.1  # s of the wall clock, that a paced run may be behind and make up for
-_ARMING_PERIOD = 0.005  # s of the wall clock, at which commands are looked for while nothing moves
+_MAX_SLEEP = 3600.0  # s
+_MAX_LAG = 0.1  # s of the wall clock: lag that a paced run catches up; beyond it the schedule shifts
+_ARMING_PERIOD = 0.005  # s of the wall clock, between polls of the commands while the run waits for arming
 _ROUNDING = 1e-6  # of a step
 _DOWN: Array = np.array([0.0, 0.0, 1.0])
-_FIRST_APPLIED = "thruster_force[1]"  # outputs before it are read at the beginning of a step, from it on at the end
+_FIRST_APPLIED = "thruster_force[1]"  # outputs before it are read before doStep, this one and those behind it after
 
 
 class Observer(Protocol):
-    """Listens to a run."""
+    """Receives the row of signals after each step."""
 
     def observe(self, k: int, row: Array) -> None:
-        """Take the row of step `k`, shape (n,); it is overwritten in the next step, so copy what is kept."""
+        """Take the row of step `k`, shape (n,). The next step overwrites it: copy what you keep."""
         ...
 
 
 class Master:
-    """Everything that a run needs, made once; `run` then steps it.
+    """The co-simulation of one scenario: FMU, law, arbiter and regions, set up once; `run` steps them.
 
     Parameters
     ----------
     scenario : Scenario
-        What to run.
+        The scenario of the run.
     law : Law, optional
-        What steers; default: the scenario's law.
+        The control law; default: the scenario's.
     plant : SteppedPlant, optional
-        What is steered, closed with the master; default: the FMU of the scenario's vehicle.
+        The plant, which the master closes; default: the FMU of the scenario's vehicle.
 
     Attributes
     ----------
     signals : Signals
         The row that each step fills.
-    truth, state : VehicleState
-        The vehicle as it is, and as law and arbiter are told; the same where sensing is exact.
+    true_state, state : VehicleState
+        The plant's state, and the measured one that law and arbiter receive; the same object where sensing is exact.
     navigator : Navigator or None
         The filter that estimates the state, where sensing is through sensors.
 
@@ -78,7 +78,7 @@ class Master:
     BuildError
         If there is no FMU and none can be built.
     LawError, DefinitionError, ScenarioError
-        If law or arbiter cannot be set up, or the scenario asks for what a law that is a function has not.
+        If law or arbiter cannot be set up, or the scenario needs a feature that a `FunctionLaw` lacks.
 
     Examples
     --------
@@ -92,14 +92,14 @@ class Master:
 
     def __init__(self, scenario: Scenario, law: Law | None = None, plant: SteppedPlant | None = None) -> None:
         if isinstance(law, FunctionLaw):
-            scenario = with_custom_law(law, scenario)  # refuses what such a law cannot have
+            scenario = with_custom_law(law, scenario)  # raises for keys that such a law does not support
         self.scenario = scenario
         self.arbiter = Arbiter(system=scenario.rules.system, engine=scenario.arbiter.engine)
         self.law: Law = law_of(scenario) if law is None else law
         self._jacobi = scenario.master.order == "jacobi"
         self._failures = bool(scenario.failures)
         self.environment = RegionEnvironment(scenario)
-        self._boundary = 0.0  # s, when the next step begins
+        self._boundary = 0.0  # s, beginning of the next step
 
         self.plant: SteppedPlant = Plant(scenario.vehicle, scenario.plant.fmi) if plant is None else plant
         try:
@@ -112,17 +112,17 @@ class Master:
             raise
 
     def _bind(self) -> None:
-        """Name the parts of the row, and the buffers beside it."""
+        """Bind actuators, sensing, arbiter and commands to their parts of the row."""
         s, n = self.signals, len(self.scenario.regions)
         self.actuators = Actuators(self.scenario, self.plant, s)
         plant, n_outputs = self.plant, len(self.plant.outputs)
         n_measured = plant.outputs.names.index(_FIRST_APPLIED)
-        # views of their memory, which are copied in a third of the time of arrays
-        outputs, given = s.view("position.x", n_outputs).data, plant.outputs.values.data
-        self._measured, self._plant_measured = outputs[:n_measured], given[:n_measured]
-        self._applied, self._plant_applied = outputs[n_measured:], given[n_measured:]
+        # memoryviews: copying one takes a third of the time of copying an array
+        outputs, plant_outputs = s.view("position.x", n_outputs).data, plant.outputs.values.data
+        self._measured, self._plant_measured = outputs[:n_measured], plant_outputs[:n_measured]
+        self._applied, self._plant_applied = outputs[n_measured:], plant_outputs[n_measured:]
         self._flags = s.view("position.x", n_outputs + len(plant.flags))[n_outputs:]
-        self._raised = b""  # the flags that stand in the row
+        self._raised = b""  # the flags as they were last written into the row
 
         true_state = VehicleState(
             position=s.view("position.x", 3),
@@ -135,7 +135,7 @@ class Master:
         self.navigator = self._sensor.navigator if isinstance(self._sensor, SensorNavigation) else None
 
         values, clearances = s.view("goal.value", n + 1), s.view("goal.clearance", n + 1)
-        # where sensing is exact, what the arbiter sees is what is recorded
+        # where sensing is exact, the arbiter uses the evaluation that is recorded
         self._true_evaluation = self._given_evaluation = self.environment.empty_evaluation(values, clearances)
         if self._sensor is not None:
             self._given_evaluation = self.environment.empty_evaluation(np.zeros(n + 1), np.zeros(n + 1))
@@ -148,7 +148,7 @@ class Master:
             s.view(f"membership.{names[0]}", len(names)), s.view(f"weight.{names[0]}", len(names)),
             s.view(f"arbiter.{inputs[0].name}", len(inputs)) if self.scenario.arbiter.file else None,
         )  # fmt: skip
-        self._expected = NOTHING_EXPECTED  # by the law, of the next step, where what is measured is not exact
+        self._expected = NOTHING_EXPECTED  # the law's prediction for the next step; unused where sensing is exact
         self._estimate = s.view("estimate.phi1", 4)
         n_reports = len(self.law.diagnostics)
         self._reports = n_reports > 0
@@ -166,10 +166,10 @@ class Master:
 
     @property
     def row(self) -> Array:
-        """The row of the present step, shape (n,), which cannot be written."""
-        seen = self.signals.row.view()
-        seen.flags.writeable = False
-        return seen
+        """The row of the present step, shape (n,), read-only."""
+        row = self.signals.row.view()
+        row.flags.writeable = False
+        return row
 
     def run(
         self,
@@ -178,21 +178,21 @@ class Master:
         commands: CommandSource | None = None,
         awaiting: Observer | None = None,
     ) -> None:
-        """Step from time 0 to the end, once, telling the observers of each step.
+        """Step from time 0 to the end, once, and pass each row to the observers.
 
-        The row of step k holds what was measured and decided at its beginning, and the forces that acted at its end.
+        The row of step k holds measurements and decisions from its beginning, and the applied forces from its end.
 
         Parameters
         ----------
         observers : sequence of Observer
-            Told in this order.
+            Called in this order after each step.
         rate : float, optional
-            Simulated seconds a wall-clock second at the most; default: as fast as it goes.
+            Greatest number of simulated seconds per wall-clock second; default: no limit.
         commands : CommandSource, optional
-            What is commanded on the way, if the scenario's commands are enabled. Where nothing moves before the vehicle
-            is armed, the first step waits for that command. After a command to reset, the run ends.
+            Commands during the run, if the scenario's commands are enabled. With `commands.await_arm` the first step
+            waits for the command to arm. A command to reset ends the run.
         awaiting : Observer, optional
-            Told how things stand, as of step 0, while arming is awaited.
+            Receives the row of the initial state, as step 0, while the run waits for arming.
 
         Raises
         ------
@@ -200,27 +200,27 @@ class Master:
             If the FMU fails in a step.
         """
         step, last = self.scenario.time.step, self.scenario.steps
-        seen = self.row
+        row = self.row
         waited = self._await_arming(commands, awaiting)
         started = time.perf_counter()
         for k in range(last + 1):
             self.step(k, commands if k or not waited else None)
             for observer in observers:
-                observer.observe(k, seen)
+                observer.observe(k, row)
             if self.command_handler is not None and self.command_handler.reset:
                 return
             if rate is not None:
                 ahead = started + (k + 1) * step / rate - time.perf_counter()
-                time.sleep(min(max(0.0, ahead), _LONGEST_SLEEP))
-                started -= min(0.0, ahead + _MADE_UP)  # what took longer, such as loading, is not made up for in a rush
+                time.sleep(min(max(0.0, ahead), _MAX_SLEEP))
+                started -= min(0.0, ahead + _MAX_LAG)  # a longer delay, such as loading, is not caught up
 
     def step(self, k: int, commands: CommandSource | None = None) -> None:
-        """Do step `k`: the first is 0, and each is done once, in their order; the last one moves nothing.
+        """Do step `k`; call it once for each step, in order, from 0. The last step does not advance the plant.
 
         Parameters
         ----------
         k : int
-            Which.
+            Number of the step.
         commands : CommandSource, optional
             As for `run`.
 
@@ -242,7 +242,7 @@ class Master:
         if self.command_handler is not None and self.command_handler.update(
             float(self.signals.row[0]), float(self._given_evaluation.clearances[0])
         ):
-            self._apply_commands(self.command_handler, ())  # what the next item of the mission changes
+            self._apply_commands(self.command_handler, ())  # changes by the next mission item
             self._evaluate_regions()
         if not jacobi and k % scenario.arbiter_every == 0:
             self._arbitrate()
@@ -264,12 +264,13 @@ class Master:
                 self.actuators.fail(failure)
 
     def _measure(self, k: int) -> None:
+        """Copy the plant's outputs into the row, and update the measured state."""
         self._measured[:] = self._plant_measured
         if self._sensor is not None:
             self._sensor.measure(self.signals.row[0], k % self.scenario.control_every == 0)
 
     def measure_initial_state(self) -> None:
-        """Fill the row with how things stand before the first step; nothing moves, and no noise is drawn."""
+        """Fill the row with the initial state. The plant is not stepped, and no noise is drawn."""
         self._measured[:] = self._plant_measured
         if self._sensor is not None:
             self._sensor.give_true_state()
@@ -278,21 +279,21 @@ class Master:
             self.command_handler.update(0.0, float(self._given_evaluation.clearances[0]))
 
     def _await_arming(self, commands: CommandSource | None, awaiting: Observer | None) -> bool:
-        """Apply commands before step 0 until one arms the vehicle, or none is to come; return whether it waited."""
+        """Apply commands before step 0 until one arms the vehicle or the source is exhausted; return True if waited."""
         command_handler = self.command_handler
         if command_handler is None or command_handler.armed or commands is None:
             return False
         while not (command_handler.armed or commands.exhausted):
             self.measure_initial_state()
             self._apply_commands(command_handler, commands.take(0))
-            command_handler.reset = False  # nothing has begun
+            command_handler.reset = False  # no step has been done: there is nothing to reset
             if awaiting is not None:
                 awaiting.observe(0, self.row)
             time.sleep(_ARMING_PERIOD)
         return True
 
     def _apply_commands(self, command_handler: CommandHandler, commands: Sequence[Command]) -> None:
-        """Follow the commands of this step, and take over what was changed."""
+        """Apply the commands of this step, and pass changed settings to law and arbiter."""
         for command in commands:
             command_handler.apply(command, float(self.signals.row[0]))
         if command_handler.control_regained:
@@ -308,7 +309,7 @@ class Master:
         command_handler.mark_applied()
 
     def _evaluate_regions(self) -> None:
-        """Evaluate the regions, where they are now, at the pose that the arbiter decides by, and at the true one."""
+        """Move the regions to the present time, and evaluate them at the arbiter's pose and at the true pose."""
         self.environment.update_positions(self.signals.row[0], self._shifts)
         self._arbitration.observe(self._expected)
         if self._sensor is not None:
@@ -317,12 +318,12 @@ class Master:
         self.environment.advance_goal(self._true_evaluation.clearances[0], self._goal_place)
 
     def _arbitrate(self) -> None:
-        """Decide by the regions as they stand; while the position is lost, the last weights hold."""
+        """Compute the criteria's weights; while the position is lost, keep the last ones."""
         if self._position_known:
             self._arbitration.decide(self.environment.goal, self.environment.regions)
 
     def _exchange_delayed(self, before: int) -> None:
-        """Hand on what regions and arbiter made, in the step `before`, of what stood at its beginning (Jacobi)."""
+        """Pass on the outputs that regions and arbiter computed from the inputs of step `before` (Jacobi)."""
         if before % self.scenario.arbiter_every == 0:
             self._arbitration.weigh()
         if self._position_known:
@@ -333,14 +334,14 @@ class Master:
         return self._sensor is None or bool(np.isfinite(self.state.position).all())
 
     def _control(self) -> None:
-        """Ask the law, or the sticks, for forces of the coming period, and bring them to the plant's inputs."""
+        """Compute the forces of the coming control period, by law or manual control, and allocate them."""
         actuators = self.actuators
         self._expected = NOTHING_EXPECTED
         if self.command_handler is not None and not self.command_handler.automatic_control:
             actuators.command[:] = self.command_handler.wrench()
             actuators.allocate()
             return
-        if self.navigator is not None and not self.navigator.started:  # nothing is known to steer by
+        if self.navigator is not None and not self.navigator.started:  # there is no state estimate yet
             actuators.command[:] = actuators.thrusts[:] = 0.0
             actuators.allocate()
             return
@@ -366,18 +367,18 @@ class Master:
             self._flags[...], self._raised = flags, raised
 
     def move_region(self, name: str, displacement: Array, velocity: Array) -> None:
-        """Say where a streamed region is from the next step on, and how it goes on from there.
+        """Set position and velocity of a streamed region from the next step on.
 
-        To be called between steps: before `run`, or by an observer.
+        Call it between steps: before `run`, or in an observer.
 
         Parameters
         ----------
         name : str
-            Of a region, or ``"goal"``, that the scenario calls streamed.
+            Of a region with ``streamed = true`` in the scenario, or ``"goal"``.
         displacement : array_like, shape (3,)
-            At the beginning of the next step, from where the scenario has it [m, NED].
+            At the beginning of the next step, from the region's place in the scenario [m, NED].
         velocity : array_like, shape (3,)
-            From then on [m/s, NED]; the law is told.
+            From then on [m/s, NED]; the law receives it too.
 
         Raises
         ------

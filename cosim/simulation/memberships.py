@@ -1,4 +1,4 @@
-"""How much each criterion asks for attention, by its regions: for the master and the fused loop."""
+"""Memberships of the criteria, computed from their regions: for the master and the fused loop."""
 
 from __future__ import annotations
 
@@ -19,33 +19,33 @@ _APPROACH_TIME = 1
 
 
 class PackedMemberships(NamedTuple):
-    """Why regions ask for attention: a reason of a region's criterion in each of r rows."""
+    """Membership functions in r rows, each of one region and one reason of its criterion."""
 
-    regions: NDArray[np.int64]  # (r,) whose reason it is
-    criteria: NDArray[np.int64]  # (r,) of that region
+    regions: NDArray[np.int64]  # (r,) index of the region
+    criteria: NDArray[np.int64]  # (r,) index of the region's criterion
     quantities: NDArray[np.int64]  # (r,) 0 its clearance, 1 the time to contact
     ramps: Array  # (r,) m or rad, where the membership reaches 0; NaN: it goes by points or a curve
-    follows: NDArray[np.bool_]  # (r,) whether the ramp is the arbiter's
+    follows: NDArray[np.bool_]  # (r,) True if the ramp is the arbiter's
     offsets: NDArray[np.int64]  # (r + 1,) into the points
     places: Array  # m, rad or s: of the points, one row's behind the other's
     degrees: Array  # of the points
-    curves: PackedCurves  # of terms that are not straight, which have no points
-    by_time: bool  # whether any row asks for the time to contact
+    curves: PackedCurves  # of curved terms, which have no points
+    by_time: bool  # True if a row needs the time to contact
 
 
 def pack_memberships(
     regions: Sequence[SecondaryRegion], criteria: Sequence[CriterionSetup], width: float
 ) -> PackedMemberships:
-    """Turn the reasons of regions into arrays.
+    """Pack the membership functions of regions into arrays.
 
     Parameters
     ----------
     regions : sequence of SecondaryRegion
-        Any number.
+        May be empty.
     criteria : sequence of CriterionSetup
-        Theirs, in order.
+        Criteria of these regions, in their order.
     width : float
-        Of the ramp that the arbiter has [m or rad].
+        Of the arbiter's ramp [m or rad].
 
     Returns
     -------
@@ -79,16 +79,16 @@ def pack_memberships(
 def compute_memberships(
     packed: PackedMemberships, clearances: Array, approach_times: Array, memberships: Array
 ) -> None:
-    """Write the membership of each criterion, that of its most pressing region.
+    """Compute the membership of each criterion: the greatest over its regions.
 
     Parameters
     ----------
     packed : PackedMemberships
         Of n regions.
     clearances : ndarray, shape (n,)
-        Of each region [m], or [rad] of attitude; what is no number asks for nothing.
+        Of each region [m], or [rad] of attitude; NaN gives 0.
     approach_times : ndarray, shape (n,)
-        In which each is met [s]; (0,) where nothing asks for it.
+        Time to contact of each region [s]; shape (0,) where no row needs it.
     memberships : ndarray, shape (criteria,)
         Receives them, in [0, 1].
     """
@@ -105,7 +105,7 @@ def compute_memberships(
 
 
 def _degree(packed: PackedMemberships, k: int, x: float) -> float:
-    """Return the degree of a row at a place, as `fuzzy_arbiter.Shape` does: straight between points, held beyond."""
+    """Return the degree of a row at `x`, as `fuzzy_arbiter.Shape` does: linear between points, constant beyond."""
     first, end = packed.offsets[k], packed.offsets[k + 1]
     degree: float = packed.degrees[end - 1] if x == x else x
     for i in range(end - 1, first, -1):

@@ -1,4 +1,4 @@
-"""What law and arbiter are told of the vehicle: its state with noise on position and velocity, held, or lost."""
+"""The measured state that law and arbiter receive: noise on position and velocity, and gaps without them."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ STREAM = 1  # beside the seed, as in scored scenes: a scene and a scenario of on
 
 
 class Sensor:
-    """Makes the state that is told from the true one.
+    """Computes the measured state from the true one.
 
     Parameters
     ----------
     sensing : Sensing
         Noise and gaps.
-    truth : VehicleState
+    true_state : VehicleState
         Views of the true state.
-    told : VehicleState
-        Receives what is told.
+    given : VehicleState
+        Receives the measured state.
     """
 
     def __init__(self, sensing: Sensing, true_state: VehicleState, given: VehicleState) -> None:
@@ -37,7 +37,7 @@ class Sensor:
         self._given.velocity_body[:] = self._true_state.velocity_body
 
     def measure(self, time: float, anew: bool) -> None:
-        """Write what is told at a time.
+        """Write the measured state at a time.
 
         Parameters
         ----------

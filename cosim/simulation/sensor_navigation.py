@@ -1,4 +1,4 @@
-"""Sensing through sensors: law and arbiter are given the estimate of the navigation filter."""
+"""Sensing through sensors: law and arbiter receive the estimate of the navigation filter."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class SensorNavigation:
     Parameters
     ----------
     scenario : Scenario
-        Of the sensors and their outages.
+        With the sensors and their outages.
     plant : SteppedPlant
-        Its sensors.
+        With the sensors.
     signals : Signals
-        Where its outputs stand.
+        Their row holds the plant's outputs.
     true_state : VehicleState
         Views of the true state.
     given : VehicleState
@@ -55,7 +55,7 @@ class SensorNavigation:
         self._given.velocity_body[:] = self._true_state.velocity_body
 
     def measure(self, time: float, anew: bool) -> None:
-        """Write the estimate for a time [s] by the sensors' samples; outages begin and end. `anew` is not used."""
+        """Apply sensor outages due at a time [s], and write the estimate from the samples. `anew` is not used."""
         while self._changes and self._changes[0][0] * self._step <= time + _ROUNDING * self._step:
             _, sensor, probability = self._changes.pop(0)
             self._plant.set({f"{SENSORS[sensor]}.loss_probability": probability})
@@ -67,16 +67,16 @@ class SensorNavigation:
 def make_sensing(
     scenario: Scenario, plant: SteppedPlant, signals: Signals, true_state: VehicleState
 ) -> tuple[VehicleState, Sensor | SensorNavigation | None]:
-    """Return the state that law and arbiter are given, and what writes it.
+    """Return the state that law and arbiter receive, and the object that writes it.
 
     Parameters
     ----------
     scenario : Scenario
-        How the vehicle is sensed.
+        Its key `sensing` is used.
     plant : SteppedPlant
-        Its sensors.
+        With the sensors.
     signals : Signals
-        Where it stands.
+        Their row holds the returned state.
     true_state : VehicleState
         Views of the true state.
 

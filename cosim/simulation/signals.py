@@ -1,4 +1,4 @@
-"""One row of signals: all that a step measures, decides and does, side by side in one array."""
+"""One row of signals: measurements, decisions and forces of a step in one array."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ class Signals:
         self._at = {column.name: i for i, column in enumerate(self.columns)}
 
     def index(self, name: str) -> int:
-        """Return where the column `name` is in the row."""
+        """Return the index of the column `name` in the row."""
         return self._at[name]
 
     def view(self, first: str, n: int) -> Array:
         """Return the `n` signals from the column `first` on, shape (n,), as a view into the row.
 
-        An IndexError if there are not so many.
+        Raise an IndexError if there are fewer.
         """
         at = self._at[first]
         if at + n > len(self.row):

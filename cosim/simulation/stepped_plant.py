@@ -1,4 +1,4 @@
-"""What the master needs of a plant: an FMU, or a vehicle behind a link."""
+"""Interface of a plant that the master steps: an FMU, or a vehicle behind a link."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from plant_fmu.running.channels import Channels
 
 
 class SteppedPlant(Protocol):
-    """Has named numbers, and goes on in steps.
+    """Plant with named variables that advances in steps.
 
     Attributes
     ----------
     inputs, outputs, flags : Channels
-        Its buffers change in place: inputs are sent with a step, outputs are as they are after it.
+        Buffers that change in place: `step` sends the inputs and updates the outputs.
     """
 
     inputs: Channels
@@ -26,17 +26,17 @@ class SteppedPlant(Protocol):
         ...
 
     def initialise(self) -> None:
-        """Make it ready to step."""
+        """Initialise the plant before the first step."""
         ...
 
     def step(self, step: float) -> None:
-        """Go on by so many seconds."""
+        """Advance the plant by `step` seconds."""
         ...
 
     def read_flags(self) -> Any:
-        """Return the Boolean outputs, shape (n,), as they are now."""
+        """Return the present Boolean outputs, shape (n,)."""
         ...
 
     def close(self) -> None:
-        """Give it back. May be called twice."""
+        """Release the plant. May be called twice."""
         ...

@@ -1,6 +1,6 @@
-"""A real autopilot flies the plant.
+"""Software in the loop: a real autopilot flies the plant.
 
-The other side of ArduPilot's and PX4's simulators in the loop.
+The simulator side of ArduPilot's and PX4's simulation interfaces.
 
 Imports: companion, controller, mavlink.vehicle, mavlink.wire, plant_fmu, results, run, scenario, simulation.
 """

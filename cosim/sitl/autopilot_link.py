@@ -1,4 +1,4 @@
-"""A MAVLink link beside the lockstep: hears the autopilot's own estimate, and tells it what a DVL measures."""
+"""A MAVLink link beside the lockstep: receives the autopilot's estimate, and sends the measurements of a DVL."""
 
 from __future__ import annotations
 
@@ -30,32 +30,32 @@ ESTIMATE = (
 )
 
 _RATES = {0: 5.0, 31: 50.0, 32: 50.0}  # Hz, by message id: HEARTBEAT, ATTITUDE_QUATERNION, LOCAL_POSITION_NED
-_LISTENING = 0.005  # s of simulated time between two looks at the link
+_LISTENING = 0.005  # s of simulated time between two readings of the link
 _ASKING, _HEARTBEAT = 10.0, 1.0  # s of the link's clock
 _MICRO = 1e6
 
 
 @dataclass(frozen=True)
 class DvlOptions:
-    """How the autopilot gets the velocity over ground, as VISION_POSITION_DELTA."""
+    """Rate, latency and dropout of the velocity over ground, sent as VISION_POSITION_DELTA."""
 
     rate: float = 8.0  # Hz
     latency: float = 0.1  # s, between the end of an interval and its message
-    dropout: float = 0.0  # part of the messages that do not come, 0 to 1
-    seed: int = 1  # of those
+    dropout: float = 0.0  # fraction of lost messages, 0 to 1
+    seed: int = 1  # of the losses
 
 
 class Dvl:
-    """Integrates the DVL's velocity and the gyro over each interval.
+    """Integrate the DVL's velocity and the gyro over each interval.
 
     Parameters
     ----------
     options : DvlOptions
-        How often, how late, and how much is lost.
+        Rate, latency and dropout.
 
     Examples
     --------
-    The autopilot's time in microseconds, the interval, the turn and the way in it:
+    The autopilot's time and the interval in microseconds, and the turn and the displacement in it:
 
     >>> from cosim.sitl.autopilot_link import Dvl, DvlOptions
     >>> from cosim.sitl.motion import Motion
@@ -75,7 +75,7 @@ class Dvl:
         self._due: deque[tuple[float, Any]] = deque()
 
     def take(self, motion: Motion) -> list[Any]:
-        """Take the motion at an instant; return what is sent now: time and interval [us], turn [rad], way [m]."""
+        """Integrate the motion; return the deltas due now: time and interval [us], rotation [rad], displacement [m]."""
         now = motion.time
         if not self._last <= now:
             self._begun = self._last = now
@@ -94,19 +94,19 @@ class Dvl:
 
 
 class AutopilotLink:
-    """Listens to the autopilot that flies the plant.
+    """MAVLink link to the autopilot that flies the plant.
 
     Parameters
     ----------
     endpoint : Endpoint
-        One of its ports; messages go out as component 197 of the vehicle.
+        Port of the autopilot; messages are sent as component 197 of the vehicle.
     dvl : DvlOptions, optional
-        Tell it what a DVL measures; default: nothing.
+        DVL whose measurements are sent; default: none.
 
     Attributes
     ----------
     estimate : ndarray, shape (len(ESTIMATE),)
-        As `ESTIMATE` names it; NaN before it is heard.
+        Values of `ESTIMATE`; NaN before they are received.
 
     Raises
     ------
@@ -125,7 +125,7 @@ class AutopilotLink:
 
     @property
     def is_armed(self) -> bool:
-        """Whether the autopilot said so last."""
+        """Whether the autopilot was armed in its last heartbeat."""
         return self._reported.is_armed
 
     def close(self) -> None:
@@ -133,7 +133,7 @@ class AutopilotLink:
         self._link.close()
 
     def exchange(self, motion: Motion) -> None:
-        """Tell what is measured at an instant, and listen now and then."""
+        """Send the DVL's measurements at an instant, and receive messages at intervals."""
         m = self._mavlink
         if self._dvl is not None:
             for stamp, interval, turned, moved in self._dvl.take(motion):

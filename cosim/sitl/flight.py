@@ -1,4 +1,4 @@
-"""One run that an autopilot flies: the plant, its record and its folder, stepped from outside."""
+"""One run that an autopilot flies: plant, record and folder, stepped by a server."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.master import Master
 from cosim.sitl.law import AutopilotLaw
 from cosim.sitl.motion import Lowering, Motion, MotionReader, carried
+from cosim.sitl.rangefinder import Rangefinder
 
 
 class Flight:
@@ -23,22 +24,22 @@ class Flight:
     Parameters
     ----------
     scenario : Scenario
-        What is flown.
+        The scenario of the run.
     law : AutopilotLaw
-        The autopilot; nobody else's.
+        The autopilot; not shared with other flights.
     out : Path or None
         The run folder, as for `claim`.
     record_rate : float
-        Rows a simulated second at the most [Hz].
+        Greatest number of rows per simulated second [Hz].
 
     Attributes
     ----------
     folder : Path
         The run folder.
     steps : int
-        That were made.
+        Number of steps made.
     waited : int
-        Frames of the autopilot before them, in which the vehicle was lowered to where it starts, and held there.
+        Frames of the autopilot before the first step, in which the vehicle is lowered to its start and held there.
 
     Raises
     ------
@@ -62,7 +63,7 @@ class Flight:
         except BaseException:
             self._master.close()
             raise
-        self._reader = MotionReader(self._master.plant, "bottom_depth" in scenario.plant.parameters)
+        self._reader = MotionReader(self._master.plant, Rangefinder(scenario))
         self._every = max(1, round(1.0 / (record_rate * scenario.time.step)))
         self._started = time.perf_counter()
         self._wall_time: float | None = None
@@ -71,16 +72,16 @@ class Flight:
 
     @property
     def done(self) -> bool:
-        """Whether the scenario's time is over."""
+        """True if the scenario's time is over."""
         return self.steps >= self.scenario.steps
 
     def step(self) -> Motion:
-        """Make the next step, with the law as it stands, and record it where it is due.
+        """Make the next step with the present outputs of the law, and record it if a row is due.
 
         Returns
         -------
         Motion
-            At the end of the step.
+            Motion at the end of the step.
 
         Raises
         ------
@@ -96,31 +97,31 @@ class Flight:
 
     @property
     def can_start(self) -> bool:
-        """Whether the vehicle is where the scenario starts: lowered there, or never seen elsewhere."""
+        """Whether the vehicle is at the start of the scenario: lowering is over, or no frame has been waited."""
         return self.waited == 0 or self._lowering.is_over(self.waited * self.scenario.time.step)
 
     def wait(self) -> Motion:
-        """Let a frame go by with the vehicle lowered from the surface to where it starts, and held there."""
+        """Pass one frame of lowering the vehicle from the surface to its start, and holding it there."""
         self.waited += 1
         return carried(self.motion(), *self._lowering.at(self.waited * self.scenario.time.step))
 
     def motion(self) -> Motion:
-        """Return the vehicle's motion as it is now, by the autopilot's time."""
+        """Return the present motion of the vehicle, at the autopilot's time."""
         return self._reader.read((self.waited + self.steps) * self.scenario.time.step)
 
     def _record(self) -> None:
-        """Keep the row of the step that was made last, if it is due."""
+        """Record the row of the last step, if one is due."""
         if self.steps % self._every == 0:
             with self._writing():
                 self._recorder.observe(self.steps, self._master.row)
 
     def end(self) -> None:
-        """Close plant and record; RunError if it cannot be written. May be called twice."""
+        """Close plant and record; raise RunError if it cannot be written. May be called twice."""
         if self._wall_time is not None:
             return
         self._wall_time = time.perf_counter() - self._started
         try:
-            if self.done:  # the last row: it moves nothing
+            if self.done:  # the last row, at the end time
                 self._master.step(self.steps)
                 self._record()
         finally:
@@ -129,19 +130,19 @@ class Flight:
                 self._claimed.keep(self._recorder)
 
     def conclude(self, status: str, report: bool) -> Run:
-        """Write the summary of a flight that has ended, and made a step.
+        """Write the summary of a flight that has ended after at least one step.
 
         Parameters
         ----------
         status : str
-            How it ended.
+            Status for the summary.
         report : bool
             Write report and figures too.
 
         Returns
         -------
         Run
-            With its summary.
+            The run with its summary.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""All runs of one call: an autopilot that starts again begins a new one."""
+"""The runs of one SITL session: a restart of the autopilot begins a new one."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from plant_fmu.build import cached_fmu
 
 RESTARTED = "ended: the autopilot started again"
 
-_SOME_RATE = 1000  # Hz, with which a scenario is tried before an autopilot comes
+_SOME_RATE = 1000  # Hz, frame rate for the validation of a scenario before an autopilot connects
 
 
 @dataclass
 class Counts:
-    """Frames of the autopilot, by what became of them."""
+    """Counts of the autopilot's frames, by treatment."""
 
     steps: int = 0
     waited: int = 0  # before the first one, with the vehicle held
     resent: int = 0  # answered again, without a step
-    lost: int = 0  # that have not come
+    lost: int = 0  # never received
     malformed: int = 0
     refused: int = 0  # of a second sender
-    unsent: int = 0  # answers that the network did not take
+    unsent: int = 0  # answers that could not be sent
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What an autopilot leaves."""
+    """Runs of a SITL session, and counts of its frames."""
 
     runs: list[Run]
     counts: Counts
@@ -42,12 +42,12 @@ class Outcome:
 
 @dataclass(frozen=True)
 class FlightOptions:
-    """What is flown, and what is left of it."""
+    """Scenario, vehicle, output folder and recording of a SITL session."""
 
     scenario: str | Path = SCENARIO
     overrides: tuple[str, ...] = ()
     vehicle: str | None = None  # None: the scenario's
-    out: Path | None = None  # run folder; those of later runs have a number behind it
+    out: Path | None = None  # run folder; later runs have a number after its name
     record_rate: float = 100.0  # Hz, simulated
     report: bool = True
 
@@ -58,23 +58,23 @@ class Flights:
     Parameters
     ----------
     options : FlightOptions
-        What is flown.
+        Options of the session.
     autopilot : str
-        What stands for the law in summary and report.
+        Name of the autopilot, used as the law's name in summary and report.
     law_of : callable
-        Makes the law of a vehicle.
+        Makes the law for a vehicle.
 
     Attributes
     ----------
     flight : Flight or None
-        The present one.
+        The present run.
     law : AutopilotLaw
-        Of the present one.
+        Law of the present one.
 
     Raises
     ------
     ScenarioError, RunError, BuildError
-        If what is to be flown cannot be: it is tried at once, before anybody waits for an autopilot.
+        If the scenario cannot be flown, which is checked before waiting for an autopilot.
     """
 
     def __init__(self, options: FlightOptions, autopilot: str, law_of: Callable[[Vehicle], AutopilotLaw]) -> None:
@@ -90,7 +90,7 @@ class Flights:
         self._ended: list[tuple[Flight, str]] = []
 
     def begin(self, frame_rate: int) -> Flight:
-        """Begin a run at the rate of an autopilot's frames [Hz].
+        """Start a run at the rate of an autopilot's frames [Hz].
 
         Raises
         ------
@@ -105,7 +105,7 @@ class Flights:
         return self.flight
 
     def end(self, status: str) -> None:
-        """End the present run, if there is one, with a summary that says how; its report waits for the end of all."""
+        """End the present run, if there is one, with its status in a summary; the session's end writes its report."""
         flight, self.flight = self.flight, None
         if flight is not None:
             flight.end()
@@ -114,28 +114,28 @@ class Flights:
                 flight.conclude(status, report=False)
 
     def fly(self, work: Callable[[], str], counts: Counts) -> Outcome:
-        """Let a server work until it ends, and conclude what it leaves.
+        """Run a server until it ends, and conclude its runs.
 
         Parameters
         ----------
         work : callable
-            Begins and steps flights; returns how it ended.
+            The server: it begins and steps flights, and returns the status of the last one.
         counts : Counts
-            Of the server.
+            Counts of the server.
 
         Returns
         -------
         Outcome
-            The status of its last run says how it ended.
+            The runs with their statuses, and the counts.
 
         Raises
         ------
         RunError
-            If a run cannot be written, or no autopilot came.
+            If a run cannot be written, or no autopilot has connected.
         PlantFmuError, CosimError
-            If a run fails; what was recorded until then is left readable.
+            If a run fails; its record until then stays readable.
         KeyboardInterrupt
-            If Ctrl-C came before there was a run.
+            After Ctrl-C before the first run.
         """
         failure: Exception | None = None
         interrupted = False
@@ -154,6 +154,6 @@ class Flights:
         return Outcome(runs, counts)
 
     def _conclude(self) -> list[Run]:
-        """Write the reports of all runs that made a step, unless they are not wanted, and return these runs."""
+        """Write the reports of all runs with at least one step, unless disabled, and return these runs."""
         report = self._options.report
         return [flight.conclude(status, report) for flight, status in self._ended]

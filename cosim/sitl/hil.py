@@ -1,4 +1,4 @@
-"""PX4's simulator interface: a TCP server that sends sensors, and makes a step for each answer."""
+"""PX4's simulator interface: a TCP server that sends sensor data, and makes a step for each answer."""
 
 from __future__ import annotations
 
@@ -19,49 +19,49 @@ from cosim.sitl.motion import Motion, at_rest
 log = logging.getLogger(__name__)
 
 LEFT = "ended: the autopilot left"
-RATE = 250  # Hz, frames a simulated second
-SYSTEM_ID, COMPONENT_ID = 254, 25  # of neither a vehicle nor a ground station
+RATE = 250  # Hz, frames per simulated second
+SYSTEM_ID, COMPONENT_ID = 254, 25  # different from vehicles and ground stations
 
 _GPS_EVERY, _HEARTBEAT_EVERY = RATE // 10, RATE
 _POLL = 0.25  # s of the wall clock
 _ARMED = 128  # bit of HIL_ACTUATOR_CONTROLS.mode
-_SENT_AT_ONCE = 5.0  # s of the wall clock, within which PX4 must take a frame
+_SENT_AT_ONCE = 5.0  # s of the wall clock, timeout of sending a frame
 _CHANNELS = 16
 
 
 class _GoneError(Exception):
-    """The autopilot has left."""
+    """The autopilot has closed the connection."""
 
 
 class _SilentError(Exception):
-    """The autopilot has said nothing for too long."""
+    """The autopilot has sent nothing for longer than the timeout."""
 
 
 class HilServer:
-    """Flies the plant in lockstep with a PX4.
+    """Fly the plant in lockstep with a PX4.
 
-    While PX4 starts, which goes by the wall clock, the vehicle is held where it starts, and the run has not begun; it
-    begins with the first actuator controls. From then on each of them makes one step.
+    PX4 starts up by the wall clock; meanwhile the vehicle is held at its start. The run begins with the first actuator
+    controls, and each of these makes one step.
 
     Parameters
     ----------
     flights : Flights
-        What is flown.
+        The runs of the session.
     address : (str, int)
-        To bind; port 0 for any that is free.
+        Address to bind; port 0 for any free one.
     timeout : float, optional
-        Seconds of the wall clock without a word, after which it ends; default: wait for ever.
+        Seconds of the wall clock without data, after which the session ends; default: no limit.
     tell : callable, optional
-        Is told in a line what happens, for people.
+        Shows a line of progress to the user.
     origin : (float, float)
         Latitude and longitude [deg] of position 0.
 
     Attributes
     ----------
     address : (str, int)
-        That is bound.
+        The bound address.
     counts : Counts
-        So far.
+        Counts of frames so far.
 
     Raises
     ------
@@ -93,14 +93,14 @@ class HilServer:
         self._heard = time.monotonic()
 
     def serve(self) -> Outcome:
-        """Fly until the scenario's time is over, PX4 has been silent for too long, or Ctrl-C, as `Flights.fly` says."""
+        """Fly until the scenario's end, a timeout, or Ctrl-C, as `Flights.fly`."""
         try:
             return self._flights.fly(self._answer, self.counts)
         finally:
             self._listener.close()
 
     def _answer(self) -> str:
-        """Take one connection behind the other; return how it ended."""
+        """Serve one connection after the other; return the status of the last run."""
         while True:
             try:
                 connection, peer = self._accept()
@@ -124,24 +124,24 @@ class HilServer:
             try:
                 found = self._listener.accept()
             except TimeoutError:
-                self._look_at_the_clock()
+                self._check_timeout()
             else:
                 self._heard = time.monotonic()
                 return found
 
     def _fly(self, flight: Flight, connection: socket.socket) -> None:
-        """Fly one connection, until the scenario's time is over."""
+        """Fly with one connection until the scenario's end."""
         codec = self._mavlink.MAVLink(None, srcSystem=SYSTEM_ID, srcComponent=COMPONENT_ID)
         codec.robust_parsing = True
         motion = at_rest(flight.motion())
-        frame = 0  # of PX4's clock, which goes on from its start
+        frame = 0  # of PX4's clock, which is never reset
         controls: Iterator[list[float]] = iter(())
         while not flight.done:
             self._send(connection, codec, motion, frame)
             frame += 1
             while (answer := next(controls, None)) is None:
                 data = self._receive(connection, waits=flight.steps > 0)
-                if data is None:  # it is still starting: the clock must go on for it
+                if data is None:  # PX4 is still starting: its clock must advance
                     break
                 controls = iter(self._controls(codec, data))
             if answer is not None:
@@ -162,17 +162,17 @@ class HilServer:
         connection.settimeout(_SENT_AT_ONCE)
         try:
             connection.sendall(data)
-        except OSError as error:  # a part may have gone out: nothing that follows could be read
+        except OSError as error:  # the stream may end within a message
             raise _GoneError from error
 
     def _receive(self, connection: socket.socket, *, waits: bool) -> bytes | None:
-        """Return bytes; None if it need not wait, and a frame's time has passed on the wall clock without any."""
+        """Receive bytes; return None if `waits` is False and none arrive within a frame's time of the wall clock."""
         connection.settimeout(_POLL if waits else 1.0 / RATE)
         while True:
             try:
                 data = connection.recv(4096)
             except TimeoutError:
-                self._look_at_the_clock()
+                self._check_timeout()
                 if not waits:
                     return None
             except OSError as error:
@@ -184,7 +184,7 @@ class HilServer:
                 return data
 
     def _controls(self, codec: Any, data: bytes) -> list[list[float]]:
-        """Return the actuator controls in some bytes; those of a vehicle that is not armed ask for nothing."""
+        """Parse the actuator controls in received bytes; those of a disarmed vehicle are zeros."""
         found = []
         for message in codec.parse_buffer(data) or ():
             kind = message.get_type()
@@ -194,6 +194,6 @@ class HilServer:
                 found.append(list(message.controls) if message.mode & _ARMED else [0.0] * _CHANNELS)
         return found
 
-    def _look_at_the_clock(self) -> None:
+    def _check_timeout(self) -> None:
         if self._timeout is not None and time.monotonic() - self._heard > self._timeout:
             raise _SilentError

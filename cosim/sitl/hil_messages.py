@@ -11,7 +11,7 @@ from controller.quaternion import rotation_matrix
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.sitl.motion import Motion
 
-FIELD_NED = (0.175, -0.012, 0.466)  # gauss, of the Earth, where it is told to be: near Edinburgh
+FIELD_NED = (0.175, -0.012, 0.466)  # gauss, magnetic field near Edinburgh, at the default origin
 TEMPERATURE = 15.0  # degrees Celsius
 
 _ALL_BUT_AIRSPEED = 0x1BFF  # fields of HIL_SENSOR: accelerations, rates, field, pressure, its altitude, temperature
@@ -20,25 +20,25 @@ _INT16, _UINT16 = 32767, 65535
 
 
 def hil_messages(mavlink: Any, motion: Motion, time_us: int, origin: tuple[float, float], gps: bool) -> list[Any]:
-    """Return what PX4 is told of an instant; the last message, HIL_SENSOR, sets its clock.
+    """Make the messages to PX4 for an instant; the last one, HIL_SENSOR, sets its clock.
 
     Parameters
     ----------
     mavlink : module
         The dialect.
     motion : Motion
-        Of the vehicle.
+        Motion of the vehicle.
     time_us : int
-        Of PX4's clock [us].
+        Time of PX4's clock [us].
     origin : (float, float)
         Latitude and longitude [deg] of position 0, which is at the surface.
     gps : bool
-        Tell the position too.
+        Include HIL_GPS.
 
     Returns
     -------
     list of messages
-        HIL_GPS where it is asked for, HIL_STATE_QUATERNION, HIL_SENSOR.
+        HIL_GPS if `gps`, HIL_STATE_QUATERNION, HIL_SENSOR.
     """
     latitude, longitude = (round(1e7 * angle) for angle in LocalFrame(*origin).to_global(motion.position_ned)[:2])
     up = -motion.position_ned[2]
@@ -71,17 +71,17 @@ def hil_messages(mavlink: Any, motion: Motion, time_us: int, origin: tuple[float
 
 
 def air_pressure(altitude: float) -> float:
-    """Return the pressure [hPa] from which PX4, which knows of no water, finds an altitude [m] again.
+    """Return the air pressure [hPa] from which PX4, whose model has no water, computes an altitude [m].
 
     Parameters
     ----------
     altitude : float
-        Above the surface [m]; a depth is an altitude below 0.
+        Altitude above the surface [m]; a depth is negative.
 
     Returns
     -------
     float
-        Of the standard atmosphere, carried on below sea level.
+        By the standard atmosphere, extrapolated below sea level.
     """
     return float(1013.25 * max(0.0, 1.0 - 0.0065 * altitude / 288.15) ** (_GRAVITY * 0.0289644 / (8.31446 * 0.0065)))
 

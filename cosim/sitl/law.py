@@ -1,4 +1,4 @@
-"""The autopilot as a law: what its outputs said last is what the thrusters are asked for."""
+"""The autopilot as a law: its last outputs command the thruster forces."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ from plant_fmu.autopilot import Curve, effort_of_pulse
 
 
 class AutopilotLaw:
-    """Thruster forces by the last outputs of an autopilot.
+    """Thruster forces from the last outputs of an autopilot.
 
     Parameters
     ----------
     channels : sequence of int
         Output of each thruster, from 1; 0 for none.
     efforts : sequence of callable
-        For each thruster, from what its output says to the part of its greatest force, -1 to 1.
+        For each thruster, the map from its output to the fraction of its greatest force, -1 to 1.
     vehicle : Vehicle
-        Whose thrusters' limits are the greatest forces.
+        Its thrusters' limits are the greatest forces.
     what : str
         Name of an output in the record, such as ``pwm``.
     unit : str
-        Of what an output says.
+        Unit of an output.
     idle : float
-        What the outputs of an autopilot that is not armed say, where they say anything but 0.
+        Value of the outputs of a disarmed autopilot, beside 0.
     link : AutopilotLink, optional
-        Hears the autopilot's own estimate, which is reported too.
+        Receives the autopilot's estimate, which is reported too.
 
     Attributes
     ----------
     lost : int
-        Frames of the autopilot that have not come, so far.
+        Number of lost frames of the autopilot.
     link : AutopilotLink or None
-        As given.
+        The given link.
     """
 
     output: ClassVar[Output] = "thrusters"
@@ -80,7 +80,7 @@ class AutopilotLaw:
         self._forces: Array = np.zeros(vehicle.n_thrusters)
 
     def take(self, outputs: Sequence[float]) -> None:
-        """Keep what the autopilot's outputs say, shape (channels,); those beyond the end say 0."""
+        """Take the autopilot's outputs, shape (channels,); those beyond the end are 0."""
         n = len(outputs)
         for place, (i, at, effort, least, most) in enumerate(self._driven):
             said = outputs[at] if at < n else 0.0
@@ -91,17 +91,17 @@ class AutopilotLaw:
 
     @property
     def is_driving(self) -> bool:
-        """Whether it is armed, or its outputs for thrusters say anything but idle."""
+        """Whether it is armed, or one of its thruster outputs is not idle."""
         return self._drives or (self.link is not None and self.link.is_armed)
 
     @property
     def estimate(self) -> Array:
-        """Nothing: an autopilot keeps what it finds out to itself."""
+        """Zeros, shape (4,): an autopilot does not estimate phi."""
         return self._estimate
 
     @property
     def report(self) -> Array:
-        """What the outputs said, how many frames are lost, and the estimate, shape (len(diagnostics),)."""
+        """Last outputs, number of lost frames, and the autopilot's estimate, shape (len(diagnostics),)."""
         n = len(self._driven)
         self._report[n] = self.lost
         if self.link is not None:
@@ -111,24 +111,24 @@ class AutopilotLaw:
     def step(
         self, state: VehicleState, goal: PackedRegions, regions: PackedRegions, weights: Array, forces: Array
     ) -> None:
-        """Write the thruster forces [N]; state, regions and weights are the autopilot's own affair."""
+        """Write the thruster forces [N]; state, regions and weights are not used."""
         forces[:] = self._forces
 
 
 def law_of_pwm(vehicle: Vehicle, link: AutopilotLink | None = None) -> AutopilotLaw:
-    """Return the law of an autopilot that gives servo pulses.
+    """Make the law of an autopilot with servo pulses as outputs.
 
     Parameters
     ----------
     vehicle : Vehicle
-        Its table ``autopilot`` says which pulse gives which force.
+        Its table ``autopilot`` maps pulses to forces.
     link : AutopilotLink, optional
-        To the autopilot.
+        Link to the autopilot.
 
     Returns
     -------
     AutopilotLaw
-        Without force until pulses come.
+        With zero forces until pulses arrive.
 
     Raises
     ------
@@ -144,17 +144,17 @@ def law_of_pwm(vehicle: Vehicle, link: AutopilotLink | None = None) -> Autopilot
 
 
 def law_of_controls(vehicle: Vehicle) -> AutopilotLaw:
-    """Return the law of an autopilot that gives controls from -1 to 1, one for each thruster in their order.
+    """Make the law of an autopilot with controls from -1 to 1 as outputs, one for each thruster in order.
 
     Parameters
     ----------
     vehicle : Vehicle
-        1 asks for the greatest force of a thruster, -1 for the most negative one, and between it goes straight.
+        Its thrusters' limits are the forces at the controls -1 and 1; the map is linear on each side of 0.
 
     Returns
     -------
     AutopilotLaw
-        Without force until controls come.
+        With zero forces until controls arrive.
     """
     n = vehicle.n_thrusters
     return AutopilotLaw(range(1, n + 1), [_clipped] * n, vehicle, "control", "")

@@ -1,4 +1,4 @@
-"""The autopilot's count of frames: what a packet means for the plant."""
+"""The autopilot's frame count, by which packets are classified."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ Frame = Literal["first", "next", "resent", "gap", "restart"]
 
 
 class Lockstep:
-    """Follows the count of frames of one autopilot, which goes up by one with each answer that it has taken in.
+    """Tracks the frame count of one autopilot, which increases by one with each answer that it has received.
 
     Attributes
     ----------
     count : int or None
-        Of the last frame that made a step.
+        Count of the last frame that made a step.
     missed : int
-        Frames that were left out before the one judged last.
+        Number of frames missing before the last one.
     """
 
     def __init__(self) -> None:
@@ -23,18 +23,18 @@ class Lockstep:
         self.missed = 0
 
     def judge(self, count: int) -> Frame:
-        """Say what a frame is, and follow it.
+        """Classify a frame, and store its count.
 
         Parameters
         ----------
         count : int
-            Of the frame.
+            Count of the frame.
 
         Returns
         -------
         Frame
-            ``"next"`` and ``"gap"`` ask for one step, ``"first"`` and ``"restart"`` for a new plant and one step, and
-            ``"resent"`` for the last answer once more.
+            ``"next"`` and ``"gap"`` require one step, ``"first"`` and ``"restart"`` a new plant and one step, and
+            ``"resent"`` the last answer again.
         """
         last, self.count = self.count, count
         self.missed = 0

@@ -1,4 +1,4 @@
-"""What an autopilot is told of the vehicle: where it is, how it moves, and what its IMU feels."""
+"""The vehicle's motion for an autopilot: pose, velocity, and measurements of IMU and DVL."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from controller.quaternion import rotation_matrix
 from cosim.simulation.stepped_plant import SteppedPlant
+from cosim.sitl.rangefinder import Rangefinder
 
 Three = tuple[float, float, float]
 
@@ -21,9 +22,9 @@ _NAMES = (
     "measured.altitude",
     *(f"measured.velocity.{name}" for name in "uvw"),
 )
-_GRAVITY = 9.81  # m/s2, as ArduPilot and PX4 have it, near enough
+_GRAVITY = 9.81  # m/s2, close to ArduPilot's and PX4's
 _AT_THE_SURFACE = 4.0  # s, in which an autopilot calibrates its sensors
-_LOWERING, _LONGEST = 1.0, 6.0  # m/s at the most, unless it took longer than so many seconds
+_LOWERING, _LONGEST = 1.0, 6.0  # m/s, greatest speed, unless lowering would take longer than that many seconds
 
 
 class Motion(NamedTuple):
@@ -36,58 +37,62 @@ class Motion(NamedTuple):
     velocity_ned: Three  # m/s, over ground
     attitude: Three  # rad, roll, pitch, yaw
     quaternion: tuple[float, float, float, float]  # from body to world, scalar first
-    altitude: float | None  # m, above the bottom as the DVL measures it; None where there is no bottom
+    altitude: float | None  # m, to what is below along the body's vertical axis; None where there is nothing to meet
     dvl: Three  # m/s, over ground, body frame, as the DVL measures it
 
 
 class MotionReader:
-    """Reads the motion off a plant's outputs.
+    """Reads the motion from a plant's outputs.
 
     Parameters
     ----------
     plant : SteppedPlant
         Initialised.
-    bottom : bool
-        Whether there is one.
+    rangefinder : Rangefinder
+        Rangefinder that looks down.
     """
 
-    def __init__(self, plant: SteppedPlant, bottom: bool) -> None:
+    def __init__(self, plant: SteppedPlant, rangefinder: Rangefinder) -> None:
         names = plant.outputs.names
-        self._values, self._bottom = plant.outputs.values, bottom
+        self._values, self._rangefinder = plant.outputs.values, rangefinder
+        x = names.index("position.x")
+        self._position = self._values[x : x + 3]
         self._at = np.array([names.index(name) for name in _NAMES])
         e0, u = names.index("quaternion.e0"), names.index("velocity.u")
         self._quaternion, self._velocity_body = self._values[e0 : e0 + 4], self._values[u : u + 3]
 
     def read(self, time: float) -> Motion:
-        """Return the motion as it is after the plant's last step, which ended at a time [s]."""
+        """Return the motion after the plant's last step, which ended at `time` [s]."""
         p, q, r, fx, fy, fz, x, y, z, roll, pitch, yaw, altitude, u, v, w = self._values[self._at].tolist()
         e0, e1, e2, e3 = self._quaternion.tolist()
+        below = self._rangefinder
+        distance = below.measure(self._position, self._quaternion, altitude) if below.is_fitted else None
         vx, vy, vz = (rotation_matrix(self._quaternion) @ self._velocity_body).tolist()  # (15)
         return Motion(
             time, (p, q, r), (fx, fy, fz), (x, y, z), (vx, vy, vz), (roll, pitch, yaw), (e0, e1, e2, e3),
-            altitude if self._bottom else None, (u, v, w),
+            distance, (u, v, w),
         )  # fmt: skip
 
 
 def at_rest(motion: Motion) -> Motion:
-    """Return the motion of a vehicle that is held where it is: the IMU feels gravity alone."""
+    """Return the motion of a vehicle that is held in place: the IMU measures gravity alone."""
     return carried(motion, motion.position_ned[2], 0.0, 0.0)
 
 
 def carried(motion: Motion, depth: float, speed: float, acceleration: float) -> Motion:
-    """Return the motion of a vehicle that is carried down at the place and the attitude of another motion.
+    """Return the motion of a vehicle that is moved down at the horizontal position and attitude of another motion.
 
     Parameters
     ----------
     motion : Motion
-        Whose place and attitude count.
+        Its horizontal position and attitude are used.
     depth, speed, acceleration : float
-        Of the vehicle [m, m/s, m/s2], downwards.
+        Vertical motion of the vehicle [m, m/s, m/s2], positive down.
 
     Returns
     -------
     Motion
-        The IMU feels gravity and the acceleration, and the DVL measures the speed.
+        The IMU measures gravity and the acceleration, the DVL the speed.
     """
     to_body = rotation_matrix(np.array(motion.quaternion)).T
     fx, fy, fz = (to_body @ np.array([0.0, 0.0, acceleration - _GRAVITY])).tolist()
@@ -100,14 +105,14 @@ def carried(motion: Motion, depth: float, speed: float, acceleration: float) -> 
 
 
 class Lowering:
-    """How a vehicle comes from the surface, where it is switched on, to the depth at which a scenario starts.
+    """Trajectory of a vehicle from the surface, where it is switched on, to the depth at which a scenario starts.
 
-    An ArduSub calibrates its depth sensor when it is switched on, and again whenever it comes above that depth.
+    ArduSub calibrates its depth sensor when it is switched on, and again whenever it rises above that depth.
 
     Parameters
     ----------
     depth : float
-        At the end [m]; what is at the surface already is not moved.
+        Depth at the end [m]; 0 or less for no motion.
 
     Examples
     --------
@@ -122,7 +127,7 @@ class Lowering:
         self._duration = min(0.5 * math.pi * self._depth / _LOWERING, _LONGEST)
 
     def at(self, time: float) -> Three:
-        """Return depth, speed and acceleration [m, m/s, m/s2] so many seconds after the vehicle was switched on."""
+        """Return depth, speed and acceleration [m, m/s, m/s2] at a time [s] after the vehicle was switched on."""
         if self.is_over(time) or time <= _AT_THE_SURFACE:
             return (self._depth if self.is_over(time) else 0.0), 0.0, 0.0
         rate = math.pi / self._duration
@@ -130,5 +135,5 @@ class Lowering:
         return half * (1.0 - math.cos(phase)), half * rate * math.sin(phase), half * rate**2 * math.cos(phase)
 
     def is_over(self, time: float) -> bool:
-        """Return whether it is where it starts, at a time [s]."""
+        """Return True if the vehicle has reached its start depth at a time [s]."""
         return self._depth == 0.0 or time >= _AT_THE_SURFACE + self._duration

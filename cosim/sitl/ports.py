@@ -1,3 +1,3 @@
-"""Where autopilots look for their plant."""
+"""Default ports at which autopilots expect their simulator."""
 
 PORTS = {"ardupilot": 9002, "px4": 4560}  # by backend: UDP, TCP

@@ -1,4 +1,4 @@
-"""The scenario that an autopilot flies: any one, at the autopilot's own step, with the autopilot for its law."""
+"""The scenario that an autopilot flies: any scenario, with the autopilot's step, and the autopilot as its law."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cosim.errors import RunError
 from cosim.scenario.scenario import Scenario, load_scenario
 from cosim.scenario.validation import MAX_STEPS
 
-SCENARIO = "sitl"  # that is flown where none is named
+SCENARIO = "sitl"  # default scenario
 LOWEST_RATE, HIGHEST_RATE = 11, 65535  # Hz: an autopilot's frame is shorter than 0.1 s, and a packet holds 16 bits
 
 
@@ -28,22 +28,22 @@ def scenario_to_fly(
     vehicle : str or None
         A shipped vehicle or a TOML file; None for the scenario's.
     frame_rate : int
-        Of the autopilot [Hz], `LOWEST_RATE` to `HIGHEST_RATE`.
+        Frame rate of the autopilot [Hz], `LOWEST_RATE` to `HIGHEST_RATE`.
     autopilot : str
-        What stands for the law in summary and report, such as ``ardupilot``.
+        Name of the autopilot, used as the law's name in summary and report, such as ``ardupilot``.
 
     Returns
     -------
     Scenario
-        Through thrusters; the step is the autopilot's frame, and the law is asked at each. Duration and the arbiter's
-        period are the nearest multiples of it, the duration no longer than a run can be.
+        With thrusters; step and control period are the autopilot's frame. Duration and the arbiter's period are rounded
+        to multiples of it, the duration to at most the longest run.
 
     Raises
     ------
     ScenarioError
         As `load_scenario`.
     RunError
-        If the scenario asks for what goes with a law of ours alone.
+        If the scenario needs a law of this package.
     """
     changes = [*overrides, "actuation.through=thrusters"]
     if vehicle is not None:

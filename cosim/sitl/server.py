@@ -1,4 +1,4 @@
-"""ArduPilot's JSON backend: a UDP socket that answers each frame of the autopilot with the plant's next state."""
+"""Server of ArduPilot's JSON backend: answers each UDP frame of the autopilot with the plant's next state."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ log = logging.getLogger(__name__)
 
 Sender = tuple[str, int]
 
-_POLL = 0.25  # s of the wall clock, after which a silent socket is left to look at the clock
-_PRESENT = 1.0  # s of the wall clock, for which a silent autopilot keeps its place against another sender
+_POLL = 0.25  # s of the wall clock, timeout of the socket, after which the silence is checked
+_PRESENT = 1.0  # s of the wall clock without frames, before another sender is accepted
 _WARNING_PERIOD = 10.0  # s of the wall clock, between two warnings of one kind
 
 
 class JsonServer:
-    """Flies the plant in lockstep with an ArduPilot.
+    """Fly the plant in lockstep with an ArduPilot.
 
     Parameters
     ----------
     flights : Flights
-        What is flown.
+        The runs of the session.
     address : (str, int)
-        To bind; port 0 for any that is free.
+        Address to bind; port 0 for any free one.
     timeout : float, optional
-        Seconds of the wall clock without a frame, after which it ends; default: wait for ever.
+        Seconds of the wall clock without a frame, after which the session ends; default: no limit.
     tell : callable, optional
-        Is told in a line what happens, for people.
+        Shows a line of progress to the user.
 
     Attributes
     ----------
     address : (str, int)
-        That is bound.
+        The bound address.
     counts : Counts
-        So far.
+        Counts of frames so far.
 
     Raises
     ------
@@ -73,19 +73,19 @@ class JsonServer:
         self._warned: dict[str, float] = {}
 
     def serve(self) -> Outcome:
-        """Answer until the scenario's time is over, the autopilot has been silent for too long, or Ctrl-C.
+        """Answer frames until the scenario's end, a timeout, or Ctrl-C.
 
         Returns
         -------
         Outcome
-            The status of its last run says how it ended.
+            The runs with their statuses, and the counts.
 
         Raises
         ------
         RunError
-            If a run cannot be written, or no autopilot came in time.
+            If a run cannot be written, or no autopilot has connected in time.
         PlantError
-            If the FMU fails; what was recorded until then is left readable.
+            If the FMU fails; the record until then stays readable.
         KeyboardInterrupt
             If there is no run yet.
         """
@@ -95,12 +95,12 @@ class JsonServer:
             self._socket.close()
 
     def _answer_frames(self) -> str:
-        """Answer frame by frame; return how it ended."""
+        """Answer frame by frame; return the status of the last run."""
         receive = self._socket.recvfrom
         while True:
             try:
                 data, sender = receive(wire.LARGEST + 1)
-            except OSError:  # nothing in time; or word that an answer before did not arrive, where a system tells that
+            except OSError:  # timeout; or the report of an earlier answer that was refused
                 data, sender = b"", None
             now = time.monotonic()
             if sender is not None and self._accept(data, sender, now):
@@ -111,7 +111,7 @@ class JsonServer:
                 return f"ended: silence for {self._timeout:g} s"
 
     def _accept(self, data: bytes, sender: Sender, now: float) -> bool:
-        """Do what a datagram asks for; return whether it is of the autopilot."""
+        """Process a datagram; return True if it is a valid one of the autopilot."""
         packet = wire.decode(data)
         if packet is None or packet.frame_rate < LOWEST_RATE:
             self.counts.malformed += 1
@@ -137,7 +137,7 @@ class JsonServer:
         return True
 
     def _admit(self, packet: wire.ServoPacket, sender: Sender, now: float) -> bool:
-        """Let a new sender in, unless the one before is still there."""
+        """Accept a new sender unless the one before is still active; return True if accepted."""
         if self._sender is not None:
             there = f"{self._sender[0]}:{self._sender[1]}"
             if now - self._heard < _PRESENT:
@@ -145,7 +145,7 @@ class JsonServer:
                 self._warn("refused", f"{sender[0]}:{sender[1]} sends too, beside {there}: refused")
                 return False
             if self._lockstep.count is None or packet.frame_count != self._lockstep.count + 1:
-                self._lockstep = Lockstep()  # not the same one from another port: whatever its count, it begins anew
+                self._lockstep = Lockstep()  # another autopilot, not the same from another port: restart for any count
         self._sender = sender
         return True
 
@@ -153,7 +153,7 @@ class JsonServer:
         if self._flights.flight is not None:
             self._flights.end(RESTARTED)
         flight = self._flights.begin(frame_rate)
-        sender = f"{self._sender[0]}:{self._sender[1]}" if self._sender else "nobody"
+        sender = f"{self._sender[0]}:{self._sender[1]}" if self._sender else "no sender"
         self._tell(f"{flight.folder}: {sender} flies, {frame_rate} frames a simulated second")
 
     def _lose(self, missed: int) -> None:
@@ -169,7 +169,7 @@ class JsonServer:
         if flight.steps or (law.is_driving and flight.can_start):
             motion = flight.step()
             self.counts.steps += 1
-        else:  # it starts, or is not armed yet
+        else:  # the autopilot starts, or is not armed yet
             motion = flight.wait()
             self.counts.waited += 1
         if law.link is not None:
@@ -177,7 +177,7 @@ class JsonServer:
         self._answer = wire.encode(motion)
 
     def _warn(self, kind: str, text: str) -> None:
-        """Warn, of each kind now and then."""
+        """Log a warning, with a limited rate for each kind."""
         now = time.monotonic()
         if now - self._warned.get(kind, -_WARNING_PERIOD) >= _WARNING_PERIOD:
             self._warned[kind] = now

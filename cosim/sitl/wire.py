@@ -1,7 +1,7 @@
-"""The wire of ArduPilot's JSON backend: servo packets in, a line of JSON out.
+"""Wire format of ArduPilot's JSON backend: servo packets in, a line of JSON out.
 
-The autopilot reads the line with a search for the bare key words, and takes the number two characters behind the first
-one that it finds: so there is no blank behind a colon, and no key that holds another one's word before it.
+The autopilot searches the line for the bare key, and parses the number two characters behind its first occurrence. So
+there is no blank after a colon, and no key contains the name of a later one.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ class ServoPacket:
     """One frame of the autopilot."""
 
     frame_rate: int  # Hz
-    frame_count: int  # of the frames that the autopilot has taken in since it started
-    pwm: tuple[int, ...]  # us, 16 or 32 servo outputs, 0 for one that gives no pulse
+    frame_count: int  # frames that the autopilot has received since it started
+    pwm: tuple[int, ...]  # us, 16 or 32 servo outputs, 0 without a pulse
 
 
 def decode(data: bytes) -> ServoPacket | None:
-    """Read a servo packet.
+    """Decode a servo packet.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def decode(data: bytes) -> ServoPacket | None:
     Returns
     -------
     ServoPacket or None
-        None if it is none.
+        None if it is not a servo packet.
     """
     magic, packing = _MAGIC_OF_LENGTH.get(len(data), (0, None))
     if packing is None:
@@ -49,22 +49,22 @@ def decode(data: bytes) -> ServoPacket | None:
 
 
 def encode(motion: Motion) -> bytes:
-    """Write the plant's state as the autopilot reads it.
+    """Format the plant's state for the autopilot.
 
     Parameters
     ----------
     motion : Motion
-        Of the vehicle.
+        Motion of the vehicle.
 
     Returns
     -------
     bytes
-        A line of JSON between two ends of lines; each number reads back to the same bits.
+        A line of JSON between two newlines; each number reads back to the same bits.
 
     Raises
     ------
     RunError
-        If a number is not finite, which JSON cannot say.
+        If a number is not finite, which JSON does not support.
     """
     t, (p, q, r), (fx, fy, fz), (x, y, z), (vx, vy, vz), (roll, pitch, yaw), (e0, e1, e2, e3), altitude, _ = motion
     total = t + p + q + r + fx + fy + fz + x + y + z + vx + vy + vz + roll + pitch + yaw + e0 + e1 + e2 + e3

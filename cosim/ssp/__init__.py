@@ -1,6 +1,6 @@
 """A scenario as a system of FMUs.
 
-Plant, controller and arbiter become three FMUs in one SSP 1.0 file, which other masters run without Python.
+Plant, controller and arbiter as three FMUs in one SSP 1.0 file, which other masters run without Python.
 
 Imports: batch, controller, fuzzy_arbiter, plant_fmu, scenario, simulation.
 """

@@ -26,12 +26,12 @@ _DECLARATION = re.compile(r"^int (\w+)\(const double inputs\[\d+\], double outpu
 
 
 def arbiter_component(scenario: Scenario) -> Component:
-    """Return the arbiter of a scenario.
+    """Make the component of a scenario's arbiter.
 
     Parameters
     ----------
     scenario : Scenario
-        Its engine is the closed form, or gives the same.
+        With the closed engine, or one with the same results.
 
     Returns
     -------
@@ -61,11 +61,11 @@ def arbiter_component(scenario: Scenario) -> Component:
 
 
 def _inputs(scenario: Scenario) -> Iterator[Variable]:
-    """Yield what the rules get: the memberships, or signals of a scenario's own."""
+    """Yield the inputs of the rules: the memberships, or the scenario's signals."""
     for i, signal in enumerate(rule_inputs(scenario)):
         low, high = scenario.rules.system.inputs[i].universe
         unit = signal.unit if signal.unit in q.UNITS else ""
-        quantity = Quantity(unit, min(low, 0.0), max(high, 0.0))  # 0 is what masters begin with
+        quantity = Quantity(unit, min(low, 0.0), max(high, 0.0))  # masters start inputs with 0
         yield Variable(f"arbiter.{signal.name}", "input", f"inputs[{i}]", quantity, signal.what)
     for i, name in enumerate(() if rule_inputs(scenario) else scenario.criterion_names):
         what = f"Degree to which criterion {name} asks for attention"

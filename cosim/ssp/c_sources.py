@@ -15,7 +15,7 @@ def c_files(package: str, folder: str) -> dict[str, bytes]:
     package : str
         Such as ``"controller"``.
     folder : str
-        In it.
+        Folder in the package.
 
     Returns
     -------
@@ -27,16 +27,16 @@ def c_files(package: str, folder: str) -> dict[str, bytes]:
 
 
 def under_own_names(files: dict[str, bytes]) -> dict[str, bytes]:
-    """Return C files so that what they define bears the names of their FMU, and several FMUs link into one program.
+    """Prefix the functions of C files with the name of their FMU, so that several FMUs can be linked into one program.
 
     Parameters
     ----------
     files : dict of str to bytes
-        By name; such as do not know of FMUs.
+        By name; files that do not depend on FMI.
 
     Returns
     -------
     dict of str to bytes
-        The same, C files with the generated header before all else.
+        The files; C files include the generated header first.
     """
     return {name: _NAMED + code if name.endswith(".c") else code for name, code in files.items()}

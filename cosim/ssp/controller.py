@@ -1,4 +1,4 @@
-"""What is sensed, regions and law of a scenario as a component for FMUs."""
+"""Sensing, regions and law of a scenario as a component for FMUs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Numbers of shapes are those that the shape works with: unit vectors and rotation
 
 _LEAST, _MOST = 1e-9, 1e9
 _PERIOD = Quantity("s", 1e-6, 1e6)
-# of gains whose unit follows that of g of the goal, which is m2 where they are said
+# units of gains by the unit of the goal's g; the gains are documented for m2
 _UNITS_BY_GOAL = {
     "N/m3": {"m2": "N/m3", "m": "N/m", "": "N.m"},
     "1/(m2.s)": {"m2": "1/(m2.s)", "m": "1/s", "": "m2/s"},
@@ -47,12 +47,12 @@ _GAIN_UNITS = {"m2": "N/m2", "m": "N/m", "": "N", "rad": "N/rad"}
 
 
 def controller_component(scenario: Scenario) -> Component:
-    """Return the controller of a scenario.
+    """Make the component of a scenario's controller.
 
     Parameters
     ----------
     scenario : Scenario
-        Its law is a shipped one; nothing of it is streamed.
+        With a built-in law, and without streamed regions.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def controller_component(scenario: Scenario) -> Component:
 
 
 def prefixes(regions: Sequence[Region]) -> list[str]:
-    """Return what the variables of each region begin with.
+    """Return the prefix of each region's variables.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def prefixes(regions: Sequence[Region]) -> list[str]:
     Returns
     -------
     list of str
-        In FMI's structured naming a name has letters, digits and underscores.
+        Of letters, digits and underscores, as in FMI's structured naming.
     """
     found = ["goal"]
     for region in regions[1:]:
@@ -121,7 +121,7 @@ def _variables(scenario: Scenario, regions: Sequence[Region], places: Places) ->
 
 
 def _samples(scenario: Scenario) -> Iterator[Variable]:
-    """Yield an input for each of the plant's outputs of sensors."""
+    """Yield an input for each sensor output of the plant."""
     found = [v for v in variables(scenario.vehicle) if v.name.startswith("measured.")]
     values = [v for v in found if not v.name.startswith("measured.time.")]
     for member, rows in (("samples", values), ("sample_times", found[len(values) :])):
@@ -148,7 +148,7 @@ def _outputs(scenario: Scenario, regions: Sequence[Region]) -> Iterator[Variable
     def output(name: str, member: str, unit: str, description: str) -> Variable:
         return Variable(name, "output", f"outputs.{member}", q.unbounded(unit), description)
 
-    if scenario.actuation.through != "thrusters":  # else it would act beside the thrusters' forces
+    if scenario.actuation.through != "thrusters":  # with thrusters, the wrench would act in addition to their forces
         for i, name in enumerate(FORCES):
             what = f"{'Force along' if i < 3 else 'Moment about'} body {AXES[i % 3]} that the law asks for"
             yield output(f"wrench.{name}", f"wrench[{i}]", "N" if i < 3 else "N.m", what)
@@ -178,7 +178,7 @@ def _outputs(scenario: Scenario, regions: Sequence[Region]) -> Iterator[Variable
 
 
 def rule_inputs(scenario: Scenario) -> tuple[InputSignal, ...]:
-    """Return what the arbiter's rules get, none where they get the memberships as they stand."""
+    """Return the input signals of the arbiter's rules; empty if these are the memberships."""
     signals = scenario.rules.inputs
     plain = [(signal.kind, signal.of) for signal in signals]
     return () if plain == [("membership", i) for i in range(len(scenario.criteria))] else signals
@@ -212,7 +212,7 @@ def _parameters(scenario: Scenario, places: Places) -> Iterator[Variable]:
 
 
 def _takes(law: CompiledLaw, gain: str, value: float) -> bool:
-    """Return whether a law can work with a gain."""
+    """Return True if a law accepts the value of a gain."""
     try:
         law.validate(law.gains._replace(**{gain: value}))
     except LawError:
@@ -221,7 +221,7 @@ def _takes(law: CompiledLaw, gain: str, value: float) -> bool:
 
 
 def _without_unit(comment: str) -> str:
-    """Return what is said of a gain in its source, as a description."""
+    """Return the comment on a gain without its unit, as a description."""
     words = comment.split(", ", 1)[-1]
     return words[:1].upper() + words[1:]
 

@@ -1,4 +1,4 @@
-"""What the FMUs of controller and arbiter hold beside description, sources and binaries: a page, and licences."""
+"""Documentation in the FMUs of controller and arbiter: a page and licences."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from plant_fmu.variables import Variable
 
 
 def contents(title: str, words: str, rows: Sequence[Variable], fmi: int) -> dict[str, bytes]:
-    """Return the members of an FMU.
+    """Make the documentation files of an FMU.
 
     Parameters
     ----------
     title : str
         Of the page.
     words : str
-        What it does, in paragraphs with an empty line between them.
+        Description, in paragraphs separated by empty lines.
     rows : sequence of Variable
         Of the FMU.
     fmi : int
@@ -34,7 +34,7 @@ def contents(title: str, words: str, rows: Sequence[Variable], fmi: int) -> dict
     Raises
     ------
     BuildError
-        If the installation has lost its licence.
+        If the installation lacks its licence.
     """
     page = Template((resources.files("cosim.ssp") / "page.html").read_text(encoding="utf-8")).substitute(
         title=escape(title),

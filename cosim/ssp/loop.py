@@ -1,6 +1,6 @@
-"""The loop of a scenario within the controller's FMU: its functions in Python, and the arrays that they work on.
+"""The loop of a scenario in the controller's FMU: its functions in Python, and their arrays.
 
-They are those of the master and of the fused loop; `cosim.ssp.translated` makes C of them.
+The functions are those of the master and the fused loop; `cosim.ssp.translated` translates them to C.
 """
 
 from __future__ import annotations
@@ -43,26 +43,26 @@ def decide(
     now: Array,
     signals: ArbiterSignals,
 ) -> None:
-    """Evaluate the regions at the pose that the arbiter decides by, and write what its rules get.
+    """Evaluate the regions at the arbiter's pose, and compute the inputs of its rules.
 
     Parameters
     ----------
     places : RegionPlaces
-        Goal and regions, where they are now.
+        Goal and regions at their present positions.
     measured : VehicleState
-        As the law is given it.
+        The state that the law receives.
     expected : ndarray, shape (6,)
-        What the law expected of now, NaN where nothing.
+        The law's prediction for this step, NaN without one.
     state : VehicleState
-        Receives what is decided by.
+        Receives the arbiter's state.
     evaluation : RegionEvaluation
-        Receives what goal and regions say.
+        Receives values and clearances of goal and regions.
     inputs : PackedInputs
-        What the rules get.
+        Sources of the inputs of the rules.
     now : ndarray, shape (1,)
         Time [s].
     signals : ArbiterSignals
-        Receives it.
+        Receives memberships and inputs.
     """
     write_arbiter_state(measured, expected, state)
     evaluate_places(places, state, evaluation)
@@ -70,7 +70,7 @@ def decide(
 
 
 def allocate_wrench(allocator: Allocator, stage: Array, wrench: Array, forces: Array) -> None:
-    """Write thruster forces [N] for a wrench [N, N m], `stage` thrusters being reported as failed."""
+    """Allocate a wrench [N, N m] to thruster forces [N] while `stage` thrusters are reported as failed."""
     k = int(stage[0])
     allocate(allocator.inverse[k], allocator.lower[k], allocator.upper[k], allocator.direction, wrench, forces)
 
@@ -81,19 +81,19 @@ def find_goal(goal: PackedRegions, position: Array, quaternion: Array, clearance
 
 
 class Loop:
-    """A scenario's loop beside plant and arbiter.
+    """A scenario's loop without plant and arbiter.
 
     Parameters
     ----------
     scenario : Scenario
-        With nothing that a system of FMUs has not.
+        With features that a system of FMUs supports.
 
     Attributes
     ----------
     setup : FlightConfig
-        What is flown.
+        Configuration of the flight.
     law : CompiledLaw
-        As it begins.
+        The law in its initial state.
     functions : dict of str to (function, tuple)
         By name in C, with their arguments.
     """
@@ -116,7 +116,7 @@ class Loop:
 
     @property
     def functions(self) -> dict[str, tuple[Any, tuple[Any, ...]]]:
-        """What is called in a step, by name in C."""
+        """Functions that a step calls, with their arguments, by name in C."""
         goal, regions = self.setup.goal, self.setup.regions
         forces = self.wrench if self.law.output == "wrench" else self.thrusts
         found: dict[str, tuple[Any, tuple[Any, ...]]] = {

@@ -1,4 +1,4 @@
-"""Where the arrays of translated functions stand in an FMU: in its model, which states copy, or as constants."""
+"""Memory of translated functions in an FMU: arrays in the model, which FMU states copy, or constants."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from controller.translator.static_data import array_data, initializer
 from controller.translator.types import BOOL, DOUBLE, INT, UINT, Array, type_of
 from cosim.simulation.signals import Array as Numbers
 
-POOLS = {DOUBLE: "numbers", INT: "integers", UINT: "words", BOOL: "flags"}  # members of the model, by what they hold
+POOLS = {DOUBLE: "numbers", INT: "integers", UINT: "words", BOOL: "flags"}  # members of the model, by item type
 _TYPES = {"numbers": np.float64, "integers": np.int64, "words": np.uint64, "flags": np.bool_}
 
 
 class Memory:
-    """Places of arrays: what changes, in members of the C struct ``Model``; what does not, in constants.
+    """Places of arrays: variable ones in members of the C struct ``Model``, fixed ones in constants.
 
-    An array that shares memory with another one stands in the same place. Parameters come first: the importer sets
-    them, and they keep their numbers when a run begins anew.
+    Arrays that share memory have the same place. Parameters come first: the importer sets them, and a reset does not
+    change them.
     """
 
     def __init__(self) -> None:
         self._pools: dict[str, list[np.ndarray]] = {member: [] for member in POOLS.values()}
         self._sizes = dict.fromkeys(POOLS.values(), 0)
-        self._places: dict[int, int] = {}  # of whole arrays, by their ids, which are theirs while they are kept
+        self._places: dict[int, int] = {}  # of base arrays, by id, which is unique while they are kept
         self._constants: dict[int, str] = {}
         self._kept: list[np.ndarray] = []
-        self.definitions: list[str] = []  # C, of the constants
+        self.definitions: list[str] = []  # C definitions of the constants
 
     def keep(self, array: np.ndarray) -> int:
-        """Return the place of an array's first item in the member for its type, which it has from now on."""
+        """Give an array a place in the member for its type; return the index of its first item there."""
         whole = array
         while isinstance(whole.base, np.ndarray):
             whole = whole.base
@@ -45,7 +45,7 @@ class Memory:
         return self._places[id(whole)] + between // array.itemsize
 
     def fix(self, *values: Any) -> None:
-        """Let all arrays of arguments be constants, but those that have a place already."""
+        """Define all arrays of arguments as constants, except those that have a place already."""
         for array in (array for value in values for array in arrays_of(value)):
             if array.size and id(array) not in self._places and id(array) not in self._constants:
                 name = f"CONSTANT_{len(self._constants)}"
@@ -53,13 +53,22 @@ class Memory:
                 self._kept.append(array)
                 self.definitions.append(array_data(array, name, "static const"))
 
+    def name(self, array: np.ndarray, expression: str) -> None:
+        """Let an array stand where a C expression says."""
+        self._constants[id(array)] = expression
+        self._kept.append(array)
+
+    def is_named(self, array: np.ndarray) -> bool:
+        """Return whether an array is a constant, or stands where a C expression says."""
+        return id(array) in self._constants
+
     def call(self, program: Program, name: str, arguments: tuple[Any, ...]) -> str:
-        """Return the C function ``void control_name(Model *m)``, which calls a function of the program.
+        """Return the C code of ``void control_name(Model *m)``, which calls a function of the program.
 
         Parameters
         ----------
         program : Program
-            That exports the function as ``translated_name``.
+            It exports the function as ``translated_name``.
         name : str
             Of the function.
         arguments : tuple
@@ -84,11 +93,11 @@ class Memory:
         )
 
     def sizes(self) -> dict[str, int]:
-        """Return how many items each member has, at least one, as ``N_NUMBERS`` and so on."""
+        """Return the number of items of each member, at least one, by constants such as ``N_NUMBERS``."""
         return {f"N_{member.upper()}": max(size, 1) for member, size in self._sizes.items()}
 
     def starts(self) -> Iterator[str]:
-        """Yield the C definitions of what each member holds at first."""
+        """Yield the C definitions of the initial values of each member."""
         for member, arrays in self._pools.items():
             parts = [array.ravel() for array in arrays] or [np.zeros(1)]
             numbers: np.ndarray = np.concatenate(parts).astype(_TYPES[member])
@@ -97,7 +106,7 @@ class Memory:
 
     @property
     def size(self) -> int:
-        """How many real numbers have a place."""
+        """Number of real numbers with a place."""
         return self._sizes["numbers"]
 
     def _member(self, array: np.ndarray) -> str:
@@ -107,7 +116,7 @@ class Memory:
 
 
 class Named:
-    """An argument that the model holds as numbers of its own, such as gains."""
+    """An argument that is its own member of the model, such as gains."""
 
     def __init__(self, value: tuple[float, ...], member: str) -> None:
         self.value = value

@@ -1,4 +1,4 @@
-"""What the packed numbers of a shape are called in an FMU, and what they may be."""
+"""Names and ranges of the packed numbers of a shape in an FMU."""
 
 from __future__ import annotations
 

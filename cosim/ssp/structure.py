@@ -16,7 +16,7 @@ from plant_fmu.variables import Variable
 _NAMESPACES = {
     "xmlns:ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
     "xmlns:ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
-    # up here: libcosim takes an attribute of the element below for an algorithm
+    # declared at the root: libcosim would read a namespace attribute of the element below as an algorithm
     "xmlns:osp": "http://opensimulationplatform.com/SSP/OSPAnnotations",
     "xmlns:oms": "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
 }
@@ -29,17 +29,17 @@ class Part:
     name: str
     source: str  # of the FMU, in the archive
     component: Component
-    connectors: tuple[str, ...]  # names of the inputs and outputs that are shown
+    connectors: tuple[str, ...]  # names of the inputs and outputs with a connector
 
     @property
     def parameters(self) -> str:
-        """Place of its parameter set, in the archive."""
+        """Path of its parameter set in the archive."""
         return self.source.replace(".fmu", ".ssv")
 
 
 @dataclass(frozen=True)
 class Wire:
-    """Outputs of one part that go to inputs of another, of the same names."""
+    """Connection of outputs of one part to the inputs of the same names of another."""
 
     start: str
     end: str
@@ -49,23 +49,23 @@ class Wire:
 def structure(
     name: str, description: str, parts: Sequence[Part], wires: Sequence[Wire], stop_time: float, step: float
 ) -> str:
-    """Return ``SystemStructure.ssd``.
+    """Write the text of ``SystemStructure.ssd``.
 
     Parameters
     ----------
     name, description : str
         Of the system.
     parts : sequence of Part
-        In the order in which masters that care for it step them.
+        In stepping order, for masters that use it.
     wires : sequence of Wire
-        Between them.
+        Connections between the parts.
     stop_time, step : float
-        [s]; SSP 1.0 has no place for the step, so that it stands in an annotation of the Open Simulation Platform's.
+        [s]; SSP 1.0 has no element for the step, so it is in annotations of OSP and OMSimulator.
 
     Returns
     -------
     str
-        XML text, the same for the same system.
+        XML text; deterministic.
     """
     version = metadata.version("subreach")
     root = ET.Element(
@@ -104,13 +104,13 @@ def structure(
 
 
 def identifier(name: str) -> str:
-    """Return a name with an underscore for all that an identifier has not, which OMSimulator wants of a system."""
+    """Replace characters that are invalid in an identifier by underscores, since OMSimulator requires one as name."""
     words = re.sub(r"\W", "_", name, flags=re.ASCII)
     return words if words and not words[0].isdigit() else f"_{words}"
 
 
 def _annotate_for_omsimulator(system: ET.Element, step: float) -> None:
-    """Say the step where OMSimulator reads it."""
+    """Add the step in the annotation that OMSimulator reads."""
     annotation = ET.SubElement(ET.SubElement(system, "ssd:Annotations"), "ssc:Annotation", type="org.openmodelica")
     information = ET.SubElement(ET.SubElement(annotation, "oms:Annotations"), "oms:SimulationInformation")
     ET.SubElement(

@@ -38,19 +38,19 @@ WRENCH = tuple(f"wrench.{name}" for name in FORCES)
 def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str = NATIVE) -> Path:
     """Write a scenario's plant, controller and arbiter as a system structure and package (SSP 1.0).
 
-    The system is Jacobi's: in each step every FMU works on what the others had put out at its beginning, whatever order
-    a master steps them in.
+    The system is of Jacobi type: in each step every FMU uses the outputs of the others from the beginning of the step,
+    in any stepping order of the master.
 
     Parameters
     ----------
     scenario : Scenario
-        With a shipped law, and nothing that comes from outside.
+        With a built-in law, and without commands and streamed regions.
     out : Path
-        The file to write; it appears whole or not at all, with the same bytes each time.
+        The file to write, atomically and with deterministic content.
     fmi : int
-        2 or 3, of all three FMUs. Most masters of SSP take 2 alone.
+        2 or 3, of all three FMUs. Most SSP masters support 2 only.
     platforms : str
-        As `plant_fmu.build_fmu` takes it.
+        As for `plant_fmu.build_fmu`.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str =
     Raises
     ------
     RunError
-        If the scenario has what such a system has not.
+        If the scenario has a feature that such a system does not support.
     BuildError
         If an FMU cannot be built, or `out` cannot be written.
     """
@@ -92,7 +92,7 @@ def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str =
 
 
 def _wires(components: Mapping[str, Component]) -> list[Wire]:
-    """Connect every output with the input of another component that bears its name."""
+    """Connect every output to the inputs of other components with its name."""
     roles = {name: {v.name: v.role for v in component.variables} for name, component in components.items()}
     return [
         Wire(start, end, tuple(
@@ -106,7 +106,7 @@ def _wires(components: Mapping[str, Component]) -> list[Wire]:
 def _shown(part: str, component: Component, wires: Sequence[Wire]) -> tuple[str, ...]:
     """Return the names of a component's real outputs, and of its inputs that are connected.
 
-    FMPy gives inputs that are shown but not connected the number of another one.
+    FMPy sets inputs that have a connector but no connection to the value of another one.
     """
     connected = {name for wire in wires if wire.end == part for name in wire.names}
     return tuple(
@@ -116,20 +116,20 @@ def _shown(part: str, component: Component, wires: Sequence[Wire]) -> tuple[str,
 
 
 def plant_component(scenario: Scenario) -> Component:
-    """Return the plant of a scenario, which starts as the scenario says.
+    """Make the component of a scenario's plant, with the scenario's start values.
 
     Parameters
     ----------
     scenario : Scenario
-        Whose vehicle, start and plant numbers are used.
+        Its vehicle, initial state and plant parameters are used.
 
     Returns
     -------
     Component
-        The vehicle's, with other start values.
+        The vehicle's component, with other start values.
     """
     start = {name: float(value) for name, value in start_values(scenario).items()}
-    for failure in scenario.failures:  # at once, before there is a connection
+    for failure in scenario.failures:  # failures at time 0 are start values, since connections act after the first step
         if failure.time <= 0.0 and not failure.stuck:
             start[f"thrust_effectiveness[{failure.thruster}]"] = failure.effectiveness
     coupled = bool(scenario.failures or scenario.outages)
@@ -137,7 +137,7 @@ def plant_component(scenario: Scenario) -> Component:
 
 
 def _origin(scenario: Scenario) -> dict[str, bytes]:
-    """Return the files from which the system can be made again."""
+    """Return the scenario's files, from which the system can be built again."""
     if scenario.vehicle_file is None:
         return {"documentation/scenario.toml": scenario.toml().encode()}
     return {
@@ -154,7 +154,7 @@ def _fmu(component: Component, fmi: int, platforms: str) -> bytes:
 
 
 def _require(scenario: Scenario) -> None:
-    """Refuse what the FMUs of a system have not."""
+    """Raise a RunError for features that the FMUs of a system do not support."""
     streamed = next((r.region.name for r in scenario.regions if r.streamed), "")
     require_builtin_law(scenario)
     for good, key, received, expected in (
@@ -164,7 +164,7 @@ def _require(scenario: Scenario) -> None:
             repr(scenario.arbiter.engine),
             "'closed' or 'exact', such as by --set arbiter.engine=closed",
         ),
-        (not scenario.commands.enabled, "commands.enabled", "true", "false: nobody steers a system from outside"),
+        (not scenario.commands.enabled, "commands.enabled", "true", "false: a system takes no commands"),
         (not scenario.goal_streamed, "goal.streamed", "true", "false"),
         (not streamed, f"regions.{streamed}.streamed", "true", "false"),
     ):

@@ -1,4 +1,4 @@
-"""The C of a scenario's loop: translated functions, where their arrays stand, and what of the scene is no parameter."""
+"""C code of a scenario's loop: translated functions, places of their arrays, and constants of the scene."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from cosim.ssp.loop import Loop
 from cosim.ssp.memory import Memory, Named, arrays_of
 from cosim.ssp.normal_tables import generator_state
 
-_AXIS = np.array([0.48, 0.6, 0.64])  # of a turn that no law begins with
-_NONE = -1  # place of what a law has not
+_AXIS = np.array([0.48, 0.6, 0.64])  # rotation axis of an attitude that no law has initially
+_NONE = -1  # place of an array that a law does not have
 
 
 @dataclass(frozen=True)
 class Places:
-    """Where arrays stand in the model's numbers; `constants` by the names that the C code has for them."""
+    """Places of arrays in the model's numbers; `constants` by their names in C."""
 
     constants: dict[str, int]
     goal_numbers: int
@@ -42,7 +42,7 @@ class Places:
 
 @dataclass(frozen=True)
 class Translated:
-    """C files, and where what they work on stands."""
+    """C files, and the places of their arrays."""
 
     files: dict[str, str]  # by name
     constants: dict[str, int]  # for the generated header
@@ -55,21 +55,21 @@ def translate_loop(scenario: Scenario, regions: Sequence[Region], names: Sequenc
     Parameters
     ----------
     scenario : Scenario
-        With a shipped law.
+        With a built-in law.
     regions : sequence of Region
         Of the scenario, the goal first.
     names : sequence of str
-        What the variables of each begin with.
+        Prefix of the variables of each region.
 
     Returns
     -------
     Translated
-        Files of one folder, with those of ``csrc/controller``.
+        Files for the folder with those of ``csrc/controller``.
 
     Raises
     ------
     TranslationError
-        If a function is beyond what is translated.
+        If a function uses Python that cannot be translated.
     """
     loop = Loop(scenario)
     memory = Memory()
@@ -126,7 +126,7 @@ void control_rewind(Model *m)
 
 
 def _place(loop: Loop, memory: Memory, scenario: Scenario) -> Places:
-    """Give every array its place: parameters, then what changes; all else of regions, inputs and allocation stays."""
+    """Place all arrays: parameters, then variables; other arrays of regions, inputs and allocation are constants."""
     keep, (goal, regions), law = memory.keep, (loop.setup.goal, loop.setup.regions), loop.law
     desired, period = _desired(law, scenario), getattr(law.memory, "period", None)
     parameters = {
@@ -182,7 +182,7 @@ def _place(loop: Loop, memory: Memory, scenario: Scenario) -> Places:
 
 
 def _desired(law: CompiledLaw, scenario: Scenario) -> np.ndarray:
-    """Return the array in a law's memory that a command to keep another attitude writes."""
+    """Return the array in a law's memory that `set_attitude` writes."""
     other = law_of(scenario)
     before = [array.copy() for array in arrays_of(other.memory)]
     other.set_attitude(from_axis_angle(_AXIS, 2.0))
@@ -195,7 +195,7 @@ def _desired(law: CompiledLaw, scenario: Scenario) -> np.ndarray:
 def _scene(
     loop: Loop, memory: Memory, scenario: Scenario, regions: Sequence[Region], names: Sequence[str]
 ) -> dict[str, str]:
-    """Return what of the scene is no parameter, as macros of C."""
+    """Return the constants of the scene that are not parameters, as C macros."""
     setup, sensing = loop.setup, scenario.sensing
     follows = setup.inputs.memberships.follows
     ramps = memory.keep(setup.inputs.memberships.ramps)
@@ -237,7 +237,7 @@ def _scene(
 
 
 def _constraints(regions: Sequence[Region]) -> Iterator[str]:
-    """Yield what must hold among the numbers of shapes, a ``Constraint`` of C each."""
+    """Yield the constraints among the numbers of shapes, as C initializers of ``Constraint``."""
     for i, region in enumerate(regions):
         for what, place, other, fault in constraints(region.shape.numbers()):
             yield f'{{HOLDS_{what.upper()}, {i}, {place}, {other}, "{fault}"}}'

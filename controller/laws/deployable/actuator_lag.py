@@ -1,9 +1,9 @@
 """Forces and state behind the lag of the thrusters, which the observer estimates.
 
 Forces f follow commands u by tau f' = u - f. They are propagated for the estimated lag, and for a standard deviation
-less and more: the secant between these is how the forces depend on the lag, and what it misses at the estimated one is
-their curvature. Where the estimate has moved, the forces move with it, to what they would be now had the lag always
-been that.
+less and more: the secant between these is the sensitivity of the forces to the lag, and its error at the estimated lag
+is their curvature. When the estimate changes, the forces are interpolated to the new lag, as if it had always been
+that.
 
 Let a be the acceleration without thrust, and G f that of the thrusters. Then p + tau v has the rate v + tau (a + G f),
 and this has the rate a + G u + tau a'. So the point ahead answers to commands at once, and the vehicle follows it: its
@@ -29,7 +29,7 @@ _GREATEST_TURN = 0.5  # rad, of the attitude ahead
 
 
 def update_forces(estimate: Estimate, thrusters: Thrusters, period: float) -> None:
-    """Propagate the acting forces over the last period [s], behind the estimated lag and behind its bracket."""
+    """Propagate the acting forces over the last period [s], for the estimated lag and for its bracket."""
     lag, spread = estimate.state[LAG], np.sqrt(estimate.covariance[LAG, LAG])
     lags, bracket, now = estimate.lags, estimate.bracket, thrusters.acting_now
     least, most = max(lag - spread, 0.0), lag + spread
@@ -38,7 +38,7 @@ def update_forces(estimate: Estimate, thrusters: Thrusters, period: float) -> No
     remains_most, average_most = _of_lag(most, period)
     for j in range(thrusters.forces.size):
         commanded = thrusters.forces[j] if np.isnan(thrusters.stuck[j]) else thrusters.stuck[j]
-        # what the forces would be now, had the lag been what it is now taken for
+        # deviation from the command, if the lag had always been the present estimate
         behind = _between(bracket[0, j], now[j], bracket[1, j], lags, lag) - commanded
         behind_least = _between(bracket[0, j], now[j], bracket[1, j], lags, least) - commanded
         behind_most = _between(bracket[0, j], now[j], bracket[1, j], lags, most) - commanded
@@ -53,7 +53,7 @@ def update_forces(estimate: Estimate, thrusters: Thrusters, period: float) -> No
 
 
 def _between(least: float, middle: float, most: float, lags: Array, lag: float) -> float:
-    """Return the force behind a lag, of those behind three `lags`; the nearest one beyond them."""
+    """Interpolate the force behind a lag from those behind three `lags`; beyond them, return the nearest."""
     first, low, high = 1, middle, most
     if lag < lags[1]:
         first, low, high = 0, least, middle
@@ -63,7 +63,7 @@ def _between(least: float, middle: float, most: float, lags: Array, lag: float) 
 
 
 def _of_lag(lag: float, period: float) -> tuple[float, float]:
-    """Return how much of a force remains after a period [s] behind a lag [s], and on average within it."""
+    """Return the fraction of a force that remains after a period [s] with a lag [s], and its mean over the period."""
     if lag < 0.03 * period:  # exp(-33) is nothing
         return 0.0, lag / period
     remains = exponential(-period / lag)
@@ -71,7 +71,7 @@ def _of_lag(lag: float, period: float) -> tuple[float, float]:
 
 
 class PredictedState(NamedTuple):
-    """The state ahead by the lag."""
+    """The predicted state, ahead by the lag."""
 
     position: Array  # (3,) m, NED
     velocity: Array  # (6,) m/s over ground, NED, and rad/s, body axes
@@ -99,15 +99,15 @@ def predict_state(
     predicted : PredictedState
         Updated.
     position, velocity : ndarray, shape (3,)
-        [m], [m/s], NED.
+        Position [m] and velocity [m/s], NED.
     quaternion : ndarray, shape (4,)
-        From body to world.
+        Attitude, from body to world.
     omega : ndarray, shape (3,)
-        [rad/s], body axes.
+        Angular velocity [rad/s], body axes.
     acceleration : ndarray, shape (6,)
-        With the forces that act now: [m/s2] over ground, NED; [rad/s2], body axes.
+        Acceleration by the present forces: [m/s2] over ground, NED; [rad/s2], body axes.
     lag : float
-        [s].
+        Lag of the thrusters [s].
     """
     for i in range(3):
         predicted.position[i] = position[i] + lag * velocity[i]

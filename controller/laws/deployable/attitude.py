@@ -1,11 +1,11 @@
 """Attitude: held by proportional and rate feedback, with the restoring moments adapted from the body rates.
 
-Rates are measured well, and the moment that moved the vehicle shows within a period: I omega' = tau - D omega -
+Rates are measured well, so that their change over a period gives the acting moment: I omega' = tau - D omega -
 S(k) phi_{2..4} - nu_r x (M nu_r), where the fourth is Munk's moment, which added mass causes in oblique motion. The
-observer makes of it the three moments of phi (12).
+observer estimates from it the three moments of phi (12).
 
-The desired attitude is the preferred one unless a region of attitude asks for another: where its clearance would be
-less than `comfort`, the desired attitude turns until it has that much, within the allowed tilt, and returns afterwards.
+The desired attitude is the preferred one unless a region of attitude requires another: if its clearance would be less
+than `comfort`, the desired attitude turns until it has that much, within the allowed tilt, and returns afterwards.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ Array = NDArray[np.float64]
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 _RETURN = 0.2  # 1/s, rate of return to the preferred attitude
 _CURRENT_STEP = 0.01  # m/s, of the difference quotient
-_TURN = 4.0  # 1/s, rate of turning to where a region has its comfort
+_TURN = 4.0  # 1/s, rate of turning until a region has its comfort
 
 
 class Attitude(NamedTuple):
     """State of the attitude loop."""
 
-    preferred: Array  # (4,) attitude where no region asks for another, from body to world
+    preferred: Array  # (4,) attitude where no region requires another, from body to world
     desired: Array  # (4,) setpoint of the loop
     last_omega: Array  # (3,) rad/s
-    by_current: Array  # (3, 2) N s, how the moment that the model knows grows with the current
+    by_current: Array  # (3, 2) N s, derivative of the modelled moment by the current
     measured_moment: Array  # (3,) N m, of thrusters and weight, over the last period, body axes
-    started: Array  # (1,) 1 once last_omega is there
+    started: Array  # (1,) 1 once last_omega is measured
 
 
 def empty_attitude(preferred: Array) -> Attitude:
@@ -64,24 +64,24 @@ def measure_moment(
     attitude : Attitude
         `measured_moment` is updated.
     dynamics : Dynamics
-        Of the vehicle.
+        Dynamics of the vehicle.
     R : ndarray, shape (3, 3)
-        From body to world.
+        Rotation from body to world.
     omega : ndarray, shape (3,)
         Measured rates [rad/s], body axes.
     estimate : Estimate
-        Of the velocities of vehicle and water, and the acceleration predicted for the period.
+        Estimate of the velocities of vehicle and water, and of the acceleration in the period.
     period : float
-        [s].
+        Control period [s].
 
     Returns
     -------
     bool
-        False before rates were measured twice.
+        False until rates were measured twice.
     """
     started = bool(attitude.started[0] > 0.0)
     mean, water, known, other, rate = zeros(3), zeros(3), zeros(6), zeros(6), zeros(6)
-    loads = Loads(water, zeros(1), zeros(3))  # current alone: weight and buoyancy are what is looked for
+    loads = Loads(water, zeros(1), zeros(3))  # only the current: weight and buoyancy are the unknowns
     copy(estimate.water_velocity, water)
     for i in range(3):
         mean[i] = 0.5 * (attitude.last_omega[i] + omega[i])
@@ -112,20 +112,20 @@ def measure_moment(
 def update_desired(
     attitude: Attitude, regions: PackedRegions, position: Array, gains: DeployableGains, period: float
 ) -> None:
-    """Turn the desired attitude towards the preferred one, or to where regions of attitude have their comfort.
+    """Turn the desired attitude towards the preferred one, or until regions of attitude have their comfort.
 
     Parameters
     ----------
     attitude : Attitude
         `desired` is updated.
     regions : PackedRegions
-        Those of attitude among them count, hard or soft.
+        Regions; only those of attitude apply, hard or soft.
     position : ndarray, shape (3,)
-        Where the vehicle is [m, NED].
+        Position of the vehicle [m, NED].
     gains : DeployableGains
         Comfort, tilt, turning rate.
     period : float
-        [s].
+        Control period [s].
     """
     error, omega, gradient, k = zeros(4), zeros(3), zeros(3), zeros(3)
     error[0], error[1], error[2], error[3] = error_parts(attitude.preferred, attitude.desired)
@@ -141,7 +141,7 @@ def update_desired(
             limited = True
             if size > 0.0:
                 _add_scaled(_TURN * (gains.comfort - clearance) / size, gradient, omega)
-            elif clearance < 0.0:  # half a turn away, where all axes are as short: about the vertical
+            elif clearance < 0.0:  # half a turn away all axes are equivalent: about the vertical
                 k[0], k[1], k[2] = down_parts(attitude.desired)
                 _add_scaled(_TURN * (gains.comfort - clearance), k, omega)
     if not limited and error[0] > 1.0 - 1e-15:
@@ -189,7 +189,7 @@ def compute_moment(
     gains: DeployableGains,
     out: Array,
 ) -> None:
-    """Write the desired moment, shape (3,) [N m], body axes: against the `free` wrench, but for its damping."""
+    """Write the desired moment, shape (3,) [N m], body axes: cancels the `free` wrench, except its damping."""
     e = zeros(4)
     e[0], e[1], e[2], e[3] = error_parts(attitude.desired, quaternion)
     w = gains.attitude_bandwidth

@@ -10,11 +10,11 @@ linear in the thruster forces u:
     n^T A u >= -rate (dh/dt + phi) - phi' dh/dt - n^T a_free - (dn/dt)^T v,
 
 with n the gradient of h over the pose, v the velocity relative to the region, A u the acceleration by the thrusters and
-a_free the acceleration without them. Along psi = 0 this asks for a (1 - (a / kappa) / sqrt(2 a h + (a / kappa)^2)),
+a_free the acceleration without them. Along psi = 0 this requires a (1 - (a / kappa) / sqrt(2 a h + (a / kappa)^2)),
 which is less than a: never more than is available. A region's own motion enters through dh/dt. Where a region has
 several faces, those that lie ahead have barriers too: `faces.py`. Clearances of regions of position are in m and depend
-on position alone; those of attitude (camera view, heading) are in rad and depend on both. docs/deployable.md says what
-this guarantees and what not.
+on position alone; those of attitude (camera view, heading) are in rad and depend on both. docs/deployable.md states the
+guarantees and their limits.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ Array = NDArray[np.float64]
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 _FLAT = (Box.kind, Prism.kind, DepthBand.kind, HalfSpace.kind)
-_IMPULSE = 0.5  # s, for which what is asked for is taken to act where faces ahead are looked for
+_IMPULSE = 0.5  # s, assumed duration of the desired acceleration in the search for faces ahead
 _LN_10 = 2.302585092994046
-_AHEAD = 1e-4  # s, of the difference quotient of a gradient: exact to a part of 1e-4, rounding included
+_AHEAD = 1e-4  # s, of the difference quotient of a gradient: relative error 1e-4, rounding included
 _FIRM = (3.0, 3.0)  # decades: price of slack against missing the desired force, at weight 0, and added at weight 1
-_LEAP = 0.5  # cosine of the turn of a gradient within that time, beyond which it is a jump
+_LEAP = 0.5  # cosine of the turn of a gradient within `_AHEAD`, below which it is a jump
 _MARGIN_OF_ATTITUDE = 0.02  # rad
 KEPT = 0.01  # m/s2, slack up to which a barrier counts as kept
-_BOUND_LEAP = 0.05  # m, by which no motion of the vehicle lowers the bound within a step
+_BOUND_LEAP = 0.05  # m, more than the motion of the vehicle can lower the bound in a step
 
 
 class RegionObservation(NamedTuple):
@@ -62,8 +62,8 @@ class RegionObservation(NamedTuple):
     later_gradients: Array  # (n, 3)
     later_rotation_gradients: Array  # (n, 3)
     later_clearances: Array  # (n,)
-    bound: Array  # (1,) m, of `write_rows`: what clearances may fall to, if no barrier yields
-    asked: Array  # (n,) m/s2, rad/s2: what the barrier of each region asked of the thrusters last
+    bound: Array  # (1,) m, of `write_rows`: lower bound of the clearances, if no barrier yields
+    asked: Array  # (n,) m/s2, rad/s2: last right side of each region's barrier
 
 
 class Motion(NamedTuple):
@@ -72,11 +72,11 @@ class Motion(NamedTuple):
     position: Array  # (3,) m, NED
     velocity: Array  # (6,) m/s over ground, rad/s
     free_acceleration: Array  # (6,) m/s2, rad/s2: acceleration without thrust
-    thruster_acceleration: Array  # (6, m) m/s2, rad/s2: acceleration of one newton that each thruster gives
+    thruster_acceleration: Array  # (6, m) m/s2, rad/s2: acceleration by one newton of each thruster
     mass: float  # kg
     inertia: float  # kg m2, mean
     braking: float  # m/s2 that is always available
-    position_spread: float  # m, by which the position is uncertain between two steps
+    position_spread: float  # m, uncertainty of the position between two steps
     position_variance: Array  # (3,) m2, NED, of the estimate
     attitude_deviation: float  # rad, of the estimate, standard deviation
 
@@ -92,7 +92,7 @@ def empty_observation(n: int) -> RegionObservation:
 def observe_regions(
     observation: RegionObservation, regions: PackedRegions, position: Array, quaternion: Array, velocity: Array
 ) -> None:
-    """Evaluate the regions at a pose [m, NED], and where a velocity, shape (6,) as in `Motion`, leads in `_AHEAD`."""
+    """Evaluate the regions at a pose [m, NED], and at the pose `_AHEAD` later by a velocity as in `Motion`, (6,)."""
     s = observation
     evaluate_packed(regions, position, quaternion, s.values, s.gradients, s.rotation_gradients, s.clearances)
     r, place, attitude = regions, zeros(3), zeros(4)
@@ -130,8 +130,8 @@ def gradient_rate(kind: int, sign: float, n: Array, later: Array, velocity: Arra
     """Return (dn/dt)^T v, from a gradient now and later, (6,) each, along a velocity [m/s, rad/s] against the region.
 
     The gradient of a flat face is constant, and jumps where another face becomes the nearest. So with flat faces only a
-    gradient that turns away counts, as round an edge; with others, no jump towards the vehicle counts. Within a region
-    that is kept in (`sign` above 0) what turns away is a jump, too.
+    gradient that turns away applies, as round an edge; with others, jumps towards the vehicle are ignored. Inside a
+    region to stay in (`sign` above 0) a gradient that turns away is a jump, too.
     """
     turning, alike = 0.0, 0.0
     for axis in range(6):
@@ -145,9 +145,9 @@ def gradient_rate(kind: int, sign: float, n: Array, later: Array, velocity: Arra
 
 
 def _margin(n: Array, motion: Motion, deviations: Array, of_attitude: bool, gains: DeployableGains) -> float:
-    """Return the margin [m, or rad] of a clearance with slope n, by how uncertain vehicle and region are.
+    """Return the margin [m, or rad] of a clearance with slope n, from the uncertainty of vehicle and region.
 
-    `deviations`, shape (3,) [m], are those of the region.
+    `deviations`, shape (3,) [m], are standard deviations of the region's position.
     """
     variance, along, turned = 0.0, 0.0, 0.0
     for axis in range(3):
@@ -163,7 +163,7 @@ def _margin(n: Array, motion: Motion, deviations: Array, of_attitude: bool, gain
 def _stopping_distance(
     relative: Array, wanted: Array, braking: float, gains: DeployableGains, path_velocity: Array
 ) -> float:
-    """Return the distance [m] in which the vehicle stops, from the velocity that it will have, which it writes."""
+    """Write the expected velocity into `path_velocity`, and return the stopping distance [m] from it."""
     for axis in range(3):
         path_velocity[axis] = relative[axis] + _IMPULSE * wanted[axis]
     speed = length3(path_velocity[0], path_velocity[1], path_velocity[2])
@@ -171,7 +171,7 @@ def _stopping_distance(
 
 
 def _desired_acceleration(motion: Motion, nominal: Array, out: Array) -> None:
-    """Write the acceleration [m/s2] that desired thruster forces [N] give, shape (3,)."""
+    """Write the acceleration [m/s2] by desired thruster forces [N], shape (3,)."""
     for axis in range(3):
         out[axis] = motion.free_acceleration[axis]
         for j in range(nominal.size):
@@ -191,8 +191,8 @@ def write_rows(
 ) -> int:
     """Write the constraint of each hard region that the thrusters could violate; return the number of rows.
 
-    And the bound of the clearances [m], by h and psi, whose fall below zero lasts: min(h, psi / kappa) beside `margin`,
-    which covers an acceleration that is wrong by rate kappa margin.
+    Also write the lower bound of the clearances [m]: min(0, margin + h, psi / kappa). The `margin` covers an error of
+    the acceleration of rate kappa margin.
 
     Parameters
     ----------
@@ -203,13 +203,13 @@ def write_rows(
     regions : PackedRegions
         The n regions.
     weights : ndarray, shape (n,)
-        Of the arbiter: slack of a region of greater weight costs more.
+        Weights of the arbiter: slack of a region of greater weight costs more.
     motion : Motion
-        Of the vehicle.
+        Motion of the vehicle.
     lower, upper : ndarray, shape (m,)
-        Limits [N].
+        Limits of the forces [N].
     share : float
-        Below 1 while barriers yield: what each asks for moves by this share towards what it would ask for.
+        Below 1 while barriers yield: fraction by which each right side moves from its last value to the new one.
     gains : DeployableGains
         Margin, slope and rate of barriers.
 
@@ -230,7 +230,7 @@ def write_rows(
         braking = gains.turning_deceleration if of_attitude else motion.braking
         margin = _margin(n, motion, regions.deviations[i], of_attitude, gains)
         scale = square(motion.mass)
-        if of_attitude:  # by the slopes over place [rad2/m2] and attitude [1]
+        if of_attitude:  # by the slopes over position [rad2/m2] and attitude [1]
             scale *= square(n[0]) + square(n[1]) + square(n[2])
             scale += square(motion.inertia) * (square(n[3]) + square(n[4]) + square(n[5]))
         price = exponential(_LN_10 * (-_FIRM[0] - _FIRM[1] * weights[i])) / max(scale, 1e-9)
@@ -246,7 +246,7 @@ def write_rows(
             reach = margin + _stopping_distance(relative, wanted, braking, gains, path_velocity)
             if 0.0 < distance < reach:
                 faces = 1 + FACES
-        for face in range(faces):  # the nearest, and those ahead
+        for face in range(faces):  # the nearest face, and those ahead
             if face > 0:
                 distance = face_ahead(regions, i, motion.position, n[:3], path_velocity, reach, later_gradient[:3])
                 if not distance < np.inf:
@@ -292,7 +292,7 @@ def add_row(
     work : Workspace
         Receives row, right side and price.
     rows : int
-        Rows that there are.
+        Present number of rows.
     n : ndarray, shape (6,)
         Slope of a clearance over the pose.
     thruster_acceleration : ndarray, shape (6, m)
@@ -316,10 +316,10 @@ def add_row(
 
 
 def update_promise(promised: Array, bound: float, slack: float) -> None:
-    """Raise what is promised of the clearances, shape (2,) [m], to the bound of this step, if that is higher.
+    """Raise the promised lower bound of the clearances, shape (2,) [m], to the bound of this step, if that is higher.
 
-    A bound that falls is no excuse: it would follow whatever happens. The promise begins anew where a barrier yields by
-    more than counts as kept, and where the bound leaps, since then regions or estimate did.
+    A falling bound does not lower the promise, which would else follow any violation. The promise is reset if a barrier
+    yields by more than `KEPT`, or if the bound jumps, since then regions or estimate jumped.
     """
     if slack > KEPT or not bound >= promised[1] - _BOUND_LEAP:
         promised[0] = bound

@@ -1,4 +1,4 @@
-"""What deceleration may be relied on, whatever the direction and whichever thruster is lost."""
+"""The deceleration available in every direction, also with any one thruster lost."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ def least_forces(vehicle: VehicleModel) -> Array:
     """Return the greatest force in the worst direction, with each thruster lost and with none.
 
     Without any moment, over the 26 directions to faces, edges and corners of a cube in body axes: for the shipped
-    vehicles within 2 % of the least over all directions. Where the rest cannot push in every direction, nothing is left
-    to rely on after a loss, and the figure is that with none lost.
+    vehicles within 2 % of the least over all directions. If the remaining thrusters cannot push in every direction, the
+    force with none lost is returned instead.
 
     Parameters
     ----------
     vehicle : VehicleModel
-        With m thrusters.
+        Vehicle with m thrusters.
 
     Returns
     -------
     ndarray, shape (m + 1,)
-        [N]; the last with all thrusters working.
+        Forces [N] with thruster j lost; the last with all working.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def _least_forces(matrix: bytes, m: int, least: bytes, greatest: bytes) -> tuple
 
 def _greatest_force(B: Array, limits: list[tuple[float, float]], direction: Array) -> float:
     """Return the greatest s with B u = [s direction, 0] and u within its limits."""
-    from scipy.optimize import linprog  # here, for it takes a third of the time that a command takes to start
+    from scipy.optimize import linprog  # a slow import, a third of a command's start time
 
     m = B.shape[1]
     cost = np.zeros(m + 1)

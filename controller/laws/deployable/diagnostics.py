@@ -1,4 +1,4 @@
-"""What the deployable law reports after each step."""
+"""Reports of the deployable law after each step."""
 
 from __future__ import annotations
 

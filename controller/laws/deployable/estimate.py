@@ -1,4 +1,4 @@
-"""What the observer estimates: the state, its covariance, and what others read of them."""
+"""The observer's estimate: state, covariance, and the parts that other modules read."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-# first of each kind in the state
+# index of the first state of each kind
 POSITION, VELOCITY, CURRENT, NET_WEIGHT, MOMENTS, HEIGHT, LAG, EFFECTIVENESS = 0, 3, 6, 8, 9, 12, 13, 14
 
-_LIGHT = 50.0  # kg, up to which numbers in N are as they stand
-_FIRST_VELOCITY = 0.3  # m/s, of one that is not measured
+_LIGHT = 50.0  # kg, mass above which numbers in N are scaled
+_FIRST_VELOCITY = 0.3  # m/s, standard deviation at the start of an unmeasured velocity
 _FIRST_CURRENT, _FIRST_RESTORING = 0.3, 15.0  # m/s, N: standard deviations at the start
 _GRAVITY = 9.81  # m/s2
 _FIRST_HEIGHT, _FIRST_ARM = 0.05, 0.15  # m, standard deviations at the start; the second of the weight's moments
 _FIRST_EFFECTIVENESS, _FIRST_COMMON = 0.12, 0.12  # of each thruster, and of all together
-_FIRST_LAG = 0.3  # s, and its standard deviation, of a vehicle whose file names none; else what it names
+_FIRST_LAG = 0.3  # s, and its standard deviation, if the vehicle has none
 _KNOWN_LAG = 1e-6  # s, standard deviation of a lag that is not estimated
 _GREATEST_EFFECTIVENESS = 1.1
 
 
 class Estimate(NamedTuple):
-    """State and covariance of the filter, and what others read of them."""
+    """State and covariance of the filter, and the parts that other modules read."""
 
     first_state: Array  # (14 + m,) before the first measurement
     first_covariance: Array  # (14 + m, 14 + m) likewise
-    state: Array  # (14 + m,) as the module says; SI, NED, body axes
+    state: Array  # (14 + m,) as in `observer`; SI, NED, body axes
     covariance: Array  # (14 + m, 14 + m)
     position: Array  # (3,) m, NED
     velocity: Array  # (3,) m/s over ground, NED
@@ -45,23 +45,23 @@ class Estimate(NamedTuple):
     time_since_measurement: Array  # (1,) s since the last valid measurement; negative before the first
     time_since_valid: Array  # (2,) s since the last valid position, and velocity
     repeated: Array  # (2,) 1 if the last position, and velocity, repeated the one before to the bit
-    slow: Array  # (2,) 1 if they do so while the vehicle moves: new ones come more seldom than steps
-    longest_gap: Array  # (1,) s, longest time without a measurement of late
-    weight: Array  # (1,) of positions and velocities as evidence of failures: less than 1 of one whose error lasts
+    slow: Array  # (2,) 1 if they repeat while the vehicle moves: the sensor is slower than the steps
+    longest_gap: Array  # (1,) s, longest recent time without a measurement
+    weight: Array  # (1,) of positions and velocities as evidence of failures: below 1 for lasting errors
     last_measured: Array  # (6,) position and velocity, as last measured
     mass_scale: Array  # (1,) mass over 50 kg, at least 1: a heavier vehicle's W - B is less well known
     lags: Array  # (3,) s, the estimated lag between a standard deviation less and more
     bracket: Array  # (2, m) N, forces behind the least and the greatest of them
-    by_lag: Array  # (m,) N/s, by how much the acting forces grow with the lag, between those
-    curvature: Array  # (m,) N, by which the acting forces differ from a line between those
+    by_lag: Array  # (m,) N/s, secant of the acting forces over the lag, between those
+    curvature: Array  # (m,) N, difference of the acting forces from that secant
     transition: Array  # (3, 14 + m) of the velocity over a period
     product: Array  # (3, 14 + m) transition times covariance
     row: Array  # (14 + m,) of a measurement
     gain: Array  # (14 + m,) of a measurement
-    deviation: Array  # (2 m, 14 + m) of the true state from the estimate, if thruster j gives nothing; m + j: is stuck
-    supposed: Array  # (2, m) effectiveness, and force [N] before it, with which each got stuck by its hypothesis
-    missing: Array  # (m,) N, by which the force of a thruster that is stuck differed from the expected one
-    direct: Array  # (2 m,) of the last number by what is missing
+    deviation: Array  # (2 m, 14 + m) of the true state from the estimate, if thruster j is lost; m + j: is stuck
+    supposed: Array  # (2, m) effectiveness, and force [N] without it, at which each is stuck by its hypothesis
+    missing: Array  # (m,) N, difference of a stuck thruster's force from the expected one
+    direct: Array  # (2 m,) direct effect of the missing force on the last measured number
     evidence: (
         Array  # (2, 2 m) of the last measurements: innovations times deviations, deviations squared; over variances
     )
@@ -117,7 +117,7 @@ def make_estimate(vehicle: VehicleModel) -> Estimate:
 
 
 def reset(estimate: Estimate) -> None:
-    """Reset all to before the first measurement, but the effectiveness of the thrusters."""
+    """Reset all to the state before the first measurement, except the effectiveness of the thrusters."""
     for i in range(EFFECTIVENESS):
         estimate.state[i] = estimate.first_state[i]
         for k in range(estimate.state.size):
@@ -128,7 +128,7 @@ def reset(estimate: Estimate) -> None:
 
 
 def initialize(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> None:
-    """Initialize from the first measurement [m, m/s, NED]; a velocity that is not measured is taken for zero."""
+    """Initialize from the first measurement [m, m/s, NED]; an unmeasured velocity is assumed to be zero."""
     start_from(estimate, POSITION, position, gains.position_noise)
     if np.isnan(velocity[0] + velocity[1] + velocity[2]):
         start_from(estimate, VELOCITY, zeros(3), _FIRST_VELOCITY)
@@ -139,7 +139,7 @@ def initialize(estimate: Estimate, position: Array, velocity: Array, gains: Depl
 
 
 def start_from(estimate: Estimate, first: int, measured: Array, deviation: float) -> None:
-    """Start anew from a measured position or velocity, whatever was estimated; all else keeps its estimate."""
+    """Replace the estimate of position or velocity by a measurement; all other states keep their estimate."""
     P = estimate.covariance
     for axis in range(3):
         i = first + axis
@@ -154,7 +154,7 @@ def start_from(estimate: Estimate, first: int, measured: Array, deviation: float
 
 
 def publish(estimate: Estimate) -> None:
-    """Copy the parts of the state."""
+    """Copy the parts of the state that other modules read."""
     x = estimate.state
     copy(x[:3], estimate.position)
     copy(x[VELOCITY:CURRENT], estimate.velocity)
@@ -164,7 +164,7 @@ def publish(estimate: Estimate) -> None:
 
 
 def set_effectiveness(estimate: Estimate, j: int, value: float) -> None:
-    """Set the effectiveness of a thruster: 0 of one that is isolated, 1 of one that works again."""
+    """Set the effectiveness of a thruster: 0 for an isolated one, 1 for one that works again."""
     P, k = estimate.covariance, EFFECTIVENESS + j
     estimate.state[k] = value
     for i in range(estimate.state.size):
@@ -175,12 +175,12 @@ def set_effectiveness(estimate: Estimate, j: int, value: float) -> None:
 
 
 def inflate_effectiveness(estimate: Estimate, j: int) -> None:
-    """Widen the spread of an effectiveness that has changed."""
+    """Inflate the variance of an effectiveness that has changed."""
     estimate.covariance[EFFECTIVENESS + j, EFFECTIVENESS + j] += square(_FIRST_EFFECTIVENESS)
 
 
 def freeze(estimate: Estimate, gains: DeployableGains) -> None:
-    """Freeze lag and effectiveness where the gains say that they are not estimated."""
+    """Freeze lag and effectiveness if the gains exclude them from estimation."""
     P = estimate.covariance
     for i in range(LAG, estimate.state.size):
         if (gains.lag_bound if i == LAG else gains.effectiveness_estimation) == 0.0:
@@ -205,7 +205,7 @@ def project(estimate: Estimate, gains: DeployableGains) -> None:
 
 
 def _bound(estimate: Estimate, i: int, least: float, most: float) -> None:
-    """Bring one state within its bounds, and the others to what is likeliest then."""
+    """Project one state onto its bounds, and condition the others on it."""
     x, P = estimate.state, estimate.covariance
     excess = x[i] - min(max(x[i], least), most)
     if excess != 0.0:

@@ -1,8 +1,8 @@
 """Faces ahead of the vehicle, of regions with several faces.
 
-Within a box, the clearance is the distance to the nearest face. The face that the vehicle heads for becomes the nearest
-too late to brake. So a line along the velocity is followed to where it would leave the region, as far as the vehicle
-needs for stopping; the face found there is a plane with a barrier of its own. The component of the velocity towards
+Inside a box, the clearance is the distance to the nearest face. The face that the vehicle heads for becomes the nearest
+too late to brake. So a line along the velocity is followed to the point where it leaves the region, up to the stopping
+distance; the face found there is a plane with its own barrier. The component of the velocity towards
 faces that have barriers already is removed, so that the next face is found in a corner, too.
 """
 
@@ -18,18 +18,18 @@ from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-_SMOOTH = (Sphere.kind, Ellipsoid.kind)  # from outside
+_SMOOTH = (Sphere.kind, Ellipsoid.kind)  # without kinks outside
 _HALF_SPACE = HalfSpace.kind
-FACES = 2  # searched for beside the nearest
-_LOOKS = 16  # along a line at most
-_HALVINGS = 6  # of the interval in which it leaves the region
+FACES = 2  # faces searched for beside the nearest
+_LOOKS = 16  # evaluations along a line at most
+_HALVINGS = 6  # bisections of the interval in which it leaves the region
 
 
 def has_faces(kind: int, sign: float) -> bool:
-    """Return whether the clearance of a region has a kink where two faces are equally near.
+    """Return True if the clearance of a region has a kink where two faces are equally near.
 
-    Within a region that is kept in (`sign` above 0) that is so for all but a half space: within an ellipsoid along its
-    long axes, within a sphere in its middle.
+    Inside a region to stay in (`sign` above 0) this holds for all but a half space: an ellipsoid has the kink along its
+    long axes, a sphere at its center.
     """
     return kind != _HALF_SPACE and (sign > 0.0 or kind not in _SMOOTH)
 
@@ -37,22 +37,22 @@ def has_faces(kind: int, sign: float) -> bool:
 def face_ahead(
     regions: PackedRegions, i: int, position: Array, nearest: Array, velocity: Array, reach: float, face: Array
 ) -> float:
-    """Find the face of region `i` that a velocity leads to, beside the nearest one.
+    """Find the face of region `i` that the vehicle heads for, beside the nearest one.
 
     Parameters
     ----------
     regions : PackedRegions
-        At their present places.
+        Regions at their present positions.
     i : int
         Index of a region of position.
     position : ndarray, shape (3,)
-        Of the vehicle [m, NED], where the region is kept.
+        Position of the vehicle [m, NED], at which the region is satisfied.
     nearest : ndarray, shape (3,)
         Gradient of the clearance there, of length 1: the face that has a barrier already.
     velocity : ndarray, shape (3,)
-        Relative to the region [m/s]; its component towards `nearest` is removed in place.
+        Velocity relative to the region [m/s]; its component towards the nearest face is removed in place.
     reach : float
-        How far the line is followed [m].
+        Length of the line [m].
     face : ndarray, shape (3,)
         Receives the gradient of the clearance at the face.
 
@@ -94,7 +94,7 @@ def face_ahead(
 def _clearance_along(
     regions: PackedRegions, i: int, position: Array, velocity: Array, time: float, point: Array, gradient: Array
 ) -> float:
-    """Return the clearance where a velocity leads in a time; `point` and `gradient` are written, shape (3,) each."""
+    """Return the clearance after a time at a velocity; write `point` and `gradient`, shape (3,) each."""
     for axis in range(3):
         point[axis] = position[axis] + time * velocity[axis]
     return clearance_of_place(regions, i, point, gradient)

@@ -1,21 +1,20 @@
 """Detection of failed thrusters, by the innovations of the observer.
 
-There are two hypotheses about each thruster: it loses its force, or it is stuck at the force that it has. If one holds,
-the true state deviates from the estimate: at first by the effectiveness that is lost, or by the force that no longer
-changes; from then on as the filter propagates any error of its state (Willsky and Jones, 1976). So what the filter
-adapts to by mistake, or blames on other causes, is part of the deviation. The log-likelihood ratio of a hypothesis
-against "as before" is summed, never below zero: Page's test. At zero the hypothesis starts anew; that is the supposed
-time of the failure.
+There are two hypotheses about each thruster: it loses its force, or it is stuck at its present force. If one holds, the
+true state deviates from the estimate: at first by the lost effectiveness, or by the force that no longer changes; then
+as the filter propagates any error of its state (Willsky and Jones, 1976). So the deviation includes the filter's false
+adaptation of other states. The log-likelihood ratio of a hypothesis against "no failure" is summed, never below zero:
+Page's test. At zero the hypothesis restarts; that is the supposed time of the failure.
 
-A moment or a velocity that can have other causes counts little, since the covariance of the innovation includes them:
-an uncertain effectiveness or lag, restoring moments not yet found, W - B, current, the height of the centre of gravity.
-So a thruster that fails at low thrust is found when it is used.
+A moment or a velocity that can have other causes has little weight, since the covariance of the innovation includes
+them: an uncertain effectiveness or lag, unknown restoring moments, W - B, current, the height of the center of gravity.
+So a thruster that fails at low thrust is detected when it is used.
 
-A thruster fails when its sum passes the threshold, well ahead of that of every other thruster. The likeliest loss then
-says whether it goes on with what is left, or is isolated. The deviation is taken into the state. A thruster that was
-isolated by a narrow lead is tried again, once, when another one is isolated. Where several are isolated, one of them
-may be wrongly accused: each is tried again after a while, in turn, while no barrier is active; one that gives nothing
-is soon isolated again. One that is reported as failed is never tried.
+A thruster has failed if its sum exceeds the threshold, and that of every other thruster by a lead. By the likeliest
+loss it is kept with its remaining effectiveness, or isolated. The deviation is added to the state. A thruster isolated
+by a narrow lead is tried again, once, when another one is isolated. If several are isolated, one of them may be a false
+alarm: each is tried again after a while, in turn, while no barrier is active; a failed one is soon isolated again. A
+thruster that is reported as failed is never tried.
 """
 
 from __future__ import annotations
@@ -32,21 +31,21 @@ from controller.laws.deployable.model import Thrusters
 
 Array = NDArray[np.float64]
 
-_MOST_A_STEP = 3.0  # of the log-likelihood ratio, so that no single outlier decides
-_LOSS = 0.6  # part of its force that a thruster loses by the hypothesis: it is near for a half and for all
+_MOST_A_STEP = 3.0  # limit of the log-likelihood ratio per step, so that no single outlier decides
+_LOSS = 0.6  # fraction of force lost by the hypothesis: close enough to both a half and all
 _USEFUL = 0.15  # effectiveness below which a thruster is isolated
 _SPREADS = 3.0  # standard deviations below that
-_LEAD = 8.0  # of the likeliest thruster before the next
-_STUCK_SPREAD = 0.5  # standard deviation of the force at which a thruster is stuck, as part of it
-_CERTAIN = 40.0  # with such a lead it is isolated for good, but for trials
-_TRIAL = 5.0  # s after the last isolation or trial, for each the first time
-_RARER = 8  # as long for each the next time
+_LEAD = 8.0  # of the log-likelihood ratio of the likeliest thruster over the next
+_STUCK_SPREAD = 0.5  # standard deviation of the force at which a thruster is stuck, relative to it
+_CERTAIN = 40.0  # lead above which the isolation is not tentative
+_TRIAL = 5.0  # s from the last isolation or trial to a thruster's first trial
+_RARER = 8  # factor of that time for each further trial
 
 
 class FaultState(NamedTuple):
     """The hypotheses, two for each thruster."""
 
-    ratio: Array  # (2 m,) summed log-likelihood ratio: thruster j gives nothing; m + j: is stuck
+    ratio: Array  # (2 m,) summed log-likelihood ratio: thruster j is lost; m + j: is stuck
     sums: Array  # (2, 2 m) of the evidence since the supposed time of the failure
     tentative: NDArray[np.int64]  # (m,) 1 of a thruster isolated tentatively, more of one isolated for good
     trials: NDArray[np.int64]  # (m,) of each thruster
@@ -67,16 +66,16 @@ def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thruste
     fault_state : FaultState
         Updated in place.
     estimate : Estimate
-        With the evidence of the last measurements. Its state changes if a thruster has failed.
+        Estimate with the evidence of the last measurements. Its state changes if a thruster has failed.
     thrusters : Thrusters
-        Whose `health` and `stuck` change if one is isolated; the caller calls `model.reallocate`.
+        Their `health` and `stuck` change if one is isolated; the caller calls `model.reallocate`.
     gains : DeployableGains
         The threshold.
 
     Returns
     -------
     int
-        From 0; -1 for none.
+        Index of the failed thruster, from 0; -1 for none.
     """
     if gains.failure_threshold <= 0.0:
         return -1
@@ -105,7 +104,7 @@ def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thruste
         force = np.nan
         if hypothesis > at:
             force = estimate.supposed[0, at] * estimate.supposed[1, at]
-        elif remaining > _USEFUL:  # it goes on with what is left
+        elif remaining > _USEFUL:  # kept with the remaining effectiveness
             fault_state.tentative[at] = 0
             inflate_effectiveness(estimate, at)
             _start_all_anew(fault_state, estimate, thrusters)
@@ -133,14 +132,14 @@ def try_again(
     reported : ndarray, shape (m,)
         Health of the thrusters as reported: one that is reported as failed is not tried.
     quiet : bool
-        Whether no barrier was active in the last step.
+        True if no barrier was active in the last step.
     period : float
-        [s].
+        Control period [s].
 
     Returns
     -------
     int
-        From 0; the caller calls `model.reallocate`.
+        Index of the thruster, from 0, or -1; the caller calls `model.reallocate`.
     """
     fault_state.waited[0] += period
     isolated, least = 0, -1
@@ -161,7 +160,7 @@ def try_again(
 
 
 def _likelier(fault_state: FaultState, j: int, m: int) -> int:
-    """Return which hypothesis about thruster j is likelier: that it lost some of its force, or is stuck."""
+    """Return the index of the likelier hypothesis about thruster j: j if it lost force, m + j if it is stuck."""
     sums = fault_state.sums
     lost = 0.5 * square(sums[0, j]) / sums[1, j] if sums[0, j] > 0.0 else 0.0
     stuck = sums[0, m + j] - 0.5 * sums[1, m + j]
@@ -181,7 +180,7 @@ def _add_evidence(fault_state: FaultState, estimate: Estimate, thrusters: Thrust
 
 
 def _start_anew(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, j: int, hypothesis: int) -> None:
-    """Suppose that thruster j fails now, if it does."""
+    """Restart a hypothesis: the supposed failure of thruster j is now."""
     fault_state.ratio[hypothesis] = fault_state.sums[0, hypothesis] = fault_state.sums[1, hypothesis] = 0.0
     estimate.deviation[hypothesis, :] = 0.0
     if hypothesis == j:
@@ -191,7 +190,7 @@ def _start_anew(fault_state: FaultState, estimate: Estimate, thrusters: Thruster
 
 
 def _start_all_anew(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters) -> None:
-    """Suppose that any thruster fails now, if it does."""
+    """Restart all hypotheses: the supposed failure of each thruster is now."""
     m = thrusters.health.size
     for j in range(m):
         _start_anew(fault_state, estimate, thrusters, j, j)
@@ -207,6 +206,6 @@ def _isolate(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, 
     fault_state.waited[0] = 0.0
     thrusters.health[failed], thrusters.stuck[failed] = 0.0, force
     set_effectiveness(estimate, failed, 0.0 if np.isnan(force) else 1.0)
-    if not np.isnan(force):  # which is hardly known, and may be none
+    if not np.isnan(force):  # the force is uncertain, and may be zero
         estimate.covariance[EFFECTIVENESS + failed, EFFECTIVENESS + failed] = square(_STUCK_SPREAD)
     _start_all_anew(fault_state, estimate, thrusters)

@@ -1,4 +1,4 @@
-"""The numbers of the deployable law that a user may turn, with defaults that suit a vehicle of a metre."""
+"""Gains of the deployable law, with defaults for a vehicle of about a metre."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 from controller.errors import LawError
 from controller.law import validate_gains
 
-SPREADS = 3.0  # standard deviations of a place, by which margins are wider
+SPREADS = 3.0  # standard deviations of a position added to margins
 
 
 class DeployableGains(NamedTuple):
@@ -22,13 +22,13 @@ class DeployableGains(NamedTuple):
     position_bandwidth: float = 0.8  # 1/s, of the approach to the end of the path
     depth: float = 0.3  # m, depth in the goal region at which the path ends, where the region is that deep
     attitude_bandwidth: float = 2.0  # rad/s
-    # attitude asked for by regions
-    comfort: float = 0.15  # rad, clearance that a region of attitude has where the held attitude heeds it
+    # attitude required by regions
+    comfort: float = 0.15  # rad, clearance of regions of attitude that the held attitude keeps
     tilt: float = 0.35  # rad, greatest from the vertical that a region may ask for
     turning_rate: float = 0.6  # rad/s, greatest of the held attitude
     turning_deceleration: float = 0.5  # rad/s2, relied on by barriers of attitude
     # barriers
-    margin: float = 0.03  # m, kept of hard regions beside what the estimate's error asks for
+    margin: float = 0.03  # m, kept of hard regions in addition to the estimate's error
     braking_share: float = 0.8  # of the deceleration that is left with any one thruster lost, relied on for stopping
     barrier_slope: float = 1.5  # 1/s, greatest rate at which a barrier may be approached per metre
     barrier_rate: float = 4.0  # 1/s, at which a barrier's speed limit is enforced
@@ -49,7 +49,7 @@ class DeployableGains(NamedTuple):
     coast: float = 2.0  # s that the law goes on without valid measurements before it only holds W - B
     rise: float = 0.0  # N, lift once all but attitude is lost for that long, beside the force against W - B
     failure_threshold: float = 12.0  # log-likelihood ratio at which a thruster is isolated; 0: never
-    # parts that 0 takes out, to see what they are worth
+    # parts that 0 disables, for comparison
     effectiveness_estimation: float = 1.0  # without it, of each thruster the same
     path_planning: float = 1.0  # without it, straight at the goal
     barriers: float = 1.0  # without them, no region is kept but by the path
@@ -76,17 +76,17 @@ _MAY_BE_ZERO = {
 
 
 def check_gains(gains: DeployableGains) -> DeployableGains:
-    """Return the gains if the law can work with them.
+    """Validate the gains, and return them.
 
     Parameters
     ----------
     gains : DeployableGains
-        To be checked.
+        Gains to validate.
 
     Returns
     -------
     DeployableGains
-        The same.
+        The same gains.
 
     Raises
     ------

@@ -23,17 +23,17 @@ from controller.stack_array import zeros
 Array = NDArray[np.float64]
 
 _FARTHEST = 1e6  # m, of a plausible position
-_JUMP = 0.5  # of the standard deviation of a position that is an estimate, taken for noise
-_STEADY = 0.01  # m/s, deviation of a velocity, beyond which its error lasts, and counts as noise that much greater
+_JUMP = 0.5  # fraction of an estimated position's standard deviation that is noise
+_STEADY = 0.01  # m/s, standard deviation of a velocity above which its error lasts, and its noise is increased
 _FASTEST = 100.0  # m/s, rad/s
-_RESTING, _PUSHED = 0.02, 0.05  # m/s, m/s2, sums over the axes: below and above, the vehicle rests and is about to move
+_RESTING, _PUSHED = 0.02, 0.05  # m/s, m/s2, sums over the axes: below, the vehicle rests; above, it starts to move
 
 
 def smooth_weights(weights: Array, smoothed: Array, hard: NDArray[np.bool_], share: float) -> None:
-    """Write the arbiter's weights, shape (2, n), those of hard regions moved towards them by a share.
+    """Write the arbiter's weights, shape (2, n), those of hard regions low-pass filtered in two stages by a share.
 
-    The first stage follows the arbiter, the second one the first: so noise makes small steps of small steps. The first
-    weights are taken as they are. Each of the arbiter's is clipped to [0, 1]; NaN becomes 1, the cautious value.
+    The first stage follows the arbiter, the second one the first. The first weights are not filtered. The arbiter's
+    weights are clipped to [0, 1]; NaN becomes 1, the cautious value.
     """
     for i in range(weights.size):
         weight = 1.0 if np.isnan(weights[i]) else min(max(weights[i], 0.0), 1.0)
@@ -44,7 +44,7 @@ def smooth_weights(weights: Array, smoothed: Array, hard: NDArray[np.bool_], sha
 
 
 def reports_change(reported: Array, before: Array, health: Array) -> bool:
-    """Return whether the reported health differs from the last report, or from the assumed health of a failed thruster.
+    """Return True if the reported health differs from the last report, or from the assumed health of a failed thruster.
 
     A health of 0 or below reports a failure; any other value, NaN too, a working thruster.
     """
@@ -71,7 +71,7 @@ def update_thrusters(memory: DeployableMemory, reported: Array) -> None:
 
 
 def process_measurement(memory: DeployableMemory, state: VehicleState, gains: DeployableGains) -> bool:
-    """Propagate the estimate over the last period and correct it; return whether the measurement was accepted."""
+    """Propagate the estimate over the last period and correct it; return True if the measurement was accepted."""
     estimate, period = memory.state_estimate, memory.period[0]
     valid = _is_plausible_attitude(state.quaternion, state.velocity_body)
     if valid:
@@ -82,13 +82,13 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
         copy(state.velocity_body[3:], memory.omega)
     else:
         _propagate_attitude(memory)
-        memory.attitude.started[0] = 0.0  # a change over several periods is no rate of one
+        memory.attitude.started[0] = 0.0  # the next change of the rates would span several periods
     R, position, velocity = zeros(3, 3), zeros(3), zeros(3)
     write_rotation(memory.quaternion, R)
     position_noise, velocity_noise, lasting = gains.position_noise, gains.velocity_noise, 0.0
     for i in range(12):
         memory.deviation[i] = min(max(state.deviation[i], 0.0), _FARTHEST) if state.deviation[i] >= 0.0 else _FARTHEST
-    for i in range(3):  # an estimate drifts, and jumps by a part of its deviation
+    for i in range(3):  # an estimated state drifts, and jumps by a fraction of its deviation
         position_noise = max(position_noise, _JUMP * memory.deviation[i])
         velocity_noise = max(velocity_noise, square(memory.deviation[3 + i]) / _STEADY)
         lasting = max(lasting, memory.deviation[3 + i])
@@ -131,7 +131,7 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
 
 
 def _is_new(estimate: Estimate, group: int, repeats: bool, gains: DeployableGains) -> bool:
-    """Return whether a position or velocity is new: what repeats itself is old, but of a fast sensor of what rests."""
+    """Return True if a position or velocity is new: not a repetition, or a repetition of a fast sensor at rest."""
     v, a = estimate.velocity, estimate.acceleration
     rests = abs(v[0]) + abs(v[1]) + abs(v[2]) < _RESTING
     moves = not rests or abs(a[0]) + abs(a[1]) + abs(a[2]) > _PUSHED
@@ -146,7 +146,7 @@ def _is_new(estimate: Estimate, group: int, repeats: bool, gains: DeployableGain
 
 
 def _correct_group(estimate: Estimate, first: int, measured: Array, noise: float, gains: DeployableGains) -> bool:
-    """Correct by a position or a velocity; start from it where it has long been consistently elsewhere."""
+    """Correct by a position or a velocity; replace the estimate if all were rejected for longer than `coast`."""
     group = 0 if first == estimate_state.POSITION else 1
     if observer.correct(estimate, first, measured, noise, gains):
         estimate.time_since_valid[group] = 0.0
@@ -157,7 +157,7 @@ def _correct_group(estimate: Estimate, first: int, measured: Array, noise: float
 
 
 def _repeats(measured: Array, last: Array) -> bool:
-    """Return whether what is measured is to the bit what was measured last, which it then becomes."""
+    """Return True if a measurement equals the last one bit for bit; store it as the last one."""
     repeats = True
     for i in range(3):
         repeats = repeats and (measured[i] == last[i] or (np.isnan(measured[i]) and np.isnan(last[i])))
@@ -166,7 +166,7 @@ def _repeats(measured: Array, last: Array) -> bool:
 
 
 def _is_plausible_velocity(velocity: Array) -> bool:
-    """Return whether a velocity [m/s] is finite and plausible."""
+    """Return True if a velocity [m/s] is finite and plausible."""
     can = True
     for i in range(3):
         can = can and abs(velocity[i]) < _FASTEST
@@ -174,7 +174,7 @@ def _is_plausible_velocity(velocity: Array) -> bool:
 
 
 def _correct_by_rates(memory: DeployableMemory, R: Array, predicted: bool, gains: DeployableGains) -> None:
-    """Correct the estimate by the moment that the change of the rates shows; `predicted` says that there is one."""
+    """Correct the estimate by the moment from the change of the rates, if the estimate was `predicted`."""
     estimate, attitude, period = memory.state_estimate, memory.attitude, memory.period[0]
     known = attitude_loop.measure_moment(attitude, memory.dynamics, R, memory.omega, estimate, period)
     if known and predicted:
@@ -194,7 +194,7 @@ def _correct_by_rates(memory: DeployableMemory, R: Array, predicted: bool, gains
 
 
 def _is_plausible_attitude(quaternion: Array, velocity_body: Array) -> bool:
-    """Return whether a quaternion has length 1 and the rates are plausible."""
+    """Return True if a quaternion has length 1 and the rates are plausible."""
     size, fastest = 0.0, 0.0
     for i in range(4):
         size += square(quaternion[i])
@@ -218,7 +218,7 @@ def _propagate_attitude(memory: DeployableMemory) -> None:
 
 
 def _is_plausible_motion(position: Array, velocity: Array) -> bool:
-    """Return whether position [m] and velocity [m/s] are finite and plausible."""
+    """Return True if position [m] and velocity [m/s] are finite and plausible."""
     can = _is_plausible_velocity(velocity)
     for i in range(3):
         can = can and abs(position[i]) < _FARTHEST

@@ -52,14 +52,15 @@ from controller.linear_algebra import copy
 from controller.quadratic_program import empty_workspace
 from controller.quaternion import write_rotation
 from controller.regions.kinds import FIRST_OF_ATTITUDE
-from controller.regions.region_set import PackedRegions
+from controller.regions.region_set import PackedRegions, clearance_at
 from controller.stack_array import zeros
 
-_STALE = 0.15  # s without a measurement, after which the vehicle goes slower
-_TRUSTED_SPREAD = 0.3  # m, of those deviations, beyond which it does too; at twice as much it stops
+_STALE = 0.15  # s without a measurement, after which the speed is reduced
+_TRUSTED_SPREAD = 0.3  # m, `SPREADS` deviations above which the speed is reduced; at twice as much it is 0
 _SEED = 1
-_ON_THE_WAY = 0.3  # m/s, from which on soft regions do not push back at all
-_LEAST_EFFECTIVENESS = 0.5  # by which more force is commanded
+_ON_THE_WAY = 0.3  # m/s, desired speed from which soft regions do not push back at all
+_SHALLOWEST = 1e-3  # m, least depth in the goal region at which they do so in full again
+_LEAST_EFFECTIVENESS = 0.5  # below it, the desired force is reduced in proportion
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 
 
@@ -72,7 +73,7 @@ def step(
     memory: DeployableMemory,
     forces: Array,
 ) -> None:
-    """Do what `CompiledLaw.step` says, by the deployable law."""
+    """Run a step of the deployable law, as specified by `CompiledLaw.step`."""
     estimate, thrusters, dynamics, period = memory.state_estimate, memory.thrusters, memory.dynamics, memory.period[0]
     input_validation.smooth_weights(weights, memory.weights, regions.hard, period / (period + gains.price_smoothing))
     R, desired, acceleration, free, against, wrench = zeros(3, 3), zeros(3), zeros(6), zeros(6), zeros(6), zeros(6)
@@ -141,7 +142,9 @@ def step(
             acceleration[axis] - free[axis] - memory.filtered_acceleration[axis]
         )
     _force_of(dynamics, R_ahead, memory.filtered_acceleration, wrench)
-    _soft_forces(memory.observation, regions, memory.weights[1], desired, R_ahead, dynamics, wrench)
+    deep = min(clearance_at(goal, 0, memory.plan.path[memory.plan.counts[0] - 1]), gains.depth)
+    entered = min(max(clearance_at(goal, 0, ahead.position) / max(deep, _SHALLOWEST), 0.0), 1.0)
+    _soft_forces(memory.observation, regions, memory.weights[1], desired, entered, R_ahead, dynamics, wrench)
     attitude_loop.update_desired(memory.attitude, regions, ahead.position, gains, period)
     attitude_loop.compute_moment(
         memory.attitude, dynamics, ahead.quaternion, ahead.velocity[3:], against, gains, wrench[3:]
@@ -174,7 +177,7 @@ def step(
     rows = 0
     memory.observation.bound[0] = NO_BOUND
     if gains.barriers > 0.0:
-        yields = memory.report[12] > KEPT  # then noise would be that of barriers against each other
+        yields = memory.report[12] > KEPT  # yielding barriers amplify noise
         rows = write_rows(
             work, memory.observation, regions, memory.weights[1], motion, lower, upper,
             share if yields else 1.0, gains,
@@ -188,14 +191,14 @@ def step(
     copy(estimate.moments, memory.estimate[1:])
     write_report(memory.report, estimate, memory.plan.cost[0], memory.plan.counts[0], thrusters.health, desired)
     write_program_report(memory.report, work.multipliers, work.price, rows, steps)
-    beyond = max(spread - 2.0 * _TRUSTED_SPREAD, 0.0)  # the margins'
+    beyond = max(spread - 2.0 * _TRUSTED_SPREAD, 0.0)  # spread that the margins do not cover
     slack = memory.report[12]
     update_promise(memory.promised, memory.observation.bound[0], slack)
     memory.report[16] = memory.promised[0] - beyond - slack / (gains.barrier_rate * gains.barrier_slope)
 
 
 def _hold_weight(memory: DeployableMemory, R: Array, gains: DeployableGains, forces: Array) -> None:
-    """Write the forces that hold W - B, and `rise`; none before anything is known, or without an attitude."""
+    """Write the forces that compensate W - B, plus `rise`; zeros before the first estimate, or without an attitude."""
     thrusters, wrench = memory.thrusters, zeros(6)
     if memory.state_estimate.time_since_measurement[0] > 0.0 and memory.attitude.started[0] > 0.0:
         for k in range(3):
@@ -208,9 +211,9 @@ def _hold_weight(memory: DeployableMemory, R: Array, gains: DeployableGains, for
 
 
 def _limit_speed(estimate: Estimate, spread: float, gains: DeployableGains, desired: Array) -> None:
-    """Limit the wanted velocity to what `acceleration` stops before the law has coasted too long, or knows no place.
+    """Limit the desired velocity so that the vehicle can stop before `coast` ends or the position is too uncertain.
 
-    `spread` is that of the position [m].
+    `spread` is the uncertainty of the position [m].
     """
     gap = max(estimate.time_since_measurement[0], estimate.longest_gap[0])
     most = gains.speed
@@ -225,7 +228,7 @@ def _limit_speed(estimate: Estimate, spread: float, gains: DeployableGains, desi
 
 
 def _force_of(dynamics: Dynamics, R: Array, acceleration: Array, out: Array) -> None:
-    """Write the body force [N] that gives an acceleration, world frame, into out[:3]."""
+    """Write the body force [N] of an acceleration, world frame, into out[:3]."""
     for i in range(3):
         out[i] = 0.0
         for k in range(3):
@@ -240,6 +243,7 @@ def _soft_forces(
     regions: PackedRegions,
     weights: Array,
     desired: Array,
+    entered: float,
     R: Array,
     dynamics: Dynamics,
     wrench: Array,
@@ -247,7 +251,8 @@ def _soft_forces(
     """Add the repulsive force of violated soft regions of position (22), -alpha_i g_i grad g_i / |grad g_i|.
 
     Each is at most the force that the thrusters give in every direction. The path decides what is crossed: on the way,
-    which is as fast as `desired` [m/s, NED], a region pushes aside, but not back.
+    which is as fast as `desired` [m/s, NED], a region pushes aside, but not back. Nor does it outside the goal region,
+    however slow the approach is: `entered` is 0 there, and 1 where the vehicle is as deep in it as the path's end.
     """
     speed, force = length3(desired[0], desired[1], desired[2]), zeros(3)
     most = dynamics.translational_mass[0] * model.smallest(dynamics.braking)
@@ -262,8 +267,9 @@ def _soft_forces(
             force[axis] = -push * observation.gradients[i, axis] / size
             along += force[axis] * desired[axis]
         if along < 0.0:
+            spared = max(min(speed / _ON_THE_WAY, 1.0), 1.0 - entered)  # share of the push back
             for axis in range(3):
-                force[axis] -= along * desired[axis] / (speed * max(speed, _ON_THE_WAY))
+                force[axis] -= spared * along * desired[axis] / square(speed)
         for k in range(3):
             for axis in range(3):
                 wrench[k] += R[axis, k] * force[axis]
@@ -275,9 +281,9 @@ class DeployableLaw(CompiledLaw):
     Parameters
     ----------
     vehicle : VehicleModel
-        Nominal numbers.
+        Nominal parameters of the vehicle.
     gains : DeployableGains
-        Of the law.
+        Gains of the law.
     desired_quaternion : array_like, shape (4,)
         Attitude to be kept, from body to world.
     period : float
@@ -343,7 +349,7 @@ class DeployableLaw(CompiledLaw):
 
     @classmethod
     def validate(cls, gains: Any) -> Any:
-        """Return gains if the law can work with them."""
+        """Validate the gains, and return them."""
         return check_gains(gains)
 
     @property
@@ -353,5 +359,5 @@ class DeployableLaw(CompiledLaw):
         return expected
 
     def set_attitude(self, quaternion: Array) -> None:
-        """Keep another attitude, a unit `quaternion`, where no region asks for one, from the next step on."""
+        """Set the preferred attitude, a unit `quaternion`, from the next step on."""
         self.memory.attitude.preferred[:] = validate_quaternion(quaternion)

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 class DeployableMemory(NamedTuple):
-    """Arrays, so that C can take it."""
+    """State between steps, as arrays, for the translation to C."""
 
     period: Array  # (1,) s
     estimate: Array  # (4,) phi_hat [N, N m]
@@ -34,15 +34,15 @@ class DeployableMemory(NamedTuple):
     observation: RegionObservation
     program: Workspace
     predicted: PredictedState
-    expected: Array  # (6,) m, NED, and m/s, body: where the vehicle is at the next step; NaN if that is not known
+    expected: Array  # (6,) m, NED, and m/s, body: predicted position and velocity at the next step; NaN if unknown
     quaternion: Array  # (4,) from body to world, measured, or propagated by the model
     omega: Array  # (3,) rad/s, likewise
-    deviation: Array  # (12,) of the measured state, as `VehicleState` has it
+    deviation: Array  # (12,) of the measured state, as in `VehicleState`
     position_variance: Array  # (3,) m2, NED, of the estimated position
-    promised: Array  # (2,) m, NaN if none: what clearances may fall to, promised since; and by the last step alone
+    promised: Array  # (2,) m, NaN if none: promised lower bound of the clearances; bound of the last step
     weights: Array  # (2, n) of the arbiter, sanitized; those of hard regions smoothed in two stages; NaN at first
     reported: Array  # (m,) health of the thrusters as last reported
     filtered_acceleration: Array  # (3,) m/s2, NED, desired of the thrusters, low-pass filtered
-    thruster_acceleration: Array  # (6, m) m/s2, rad/s2: of one newton of each thruster
+    thruster_acceleration: Array  # (6, m) m/s2, rad/s2: by one newton of each thruster
     acceleration_ahead: Array  # (6, m) the same, at the attitude ahead of the lag
-    given_limits: Array  # (2, m) N that each thruster gives at its lower and upper limit
+    given_limits: Array  # (2, m) N, true force of each thruster at its lower and upper limit

@@ -13,18 +13,18 @@ from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-_REGULARISATION = 1e-3  # of a thruster's own share in H
+_REGULARISATION = 1e-3  # relative to a thruster's diagonal entry of H
 
 
 class Dynamics(NamedTuple):
-    """Constant numbers of the vehicle, derived from its nominal ones."""
+    """Constants of the vehicle, derived from its nominal parameters."""
 
-    mass: Array  # (6, 6) kg, kg m, kg m2: M, rigid body and added, centre of gravity at the origin
+    mass: Array  # (6, 6) kg, kg m, kg m2: M, rigid body and added, center of gravity at the origin
     inverse_mass: Array  # (6, 6) SI
     linear_damping: Array  # (6,) N s/m, N m s/rad
     quadratic_damping: Array  # (6,) N s2/m2, N m s2/rad2
-    translational_mass: Array  # (1,) kg, mean of the three
-    rigid_mass: Array  # (1,) kg, without the added one
+    translational_mass: Array  # (1,) kg, mean over the three axes
+    rigid_mass: Array  # (1,) kg, without added mass
     braking: Array  # (m + 1,) m/s2, worst direction: with thruster j lost, and last with all working
 
 
@@ -41,27 +41,27 @@ class Thrusters(NamedTuple):
     allocator: Array  # (m, 6) H^-1 B^T Q: from wrench to nearest forces
     metric: Array  # (6,) Q: cost of an error of the wrench, 1/N2, 1/(N m)2
     health: Array  # (m,) 1 working, 0 failed
-    stuck: Array  # (m,) N, that a thruster gives which no longer follows its command; NaN of all others
-    effectiveness: Array  # (m,) estimated part of its force that each gives
+    stuck: Array  # (m,) N, constant force of a stuck thruster; NaN for all others
+    effectiveness: Array  # (m,) estimated ratio of each thruster's force to the commanded one
     forces: Array  # (m,) N, commanded in the last period
     acting: Array  # (m,) N, mean over that period behind the lag
     acting_now: Array  # (m,) N, at its end
 
 
 def make_dynamics(vehicle: VehicleModel, braking: Array) -> Dynamics:
-    """Return the constant numbers of a vehicle.
+    """Return the constants of a vehicle.
 
     Parameters
     ----------
     vehicle : VehicleModel
-        Nominal numbers.
+        Nominal parameters.
     braking : ndarray, shape (m + 1,)
         Greatest force [N] in the worst direction with each thruster lost, and with none.
 
     Returns
     -------
     Dynamics
-        Arrays of its own.
+        Copies of the vehicle's arrays.
     """
     mass = vehicle.rigid_mass + vehicle.added_mass
     mean = float(np.trace(mass[:3, :3])) / 3.0
@@ -84,12 +84,12 @@ def make_thrusters(vehicle: VehicleModel) -> Thrusters:
     Parameters
     ----------
     vehicle : VehicleModel
-        Nominal numbers.
+        Nominal parameters.
 
     Returns
     -------
     Thrusters
-        Arrays of its own.
+        Copies of the vehicle's arrays.
     """
     B = vehicle.thruster_matrix
     m = B.shape[1]
@@ -116,10 +116,10 @@ def make_thrusters(vehicle: VehicleModel) -> Thrusters:
 
 
 def reallocate(thrusters: Thrusters) -> None:
-    """Update matrix, limits and inverses to `health` and `stuck`."""
+    """Update matrix, limits and inverses from `health` and `stuck`."""
     m = thrusters.health.size
     for j in range(m):
-        if not np.isnan(thrusters.stuck[j]):  # it gives its force whatever is commanded
+        if not np.isnan(thrusters.stuck[j]):  # constant force for any command
             for k in range(6):
                 thrusters.matrix[k, j] = thrusters.nominal_matrix[k, j]
             thrusters.lower[j] = thrusters.upper[j] = thrusters.stuck[j]
@@ -149,7 +149,7 @@ def reallocate(thrusters: Thrusters) -> None:
 
 
 class Loads(NamedTuple):
-    """What acts on the vehicle beside its thrusters."""
+    """Loads on the vehicle other than its thrusters."""
 
     water_velocity: Array  # (3,) m/s, NED
     net_weight: Array  # (1,) N, W - B
@@ -159,21 +159,21 @@ class Loads(NamedTuple):
 def free_wrench(dynamics: Dynamics, R: Array, velocity: Array, omega_body: Array, loads: Loads, out: Array) -> None:
     """Write the wrench on the body without thrust, shape (6,) [N, N m]: all of (11) but thrust and M nu_r'.
 
-    Drag against the water, weight and buoyancy, and the momentum M nu_r in the rotating body axes, which with oblique
-    motion has a moment, Munk's.
+    It has drag against the water, weight and buoyancy, and the rate of the momentum M nu_r in the rotating body axes,
+    which in oblique motion includes Munk's moment.
 
     Parameters
     ----------
     dynamics : Dynamics
-        Of the vehicle.
+        Constants of the vehicle.
     R : ndarray, shape (3, 3)
-        From body to world.
+        Rotation from body to world.
     velocity : ndarray, shape (3,)
-        Over ground [m/s], world frame.
+        Velocity over ground [m/s], world frame.
     omega_body : ndarray, shape (3,)
-        [rad/s].
+        Angular velocity [rad/s], body axes.
     loads : Loads
-        What acts on it.
+        Current, net weight and restoring moments.
     out : ndarray, shape (6,)
         Receives the wrench, body axes.
     """
@@ -200,17 +200,17 @@ def to_acceleration(
     Parameters
     ----------
     dynamics : Dynamics
-        Of the vehicle.
+        Constants of the vehicle.
     R : ndarray, shape (3, 3)
-        From body to world.
+        Rotation from body to world.
     velocity : ndarray, shape (3,)
-        Over ground [m/s], world frame.
+        Velocity over ground [m/s], world frame.
     omega_body : ndarray, shape (3,)
-        [rad/s].
+        Angular velocity [rad/s], body axes.
     loads : Loads
-        What acts on it.
+        Current, net weight and restoring moments.
     wrench : ndarray, shape (6,)
-        Of all that acts, that of `free_wrench` included, body axes [N, N m].
+        Total wrench, including that of `free_wrench`, body axes [N, N m].
     out : ndarray, shape (6,)
         Receives the linear acceleration over ground, NED [m/s2], and the angular one in body axes [rad/s2].
     """
@@ -238,7 +238,7 @@ def _relative_velocity(R: Array, velocity: Array, loads: Loads, out: Array) -> N
 def free_acceleration(
     dynamics: Dynamics, R: Array, velocity: Array, omega_body: Array, loads: Loads, out: Array
 ) -> None:
-    """Write the acceleration without thrust, shape (6,), as `to_acceleration` has it."""
+    """Write the acceleration without thrust, shape (6,), in the frames of `to_acceleration`."""
     wrench = zeros(6)
     free_wrench(dynamics, R, velocity, omega_body, loads, wrench)
     to_acceleration(dynamics, R, velocity, omega_body, loads, wrench, out)
@@ -247,7 +247,7 @@ def free_acceleration(
 def write_thruster_acceleration(
     dynamics: Dynamics, thrusters: Thrusters, R: Array, R_ahead: Array, out: Array, ahead: Array
 ) -> None:
-    """Write the acceleration of one newton that each thruster gives, shape (6, m), at the attitudes `R` and `R_ahead`.
+    """Write the acceleration by one newton of each thruster, shape (6, m), at the attitudes `R` and `R_ahead`.
 
     Linear in NED [m/s2], angular in body axes [rad/s2].
     """
@@ -265,9 +265,9 @@ def write_thruster_acceleration(
 
 
 def write_given_limits(thrusters: Thrusters, limits: Array) -> None:
-    """Write the force [N] that each thruster gives at its lower and upper limit, shape (2, m).
+    """Write the true force [N] of each thruster at its lower and upper limit, shape (2, m).
 
-    A thruster that is stuck follows no command: both limits are the force that it is estimated to give.
+    Both limits of a stuck thruster are its estimated force.
     """
     for j in range(thrusters.health.size):
         if not np.isnan(thrusters.stuck[j]):
@@ -279,9 +279,9 @@ def write_given_limits(thrusters: Thrusters, limits: Array) -> None:
 
 
 def command_forces(thrusters: Thrusters, forces: Array) -> None:
-    """Turn the forces that thrusters shall give [N] into commands [N]: more of one that has lost force.
+    """Convert desired forces of the thrusters [N] to commands [N], divided by their effectiveness.
 
-    A stuck one gets none, else a working one would give what it is wrongly thought to be stuck at.
+    A stuck thruster gets zero: if it works after all, it does not produce the force at which it is assumed stuck.
     """
     for j in range(forces.size):
         if not np.isnan(thrusters.stuck[j]):
@@ -299,7 +299,7 @@ def smallest(values: Array) -> float:
 
 
 def available_braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
-    """Return the deceleration [m/s2] in the worst direction with one thruster lost: the failed one, or any.
+    """Return the deceleration [m/s2] in the worst direction with the failed thruster lost, or else any one.
 
     Each further failure halves it, which is a rule of thumb.
     """
@@ -312,7 +312,7 @@ def available_braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
 
 
 def thrust_acceleration(dynamics: Dynamics, thrusters: Thrusters, R: Array, forces: Array, out: Array) -> None:
-    """Write the acceleration by thruster forces [N], less what they lose: (6,), linear in NED, angular in body axes."""
+    """Write the acceleration by thruster forces [N] times effectiveness: (6,), linear in NED, angular in body axes."""
     wrench, body = zeros(6), zeros(6)
     for k in range(6):
         for j in range(forces.size):

@@ -1,11 +1,11 @@
-"""Observer: one Kalman filter of the motion and of all that moves the vehicle and is not known.
+"""Observer: one Kalman filter of the motion and of all unknown parameters that affect it.
 
 The states: position (3), velocity over ground (3), current (2), W - B, the restoring moments phi_2..phi_4 of (12),
-height of the centre of gravity below the origin, lag of the thrusters, and the effectiveness of each. The prediction is
+height of the center of gravity below the origin, lag of the thrusters, and the effectiveness of each. The prediction is
 the model (11) with its coupled mass matrix, under the commanded forces within their limits behind the lag, so that a
-saturated thruster causes no wind-up. The states are corrected by the moment that measured rates show, and by measured
-position and velocity. What one of them explains is not blamed on another: the hypotheses of `fault_detection` are
-tested by the innovations of this filter. Projection keeps current, W - B, moments, lag and effectiveness in bounds.
+saturated thruster causes no wind-up. The states are corrected by the moment from measured rates, and by measured
+position and velocity. A joint filter attributes each effect to the right state; `fault_detection` tests its hypotheses
+by the innovations of the same filter. Projection keeps current, W - B, moments, lag and effectiveness in bounds.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ _UNMODELLED = 0.03  # m/s2/sqrt(Hz), acceleration noise of the model
 _SLOWEST = 0.15  # m/s against the water, least speed at which drag is linearized
 _GATE = 6.0  # standard deviations beyond which a measurement is rejected
 _ANGULAR = 0.019  # rad/s2/sqrt(Hz), angular acceleration noise of the model
-_GAP_MEMORY = 1.0  # s, over which a gap in the measurements is forgotten
-_RIPPLE = 0.05  # standard deviation of a thruster's force in one period, as part of it
+_GAP_MEMORY = 1.0  # s, time constant at which the longest gap decays
+_RIPPLE = 0.05  # standard deviation of a thruster's force in one period, relative to it
 _WEAR = 0.01  # 1/sqrt(s), drift of an effectiveness
 _LAG_DRIFT = 0.003  # s/sqrt(s)
-_CURVED = 0.9  # s, for which what the secant of the lag misses lasts, so that as noise it counts the more
-_OUTLIER = 3.0  # standard deviations, beyond which an innovation counts as if it had that many
+_CURVED = 0.9  # s, correlation time of the error of the lag's secant, which scales it as noise
+_OUTLIER = 3.0  # standard deviations, to which an innovation is limited by a greater variance
 
 
 def predict(
@@ -57,9 +57,9 @@ def predict(
     gains: DeployableGains,
     period: float,
 ) -> None:
-    """Predict over a period [s] under the forces that acted in it.
+    """Predict the estimate over a period [s] under the forces that acted in it.
 
-    `thruster_acceleration`, shape (6, m), is that of one newton of each thruster.
+    `thruster_acceleration`, shape (6, m), is the acceleration by one newton of each thruster.
     """
     x, P, F = estimate.state, estimate.covariance, estimate.transition
     mass, T = dynamics.translational_mass[0], period
@@ -90,7 +90,7 @@ def predict(
     _propagate_covariance(estimate, T)
     for axis in range(3):
         P[VELOCITY + axis, VELOCITY + axis] += square(_UNMODELLED) * T + _CURVED / T * square(curvature[axis])
-        # so that the moments follow at the rate of adaptation
+        # the moments adapt at the rate `adaptation`
         P[MOMENTS + axis, MOMENTS + axis] += square(gains.adaptation * _ANGULAR * dynamics.mass[3 + axis, 3 + axis]) * T
     for axis in range(2):
         P[CURRENT + axis, CURRENT + axis] += square(gains.current_drift) * T
@@ -140,7 +140,7 @@ def _propagate_covariance(estimate: Estimate, period: float) -> None:
 def _propagate_deviations(
     estimate: Estimate, thrusters: Thrusters, thruster_acceleration: Array, period: float
 ) -> None:
-    """Propagate the deviations of all hypotheses over a period [s]; a thruster that is stuck lacks force besides."""
+    """Propagate the deviations of all hypotheses over a period [s], with the missing force of stuck thrusters."""
     F, deviation, m = estimate.transition, estimate.deviation, thrusters.acting.size
     for j in range(2 * m):
         for axis in range(3):
@@ -169,15 +169,15 @@ def correct_by_moment(
     gains: DeployableGains,
     period: float,
 ) -> None:
-    """Correct by the moment [N m] of thrusters and weight that the rates showed over a period [s], shape (3,).
+    """Correct by the moment [N m] of thrusters and weight, measured by the rates over a period [s], shape (3,).
 
-    `by_current`, shape (3, 2), is how the moment that the model knows grows with the current [N s]; `rate_deviation`,
-    shape (3,), the standard deviation [rad/s] of the rates.
+    `by_current`, shape (3, 2), is the derivative of the modelled moment by the current [N s]; `rate_deviation`, shape
+    (3,), the standard deviation [rad/s] of the rates.
     """
     row, x = estimate.row, estimate.state
     k, middle, body = zeros(3), zeros(3), zeros(3)
     k[0], k[1], k[2] = down_parts(quaternion)
-    for i in range(3):  # as it was in the middle of the period
+    for i in range(3):  # at the middle of the period
         a, b = (i + 1) % 3, (i + 2) % 3
         middle[i] = k[i] + 0.5 * period * (omega_body[a] * k[b] - omega_body[b] * k[a])
         for axis in range(3):
@@ -210,25 +210,25 @@ def correct_by_moment(
 
 
 def correct(estimate: Estimate, first: int, measured: Array, noise: float, gains: DeployableGains) -> bool:
-    """Correct by what is measured of a position or a velocity, as far as it is a number.
+    """Correct by a measured position or velocity; components that are NaN are skipped.
 
     Parameters
     ----------
     estimate : Estimate
-        Corrected in place.
+        Estimate, corrected in place.
     first : int
         `POSITION` or `VELOCITY`.
     measured : ndarray, shape (3,)
-        [m] or [m/s], NED; what is NaN is not measured.
+        Measurement [m] or [m/s], NED; NaN if not measured.
     noise : float
         Standard deviation of one measurement, in the same unit.
     gains : DeployableGains
-        The bounds.
+        Gains with the bounds.
 
     Returns
     -------
     bool
-        False, and nothing is changed, if nothing is measured, or one number cannot be.
+        False, without a change, if all components are NaN, or one is outside the gate.
     """
     P, x, known = estimate.covariance, estimate.state, 0
     for axis in range(3):
@@ -253,7 +253,7 @@ def correct(estimate: Estimate, first: int, measured: Array, noise: float, gains
 def _correct(estimate: Estimate, innovation: float, noise: float, weight: float, begin: int, end: int) -> None:
     """Correct by one number; add weighted evidence of each hypothesis, and propagate its deviation.
 
-    The `row` of the number is set, and 0 but from `begin` to before `end`.
+    Before the call, set the `row` of the number; it must be 0 outside `begin` to `end` (exclusive).
     """
     P, row, gain = estimate.covariance, estimate.row, estimate.gain
     n, variance = row.size, noise

@@ -1,6 +1,6 @@
-"""Numbers from the rows of a campaign.
+"""Statistics of the rows of a campaign.
 
-Rates with intervals, quantiles, effects of what varies, and which rows deserve a look.
+Rates with intervals, quantiles, effects of varied keys, and the worst rows.
 
 Imports: campaigns.scenes, campaigns.store, simulation.
 """

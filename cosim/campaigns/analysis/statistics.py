@@ -1,6 +1,6 @@
-"""Numbers that pages and summaries have in common: rates with intervals, quantiles, bins, effects, paired differences.
+"""Statistics for pages and summaries: rates with intervals, quantiles, bins, effects, and paired differences.
 
-SciPy's statistics take as long to import as all else that a worker needs, and no worker needs them.
+`scipy.stats` is imported in the functions, since workers import this module without using it, and importing takes long.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ Facts = NDArray[np.bool_]
 
 CONFIDENCE = 0.95
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-CHANCE = 0.01  # how often chance alone makes an effect or a rank correlation that is told
-_BINS = 6  # at the most; fewer distinct values have one each
-_LEAST_ROWS = 16  # of which an effect is told: two bins of eight
+CHANCE = 0.01  # significance level of effects and rank correlations
+_BINS = 6  # greatest number of bins; fewer distinct values have one bin each
+_LEAST_ROWS = 16  # for an effect: two bins of eight
 _RESAMPLES = 2000  # of a bootstrap
-_ROUNDING = 1e-14  # of a number, within which an outcome is constant
+_ROUNDING = 1e-14  # relative range within which an outcome counts as constant
 
 
 def rate(happened: Facts) -> dict[str, Any]:
-    """Return how many, which share of all, and the 95 % interval of it by Wilson.
+    """Return count and share of rows in which an event happened, and the 95 % interval of the share by Wilson.
 
     Parameters
     ----------
     happened : ndarray of bool, shape (n,)
-        Of each row.
+        True for rows in which it happened.
 
     Returns
     -------
     dict
-        ``rows`` that it happened in, ``share``, and ``low`` and ``high`` of the interval; None of no rows.
+        ``rows`` in which it happened, ``share``, and ``low`` and ``high`` of the interval; None without rows.
     """
     n, k = len(happened), int(happened.sum())
     if not n:
@@ -48,17 +48,17 @@ def rate(happened: Facts) -> dict[str, Any]:
 
 
 def quantiles(values: Array) -> dict[str, float | None]:
-    """Return quantiles of numbers that there are and that are finite.
+    """Return quantiles of the finite numbers.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
-        NaN where there is none.
+        NaN for missing numbers.
 
     Returns
     -------
     dict of str to float or None
-        By the quantile, such as ``"0.5"``.
+        By quantile, such as ``"0.5"``; None without finite numbers.
     """
     values = values[np.isfinite(values)]
     found = np.quantile(values, QUANTILES) if values.size else [None] * len(QUANTILES)
@@ -66,16 +66,16 @@ def quantiles(values: Array) -> dict[str, float | None]:
 
 
 class Bin(NamedTuple):
-    """Rows whose values are near to each other."""
+    """Rows with neighbouring values of a key."""
 
     low: float  # least of the values
     high: float  # greatest
     middle: float  # median
-    rows: Facts  # (n,) which
+    rows: Facts  # (n,) mask
 
 
 def bins(values: Array) -> Iterator[Bin]:
-    """Yield the bins of a key: one for each value where there are few, otherwise some with equally many rows.
+    """Yield the bins of a key: one for each value if there are few, otherwise bins with equal numbers of rows.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def bins(values: Array) -> Iterator[Bin]:
 
 
 def _bin_numbers(values: Array, most: int) -> NDArray[np.int64]:
-    """Return the bin of each value, counted from 0, of so many bins at the most."""
+    """Return the index of the bin of each value, from 0, with at most `most` bins."""
     distinct = np.unique(values)
     if len(distinct) <= most:
         return np.searchsorted(distinct, values)
@@ -104,24 +104,24 @@ def _bin_numbers(values: Array, most: int) -> NDArray[np.int64]:
 
 
 def effect(values: Array, outcome: Array) -> dict[str, float] | None:
-    """Estimate the share of an outcome's variance that goes with a key alone: its first-order Sobol' index.
+    """Estimate the share of an outcome's variance that a key alone explains: its first-order Sobol' index.
 
-    It sees a dependence of any form, also one that goes up and down again, of which no correlation tells. The outcome
-    is fitted by a line in each of some bins of the key, or by its mean at each value where the key has few; the
-    estimate is the share that the fit explains, less what chance adds to it (adjusted R²; of means: Kelley's ε²).
+    It measures a dependence of any form, also a non-monotonic one, which a correlation does not show. The outcome is
+    fitted by a line in each of several bins of the key, or by its mean at each value of a key with few values. The
+    estimate is the share that the fit explains, corrected for chance (adjusted R²; for means Kelley's ε²).
 
     Parameters
     ----------
     values : ndarray, shape (n,)
-        Of the key, finite. Keys vary independently of each other.
+        Of the key, finite. Keys must vary independently.
     outcome : ndarray, shape (n,)
         Finite, or 0 and 1.
 
     Returns
     -------
     dict of str to float, or None
-        ``share``, up to 1, and a little below 0 by chance; ``floor``, above which chance alone brings it in a
-        hundredth of all cells (F test). None where key or outcome is constant, or rows are too few.
+        ``share``, up to 1, and a little below 0 by chance; ``floor``, which chance alone exceeds in one of a hundred
+        cells (F test). None if key or outcome is constant, or there are too few rows.
     """
     n = len(values)
     if n < _LEAST_ROWS or np.ptp(values) == 0.0 or np.ptp(outcome) <= _ROUNDING * np.abs(outcome).max():
@@ -145,19 +145,18 @@ def effect(values: Array, outcome: Array) -> dict[str, float] | None:
 
 
 def paired(one: Facts, other: Facts) -> dict[str, Any]:
-    """Return where two laws come out otherwise on the same scenes.
+    """Count the scenes that both laws, only one, or none of them completes.
 
     Parameters
     ----------
     one, other : ndarray of bool, shape (n,)
-        Which scenes each completes.
+        Masks of the scenes that each law completes.
 
     Returns
     -------
     dict
-        How many both complete, only the one, only the other, and neither; ``p``, how likely it is that the scenes that
-        one alone completes fall out at least as unevenly if the laws were equal (McNemar's exact test; None where there
-        are none).
+        Numbers of scenes that ``both`` complete, ``only_one``, ``only_other`` and ``neither``; ``p`` of McNemar's exact
+        test on the scenes that only one law completes, None if there are none.
     """
     from scipy.stats import binomtest
 
@@ -173,7 +172,7 @@ def paired(one: Facts, other: Facts) -> dict[str, Any]:
 
 
 def median_difference(differences: Array) -> dict[str, Any]:
-    """Return the median of paired differences and its 95 % interval, which takes no shape of distribution for granted.
+    """Return the median of paired differences and its distribution-free 95 % interval.
 
     Parameters
     ----------
@@ -183,7 +182,7 @@ def median_difference(differences: Array) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``pairs``, ``median``, ``low`` and ``high``; None where there are too few.
+        ``pairs``, ``median``, ``low`` and ``high``; None if there are too few.
     """
     n = len(differences)
     if not n:
@@ -201,13 +200,13 @@ def mean_ratio(one: Array, other: Array) -> dict[str, Any]:
     Parameters
     ----------
     one, other : ndarray, shape (n,)
-        Numbers of the same rows, at least 0; rows in which either is none are left out.
+        Numbers of the same rows, at least 0; rows in which one is not finite are ignored.
 
     Returns
     -------
     dict
         ``pairs``, the means ``one`` and ``other``, their ``ratio``, and ``low`` and ``high`` of its interval by the
-        bootstrap over rows, by percentiles; None where there are no rows, or the other mean is 0.
+        bootstrap over rows, by percentiles; None without rows, or if the other mean is 0.
     """
     there = np.isfinite(one) & np.isfinite(other)
     one, other = one[there], other[there]

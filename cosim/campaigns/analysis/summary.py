@@ -1,4 +1,4 @@
-"""What a campaign comes to: numbers from its rows alone."""
+"""Summary of a campaign, computed from its rows alone."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ from cosim.campaigns.scenes.plan import Plan
 from cosim.campaigns.store.results import Results
 from cosim.simulation.signals import Array
 
-SPREADS = ("reach_time", "min_clearance", "effort", "thrust_variation")  # whose quantiles are told
-OF_ALL = ("min_clearance",)  # of these over all scenes; of the others over those that were reached
-_REASONS = 5  # why scenes were refused
+SPREADS = ("reach_time", "min_clearance", "effort", "thrust_variation")  # columns with quantiles
+OF_ALL = ("min_clearance",)  # columns with quantiles over all scenes; the others over those that were reached
+_REASONS = 5  # greatest number of listed reasons for refusing scenes
 MEDIANS = ("reach_time", "effort", "thrust_variation", "min_clearance", "worst_step_time")
 
 
 def summarise(plan: Plan, results: Results, folder: Path) -> dict[str, Any]:
-    """Return the summary of a campaign.
+    """Summarise a campaign.
 
     Parameters
     ----------
     plan : Plan
-        What was flown.
+        Plan of the campaign.
     results : Results
-        What came of it.
+        Its rows.
     folder : Path
-        Where it is, for the commands that repeat scenes.
+        Its folder, for the commands that repeat scenes.
 
     Returns
     -------
     dict
-        Ready for JSON: counts; rates with 95 % intervals by Wilson; quantiles and medians over the scenes that were
-        reached (None where there are none), of the clearance over all; the same by kind of scene, where there are
-        several; the seeds that failed, the worst scenes, and the plan. Units as in the columns of the results.
+        For JSON: counts; rates with 95 % intervals by Wilson; quantiles and medians over the scenes that were reached
+        (None without any), of the clearance over all; the same by kind of scene, if there are several; the seeds that
+        failed, the worst scenes, and the plan. Units as in the columns of the results.
     """
     reached, violation, seeds = results["reached"], results["violation"], results["seed"]
     stopped = ~np.isnan(results.number("stopped_at"))
@@ -70,13 +70,13 @@ def summarise(plan: Plan, results: Results, folder: Path) -> dict[str, Any]:
 
 
 def rates_of(results: Results) -> dict[str, Facts]:
-    """Return the facts whose rates are told, shape (scenes,) each."""
+    """Return the masks of scenes that were completed, reached and violated, shape (scenes,) each."""
     reached, violation = results["reached"], results["violation"]
     return {"completed": reached & ~violation, "reached": reached, "violation": violation}
 
 
 def _spread(results: Results, of: Facts) -> dict[str, Any]:
-    """Return rates and quantiles of some scenes."""
+    """Return rates and quantiles of the scenes `of`."""
     reached = results["reached"]
     return {
         "rates": {name: rate(happened[of]) for name, happened in rates_of(results).items()},
@@ -87,13 +87,13 @@ def _spread(results: Results, of: Facts) -> dict[str, Any]:
 
 
 def _reasons(results: Results) -> dict[str, str]:
-    """Return why the first scenes were refused, by their seed."""
+    """Return the reasons for refusing the first refused scenes, by seed."""
     first = np.flatnonzero(~results.absent("refused"))[:_REASONS]
     return {str(seed): str(why) for seed, why in zip(results["seed"][first], results["refused"][first], strict=True)}
 
 
 def median(values: Array) -> float | None:
-    """Return the median of numbers, None of none, or where it is no finite number."""
+    """Return the median of numbers without NaN; None if it is not finite, or without numbers."""
     return _or_none(np.median, values[~np.isnan(values)])
 
 

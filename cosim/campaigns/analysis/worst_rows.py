@@ -1,4 +1,4 @@
-"""Which rows of a campaign most deserve a look."""
+"""The worst rows of a campaign."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim.campaigns.store.results import Results
 
-LISTED = 10  # rows that summaries and pages name
+LISTED = 10  # rows that summaries and pages list
 ORDER = (
     "First what violated a hard region, the deepest first (a flight that the plant stopped counts as one, as deep as "
     "it had come), then what never reached the goal, then the rest, the slowest first."
@@ -18,26 +18,26 @@ ORDER = (
 
 
 class Worst(NamedTuple):
-    """A row, and why it is among the worst."""
+    """A row with the reason why it is among the worst."""
 
     key: int
     why: str
 
 
 def worst_rows(results: Results, count: int = LISTED) -> list[Worst]:
-    """Return the worst rows of a sweep or of a campaign of scenes; those that were refused are left out.
+    """Return the worst rows of a sweep or of a campaign of scenes, without refused ones.
 
     Parameters
     ----------
     results : Results
         Of the campaign.
     count : int
-        How many at the most.
+        Greatest number of rows.
 
     Returns
     -------
     list of Worst
-        In the order that `ORDER` tells; rows that are as bad in the order of their keys.
+        In the order that `ORDER` describes; equally bad rows in the order of their keys.
     """
     names = results.schema.names
     keys, reached = results[names[0]], results.fact("reached")
@@ -65,14 +65,14 @@ def worst_rows(results: Results, count: int = LISTED) -> list[Worst]:
 
 
 def worst_table(results: Results, folder: Path) -> list[dict[str, Any]]:
-    """Return the worst rows as a summary has them, each with the command that repeats it.
+    """Return the worst rows for a summary, each with the command that repeats it.
 
     Parameters
     ----------
     results : Results
         Of the campaign.
     folder : Path
-        Where it is.
+        The campaign's folder.
 
     Returns
     -------

@@ -1,6 +1,6 @@
-"""Search for scenes in which a law does worst, and estimate how rare its violations are.
+"""Search for the worst scenes of a law, and estimate the probability of its violations.
 
-Rows are flown as those of campaigns and sweeps are, but each follows from what came of those before.
+Rows are flown as those of campaigns and sweeps are, but each depends on the results of earlier ones.
 
 Imports: campaigns.analysis, campaigns.scenes, campaigns.store, campaigns.sweeps, campaigns.workers, io, plant_fmu,
 scenario.

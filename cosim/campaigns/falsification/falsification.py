@@ -1,4 +1,4 @@
-"""A search from its settings to its folder: rows flown as the search asks for them, random ones beside, a summary."""
+"""Run a search and write its folder: rows requested by the search, random ones for comparison, and a summary."""
 
 from __future__ import annotations
 
@@ -29,28 +29,28 @@ from cosim.errors import RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
 
-RANDOM = "random"  # folder of as many rows that are drawn at random
-LISTED = 10  # of the worst rows
+RANDOM = "random"  # folder of as many random rows
+LISTED = 10  # worst rows that are listed
 _COLUMNS = {"clearance": "min_clearance", "violation": "weighted_violation", "arrival": "reach_time"}
-_REFUSED = 1e9  # cost of a row that was not flown: no search goes there
-_STOPPED = -1e-6  # m, clearance of a flight that the plant stopped, at the most: it was not seen to be safe
-_APART = 0.1  # of rows that are listed, at least: root of the mean square over the coordinates
+_REFUSED = 1e9  # cost of a row that was not flown, which the search avoids
+_STOPPED = -1e-6  # m, greatest clearance of a flight that the plant stopped, which counts as a violation
+_APART = 0.1  # least distance of listed rows: root mean square over the coordinates
 
 Search = SceneSearch | ScenarioSearch
 
 
 @dataclass(frozen=True)
 class Falsification:
-    """Where a search was written, and what it came to."""
+    """Folder, results and summary of a search."""
 
     folder: Path
     results: Results
     summary: dict[str, Any]
-    flown: int  # rows of the search, by this call; the rest had been flown before
+    flown: int  # rows flown by this call; the rest was in the folder
 
 
 class _Flights:
-    """Flies the rows that a search asks for, and keeps them in the folder."""
+    """Fly the rows that a search requests, and store them in the folder."""
 
     def __init__(self, work: Search, folder: CampaignFolder, pool: WorkerPool, bar: Any) -> None:
         self._work, self._folder, self._pool, self._bar = work, folder, pool, bar
@@ -60,7 +60,7 @@ class _Flights:
         self.points = np.empty((0, work.dimension))
 
     def __call__(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the costs of points."""
+        """Return the costs of points, shape (n,); fly those that are not in the folder."""
         rows = self._work.add(points)
         self.points = np.concatenate([self.points, points])
         known = np.isin(rows, self._keys)
@@ -80,33 +80,33 @@ class _Flights:
 
 
 def run_falsification(work: Search, out: Path, workers: int = 1, progress: bool = False) -> Falsification:
-    """Search for the rows that go worst, or estimate how likely a violation is, and write results and summary.
+    """Search for the worst rows, or estimate the probability of a violation, and write results and summary.
 
     Parameters
     ----------
     work : SceneSearch or ScenarioSearch
-        What is searched.
+        The search.
     out : Path
-        A folder that does not exist, is empty, or holds the same search: as a whole, which writes its summary again,
-        or as a part, which goes on.
+        A folder that does not exist, is empty, or holds the same search: a complete one, whose summary is written
+        again, or a part, which is continued.
     workers : int
-        Processes; rows are the same for any number.
+        Number of processes; rows are the same for any number.
     progress : bool
         Show a bar, if there is a terminal.
 
     Returns
     -------
     Falsification
-        With every row that was flown; beside a search for the worst, its folder ``random`` has as many random ones.
+        All rows of the search; for a search of the worst, the folder ``random`` has as many random ones.
 
     Raises
     ------
     RunError
-        If the folder holds something else or cannot be written, or processes die whatever they fly.
+        If the folder holds something else or cannot be written, or processes crash on any row.
     BuildError, PlantError
         If there is no FMU of the vehicle.
     KeyboardInterrupt
-        After Ctrl-C; what is done is kept.
+        After Ctrl-C; finished rows are kept.
     """
     settings = work.settings
     estimate = None
@@ -124,7 +124,7 @@ def run_falsification(work: Search, out: Path, workers: int = 1, progress: bool 
         folder.remove_parts()
         random = None if settings.rare_event else work.fly_random(out / RANDOM, workers, progress)
         try:
-            summary = _summarise(work, out, results, random, flights.points)
+            summary = _summarize(work, out, results, random, flights.points)
             summary["estimate"] = estimate and asdict(estimate)
             write_atomic(out / SUMMARY, json_text(summary))
         except OSError as error:
@@ -133,22 +133,22 @@ def run_falsification(work: Search, out: Path, workers: int = 1, progress: bool 
 
 
 def costs_of(rows: Any, objective: Objective, horizon: float) -> NDArray[np.float64]:
-    """Return what a search makes least.
+    """Return the costs that a search minimizes.
 
     Parameters
     ----------
     rows : pyarrow.Table
-        Of a campaign or a sweep.
+        Rows of a campaign or a sweep.
     objective : str
-        Which of the outcomes counts.
+        Outcome that gives the cost.
     horizon : float
         Length of a flight [s].
 
     Returns
     -------
     ndarray, shape (rows,)
-        Least clearance [m], of a flight that stopped below 0; less the weighted violation [m s]; or less the time of
-        arrival [s], that of who never arrives being the horizon. What was not flown has a great cost.
+        Least clearance [m], below 0 for a stopped flight; or the negative weighted violation [m s]; or the negative
+        time of arrival [s], the horizon without arrival. Rows that were not flown cost 1e9.
     """
     values = to_array(rows[_COLUMNS[objective]]).astype(float)
     if objective == "clearance":
@@ -159,7 +159,7 @@ def costs_of(rows: Any, objective: Objective, horizon: float) -> NDArray[np.floa
     return np.where(to_array(pc.is_null(rows["refused"])), costs, _REFUSED)
 
 
-def _summarise(
+def _summarize(
     work: Search, out: Path, results: Results, random: Results | None, points: NDArray[np.float64]
 ) -> dict[str, Any]:
     costs = costs_of(results.table, work.settings.objective, work.horizon)
@@ -178,7 +178,7 @@ def _summarise(
 
 
 def _counts(results: Results, costs: NDArray[np.float64]) -> dict[str, Any]:
-    """Return how many rows there are of each kind, and the least cost so far wherever it falls."""
+    """Return the number of rows of each kind, and the rows at which the least cost so far decreases."""
     violation = "violation" if "violation" in results.schema.names else "violated"
     least = np.minimum.accumulate(costs)
     falls = np.flatnonzero(np.diff(least, prepend=np.inf) < 0.0)
@@ -194,7 +194,7 @@ def _counts(results: Results, costs: NDArray[np.float64]) -> dict[str, Any]:
 def _worst(
     folder: Path, results: Results, costs: NDArray[np.float64], points: NDArray[np.float64] | None
 ) -> list[dict[str, Any]]:
-    """Return the worst rows, of those near to each other the worst one."""
+    """Return the worst rows, at least `_APART` from each other."""
     found: list[int] = []
     for i in np.argsort(costs, kind="stable").tolist():
         if len(found) == LISTED or costs[i] == _REFUSED:

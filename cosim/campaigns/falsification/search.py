@@ -1,4 +1,4 @@
-"""The least of a noisy function over a unit cube, by CMA-ES that begins again where it stalls."""
+"""Minimize a noisy function over a unit cube, by CMA-ES with restarts."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from plant_fmu.installing import install_hint
 
 Evaluate = Callable[[NDArray[np.float64]], NDArray[np.float64]]  # points (n, dimension) → costs (n,)
 
-_FIRST = 0.1  # share of the budget that is drawn evenly: where wide searches begin
-_WIDE, _NARROW = 0.1, 0.02  # spread of a search when it begins, of each coordinate
+_FIRST = 0.1  # fraction of the budget that is drawn uniformly, as starts of wide searches
+_WIDE, _NARROW = 0.1, 0.02  # initial standard deviations of a search in each coordinate
 _PATIENCE = 10  # generations without a lesser cost, after which a search ends
 
 
 def minimize(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> None:
-    """Evaluate a function at as many points as the budget has, ever more of them where it is least.
+    """Evaluate a function at `budget` points, concentrated where it is least.
 
-    A tenth of them is drawn evenly. From the best of those begins a CMA-ES with a diagonal covariance (Ros and Hansen
-    2008), which follows some eighty coordinates within a hundred generations. Where ten generations bring nothing, a
-    narrow search begins from the least cost of all, and after it a wide one from the next best that was drawn. Each
-    wide one has twice the population of that before (Auger and Hansen 2005).
+    A tenth of them is drawn uniformly. From the best of these starts a CMA-ES with a diagonal covariance (Ros and
+    Hansen 2008), which adapts to some eighty coordinates within a hundred generations. After ten generations without
+    improvement a narrow search starts from the least cost of all, and after it a wide one from the next best drawn
+    point. Each wide one has twice the population of the last (Auger and Hansen 2005).
 
     Parameters
     ----------
     evaluate : callable
-        Points, shape (n, dimension), each coordinate from 0 to 1; returns their finite costs, shape (n,).
+        Function from points, shape (n, dimension), each coordinate from 0 to 1, to their finite costs, shape (n,).
     dimension : int
-        How many coordinates.
+        Number of coordinates.
     budget : int
-        How many points.
+        Number of points.
     seed : int
-        Of the search; the same one gives the same points where the costs are the same.
+        Seed of the search; equal seeds and costs give equal points.
 
     Raises
     ------
@@ -75,12 +75,12 @@ def minimize(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> None
 
 
 def import_cma() -> Any:
-    """Import the package cma, or say how to get it.
+    """Import the package cma.
 
     Raises
     ------
     RunError
-        If it is not installed.
+        If it is not installed; the text has the command that installs it.
     """
     try:
         import cma

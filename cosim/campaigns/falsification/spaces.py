@@ -1,4 +1,4 @@
-"""Scenes as points of a unit cube, so that a search can move among them, and a sampler draw them as they come."""
+"""Scenes as points of a unit cube, for a search or a sampler."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from cosim.campaigns.scenes.generator import MOST_OBSTACLES, draw_scene
 
 FAMILIES = (*MOST_OBSTACLES, *CONFLICTS)
 _CHANCES = 2**31  # seeds, of noise and of obstacles that are drawn again
-_CONFLICTS = 64  # that are drawn to see how many numbers one has
-_OF_AN_OBSTACLE = 5  # coordinates: radius, place along the way, three of the distance from it
+_CONFLICTS = 64  # conflicts that are drawn to find the number of their coordinates
+_OF_AN_OBSTACLE = 5  # coordinates: radius, position along the straight line, three of the distance from it
 
 Point = NDArray[np.float64]  # (dimension,) each from 0 to 1
 
 
 class Shares:
-    """Stands for a random number generator: a number drawn is at a given share of its distribution.
+    """Replacement of a random number generator: each number is a given quantile of its distribution.
 
     Parameters
     ----------
     shares : ndarray, shape (n,)
-        Of the first n numbers, from 0 to 1.
+        Quantiles of the first n numbers, from 0 to 1.
     rest : numpy.random.Generator
-        What the numbers after those are drawn from.
+        Generator of the numbers after those.
     limit : float
         Greatest distance of a normal number from its mean [standard deviations].
     """
@@ -38,7 +38,7 @@ class Shares:
         self.drawn = 0  # numbers
 
     def uniform(self, low: Any = 0.0, high: Any = 1.0, size: int | None = None) -> Any:
-        """Draw evenly between two bounds, or two lists of them; or so many numbers."""
+        """Draw uniformly between two bounds, or two lists of bounds; or `size` numbers."""
         lows, highs = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
         return np.minimum(lows + (highs - lows) * self._next(lows.shape if size is None else (size,)), highs)[()]
 
@@ -48,16 +48,16 @@ class Shares:
         return mean + deviations * np.clip(ndtri(self._next(deviations.shape)), -self._limit, self._limit)
 
     def integers(self, low: int, high: int | None = None) -> int:
-        """Draw a whole number from `low` on, below `high`; or from 0 on, below the only bound."""
+        """Draw an integer from `low` to below `high`; or from 0 to below a single bound."""
         low, high = (0, low) if high is None else (low, high)
         return min(low + int((high - low) * self._next(())), high - 1)
 
     def permutation(self, n: int) -> NDArray[np.int64]:
-        """Draw an order of the numbers from 0 on, below `n`."""
+        """Draw a permutation of the numbers from 0 to below `n`."""
         return np.argsort(self._next((n,)), kind="stable")
 
     def choice(self, n: int, size: int, replace: bool) -> NDArray[np.int64]:
-        """Draw so many different numbers from 0 on, below `n`."""
+        """Draw `size` different numbers from 0 to below `n`."""
         if replace:
             raise NotImplementedError("numbers that may come twice")
         return self.permutation(n)[:size]
@@ -72,9 +72,8 @@ class Shares:
 class SceneSpace:
     """The scenes of a family of the generator, each a point of a unit cube.
 
-    Points that are drawn evenly give scenes with the generator's own distribution: a coordinate is the share of the
-    distribution of one number. An obstacle that leaves too little room around start or goal is drawn again, as by the
-    generator.
+    Uniformly drawn points give scenes with the generator's own distribution: a coordinate is the quantile of one
+    number. An obstacle too close to start or goal is drawn again, as by the generator.
 
     Parameters
     ----------
@@ -82,8 +81,8 @@ class SceneSpace:
         One of `FAMILIES`.
     limit : float, optional
         Greatest distance of a normal number from its mean [standard deviations]. Noise, and obstacles that are drawn
-        again, then follow from the scene's seed. Without a limit they follow from the last coordinate, so that a
-        flight follows from its point alone, and near points mostly have near outcomes.
+        again, then depend on the scene's seed. Without a limit they depend on the last coordinate, so that a flight
+        depends only on its point, and close points mostly have similar outcomes.
     """
 
     def __init__(self, family: str, limit: float | None = None) -> None:
@@ -107,21 +106,21 @@ class SceneSpace:
         Parameters
         ----------
         point : ndarray, shape (dimension,)
-            From 0 to 1.
+            Coordinates from 0 to 1.
         seed : int
-            The scene's own.
+            Seed of the scene.
 
         Returns
         -------
         bytes
-            As `cosim.campaigns.scenes.scene_file.decode_scene` reads it.
+            Line for `cosim.campaigns.scenes.scene_file.decode_scene`.
         """
         chance = int(point[-1] * _CHANCES) if self._chance_in_point else seed
         rest = np.random.default_rng([chance, 2])
         others = Shares(point[: self._others], rest, self._limit)
         if self.family in MOST_OBSTACLES:
             obstacles = point[self._others : self._others + self._of_obstacles].reshape(-1, _OF_AN_OBSTACLE)
-            # of each obstacle its own: whether another one is drawn again changes nothing
+            # one generator per obstacle: redrawing one does not change another
             again = [
                 np.random.default_rng([chance, 2, i]) if self._chance_in_point else rest for i in range(len(obstacles))
             ]

@@ -12,13 +12,13 @@ from scipy.stats import t
 
 from cosim.campaigns.falsification.search import Evaluate
 
-_PARTICLES = 16  # part of the budget that is flown at once: it lasts for about 15 levels, each half as likely
-_KEPT = 0.5  # share of the particles that are beyond the next level
-_MOVES = 2  # that every copied particle is tried to make
-_CHANGED = 0.5  # share of the coordinates that a move changes
-_ACCEPTED = 0.3  # share of the moves that the step is adapted to
+_PARTICLES = 16  # ratio of budget to particles: enough for about 15 levels, each half as likely
+_KEPT = 0.5  # fraction of the particles that are beyond the next level
+_MOVES = 2  # proposed moves of every copied particle
+_CHANGED = 0.5  # fraction of the coordinates that a move changes
+_ACCEPTED = 0.3  # desired acceptance rate of the moves, to which the step is adapted
 _GAIN = 2.0  # of that adaptation
-_SHORTEST = 0.02  # step
+_SHORTEST = 0.02  # least step
 _TAIL = 0.025  # of the interval, on each side
 LEAST_BUDGET = 100  # points
 
@@ -27,40 +27,40 @@ LEAST_BUDGET = 100  # points
 class Estimate:
     """A probability with its interval."""
 
-    probability: float  # 0 where no point was in the event
-    low: float  # of the 95 % interval; 0 where no point was in the event
+    probability: float  # 0 if no point was in the event
+    low: float  # of the 95 % interval; 0 if no point was in the event
     high: float
-    levels: tuple[tuple[float, float], ...]  # cost, and how likely it is not to be greater
-    families: int  # first particles that the last ones descend from: of few, little can be said
+    levels: tuple[tuple[float, float], ...]  # cost, and probability that it is not exceeded
+    families: int  # first particles that the last ones descend from: few give a poor estimate
 
 
 def estimate_probability(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> Estimate:
-    """Estimate how likely the cost of a point that is drawn evenly is below 0.
+    """Estimate the probability that the cost of a uniformly drawn point is below 0.
 
-    Particles are drawn evenly. Again and again the half with the greater costs is replaced by copies of the others,
-    which a Markov chain then moves where the cost is no greater than the level that parts the halves: the estimate is
-    the product of the shares (Au and Beck 2001, Cerou and others 2012). A move changes half of the coordinates, by
-    preconditioned Crank-Nicolson steps in normal numbers, so points stay distributed as they were drawn. A cost may be
-    random: it is then drawn anew with each move.
+    Particles are drawn uniformly. At each level the half with the greater costs is replaced by copies of the others,
+    which a Markov chain then moves to costs no greater than the level that separates the halves: the estimate is the
+    product of the fractions (Au and Beck 2001, Cerou and others 2012). A move changes half of the coordinates, by
+    preconditioned Crank-Nicolson steps in normal numbers, which preserve the distribution. A cost may be random: it is
+    then drawn again with each move.
 
-    The interval is that of the logarithm, by Student's distribution. Its variance sums those of the shares, each
+    The interval is that of the logarithm, by Student's distribution. Its variance is the sum over the fractions, each
     between the families of first particles: copies of one are not independent.
 
     Parameters
     ----------
     evaluate : callable
-        Points, shape (n, dimension), each coordinate from 0 to 1; returns their costs, shape (n,).
+        Function from points, shape (n, dimension), each coordinate from 0 to 1, to their costs, shape (n,).
     dimension : int
-        How many coordinates.
+        Number of coordinates.
     budget : int
-        How many points at the most, `LEAST_BUDGET` or more.
+        Most points, `LEAST_BUDGET` or more.
     seed : int
-        Of particles and moves.
+        Seed of particles and moves.
 
     Returns
     -------
     Estimate
-        Where no cost comes below 0, its upper bound alone says something: the least one of all levels.
+        Probability and interval; without a cost below 0 only its upper bound is valid, the least of all levels.
     """
     rng = np.random.default_rng(seed)
     n = max(LEAST_BUDGET // 5, budget // _PARTICLES)
@@ -92,7 +92,7 @@ def estimate_probability(evaluate: Evaluate, dimension: int, budget: int, seed: 
             step = float(np.clip(step * math.exp(_GAIN * (accepted.mean() - _ACCEPTED)), _SHORTEST, 1.0))
     event = costs < 0.0
     if not event.any():
-        none = 1.0 - _TAIL ** (1.0 / several)  # Clopper and Pearson, none of so many families
+        none = 1.0 - _TAIL ** (1.0 / several)  # Clopper and Pearson, none of `several` families
         bound = min(bound, reached * _factor(variance, several) * none)
         return Estimate(0.0, 0.0, bound, tuple(levels), several)
     probability = reached * float(event.mean())
@@ -102,12 +102,12 @@ def estimate_probability(evaluate: Evaluate, dimension: int, budget: int, seed: 
 
 
 def _factor(variance: float, several: int) -> float:
-    """Return by which factor a probability may be off, from so many families."""
+    """Return the factor of the interval about a probability, from its relative variance and number of families."""
     return math.exp(float(t.ppf(1.0 - _TAIL, several - 1)) * math.sqrt(variance)) if several > 1 else math.inf
 
 
 def _relative_variance(inside: NDArray[np.bool_], families: NDArray[np.int64]) -> float:
-    """Return the squared relative error of a share, between families that are independent of each other."""
+    """Return the squared relative error of a fraction, between independent families."""
     share, several = inside.mean(), len(np.unique(families))
     sums = np.bincount(families, inside - share)
     return float((sums**2).sum() / inside.sum() ** 2 * several / max(1, several - 1))

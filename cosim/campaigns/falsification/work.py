@@ -1,4 +1,4 @@
-"""What a search flies: rows whose numbers are known only when the search asks for them."""
+"""The rows of a search, which are created when the search requests them."""
 
 from __future__ import annotations
 
@@ -36,24 +36,24 @@ _MOST = 1_000_000  # rows
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """What is searched for, and for how long.
+    """Objective and budget of a search.
 
     Parameters
     ----------
     objective : str
         ``"clearance"``, the least one; ``"violation"``, the greatest one weighted by priority; ``"arrival"``, the
-        latest one, never being the worst.
+        latest one, where no arrival is the worst.
     budget : int
-        Rows that are flown.
+        Number of rows.
     seed : int
-        Of the search.
+        Seed of the search.
     rare_event : bool
-        Estimate how likely a violation is, in the place of a search for the worst.
+        Estimate the probability of a violation, instead of a search for the worst.
 
     Raises
     ------
     RunError
-        If there can be no such search.
+        If the settings are invalid.
     """
 
     objective: Objective = "clearance"
@@ -73,21 +73,21 @@ class SearchSettings:
             raise RunError(f"objective is {self.objective}, expected clearance: the rare event is a violation")
 
     def table(self) -> dict[str, Any]:
-        """Return what the rows follow from, for JSON; a RunError if what searches is not installed."""
+        """Return the settings and the version of cma, for JSON; raise RunError if cma is needed and not installed."""
         return asdict(self) | ({} if self.rare_event else {"cma": import_cma().__version__})
 
 
 class SceneSearch:
-    """Scenes of a family of the generator, searched for those in which a law does worst.
+    """A search for the worst scenes of a family of the generator.
 
     Parameters
     ----------
     family : str
         One of `cosim.campaigns.falsification.spaces.FAMILIES`.
     task : SceneTask
-        How they are flown.
+        Law and conditions of the flights.
     settings : SearchSettings
-        What is searched for.
+        Objective and budget.
 
     Raises
     ------
@@ -114,17 +114,17 @@ class SceneSearch:
         return self.settings.budget
 
     def add(self, points: NDArray[np.float64]) -> Rows:
-        """Make rows of points, shape (n, dimension), and return their numbers."""
+        """Add a row for each point, shape (n, dimension), and return their numbers."""
         first = len(self._lines)
         self._lines += [self._space.line(point, first + i) for i, point in enumerate(points)]
         return np.arange(first, len(self._lines))
 
     def batch(self, rows: Rows) -> list[bytes]:
-        """Return the lines of some rows."""
+        """Return the scenes of some rows, as lines of JSON."""
         return [self._lines[row] for row in rows]
 
     def rows_of(self, keys: Rows) -> Rows:
-        """Return the rows of some seeds, which are their numbers; -1 for one that has none."""
+        """Return the rows of some seeds, which equal their numbers; -1 for a seed without a row."""
         return np.where((keys >= 0) & (keys < len(self)), keys, -1)
 
     def refused(self, row: int, reason: str) -> Any:
@@ -132,7 +132,7 @@ class SceneSearch:
         return table_of([refused_row(row, reason, self._lines[row].decode().strip())])
 
     def fly_random(self, out: Path, workers: int, progress: bool) -> Results:
-        """Fly as many scenes as the generator makes them."""
+        """Fly as many random scenes of the generator."""
         with TemporaryDirectory() as folder:
             scenes = Path(folder) / "scenes.jsonl"
             scenes.write_text("\n".join(generate_scenes(len(self), self.settings.seed, self.family)))
@@ -141,23 +141,23 @@ class SceneSearch:
 
 
 class ScenarioSearch(SweepWork):
-    """A scenario, searched for the values of some keys with which it goes worst.
+    """A search for the worst values of some keys of a scenario.
 
     Parameters
     ----------
     scenario : Scenario
-        What stays.
+        The scenario.
     vary : sequence of Vary
-        What varies, and in which range.
+        Keys and ranges of their values.
     settings : SearchSettings
-        What is searched for.
+        Objective and budget.
 
     Raises
     ------
     ScenarioError
-        If a key is unknown, or what it names is no number.
+        If a key is unknown, or its value is not a number.
     RunError
-        If nothing varies, a key that is a whole number has values that are none, or the package cma is not installed.
+        If no key varies, an integer key has other values, or the package cma is not installed.
     """
 
     def __init__(self, scenario: Scenario, vary: Sequence[Vary], settings: SearchSettings) -> None:
@@ -168,7 +168,7 @@ class ScenarioSearch(SweepWork):
         self._values = np.empty((0, self.dimension))
 
     def add(self, points: NDArray[np.float64]) -> Rows:
-        """Make rows of points, shape (n, dimension), and return their numbers."""
+        """Add a row for each point, shape (n, dimension), and return their numbers."""
         first = len(self._values)
         values = [vary.at(points[:, i]) for i, vary in enumerate(self.design.vary)]
         self._values = np.concatenate([self._values, np.column_stack(values)])
@@ -179,5 +179,5 @@ class ScenarioSearch(SweepWork):
         return SweepBatch(rows, self._values[rows], self.design.seeds(rows))
 
     def fly_random(self, out: Path, workers: int, progress: bool) -> Results:
-        """Fly as many rows with values that are drawn evenly."""
+        """Fly as many rows with uniformly drawn values."""
         return run_sweep(self._scenario, self.design, out, workers=workers, progress=progress).results

@@ -1,4 +1,4 @@
-"""The page that an ablation ends with."""
+"""The page of an ablation."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ def write_ablation_page(folder: Path, replays: int) -> Path:
     Parameters
     ----------
     folder : Path
-        Of an ablation that is complete.
+        Of a complete ablation.
     replays : int
-        Scenes that are flown again by all variants, step by step.
+        Number of scenes that all variants fly again step by step.
 
     Returns
     -------
@@ -44,7 +44,7 @@ def write_ablation_page(folder: Path, replays: int) -> Path:
     RunError
         If the folder holds no ablation, or cannot be written.
     KeyboardInterrupt
-        After Ctrl-C; the page is there, without the replays.
+        After Ctrl-C; the page is written without the replays.
     """
     numbers = read_json(folder / NUMBERS)
     variants = numbers.get("variants")
@@ -66,7 +66,7 @@ def write_ablation_page(folder: Path, replays: int) -> Path:
 
 
 def _changed(results: Mapping[str, Results]) -> list[tuple[int, str, str, float, float]]:
-    """Return scene, kind, variant, and both weighted violations, where these differ most; a scene once."""
+    """Return scenes by difference of weighted violation: seed, kind, variant, and both values; each scene once."""
     whole, found = results[WHOLE].number("weighted_violation"), []
     seeds, kinds = results[WHOLE]["seed"], scene_kinds(results[WHOLE]).kinds
     for name, rows in results.items():
@@ -149,7 +149,7 @@ def _verdict(variants: dict[str, Any]) -> str:
 
 
 def _helps(of: dict[str, Any]) -> bool:
-    """Return whether a part shows to help: in completed scenes or in the weighted violation, beyond chance."""
+    """Return True if a part significantly improves completed scenes or weighted violation."""
     pairs, ratio = of["paired"], of["weighted_violation"]
     more = pairs["p"] is not None and pairs["p"] < 0.05 and pairs["only_one"] > pairs["only_other"]
     return more or (ratio["high"] is not None and ratio["high"] < 1.0)

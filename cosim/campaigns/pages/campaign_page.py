@@ -1,4 +1,4 @@
-"""The page that a campaign of scenes ends with."""
+"""The page of a campaign of scenes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 PAGE = "campaign.html"
 FACTS = ("completed", "reached", "violation")  # in the order of the page
-_DRAWN = ("completed", "violation")  # by what they depend on
+_DRAWN = ("completed", "violation")  # drawn over the features of scenes
 
 
 def write_campaign_page(folder: Path, replays: int) -> Path:
@@ -43,9 +43,9 @@ def write_campaign_page(folder: Path, replays: int) -> Path:
     Parameters
     ----------
     folder : Path
-        Of a campaign that is complete.
+        Of a complete campaign.
     replays : int
-        Worst scenes that are flown again step by step, each with a page of its own.
+        Number of worst scenes that are flown again step by step, each with its own page.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def write_campaign_page(folder: Path, replays: int) -> Path:
     RunError
         If the folder holds no such campaign, or cannot be written.
     KeyboardInterrupt
-        After Ctrl-C; the page is there, without the replays.
+        After Ctrl-C; the page is written without the replays.
     """
     require_complete(folder)
     summary = read_json(folder / SUMMARY)
@@ -77,17 +77,17 @@ def write_campaign_page(folder: Path, replays: int) -> Path:
 
 
 def campaign_lines(summary: dict[str, Any]) -> Iterator[str]:
-    """Yield the lines that tell a campaign on a terminal.
+    """Yield the lines about a campaign for a terminal.
 
     Parameters
     ----------
     summary : dict
-        Of `cosim.campaigns.analysis.summary.summarise`.
+        From `cosim.campaigns.analysis.summary.summarise`.
 
     Yields
     ------
     str
-        Without its end.
+        Without a newline.
     """
     s = summary
     yield f"{s['law']}: {s['reached']} of {s['scenes']} scenes reached, {s['violations']} with a violation"
@@ -97,24 +97,24 @@ def campaign_lines(summary: dict[str, Any]) -> Iterator[str]:
 
 
 def group_of(name: str, part: Mapping[str, Any]) -> Group:
-    """Return a summary, or the part of it that is of one kind of scenes, as a line of tables."""
+    """Return a summary, or the part of it for one kind of scenes, as a row of tables."""
     return Group(name, part["scenes"], part["rates"], part["quantiles"])
 
 
 def spreads_of(results: Results, groups: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the numbers whose distributions are drawn, by column and group.
+    """Return the values whose distributions are drawn, by column and group.
 
     Parameters
     ----------
     results : Results
         Of a campaign.
     groups : mapping from str to ndarray of bool
-        Which scenes.
+        Masks of scenes.
 
     Returns
     -------
     dict
-        Of a reach time NaN where it was not reached; of what counts where it was reached only those.
+        Reach times are NaN if the goal was not reached; columns not in `OF_ALL` are over reached scenes.
     """
     reached, found = results["reached"], {}
     for name in SPREADS:

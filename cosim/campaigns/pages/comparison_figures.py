@@ -1,4 +1,4 @@
-"""Two laws scene by scene."""
+"""Figures that compare two laws scene by scene."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from cosim.campaigns.pages.figures import WIDTH, legend_above
 from cosim.campaigns.store.results import Results
 from cosim.report.figures.style import BLACK, BLUE, GREEN, ORANGE, RED
 
-_MOST = 1500  # scenes that are drawn
-_NEVER = 1.12  # of the greatest number: where what has none is drawn
+_MOST = 1500  # greatest number of scenes that are drawn
+_NEVER = 1.12  # position of missing numbers, relative to the greatest number
 
 
 def side_by_side(one: str, results: Results, other: str, others: Results, columns: Sequence[tuple[str, str]]) -> Figure:
-    """Return each scene as a mark, one law's number across and the other's up, by which of them completes it.
+    """Draw each scene as a marker at the numbers of both laws, by which of them completes it.
 
     Parameters
     ----------
@@ -25,12 +25,12 @@ def side_by_side(one: str, results: Results, other: str, others: Results, column
     results, others : Results
         Of the same scenes.
     columns : sequence of (str, str)
-        Columns and their labels; a panel each.
+        Columns and their labels, with a panel each.
 
     Returns
     -------
     Figure
-        With a line where both come to the same.
+        With the line of equal numbers.
     """
     some = np.unique(np.linspace(0, len(results) - 1, min(len(results), _MOST)).astype(int))
     mine, theirs = (rows["reached"] & ~rows["violation"] for rows in (results, others))

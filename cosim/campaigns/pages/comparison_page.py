@@ -1,4 +1,4 @@
-"""The page that a comparison of laws ends with."""
+"""The page of a comparison of laws."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 NUMBERS = "compare.json"
 PAGE = "compare.html"
-_LISTED = 3  # worst scenes of each law, unless more have replays
-_SEEN = ("reach_time", "min_clearance")  # that are drawn scene by scene
+_LISTED = 3  # worst scenes that are listed for each law, unless more have replays
+_SEEN = ("reach_time", "min_clearance")  # columns that are drawn scene by scene
 
 
 def write_comparison_page(folder: Path, replays: int) -> Path:
@@ -37,9 +37,9 @@ def write_comparison_page(folder: Path, replays: int) -> Path:
     Parameters
     ----------
     folder : Path
-        Of a comparison that is complete.
+        Of a complete comparison.
     replays : int
-        Worst scenes of each law that are flown again by all laws, step by step.
+        Number of worst scenes of each law that all laws fly again step by step.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def write_comparison_page(folder: Path, replays: int) -> Path:
     RunError
         If the folder holds no such comparison, or cannot be written.
     KeyboardInterrupt
-        After Ctrl-C; the page is there, without the replays.
+        After Ctrl-C; the page is written without the replays.
     """
     numbers = read_json(folder / NUMBERS)
     laws = numbers.get("laws")
@@ -153,7 +153,7 @@ def _verdict(numbers: dict[str, Any]) -> str:
 
 
 def _paired(page: Page, numbers: dict[str, Any]) -> None:
-    """Add, law against law, which scenes only one completes, and how much they differ where both do."""
+    """Add a table of pairs of laws: scenes that only one completes, and differences where both do."""
     page.table(
         ["", "both complete", "only the first", "only the second", "neither", "p", "reach time, s", "effort, N s"],
         [

@@ -1,4 +1,4 @@
-"""Figures of campaigns: rates with their intervals, distributions, and how outcomes depend on what varies."""
+"""Figures of campaigns: rates with their intervals, distributions, and outcomes over varied keys."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from cosim.report.figures.style import BLACK, BLUE, CYCLE, GREEN, ORANGE, RED, N
 from cosim.simulation.signals import Array
 
 WIDTH = 5.6  # in, of a figure: readable on a phone too
-_ACROSS = 2  # panels
-_MOST_KEYS = 8  # that are drawn
-_POINTS = 700  # of a panel
-_TICKS = 5  # intervals across a panel at the most: labels of five digits have room
-_WIDE = 30.0  # a logarithmic range over which only powers of ten have room
-_STEPS = 400  # of a drawn distribution
+_ACROSS = 2  # panels per row
+_MOST_KEYS = 8  # greatest number of keys that are drawn
+_POINTS = 700  # greatest number of points in a panel
+_TICKS = 5  # greatest number of intervals across a panel, so that labels of five digits fit
+_WIDE = 30.0  # ratio of a logarithmic range from which on only powers of ten have ticks
+_STEPS = 400  # greatest number of steps of a drawn distribution
 _DASHES = ("-", "--", "-.", ":")
 
 FACT_COLOURS = {"completed": BLUE, "reached": GREEN, "settled": BLUE, "violation": RED, "violated": RED}
@@ -32,13 +32,13 @@ class Rated(NamedTuple):
     """A line of a forest plot."""
 
     fact: str
-    group: str  # "" where there is one alone
+    group: str  # "" if there is only one
     rows: int  # of the group
     rate: dict[str, Any]
 
 
 class Key(NamedTuple):
-    """What rows differ in."""
+    """A key that varies over the rows."""
 
     label: str  # with unit
     values: Array  # (n,)
@@ -46,12 +46,12 @@ class Key(NamedTuple):
 
 
 def forest(lines: Sequence[Rated]) -> Figure:
-    """Return rates as marks with their 95 % intervals, one line each, under a heading for each fact.
+    """Draw rates as markers with their 95 % intervals, a line each, under a heading for each fact.
 
     Parameters
     ----------
     lines : sequence of Rated
-        Those of one fact side by side.
+        Those of one fact one after the other.
 
     Returns
     -------
@@ -96,19 +96,19 @@ def _interval(axes: Axes, line: Rated, y: float) -> None:
 
 
 def distributions(columns: Mapping[str, Mapping[str, Array]], addition: str) -> Iterator[NamedFigure]:
-    """Yield the share of all that is at most each value, a panel for each column, with a dot at the median.
+    """Yield the figure of empirical distributions, a panel for each column, with a dot at the median.
 
     Parameters
     ----------
     columns : mapping from str to mapping from str to ndarray, shape (n,)
-        By column, then by group; NaN where there is no number.
+        By column, then by group; NaN for missing numbers.
     addition : str
-        What the caption adds.
+        Addition to the caption.
 
     Yields
     ------
-    Drawing
-        ``distributions``; nothing if there are no numbers. What never comes leaves a curve below 100 %.
+    NamedFigure
+        ``distributions``; nothing without numbers. Missing numbers keep a curve below 100 %.
     """
     there = {name: of for name, of in columns.items() if any(np.isfinite(values).any() for values in of.values())}
     if not there:
@@ -120,7 +120,7 @@ def distributions(columns: Mapping[str, Mapping[str, Array]], addition: str) -> 
             colour, dash = CYCLE[i % len(CYCLE)], _DASHES[i % len(_DASHES)]
             axes.step(x, shares, where="post", color=colour, linestyle=dash, label=name)
             median = quantiles(values)["0.5"]
-            if median is not None:  # half of those that come are below it: of an odd number, on the middle one's riser
+            if median is not None:  # at half of the share of existing numbers
                 axes.plot(median, shares[-1] / 2.0, "o", color=colour, markersize=5)
         if column == "min_clearance":
             axes.axvline(0.0, color=BLACK, linewidth=0.8)
@@ -141,19 +141,19 @@ def shares_up_to(values: Array) -> tuple[Array, Array]:
     Parameters
     ----------
     values : ndarray, shape (n,)
-        NaN where there is none: such are counted, and never come.
+        NaN for missing numbers, which count in the total.
 
     Returns
     -------
     ndarray, ndarray
-        The finite ones in rising order, and the share of all that is at most each.
+        The finite numbers in rising order, and the share of all numbers up to each.
     """
     finite = np.sort(values[np.isfinite(values)])
     return finite, np.arange(1, len(finite) + 1) / max(1, len(values))
 
 
 def binned_rates(keys: Sequence[Key], facts: Mapping[str, Facts]) -> Figure:
-    """Return how often each fact happens in each part of a key's range, with 95 % intervals by Wilson.
+    """Draw the rate of each fact in bins of each key, with 95 % intervals by Wilson.
 
     Parameters
     ----------
@@ -185,23 +185,23 @@ def binned_rates(keys: Sequence[Key], facts: Mapping[str, Facts]) -> Figure:
 
 
 def scatter(keys: Sequence[Key], values: Array, label: str, reached: Facts, violated: Facts) -> Figure:
-    """Return a number of every row over each key, marked by how the row came out.
+    """Draw a number of every row over each key, with markers by outcome.
 
     Parameters
     ----------
     keys : sequence of Key
         The first ones are drawn.
     values : ndarray, shape (n,)
-        What is drawn; rows without are left out.
+        The numbers; rows with NaN or infinity are skipped.
     label : str
         Of the values, with unit.
     reached, violated : ndarray of bool, shape (n,)
-        How the rows came out.
+        Outcomes of the rows.
 
     Returns
     -------
     Figure
-        A panel for each key, with as many rows as can be told apart.
+        A panel for each key, with at most 700 rows.
     """
     some = np.flatnonzero(np.isfinite(values))
     if len(some) > _POINTS:
@@ -223,7 +223,7 @@ def scatter(keys: Sequence[Key], values: Array, label: str, reached: Facts, viol
 
 
 def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:
-    """Return a figure with so many panels."""
+    """Create a figure with `count` panels."""
     down = -(-count // _ACROSS)
     figure = Figure(figsize=(WIDTH, 0.35 + height * down), layout="constrained")
     axes = figure.subplots(down, min(count, _ACROSS), squeeze=False).ravel()
@@ -233,7 +233,7 @@ def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:
 
 
 def _across(axes: Axes, key: Key) -> None:
-    """Label the axis of a key: few ticks where it is logarithmic, no fractions where it is a whole number."""
+    """Label the axis of a key: few ticks on a logarithmic scale, no fractions for whole numbers."""
     axes.set(xlabel=key.label, xscale="log" if key.log else "linear")
     if key.log:
         wide = key.values.max() > _WIDE * key.values.min()
@@ -246,9 +246,9 @@ def _across(axes: Axes, key: Key) -> None:
 
 
 def legend_above(figure: Figure, axes: Axes) -> None:
-    """Put the legend of one of its panels above a figure, in as many columns as there is room for."""
+    """Add the legend of a panel above a figure, in as many columns as fit."""
     handles, labels = axes.get_legend_handles_labels()
-    columns = int(legend_columns(labels) * WIDTH / 6.4)  # as wide as figures of runs, of which it speaks
+    columns = int(legend_columns(labels) * WIDTH / 6.4)  # `legend_columns` is for figures of runs, 6.4 in wide
     figure.legend(handles, labels, loc="outside upper center", ncols=max(1, min(columns, len(labels))))
 
 

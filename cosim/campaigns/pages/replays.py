@@ -1,4 +1,4 @@
-"""Replays of the worst rows: flown once more step by step, each on a page of its own below the campaign's folder."""
+"""Replays of the worst rows: flown again step by step, each on its own page below the campaign's folder."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from cosim.run.run import run_scenario
 from plant_fmu import PlantError
 
 WORST = "worst"  # folder of the replays
-_FLOWN = "flown.json"  # beside a replay: where flights came out otherwise
+_FLOWN = "flown.json"  # beside a replay: remarks on differing flights
 
 
 @dataclass(frozen=True)
 class Replay:
-    """The replay of a row, or why there is none."""
+    """The replay of a row, or remarks why there is none."""
 
     page: str | None  # relative to the folder
-    remarks: tuple[str, ...]  # such as a flight that came out otherwise than its row
+    remarks: tuple[str, ...]  # such as differences between flight and row
 
     def cell(self) -> Html:
-        """Return it as a cell of a table."""
+        """Format it as a cell of a table."""
         import html
 
         shown = [link(self.page, "replay")] if self.page else []
@@ -47,31 +47,31 @@ def write_page_with_replays(
     folders: Sequence[Path],
     title: Callable[[int], str],
 ) -> None:
-    """Write a page, fly rows again, and write the page with their replays.
+    """Write a page, fly rows again, and write the page again with their replays.
 
     Parameters
     ----------
     path : Path
         Of the page; the replays go into a folder beside it.
     numbers : Path
-        File that the page is made of, for errors.
+        File with the numbers of the page, for error messages.
     page : callable
-        Makes the page of the replays that there are, by their keys.
+        Makes the page, given the replays by key.
     keys : iterable of int
-        Rows that are flown again.
+        Rows to fly again.
     folders : sequence of Path
-        As of `replay_of`.
+        As for `replay_of`.
     title : callable
         Makes the title of a key's replay.
 
     Raises
     ------
     RunError
-        If the numbers are none of such a page, or a folder cannot be read.
+        If the numbers are not those of such a page, or a folder cannot be read.
     OSError
         If the page or a replay cannot be written.
     KeyboardInterrupt
-        After Ctrl-C; the page is there, without the replays.
+        After Ctrl-C; the page is written without the replays.
     """
 
     def write(shown: Mapping[int, Replay]) -> None:
@@ -84,32 +84,32 @@ def write_page_with_replays(
 
 
 def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Replay:
-    """Fly a row of one or several campaigns again, unless that is done, and put the flights on one page.
+    """Fly a row of one or several campaigns again, unless done before, and write a page with the flights.
 
     Parameters
     ----------
     out : Path
-        Where the page goes, below ``worst``.
+        Folder of the page, below ``worst``.
     key : int
         Of the row.
     folders : sequence of Path
-        Of the campaigns, which have flown the same scene by several laws; or of a single one.
+        Of campaigns that have flown the same scene by several laws, or of a single one.
     title : str
         Of the page.
 
     Returns
     -------
     Replay
-        With a page if any of the flights can be shown.
+        With a page if one of the flights can be shown.
 
     Raises
     ------
     RunError
         If a folder cannot be read.
     OSError
-        If the page cannot be written; nothing is left then.
+        If the page cannot be written; its files are removed.
     KeyboardInterrupt
-        After Ctrl-C; nothing is left.
+        After Ctrl-C; its files are removed.
     """
     place = out / WORST / str(key)
     if not (place / _FLOWN).exists():
@@ -137,7 +137,7 @@ def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Repla
 
 
 def _flown(repeat: Repeat, folder: Path) -> tuple[dict[str, Any] | None, str]:
-    """Return what a page shows of a flight, and what is to be said of it."""
+    """Fly a row step by step; return its trace, None if it cannot be shown, and a remark."""
     if repeat.scenario is None:
         return None, f"was not flown: {repeat.stored['refused']}"
     apart, remark = {}, ""

@@ -1,4 +1,4 @@
-"""Sections that the pages of campaigns, sweeps and comparisons have in common."""
+"""Common sections of the pages of campaigns, sweeps and comparisons."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cosim.campaigns.analysis.worst_rows import ORDER, Worst, rerun_command
 from cosim.campaigns.pages.replays import Replay
 from cosim.report.web_page import Page, code, interval, number
 
-LABELS = {  # of columns: what they are called, with unit
+LABELS = {  # names of columns with units
     "reached": "reached the goal",
     "settled": "settled there",
     "violated": "violated a hard region",
@@ -37,7 +37,7 @@ _WORDS = {"violation": "violated a region", "violated": LABELS["violated"]}
 
 
 class Group(NamedTuple):
-    """Some rows, and what they came to."""
+    """Rates and quantiles of a group of rows."""
 
     name: str
     rows: int
@@ -46,18 +46,18 @@ class Group(NamedTuple):
 
 
 def rates_table(page: Page, unit: str, groups: Sequence[Group], facts: Sequence[str]) -> None:
-    """Add how often each fact happens in each group.
+    """Add a table of the rate of each fact in each group.
 
     Parameters
     ----------
     page : Page
-        That it is added to.
+        The page.
     unit : str
-        What the rows are called.
+        Word for rows, in the plural.
     groups : sequence of Group
-        A row each.
+        Rows of the table.
     facts : sequence of str
-        A column each.
+        Columns of the table.
     """
     page.table(
         ["", unit, *(_WORDS.get(fact, fact) for fact in facts)],
@@ -66,12 +66,12 @@ def rates_table(page: Page, unit: str, groups: Sequence[Group], facts: Sequence[
 
 
 def quantiles_table(page: Page, groups: Sequence[Group]) -> None:
-    """Add the quantiles of each number that there is, group below group.
+    """Add a table of the quantiles of each column with numbers, group below group.
 
     Parameters
     ----------
     page : Page
-        That it is added to.
+        The page.
     groups : sequence of Group
         All with the same numbers.
     """
@@ -99,17 +99,17 @@ def worst_section(
     Parameters
     ----------
     page : Page
-        That it is added to.
+        The page.
     folder : Path
         Of the campaign.
     unit : str
-        What a row is called.
+        Word for a row.
     worst : sequence of Worst
         The rows.
     shown : mapping from int to Replay
-        By key; the others have none.
+        Existing replays by key.
     kinds : mapping from int to str
-        What each row is like; empty where they are all alike.
+        Kind of each row by key; empty if all are of one kind.
     """
     page.heading(f"The worst {unit}s")
     page.paragraph(f"{ORDER} A replay shows the flight in the browser, moving.")
@@ -129,18 +129,18 @@ def worst_section(
 
 
 def refused_section(page: Page, unit: str, refused: int, reasons: Mapping[str, str]) -> None:
-    """Add why rows were refused, if any were.
+    """Add a table of the reasons for refusing rows, if there are any.
 
     Parameters
     ----------
     page : Page
-        That it is added to.
+        The page.
     unit : str
-        What a row is called.
+        Word for a row.
     refused : int
-        How many.
+        Number of refused rows.
     reasons : mapping from str to str
-        Of the first ones, by their key.
+        Reasons of the first ones, by key.
     """
     if refused:
         page.heading(f"Refused {unit}s")
@@ -150,12 +150,12 @@ def refused_section(page: Page, unit: str, refused: int, reasons: Mapping[str, s
 
 
 def basis(page: Page, summary: Mapping[str, Any]) -> None:
-    """Add what the rows rest on.
+    """Add the versions of code and libraries on which the rows depend.
 
     Parameters
     ----------
     page : Page
-        That it is added to.
+        The page.
     summary : mapping from str to object
         Of a campaign or sweep.
     """

@@ -1,4 +1,4 @@
-"""The page that a sweep ends with, and the lines that the command prints."""
+"""The page of a sweep, and the lines that its command prints."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from cosim.report.figures.style import NamedFigure
 
 PAGE = "sweep.html"
-_TOLD_SHARE, _TOLD_RHO = 0.01, 0.1  # effects and rank correlations that are worth a place in the table
+_LEAST_SHARE, _LEAST_RHO = 0.01, 0.1  # least effects and rank correlations in the table
 
 
 def write_sweep_page(folder: Path, replays: int) -> Path:
@@ -45,9 +45,9 @@ def write_sweep_page(folder: Path, replays: int) -> Path:
     Parameters
     ----------
     folder : Path
-        Of a sweep that is complete.
+        Of a complete sweep.
     replays : int
-        Worst rows that are flown again step by step, each with a page of its own.
+        Number of worst rows that are flown again step by step, each with its own page.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def write_sweep_page(folder: Path, replays: int) -> Path:
     RunError
         If the folder holds no such sweep, or cannot be written.
     KeyboardInterrupt
-        After Ctrl-C; the page is there, without the replays.
+        After Ctrl-C; the page is written without the replays.
     """
     require_complete(folder)
     summary = read_json(folder / SUMMARY)
@@ -80,17 +80,17 @@ def write_sweep_page(folder: Path, replays: int) -> Path:
 
 
 def sweep_lines(summary: dict[str, Any]) -> Iterator[str]:
-    """Yield the lines that tell a sweep on a terminal.
+    """Yield the lines about a sweep for a terminal.
 
     Parameters
     ----------
     summary : dict
-        Of `summarise_sweep`.
+        From `summarise_sweep`.
 
     Yields
     ------
     str
-        Without its end.
+        Without a newline.
     """
     s = summary
     yield f"{s['name']}: {s['flown']} of {s['rows']} rows flown, {s['refused']} refused, {s['stopped']} stopped early"
@@ -141,7 +141,7 @@ def _any(values: Any) -> bool:
 
 
 def _by_weight(s: dict[str, Any]) -> list[str]:
-    """Return the keys, those first that outcomes depend on most."""
+    """Return the keys by descending effect on the outcomes."""
     outcomes = ("reached", "violated", "min_clearance", "reach_time")
 
     def weight(key: str) -> float:
@@ -200,7 +200,7 @@ def _verdict(s: dict[str, Any]) -> str:
 
 
 def _effects(page: Page, s: dict[str, Any]) -> None:
-    """Add how much of each outcome goes with each key alone, and whether up or down."""
+    """Add a table of the effects and rank correlations of each key with each outcome."""
     keys, rows = list(s["vary"]), []
     for name in FIELDS:
         effects = [s["effects"][key][name] for key in keys]
@@ -217,18 +217,18 @@ def _effects(page: Page, s: dict[str, Any]) -> None:
         "first-order Sobol' index, estimated by a line in each bin of the key). The rest goes with several keys "
         "together, or with what is random. The last column is what chance reaches in one cell of a hundred; shares "
         "below it are left out. ρ: rank correlation by Spearman, above 0 where the outcome goes up with the key; left "
-        f"out within {number(_TOLD_RHO)} of 0, and where chance gives as much in one cell of a hundred. All are in "
+        f"out within {number(_LEAST_RHO)} of 0, and where chance gives as much in one cell of a hundred. All are in "
         "summary.json.",
         faint=True,
     )
 
 
 def _effect(effect: dict[str, float] | None, correlation: dict[str, float] | None) -> str:
-    """Return what a cell says of a key and an outcome, nothing where chance may have brought it about."""
+    """Format effect and rank correlation of a key and an outcome; an empty text if they are not significant."""
     measures = []
-    if effect is not None and effect["share"] >= max(effect["floor"], _TOLD_SHARE):
+    if effect is not None and effect["share"] >= max(effect["floor"], _LEAST_SHARE):
         measures.append(_percent(effect["share"]))
-    if correlation is not None and abs(correlation["rho"]) >= _TOLD_RHO and correlation["p"] < CHANCE:
+    if correlation is not None and abs(correlation["rho"]) >= _LEAST_RHO and correlation["p"] < CHANCE:
         measures.append(f"ρ\N{NO-BREAK SPACE}{correlation['rho']:+.2f}".replace("-", "−"))
     return ", ".join(measures)
 

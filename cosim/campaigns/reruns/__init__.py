@@ -1,6 +1,6 @@
-"""One row of a campaign again.
+"""Rerun of a row of a campaign.
 
-The same to the last bit, and with everything recorded.
+Once with the same engine, bit for bit, and once step by step with full record.
 
 Imports: campaigns.scenes, campaigns.store, campaigns.sweeps, campaigns.workers, controller, io, plant_fmu, results,
 run, scenario.

@@ -1,4 +1,4 @@
-"""A row of a campaign as what can be flown again: a batch of one, and the scenario that says the same."""
+"""A row of a campaign prepared for repetition: as a batch of one row, and as a scenario."""
 
 from __future__ import annotations
 
@@ -37,21 +37,21 @@ from plant_fmu import PlantFmuError
 from plant_fmu.toml_tables import decode
 
 Outcome = dict[str, Any]  # some columns of a row
-_ROUNDING = 1e-6  # of a number, relative and absolute, that two flights of one scenario may differ by
+_ROUNDING = 1e-6  # relative and absolute tolerance between two flights of one scenario
 
 
 @dataclass(frozen=True)
 class Repeat:
-    """What flies a row again."""
+    """Task, batch and scenario that repeat a row."""
 
     stored: dict[str, Any]  # the row
     task: Task
     batch: Any  # of that row alone
-    scenario: Scenario | None  # that says the same; None where the row was refused
-    outcome: Callable[[Scenario, Record, dict[str, Any]], Outcome]  # of a recorded run, as the row tells it
+    scenario: Scenario | None  # equivalent to the row; None if the row was refused
+    outcome: Callable[[Scenario, Record, dict[str, Any]], Outcome]  # columns of the row from a recorded run
 
     def apart(self, received: Outcome) -> dict[str, tuple[Any, Any]]:
-        """Return by column what the row has and what came of the master's flight, where that is more than rounding."""
+        """Return stored and `received` values of the columns that differ by more than rounding."""
         assert self.scenario is not None
         step = 1.5 * self.scenario.time.step
         return {
@@ -62,7 +62,7 @@ class Repeat:
 
 
 def repeat_of(folder: Path, key: int) -> Repeat:
-    """Return how a row is flown again.
+    """Prepare the repetition of a row.
 
     Parameters
     ----------
@@ -79,8 +79,8 @@ def repeat_of(folder: Path, key: int) -> Repeat:
     Raises
     ------
     RunError
-        If the folder holds no campaign that is complete, there is no such row, it kills whoever flies it, or something
-        stands against its scenario.
+        If the folder holds no complete campaign, there is no such row, it crashes its worker, or its scenario is
+        invalid.
     """
     plan = read_plan(folder)
     if plan.get("kind") not in (SCENES, SWEEP):
@@ -105,14 +105,14 @@ def repeat_of(folder: Path, key: int) -> Repeat:
 
 
 def complete_results(folder: Path, schema: Any) -> Results:
-    """Return the rows of a campaign.
+    """Open the rows of a complete campaign.
 
     Parameters
     ----------
     folder : Path
         Of the campaign.
     schema : pyarrow.Schema
-        That they are to have.
+        Expected schema of the rows.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def complete_results(folder: Path, schema: Any) -> Results:
 
 
 def require_complete(folder: Path) -> None:
-    """Raise `RunError` if a folder holds no campaign that is complete."""
+    """Raise `RunError` if a folder holds no complete campaign."""
     if not (folder / RESULTS).exists():
         raise RunError(f"{folder}: is not complete, expected a campaign that is; its own command goes on with it")
 
@@ -144,7 +144,7 @@ def _of_sweep(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Rep
         raise RunError(f"{folder / VEHICLE_COPY}: is not that of the campaign")
     row = stored["row"]
     batch = work.batch(np.array([row]))
-    if "search" in plan:  # the values of its rows follow from those before, and stand in the rows alone
+    if "search" in plan:  # its values depend on earlier rows, and are stored in the rows only
         batch = batch._replace(values=np.array([[stored[key] for key in work.variation.keys]]))
     scenario = None
     if stored["refused"] is None:
@@ -162,33 +162,38 @@ def _of_scene(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Rep
         scenario = scene_scenario(decode_scene(line), plan["law"], gains, conditions)
 
     def outcome(scenario: Scenario, record: Record, summary: dict[str, Any]) -> Outcome:
-        return _scene_outcome(record, summary, conditions)
+        return _scene_outcome(scenario, record, summary, conditions)
 
     return Repeat(stored, SceneTask(plan["law"], gains, conditions), [line], scenario, outcome)
 
 
 def _row_outcome(scenario: Scenario, record: Record, summary: dict[str, Any]) -> Outcome:
-    """Return what a recorded run comes to, as a row of a sweep tells it."""
-    hard = [r.region.name for r in scenario.regions if r.region.hard and not of_attitude(r.region.shape)]
+    """Return the columns of a sweep's row from a recorded run."""
     same = ("reached", "reach_time", "settled", "closest_to_goal", "effort", "max_force", "max_speed")
     return {name: summary[name] for name in same} | {
         "violated": bool(summary["hard_violated"]),
-        "min_clearance": min((summary["min_clearance"][name] for name in hard), default=math.inf),
+        "min_clearance": _least_clearance(scenario, summary),
     }
 
 
-def _scene_outcome(record: Record, summary: dict[str, Any], conditions: Conditions) -> Outcome:
-    """Return the same, as a row of a campaign of scenes tells it."""
+def _scene_outcome(scenario: Scenario, record: Record, summary: dict[str, Any], conditions: Conditions) -> Outcome:
+    """Return the columns of a row of a campaign of scenes from a recorded run."""
     time, inside = record["time"], record["goal.clearance"] >= 0.0
     entered = spans(inside, time)[-1][0] if inside[-1] else math.inf
     reached = bool(time[-1] - entered >= conditions.settled - 0.5 * conditions.plant_step)
-    clearance = min(summary["min_clearance"].values())
+    clearance = _least_clearance(scenario, summary)
     return {
         "reached": reached,
         "violation": clearance < 0.0,
-        "min_clearance": clearance,
+        "min_clearance": clearance if math.isfinite(clearance) else None,
         "reach_time": entered if reached else None,
     }
+
+
+def _least_clearance(scenario: Scenario, summary: dict[str, Any]) -> float:
+    """Return the least clearance of hard regions of position [m], inf where there is none."""
+    hard = [r.region.name for r in scenario.regions if r.region.hard and not of_attitude(r.region.shape)]
+    return min((summary["min_clearance"][name] for name in hard), default=math.inf)
 
 
 def _close(one: Any, other: Any, tolerance: float) -> bool:

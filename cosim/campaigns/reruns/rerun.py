@@ -1,4 +1,4 @@
-"""One row of a campaign again: the same to the last bit, and with everything recorded."""
+"""Rerun of a row of a campaign: with the same engine, bit for bit, and step by step with full record."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from cosim.results.run_result import Run
 from cosim.run.run import run_scenario
 from plant_fmu import PlantError
 
-_OF_THE_CLOCK = ("worst_step_time",)  # columns that no repetition gives again
+_OF_THE_CLOCK = ("worst_step_time",)  # columns of wall-clock times, which differ in a rerun
 
 
 @dataclass(frozen=True)
 class Rerun:
-    """A row that was flown again."""
+    """Result of a rerun."""
 
     key: int  # of the row
-    differing: dict[str, tuple[Any, Any]]  # by column: as it is stored, as it came again
-    other_code: bool  # the code is not that which has flown the row
-    run: Run | None  # with full record; None where there can be none
-    apart: dict[str, tuple[Any, Any]]  # by column: as it is stored, as it came step by step; more than rounding
-    stopped: str | None  # why the plant refused to go on, as it did in the row
+    differing: dict[str, tuple[Any, Any]]  # by column: stored value and that of the rerun
+    other_code: bool  # True if the row was flown by other code
+    run: Run | None  # with full record; None if the row was refused or stopped
+    apart: dict[str, tuple[Any, Any]]  # by column: stored value and that of `run`, if they differ by more than rounding
+    stopped: str | None  # error of the plant that stopped the flight, as in the row
 
 
 def rerun(folder: Path, key: int, out: Path | None = None, progress: bool = False) -> Rerun:
-    """Fly a row again as it was flown, and once more step by step with full record and report.
+    """Fly a row again with its engine, and once more step by step with full record and report.
 
     Parameters
     ----------
@@ -47,14 +47,14 @@ def rerun(folder: Path, key: int, out: Path | None = None, progress: bool = Fals
     Returns
     -------
     Rerun
-        What differs, bit by bit, from what is stored; the run; and where it came out otherwise than the row.
+        Bitwise differences from the stored row, the run, and differences of the run.
 
     Raises
     ------
     RunError
-        If the folder holds no campaign that is complete, there is no such row, or it kills whoever flies it.
+        If the folder holds no complete campaign, there is no such row, or it crashes its worker.
     Exception
-        Whatever `run_scenario` raises.
+        All errors of `run_scenario`.
     """
     repeat = repeat_of(folder, key)
     flyer = repeat.task.flyer()
@@ -83,7 +83,7 @@ def rerun(folder: Path, key: int, out: Path | None = None, progress: bool = Fals
 
 
 def _identical(one: Any, other: Any) -> bool:
-    """Return whether two numbers are the same to the last bit; 0.0 and -0.0 are not."""
+    """Return True if two values are identical; 0.0 and -0.0 are not."""
     if isinstance(one, float) and isinstance(other, float):
         return one == other and math.copysign(1.0, one) == math.copysign(1.0, other)
     return bool(one == other)

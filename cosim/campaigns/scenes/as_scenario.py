@@ -1,4 +1,4 @@
-"""A scored scene as a scenario: what campaigns fly in a compiled loop, the readable master flies with full record."""
+"""Conversion of a scored scene to a scenario, which the fused loop and the master can fly."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from cosim.campaigns.scenes.scene import Scene, plant_values, scene_regions
 from cosim.scenario.scenario import Scenario, validate_scenario
 from plant_fmu.vehicle import load_vehicle
 
-VEHICLE = "odin"  # of scenes that name none
-_OF_THE_SCENARIO = ("substep", "current", "position")  # values of the plant that have keys of their own
+VEHICLE = "odin"  # of scenes without a vehicle
+_OF_THE_SCENARIO = ("substep", "current", "position")  # values of the plant with other keys in a scenario
 
 
 def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions) -> Scenario:
-    """Return the scenario that says what a scene says, flown as scenes are.
+    """Convert a scene to a scenario.
 
     Parameters
     ----------
     scene : Scene or ScenarioScene
-        What becomes a scenario.
+        The scene.
     law : str
         One of those in `controller.LAWS`.
     gains : NamedTuple
         Of the law.
     conditions : Conditions
-        How the scene is flown.
+        Conditions of the flight.
 
     Returns
     -------
     Scenario
-        What `SceneFlyer` flies.
+        The scenario that `SceneFlyer` flies.
 
     Raises
     ------
     ScenarioError
-        If the vehicle cannot be as the scene has it.
+        If the vehicle cannot have the scene's parameters.
     PlantFmuError, ControllerError
-        If the law cannot work with the gains, or there is no such vehicle.
+        If the law refuses the gains, or there is no such vehicle.
     """
     if isinstance(scene, ScenarioScene):
         return scene.with_law(law, gains._asdict(), _changes(scene, conditions))
@@ -88,7 +88,7 @@ def _changes(scene: ScenarioScene, conditions: Conditions) -> dict[str, Any]:
 
 
 def _sensing(scene: Scene, conditions: Conditions) -> dict[str, Any]:
-    """Return what the law is given: through sensors, their noise is that of data sheets, not of the scene."""
+    """Return the table ``sensing``: through sensors, noise is that of their data sheets, not of the scene."""
     sensing: dict[str, Any] = {
         "through": conditions.sensing,
         "seed": scene.seed if scene.noise.seed is None else scene.noise.seed,
@@ -99,7 +99,7 @@ def _sensing(scene: Scene, conditions: Conditions) -> dict[str, Any]:
 
 
 def _failures(scene: Scene, conditions: Conditions) -> list[dict[str, float]]:
-    """Return the failed thruster, from the control step on at which a scene has it fail."""
+    """Return the failed thruster, with its time rounded up to a control step."""
     if scene.failed_thruster is None:
         return []
     step = math.ceil(min(scene.failed_thruster.time, conditions.duration) / conditions.control)
@@ -107,7 +107,7 @@ def _failures(scene: Scene, conditions: Conditions) -> list[dict[str, float]]:
 
 
 def _regions(scene: Scene) -> list[dict[str, Any]]:
-    """Return the regions that the law is given, as a scenario's file has them."""
+    """Return the regions for the law, as tables of a scenario."""
     kinds = {shape: name for name, shape in SHAPES.items()}
     return [
         {

@@ -1,4 +1,4 @@
-"""How scored scenes are flown."""
+"""Conditions of flights of scored scenes."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from fuzzy_arbiter.formats import FORMATS, reads
 
 @dataclass(frozen=True)
 class Conditions:
-    """How scenes are flown; the defaults are those of the score.
+    """Conditions of flights; the defaults are those of the score.
 
-    A scene that is a scenario has a duration, periods and a ramp of its own.
+    A scene that is a scenario has its own duration, periods and ramp.
     """
 
     duration: float = 120.0  # s
     control: float = 0.02  # s
-    plant_steps: int = 2  # plant steps a control step, each one integration step
-    settled: float = 10.0  # s at the end inside the goal region
+    plant_steps: int = 2  # plant steps per control step, with one integration step each
+    settled: float = 10.0  # s, least time in the goal region at the end
     ramp: float = 0.2  # m, width of the arbiter's memberships
     tell_failures: bool = False
-    sensing: Literal["state", "sensors"] = "state"  # what the law is given, as `Sensing.through`
+    sensing: Literal["state", "sensors"] = "state"  # source of the law's state, as `Sensing.through`
     outages: tuple[Outage, ...] = ()  # of sensors
-    arbiter: RuleVariant = "ordered"  # by which criteria are weighed, as `ArbiterSetup.rules`
+    arbiter: RuleVariant = "ordered"  # rule variant, as `ArbiterSetup.rules`
     arbiter_file: str = (
-        ""  # name of a file of rules instead, whose inputs are named as criteria or as signals of the vehicle
+        ""  # name of a rule file instead, whose inputs are named like criteria or signals of the vehicle
     )
-    arbiter_text: str = ""  # what stands in it
-    arbiter_engine: Literal["closed", "exact"] = "closed"  # that weighs by these rules
+    arbiter_text: str = ""  # content of the file
+    arbiter_engine: Literal["closed", "exact"] = "closed"  # engine for these rules
 
     def __post_init__(self) -> None:
         for key in ("duration", "control"):
@@ -46,12 +46,12 @@ class Conditions:
 
     @classmethod
     def by_arbiter(cls, arbiter: str, **others: Any) -> Conditions:
-        """Return conditions under which criteria are weighed by a variant, or by the rules of a file.
+        """Make conditions with a rule variant, or with the rules of a file.
 
         Raises
         ------
         ScenarioError
-            If there is neither such a variant nor such a file, or it holds no rules.
+            If there is no such variant or file, or the file holds no rules.
         """
         if arbiter in get_args(RuleVariant):
             return cls(arbiter=arbiter, **others)  # type: ignore[arg-type]
@@ -74,7 +74,7 @@ class Conditions:
 
     @property
     def controls(self) -> int:
-        """How many control steps a flight has."""
+        """Number of control steps of a flight."""
         return round(self.duration / self.control)
 
     @property

@@ -1,9 +1,9 @@
-"""Scenes in which regions conflict, so that some must be violated: which ones, the arbiter decides.
+"""Scenes with conflicting regions, some of which must be violated by the arbiter's choice.
 
-Each scene is a scenario: four criteria in an order of its own, soft and hard regions that exclude each other, a net
-weight of up to 50 N (of a heavy vehicle more), a current of up to 0.4 m/s, noise, and one of three vehicles. The score
-is the priority-weighted violation: a region counts by the place of its criterion in that order, four times as much as
-one of the next criterion. The generator does not know how any law fares in its scenes.
+Each scene is a scenario: four criteria in a random order, soft and hard regions that exclude each other, a net weight
+of up to 50 N (more for a heavy vehicle), a current of up to 0.4 m/s, noise, and one of three vehicles. The score is the
+priority-weighted violation: a region has four times the weight of one of the next criterion in that order. The
+generator does not depend on the performance of any law.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ Generator = np.random.Generator
 Table = dict[str, Any]
 Kinds = dict[str, Callable[[Generator], tuple[Table, list[Table]]]]
 
-_LAGS = {"odin": 0.0, "bluerov2_heavy": 0.15, "rexrov": None}  # s, of the thrusters; None: as the vehicle's file has it
-_PRIORITY = 4.0  # of a criterion beside the next one
-_NET_WEIGHT = 50.0  # N, greatest, of a vehicle of up to 50 kg or that much of
-_MOST_OF_WEIGHT = 0.025  # its weight
+_LAGS = {"odin": 0.0, "bluerov2_heavy": 0.15, "rexrov": None}  # s, of the thrusters; None: that of the vehicle's file
+_PRIORITY = 4.0  # ratio of priorities of successive criteria
+_NET_WEIGHT = 50.0  # N, greatest net weight; for heavy vehicles
+_MOST_OF_WEIGHT = 0.025  # of their weight
 _CURRENT = 0.4  # m/s, greatest
 _CRITERIA = ("obstacle", "shape", "depth", "visibility")
 
@@ -40,27 +40,27 @@ def make_conflict(seed: int, family: str = "conflict") -> Table:
     Returns
     -------
     dict
-        Its seed, its kind, which names the vehicle as well, and the table of the scenario, without a law.
+        Seed, kind with the vehicle's name, and table of the scenario without a law.
     """
     return draw_conflict(np.random.default_rng([CONFLICTS[family].stream, seed]), seed, family)
 
 
 def draw_conflict(rng: Any, seed: int, family: str = "conflict") -> Table:
-    """Make a conflict of random numbers.
+    """Make a conflict from random numbers.
 
     Parameters
     ----------
     rng : numpy.random.Generator
-        What it is drawn from, or what stands for one.
+        Source of random numbers, or an object with its methods.
     seed : int
-        The scene's own, 0 or above.
+        Seed of the scene, 0 or above.
     family : {"conflict", "tour"}
         As for `make_conflict`.
 
     Returns
     -------
     dict
-        As `make_conflict` does.
+        As for `make_conflict`.
     """
     _, kinds, duration = CONFLICTS[family]
     vehicle = load_vehicle(list(_LAGS)[int(rng.integers(len(_LAGS)))])
@@ -93,7 +93,7 @@ def draw_conflict(rng: Any, seed: int, family: str = "conflict") -> Table:
 
 
 def _scale(vehicle: Vehicle) -> float:
-    """Return by how much forces are greater than those of a vehicle of up to 50 kg."""
+    """Return the factor of forces, relative to a vehicle of up to 50 kg."""
     return max(1.0, vehicle.mass / 50.0)
 
 
@@ -127,24 +127,24 @@ def _box(x: tuple[float, float], y: tuple[float, float], z: tuple[float, float])
 
 
 def _beyond(axis: int, at: float, sign: float = 1.0) -> Table:
-    """Return the half-space of all that is less than `at` [m] along an axis, or more, where the sign is negative."""
+    """Return the half-space below `at` [m] along an axis, or above it for a negative sign."""
     point, normal = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
     point[axis], normal[axis] = float(at), float(sign)
     return {"type": "half_space", "point": point, "normal": normal}
 
 
 def _two(rng: Generator) -> tuple[str, str]:
-    """Return two criteria, at random."""
+    """Return two random criteria."""
     first, second = rng.choice(3, 2, replace=False).tolist()
     return _CRITERIA[first], _CRITERIA[second]
 
 
 def _closing(rng: Generator, axis: int, middle: float) -> tuple[Table, list[Table]]:
-    """Make two hard faces that approach each other along an axis, until they are past each other."""
+    """Make two hard faces that approach each other along an axis until they overlap."""
     one, other = _two(rng)
     apart, overlap, duration = rng.uniform(3.0, 4.0), rng.uniform(0.2, 0.8), rng.uniform(35.0, 50.0)
     fast = (apart + overlap) / duration  # m/s, of both together
-    share = rng.uniform()  # of it, that the first one has
+    share = rng.uniform()  # fraction of it for the first face
     velocities = np.zeros((2, 3))
     velocities[0, axis], velocities[1, axis] = share * fast, (share - 1.0) * fast
     regions = [
@@ -157,17 +157,17 @@ def _closing(rng: Generator, axis: int, middle: float) -> tuple[Table, list[Tabl
 
 
 def _ceiling(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make a ceiling and a greatest depth that close in on each other."""
+    """Make a ceiling and a greatest depth that approach each other."""
     return _closing(rng, 2, 4.0)
 
 
 def _dock(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make walls of a dock that close."""
+    """Make walls of a dock that approach each other."""
     return _closing(rng, 1, 0.0)
 
 
 def _door(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make a wall with a door, behind which lies a soft region; below the wall lies another one."""
+    """Make a wall with a door, a soft region behind the door, and another one below the wall."""
     one, other = _two(rng)
     gap, edge = rng.uniform(1.4, 2.0), rng.uniform(5.5, 6.5)
     at, deep = rng.uniform(4.0, 6.0), rng.uniform(0.6, 2.0)
@@ -191,7 +191,7 @@ def _door(rng: Generator) -> tuple[Table, list[Table]]:
 
 
 def _sides(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make an obstacle that is passed through one soft region on the left, or through another on the right."""
+    """Make an obstacle with a soft region on its left and another one on its right."""
     one, other = _two(rng)
     at, half = rng.uniform(4.0, 5.5), rng.uniform(1.0, 1.8)
     thick = rng.uniform(0.8, 2.0, 2)
@@ -214,7 +214,7 @@ def _squeeze(rng: Generator) -> tuple[Table, list[Table]]:
 
 
 def _view(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make a feature to be kept in view along a way with an obstacle, clutter, and a greatest depth."""
+    """Make a moving feature to be kept in view, with an obstacle, clutter, and a greatest depth on the path."""
     speed, drop = rng.uniform(0.1, 0.2), rng.uniform(0.0, 0.25)
     velocity = (speed, 0.0, drop * speed)
     end = 2.0 + 60.0 * speed
@@ -233,19 +233,19 @@ def _view(rng: Generator) -> tuple[Table, list[Table]]:
 
 
 def _in_turn(goal: Table, *places: tuple[float, float, float]) -> Table:
-    """Return a goal that goes on to other places."""
+    """Return a goal with further places in turn."""
     return goal | {"then": [[float(x) for x in place] for place in places], "stay": 3.0}
 
 
 def _sides_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make goals beyond an obstacle, back at the start, and beyond it again, with a soft region on each side of it."""
+    """Make goals behind an obstacle, back at the start, and behind it again, with a soft region on each side."""
     goal, regions = _sides(rng)
     back = (rng.uniform(-1.0, 0.0), rng.uniform(-2.0, 2.0), rng.uniform(3.5, 4.5))
     return _in_turn(goal, back, (10.0, rng.uniform(-2.0, 2.0), rng.uniform(3.5, 4.5))), regions
 
 
 def _depths_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make goals that lie about a least and a greatest depth by turns, both soft, that exclude each other."""
+    """Make goals near a least and a greatest depth in turn, both soft, which exclude each other."""
     goal, regions = _squeeze(rng)
     x, y, z = goal["centre"]
     deep, shallow = z + rng.uniform(0.2, 0.8), z - rng.uniform(0.2, 0.8)
@@ -254,9 +254,9 @@ def _depths_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
 
 
 def _views_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make places from which a structure is looked at in turn, with a pillar between them.
+    """Make places from which a structure is viewed in turn, with a pillar between them.
 
-    Who passes the pillar outside loses the view, who passes it inside comes too near to the structure. A greatest
+    A path outside of the pillar loses the view; one inside of it violates the region around the structure. A greatest
     depth excludes the deeper places.
     """
     x, y, z = 4.0, 4.0, 4.2  # of the structure
@@ -274,7 +274,7 @@ def _views_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
 
 
 class _Family(NamedTuple):
-    """How the conflicts of a family are made."""
+    """Generators of the conflicts of a family."""
 
     stream: int  # of random numbers
     kinds: Kinds

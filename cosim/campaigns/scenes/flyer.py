@@ -1,4 +1,4 @@
-"""A scored scene, flown by a law, with the FMU of each vehicle loaded once for many."""
+"""Flies and scores scenes with a law; the FMU of each vehicle is loaded once."""
 
 from __future__ import annotations
 
@@ -27,28 +27,28 @@ _ROUNDING = 1e-9  # of a count of steps
 
 
 class Score(NamedTuple):
-    """What the flight of a scene came to."""
+    """Score of the flight of a scene."""
 
     reached: bool  # inside the goal region for the last `Conditions.settled` seconds
-    reach_time: float  # s, since when it was inside without a break; inf if it is outside at the end
-    min_clearance: float  # m, least over all hard regions, the start and all plant steps; negative: violated
+    reach_time: float  # s, beginning of the last stay inside; inf if outside at the end
+    min_clearance: float  # m, least over all hard regions and plant steps, with the start; negative: violated
     effort: float  # N s, sum over thrusters of the integral of the given force's magnitude
-    thrust_variation: float  # N, sum over thrusters of the changes of the commanded force, from 0 on
-    worst_step: float  # s of the wall clock, the longest that law and allocation took
-    failed_step: int  # plant step that the FMU refused, -1 for none
-    bound_excess: float = -math.inf  # m, by which a clearance was below the law's bound, greatest; -inf: it gives none
-    weighted_violation: float = 0.0  # m s, integral of how deep each region is violated, times its priority, summed
+    thrust_variation: float  # N, sum over thrusters of the absolute changes of the commanded force, from 0 on
+    worst_step: float  # s of the wall clock, longest time of law and allocation in a step
+    failed_step: int  # plant step in which the FMU failed, -1 for none
+    bound_excess: float = -math.inf  # m, greatest excess of the law's bound over a clearance; -inf: it has no bound
+    weighted_violation: float = 0.0  # m s, sum over regions of priority times the integral of the violation depth
 
 
 class SceneFlyer:
-    r"""One law and one plant, for scene after scene.
+    r"""Flies scenes one after the other with one law.
 
     Parameters
     ----------
     law : str
         One of those in `controller.LAWS`.
     conditions : Conditions
-        The same for all scenes.
+        Conditions of all flights.
     gains : NamedTuple, optional
         Of the law; default: its own defaults.
 
@@ -57,7 +57,7 @@ class SceneFlyer:
     RunError
         If there is no such law.
     LawError
-        If it cannot work with the gains.
+        If the law refuses the gains.
     BuildError, PlantError
         If there is no FMU of the vehicle.
 
@@ -82,7 +82,7 @@ class SceneFlyer:
         self.gains = LAWS[law].gains_type() if gains is None else gains
         vehicle = load_vehicle(VEHICLE)
         model, level = vehicle_model(vehicle), np.array(_LEVEL)
-        LAWS[law].for_vehicle(model, self.gains, level, self.conditions.control, 0)  # says now what it cannot work with
+        LAWS[law].for_vehicle(model, self.gains, level, self.conditions.control, 0)  # raises an error for invalid gains
         self._clock = Clock()
         self._plants = {VEHICLE: Plant(vehicle)}
 
@@ -92,19 +92,19 @@ class SceneFlyer:
         Parameters
         ----------
         scene : Scene or ScenarioScene
-            With all that the plant needs.
+            The scene.
         trace : bool
-            Whether to keep what happened, see `cosim.batch.flight_config`.
+            Return a trace, see `cosim.batch.flight_config`.
 
         Returns
         -------
         Score, ndarray
-            What it came to, and the trace, shape (0, 0) if none is kept.
+            The score, and the trace, shape (0, 0) without one.
 
         Raises
         ------
         ScenarioError, PlantError
-            If the plant cannot be as the scene has it. The flyer can go on with another scene.
+            If the plant refuses the scene. The flyer can then fly another one.
         BuildError
             If there is no FMU of its vehicle.
         """

@@ -1,8 +1,8 @@
-"""Random scenes to fly by campaigns, the same for everyone who uses the same seed.
+"""Generators of random scenes for campaigns, determined by the seed.
 
-A scene is a start, a spherical goal region, spheres across the straight way to it, a depth band, a steady current,
-and restoring forces that no law is given. A hard one has more obstacles, the first of which drifts, a stronger
-current, noise, and a thruster that fails. `cosim.campaigns.scenes.scene` says what is done with each number.
+A scene has a start, a spherical goal region, spheres near the straight path to it, a depth band, a steady current, and
+restoring forces that laws do not receive. A hard one has more obstacles, the first of which drifts, a stronger current,
+noise, and a thruster that fails. `cosim.campaigns.scenes.scene` defines the numbers.
 """
 
 from __future__ import annotations
@@ -21,38 +21,38 @@ from cosim.campaigns.scenes.trials import make_trial
 
 MOST_OBSTACLES = {"plain": 6, "hard": 14}
 _GOAL_RADIUS = 0.5  # m
-_FREE = 0.6  # m, from an obstacle to the start and to the goal region, at least
+_FREE = 0.6  # m, least distance of an obstacle from the start and from the goal region
 
 
 class Draws(Protocol):
-    """The random numbers of a scene: a generator of NumPy, or what stands for one."""
+    """Source of a scene's random numbers: a NumPy generator, or an object with its methods."""
 
     def uniform(self, low: Any, high: Any) -> Any:
-        """Draw evenly between two bounds, or two lists of them."""
+        """Draw uniformly between two bounds, or two lists of them."""
 
     def normal(self, mean: Any, deviation: Any) -> Any:
         """Draw from normal distributions."""
 
     def integers(self, low: int, high: int) -> Any:
-        """Draw a whole number from `low` on, below `high`."""
+        """Draw a whole number from `low` to `high` - 1."""
 
 
 def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[str]:
-    r"""Generate scenes, one for each seed from the first on.
+    r"""Generate scenes with successive seeds.
 
     Parameters
     ----------
     count : int
-        How many.
+        Number of scenes.
     seed : int
-        Of the first, 0 or above.
+        Seed of the first scene, 0 or above.
     kind : {"plain", "hard", "conflict", "tour", "trial"}
-        Of all of them; the last three as in `conflicts` and `trials` beside this module.
+        Kind of all scenes; the last three as in the modules `conflicts` and `trials`.
 
     Yields
     ------
     str
-        A line of JSON, as `cosim.campaigns.scenes.scene_file.read_scenes` reads it.
+        A line of JSON for `cosim.campaigns.scenes.scene_file.read_scenes`.
 
     Examples
     --------
@@ -79,30 +79,30 @@ def make_scene(seed: int, kind: str = "plain") -> dict[str, Any]:
     Returns
     -------
     dict
-        As JSON has it; SI units, NED.
+        Table for JSON; SI units, NED.
     """
     rng = np.random.default_rng([20261121, seed, int(kind == "hard")])
     return draw_scene(rng, itertools.repeat(rng), seed, kind)
 
 
 def draw_scene(rng: Draws, of_obstacles: Iterable[Draws], seed: int, kind: str) -> dict[str, Any]:
-    """Make a plain or hard scene of random numbers.
+    """Make a plain or hard scene from random numbers.
 
     Parameters
     ----------
     rng : Draws
-        What all but the obstacles is drawn from.
+        Source for all numbers but those of the obstacles.
     of_obstacles : iterable of Draws
-        What each obstacle is drawn from, as many as `MOST_OBSTACLES` says.
+        Source for each obstacle, `MOST_OBSTACLES` of them.
     seed : int
-        The scene's own, 0 or above.
+        Seed of the scene, 0 or above.
     kind : {"plain", "hard"}
         A hard one has drift, noise and a failing thruster.
 
     Returns
     -------
     dict
-        As JSON has it; SI units, NED.
+        Table for JSON; SI units, NED.
     """
     hard = kind == "hard"
     start = np.array([0.0, 0.0, rng.uniform(1.5, 4.0)])

@@ -1,4 +1,4 @@
-"""What scenes are like: their kind, and numbers that outcomes may depend on."""
+"""Kinds and features of scenes, on which outcomes may depend."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cosim.simulation.signals import Array
 
 PLAIN = "plain"
 
-FEATURES = {  # of each number of a scene: its unit
+FEATURES = {  # units of the features
     "obstacles": "",
     "current": "m/s",
     "weight less buoyancy": "N",
@@ -28,13 +28,13 @@ FEATURES = {  # of each number of a scene: its unit
 
 @dataclass(frozen=True)
 class SceneKinds:
-    """What each scene of a campaign is like."""
+    """Kinds and features of a campaign's scenes."""
 
     kinds: NDArray[np.str_]  # (scenes,) such as "drift, noise, failure"
     features: dict[str, Array]  # (scenes,) each, by the keys of FEATURES
 
     def groups(self) -> Iterator[tuple[str, NDArray[np.bool_]]]:
-        """Yield each kind that there is, and which scenes are of it; nothing where all are of one."""
+        """Yield each kind with the mask of its scenes; nothing if all are of one kind."""
         names = sorted(set(self.kinds.tolist()), key=lambda name: (name != PLAIN, name))
         if len(names) > 1:
             for name in names:
@@ -42,12 +42,12 @@ class SceneKinds:
 
 
 def scene_kinds(results: Results) -> SceneKinds:
-    """Return what the scenes of a campaign are like.
+    """Return kinds and features of a campaign's scenes.
 
     Parameters
     ----------
     results : Results
-        Whose column ``scene`` has them; they are read some at a time.
+        Rows with the column ``scene``, which is read in pieces.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def scene_kinds(results: Results) -> SceneKinds:
     Raises
     ------
     RunError
-        If they cannot be read, or a line is no scene.
+        If they cannot be read, or a line is not a scene.
     """
     kinds: list[str] = []
     numbers: list[tuple[float, ...]] = []
@@ -74,7 +74,7 @@ def scene_kinds(results: Results) -> SceneKinds:
 
 
 def kind_of(scene: AnyScene) -> str:
-    """Return in words what makes a scene hard beyond its regions: drift of obstacles, noise, a thruster that fails."""
+    """Return the kind of a scene: words for drift of obstacles, noise, and a failing thruster, or ``plain``."""
     if isinstance(scene, ScenarioScene):
         return scene.kind
     present = {
@@ -86,7 +86,7 @@ def kind_of(scene: AnyScene) -> str:
 
 
 def _numbers(scene: AnyScene) -> tuple[float, ...]:
-    if isinstance(scene, ScenarioScene):  # whose plants are not alike
+    if isinstance(scene, ScenarioScene):  # their features are not comparable
         return (math.nan,) * len(FEATURES)
     return (
         len(scene.obstacles),

@@ -21,7 +21,7 @@ def law_named(name: str) -> Any:
     Returns
     -------
     type of CompiledLaw
-        Whose ``gains_type`` has the law's defaults.
+        Its ``gains_type`` has the law's defaults.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def law_named(name: str) -> Any:
 
 
 def gains_from(law: str, settings: Sequence[str] = ()) -> Any:
-    """Return the gains of a law, some of them set.
+    """Return the gains of a law with settings applied.
 
     Parameters
     ----------
@@ -46,12 +46,12 @@ def gains_from(law: str, settings: Sequence[str] = ()) -> Any:
     Returns
     -------
     NamedTuple
-        Of the law's ``gains_type``; whether it can work with them, the law says.
+        Of the law's ``gains_type``, not validated.
 
     Raises
     ------
     RunError
-        If there is no such law, it has no such gain, or the value is no number.
+        If there is no such law, it has no such gain, or the value is not a number.
     """
     gains = law_named(law).gains_type()
     for text in settings:
@@ -68,7 +68,7 @@ def gains_from(law: str, settings: Sequence[str] = ()) -> Any:
 
 
 def gains_by_law(laws: Sequence[str], settings: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the gains of several laws, some of them set.
+    """Return the gains of several laws with settings applied.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def gains_by_law(laws: Sequence[str], settings: Sequence[str] = ()) -> dict[str,
     Raises
     ------
     RunError
-        If a law or a gain is unknown, or the value is no number.
+        If a law or a gain is unknown, or the value is not a number.
     """
     by_law: dict[str, list[str]] = {law: [] for law in laws}
     for text in settings:

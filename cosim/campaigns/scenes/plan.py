@@ -1,4 +1,4 @@
-"""What every row of a campaign of scenes rests on."""
+"""Plan of a campaign of scenes."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from cosim.campaigns.store.plan import SCENES, code_digest, versions
 
 @dataclass(frozen=True)
 class Plan:
-    """What every row of a campaign of scenes rests on."""
+    """All inputs that determine the rows of a campaign of scenes."""
 
     law: str
     gains: dict[str, float]
     conditions: Conditions
     scenes: int
     scenes_sha256: str
-    code_sha256: str  # of the sources of all packages: rows of different code are not mixed
+    code_sha256: str  # of the sources of all packages, so that rows of different code are not mixed
     versions: dict[str, str]
 
     def table(self) -> dict[str, Any]:
-        """Return it as a table for JSON."""
+        """Return the plan as a table for JSON."""
         outages = [asdict(outage) for outage in self.conditions.outages]  # a list, as JSON reads them
         return {"kind": SCENES} | asdict(self) | {"conditions": asdict(self.conditions) | {"outages": outages}}
 
 
 def plan_of(law: str, gains: Any, conditions: Conditions, scenes: int, digest: str) -> Plan:
-    """Return the plan of a campaign with the code and the libraries that are here.
+    """Make the plan of a campaign with the installed code and libraries.
 
     Parameters
     ----------
@@ -37,15 +37,15 @@ def plan_of(law: str, gains: Any, conditions: Conditions, scenes: int, digest: s
     gains : NamedTuple
         Of the law.
     conditions : Conditions
-        How scenes are flown.
+        Conditions of the flights.
     scenes : int
-        How many.
+        Number of scenes.
     digest : str
-        Of the scenes.
+        SHA-256 of the scenes.
 
     Returns
     -------
     Plan
-        Any two that are equal give the same rows on the same machine.
+        Equal plans give the same rows on the same machine.
     """
     return Plan(law, gains._asdict(), conditions, scenes, digest, code_digest(), versions())

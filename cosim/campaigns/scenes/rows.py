@@ -14,7 +14,7 @@ from cosim.campaigns.store.columns import of_numbers, of_texts
 
 
 class Row(NamedTuple):
-    """What a scene came to; None where there is no number."""
+    """Row of a scene; None for missing numbers."""
 
     seed: int
     reached: bool
@@ -67,23 +67,23 @@ SCHEMA: Any = pa.schema(
 
 
 def row_of(seed: int, score: Score, plant_step: float, scene: str = "") -> Row:
-    """Return the row of a flight.
+    """Make the row of a flight.
 
     Parameters
     ----------
     seed : int
         Of the scene.
     score : Score
-        What the flight came to.
+        Score of the flight.
     plant_step : float
         Length of a plant step [s].
     scene : str
-        Its line.
+        JSON line of the scene.
 
     Returns
     -------
     Row
-        A clearance that is no number, and a flight that stopped, count as violations: neither was seen to be safe.
+        A NaN clearance and a stopped flight count as violations, since they are not known to be safe.
     """
     stopped = score.failed_step >= 0
     return Row(
@@ -104,7 +104,7 @@ def row_of(seed: int, score: Score, plant_step: float, scene: str = "") -> Row:
 
 
 def refused_row(seed: int, reason: str, scene: str = "") -> Row:
-    """Return the row of a scene that was not flown."""
+    """Make the row of a scene that was not flown."""
     return Row(
         seed=seed, reached=False, violation=True, min_clearance=None, bound_excess=None, weighted_violation=None,
         reach_time=None, effort=None, thrust_variation=None, worst_step_time=None, stopped_at=0.0,
@@ -117,7 +117,7 @@ def _number(x: float) -> float | None:
 
 
 def table_of(rows: Sequence[Row]) -> Any:
-    """Return rows as a table of `SCHEMA`."""
+    """Convert rows to a table of `SCHEMA`."""
     columns = [_column(field.type, [row[i] for row in rows]) for i, field in enumerate(SCHEMA)]
     return pa.Table.from_arrays(columns, schema=SCHEMA)
 

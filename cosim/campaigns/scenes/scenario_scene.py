@@ -1,4 +1,4 @@
-"""A scene that is a whole scenario, but for the law: with its own vehicle, criteria and priorities."""
+"""A scene that is a whole scenario without a law: with its own vehicle, criteria and priorities."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MOST = 60  # characters of a kind
 
 @dataclass(frozen=True)
 class ScenarioScene:
-    r"""One scene, as its line has it.
+    r"""One scene of a file.
 
     Examples
     --------
@@ -31,15 +31,15 @@ class ScenarioScene:
 
     seed: int
     kind: str  # scenes of a kind are summarised together
-    scenario: dict[str, Any]  # as its file has it, without a law
+    scenario: dict[str, Any]  # table of the scenario, without a law
 
     def with_law(self, law: str, gains: dict[str, float], changes: dict[str, Any]) -> Scenario:
-        """Return the scenario with a law, its gains, and other changes of whole tables.
+        """Make the scenario with a law, its gains, and replaced tables.
 
         Raises
         ------
         ScenarioError
-            If it cannot be.
+            If the scenario is invalid.
         """
         table = copy.deepcopy(self.scenario) | {"law": {"name": law, "gains": gains}} | changes
         try:
@@ -52,7 +52,7 @@ AnyScene = Scene | ScenarioScene
 
 
 def check_scenario_scene(scene: ScenarioScene) -> None:
-    """Raise `ScenarioError` at the first thing that cannot be, whatever the law."""
+    """Raise `ScenarioError` at the first invalid key, for any law."""
     if not 0 <= scene.seed < 2**63:
         raise ScenarioError(f"seed is {scene.seed}, expected a whole number from 0 to 2^63 - 1")
     if not (0 < len(scene.kind) <= _MOST and scene.kind.isprintable()):

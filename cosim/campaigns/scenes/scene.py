@@ -1,6 +1,6 @@
-"""Scored scenes: a start, a goal region, obstacles, a depth band, and what the law is not given of the plant.
+"""Scored scenes: a start, a goal region, obstacles, a depth band, and parameters of the plant.
 
-The law is given `scene_regions` and the goal; `plant_values` are for the plant alone.
+The law receives `scene_regions` and the goal; `plant_values` are for the plant alone.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class SphereSpec:
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A sphere to be kept out of, which may drift."""
+    """A sphere to keep out of, which may drift."""
 
     centre: Vector3  # m, NED, at time 0
     radius: float  # m, the hull included
@@ -34,7 +34,7 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations of what is measured at each control step, white."""
+    """Standard deviations of the white noise of measurements at each control step."""
 
     position: float = 0.0  # m
     velocity: float = 0.0  # m/s
@@ -43,7 +43,7 @@ class Noise:
 
 @dataclass(frozen=True)
 class Failure:
-    """A thruster that gives nothing from some time on."""
+    """A thruster that gives no force from some time on."""
 
     index: int  # from 1
     time: float  # s
@@ -51,7 +51,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class Scene:
-    r"""One scene, as its line has it.
+    r"""One scene of a file.
 
     Examples
     --------
@@ -81,7 +81,7 @@ def scene_regions(scene: Scene) -> list[tuple[Region, str]]:
     Parameters
     ----------
     scene : Scene
-        With all that the plant needs.
+        The scene.
 
     Returns
     -------
@@ -98,26 +98,26 @@ def scene_regions(scene: Scene) -> list[tuple[Region, str]]:
 
 
 def plant_values(scene: Scene, vehicle: Vehicle, substep: float) -> dict[str, float]:
-    """Return what the plant is set to for a scene; its weight, mass and r_G stay those of the vehicle.
+    """Return the plant's parameters and start values for a scene; weight, mass and r_G are the vehicle's.
 
     Parameters
     ----------
     scene : Scene
-        With all that the plant needs.
+        The scene.
     vehicle : Vehicle
-        Whose weight and centre of gravity count.
+        Its weight and centre of gravity are used.
     substep : float
         Greatest integration step [s].
 
     Returns
     -------
     dict of str to float
-        Parameters and start values of the FMU.
+        By the names of the FMU's variables.
 
     Raises
     ------
     ScenarioError
-        If there would be no buoyancy, or the vehicle has no such thruster.
+        If the buoyancy is not above 0, or the vehicle has no such thruster.
     """
     buoyancy = vehicle.weight - scene.weight_minus_buoyancy
     if not buoyancy > 0.0:
@@ -139,7 +139,7 @@ def plant_values(scene: Scene, vehicle: Vehicle, substep: float) -> dict[str, fl
 
 
 def check_scene(scene: Scene) -> None:
-    """Raise an error at the first number that cannot be, whatever the vehicle."""
+    """Raise an error at the first number that is out of range, for any vehicle."""
     failure, noise, (shallow, deep) = scene.failed_thruster, scene.noise, scene.depth_band
     _require(0 <= scene.seed < 2**63, "seed", scene.seed, "a whole number from 0 to 2^63 - 1")
     for key in ("start", "current", "depth_band"):

@@ -1,4 +1,4 @@
-"""Files of scenes: one JSON object a line."""
+"""Files of scenes: one JSON object per line."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from cosim.errors import ScenarioError
 from plant_fmu import PlantFmuError
 from plant_fmu.toml_tables import decode
 
-_LONGEST = 1_000_000  # bytes of a scene: a pipe may never end its line
+_LONGEST = 1_000_000  # bytes of a line, since a pipe may send an endless one
 
 
 def decode_scene(line: bytes) -> AnyScene:
-    """Return the scene of a line.
+    """Parse the scene of a line.
 
     Parameters
     ----------
@@ -28,12 +28,12 @@ def decode_scene(line: bytes) -> AnyScene:
     Returns
     -------
     Scene or ScenarioScene
-        Whose numbers are finite and can be; the latter if the line has a ``scenario``.
+        With valid numbers; the latter if the line has a ``scenario``.
 
     Raises
     ------
     ScenarioError
-        If it is no scene; it names the key.
+        If it is not a scene; it names the key.
     """
     try:
         table = msgspec.json.decode(line)
@@ -50,7 +50,7 @@ def decode_scene(line: bytes) -> AnyScene:
 
 
 def read_scenes(path: Path) -> Iterator[AnyScene]:
-    r"""Read scenes from a file, one JSON object a line; blank lines are passed over.
+    r"""Read scenes from a file with one JSON object per line; blank lines are skipped.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def read_scenes(path: Path) -> Iterator[AnyScene]:
     Raises
     ------
     ScenarioError
-        If the file cannot be read, or a line is no scene; it names the line and the key.
+        If the file cannot be read, or a line is not a scene; it names the line and the key.
 
     Examples
     --------
@@ -83,14 +83,14 @@ def read_scenes(path: Path) -> Iterator[AnyScene]:
 
 
 def scenes_in(file: IO[bytes], name: str) -> Iterator[AnyScene]:
-    """Read scenes from a file.
+    """Read scenes from an open file.
 
     Parameters
     ----------
     file : file object
-        A line is one JSON object; blank ones are passed over. It may be a pipe that never ends.
+        With one JSON object per line; blank lines are skipped. It may be an endless pipe.
     name : str
-        Of where they come from, for messages.
+        Name of the source, for messages.
 
     Yields
     ------
@@ -100,7 +100,7 @@ def scenes_in(file: IO[bytes], name: str) -> Iterator[AnyScene]:
     Raises
     ------
     ScenarioError
-        At a line that is no scene; it names the line and the key.
+        At a line that is not a scene; it names the line and the key.
     """
     for number, line in enumerate(iter(lambda: file.readline(_LONGEST + 1), b""), 1):
         if len(line) > _LONGEST:

@@ -1,4 +1,4 @@
-"""The scenes of a campaign, checked once and kept on disk, so that a hundred thousand need no memory."""
+"""The scenes of a campaign, checked once and stored in a temporary file instead of memory."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ class SceneStore:
     Parameters
     ----------
     path : Path
-        A file of one JSON object a line; ``-`` for standard input.
+        A file with one JSON object per line; ``-`` for standard input.
 
     Attributes
     ----------
     seeds : list of int
         In rising order.
     digest : str
-        SHA-256 over the scenes in their order, whatever blanks the file has.
+        SHA-256 over the scenes in their order, independent of blanks in the file.
 
     Raises
     ------
     ScenarioError
-        If the file cannot be read, holds no scene, a line is none, or a seed comes twice.
+        If the file cannot be read, holds no scene, a line is not a scene, or two have the same seed.
     """
 
     def __init__(self, path: Path) -> None:
@@ -74,7 +74,7 @@ class SceneStore:
         self.seeds = sorted(self._places)
 
     def lines(self, seeds: Iterable[int]) -> list[bytes]:
-        """Return the lines of some scenes, in the order of the seeds."""
+        """Return the lines of the scenes with given seeds, in this order."""
         found = []
         for seed in seeds:
             offset, length = self._places[seed]

@@ -1,7 +1,7 @@
-"""Scenes that try one part of a law each: what it has to estimate, to find out, or to get round.
+"""Scenes that test one part of a law each: an estimate, fault detection, or path planning.
 
-Each scene is a scenario with hard regions alone: spheres across the way, between which it is narrow, and one thing that
-a law is not given and that is far from nominal. The generator does not know how any law fares in its scenes.
+Each scene is a scenario with hard regions only: spheres near the path with narrow gaps, and one property that laws do
+not receive and that is far from nominal. The generator does not depend on the performance of any law.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def make_trial(seed: int) -> Table:
     Returns
     -------
     dict
-        Its seed, its kind, which says what is tried, and the table of the scenario, without a law.
+        Seed, kind, which names the tested part, and table of the scenario without a law.
     """
     rng = np.random.default_rng([20261125, seed])
     vehicle = load_vehicle(VEHICLES[int(rng.integers(len(VEHICLES)))])
@@ -65,7 +65,7 @@ def _region(name: str, shape: Table, criterion: str = "obstacle", keep: str = "o
 
 
 def _sphere(rng: Generator) -> Table:
-    """Return a sphere across the way, which leaves start and goal free."""
+    """Return a sphere near the path, at a distance from start and goal."""
     while True:
         radius = rng.uniform(0.3, 0.9)
         centre = _START + rng.uniform(0.2, 0.8) * (_GOAL - _START) + rng.normal(0.0, [0.3, 0.8, 0.8])
@@ -82,13 +82,13 @@ def _net_weight(rng: Generator, vehicle: Vehicle, table: Table) -> None:
 
 
 def _current(rng: Generator, vehicle: Vehicle, table: Table) -> None:
-    """Let a current of 0.25 to 0.5 m/s set in."""
+    """Set a current of 0.25 to 0.5 m/s."""
     heading, speed = rng.uniform(-np.pi, np.pi), rng.uniform(0.25, 0.5)
     table["plant"]["current"] = [float(speed * np.cos(heading)), float(speed * np.sin(heading)), 0.0]
 
 
 def _moments(rng: Generator, vehicle: Vehicle, table: Table) -> None:
-    """Displace the centre of buoyancy by 2 to 5 cm from the vertical, so that the vehicle would rest tilted."""
+    """Displace the centre of buoyancy horizontally by 2 to 5 cm, so that the vehicle would rest tilted."""
     heading, arm = rng.uniform(-np.pi, np.pi), rng.uniform(0.02, 0.05)
     parameters = table["plant"]["parameters"]
     parameters["r_B.x"] = float(vehicle.r_B[0] + arm * np.cos(heading))
@@ -96,19 +96,19 @@ def _moments(rng: Generator, vehicle: Vehicle, table: Table) -> None:
 
 
 def _effectiveness(rng: Generator, vehicle: Vehicle, table: Table) -> None:
-    """Wear each thruster to 0.6 to 1 of its force."""
+    """Set the effectiveness of each thruster to 0.6 to 1."""
     wear = rng.uniform(0.6, 1.0, vehicle.n_thrusters).tolist()
     table["plant"]["parameters"] |= {f"thrust_effectiveness[{i + 1}]": x for i, x in enumerate(wear)}
 
 
 def _lag(rng: Generator, vehicle: Vehicle, table: Table) -> None:
-    """Let the thrusters lag by 0.2 to 0.5 s, which the vehicle's file does not say."""
+    """Set a lag of the thrusters of 0.2 to 0.5 s, which is not in the vehicle's file."""
     lag = float(rng.uniform(0.2, 0.5))
     table["plant"]["parameters"] = {f"thrust_time_constant[{i + 1}]": lag for i in range(vehicle.n_thrusters)}
 
 
 def _failure(rng: Generator, vehicle: Vehicle, table: Table) -> None:
-    """Let a thruster fail on the way, or stick."""
+    """Let a thruster fail or stick during the run."""
     table["failures"] = [
         {
             "thruster": int(rng.integers(1, vehicle.n_thrusters + 1)),
@@ -119,7 +119,7 @@ def _failure(rng: Generator, vehicle: Vehicle, table: Table) -> None:
 
 
 def _pocket(rng: Generator, vehicle: Vehicle, table: Table) -> None:
-    """Put a pocket across the way, open towards the start, in the place of the spheres."""
+    """Replace the spheres by a pocket on the path, open towards the start."""
     at, deep, half = rng.uniform(5.0, 7.0), rng.uniform(1.5, 3.5), rng.uniform(1.0, 2.0)
     walls = {
         "back": ((at, at + 0.4), (-half - 0.4, half + 0.4)),

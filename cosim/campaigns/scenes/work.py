@@ -1,4 +1,4 @@
-"""Scenes as the work of a campaign: a row a scene, in order of seed."""
+"""Scenes as the work of a campaign: a row for each scene, in order of seed."""
 
 from __future__ import annotations
 
@@ -21,36 +21,36 @@ from plant_fmu import PlantError
 
 @dataclass(frozen=True)
 class SceneTask:
-    """What all scenes of a campaign have in common."""
+    """The data that all scenes of a campaign share."""
 
     law: str
     gains: Any  # NamedTuple of the law's gains_type
     conditions: Conditions
 
     def flyer(self) -> SceneBatches:
-        """Return a flyer of its own."""
+        """Create a flyer."""
         return SceneBatches(self)
 
 
 class SceneBatches:
-    """Flies scenes, a line each, one after the other.
+    """Flies scenes, given as lines, one after the other.
 
     Parameters
     ----------
     task : SceneTask
-        How.
+        Law, gains and conditions.
 
     Raises
     ------
     RunError, LawError, BuildError, PlantError
-        As `SceneFlyer` does.
+        As `SceneFlyer`.
     """
 
     def __init__(self, task: SceneTask) -> None:
         self._flyer = SceneFlyer(task.law, task.conditions, task.gains)
 
     def fly(self, batch: list[bytes]) -> Any:
-        """Return a table with a row for each line; what the plant refuses has one that says so."""
+        """Return a table with a row for each line; a scene that the plant refuses has a row with the reason."""
         rows = []
         for line in batch:
             scene, text = decode_scene(line), line.decode().strip()
@@ -75,7 +75,7 @@ class SceneWork:
     store : SceneStore
         The scenes.
     task : SceneTask
-        How they are flown.
+        Law, gains and conditions.
     """
 
     unit, schema = "scene", SCHEMA
@@ -92,11 +92,11 @@ class SceneWork:
         return len(self._seeds)
 
     def batch(self, rows: Rows) -> list[bytes]:
-        """Return the lines of some rows."""
+        """Return the JSON lines of some rows."""
         return self._store.lines(self._seeds[rows].tolist())
 
     def rows_of(self, keys: Rows) -> Rows:
-        """Return the rows of some seeds; -1 for one that has none."""
+        """Return the rows of some seeds; -1 for an unknown seed."""
         rows = np.minimum(np.searchsorted(self._seeds, keys), len(self._seeds) - 1)
         return np.where(self._seeds[rows] == keys, rows, -1)
 

@@ -1,6 +1,6 @@
-"""Columns of a table from arrays and texts, and back.
+"""Conversion between columns of a table and arrays or texts.
 
-``pyarrow.array`` and ``to_numpy`` do the same, but import pandas where it is installed: a third of a second a worker.
+``pyarrow.array`` and ``to_numpy`` do the same, but import pandas if it is installed: a third of a second per worker.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-_TYPES = {"f": pa.float64(), "i": pa.int64(), "b": pa.bool_()}  # by NumPy's letter
+_TYPES = {"f": pa.float64(), "i": pa.int64(), "b": pa.bool_()}  # by NumPy's kind
 
 
 def of_numbers(values: NDArray[Any], absent: NDArray[np.bool_] | None = None) -> Any:
-    """Return a column of numbers or facts.
+    """Make a column of numbers or Booleans.
 
     Parameters
     ----------
     values : ndarray of float64, int64 or bool, shape (n,)
         Of the rows.
     absent : ndarray of bool, shape (n,), optional
-        Where the column has nothing.
+        Mask of nulls.
 
     Returns
     -------
@@ -37,12 +37,12 @@ def of_numbers(values: NDArray[Any], absent: NDArray[np.bool_] | None = None) ->
 
 
 def of_texts(texts: Sequence[str | None]) -> Any:
-    """Return a column of texts.
+    """Make a column of texts.
 
     Parameters
     ----------
     texts : sequence of str or None
-        Of the rows; None is nothing.
+        Of the rows; None for null.
 
     Returns
     -------
@@ -62,12 +62,12 @@ def to_array(column: Any) -> NDArray[Any]:
     Parameters
     ----------
     column : pyarrow.ChunkedArray
-        Of numbers, facts or texts.
+        Of numbers, Booleans or texts.
 
     Returns
     -------
     ndarray, shape (n,)
-        NaN or None where there is nothing.
+        NaN or None for null.
     """
     if column.type == pa.string():
         return np.array(column.to_pylist(), dtype=object)
@@ -79,14 +79,14 @@ def to_array(column: Any) -> NDArray[Any]:
 
 
 def _values(column: Any) -> NDArray[Any]:
-    """Return numbers or facts, anything where there is nothing."""
+    """Return numbers or Booleans, with undefined values for nulls."""
     if column.type == pa.bool_():
         return _values(pc.cast(column, pa.uint8())).view(np.bool_)
     chunks = [
         pa.Array.from_buffers(chunk.type, len(chunk), [None, chunk.buffers()[1]], 0, chunk.offset)
         for chunk in column.chunks
     ]
-    nothing = pa.Array.from_buffers(column.type, 0, [None, pa.py_buffer(b"")])  # tells the type where there is none
+    nothing = pa.Array.from_buffers(column.type, 0, [None, pa.py_buffer(b"")])  # sets the type of an empty column
     return np.concatenate([np.from_dlpack(chunk) for chunk in (nothing, *chunks)])
 
 

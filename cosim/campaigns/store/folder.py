@@ -1,4 +1,4 @@
-"""The folder of a campaign: claimed by one, filled part by part, joined at the end."""
+"""The folder of a campaign: locked by one process, filled part by part, joined at the end."""
 
 from __future__ import annotations
 
@@ -23,22 +23,21 @@ from cosim.io.strict_json import read_json
 PLAN = "campaign.json"
 RESULTS = "results.parquet"
 SUMMARY = "summary.json"
-PARTS = "results.parts"  # what a killed campaign leaves
+PARTS = "results.parts"  # folder of the parts of an unfinished campaign
 LOCK = ".lock"
 
 
 class CampaignFolder:
-    """A folder that belongs to one campaign, and to one process at a time.
+    """The folder of one campaign, locked by one process at a time.
 
-    Rows come in parts, each a file that is there whole or not at all. A part that a damaged disk has left unreadable
-    is flown again.
+    Rows are written in parts, each an atomic file. The rows of an unreadable part are flown again.
 
     Parameters
     ----------
     path : Path
         A folder that does not exist, is empty, or holds the same campaign.
     work : Work
-        What the campaign is.
+        The work of the campaign.
 
     Raises
     ------
@@ -50,7 +49,7 @@ class CampaignFolder:
         self.path, self._schema = path, work.schema
         try:
             path.mkdir(parents=True, exist_ok=True)
-            self._refuse_strangers()
+            self._refuse_other_files()
             self._lock = _lock(path / LOCK)
         except OSError as error:
             raise RunError(f"{path}: {error.strerror or error}") from error
@@ -64,7 +63,7 @@ class CampaignFolder:
             self.close()
             raise
 
-    def _refuse_strangers(self) -> None:
+    def _refuse_other_files(self) -> None:
         if not (self.path / PLAN).exists() and any(p.name not in (LOCK, f".{PLAN}") for p in self.path.iterdir()):
             raise RunError(f"{self.path}: exists and holds no campaign, expected a new folder or that of a campaign")
 
@@ -95,19 +94,19 @@ class CampaignFolder:
         return Results(self.path / RESULTS, self._schema)
 
     def remove_parts(self) -> None:
-        """Remove what is joined."""
+        """Remove the parts."""
         self._parts.remove()
 
     def keys(self) -> Rows:
-        """Return the keys of the rows that parts hold, shape (n,)."""
+        """Return the keys of the rows in the parts, shape (n,)."""
         return self._parts.keys()
 
     def rows(self) -> Any:
-        """Return all rows that there are, in order of key: a pyarrow.Table."""
+        """Return all existing rows in order of key, a pyarrow.Table."""
         return self.results().table if self.complete else self._parts.table()
 
     def add(self, table: Any) -> None:
-        """Write the rows of a batch, in order of key."""
+        """Write the rows of a batch, which are in order of key."""
         self._parts.add(table)
 
     def join(self) -> Results:
@@ -116,7 +115,7 @@ class CampaignFolder:
         return self.results()
 
     def close(self) -> None:
-        """Let others have the folder. May be called twice."""
+        """Unlock the folder. May be called twice."""
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
@@ -132,7 +131,7 @@ class CampaignFolder:
 
 @contextlib.contextmanager
 def held(path: Path) -> Iterator[None]:
-    """Keep other processes out of the folder of a campaign while something is written into it.
+    """Lock the folder of a campaign during a block that writes into it.
 
     Parameters
     ----------
@@ -142,7 +141,7 @@ def held(path: Path) -> Iterator[None]:
     Raises
     ------
     RunError
-        If another process is at work in it, or it cannot be written.
+        If another process has locked it, or it cannot be written.
     """
     try:
         lock = _lock(path / LOCK)
@@ -158,7 +157,7 @@ def held(path: Path) -> Iterator[None]:
 
 
 def read_plan(path: Path) -> dict[str, Any]:
-    """Return the plan of the campaign that a folder holds.
+    """Read the plan of the campaign in a folder.
 
     Parameters
     ----------
@@ -168,12 +167,12 @@ def read_plan(path: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        As it was written.
+        The plan.
 
     Raises
     ------
     RunError
-        If it holds none that can be read.
+        If it holds no readable plan.
     """
     if not (path / PLAN).exists():
         raise RunError(f"{path}: holds no campaign ({PLAN} is missing)")
@@ -183,7 +182,7 @@ def read_plan(path: Path) -> dict[str, Any]:
 
 
 def _lock(path: Path) -> int | None:
-    """Lock a file for as long as this process lives, and return its descriptor."""
+    """Lock a file until its descriptor is closed or the process ends; return the descriptor."""
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
     try:
         if sys.platform == "win32":

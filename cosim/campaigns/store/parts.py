@@ -1,4 +1,4 @@
-"""Rows on disk while a campaign goes on: a part a batch, and parts merged before they become many."""
+"""Rows on disk during a campaign: a part for each batch, merged to bound the number of parts."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from cosim.io.atomic_file import atomic_file
 
 log = logging.getLogger(__name__)
 
-MERGED = 64  # parts of about one size that become one
-_CHUNK = 8192  # rows read at once of a part
-_GROUP = 65536  # rows in a group of what is written
+MERGED = 64  # number of parts of about one size that are merged
+_CHUNK = 8192  # rows that are read at once from a part
+_GROUP = 65536  # rows of a row group
 _NAME = re.compile(r"[0-9]{8,}-[0-9]{8,}\.parquet")
 
 
 class Parts:
-    """Parquet files of one schema in a folder, each there whole or not at all.
+    """Parquet files of one schema in a folder, each written atomically.
 
-    A part is named for the batches in it, ``00000003-00000003``; those merged from it, ``00000000-00000063``. Who is
-    killed between the merged one and the removal of what is in it leaves both, which the names tell.
+    The name of a part is the range of its batches, ``00000003-00000003``, or ``00000000-00000063`` for a merged one. A
+    kill after merging and before the removal of the sources leaves both, which the names show.
 
     Parameters
     ----------
     folder : Path
-        Is made.
+        Is created.
     schema : pyarrow.Schema
         Its first column is the key of a row.
     """
@@ -43,10 +43,10 @@ class Parts:
     def __init__(self, folder: Path, schema: Any) -> None:
         self._folder, self._schema = folder, schema
         folder.mkdir(exist_ok=True)
-        for scratch in folder.glob(".*"):  # of a part that was being written
+        for scratch in folder.glob(".*"):  # incomplete parts
             scratch.unlink()
         self._files: list[Path] = []
-        parts = [file for file in folder.glob("*.parquet") if _NAME.fullmatch(file.name)]  # others are not ours
+        parts = [file for file in folder.glob("*.parquet") if _NAME.fullmatch(file.name)]  # other files are ignored
         for file in sorted(parts, key=lambda file: (_span(file)[0], -_span(file)[1])):
             if self._files and _span(file)[1] <= _span(self._files[-1])[1]:
                 file.unlink()
@@ -93,7 +93,7 @@ class Parts:
         Raises
         ------
         OSError
-            If it cannot be written; nothing is left of it then.
+            If it cannot be written; the incomplete file is removed.
         """
         file = self._folder / f"{self._next:08}-{self._next:08}.parquet"
         write_tables(file, [table], self._schema)
@@ -105,7 +105,7 @@ class Parts:
             level += 1
 
     def _last_of(self, level: int) -> list[Path]:
-        """Return the files at the end that were merged so often."""
+        """Return the last files that were merged `level` times."""
         return list(itertools.takewhile(lambda file: _level(file) == level, reversed(self._files)))[::-1]
 
     def _merge(self, files: list[Path]) -> None:
@@ -146,7 +146,7 @@ def _span(file: Path) -> tuple[int, int]:
 
 
 def _level(file: Path) -> int:
-    """Return how often a part was merged."""
+    """Return the number of times that a part was merged."""
     first, last = _span(file)
     level, batches = 0, last - first + 1
     while batches >= MERGED:
@@ -155,7 +155,7 @@ def _level(file: Path) -> int:
 
 
 def _keys(file: Path, schema: Any) -> Any:
-    """Return the keys of a part, all of which is read: what is damaged must not come to light when parts are joined."""
+    """Return the keys of a part, after reading all of it, so that damage is found before parts are joined."""
     try:
         check_schema(file, schema)
         with pq.ParquetFile(file) as parquet:
@@ -169,13 +169,13 @@ def _keys(file: Path, schema: Any) -> Any:
 
 
 def _type(schema: Any, name: str) -> str:
-    """Return the type of a column in words."""
+    """Describe the type of a column."""
     field = schema.field(name)
     return f"{field.type}{', perhaps null' if field.nullable else ''}"
 
 
 def check_schema(file: Path, schema: Any) -> None:
-    """Raise a RunError that names the first column in which a Parquet file is not of a schema."""
+    """Raise a RunError that names the first column in which a Parquet file differs from a schema."""
     found = pq.read_schema(file)
     if found.equals(schema):
         return
@@ -191,12 +191,12 @@ def check_schema(file: Path, schema: Any) -> None:
 
 
 def write_tables(path: Path, tables: Any, schema: Any) -> None:
-    """Write tables to one Parquet file, whole or not at all.
+    """Write tables to one Parquet file atomically.
 
     Parameters
     ----------
     path : Path
-        The file; what was there is replaced.
+        The file; an existing one is replaced.
     tables : iterable of pyarrow.Table
         Of the schema.
     schema : pyarrow.Schema
@@ -205,7 +205,7 @@ def write_tables(path: Path, tables: Any, schema: Any) -> None:
     Raises
     ------
     OSError
-        If it cannot be written; nothing is left then.
+        If it cannot be written; the incomplete file is removed.
     """
     with atomic_file(path) as file, pq.ParquetWriter(file, schema, compression="zstd") as writer:
         for table in _grouped(tables):
@@ -213,7 +213,7 @@ def write_tables(path: Path, tables: Any, schema: Any) -> None:
 
 
 def _grouped(tables: Any) -> Iterator[Any]:
-    """Yield what comes in small tables in greater ones."""
+    """Concatenate small tables to larger ones."""
     waiting: list[Any] = []
     rows = 0
     for table in tables:
@@ -227,7 +227,7 @@ def _grouped(tables: Any) -> Iterator[Any]:
 
 
 def in_order(files: Sequence[Path], schema: Any) -> Iterator[Any]:
-    """Yield the rows of files, each in order of key, in order of key; no more of them are read than overlap.
+    """Merge the rows of sorted files in order of key; only files with overlapping keys are open at a time.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ def in_order(files: Sequence[Path], schema: Any) -> Iterator[Any]:
     Yields
     ------
     pyarrow.Table
-        Some rows, all after those before.
+        Some rows, with keys above those before.
     """
     key = schema.names[0]
     closed = sorted(((_least(file), file) for file in files), reverse=True)
@@ -247,7 +247,7 @@ def in_order(files: Sequence[Path], schema: Any) -> Iterator[Any]:
     while closed or open_files:
         if not open_files:
             open_files.append(_Reader(closed.pop()[1], schema))
-        # rows up to the bound are all at hand: nothing that is not read yet lies below
+        # all rows up to the bound are loaded: unread rows have greater keys
         bound = min(reader.last for reader in open_files)
         while closed and closed[-1][0] <= bound:
             open_files.append(_Reader(closed.pop()[1], schema))
@@ -281,7 +281,7 @@ class _Reader:
             self.last = int(self._keys[-1])
 
     def up_to(self, bound: int) -> Any:
-        """Return the rows at hand up to a key, and have others at hand if none are left."""
+        """Return the loaded rows up to a key, and load the next chunk if none are left."""
         n = int(np.searchsorted(self._keys, bound, side="right"))
         rows, self._table, self._keys = self._table.slice(0, n), self._table.slice(n), self._keys[n:]
         if not len(self._keys):

@@ -1,4 +1,4 @@
-"""What makes a campaign the one that it is: a folder holds one, and goes on with no other."""
+"""Identity of a campaign: digests, versions, and differences of plans. A folder continues its own campaign only."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ import plant_fmu
 _SOURCES = (".py", ".c", ".h", ".toml")
 _LIBRARIES = ("subreach", "numpy", "pyarrow", "scipy")
 SCENES, SWEEP = "scenes", "sweep"  # kinds of campaigns
-_NAMED = 3  # differences that a message names
+_NAMED = 3  # greatest number of differences in a message
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of what rows depend on."""
+    """Return the versions of Python and of the libraries on which rows depend."""
     return {"python": platform.python_version()} | {name: _version(name) for name in _LIBRARIES}
 
 
-_version = cache(metadata.version)  # which looks through files
+_version = cache(metadata.version)  # it searches files
 
 
 @cache
@@ -41,17 +41,17 @@ def code_digest() -> str:
 
 
 def difference(one: dict[str, Any], other: dict[str, Any]) -> str:
-    """Return in words where two plans differ.
+    """Describe the differences of two plans.
 
     Parameters
     ----------
     one, other : dict
-        The tables of a plan, as it stands in a folder, and as it is now.
+        Tables of the plan in a folder, and of the present one.
 
     Returns
     -------
     str
-        Such as ``"gains.k_p1 is 18.8, now 10.0"``, kind or law alone where they are others; "" where they are equal.
+        Such as ``"gains.k_p1 is 18.8, now 10.0"``; only kind or law if these differ; "" if the plans are equal.
     """
     alone = next((key for key in ("kind", "law") if one.get(key) != other.get(key)), None)
     keys = [alone] if alone else sorted(one.keys() | other.keys())

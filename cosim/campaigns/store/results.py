@@ -22,14 +22,14 @@ _PIECE = 1000  # rows
 
 
 class Results:
-    """The rows of a campaign, in a file that is read column by column as they are asked for.
+    """The rows of a campaign in a file, whose columns are read at each use.
 
     Parameters
     ----------
     path : Path
         A Parquet file, in order of key.
     schema : pyarrow.Schema, optional
-        That it is to have.
+        Expected schema.
 
     Raises
     ------
@@ -50,26 +50,26 @@ class Results:
         return self._rows
 
     def __getitem__(self, name: str) -> Any:
-        """Return a column, shape (rows,); NaN or None where there is nothing."""
+        """Return a column, shape (rows,), with NaN or None for null."""
         with self._readable():
             return to_array(self._read([name])[name])
 
     def number(self, name: str, absent: float = np.nan) -> Array:
-        """Return a column of numbers, shape (rows,), with `absent` where there is none."""
+        """Return a column of numbers, shape (rows,), with `absent` for null and NaN."""
         column: Array = self[name].astype(float)
         return np.where(np.isnan(column), absent, column)
 
     def fact(self, name: str) -> NDArray[np.bool_]:
-        """Return a column of facts, shape (rows,); what is not known is no fact."""
+        """Return a column of Booleans, shape (rows,), with False for null."""
         facts: NDArray[np.bool_] = self[name].astype(bool)  # None is false
         return facts
 
     def absent(self, name: str) -> NDArray[np.bool_]:
-        """Return where a column has nothing, shape (rows,)."""
+        """Return a mask of the nulls of a column, shape (rows,)."""
         return to_array(pc.is_null(self._read([name])[name]))
 
     def pieces(self, name: str) -> Iterator[list[Any]]:
-        """Yield a column some rows at a time, in their order; a RunError if it is not there."""
+        """Yield a column in pieces of rows in order; raise a RunError if it does not exist."""
         with self._readable(), pq.ParquetFile(self.path) as file:
             for batch in file.iter_batches(_PIECE, columns=[name]):
                 yield batch.column(0).to_pylist()
@@ -82,7 +82,7 @@ class Results:
 
     @property
     def table(self) -> Any:
-        """All of it, a pyarrow.Table."""
+        """All rows, a pyarrow.Table."""
         return self._read()
 
     def _read(self, names: list[str] | None = None) -> Any:

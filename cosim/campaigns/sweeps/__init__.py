@@ -1,6 +1,6 @@
 """Sweeps.
 
-Designs that choose the values, and the rows that come of them.
+Designs that choose the values, and their rows.
 
 Imports: batch, campaigns.analysis, campaigns.store, campaigns.workers, plant_fmu, results, scenario, simulation.
 """

@@ -1,4 +1,4 @@
-"""Designs: which values a sweep gives the keys that vary. A row's values follow from its number alone."""
+"""Designs of sweeps: values of the keys that vary. A row's values depend on its number alone."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ Kind = Literal["grid", "random", "sobol", "lhs"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 MOST = 10_000_000  # rows
 _MOST_SOBOL = 21201  # keys
-_SEEDS = 2**31  # of FMI integers from 0
+_SEEDS = 2**31  # number of FMI integers from 0
 
 
 @dataclass(frozen=True)
 class Vary:
-    """The values that a key may take: a range, or a list."""
+    """The values of a key: a range, or a list."""
 
     key: str
     low: float = math.nan
     high: float = math.nan
     points: int | None = None  # of a range, on a grid
-    log: bool = False  # even steps of a range multiply
-    values: tuple[float, ...] = ()  # a list, in the place of a range
+    log: bool = False  # True: a logarithmic range
+    values: tuple[float, ...] = ()  # a list, instead of a range
 
     def at(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the values at each `share` of the range or list, from 0 up to 1; the ends are met exactly."""
+        """Return the values at each `share` of the range or list, from 0 to 1; the ends are exact."""
         if self.values:
             places = np.minimum(np.floor(share * len(self.values)).astype(np.int64), len(self.values) - 1)
             return np.array(self.values)[places]
@@ -47,18 +47,18 @@ class Vary:
 
     @property
     def steps(self) -> int:
-        """How many values it has on a grid."""
+        """Number of values on a grid."""
         return len(self.values) or self.points or 0
 
     def on_grid(self, places: Rows) -> NDArray[np.float64]:
-        """Return the values at places on a grid, counted from 0."""
+        """Return the values at indices of a grid, from 0."""
         if self.values:
             return np.array(self.values)[places]
         return self.at(places / max(1, self.steps - 1))
 
     @property
     def whole(self) -> bool:
-        """Whether all of its values are whole numbers; those of a range are not, but on a grid."""
+        """Whether all values are whole numbers; False for a range without points."""
         return bool(self.steps) and bool(np.all(np.mod(self.on_grid(np.arange(self.steps)), 1.0) == 0.0))
 
     def table(self) -> dict[str, Any]:
@@ -71,24 +71,24 @@ class Vary:
 
 @dataclass(frozen=True)
 class Design:
-    """Which values the rows of a sweep have.
+    """Values of the keys in the rows of a sweep.
 
     Parameters
     ----------
     vary : sequence of Vary
         The keys, at least one.
     kind : str
-        ``"grid"``, every value with every other, the last key fastest; ``"random"``, each row for itself; ``"sobol"``,
-        scrambled; or ``"lhs"``, a Latin hypercube.
+        ``"grid"``, all combinations, the last key fastest; ``"random"``, independent rows; ``"sobol"``, a scrambled
+        Sobol' sequence; or ``"lhs"``, a Latin hypercube.
     samples : int, optional
-        How many rows; on a grid they follow from the points.
+        Number of rows; None on a grid, where the points determine it.
     seed : int
-        Of the values, and of the rows' own seeds.
+        Of the values, and of the seeds of the rows.
 
     Raises
     ------
     RunError
-        If there can be no such design.
+        If the design is invalid.
 
     Examples
     --------
@@ -138,7 +138,7 @@ class Design:
 
     @property
     def rows(self) -> int:
-        """How many rows there are."""
+        """Number of rows."""
         return math.prod(vary.steps for vary in self.vary) if self.samples is None else self.samples
 
     def values(self, rows: Rows) -> NDArray[np.float64]:
@@ -152,7 +152,7 @@ class Design:
         Returns
         -------
         ndarray, shape (n, keys)
-            The same for a row, whatever others are asked for.
+            The values of a row do not depend on the other rows.
         """
         if self.kind == "grid":
             places = np.unravel_index(rows, [vary.steps for vary in self.vary])
@@ -163,13 +163,13 @@ class Design:
         return np.column_stack(columns)
 
     def seeds(self, rows: Rows) -> Rows:
-        """Return the seeds of some rows, shape (n,), each of which has another: a permutation of 0 to 2^31 - 1."""
+        """Return the seeds of some rows, shape (n,), all different: a permutation of 0 to 2^31 - 1."""
         factor, offset = np.random.SeedSequence(self.seed, spawn_key=(1,)).generate_state(2, np.uint32)
         odd = int(factor) | 1
         return (rows * odd + int(offset)) % _SEEDS
 
     def _shares(self, rows: Rows) -> NDArray[np.float64]:
-        """Return where in their ranges the values of some rows are, shape (n, keys)."""
+        """Return the values of some rows as shares of their ranges, from 0 to 1, shape (n, keys)."""
         if self.kind == "lhs":
             return self._hypercube[rows]
         first, n, keys = int(rows[0]), int(rows[-1] - rows[0]) + 1, len(self.vary)
@@ -178,10 +178,10 @@ class Design:
             bits.advance(first * keys)
             shares = np.random.Generator(bits).random((n, keys))
         else:
-            from scipy.stats import qmc  # here, for no worker needs it
+            from scipy.stats import qmc  # imported here, since workers do not need it
 
             sobol = qmc.Sobol(keys, scramble=True, seed=self._generator())
-            with warnings.catch_warnings():  # that it is no power of two: any number of rows may be asked for
+            with warnings.catch_warnings():  # for numbers of rows that are not powers of two
                 warnings.simplefilter("ignore", UserWarning)
                 if first:
                     sobol.fast_forward(first)
@@ -205,22 +205,22 @@ class Design:
 
 
 def design_of(table: dict[str, Any]) -> Design:
-    """Return the design of a table that `Design.table` gave.
+    """Make a design from a table of `Design.table`.
 
     Parameters
     ----------
     table : dict
-        As it stands in the plan of a sweep.
+        Part of the plan of a sweep.
 
     Returns
     -------
     Design
-        An equal one.
+        Equal to the original one.
 
     Raises
     ------
     RunError
-        If it is none.
+        If the table is invalid.
     """
     try:
         vary = tuple(_vary_of(key, of) for key, of in table["vary"].items())
@@ -237,12 +237,13 @@ def _vary_of(key: str, table: dict[str, Any]) -> Vary:
 
 
 def vary_from(texts: Sequence[str]) -> tuple[Vary, ...]:
-    """Return what varies, from texts.
+    """Parse the keys that vary from texts.
 
     Parameters
     ----------
     texts : sequence of str
-        ``key=low:high``, ``key=low:high:points``, each with ``:log`` behind it where steps multiply, or ``key=a,b,c``.
+        ``key=low:high``, ``key=low:high:points``, each with ``:log`` at the end for a logarithmic range, or
+        ``key=a,b,c``.
 
     Returns
     -------
@@ -252,7 +253,7 @@ def vary_from(texts: Sequence[str]) -> tuple[Vary, ...]:
     Raises
     ------
     RunError
-        If a text is none of these, a value is no finite number, a range has no width, or a key comes twice.
+        If a text has another form, a value is not a finite number, a range has no width, or a key is given twice.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The rows of a sweep: flown in batches by an engine, and told in a table."""
+"""The rows of a sweep: flown in batches by an engine, and converted to a table."""
 
 from __future__ import annotations
 
@@ -38,22 +38,22 @@ class SweepBatch(NamedTuple):
 
 
 def schema_of(keys: tuple[str, ...]) -> Any:
-    """Return the schema of the rows of a sweep.
+    """Make the schema of the rows of a sweep.
 
     Parameters
     ----------
     keys : tuple of str
-        What varies.
+        The keys that vary.
 
     Returns
     -------
     pyarrow.Schema
-        Number of the row, values of the keys, seed, outcomes with null where there is none, why it was refused.
+        Number of the row, values of the keys, seed, outcomes or null, reason for refusing it.
 
     Raises
     ------
     ValueError
-        If a key has the name of another column: no key of a scenario has.
+        If a key has the name of another column, which no key of a scenario has.
     """
     if taken := {"row", "seed", "refused", *FIELDS} & set(keys):
         raise ValueError(f"{min(taken)!r} varies, expected keys of a scenario")
@@ -74,21 +74,21 @@ def schema_of(keys: tuple[str, ...]) -> Any:
 
 
 def table_of(keys: tuple[str, ...], batch: SweepBatch, flown: Flown) -> Any:
-    """Return flights as a table.
+    """Convert flights to a table.
 
     Parameters
     ----------
     keys : tuple of str
-        What varies.
+        The keys that vary.
     batch : SweepBatch
-        What was flown.
+        The batch.
     flown : Flown
-        What came of it.
+        Its outcomes.
 
     Returns
     -------
     pyarrow.Table
-        Of `schema_of`; null where an outcome is no number, and all outcomes of a row that was refused.
+        Of `schema_of`; null for NaN outcomes, and for all outcomes of a refused row.
     """
     refused = np.zeros(len(batch.rows), dtype=bool)
     refused[list(flown.refused)] = True
@@ -103,14 +103,14 @@ def table_of(keys: tuple[str, ...], batch: SweepBatch, flown: Flown) -> Any:
 
 @dataclass(frozen=True)
 class SweepTask:
-    """What all rows of a sweep have in common."""
+    """The data that all rows of a sweep share."""
 
     variation: Variation = field(compare=False)
     engine: str  # module:class
-    mark: str = field(default_factory=lambda: secrets.token_hex(16))  # by which processes know it again
+    mark: str = field(default_factory=lambda: secrets.token_hex(16))  # identity across processes
 
     def flyer(self) -> SweepFlyer:
-        """Return a flyer of its own."""
+        """Create a flyer."""
         return SweepFlyer(self)
 
 
@@ -120,12 +120,12 @@ class SweepFlyer:
     Parameters
     ----------
     task : SweepTask
-        How.
+        Variation and engine.
 
     Raises
     ------
     RunError
-        If the engine cannot fly the scenario.
+        If the engine does not support the scenario.
     """
 
     def __init__(self, task: SweepTask) -> None:
@@ -134,7 +134,7 @@ class SweepFlyer:
         self._engine = getattr(importlib.import_module(module), name)(task.variation)
 
     def fly(self, batch: SweepBatch) -> Any:
-        """Return a table with a row for each of the batch."""
+        """Fly a batch; return a table with its rows."""
         return table_of(self._keys, batch, self._engine.fly(batch.values, batch.seeds))
 
     def close(self) -> None:
@@ -148,18 +148,18 @@ class SweepWork:
     Parameters
     ----------
     scenario : Scenario
-        What stays.
+        The base scenario.
     design : Design
-        What varies.
+        The keys that vary.
     engine : str
         One of `ENGINES`.
 
     Raises
     ------
     ScenarioError
-        If a key is unknown, or what it names is no number.
+        If a key is unknown, or not one of a number.
     RunError
-        If there is no such engine, or a key that is a whole number has values that are none.
+        If there is no such engine, or a key of a whole number has fractional values.
     """
 
     unit = "row"
@@ -197,7 +197,7 @@ class SweepWork:
         return SweepBatch(rows, self.design.values(rows), self.design.seeds(rows))
 
     def rows_of(self, keys: Rows) -> Rows:
-        """Return the rows of some keys, which are their numbers; -1 for one that has none."""
+        """Return the rows of some keys, which are their numbers; -1 for an unknown key."""
         return np.where((keys >= 0) & (keys < len(self)), keys, -1)
 
     def refused(self, row: int, reason: str) -> Any:
@@ -206,7 +206,7 @@ class SweepWork:
 
 
 def _files(scenario: Scenario) -> dict[str, bytes]:
-    """Return what repeats the scenario, by name."""
+    """Return the files that repeat the scenario, by name."""
     if scenario.vehicle_file is None:
         return {SCENARIO: scenario.toml().encode()}
     try:
@@ -217,7 +217,7 @@ def _files(scenario: Scenario) -> dict[str, bytes]:
 
 
 def _for_json(value: Any) -> Any:
-    """Return a table of a scenario as JSON can hold it: what is not finite as a word."""
+    """Convert a table of a scenario for JSON, with texts for NaN and infinity."""
     if isinstance(value, dict):
         return {key: _for_json(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""What a sweep comes to: numbers from its rows alone."""
+"""Summary of a sweep, computed from its rows alone."""
 
 from __future__ import annotations
 
@@ -16,30 +16,29 @@ from cosim.campaigns.sweeps.rows import SweepWork
 from cosim.scenario.key_names import key_name
 from cosim.simulation.signals import Array
 
-FACTS = ("reached", "settled", "violated")  # whose rates are told
-SPREADS = ("reach_time", "settle_time", "min_clearance", "effort", "max_force", "max_speed")  # whose quantiles are told
-_REASONS = 5  # why rows were refused
+FACTS = ("reached", "settled", "violated")  # columns with rates
+SPREADS = ("reach_time", "settle_time", "min_clearance", "effort", "max_force", "max_speed")  # columns with quantiles
+_REASONS = 5  # greatest number of listed reasons for refusing rows
 
 
 def summarise_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str, Any]:
-    """Return the summary of a sweep.
+    """Summarise a sweep.
 
     Parameters
     ----------
     work : SweepWork
-        What was flown.
+        The work of the sweep.
     results : Results
-        What came of it.
+        Its rows.
     folder : Path
-        Where they are, for the commands that repeat rows.
+        Its folder, for the commands that repeat rows.
 
     Returns
     -------
     dict
-        Ready for JSON: counts, and why the first rows were refused; rates with 95 % intervals by Wilson, of the rows
-        that were flown; quantiles (None where there is nothing); the worst rows; of every key with every outcome
-        the `effect`, and the rank correlation by Spearman, None where either is constant; and the plan.
-        Units as in the columns of the results.
+        For JSON: counts, and reasons for refusing the first rows; rates with 95 % intervals by Wilson, of the rows that
+        were flown; quantiles (None without numbers); the worst rows; for every key and outcome the `effect`, and the
+        rank correlation by Spearman, None if one is constant; and the plan. Units as in the columns of the results.
     """
     flown, base = results.absent("refused"), work.variation.base
     return {
@@ -61,7 +60,7 @@ def summarise_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str
 
 
 def _reasons(results: Results, flown: Facts) -> dict[str, str]:
-    """Return why the first rows were refused, by their number."""
+    """Return the reasons for refusing the first refused rows, by number."""
     first = np.flatnonzero(~flown)[:_REASONS]
     return {str(row): str(why) for row, why in zip(results["row"][first], results["refused"][first], strict=True)}
 
@@ -72,7 +71,7 @@ def _of_keys(
     flown: Facts,
     measure: Callable[[Array, Array], dict[str, float] | None],
 ) -> dict[str, dict[str, Any]]:
-    """Return a measure of each key with each outcome, over those rows that were flown and have a finite number."""
+    """Return a measure of each key with each outcome, over the flown rows with a finite outcome."""
     keys = {key: results.number(key) for key in work.variation.keys}
     found: dict[str, dict[str, Any]] = {key: {} for key in keys}
     for name, (kind, _, _) in FIELDS.items():

@@ -1,7 +1,7 @@
-"""Who flies the rows.
+"""Worker pools, which fly the rows of a campaign.
 
-This process, processes of its own, or a Dask cluster; batches are sized by the time that a row takes, and a row that
-kills its worker is refused.
+In this process, in worker processes, or on a Dask cluster. Batches are sized by the time that a row takes. A row that
+crashes its worker each time is refused.
 
 Imports: plant_fmu.
 """

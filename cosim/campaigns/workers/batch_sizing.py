@@ -1,4 +1,4 @@
-"""How the rows that are left are cut into batches: by the time that a row takes, as measured while it goes on."""
+"""Cuts the rows that are left into batches, sized by the measured time of a row."""
 
 from __future__ import annotations
 
@@ -9,35 +9,35 @@ import numpy as np
 
 from cosim.campaigns.workers.work import Rows
 
-FIRST = 1  # rows in the first batch, before anybody knows how long a row takes
-TARGET = 1.0  # s of work in a batch: it is sent, written and merged by one process, whatever the number of workers
-LEAST = 0.05  # s of work in the small batches at the end, where workers would wait for each other
-GROWTH = 4  # times the batch before, at the most: the first ones hold the time of compiling
-EVEN = 16  # a batch of more rows is a multiple of this, for engines that fly rows side by side
-GREATEST = 65536  # rows
+FIRST = 1  # rows of the first batch, before the time of a row is known
+TARGET = 1.0  # s of work in a batch; one process submits and writes all batches, for any number of workers
+LEAST = 0.05  # s of work in the last batches, which are small so that all workers end together
+GROWTH = 4  # greatest ratio of a batch's size to the one before: the time of first batches includes compiling
+EVEN = 16  # batches with more rows are a multiple of this, for engines that fly rows in parallel lanes
+GREATEST = 65536  # rows of a batch
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Rows that are flown together."""
+    """Rows that one worker flies together."""
 
     rows: Rows
-    crash_count: int = 0  # how often a process has died of it
-    alone: bool = False  # to be flown while nothing else is, so that a death can be laid to it
+    crash_count: int = 0  # number of worker crashes during this batch
+    alone: bool = False  # True: no other batch is under way meanwhile, so that a crash is certainly by this one
 
     def halves(self, crash_count: int) -> tuple[Batch, Batch]:
-        """Return it in two parts, each of which begins with some strikes."""
+        """Split the batch into halves, each of which begins with `crash_count`."""
         middle = len(self.rows) // 2
         return Batch(self.rows[:middle], crash_count, self.alone), Batch(self.rows[middle:], crash_count, self.alone)
 
 
 class Batches:
-    """The batches of a campaign, cut when they are asked for.
+    """The batches of a campaign, cut as they are taken.
 
     Parameters
     ----------
     rows : ndarray of int, shape (n,)
-        Those that are left, in rising order.
+        Rows that are left, in rising order.
     """
 
     def __init__(self, rows: Rows) -> None:
@@ -48,17 +48,17 @@ class Batches:
         self._row_time = math.inf  # s
 
     def take(self, width: int) -> Batch | None:
-        """Return the next batch, None if there is none now.
+        """Return the next batch; None if no rows are left.
 
         Parameters
         ----------
         width : int
-            How many batches are flown at the same time.
+            Number of batches under way at the same time.
 
         Returns
         -------
         Batch or None
-            Those that were put back come first.
+            Batches that were put back come first.
         """
         if self._back:
             return self._back.pop()
@@ -74,11 +74,11 @@ class Batches:
         return batch
 
     def put_back(self, batch: Batch) -> None:
-        """Have a batch flown again, next."""
+        """Put a batch back, to be taken next."""
         self._back.append(batch)
 
     def measured(self, rows: int, seconds: float) -> None:
-        """Take note of how long a batch took; one that is small by now may be a worker's first, and tells less."""
+        """Adapt the size by the time of a batch [s]; ignore a relatively small one: it may include start-up."""
         if rows * GROWTH < self._size:
             return
         self._row_time = max(seconds, 1e-9) / rows

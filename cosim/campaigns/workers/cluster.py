@@ -1,4 +1,4 @@
-"""Dask: a cluster that exists, or one of processes on this machine."""
+"""Dask: an existing cluster, or a local one with processes on this machine."""
 
 from __future__ import annotations
 
@@ -16,35 +16,35 @@ from cosim.campaigns.workers.worker_pools import Flight, WorkerCrash, interrupts
 from cosim.errors import RunError
 from plant_fmu.installing import install_hint
 
-_QUEUED = 2  # batches a thread of a worker, so that none waits for work
-_LOOK = 5.0  # s between looks at how many workers there are: they may come and go
-_PATIENCE = 30.0  # s for the first worker, and without any
-_PATIENCE_WITH_SCHEDULER = 10.0  # s for it to answer
-_PATIENCE_WITH_WORKERS = 2.0  # s for one to end the batch that it is at
-# of a cluster of ours: how its processes watch themselves, many times a second, takes a tenth of two cores
-_CALM: dict[str, Any] = {
+_QUEUED = 2  # batches per worker thread, so that no thread waits for work
+_COUNT_PERIOD = 5.0  # s between counts of the workers, which may join and leave
+_WORKER_TIMEOUT = 30.0  # s, for the first worker, and for a cluster without workers
+_SCHEDULER_TIMEOUT = 10.0  # s
+_RELEASE_TIMEOUT = 2.0  # s, for a worker to end its present batch
+# for local clusters: by default their self-monitoring takes a tenth of two cores
+_LOW_OVERHEAD: dict[str, Any] = {
     "distributed.worker.profile.enabled": False,
     "distributed.worker.memory.monitor-interval": "1s",
     "distributed.admin.system-monitor.interval": "5s",
     "distributed.admin.tick.interval": "1s",
-    "distributed.scheduler.allowed-failures": 0,  # we count deaths ourselves, and know how to lay them to a row
+    "distributed.scheduler.allowed-failures": 0,  # `dispatch` counts crashes itself, and finds the row
 }
-_SETTLING = 1.0  # s that a new worker is left in peace: one that dies at once is not replaced again
+_SETTLING = 1.0  # s, wait for new workers, so that one that crashes at once is not restarted again
 
 
 def is_cluster(executor: Executor) -> bool:
-    """Return whether an executor is what ``Client.get_executor()`` of Dask gives."""
+    """Return True if an executor is one of Dask's ``Client.get_executor()``."""
     module: Any = sys.modules.get("distributed.cfexecutor")
     return module is not None and isinstance(executor, module.ClientExecutor)
 
 
 class Cluster:
-    """The workers of a Dask cluster. What is lost with a worker is flown again by another.
+    """The workers of a Dask cluster. Batches lost with a worker are flown again by another one.
 
     Parameters
     ----------
     executor : distributed.cfexecutor.ClientExecutor
-        Of its client.
+        Executor of the cluster's client.
     """
 
     def __init__(self, executor: Any) -> None:
@@ -52,22 +52,22 @@ class Cluster:
 
         self._executor, self._client = executor, executor._client
         self._killed: Any = distributed.KilledWorker
-        self._workers = self._looked = self._seen = 0.0
-        self._bereft = False
+        self._workers = self._counted = self._last_present = 0.0
+        self._has_crashed = False
         self._local = isinstance(self._client.cluster, distributed.LocalCluster)
-        self._look()
+        self._count_workers()
         self._most = self._workers
 
     @property
     def width(self) -> int:
-        """How many batches may be under way."""
-        if time.monotonic() - self._looked >= _LOOK:
-            self._look()
+        """Greatest number of batches under way."""
+        if time.monotonic() - self._counted >= _COUNT_PERIOD:
+            self._count_workers()
         return max(1, _QUEUED * int(self._workers))
 
     def submit(self, task: Task, batch: Any) -> Flight:
-        """Have a batch flown; after a death, once there are as many workers as before."""
-        if self._bereft:
+        """Submit a batch; after a crash, first wait until there are as many workers as before."""
+        if self._has_crashed:
             self._recover()
         try:
             flight: Flight = self._executor.submit(fly, task, batch)
@@ -76,52 +76,52 @@ class Cluster:
         return flight
 
     def result(self, flight: Flight) -> tuple[Any, float] | WorkerCrash:
-        """Return what came of it; Dask lays the death of a worker to everything that had been sent there."""
+        """Return the result of a batch; after a crash Dask fails all batches that were sent to that worker."""
         try:
             return flight.result()
         except self._killed as error:
-            self._bereft = True
+            self._has_crashed = True
             return WorkerCrash(error.allowed_failures + 1, certain=False)
         except (CancelledError, OSError) as error:
             raise _lost(error) from error
 
     def check(self) -> None:
-        """Look whether there are workers; a RunError if not."""
-        self._look()
-        if time.monotonic() - self._seen > _PATIENCE:
-            raise RunError(f"the cluster has had no workers for {_PATIENCE:g} s; what is flown is kept")
+        """Raise a RunError if there have been no workers for some time."""
+        self._count_workers()
+        if time.monotonic() - self._last_present > _WORKER_TIMEOUT:
+            raise RunError(f"the cluster has had no workers for {_WORKER_TIMEOUT:g} s; what is flown is kept")
 
-    def _look(self) -> None:
+    def _count_workers(self) -> None:
         try:
             self._workers = sum(self._client.nthreads().values())
         except (OSError, RuntimeError, TimeoutError) as error:
             raise _lost(error) from error
-        self._looked = time.monotonic()
+        self._counted = time.monotonic()
         if self._workers:
-            self._seen = self._looked
+            self._last_present = self._counted
 
     def _recover(self) -> None:
-        """Wait for workers in the place of those that died; those that do not come by themselves are sent for."""
-        if not self._wait(_PATIENCE / 3.0) and self._local:
+        """Wait for replacements of crashed workers; restart the workers of a local cluster if none join."""
+        if not self._wait(_WORKER_TIMEOUT / 3.0) and self._local:
             with interrupts_held():
                 self._client.cluster.scale(0)
                 self._client.cluster.scale(int(self._most))
-            self._wait(_PATIENCE)
+            self._wait(_WORKER_TIMEOUT)
         time.sleep(_SETTLING)
-        self._bereft, self._most = False, max(1.0, self._workers)
+        self._has_crashed, self._most = False, max(1.0, self._workers)
         self.check()
 
     def _wait(self, patience: float) -> bool:
         until = time.monotonic() + patience
         while self._workers < self._most and time.monotonic() < until:
             time.sleep(_SETTLING / 10.0)
-            self._look()
+            self._count_workers()
         return self._workers >= self._most
 
     def close(self) -> None:
-        """Leave the cluster to whom it belongs, its workers without what they held for us."""
-        with contextlib.suppress(Exception):  # whoever is gone holds nothing
-            self._client.run(release, _PATIENCE_WITH_WORKERS)
+        """Free the flyers of the workers; the cluster stays open."""
+        with contextlib.suppress(Exception):  # workers that have left hold no flyer
+            self._client.run(release, _RELEASE_TIMEOUT)
 
 
 def _lost(error: BaseException) -> RunError:
@@ -131,9 +131,9 @@ def _lost(error: BaseException) -> RunError:
 
 @contextlib.contextmanager
 def _quiet(name: str) -> Iterator[None]:
-    """Leave out what a library logs: what it means for the campaign, we say.
+    """Silence the log of a library, whose errors the campaign reports itself.
 
-    Its loggers have levels of their own, that of the library over them does not reach down.
+    Each of its loggers is silenced, since each has its own level.
     """
     names = [name, *(other for other in logging.root.manager.loggerDict if other.startswith(f"{name}."))]
     before = {logger: logger.level for logger in map(logging.getLogger, names)}
@@ -148,19 +148,19 @@ def _quiet(name: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def cluster_executor(scheduler: str | None, workers: int) -> Iterator[Executor]:
-    """Connect to a cluster, or make one of processes on this machine.
+    """Connect to a cluster, or start a local one on this machine.
 
     Parameters
     ----------
     scheduler : str or None
-        Address such as ``tcp://10.0.0.1:8786``; None for one on this machine.
+        Address such as ``tcp://10.0.0.1:8786``; None for a local cluster.
     workers : int
-        Processes of one on this machine, a thread each.
+        Number of processes of a local cluster, with one thread each.
 
     Yields
     ------
     concurrent.futures.Executor
-        Closed when it is left, and so is a cluster on this machine.
+        Closed at the end of the block, with a local cluster.
 
     Raises
     ------
@@ -177,7 +177,7 @@ def cluster_executor(scheduler: str | None, workers: int) -> Iterator[Executor]:
         stack.enter_context(_quiet("distributed"))
         try:
             if scheduler is None:
-                stack.enter_context(dask.config.set(_CALM))
+                stack.enter_context(dask.config.set(_LOW_OVERHEAD))
                 with interrupts_held():
                     cluster = untyped.LocalCluster(
                         n_workers=workers, threads_per_worker=1, processes=True, silence_logs=logging.CRITICAL,
@@ -186,9 +186,9 @@ def cluster_executor(scheduler: str | None, workers: int) -> Iterator[Executor]:
                 stack.enter_context(cluster)
                 client = untyped.Client(cluster)
             else:
-                client = untyped.Client(scheduler, timeout=_PATIENCE_WITH_SCHEDULER)
+                client = untyped.Client(scheduler, timeout=_SCHEDULER_TIMEOUT)
             stack.enter_context(client)
-            client.wait_for_workers(1, timeout=_PATIENCE)
+            client.wait_for_workers(1, timeout=_WORKER_TIMEOUT)
         except (OSError, ValueError, TimeoutError) as error:
             said = " ".join(str(error).split()) or type(error).__name__
             raise RunError(f"the cluster {scheduler or 'on this machine'} cannot be used: {said}") from error

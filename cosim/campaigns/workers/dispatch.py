@@ -1,4 +1,4 @@
-"""Batches, shared out until every row has come home or is known to kill whoever flies it."""
+"""Dispatches batches to a worker pool until every row is finished, or refused because it crashes its worker."""
 
 from __future__ import annotations
 
@@ -15,41 +15,41 @@ from cosim.errors import RunError
 log = logging.getLogger(__name__)
 
 KILLED = "the process that flew it died each time (killed, or out of memory)"
-_LOOK = 5.0  # s between looks at the crew, where nothing comes home
-_DEATHS = 30  # in a row, with nothing that came home between them: it is not the rows
+_CHECK_PERIOD = 5.0  # s between checks of the pool while no batch finishes
+_MAX_CRASHES = 30  # in a row without a finished batch: the cause is not a row
 
 
 def fly_all(work: Work, batches: Batches, pool: WorkerPool) -> Generator[Any, None, None]:
-    """Fly batches, and yield the rows of each as it comes home, in whatever order that is.
+    """Fly batches, and yield the table of each as it finishes, in any order.
 
-    A batch that processes die of is flown again; the third time it is taken apart, down to the row that is to blame,
-    which is refused. The first batch is flown alone: whatever has to be compiled is, and the others find it on disk.
+    A batch that crashes its worker is flown again. After three crashes it is halved, down to the row that causes them,
+    which is refused. The first batch is flown alone: it compiles the code that the others load from disk.
 
     Parameters
     ----------
     work : Work
-        What is flown.
+        The work of the campaign.
     batches : Batches
-        What is left of it.
+        The rows that are left.
     pool : WorkerPool
-        By whom.
+        The pool that flies them.
 
     Yields
     ------
     pyarrow.Table
-        Of one batch.
+        Rows of one batch, or a refused row.
 
     Raises
     ------
     RunError
-        If processes die whatever they fly, or the crew cannot go on.
+        If workers crash with any row, or the pool fails.
     """
     under_way: dict[Flight, Batch] = {}
-    condemned: list[Any] = []  # rows that are refused, once it is seen that others can be flown
-    home, deaths = 0, 0
+    refused: list[Any] = []  # tables of rows to be refused, once another batch has finished
+    n_finished, crashes = 0, 0
 
-    def send() -> None:
-        width = pool.width if home else 1
+    def submit_batches() -> None:
+        width = pool.width if n_finished else 1
         while len(under_way) < width and not any(batch.alone for batch in under_way.values()):
             batch = batches.take(width)
             if batch is None:
@@ -60,34 +60,34 @@ def fly_all(work: Work, batches: Batches, pool: WorkerPool) -> Generator[Any, No
             under_way[pool.submit(work.task, work.batch(batch.rows))] = batch
 
     while True:
-        send()
+        submit_batches()
         if not under_way:
             break
-        done = wait(under_way, _LOOK, FIRST_COMPLETED).done
+        done = wait(under_way, _CHECK_PERIOD, FIRST_COMPLETED).done
         if not done:
             pool.check()
         for flight in done:
             batch, received = under_way.pop(flight), pool.result(flight)
             if not isinstance(received, WorkerCrash):
-                home, deaths = home + 1, 0
+                n_finished, crashes = n_finished + 1, 0
                 batches.measured(len(batch.rows), received[1])
                 yield received[0]
-                yield from condemned
-                condemned.clear()
+                yield from refused
+                refused.clear()
                 continue
-            deaths += received.crash_count > 0
-            if deaths > _DEATHS:
+            crashes += received.crash_count > 0
+            if crashes > _MAX_CRASHES:
                 raise RunError(
-                    f"{deaths} processes died one after the other, whatever they flew; what is flown is kept"
+                    f"{crashes} processes died one after the other, whatever they flew; what is flown is kept"
                 )
-            condemned += _again(work, batches, batch, received)
-    if condemned and not home:
+            refused += _retry(work, batches, batch, received)
+    if refused and not n_finished:
         raise RunError("every process died, whatever it flew (killed, or out of memory)")
-    yield from condemned
+    yield from refused
 
 
-def _again(work: Work, batches: Batches, batch: Batch, crash: WorkerCrash) -> list[Any]:
-    """Put back a batch that did not come home, whole or in halves; return the table of its row if that is to blame."""
+def _retry(work: Work, batches: Batches, batch: Batch, crash: WorkerCrash) -> list[Any]:
+    """Put back a batch whose worker crashed, whole or in halves; return the table of its row if that is the cause."""
     if not crash.crash_count:
         batches.put_back(batch)
     elif not (crash.certain or batch.alone):

@@ -1,4 +1,4 @@
-"""What a campaign flies, whatever it is: rows with numbers, and something that flies a batch of them anywhere."""
+"""Interfaces of a campaign's work: numbered rows, and flyers that fly batches of them in any process."""
 
 from __future__ import annotations
 
@@ -12,39 +12,39 @@ Rows = NDArray[np.int64]
 
 
 class Flyer(Protocol):
-    """Flies batches, one after the other, in the process that has made it."""
+    """Flies batches, one after the other, in the process in which it was created."""
 
     def fly(self, batch: Any) -> Any:
-        """Return a pyarrow.Table of the work's schema, with a row for each of a batch in its order."""
+        """Fly a batch; return a pyarrow.Table of the work's schema with its rows in order."""
 
     def close(self) -> None:
-        """Free what it holds. May be called twice."""
+        """Free the flyer's resources. May be called twice."""
 
 
 class Task(Protocol):
-    """What all rows of a campaign have in common: small, hashable, and can be pickled."""
+    """The data that all rows of a campaign share: small, hashable, and picklable."""
 
     def flyer(self) -> Flyer:
-        """Return a flyer of its own."""
+        """Create a flyer."""
 
 
 class Work(Protocol):
-    """Rows 0 to ``len(work)`` - 1, and how they are flown.
+    """Rows 0 to ``len(work)`` - 1, and the task by which they are flown.
 
     The first column of the schema, a 64-bit integer, is the key of a row; keys rise with the rows.
     """
 
     @property
     def name(self) -> str:
-        """What it is called, for the bar."""
+        """Name of the work, for the progress bar."""
 
     @property
     def unit(self) -> str:
-        """What a row is called, such as ``"scene"``."""
+        """Word for a row, such as ``"scene"``."""
 
     @property
     def task(self) -> Task:
-        """How rows are flown."""
+        """The task by which rows are flown."""
 
     @property
     def schema(self) -> Any:
@@ -52,19 +52,19 @@ class Work(Protocol):
 
     @property
     def plan(self) -> Mapping[str, Any]:
-        """All that the rows rest on, for JSON."""
+        """All inputs that determine the rows, for JSON."""
 
     @property
     def files(self) -> Mapping[str, bytes]:
-        """What the folder holds beside the plan, by name."""
+        """Further files of the folder beside the plan, by name."""
 
     def __len__(self) -> int: ...
 
     def batch(self, rows: Rows) -> Any:
-        """Return what a flyer needs to fly some rows; it can be pickled."""
+        """Return the picklable batch of some rows for a flyer."""
 
     def rows_of(self, keys: Rows) -> Rows:
-        """Return the rows that have some keys; -1 for a key that no row has."""
+        """Return the rows of some keys; -1 for a key that no row has."""
 
     def refused(self, row: int, reason: str) -> Any:
         """Return the table of one row that could not be flown."""

@@ -1,4 +1,4 @@
-"""What happens in the process that flies rows: this one, a worker of ours, or one of a cluster."""
+"""Code that runs in the process that flies rows: this process, a worker process, or one of a cluster."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from cosim.campaigns.workers.work import Flyer, Task
 
 @dataclass
 class _Held:
-    """The flyer of this process. Making one loads the FMU and compiles the loop, so it stays from batch to batch."""
+    """The flyer of this process, kept between batches: creating one loads the FMU and compiles the loop."""
 
-    lock: threading.Lock = field(default_factory=threading.Lock)  # a flyer is no thing for two threads
+    lock: threading.Lock = field(default_factory=threading.Lock)  # a flyer is not thread-safe
     task: Task | None = None
     flyer: Flyer | None = None
 
@@ -39,19 +39,19 @@ _held = _Held()
 
 
 def fly(task: Task, batch: Any) -> tuple[Any, float]:
-    """Fly a batch; threads of one process do so by turns.
+    """Fly a batch; threads of one process take turns.
 
     Parameters
     ----------
     task : Task
-        How.
+        The task of the work.
     batch : object
-        Of the work.
+        A batch of the work.
 
     Returns
     -------
     pyarrow.Table, float
-        Its rows, and how long they took [s].
+        The batch's rows, and the time that they took [s].
     """
     with _held.lock:
         flyer = _held.of(task)
@@ -61,12 +61,12 @@ def fly(task: Task, batch: Any) -> tuple[Any, float]:
 
 
 def prepare(task: Task) -> None:
-    """Make the flyer of a task; if that fails, its first batch says so.
+    """Create the flyer of a task; after a failure the first batch raises the error.
 
     Parameters
     ----------
     task : Task
-        How batches will be flown.
+        Task of the batches to come.
     """
     with _held.lock:
         _held.of(task)
@@ -78,7 +78,7 @@ def release(patience: float) -> None:
     Parameters
     ----------
     patience : float
-        How long to wait for the batch that is being flown [s]; after that the flyer stays.
+        Time to wait for a batch under way [s]; after it the flyer is kept.
     """
     if _held.lock.acquire(timeout=patience):
         try:
@@ -89,7 +89,7 @@ def release(patience: float) -> None:
 
 @contextlib.contextmanager
 def flyer_held(task: Task) -> Iterator[None]:
-    """Hold a flyer in this process: it says what it cannot do, and what has to be built once is built."""
+    """Hold a flyer in this process during a block: it raises errors of the task, and builds what is built once."""
     prepare(task)
     try:
         yield
@@ -98,7 +98,7 @@ def flyer_held(task: Task) -> Iterator[None]:
 
 
 def begin_worker() -> None:
-    """Leave Ctrl-C and a closed terminal to the parent, and end when it does."""
+    """Set up a worker process: ignore Ctrl-C and SIGHUP, which the parent handles, and end with the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "SIGHUP"):
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
@@ -114,6 +114,6 @@ def _follow_parent() -> None:
 
 
 def _end_worker(*_: object) -> None:
-    """End at once, whatever lock another worker took with it when it died, but leave no files."""
+    """Free the flyer and its files, and exit without cleanup: another worker may have crashed holding a lock."""
     _held.free()
     os._exit(1)

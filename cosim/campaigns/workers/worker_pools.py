@@ -1,4 +1,4 @@
-"""Who flies batches: this process, processes of our own, or any executor that we are given."""
+"""Worker pools: this process, processes on this machine, or an external executor."""
 
 from __future__ import annotations
 
@@ -16,133 +16,133 @@ from cosim.campaigns.workers.work import Task
 from cosim.campaigns.workers.worker import begin_worker, fly, prepare
 from cosim.errors import RunError
 
-FATAL = 3  # processes that may die of a batch before it is taken apart
-_QUEUED = 2  # batches a worker, so that none waits for work
+FATAL = 3  # crashes after which a batch is halved
+_QUEUED = 2  # batches per worker, so that no worker waits for work
 
 Flight = Future[tuple[Any, float]]  # table, s
 
 
 @dataclass(frozen=True)
 class WorkerCrash:
-    """A batch did not come home, because its process died."""
+    """Result of a batch whose worker process crashed."""
 
-    crash_count: int  # how many have died of it
-    certain: bool = True  # that it was this batch
+    crash_count: int  # number of crashes by this batch; 0 if another batch of the worker was the cause
+    certain: bool = True  # False if another batch may be the cause
 
 
 class WorkerPool(Protocol):
-    """Flies batches somewhere."""
+    """Flies batches in workers."""
 
     @property
     def width(self) -> int:
-        """How many batches may be under way."""
+        """Greatest number of batches under way."""
 
     def submit(self, task: Task, batch: Any) -> Flight:
-        """Have a batch flown."""
+        """Submit a batch to a worker."""
 
     def result(self, flight: Flight) -> tuple[Any, float] | WorkerCrash:
-        """Return what came of a batch that is done; raise what cannot be mended."""
+        """Return the result of a batch that is done; raise an error that ends the campaign."""
 
     def check(self) -> None:
-        """Raise an error if nothing that is under way will ever come home."""
+        """Raise an error if no batch under way can finish."""
 
     def close(self) -> None:
-        """Send everybody home; what is under way is lost."""
+        """Stop the workers; batches under way are lost."""
 
 
 class InProcess:
-    """Nobody but this process: a batch is flown when it is submitted."""
+    """Pool without workers: `submit` flies the batch in this process."""
 
     width = 1
 
     def submit(self, task: Task, batch: Any) -> Flight:
-        """Fly a batch."""
+        """Fly a batch in this process."""
         flight: Flight = Future()
         flight.set_result(fly(task, batch))
         return flight
 
     def result(self, flight: Flight) -> tuple[Any, float] | WorkerCrash:
-        """Return what came of it."""
+        """Return the result of a batch."""
         return flight.result()
 
     def check(self) -> None:
-        """Wait for nobody."""
+        """Do nothing: a submitted batch is finished."""
 
     def close(self) -> None:
-        """Nobody to send home."""
+        """Do nothing: there are no workers."""
 
 
 @dataclass(eq=False)
 class _Worker:
-    """One process. Each has a pool of its own, so that when it dies, we know of what, and the others go on."""
+    """One process in its own executor, so that a crash can be attributed to a batch and leaves the others running."""
 
     pool: ProcessPoolExecutor
     under_way: list[Flight] = field(default_factory=list)  # in order of submission: the first is being flown
-    fatal: Flight | None = None  # what the process has died of
+    crashed_flight: Flight | None = None  # the one during which the process crashed
 
-    def blame(self) -> None:
-        """Lay a death to the first flight that has not come home."""
-        if self.fatal is None:
-            self.fatal = next(flight for flight in self.under_way if not _has_finished(flight))
+    def attribute_crash(self) -> None:
+        """Attribute a crash to the first flight that has not finished."""
+        if self.crashed_flight is None:
+            self.crashed_flight = next(flight for flight in self.under_way if not _has_finished(flight))
 
 
 class Processes:
-    """Processes of our own on this machine; one that dies is replaced.
+    """Worker processes on this machine; one that crashes is replaced.
 
     Parameters
     ----------
     n : int
-        How many.
+        Number of processes.
     task : Task
-        What they get ready for at once, beside each other.
+        Task for which each process creates its flyer at its start.
     """
 
     def __init__(self, n: int, task: Task) -> None:
         self._task = task
-        self._workers = [self._free_worker() for _ in range(n)]
-        self._hand_of: dict[Flight, _Worker] = {}
+        self._workers = [self._start_worker() for _ in range(n)]
+        self._worker_of: dict[Flight, _Worker] = {}
 
     @property
     def width(self) -> int:
-        """How many batches may be under way."""
+        """Greatest number of batches under way."""
         return _QUEUED * len(self._workers)
 
     def submit(self, task: Task, batch: Any) -> Flight:
-        """Have a batch flown by the process that has least to do."""
+        """Submit a batch to the process with the fewest batches."""
         worker = min(self._workers, key=lambda worker: len(worker.under_way))
         try:
             flight = worker.pool.submit(fly, task, batch)
-        except BrokenProcessPool:  # it died, and nobody has settled that yet
+        except BrokenProcessPool:  # it crashed, and `result` has not replaced it yet
             worker = self._replace(worker)
             flight = worker.pool.submit(fly, task, batch)
         worker.under_way.append(flight)
-        self._hand_of[flight] = worker
+        self._worker_of[flight] = worker
         return flight
 
     def result(self, flight: Flight) -> tuple[Any, float] | WorkerCrash:
-        """Return what came of it."""
-        worker = self._hand_of.pop(flight)
+        """Return the result of a batch; replace its worker after a crash."""
+        worker = self._worker_of.pop(flight)
         try:
             return flight.result()
         except BrokenProcessPool:
-            worker.blame()
+            worker.attribute_crash()
             if worker in self._workers:
                 self._replace(worker)
-            return WorkerCrash(1 if flight is worker.fatal else 0)
+            return WorkerCrash(1 if flight is worker.crashed_flight else 0)
         finally:
             worker.under_way.remove(flight)
 
     def check(self) -> None:
-        """Be sure to hear of every death."""
+        """Do nothing: each executor reports a crash of its process."""
 
     def _replace(self, worker: _Worker) -> _Worker:
-        new = self._free_worker()
+        new = self._start_worker()
         self._workers[self._workers.index(worker)] = new
         worker.pool.shutdown(wait=False)
         return new
 
-    def _free_worker(self) -> _Worker:
-        """Start a process, and have it get ready, which takes it a second."""
+    def _start_worker(self) -> _Worker:
+        """Start a process that creates its flyer, which takes about a second."""
         context = multiprocessing.get_context("spawn")
         with interrupts_held():
             pool = ProcessPoolExecutor(1, mp_context=context, initializer=begin_worker)
@@ -150,7 +150,7 @@ class Processes:
         return _Worker(pool)
 
     def close(self) -> None:
-        """Send everybody home."""
+        """Stop the processes."""
         for worker in self._workers:
             worker.pool.shutdown(wait=False, cancel_futures=True)
         for worker in self._workers:
@@ -158,14 +158,14 @@ class Processes:
 
 
 class ExternalExecutor:
-    """An executor that somebody else has made, and closes.
+    """An executor that the caller has created, and closes.
 
     Parameters
     ----------
     executor : Executor
-        Threads take turns. Where processes of it die, the campaign ends, and can go on later.
+        Its threads take turns. A crash of its processes ends the campaign, which can be continued later.
     workers : int
-        How many batches it flies at the same time.
+        Number of batches that it flies at the same time.
     """
 
     def __init__(self, executor: Executor, workers: int) -> None:
@@ -173,24 +173,24 @@ class ExternalExecutor:
         self.width = _QUEUED * workers
 
     def submit(self, task: Task, batch: Any) -> Flight:
-        """Have a batch flown."""
+        """Submit a batch to the executor."""
         try:
             return self._executor.submit(fly, task, batch)
         except (BrokenExecutor, RuntimeError) as error:
             raise _broken(error) from error
 
     def result(self, flight: Flight) -> tuple[Any, float] | WorkerCrash:
-        """Return what came of it."""
+        """Return the result of a batch."""
         try:
             return flight.result()
         except (BrokenExecutor, CancelledError) as error:
             raise _broken(error) from error
 
     def check(self) -> None:
-        """Believe the executor."""
+        """Do nothing: the executor reports failures itself."""
 
     def close(self) -> None:
-        """Leave the executor to whom it belongs."""
+        """Do nothing: the caller closes the executor."""
 
 
 def _broken(error: BaseException) -> RunError:
@@ -204,16 +204,16 @@ def _has_finished(flight: Flight) -> bool:
 
 @contextlib.contextmanager
 def interrupts_held() -> Iterator[None]:
-    """Hold Ctrl-C and a closed terminal back while a process is started: it inherits that, and never hears of them.
+    """Block SIGINT and SIGHUP while a process is started, which inherits the blocked signals.
 
-    So does the process by which Python frees what all of them share.
+    Python's resource tracker inherits them too.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGHUP})
     try:
-        resource_tracker.ensure_running()  # which lets Ctrl-C through when it is started, but has its own way with it
+        resource_tracker.ensure_running()  # its start unblocks SIGINT, which it ignores itself
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         yield
     finally:

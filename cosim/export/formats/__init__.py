@@ -1,6 +1,6 @@
-"""Formats of other tools, one module each, which names its `Format` as ``FORMAT``.
+"""Export formats: one module for each, with its `Format` as ``FORMAT``.
 
-A module that is put here is a format, known by the module's name.
+Each module in this folder is a format with the module's name.
 
 Imports: mavlink, mavlink.wire.
 """
@@ -14,7 +14,7 @@ __all__ = ["FORMATS"]
 
 
 def _find_formats() -> dict[str, Format]:
-    """Return the entry of each module here."""
+    """Return the `Format` of each module in this folder, by name."""
     found = {}
     for module in iter_modules(__path__):
         entry = getattr(import_module(f"{__name__}.{module.name}"), "FORMAT", None)

@@ -1,4 +1,4 @@
-"""CSV: one table of numbers that read back to the last bit, and a second one of the units."""
+"""CSV: a table of numbers that read back exactly, and a second one of the units."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from cosim.export.format import Format
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
     """Write the tables.
 
-    The header has the names alone, so that a column is found by the name that it has everywhere else.
+    The header has the names without units, so that a column is found by its signal's name.
 
     Parameters
     ----------
     excerpt : Excerpt
-        What is written.
+        The run with the selected signals.
     path : Path
         The file.
 
     Returns
     -------
     list of Path
-        It, and the table of units beside it.
+        The file, and the table of units beside it.
     """
     names = [column.name for column in excerpt.columns]
     with path.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerow(names)
         for block in excerpt.blocks(names):
-            # repr is the shortest text that reads back to the same bits, and has a point, so that 1.0 stays no integer
+            # repr is the shortest text that reads back to the same bits, and keeps the point of 1.0
             file.writelines(f"{','.join(map(repr, row))}\n" for row in block.numbers().tolist())
     units = path.with_suffix(".units.csv")
     with units.open("w", encoding="utf-8", newline="") as file:

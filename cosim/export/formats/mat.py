@@ -14,7 +14,7 @@ from cosim.export.excerpt import Excerpt
 from cosim.export.format import Format
 from cosim.export.names import legal
 
-_GREATEST = 2**31 - 2**20  # bytes of a variable in a file of version 5, less what names and heads take
+_GREATEST = 2**31 - 2**20  # bytes of a variable in a file of version 5, less a margin for names and headers
 
 
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
@@ -23,19 +23,19 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
     Parameters
     ----------
     excerpt : Excerpt
-        What is written.
+        The run with the selected signals.
     path : Path
         The file.
 
     Returns
     -------
     list of Path
-        It alone.
+        The file.
 
     Raises
     ------
     ExportError
-        If it is more than the format holds.
+        If the data exceed the size limit of the format.
     """
     from scipy.io import savemat
 

@@ -1,4 +1,4 @@
-"""MCAP: signals as messages of Protobuf, and the scene, as Foxglove shows them."""
+"""MCAP: signals as Protobuf messages, and the scene for Foxglove."""
 
 from __future__ import annotations
 

@@ -20,16 +20,16 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
     Parameters
     ----------
     excerpt : Excerpt
-        What is written.
+        The run with the selected signals.
     path : Path
         The file.
 
     Returns
     -------
     list of Path
-        It alone.
+        The file.
     """
-    # what numpy.savez_compressed does, but with a block of a signal in memory at a time
+    # as numpy.savez_compressed, but with one block of a signal in memory at a time
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, allowZip64=True) as archive:
         for name, array in _texts(excerpt):
             with _member(archive, name) as file:

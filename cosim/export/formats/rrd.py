@@ -1,4 +1,4 @@
-"""RRD: signals and the scene, as Rerun shows them."""
+"""RRD: signals and the scene for Rerun."""
 
 from __future__ import annotations
 

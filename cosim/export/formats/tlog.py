@@ -15,19 +15,19 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
     Parameters
     ----------
     excerpt : Excerpt
-        Of the whole run.
+        The whole run.
     path : Path
         The file.
 
     Returns
     -------
     list of Path
-        It alone.
+        The file.
 
     Raises
     ------
     ExportError
-        If anything of the run could not be written.
+        If a part of the run could not be written.
     """
     from cosim.mavlink.replay import replay
     from cosim.mavlink.wire.endpoint import Endpoint

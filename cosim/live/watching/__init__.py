@@ -1,6 +1,6 @@
 """A run in the terminal.
 
-Live, from its folder while it is written, or played back.
+Sources: a live view, the folder of a run that is being recorded, or of a finished run.
 
 Imports: replay, results, scenario, simulation, simulation.commands.
 """

@@ -1,4 +1,4 @@
-"""Bars of letters."""
+"""Bars of text characters."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from rich.text import Text
 
 
 class Bars:
-    """Draws bars; in plain letters where a terminal knows no others.
+    """Draws bars in block characters or in ASCII.
 
     Parameters
     ----------
     ascii_only : bool
-        In plain letters.
+        Use ASCII characters only.
     """
 
     def __init__(self, ascii_only: bool) -> None:
@@ -21,13 +21,13 @@ class Bars:
         self._less = "<" if ascii_only else "◀"
 
     def part(self, part: float, width: int, style: str) -> Text:
-        """Return a bar from 0 to 1; NaN is empty."""
+        """Return a bar for a value from 0 to 1; NaN gives an empty one."""
         width = max(1, width)
         filled = 0 if math.isnan(part) else round(min(1.0, max(0.0, part)) * width)
         return Text().append(self._full * filled, style=style).append(self._empty * (width - filled), style="dim")
 
     def signed(self, part: float, width: int, style: str) -> Text:
-        """Return a bar from -1 to 1 with 0 in its middle; beyond it ends in an arrow."""
+        """Return a bar for a value from -1 to 1 with 0 in the middle; values beyond end in an arrow."""
         half = max(1, (width - 1) // 2)
         filled = 0 if math.isnan(part) else min(half, math.ceil(abs(part) * half))
         run = self._full * filled

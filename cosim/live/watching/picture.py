@@ -1,4 +1,4 @@
-"""A run at a moment as lines for a terminal: what matters now, weights and distances as bars, and why."""
+"""A run at one instant as lines for a terminal: active region, weights and distances as bars, state, and rules."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from cosim.live.watching.sources import Look
 from cosim.simulation.commands.commands import MODES
 
 _STYLES = {"#D55E00": "red", "#E69F00": "yellow", "#56B4E9": "blue"}  # of the terminal, for colours of criteria
-_OF_GOAL = "green"
+_GOAL_STYLE = "green"
 _LONGEST_NAME = 12  # characters of a criterion
-_FIRED = 0.005  # strength of a rule below which it does not count
-_WIDE = 120  # characters, from which on three columns have room
+_FIRED = 0.005  # least strength of a rule that is shown
+_WIDE = 120  # least width for three columns, characters
 
 
 def picture(look: Look, width: int = 80, height: int | None = None, ascii_only: bool = False) -> RenderableType:
-    """Return the picture of a moment.
+    """Draw a run at one instant.
 
     Parameters
     ----------
     look : Look
-        The run then.
+        The run at that instant.
     width : int
-        Characters of a line at the most.
+        Greatest length of a line, in characters.
     height : int, optional
-        Lines at the most; regions and rules that find no room are counted.
+        Greatest number of lines; of regions and rules beyond it only the number is shown.
     ascii_only : bool
-        Draw bars in plain letters.
+        Draw bars in ASCII characters.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def picture(look: Look, width: int = 80, height: int | None = None, ascii_only: 
 
 
 def plain(text: object) -> str:
-    """Return a text without anything that could steer a terminal."""
+    """Replace all control characters of a text by spaces."""
     return "".join(letter if letter.isprintable() else " " for letter in str(text))
 
 
@@ -89,7 +89,7 @@ def _head(look: Look, width: int, bars: Bars) -> list[Text]:
 
 
 def _now(look: Look) -> Text:
-    """Return who is given way to, in words."""
+    """Return a line of words with the active region, the mode and the arming."""
     line = Text(no_wrap=True, overflow="ellipsis")
     index = look["active"]
     if math.isnan(index) or not 0 <= int(index) < len(look.header["regions"]):
@@ -97,7 +97,7 @@ def _now(look: Look) -> Text:
     region = look.header["regions"][int(index)]
     criterion, keep = region["criterion"], "stay within" if region["keep"] == "in" else "keep out"
     if criterion is None:
-        line.append("Heads for the goal", style=f"bold {_OF_GOAL}")
+        line.append("Heads for the goal", style=f"bold {_GOAL_STYLE}")
     else:
         line.append(f"Gives way to {plain(region['name'])}", style=f"bold {_style(look, criterion)}")
         line.append(f" ({plain(criterion)}, {keep})")
@@ -118,10 +118,10 @@ def _foot(look: Look) -> list[Text]:
 
 
 def _style(look: Look, criterion: str | None) -> str:
-    """Return the style of a criterion, None for the goal."""
+    """Return the text style of a criterion, or of the goal for None."""
     colours = {one["name"]: one["colour"].upper() for one in look.header["criteria"]}
     colour = colours.get(criterion) if criterion is not None else None
-    return _OF_GOAL if colour is None else _STYLES.get(colour, colour)
+    return _GOAL_STYLE if colour is None else _STYLES.get(colour, colour)
 
 
 def _weights(look: Look, width: int, bars: Bars) -> list[Text]:
@@ -137,7 +137,7 @@ def _weights(look: Look, width: int, bars: Bars) -> list[Text]:
 
 
 def _distances(look: Look, width: int, bars: Bars, room: int | None) -> list[Text]:
-    """Return a bar for each region, 0 in its middle: to the right respected, to the left violated."""
+    """Return a bar for each region with 0 in the middle: to the right respected, to the left violated."""
     scale = 10.0 * max(look.header["ramp"], 0.01)
     active = look["active"]
     found = []

@@ -1,4 +1,4 @@
-"""Where the pictures of a run come from: its folder, finished or still being written, or a live view."""
+"""Sources of the instants of a run: the folder of a finished run or of one being recorded, or a live view."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from cosim.scenario.scenario import load_scenario
 from cosim.simulation.signals import Array
 
 _FRAME = 0.1  # s of the wall clock, between pictures
-_FAST = 200  # pictures of a run that is played back as fast as it goes
-_ROWS = 10_000  # of a finished run
-_FRESH = 5.0  # s; parts of a record that are older are not written any more
-_ANSWER = 5.0  # s, that a live view may take to answer
-_GREATEST = 1 << 26  # bytes of a message
+_FAST = 200  # pictures of a run that is played back at full speed
+_ROWS = 10_000  # greatest number of rows of a finished run
+_FRESH = 5.0  # s; a run whose newest part is older is not being recorded
+_ANSWER = 5.0  # s, timeout of a connection to a live view
+_GREATEST = 1 << 26  # bytes, greatest size of a message
 
 
 class _Signal(msgspec.Struct):
@@ -62,7 +62,7 @@ class _Truth(msgspec.Struct):
 
 
 class _Header(msgspec.Struct):
-    """What a picture takes of the header of a live view, which may be another's."""
+    """The used part of a live view's header, which is validated since the server may be another program."""
 
     title: str
     law: str
@@ -77,31 +77,31 @@ class _Header(msgspec.Struct):
 
 @dataclass(frozen=True)
 class Look:
-    """A run at a moment."""
+    """A run at one instant."""
 
     header: dict[str, Any]
     row: Array | None  # (columns,), None before the first
-    note: str  # how it is looked at
-    ended: tuple[str, str] | None = None  # status and verdict, once it is over
-    silent: bool = False  # nothing new has come for long
+    note: str  # source of the row
+    ended: tuple[str, str] | None = None  # status and verdict, once the run is over
+    silent: bool = False  # True if the recording has no new rows
 
     def __getitem__(self, name: str) -> float:
-        """Return a signal; NaN where there is none."""
+        """Return the value of a signal; NaN if there is none."""
         names = [signal["name"] for signal in self.header["signals"]]
         return float(self.row[names.index(name)]) if self.row is not None and name in names else math.nan
 
 
 def looks(what: str, rate: float | None = 1.0, once: bool = False) -> Iterator[Look]:
-    """Look at a run until it is over.
+    """Iterate over instants of a run until it is over.
 
     Parameters
     ----------
     what : str
         A run folder; or the port, or the address (``ws://HOST:PORT``), of a live view.
     rate : float or None
-        Simulated seconds a second when a finished run is played back; None for as fast as it goes.
+        Simulated seconds per second in the playback of a finished run; None for full speed.
     once : bool
-        Look once, at the newest there is.
+        Yield the newest instant only.
 
     Yields
     ------
@@ -113,7 +113,7 @@ def looks(what: str, rate: float | None = 1.0, once: bool = False) -> Iterator[L
     RunError, ScenarioError
         If the folder holds no run that can be read.
     TelemetryError
-        If nobody answers at the address, or the connection is lost.
+        If the address does not answer, or the connection is lost.
     """
     if what.isdecimal() or "://" in what:
         found = _live(_endpoint(what))
@@ -136,7 +136,7 @@ def _finished(path: Path, rate: float | None, once: bool) -> Iterator[Look]:
     run = load_run(path)
     viewing = Viewing(run.scenario, run.record.columns)
     record, steps = run.record, len(run.record)
-    # no picture needs more rows than these, and all of a long run would not fit into memory
+    # a picture needs no more rows than these, and all rows of a long run would not fit into memory
     rows = np.arange(steps - 1, -1, -max(1, steps // _ROWS))[::-1] if not once else np.array([steps - 1])
     picked = record.take(rows, [record.columns[i].name for i in viewing.picked]).numbers()
     times, ended = picked[:, 0], (str(run.summary["status"]), verdict(run.summary))
@@ -158,14 +158,14 @@ def _finished(path: Path, rate: float | None, once: bool) -> Iterator[Look]:
 
 
 def _is_written(path: Path) -> bool:
-    """Return whether a run goes on in a folder."""
+    """Return True if a run is being recorded in a folder."""
     parts = path / PARTS
     if (path / RECORD).exists() or (path / SUMMARY).exists() or not parts.is_dir():
         return False
     files = list(parts.glob("*.parquet"))
     try:
         return not files or time.time() - max(file.stat().st_mtime for file in files) < _FRESH
-    except FileNotFoundError:  # the run ends: its parts have just been joined
+    except FileNotFoundError:  # the run has just merged its parts
         return False
 
 
@@ -188,7 +188,7 @@ def _growing(path: Path) -> Iterator[Look]:
             except RunError:
                 if (path / PARTS / newest).exists():
                     raise
-                continue  # the run ends: its parts have just been joined
+                continue  # the run has just merged its parts
             known, since = newest, time.monotonic()
             row = viewing.extended(last[:, viewing.picked])[0]
         silent = time.monotonic() - since
@@ -221,7 +221,7 @@ def _live(endpoint: tuple[str, int]) -> Iterator[Look]:
     url = f"ws://{endpoint[0]}:{endpoint[1]}/ws"
     header: dict[str, Any] | None = None
     try:
-        # with a socket of its own no proxy comes in between
+        # connecting by our own socket bypasses proxies
         reached = socket.create_connection(endpoint, timeout=_ANSWER)
         with connect(url, sock=reached, open_timeout=_ANSWER, max_size=_GREATEST, compression=None) as connection:
             row: Array | None = None

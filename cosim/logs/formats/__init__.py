@@ -1,6 +1,6 @@
 """Formats of logs, one module each, which names its `LogFormat` as ``FORMAT``.
 
-A module that is put here is a format, known by the suffixes that it names.
+A module in this folder adds a format for the suffixes that it names.
 
 Imports: mavlink.wire, plant_fmu, simulation.
 """
@@ -14,7 +14,7 @@ __all__ = ["FORMATS"]
 
 
 def _find_formats() -> dict[str, LogFormat]:
-    """Return the entry of each suffix."""
+    """Return the format of each suffix."""
     found: dict[str, LogFormat] = {}
     for module in iter_modules(__path__):
         entry = getattr(import_module(f"{__name__}.{module.name}"), "FORMAT", None)

@@ -1,4 +1,4 @@
-"""Dataflash logs that ArduPilot writes itself: messages whose formats stand in the log."""
+"""Dataflash logs of ArduPilot: messages whose formats are in the log."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Fields = dict[str, Any]
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
-    """Read a dataflash log, as `LogFormat` says; ImportLogError if it is none."""
+    """Read a dataflash log, as specified by `LogFormat`; raise ImportLogError for another file."""
     contents.autopilot = "ardupilot"
     takers = _Takers(contents)
     lost, any_message = 0, False
@@ -49,12 +49,12 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
     if lost:
         contents.remarks.append(f"{lost} bytes of the log are no messages and were passed over.")
     for _, by in takers.clock.jumps:
-        contents.remarks.append(f"The autopilot's clock jumps by {by:+.4g} s: a second stands for it.")
+        contents.remarks.append(f"The autopilot's clock jumps by {by:+.4g} s: it is taken as a pause of 1 s.")
     takers.conclude()
 
 
 class _Takers:
-    """Takes messages into the contents of a log."""
+    """Add messages to the contents of a log."""
 
     def __init__(self, contents: LogContents) -> None:
         self._contents = contents
@@ -65,7 +65,7 @@ class _Takers:
         self.wanted = frozenset(self._takers)
 
     def take(self, name: str, m: Fields) -> None:
-        """Take a message."""
+        """Add a message."""
         at = self.clock.time(m["TimeUS"] * 1e-6) if "TimeUS" in m else _NOTHING
         try:
             self._takers[name](m, at)
@@ -73,7 +73,7 @@ class _Takers:
             raise ImportLogError(f"message {name} has no field {error}, expected it as ArduPilot has it") from error
 
     def conclude(self) -> None:
-        """Say which of several sources are taken."""
+        """Set the preferences among several sources."""
         contents = self._contents
         primary = int(contents.parameters.get("BARO_PRIMARY", 0.0))
         instances = sorted(name for quantity, name in contents.sources if quantity == "depth")
@@ -147,7 +147,7 @@ class _Takers:
 
 
 def _messages(path: Path, wanted: frozenset[str], moved: Moved) -> Iterator[tuple[str | None, Fields | None]]:
-    """Yield the name and fields of each message, no fields of one that is not wanted; no name for a byte of none."""
+    """Yield name and fields of each message, None for fields of unwanted ones; None and None for an invalid byte."""
     formats: dict[int, tuple[DFFormat, struct.Struct]] = {}
     first = DFFormat(_FMT, "FMT", _FMT_SIZE, "BBnNZ", "Type,Length,Name,Format,Columns")
     formats[_FMT] = first, struct.Struct(first.msg_struct)

@@ -20,7 +20,7 @@ from cosim.logs.spool import LogContents
 from plant_fmu.toml_tables import hint
 
 _LARGEST = 1 << 28  # bytes of a record
-_WAITING = 4096  # messages of a quantity that are put away together
+_WAITING = 4096  # messages of a quantity that are written together
 _PART = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+)\]")
 _FAILURES = (ValueError, KeyError, IndexError, struct.error, UnicodeDecodeError, EOFError, OSError, AttributeError)
 
@@ -28,7 +28,7 @@ Getter = Callable[[Any], float]
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
-    """Read a bag, as `LogFormat` says; ImportLogError if it is none, or lacks a topic or field."""
+    """Read a bag, as specified by `LogFormat`; raise ImportLogError for another file, or a missing topic or field."""
     from mcap.exceptions import McapError
     from mcap.reader import NonSeekingReader
     from mcap_ros2.decoder import DecoderFactory
@@ -43,7 +43,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
     total, clock, factory = max(1, path.stat().st_size), Clock(), DecoderFactory()
     topics: set[str] = set()
     with path.open("rb") as file:
-        # from its beginning, as far as it goes: the index at its end is lost where the recorder was killed
+        # sequentially: the index at its end is missing if the recorder was killed
         reader = NonSeekingReader(file, record_size_limit=_LARGEST)
         try:
             for schema, channel, message in reader.iter_messages(log_time_order=False):
@@ -68,11 +68,11 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
     for taker in (taker for several in takers.values() for taker in several):
         taker.flush()
     for _, by in clock.jumps:
-        contents.remarks.append(f"The clock of the bag's writer jumps by {by:+.4g} s: a second stands for it.")
+        contents.remarks.append(f"The clock of the bag's writer jumps by {by:+.4g} s: it is taken as a pause of 1 s.")
 
 
 class _Taker:
-    """Takes the fields of a quantity from messages."""
+    """Read the fields of a quantity from messages."""
 
     def __init__(self, columns: ColumnMap, name: str, contents: LogContents) -> None:
         self._columns, self._name, self._contents = columns, name, contents
@@ -84,14 +84,14 @@ class _Taker:
         self._rows: list[list[float]] = []
 
     def take(self, message: Any, written: float) -> None:
-        """Take a message."""
+        """Add a message."""
         at = written if self._stamp is None else self._clock.time(self._stamp(message))
         self._rows.append([at, *(get(message) for get in self._getters)])
         if len(self._rows) >= _WAITING:
             self.flush()
 
     def flush(self) -> None:
-        """Put away what waits."""
+        """Write the collected samples."""
         if self._rows:
             rows = np.array(self._rows)
             self._rows = []
@@ -99,7 +99,7 @@ class _Taker:
 
 
 def _walk(path: str, topic: str) -> Callable[[Any], Any]:
-    """Return what finds a field by its path, such as ``pose.position.x`` or ``data[3]``."""
+    """Return a function from a message to its field at a path, such as ``pose.position.x`` or ``data[3]``."""
     parts: list[str | int] = []
     at = 0
     while at < len(path):
@@ -137,7 +137,7 @@ def _getter(path: str, topic: str) -> Getter:
 
 
 def _stamp_getter(time: TimeColumn, topic: str) -> Getter:
-    """Return what finds a message's own time [s]: a field of seconds and nanoseconds, or a number."""
+    """Return a function from a message to its own time [s]: a field of seconds and nanoseconds, or a number."""
     find = _walk(time.column, topic)
 
     def stamp(message: Any) -> float:

@@ -1,4 +1,4 @@
-"""Tables: CSV and Parquet files, whose columns a map names."""
+"""Tables: CSV and Parquet files, with columns named by a map."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from cosim.logs.spool import LogContents
 from cosim.simulation.signals import Array
 from plant_fmu.toml_tables import hint
 
-_ROWS = 2**15  # of a Parquet file that are read at once
+_ROWS = 2**15  # rows of a Parquet file that are read at once
 _BLOCK = 4 << 20  # bytes of a CSV file that are read at once
 _MISSING = ["", "nan", "NaN", "NAN", "null", "NULL", "None", "N/A", "n/a", "inf", "-inf"]
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
-    """Read a table, as `LogFormat` says; ImportLogError if a column is missing or holds what is no number."""
+    """Read a table, as specified by `LogFormat`; raise ImportLogError if a column is missing or not numeric."""
     assert columns is not None
     times = {name: columns.time_of(name) for name in columns.quantities}
     untimed = next((name for name, time in times.items() if time is None), None)
@@ -48,11 +48,11 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
             columns.put(contents, name, at[time], values)
     for time, clock in clocks.items():
         for _, by in clock.jumps:
-            contents.remarks.append(f"Column {time.column!r} jumps by {by:+.4g} s: a second stands for it.")
+            contents.remarks.append(f"Column {time.column!r} jumps by {by:+.4g} s: it is taken as a pause of 1 s.")
 
 
 def _batches(path: Path, contents: LogContents, wanted: set[str], texts: set[str], moved: Moved) -> Iterator[Any]:
-    """Yield the rows, with the columns that are wanted."""
+    """Yield batches of rows with the wanted columns."""
     try:
         if path.suffix.lower() == ".parquet":
             with pq.ParquetFile(path, pre_buffer=False) as file:
@@ -88,7 +88,7 @@ def _batches(path: Path, contents: LogContents, wanted: set[str], texts: set[str
 
 
 def _require(names: list[str], wanted: set[str], contents: LogContents) -> None:
-    """Refuse a table that lacks columns; note those that nothing is made of."""
+    """Refuse a table that lacks columns; record the unused ones."""
     missing = sorted(wanted - set(names))
     if missing:
         raise ImportLogError(f"has no column {missing[0]!r}, which the map names; {hint(missing[0], names)}")

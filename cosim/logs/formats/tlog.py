@@ -1,4 +1,4 @@
-"""Telemetry logs of ground stations: MAVLink frames, each behind the time at which it came."""
+"""Telemetry logs of ground stations: MAVLink frames, each after its time of reception."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from cosim.mavlink.wire.framing import Counts, Gate, Header, header_at
 _CHUNK = 1 << 20  # bytes
 _STAMP = struct.Struct(">Q")  # us since 1970
 _LONGEST_FRAME = 300  # bytes
-_EARLIEST, _LATEST = 9e8, 4.1e9  # s since 1970, of a stamp that can be one
+_EARLIEST, _LATEST = 9e8, 4.1e9  # s since 1970, range of valid stamps
 _LOCAL_NED, _BODY_FRD, _DOWNWARDS = 1, 12, 25
 _INVALID_STICK = 0x7FFF
-_HEARTBEAT, _AUTOPILOT = 0, 1  # a message, and the component that is the vehicle's
-_SWIM = (0, 11, 12)  # of MAV_TYPE: no word, a boat and a submarine
+_HEARTBEAT, _AUTOPILOT = 0, 1  # ids of the message, and of the vehicle's component
+_SWIM = (0, 11, 12)  # MAV_TYPE of generic, surface boat and submarine
 _OF_OTHERS = ("MANUAL_CONTROL", "VISION_POSITION_DELTA")  # messages of the pilot's station and of a DVL's driver
 _ARDUPILOT, _PX4, _NO_AUTOPILOT = 3, 12, 8
 _RESTS_IN_THE_MIDDLE = (_ARDUPILOT, _PX4)
 _G = 9.80665
-_FRAME = "Frame: "  # how ArduSub begins the text that names its arrangement of thrusters
+_FRAME = "Frame: "  # prefix of ArduSub's text with its arrangement of thrusters
 
 Put = Callable[[str, str, float, float, Sequence[float]], None]
 NO_STAMP = math.nan
 
 
 class _Vehicle:
-    """Takes messages of the vehicle and its pilot into the contents of a log."""
+    """Add messages of the vehicle and its pilot to the contents of a log."""
 
     def __init__(self, contents: LogContents, system: int, autopilot: int, kind: int) -> None:
         self._contents = contents
@@ -51,7 +51,7 @@ class _Vehicle:
         self.wanted = {m.id: m.msgname for m in mavlink.mavlink_map.values() if m.msgname in self._takers}
 
     def take(self, header: Header, message: Any, written: float) -> None:
-        """Take a message."""
+        """Add a message."""
         name = message.get_type()
         if name in _OF_OTHERS or (header.system, header.component) == (self._system, _AUTOPILOT):
             self._takers[name](message, written)
@@ -95,7 +95,7 @@ class _Vehicle:
         if m.port:
             self._contents.unread[f"SERVO_OUTPUT_RAW of port {m.port}"] += 1
             return
-        # its clock of 32 bit begins anew after 71 minutes, so the time at which it came is taken
+        # its 32-bit clock wraps after 71 minutes, so the time of reception is used
         pulses = [float(getattr(m, f"servo{i}_raw")) for i in range(1, 17)]
         self._put("pulses", "SERVO_OUTPUT_RAW", NO_STAMP, at, pulses)
 
@@ -118,7 +118,7 @@ class _Vehicle:
         self._imu("SCALED_IMU2", m.time_boot_ms * 1e-3, at, m)
 
     def _on_raw_imu(self, m: Any, at: float) -> None:
-        if self._autopilot == _ARDUPILOT:  # whose raw numbers are scaled; others give what their chip says
+        if self._autopilot == _ARDUPILOT:  # its raw numbers are scaled; others are in units of the chip
             self._imu("RAW_IMU", m.time_usec * 1e-6, at, m)
         else:
             self._contents.unread["RAW_IMU"] += 1
@@ -157,7 +157,7 @@ def _part(value: float) -> float:
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
-    """Read a telemetry log, as `LogFormat` says; ImportLogError if it holds no vehicle."""
+    """Read a telemetry log, as specified by `LogFormat`; raise ImportLogError if it has no vehicle."""
     counts, clock = Counts(), Clock()
     gate, vehicle, names = Gate(counts), _Vehicle(contents, *_find_vehicle(path)), dialect().mavlink_map
     lost = 0
@@ -177,7 +177,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
     if lost:
         contents.remarks.append(f"{lost} bytes of the log are no MAVLink frames and were passed over.")
     for _, by in clock.jumps:
-        contents.remarks.append(f"The clock of the log's writer jumps by {by:+.4g} s: a second stands for it.")
+        contents.remarks.append(f"The clock of the log's writer jumps by {by:+.4g} s: it is taken as a pause of 1 s.")
     contents.preferences |= {
         "attitude": ("ODOMETRY", "ATTITUDE_QUATERNION", "ATTITUDE"),
         "rates": ("ODOMETRY", "ATTITUDE_QUATERNION", "ATTITUDE"),
@@ -188,7 +188,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
 
 
 def kind_of(number: int) -> str:
-    """Return which kind of vehicle a number of MAV_TYPE is, empty for one that swims or says nothing."""
+    """Return the kind of vehicle of a MAV_TYPE in words; empty for a boat, a submarine, or generic."""
     entry = dialect().enums["MAV_TYPE"].get(number)
     if number in _SWIM or entry is None:
         return ""
@@ -196,7 +196,7 @@ def kind_of(number: int) -> str:
 
 
 def _find_vehicle(path: Path) -> tuple[int, int, int]:
-    """Return the system of the first autopilot that is heard, which autopilot it is, and of which kind of vehicle."""
+    """Return system id, MAV_AUTOPILOT and MAV_TYPE of the first autopilot's heartbeat."""
     gate = Gate(Counts())
     for _, frame, header in _frames(path, lambda part: None):
         if header is not None and (header.message, header.component) == (_HEARTBEAT, _AUTOPILOT):
@@ -207,7 +207,7 @@ def _find_vehicle(path: Path) -> tuple[int, int, int]:
 
 
 def _frames(path: Path, moved: Moved) -> Iterator[tuple[float, bytes, Header | None]]:
-    """Yield when each frame came [s since 1970], the frame and its header; bytes that are none without a header."""
+    """Yield reception time [s since 1970], frame and header of each frame; None as header for invalid bytes."""
     gate = Gate(Counts())
     total = max(1, path.stat().st_size)
     with path.open("rb") as file:

@@ -16,7 +16,7 @@ from cosim.logs.formats.tlog import kind_of
 from cosim.logs.spool import LogContents
 from cosim.simulation.signals import Array
 
-# quantity, fields with [] for numbered ones; the fields' units are of SI, their frames NED and FRD
+# topic: quantities and their fields, in SI units, NED and FRD
 _TOPICS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
     "vehicle_attitude": (
         ("attitude", ("q[0]", "q[1]", "q[2]", "q[3]")),
@@ -38,7 +38,7 @@ _FAILURES = (TypeError, ValueError, KeyError, IndexError, struct.error, UnicodeD
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
-    """Read a log of PX4, as `LogFormat` says; ImportLogError if it is none."""
+    """Read a log of PX4, as specified by `LogFormat`; raise ImportLogError for another file."""
     from pyulog import ULog
     from pyulog.core import ULogException
 
@@ -66,7 +66,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
 
 
 def _take(data: Any, contents: LogContents, name: str) -> None:
-    """Take the samples of a topic."""
+    """Add the samples of a topic to the contents."""
     fields: dict[str, Array] = data.data
     times = np.asarray(fields["timestamp"], float) * 1e-6
     valid: NDArray[np.bool_] = np.ones(len(times), bool)

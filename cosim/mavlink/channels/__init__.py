@@ -1,6 +1,6 @@
-"""What carries frames.
+"""Channels that carry frames.
 
-UDP, TCP, serial lines and files, one kind a file, behind one protocol.
+UDP, TCP, serial lines and files, one kind in each module, behind one protocol.
 
 Imports: nothing.
 """

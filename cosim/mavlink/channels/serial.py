@@ -1,4 +1,4 @@
-"""A serial line, opened anew when its device was pulled out and is back."""
+"""A serial line, reopened after its device was removed and connected again."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from cosim.mavlink.channels.stream import OneStream, Stream
 log = logging.getLogger(__name__)
 
 _AGAIN = 1.0  # s, between two attempts to open
-_WAITING = 1 << 13  # bytes: more than that is stale before it is sent
+_WAITING = 1 << 13  # bytes in the queue; more would be outdated before they are sent
 
 
 class Serial(OneStream):
     """A raw line of 8 bits, no parity, one stop bit, without flow control.
 
-    The operating system's own calls do all of it, so nothing needs to be installed; Windows has other ones.
+    It uses the calls of POSIX systems, so no package is needed; Windows is not supported.
 
     Parameters
     ----------
     path : str
-        Of the device.
+        Path of the device.
     baud : int
-        Bits a second, one of those that the system knows.
+        Bits per second, one of the rates of the operating system.
 
     Raises
     ------
@@ -45,10 +45,10 @@ class Serial(OneStream):
         super().__init__(line, gone="device", slow="on a slow line")
 
     def tend(self, now: float) -> None:
-        """Write what waits, or try to open the device again."""
+        """Write queued frames, or try to reopen the device."""
         line = self._stream
         if line is not None:
-            line.flush(now)  # that it takes nothing for long is no fault of a line
+            line.flush(now)  # a serial line is not closed for a stall
             if not line.open:
                 log.warning("MAVLink: %s is gone", self._path)
                 self._lose(line)
@@ -68,7 +68,7 @@ def open_line(path: str, baud: int) -> Stream:
     OSError
         If it cannot be opened.
     TelemetryError
-        If the baud rate is none that the system knows, or this is Windows.
+        If the operating system does not have the baud rate, or is Windows.
     """
     speed = _speed(path, baud)
     file = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
@@ -94,7 +94,7 @@ def _speed(path: str, baud: int) -> int:
 
 
 def _make_raw(file: int, speed: int) -> None:
-    """Set a terminal to pass all bytes as they are, for this process alone."""
+    """Set a terminal to raw mode, for exclusive use of this process."""
     import fcntl
     import termios
     import tty

@@ -1,4 +1,4 @@
-"""Streams of bytes: whole frames wait to be written, and not too many of them; what was lost is opened anew."""
+"""Streams of bytes with a bounded queue of whole frames; a lost stream is reopened."""
 
 from __future__ import annotations
 
@@ -9,40 +9,40 @@ from typing import Final
 from cosim.mavlink.channels.channel import CHUNK
 
 WAITING = 1 << 16  # bytes
-_MUCH = 1 << 12  # bytes, that need not wait for a flush
-STALL = 5.0  # s without progress, after which the other side is given up
+_MUCH = 1 << 12  # bytes in the queue above which `put` writes at once
+STALL = 5.0  # s without progress, after which `flush` reports a stall
 
 
 class Outgoing:
-    """Frames on their way into a stream that takes what it likes.
+    """A queue of frames for a stream that accepts partial writes.
 
     Parameters
     ----------
     write : callable
-        Takes bytes and returns how many it took, or raises OSError; BlockingIOError where it can take none now.
+        Writes bytes and returns the number written, or raises OSError; BlockingIOError if it cannot write now.
     limit : int
-        Bytes that may wait. A frame that finds no room is dropped whole, so the other side never sees a torn one.
+        Bytes in the queue at most. A frame beyond the limit is dropped whole, so the other side never gets part of one.
 
     Attributes
     ----------
     dropped : int
-        Frames that found no room.
+        Frames dropped because the queue was full.
     """
 
     def __init__(self, write: Callable[[bytes], int], limit: int = WAITING) -> None:
         self._write: Final = write
         self._limit: Final = limit
         self._waiting = bytearray()
-        self._stalled: float | None = None  # since when nothing was taken
+        self._stalled: float | None = None  # time of the first write without progress
         self.dropped = 0
 
     def put(self, frame: bytes) -> bool:
-        """Take a frame to be written at the next flush, or when there is much; return whether there was room.
+        """Queue a frame for the next flush; write at once if the queue is long; return False if it was full.
 
         Raises
         ------
         OSError
-            If the other side has gone.
+            If the other side has closed.
         """
         if len(self._waiting) > _MUCH and self._stalled is None:
             self._write_some()
@@ -53,12 +53,12 @@ class Outgoing:
         return True
 
     def flush(self, now: float) -> bool:
-        """Write what waits, as far as it is taken; return False if nothing was taken for too long.
+        """Write as much of the queue as possible; return False after 5 s without progress.
 
         Raises
         ------
         OSError
-            If the other side has gone.
+            If the other side has closed.
         """
         if not self._waiting or self._write_some():
             self._stalled = None
@@ -67,7 +67,7 @@ class Outgoing:
         return self._stalled is None or now - self._stalled < STALL
 
     def _write_some(self) -> bool:
-        """Write what is taken; return whether anything was."""
+        """Write as much as the stream accepts; return True if that was anything."""
         try:
             taken = self._write(bytes(self._waiting))
         except (BlockingIOError, InterruptedError):
@@ -77,23 +77,23 @@ class Outgoing:
 
 
 class Stream:
-    """An open stream, with the frames that wait for it.
+    """An open stream with its queue of frames.
 
     Parameters
     ----------
     read, write, close : callable
-        Of the operating system: takes how many bytes to read at most, what to write, and nothing.
+        Calls of the operating system; their arguments are the most bytes to read, the bytes to write, and none.
     limit : int
-        Bytes that may wait.
+        Bytes in the queue at most.
 
     Attributes
     ----------
     outgoing : Outgoing
-        The frames that wait.
+        The queue of frames.
     open : bool
-        Whether the other side was there when it was last spoken to.
+        False once a read or write has failed.
     version : int
-        Greatest version of MAVLink that came from there; 0 before any did.
+        Greatest version of MAVLink received from the other side; 0 before any.
     """
 
     def __init__(
@@ -106,10 +106,10 @@ class Stream:
         self._read, self._close = read, close
         self.outgoing = Outgoing(write, limit)
         self.open = True
-        self.version = 0  # the greatest that the other side has spoken; 0 for none yet
+        self.version = 0  # the greatest received; 0 for none yet
 
     def read(self) -> bytes | None:
-        """Return what has come, None if nothing has; `open` tells whether more can come."""
+        """Return received bytes, or None if there are none; at the end of the stream `open` becomes False."""
         try:
             data = self._read(CHUNK)
         except (BlockingIOError, InterruptedError):
@@ -120,7 +120,7 @@ class Stream:
         return data or None
 
     def put(self, frame: bytes, old: bytes | None = None) -> bool:
-        """Take a frame for the other side, `old` if it speaks MAVLink 1; return whether there was room."""
+        """Queue a frame, or `old` if the other side sends MAVLink 1; return False if the queue was full."""
         if self.version == 1:
             if old is None:
                 return True
@@ -132,7 +132,7 @@ class Stream:
             return False
 
     def flush(self, now: float) -> bool:
-        """Write what waits; return whether the other side takes something now and then."""
+        """Write queued frames; return False if the other side has stalled."""
         try:
             return self.outgoing.flush(now)
         except OSError:
@@ -140,20 +140,20 @@ class Stream:
             return True
 
     def close(self) -> None:
-        """Give it back."""
+        """Close the stream."""
         self.open = False
         self._close()
 
 
 class OneStream:
-    """A channel to one peer, by a stream that is opened anew when it was lost.
+    """A channel to one peer, by a stream that is reopened after a loss.
 
     Parameters
     ----------
     stream : Stream or None
-        The first one, if there is one already.
+        The first stream, if it is open already.
     gone, slow : str
-        Who was not there, or took too little, when frames were dropped.
+        Words of the texts for frames dropped because the peer was absent, or too slow.
     """
 
     datagrams = False
@@ -164,25 +164,25 @@ class OneStream:
         self._gone, self._slow = gone, slow
 
     def receive(self) -> tuple[Hashable, bytes] | None:
-        """Return bytes of the other side."""
+        """Return the peer and bytes from it, or None if there are none."""
         stream = self._stream
         data = None if stream is None else stream.read()
         return None if data is None else (stream, data)
 
     def heard(self, peer: Hashable, version: int) -> None:
-        """Note which version the peer speaks."""
+        """Record the MAVLink version of the peer."""
         assert isinstance(peer, Stream)
         peer.version = max(peer.version, version)
 
     def send(self, frame: bytes, old: bytes | None = None) -> bool:
-        """Send to the other side, if it is there."""
+        """Queue a frame for the peer; return False if it is absent or the queue is full."""
         if self._stream is None:
             self.trouble[f"frames dropped while there was no {self._gone}"] += 1
             return False
         return self._stream.put(frame, old)
 
     def close(self) -> None:
-        """Close the stream, having written what can be written at once."""
+        """Write what can be written without blocking, and close the stream."""
         if self._stream is not None:
             self._stream.flush(0.0)
             self._lose(self._stream)

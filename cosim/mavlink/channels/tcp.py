@@ -16,13 +16,13 @@ from cosim.mavlink.channels.stream import WAITING, OneStream, Stream
 log = logging.getLogger(__name__)
 
 CLIENTS = 8
-_CONNECTING = 3.0  # s, that opening waits for the other side
+_CONNECTING = 3.0  # s, timeout of the first connection
 _AGAIN = 2.0  # s, between two attempts later on
 _UNDER_WAY = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK)
 
 
 def stream_of(made: socket.socket) -> Stream:
-    """Return a connection as a stream, which owns it from now on."""
+    """Return a stream that owns the connection."""
     made.setblocking(False)
     with contextlib.suppress(OSError):  # a client may have gone already
         made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -30,17 +30,17 @@ def stream_of(made: socket.socket) -> Stream:
 
 
 class TcpIn:
-    """A server. Each client has frames of its own waiting; one that takes none for 5 s is closed.
+    """A server. Each client has its own queue of frames; a client that accepts none for 5 s is closed.
 
     Attributes
     ----------
     port : int
-        On which it listens.
+        Port on which it listens.
 
     Raises
     ------
     TelemetryError
-        If the port is taken.
+        If the port is in use.
     """
 
     datagrams = False
@@ -51,14 +51,14 @@ class TcpIn:
             self._server = socket.create_server((host, port), backlog=CLIENTS)
         except OSError as error:
             raise TelemetryError(f"tcpin:{host}:{port}: {error.strerror or error}") from error
-        self._server.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, WAITING)  # its clients have it from it
+        self._server.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, WAITING)  # inherited by the clients' sockets
         self._server.setblocking(False)
         self.port: int = self._server.getsockname()[1]
         self.clients: list[Stream] = []
-        self._next = 0  # of the clients, to be read: they take turns
+        self._next = 0  # index of the client to read: round robin
 
     def receive(self) -> tuple[Hashable, bytes] | None:
-        """Return bytes of the next client that has some."""
+        """Return the next client with received bytes, and these; None if there are none."""
         for _ in range(len(self.clients)):
             self._next = (self._next + 1) % len(self.clients)
             client = self.clients[self._next]
@@ -68,17 +68,17 @@ class TcpIn:
         return None
 
     def heard(self, peer: Hashable, version: int) -> None:
-        """Note which version a client speaks; all are sent to, whatever they say."""
+        """Record the MAVLink version of a client; all clients are sent to, even if they never send."""
         assert isinstance(peer, Stream)
         peer.version = max(peer.version, version)
 
     def send(self, frame: bytes, old: bytes | None = None) -> bool:
-        """Send to each client."""
+        """Queue a frame for each client; return False if a queue was full."""
         taken = [client.put(frame, old) for client in self.clients]
         return all(taken)
 
     def tend(self, now: float) -> None:
-        """Write what waits, close clients that take none, accept new ones."""
+        """Write queued frames, close stalled clients, accept new ones."""
         for client in list(self.clients):
             if not client.open:
                 self._drop(client)
@@ -88,7 +88,7 @@ class TcpIn:
         for _ in range(CLIENTS):
             try:
                 made, _ = self._server.accept()
-            except OSError:  # nobody is there, or gone again
+            except OSError:  # no client waits, or it has closed again
                 return
             if len(self.clients) < CLIENTS:
                 self.clients.append(stream_of(made))
@@ -111,7 +111,7 @@ class TcpIn:
 
 
 class TcpOut(OneStream):
-    """A client; while there is no server, at first or later, it tries again every 2 s."""
+    """A client; while there is no server, at first or later, it tries to connect every 2 s."""
 
     def __init__(self, host: str, port: int) -> None:
         self._address = (host, port)
@@ -121,11 +121,11 @@ class TcpOut(OneStream):
         with contextlib.suppress(OSError):
             stream = stream_of(socket.create_connection((host, port), _CONNECTING))
         if stream is None:
-            log.warning("MAVLink: tcp:%s:%s: nobody listens yet; waiting", host, port)
+            log.warning("MAVLink: tcp:%s:%s: no server yet; waiting", host, port)
         super().__init__(stream, gone="server", slow="for a slow server")
 
     def tend(self, now: float) -> None:
-        """Write what waits, or connect anew."""
+        """Write queued frames, or reconnect."""
         connection = self._stream
         if connection is None:
             self._connect(now)
@@ -133,13 +133,13 @@ class TcpOut(OneStream):
             self._lose(connection)
 
     def close(self) -> None:
-        """Close the connection, and what was to become one."""
+        """Close the connection, and the attempt under way."""
         super().close()
         if self._attempt is not None:
             self._attempt.close()
 
     def _connect(self, now: float) -> None:
-        """Begin an attempt, or see what became of it."""
+        """Start a connection attempt, or check the one under way."""
         if self._attempt is None:
             if now - self._last < _AGAIN:
                 return
@@ -150,7 +150,7 @@ class TcpOut(OneStream):
         if code in _UNDER_WAY:
             return
         self._attempt = None
-        # to a port of this machine where nobody listens, a socket can connect to itself
+        # a socket can connect to itself on a local port without a listener
         if code in (0, errno.EISCONN) and attempt.getsockname() != self._address:
             self._stream = stream_of(attempt)
         else:

@@ -1,4 +1,4 @@
-"""A log of frames that ground stations replay."""
+"""A telemetry log (.tlog), which ground stations replay."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from cosim.errors import TelemetryError
 
 log = logging.getLogger(__name__)
 
-_FLUSHED = 1 << 16  # bytes that are written at once
-_PERIOD = 1.0  # s of the wall clock, after which less is written too
-_WAITING = 1 << 20  # bytes that wait at the most, for a disk that is full
+_FLUSHED = 1 << 16  # bytes in the buffer above which they are written
+_PERIOD = 1.0  # s of the wall clock between writes of a shorter buffer
+_WAITING = 1 << 20  # bytes buffered at most, while the disk is full
 
 
 class Tlog:
     """A new file of frames, each after its time: 8 bytes, big-endian, microseconds since 1970.
 
-    Where none came, as for a run that could not begin, no file is left.
+    Without any frame, as for a run that could not start, the file is removed.
 
-    The time is the wall clock at the start plus simulated time, so however fast the run was, it replays as it would
-    have been lived. QGroundControl takes a time in the future for one of another byte order; hence `begin_earlier`.
+    The time is the wall clock at the start plus simulated time, so a run of any speed replays in real time.
+    QGroundControl reads a time in the future with the other byte order; hence `begin_earlier`.
 
     Attributes
     ----------
     simulated : float
-        Time [s] of the frames to come, set by whoever sends them.
+        Simulated time [s] of the next frames, set by the sender.
 
     Raises
     ------
@@ -55,24 +55,24 @@ class Tlog:
             raise TelemetryError(f"{path}: {error.strerror or error}") from error
 
     def begin_earlier(self, seconds: float) -> None:
-        """Count from another time than the present one: by so much before it, before anything is sent."""
+        """Set the start time earlier by `seconds`; call it before the first frame."""
         self._start -= int(seconds * 1e6)
         self._stamp = self._start & ~3
 
     def receive(self) -> tuple[Hashable, bytes] | None:
-        """Return nothing: a log is written only."""
+        """Return None: a log is only written."""
         return None
 
     def heard(self, peer: Hashable, version: int) -> None:
-        """Hear nothing."""
+        """Do nothing: a log has no peers."""
 
     def send(self, frame: bytes, old: bytes | None = None) -> bool:
-        """Append a frame; return whether there was room for it."""
+        """Append a frame; return False if the buffer is full."""
         if len(self._waiting) > _WAITING:
             self.trouble["frames not logged"] += 1
             return False
         elapsed = self.simulated * 1e6
-        stamp = self._start + int(elapsed) if abs(elapsed) < 1e18 else self._stamp  # also where it is no number
+        stamp = self._start + int(elapsed) if abs(elapsed) < 1e18 else self._stamp  # the last one if it is NaN
         self._stamp = max(stamp & ~3, self._stamp)  # the lowest bits name a link
         self._waiting += struct.pack(">Q", self._stamp) + frame
         self._sent = True
@@ -81,23 +81,23 @@ class Tlog:
         return True
 
     def tend(self, now: float) -> None:
-        """Write what waits, now and then."""
+        """Write the buffer once a second."""
         if now - self._written > _PERIOD:
             self._written = now
             self._write()
 
     def close(self) -> None:
-        """Write what waits, and close the file."""
+        """Write the buffer, and close the file."""
         self._write()
         if self._waiting:
             self.trouble["bytes not logged"] += len(self._waiting)
         self._file.close()
         if not self._sent:
-            with contextlib.suppress(OSError):  # somebody took it away
+            with contextlib.suppress(OSError):  # it was removed already
                 os.unlink(self._path)
 
     def _write(self) -> None:
-        """Write what the disk takes; the rest waits, so no frame is torn should there be room again."""
+        """Write as much as the disk accepts; keep the rest, so that no frame is lost in part."""
         try:
             while self._waiting:
                 del self._waiting[: self._file.write(self._waiting)]

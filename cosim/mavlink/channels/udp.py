@@ -1,7 +1,7 @@
-"""UDP: to one address, or to whoever spoke to ours.
+"""UDP: to one address, or to each peer that sends to a local port.
 
-The frames of a turn of the thread go in one datagram, as autopilots do it: each system call costs the stepper a
-moment, for it hands over the interpreter.
+The frames of a turn of the thread share a datagram, as those of autopilots do: each system call delays the stepper,
+since it releases the interpreter lock.
 """
 
 from __future__ import annotations
@@ -15,43 +15,43 @@ from cosim.errors import TelemetryError
 from cosim.mavlink.channels.channel import DATAGRAM
 
 PEERS = 8
-SILENCE = 10.0  # s, after which a peer is forgotten
-_BUFFER = 1 << 18  # bytes the kernel keeps of what comes; what floods beyond it is lost there, at no cost
+SILENCE = 10.0  # s without a frame, after which a peer is removed
+_BUFFER = 1 << 18  # bytes of the kernel's receive buffer; what exceeds it is lost in the kernel
 
 _NOT_TAKEN = "datagrams not taken by the kernel"
-_PACKET = 1000  # bytes of frames in a datagram: small receivers read no more of one
+_PACKET = 1000  # bytes of frames in a datagram: the limit of small receivers
 
 
 class UdpOut:
-    """One fixed peer; the kernel passes nothing on that another one sends.
+    """One fixed peer; the kernel drops datagrams of others.
 
     Raises
     ------
     TelemetryError
-        If there is no way to it.
+        If there is no route to it.
     """
 
     datagrams = True
 
     def __init__(self, host: str, port: int) -> None:
         self.trouble: dict[str, int] = Counter()
-        self._packet = b""  # frames that go together
-        self._version = 0  # the greatest that the peer has spoken; 0 for none yet
+        self._packet = b""  # frames of the next datagram
+        self._version = 0  # the greatest received; 0 for none yet
         self._socket = _socket(f"udpout:{host}:{port}", lambda s: s.connect((host, port)))
 
     def receive(self) -> tuple[Hashable, bytes] | None:
-        """Return a datagram, if one is there."""
+        """Return a datagram, or None if there is none."""
         try:
             return 0, self._socket.recv(DATAGRAM)
-        except OSError:  # nothing is there, or word that nobody listened to what was sent
+        except OSError:  # nothing was received, or an earlier datagram was refused
             return None
 
     def heard(self, peer: Hashable, version: int) -> None:
-        """Note which version the peer speaks."""
+        """Record the MAVLink version of the peer."""
         self._version = max(self._version, version)
 
     def send(self, frame: bytes, old: bytes | None = None) -> bool:
-        """Take a frame for the next datagram; that nobody listens is no trouble."""
+        """Queue a frame for the next datagram; a missing listener is no failure."""
         frame = (old or b"") if self._version == 1 else frame
         if len(self._packet) + len(frame) > _PACKET:
             self._flush()
@@ -59,11 +59,11 @@ class UdpOut:
         return True
 
     def tend(self, now: float) -> None:
-        """Send what was taken."""
+        """Send the queued datagram."""
         self._flush()
 
     def close(self) -> None:
-        """Send what was taken, and close the socket."""
+        """Send the queued datagram, and close the socket."""
         self._flush()
         self._socket.close()
 
@@ -73,7 +73,7 @@ class UdpOut:
             try:
                 self._socket.send(packet)
                 return
-            except ConnectionRefusedError:  # word of an earlier one, in whose place this one was not sent: once more
+            except ConnectionRefusedError:  # the error of an earlier datagram, and this one was not sent: send it again
                 continue
             except OSError:
                 self.trouble[_NOT_TAKEN] += 1
@@ -81,17 +81,17 @@ class UdpOut:
 
 
 class UdpIn:
-    """Whoever sent a heeded frame within the last 10 s is a peer, up to 8 of them.
+    """A server. Each address that sent an accepted frame within the last 10 s is a peer, up to 8 of them.
 
     Attributes
     ----------
     port : int
-        On which it listens.
+        Port on which it listens.
 
     Raises
     ------
     TelemetryError
-        If the port is taken.
+        If the port is in use.
     """
 
     datagrams = True
@@ -101,16 +101,16 @@ class UdpIn:
         self._socket = _socket(f"udpin:{host}:{port}", lambda s: s.bind((host, port)))
         self.port: int = self._socket.getsockname()[1]
         self._packets = {1: b"", 2: b""}  # by version
-        self._heard: dict[tuple[str, int], float] = {}  # when, by address
-        self._version: dict[tuple[str, int], int] = {}  # the greatest that each has spoken
+        self._heard: dict[tuple[str, int], float] = {}  # time of the last accepted frame, by address
+        self._version: dict[tuple[str, int], int] = {}  # the greatest received from each
 
     @property
     def peers(self) -> list[tuple[str, int]]:
-        """Addresses that are sent to."""
+        """Addresses of the peers."""
         return list(self._heard)
 
     def receive(self) -> tuple[Hashable, bytes] | None:
-        """Return a datagram and its sender, if one is there."""
+        """Return a datagram and its sender, or None if there is none."""
         try:
             data, address = self._socket.recvfrom(DATAGRAM)
         except OSError:
@@ -118,7 +118,7 @@ class UdpIn:
         return address, data
 
     def heard(self, peer: Hashable, version: int) -> None:
-        """Send to this address from now on, where there is room."""
+        """Add this address to the peers, or renew it; count the frame if there are 8 already."""
         assert isinstance(peer, tuple)
         if peer in self._heard or len(self._heard) < PEERS:
             self._heard[peer] = time.monotonic()
@@ -127,21 +127,21 @@ class UdpIn:
             self.trouble["frames of peers beyond 8"] += 1
 
     def send(self, frame: bytes, old: bytes | None = None) -> bool:
-        """Take a frame for the next datagram to each peer; to none of them is well too."""
+        """Queue a frame for the next datagram to each peer; having no peers is no failure."""
         if len(self._packets[2]) + len(frame) > _PACKET:
             self._flush()
         self._packets[2] += frame
-        self._packets[1] += old or b""  # never the longer one by much: it has fewer messages, and zeros at their ends
+        self._packets[1] += old or b""  # about the same length: fewer messages, whose trailing zeros are not cut
         return True
 
     def tend(self, now: float) -> None:
-        """Send what was taken, and forget who is silent."""
+        """Send the queued datagrams, and remove silent peers."""
         self._flush()
         for peer in [peer for peer, last in self._heard.items() if now - last > SILENCE]:
             del self._heard[peer], self._version[peer]
 
     def close(self) -> None:
-        """Send what was taken, and close the socket."""
+        """Send the queued datagrams, and close the socket."""
         self._flush()
         self._socket.close()
 
@@ -156,7 +156,7 @@ class UdpIn:
 
 
 def _socket(name: str, prepare: Callable[[socket.socket], None]) -> socket.socket:
-    """Return a socket that never waits."""
+    """Return a prepared, non-blocking UDP socket."""
     try:
         made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     except OSError as error:

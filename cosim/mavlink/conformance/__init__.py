@@ -1,4 +1,4 @@
-"""What ground stations need of a vehicle.
+"""Checks of what ground stations require of a vehicle.
 
 Named checks from the client's side, for `cosim mavlink-check`.
 

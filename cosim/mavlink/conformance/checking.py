@@ -1,4 +1,4 @@
-"""All checks, one after the other, against whoever is at the other end of a link."""
+"""All checks, one after the other, of the vehicle at the other end of a link."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from dataclasses import dataclass
 
 from cosim.errors import TelemetryError
 from cosim.mavlink.conformance import commands, identity, missions, parameters, streams
+from cosim.mavlink.conformance.baselines import baseline_of
 from cosim.mavlink.conformance.client import Client
 from cosim.mavlink.conformance.connect import qgc_connect
 from cosim.mavlink.conformance.outcome import Check, Outcome, Subject, failed, judged, skipped, speed_of
 from cosim.mavlink.wire.ground_end import GroundLink, Heard
 
-LISTENING = 6.0  # s of its clock, in which the vehicle is heard before anything is asked of it
-_LONGEST = 60.0  # s of ours, for a vehicle whose clock is slow
+LISTENING = 6.0  # s of the vehicle's clock, in which its streams are recorded before any request
+_LONGEST = 60.0  # s of the wall clock, for a vehicle whose clock is slow
 _FINDING = 10.0  # s
 _GONE = 5.0  # s of silence
 _QUICK = 0.5  # s
@@ -22,11 +23,11 @@ _QUICK = 0.5  # s
 
 @dataclass(frozen=True)
 class Result:
-    """A check that was done."""
+    """A finished check, its outcome and its time."""
 
     check: Check
     outcome: Outcome
-    seconds: float  # that it took
+    seconds: float  # of the wall clock
 
 
 def connect_as_qgc(subject: Subject) -> Outcome:
@@ -42,7 +43,7 @@ def connect_as_qgc(subject: Subject) -> Outcome:
 
 
 def no_gaps(subject: Subject) -> Outcome:
-    """Check that the numbers of the frames follow each other, over all that was heard."""
+    """Check that the sequence numbers of all received frames have no gaps."""
     client = subject.client
     return judged(client.lost == 0, f"{client.total} messages, {client.lost} missing", "none missing")
 
@@ -60,33 +61,35 @@ CHECKS: tuple[Check, ...] = (
 
 
 def check_vehicle(link: GroundLink, writes: bool) -> Iterator[Result]:
-    """Check a vehicle, and give each result once it is there.
+    """Check a vehicle, and yield each result when its check ends.
 
     Parameters
     ----------
     link : GroundLink
-        Where it is.
+        Link to the vehicle.
     writes : bool
-        Whether it may be armed, steered, and given another mission; it is left as it was found.
+        True to allow arming, steering and mission uploads; the vehicle's state is restored after them.
 
     Yields
     ------
     Result
-        Of each check, in their order.
+        Result of each check, in their order.
 
     Raises
     ------
     TelemetryError
-        If no vehicle is heard within 10 s, or it goes away.
+        If no vehicle is received within 10 s, or it becomes silent.
     """
     client = Client(link)
     if client.find(_FINDING) is None:
         raise TelemetryError(f"{link.name}: no vehicle was heard in {_FINDING:g} s")
     client.forget()
     subject = Subject(client, *_listen(client), writes)
+    baseline = baseline_of(subject)
     for check in CHECKS:
         started = time.monotonic()
         outcome = check.run(subject) if writes or not check.writes else skipped("only with --commands")
+        outcome = baseline.judge(check.name, outcome)
         if time.monotonic() - client.last_heard > _GONE:
             raise TelemetryError(f"{link.name}: the vehicle has gone, in check {check.name}")
         yield Result(check, outcome, time.monotonic() - started)
@@ -94,7 +97,7 @@ def check_vehicle(link: GroundLink, writes: bool) -> Iterator[Result]:
 
 
 def _listen(client: Client) -> tuple[tuple[Heard, ...], float]:
-    """Return what the vehicle sends of its own accord, and for how long it was heard [s of the wall clock]."""
+    """Return the messages that the vehicle streams unasked, and the time of recording [s of the wall clock]."""
     started, passed = time.monotonic(), 0.0
     heard: tuple[Heard, ...] = ()
     while passed < _LONGEST and (left := LISTENING - passed * speed_of(heard)) > 0.0:
@@ -104,7 +107,7 @@ def _listen(client: Client) -> tuple[tuple[Heard, ...], float]:
 
 
 def _give_rates_back(subject: Subject) -> None:
-    """Ask for the usual rates of what came unasked, of which connecting as QGroundControl has changed some."""
+    """Request the default rates of all unasked messages, of which connecting as QGroundControl has changed some."""
     m = subject.mavlink
     for number in sorted({heard.message.get_msgId() for heard in subject.unasked}):
         subject.client.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, [number, 0, 0, 0, 0, 0, 0], _QUICK)

@@ -1,4 +1,4 @@
-"""A ground station for the length of a check: sends, waits, and remembers what was heard."""
+"""A ground station for the length of a check: sends, waits, and records received messages."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.ground_end import GroundLink, Heard
 
-_KEPT = 20_000  # messages that are remembered
+_KEPT = 20_000  # messages that are kept
 _BEAT = 1.0  # s, between our heartbeats
 _SLICE = 0.05  # s
 _VEHICLE_COMPONENT = 1  # MAV_COMP_ID_AUTOPILOT1
@@ -20,7 +20,7 @@ Wanted = Callable[[Any], bool]
 
 
 class Vehicle(NamedTuple):
-    """Who is checked."""
+    """Identity of the checked vehicle."""
 
     system: int
     component: int
@@ -29,25 +29,25 @@ class Vehicle(NamedTuple):
 
 
 class Client:
-    """Talks with one vehicle.
+    """Exchange messages with one vehicle.
 
     Parameters
     ----------
     link : GroundLink
-        The way to it.
+        Link to the vehicle.
 
     Attributes
     ----------
     vehicle : Vehicle or None
-        Who was heard first; only its messages are remembered.
+        The first vehicle received; only its messages are kept.
     mavlink : module
         The dialect.
     lost : int
-        Frames missing between the sequence numbers of what was heard.
+        Frames missing between the sequence numbers of received frames.
     total : int
-        Messages heard.
+        Messages received.
     last_heard : float
-        When the newest came [s, monotonic].
+        Time of the newest message [s, monotonic].
     """
 
     def __init__(self, link: GroundLink) -> None:
@@ -55,15 +55,15 @@ class Client:
         self.vehicle: Vehicle | None = None
         self.lost = self.total = 0
         self._heard: deque[Heard] = deque(maxlen=_KEPT)
-        self._new: deque[Heard] = deque(maxlen=_KEPT)  # that no wait has looked at
+        self._new: deque[Heard] = deque(maxlen=_KEPT)  # not examined by a wait
         self._sequence: int | None = None
         self._next_beat = 0.0
         self.last_heard = time.monotonic()
 
-    # ---- hearing ----
+    # ---- receiving ----
 
     def pump(self, timeout: float = 0.0) -> None:
-        """Take what has come from the vehicle, waiting up to `timeout` [s] for it; keep our heartbeat going."""
+        """Receive messages of the vehicle for up to `timeout` [s]; send the client's heartbeat once a second."""
         now = time.monotonic()
         if now >= self._next_beat:
             self._next_beat = now + _BEAT
@@ -87,7 +87,7 @@ class Client:
         return self.vehicle is not None and (heard.system, heard.component) == self.vehicle[:2]
 
     def collect(self, seconds: float) -> list[Heard]:
-        """Return what no wait has looked at, and all that comes in so many `seconds` of the wall clock."""
+        """Return the messages not yet examined by a wait, and those of the next `seconds` of the wall clock."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0.0:
             self.pump(left)
@@ -96,12 +96,12 @@ class Client:
         return found
 
     def forget(self) -> None:
-        """Let the next wait look only at what comes from now on."""
+        """Discard the messages not yet examined, so that the next wait examines only later ones."""
         self.pump()
         self._new.clear()
 
     def wait(self, wanted: Wanted, timeout: float) -> Any:
-        """Return the next message that is wanted, or None after `timeout` [s]; those before it are passed over."""
+        """Return the next message for which `wanted` is true, skipping others, or None after `timeout` [s]."""
         end = time.monotonic() + timeout
         while True:
             while self._new:
@@ -114,34 +114,34 @@ class Client:
             self.pump(left)
 
     def find(self, timeout: float) -> Vehicle | None:
-        """Return the vehicle, once it was heard; None if it was not within `timeout` [s]."""
+        """Wait for a vehicle's heartbeat, and return its identity; None after `timeout` [s]."""
         end = time.monotonic() + timeout
         while self.vehicle is None and (left := end - time.monotonic()) > 0.0:
             self.pump(left)
         return self.vehicle
 
     def recent(self, kind: str) -> list[Heard]:
-        """Return the messages of a kind that are remembered, oldest first."""
+        """Return the kept messages of a kind, oldest first."""
         return [heard for heard in self._heard if heard.kind == kind]
 
     def last(self, kind: str) -> Any:
         """Return the newest message of a kind, or None."""
         return next((heard.message for heard in reversed(self._heard) if heard.kind == kind), None)
 
-    # ---- speaking ----
+    # ---- sending ----
 
     @property
     def identity(self) -> tuple[int, int]:
-        """System and component that we are."""
+        """System and component id of the client."""
         return self.link.identity
 
     @property
     def target(self) -> tuple[int, int]:
-        """System and component of the vehicle."""
+        """System and component id of the vehicle."""
         return self.vehicle[:2] if self.vehicle is not None else (1, _VEHICLE_COMPONENT)
 
     def send(self, message: Any) -> bool:
-        """Send a message; return whether it went out."""
+        """Send a message; return False if it could not be sent."""
         return self.link.send(message)
 
     def send_command(
@@ -149,7 +149,7 @@ class Client:
     ) -> None:
         """Send a COMMAND_LONG, `command`, to the vehicle or another `target`.
 
-        Of the `parameters` those that are left out are NaN, as MAVSDK sends them.
+        Missing `parameters` are NaN, as MAVSDK sends them.
         """
         padded = [*parameters, *[math.nan] * (7 - len(parameters))]
         self.send(self.mavlink.MAVLink_command_long_message(*(target or self.target), command, 0, *padded))
@@ -161,7 +161,7 @@ class Client:
         return self.wait(lambda m: m.get_type() == "COMMAND_ACK" and m.command == command, timeout)
 
     def request(self, message_id: int, timeout: float = 2.0, index: float = 0.0) -> Any:
-        """Ask for the message `message_id` by MAV_CMD_REQUEST_MESSAGE, `index` its second number, and return it.
+        """Request the message `message_id` by MAV_CMD_REQUEST_MESSAGE, with `index` as param2, and return it.
 
         None after `timeout` [s]; the ack may come before or after.
         """

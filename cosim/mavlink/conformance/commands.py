@@ -1,4 +1,4 @@
-"""Commands, modes, and the small services of the clock."""
+"""Checks of commands, modes, TIMESYNC and PING."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ _QUICK = 0.5  # s, MAVSDK's timeout
 _SETTLING = 2.0  # s, for the heartbeat to show what was commanded
 _NO_COMMAND = 65000
 _NO_SYSTEM = 77
-_UNKNOWN_INT = 2**31 - 1  # what an integer coordinate that is not used holds
+_UNKNOWN_INT = 2**31 - 1  # value of an unused integer coordinate
 _PX4_MAIN, _PX4_SUB = 16, 24  # bits by which main mode and sub-mode are shifted
 _NOT_SELECTABLE = 2  # MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
 
 
 def one_ack(subject: Subject) -> Outcome:
-    """Check that a command has exactly one ack, for who sent it, soon enough for MAVSDK; unused numbers are NaN."""
+    """Check that a command with NaN in unused numbers gets exactly one ack, for its sender, within MAVSDK's timeout."""
     m, client = subject.mavlink, subject.client
     command = m.MAV_CMD_REQUEST_MESSAGE
     started = time.monotonic()
@@ -35,7 +35,7 @@ def one_ack(subject: Subject) -> Outcome:
 
 
 def command_int(subject: Subject) -> Outcome:
-    """Check that COMMAND_INT is heeded as COMMAND_LONG is, and has one ack."""
+    """Check that COMMAND_INT is executed like COMMAND_LONG, and gets one ack."""
     m, client = subject.mavlink, subject.client
     command, wanted = m.MAV_CMD_REQUEST_MESSAGE, m.MAVLINK_MSG_ID_AUTOPILOT_VERSION
     client.forget()
@@ -52,14 +52,14 @@ def command_int(subject: Subject) -> Outcome:
 
 
 def unsupported(subject: Subject) -> Outcome:
-    """Check that a command that the vehicle does not have is refused as unsupported."""
+    """Check that an unknown command is refused as unsupported."""
     ack = subject.client.command(_NO_COMMAND, [0.0] * 7, 1.0)
     good = ack is not None and ack.result == subject.mavlink.MAV_RESULT_UNSUPPORTED
     return judged(good, f"ack {ack and ack.result}", "ack 3 (unsupported)")
 
 
 def wrong_target(subject: Subject) -> Outcome:
-    """Check that what is for another system is passed over in silence."""
+    """Check that messages for another system get no answer."""
     m, client = subject.mavlink, subject.client
     client.forget()
     client.send_command(m.MAV_CMD_REQUEST_MESSAGE, [m.MAVLINK_MSG_ID_AUTOPILOT_VERSION], (_NO_SYSTEM, 1))
@@ -71,7 +71,7 @@ def wrong_target(subject: Subject) -> Outcome:
 
 
 def broadcast(subject: Subject) -> Outcome:
-    """Check that what is for all systems is answered."""
+    """Check that a broadcast command is answered."""
     m, client = subject.mavlink, subject.client
     client.forget()
     client.send_command(m.MAV_CMD_REQUEST_MESSAGE, [m.MAVLINK_MSG_ID_AUTOPILOT_VERSION], (0, 0))
@@ -89,7 +89,7 @@ def arm_and_disarm(subject: Subject) -> Outcome:
     for armed in (True, False, *([True] if was_armed else [])):
         ack = client.command(m.MAV_CMD_COMPONENT_ARM_DISARM, [armed, 0, 0, 0, 0, 0, 0])
         if ack is not None and ack.result == m.MAV_RESULT_DENIED:
-            return skipped("the vehicle heeds no commands")
+            return skipped("the vehicle accepts no commands")
         shown = client.wait(_beat_shows(lambda b, armed=armed: bool(b.base_mode & bit) == armed), _SETTLING)
         said.append((ack and ack.result, shown is not None))
     good = all(item == (m.MAV_RESULT_ACCEPTED, True) for item in said)
@@ -97,7 +97,7 @@ def arm_and_disarm(subject: Subject) -> Outcome:
 
 
 def set_modes(subject: Subject) -> Outcome:
-    """Check that each mode that a user can select is taken, in the numbers in which the vehicle shows it."""
+    """Check that each selectable mode is accepted by its number, and shown in the heartbeat."""
     m, client = subject.mavlink, subject.client
     before = client.last("HEARTBEAT")
     modes = {h.message.custom_mode: h.message for h in client.recent("AVAILABLE_MODES")}
@@ -111,7 +111,7 @@ def set_modes(subject: Subject) -> Outcome:
             continue
         ack = _set_mode(subject, number, packed)
         if ack is not None and ack.result == m.MAV_RESULT_DENIED and not refused:
-            return skipped("the vehicle heeds no commands")
+            return skipped("the vehicle accepts no commands")
         shown = client.wait(_beat_shows(lambda b, number=number: b.custom_mode == number), _SETTLING)
         if ack is None or ack.result != m.MAV_RESULT_ACCEPTED or shown is None:
             ignored += ack is None or bool(ack.result == m.MAV_RESULT_ACCEPTED)
@@ -125,7 +125,7 @@ def set_modes(subject: Subject) -> Outcome:
 
 
 def bad_mode(subject: Subject) -> Outcome:
-    """Check that a mode that is not there is refused, and changes nothing."""
+    """Check that an unknown mode is refused, and changes nothing."""
     client = subject.client
     client.collect(1.2)  # until a heartbeat shows what was set before
     before = client.last("HEARTBEAT")
@@ -149,7 +149,7 @@ def _beat_shows(shows: Any) -> Any:
 
 
 def timesync(subject: Subject) -> Outcome:
-    """Check that TIMESYNC is answered with what was sent, and the vehicle's own clock."""
+    """Check that TIMESYNC is answered with the client's time and the vehicle's own."""
     m, client = subject.mavlink, subject.client
     sent = time.monotonic_ns()
     client.forget()
@@ -161,7 +161,7 @@ def timesync(subject: Subject) -> Outcome:
 
 
 def ping(subject: Subject) -> Outcome:
-    """Check that PING is answered to who sent it."""
+    """Check that PING is answered to its sender."""
     m, client = subject.mavlink, subject.client
     if subject.ardupilot:
         return skipped("ArduPilot answers none")

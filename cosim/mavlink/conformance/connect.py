@@ -1,4 +1,4 @@
-"""QGroundControl's way of connecting, with its order, its timers and its retries."""
+"""QGroundControl's connection sequence, with its order, timers and retries."""
 
 from __future__ import annotations
 
@@ -16,41 +16,41 @@ _LIST_TIMEOUT, _GAP_TIMEOUT, _PARAMETER_TRIES = 5.0, 3.0, 5
 _MISSION_TIMEOUT, _MISSION_TRIES = 1.5, 5
 _HEARTBEAT_TIMEOUT = 10.0
 _FTP_FILE = "@PARAM/param.pck"
-COMPONENT_METADATA = 397  # which no dialect of pymavlink has
+COMPONENT_METADATA = 397  # missing in all dialects of pymavlink
 _STREAMS_OF_ARDUPILOT = ((1, 2), (2, 2), (3, 2), (6, 3), (10, 20), (11, 10), (12, 3))  # group, Hz
 _MOST_MODES = 256
 
 
 @dataclass(frozen=True)
 class Step:
-    """One step of connecting."""
+    """One step of the connection sequence."""
 
     name: str
     seconds: float
     retries: int
-    said: str  # what came of it
+    said: str  # its result, in words
     good: bool = True
 
 
 @dataclass(frozen=True)
 class Connection:
-    """How connecting went."""
+    """Result of the connection sequence."""
 
     steps: tuple[Step, ...]
 
     @property
     def seconds(self) -> float:
-        """From the first heartbeat to the last step."""
+        """Time from the first heartbeat to the end of the last step [s]."""
         return sum(step.seconds for step in self.steps)
 
     @property
     def retries(self) -> int:
-        """How often something had to be sent again."""
+        """Number of repeated requests."""
         return sum(step.retries for step in self.steps)
 
     @property
     def good(self) -> bool:
-        """Whether every step came to its end."""
+        """True if every step succeeded."""
         return bool(self.steps) and all(step.good for step in self.steps)
 
 
@@ -60,12 +60,12 @@ def qgc_connect(client: Client) -> Connection:
     Parameters
     ----------
     client : Client
-        That need not have heard the vehicle yet.
+        The client; it need not have found the vehicle yet.
 
     Returns
     -------
     Connection
-        Its steps; none if no vehicle was heard within 10 s.
+        Its steps; none if no vehicle was received within 10 s.
     """
     if client.find(_HEARTBEAT_TIMEOUT) is None:
         return Connection(())
@@ -73,7 +73,7 @@ def qgc_connect(client: Client) -> Connection:
 
 
 class _Connecting:
-    """What is known on the way."""
+    """The state of the connection sequence."""
 
     def __init__(self, client: Client) -> None:
         self._client, self._mavlink = client, client.mavlink
@@ -81,7 +81,7 @@ class _Connecting:
         self._capabilities = 0
 
     def steps(self) -> Iterator[Step]:
-        """Take step after step; the last one that is not good ends it."""
+        """Run the steps in QGroundControl's order, and yield each."""
         m = self._mavlink
         yield self._timed("version", self._version)
         yield self._timed("modes", self._modes)
@@ -100,7 +100,7 @@ class _Connecting:
         return Step(name, time.monotonic() - started, self._retries, said, good)
 
     def _request(self, message_id: int, index: float = 0.0) -> tuple[Any, int | None]:
-        """Ask for a message; return it, or None, and the result of the ack, or None if none came."""
+        """Request a message; return it, or None, and the result of its ack, or None without an ack."""
         m, command = self._mavlink, self._mavlink.MAV_CMD_REQUEST_MESSAGE
         for attempt in range(_ACK_TRIES):
             self._retries += attempt > 0
@@ -132,7 +132,7 @@ class _Connecting:
         names: list[str] = []
         for index in range(1, _MOST_MODES):
             mode, result = self._request(self._mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, index)
-            if mode is None:  # QGroundControl goes on with what it knows of the autopilot
+            if mode is None:  # QGroundControl then uses its own list of the autopilot's modes
                 refused = result is not None and result != self._mavlink.MAV_RESULT_ACCEPTED
                 return refused and not names, f"mode {index} did not come (ack {result})"
             names.append(mode.mode_name)
@@ -145,7 +145,7 @@ class _Connecting:
         return result is not None, "no ack" if result is None else f"ack {result}"
 
     def _streams(self) -> tuple[bool, str]:
-        """Ask for streams; nothing is awaited."""
+        """Request streams, without waiting for an answer."""
         m, client = self._mavlink, self._client
         assert client.vehicle is not None
         if client.vehicle.autopilot != m.MAV_AUTOPILOT_ARDUPILOTMEGA:
@@ -173,19 +173,19 @@ class _Connecting:
 
 
 def fetch_parameters(client: Client) -> tuple[dict[int, Any], int | None, int]:
-    """Fetch all parameters by their list, and ask again for those that are missing.
+    """Fetch the parameter list, and request missing parameters again.
 
     Parameters
     ----------
     client : Client
-        That has found a vehicle.
+        A client that has found a vehicle.
 
     Returns
     -------
     dict
-        PARAM_VALUE of each index.
+        PARAM_VALUE messages, by index.
     int or None
-        How many there are to be; None if nothing came.
+        Parameters of the vehicle; None without an answer.
     int
         Retries.
     """
@@ -220,16 +220,16 @@ def fetch_mission(client: Client, kind: int) -> tuple[list[Any] | None, str, int
     Parameters
     ----------
     client : Client
-        That has found a vehicle.
+        A client that has found a vehicle.
     kind : int
         A MAV_MISSION_TYPE.
 
     Returns
     -------
     list or None
-        MISSION_ITEM_INT messages; None if they did not come.
+        MISSION_ITEM_INT messages; None if some did not come.
     str
-        What came of it, in words.
+        The result, in words.
     int
         Retries.
     """

@@ -1,4 +1,4 @@
-"""Fetching a file by MAV-FTP as QGroundControl does: open, burst read, fill the gaps, end the session."""
+"""Download a file by MAV-FTP as QGroundControl does: open, burst read, fill the gaps, end the session."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ERRORS = {1: "Fail", 2: "FailErrno", 4: "InvalidSession", 7: "UnknownCommand", 1
 
 
 class Packet(NamedTuple):
-    """A reply."""
+    """A reply of the file server."""
 
     sequence: int
     session: int
@@ -30,32 +30,32 @@ class Packet(NamedTuple):
 
     @property
     def refused(self) -> bool:
-        """Whether it is a NAK."""
+        """True if it is a NAK."""
         return self.opcode == _NAK
 
     @property
     def error(self) -> int:
-        """Why it was refused."""
+        """MAV-FTP error code of a NAK."""
         return self.data[0] if self.data else 0
 
 
 class Download(NamedTuple):
-    """What came of fetching a file."""
+    """The result of a download."""
 
-    data: bytes | None  # None: there is none
-    said: str  # in the place of the data
+    data: bytes | None  # None without a file
+    said: str  # the error, in words; "" with data
     retries: int
 
 
 class _Session:
-    """The exchange so far."""
+    """An MAV-FTP session with its sequence number and retries."""
 
     def __init__(self, client: Client) -> None:
         self.client = client
         self.sequence = self.number = self.retries = 0
 
     def ask(self, opcode: int, offset: int = 0, data: bytes = b"", size: int | None = None) -> Packet | None:
-        """Send a request until its reply comes; return that, or None."""
+        """Send a request, with retries, and return its reply; None without one."""
         for attempt in range(_TRIES + 1):
             self.retries += attempt > 0
             self.client.forget()
@@ -87,19 +87,19 @@ def _packet(message: Any) -> Packet:
 
 
 def download(client: Client, path: str) -> Download:
-    """Fetch a file.
+    """Download a file.
 
     Parameters
     ----------
     client : Client
-        That has found a vehicle.
+        A client that has found a vehicle.
     path : str
-        Such as ``@PARAM/param.pck``.
+        Path on the vehicle, such as ``@PARAM/param.pck``.
 
     Returns
     -------
     Download
-        Its data, or what was said in its place.
+        Its data, or the error.
     """
     session = _Session(client)
     opened = session.ask(_OPEN, data=path.encode())
@@ -112,7 +112,7 @@ def download(client: Client, path: str) -> Download:
     if size > _GREATEST:
         return Download(None, f"a file of {size} bytes", session.retries)
     pieces = _burst(session, size)
-    _fill(session, size, pieces)
+    size = _fill(session, size, pieces)
     session.ask(_END)
     data = b"".join(pieces[offset] for offset in sorted(pieces))
     if len(data) != size:
@@ -133,14 +133,16 @@ def _burst(session: _Session, size: int) -> dict[int, bytes]:
     return pieces
 
 
-def _fill(session: _Session, size: int, pieces: dict[int, bytes]) -> None:
-    """Read what the bursts left out."""
+def _fill(session: _Session, size: int, pieces: dict[int, bytes]) -> int:
+    """Read what the bursts left out; return where the file ends, which ArduPilot's size is but an estimate of."""
     at = 0
     while at < size:
         if at not in pieces:
             following = min((offset for offset in pieces if offset > at), default=size)
             packet = session.ask(_READ, at, size=min(_DATA, following - at))
             if packet is None or packet.refused or not packet.data:
-                return
+                ended = packet is not None and packet.refused and packet.error == _END_OF_FILE and following == size
+                return at if ended else size
             pieces[at] = packet.data
         at += len(pieces[at])
+    return size

@@ -1,4 +1,4 @@
-"""Who the vehicle says it is: heartbeat, version, modes."""
+"""Checks of the vehicle's identity: heartbeat, version, modes."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Any
 from cosim.mavlink.conformance.connect import COMPONENT_METADATA
 from cosim.mavlink.conformance.outcome import Check, Outcome, Subject, failed, judged, passed, skipped
 
-_LONGEST_SILENCE = 2.2  # s, after which Mission Planner gives up
-_MOST_BETWEEN = 200  # messages between two heartbeats, the same
+_LONGEST_SILENCE = 2.2  # s, after which Mission Planner reports a lost link
+_MOST_BETWEEN = 200  # messages between two heartbeats, after which it does too
 _QUICK = 0.5  # s, MAVSDK's timeout
-_VERSION_3 = 3  # what HEARTBEAT.mavlink_version is
+_VERSION_3 = 3  # value of HEARTBEAT.mavlink_version
 
 
 def heartbeat_identity(subject: Subject) -> Outcome:
-    """Check that the heartbeat is an autopilot's, of MAVLink's present version."""
+    """Check that the heartbeat is an autopilot's, of the current MAVLink version."""
     m, vehicle, beat = subject.mavlink, subject.client.vehicle, subject.client.last("HEARTBEAT")
     if vehicle is None or beat is None:
         return failed("no heartbeat of component 1", "one a second")
@@ -53,7 +53,7 @@ def heartbeat_rate(subject: Subject) -> Outcome:
 
 
 def mavlink_2(subject: Subject) -> Outcome:
-    """Check that all frames are of MAVLink 2: QGroundControl heeds no other."""
+    """Check that all frames are of MAVLink 2: QGroundControl accepts no other."""
     link = subject.client.link
     unknown, troubles = link.counts.unknown, link.troubles()
     received = [f"{subject.client.total} messages", f"{link.old} of MAVLink 1", f"{unknown} unknown", *troubles]
@@ -61,7 +61,7 @@ def mavlink_2(subject: Subject) -> Outcome:
 
 
 def autopilot_version(subject: Subject) -> Outcome:
-    """Check that AUTOPILOT_VERSION comes when asked for, with what MAVSDK and QGroundControl look for in it."""
+    """Check that AUTOPILOT_VERSION comes on request, with the capabilities that MAVSDK and QGroundControl need."""
     m = subject.mavlink
     version = subject.client.request(m.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
     if version is None:
@@ -72,7 +72,7 @@ def autopilot_version(subject: Subject) -> Outcome:
 
 
 def available_modes(subject: Subject) -> Outcome:
-    """Check that the modes come one by one, each with a name and a number of its own."""
+    """Check that the modes come one by one, each with a unique number and a name."""
     m, client = subject.mavlink, subject.client
     found: list[Any] = []
     for index in range(1, 256):
@@ -95,7 +95,7 @@ def available_modes(subject: Subject) -> Outcome:
 
 
 def current_mode(subject: Subject) -> Outcome:
-    """Check that CURRENT_MODE says what the heartbeat does."""
+    """Check that CURRENT_MODE has the custom mode of the heartbeat."""
     m = subject.mavlink
     mode = subject.client.request(m.MAVLINK_MSG_ID_CURRENT_MODE)
     beat = subject.client.last("HEARTBEAT")
@@ -106,7 +106,7 @@ def current_mode(subject: Subject) -> Outcome:
 
 
 def component_metadata(subject: Subject) -> Outcome:
-    """Check that a message that the vehicle does not have is refused at once, or QGroundControl waits."""
+    """Check that a request for an unknown message is answered at once, or QGroundControl waits."""
     client, m = subject.client, subject.mavlink
     client.forget()
     ack = client.command(m.MAV_CMD_REQUEST_MESSAGE, [COMPONENT_METADATA, 0, 0, 0, 0, 0, 0], _QUICK)
@@ -124,4 +124,4 @@ CHECKS = (
     Check("current-mode", ("QGC",), current_mode),
     Check("component-metadata", ("QGC",), component_metadata),
 )
-LAST = (Check("mavlink-2", ("QGC",), mavlink_2),)  # over all that was heard
+LAST = (Check("mavlink-2", ("QGC",), mavlink_2),)  # over all received messages

@@ -1,4 +1,4 @@
-"""Missions: reading, and writing one that is then read back."""
+"""Checks of mission download, upload and round trip."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def mission_lists(subject: Subject) -> Outcome:
 
 
 def mission_round_trip(subject: Subject) -> Outcome:
-    """Check that an uploaded mission is the one that comes back; the one that was there is put back."""
+    """Check that an uploaded mission is downloaded unchanged; the previous mission is restored."""
     m, client = subject.mavlink, subject.client
     before, text, _ = fetch_mission(client, m.MAV_MISSION_TYPE_MISSION)
     if before is None:
@@ -37,13 +37,13 @@ def mission_round_trip(subject: Subject) -> Outcome:
     items = [_item(subject, i, latitude + i * _STEP, longitude, z) for i, z in enumerate(_DEPTHS)]
     result = upload(subject, items)
     if result == m.MAV_MISSION_DENIED:
-        return skipped("the vehicle heeds no commands")
+        return skipped("the vehicle accepts no commands")
     after, text, _ = fetch_mission(client, m.MAV_MISSION_TYPE_MISSION)
     restored = upload(subject, before)
     received = f"ack {result}, {text} back, ack {restored} of the old one"
     if result != m.MAV_MISSION_ACCEPTED or after is None or len(after) != len(items):
         return failed(received, "ack 0, and as many items back")
-    # where item 0 is home, as of ArduPilot, it may come back as something else
+    # item 0 of ArduPilot is home, and may differ
     first = 1 if subject.ardupilot else 0
     different = [
         f"item {a.seq}: {name} {getattr(a, name)}, not {getattr(b, name)}"
@@ -57,16 +57,16 @@ def mission_round_trip(subject: Subject) -> Outcome:
 
 
 def bad_upload(subject: Subject) -> Outcome:
-    """Check that an item that cannot be is refused, and the mission stays as it was."""
+    """Check that an invalid item is refused, and the mission stays unchanged."""
     m, client = subject.mavlink, subject.client
     before, text, _ = fetch_mission(client, m.MAV_MISSION_TYPE_MISSION)
     here = client.last("GLOBAL_POSITION_INT")
     latitude, longitude = (0, 0) if here is None else (here.lat, here.lon)
     first, bad = (_item(subject, i, latitude, longitude, z) for i, z in enumerate((_DEPTHS[0], float("nan"))))
-    bad.command = 65000  # and not the first item, which may stand for home
+    bad.command = 65000  # not the first item, which may be home
     result = upload(subject, [first, bad])
     if result == m.MAV_MISSION_DENIED:
-        return skipped("the vehicle heeds no commands")
+        return skipped("the vehicle accepts no commands")
     after, _, _ = fetch_mission(client, m.MAV_MISSION_TYPE_MISSION)
     received = f"ack {result}, {text} before, {None if after is None else len(after)} after"
     if result == m.MAV_MISSION_ACCEPTED and before is not None:
@@ -90,14 +90,14 @@ def upload(subject: Subject, items: list[Any]) -> int | None:
     Parameters
     ----------
     subject : Subject
-        The vehicle.
+        Vehicle that gets the mission.
     items : list
         MISSION_ITEM_INT messages; none clears the mission.
 
     Returns
     -------
     int or None
-        MAV_MISSION_RESULT.
+        MAV_MISSION_RESULT of the ack; None without one.
     """
     m, client = subject.mavlink, subject.client
     kind = m.MAV_MISSION_TYPE_MISSION

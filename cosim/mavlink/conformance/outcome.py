@@ -1,4 +1,4 @@
-"""A check, what it is done to, and what comes of it."""
+"""A check, its subject, and its outcome."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Any, Literal
 from cosim.mavlink.conformance.client import Client
 from cosim.mavlink.wire.ground_end import Heard
 
-Status = Literal["pass", "fail", "skip"]
+Status = Literal["pass", "fail", "skip", "differs"]  # the last: as this autopilot is known to
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a check, in a line."""
+    """The outcome of a check, with one line of what was received and expected."""
 
     status: Status
     received: str
@@ -23,33 +23,33 @@ class Outcome:
 
 
 def passed(received: str) -> Outcome:
-    """Return that what came is right."""
+    """Return a passed outcome."""
     return Outcome("pass", received)
 
 
 def failed(received: str, expected: str) -> Outcome:
-    """Return that something else was expected."""
+    """Return a failed outcome with what was expected."""
     return Outcome("fail", received, expected)
 
 
 def skipped(why: str) -> Outcome:
-    """Return that there was nothing to check."""
+    """Return a skipped outcome with its reason."""
     return Outcome("skip", why)
 
 
 def judged(good: bool, received: str, expected: str) -> Outcome:
-    """Return what came, and what was expected unless it is good."""
+    """Return a passed outcome if `good`, else a failed one with what was expected."""
     return passed(received) if good else failed(received, expected)
 
 
 @dataclass(frozen=True)
 class Subject:
-    """The vehicle that is checked, and what it sent of its own accord."""
+    """The checked vehicle, and the messages that it streams unasked."""
 
     client: Client
-    unasked: tuple[Heard, ...]  # what came before anything was asked of it
-    seconds: float  # of the wall clock, in which that came
-    writes: bool  # whether it may be armed, steered, and given another mission
+    unasked: tuple[Heard, ...]  # messages before the first request
+    seconds: float  # of the wall clock, in which they came
+    writes: bool  # True to allow arming, steering and mission uploads
 
     @property
     def mavlink(self) -> Any:
@@ -58,33 +58,33 @@ class Subject:
 
     @property
     def ardupilot(self) -> bool:
-        """Whether it shows itself as ArduPilot."""
+        """True if its heartbeat is ArduPilot's."""
         vehicle = self.client.vehicle
         return vehicle is not None and bool(vehicle.autopilot == self.mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)
 
     @property
     def speed(self) -> float:
-        """Seconds of the vehicle's clock that went by in a second."""
+        """Seconds of the vehicle's clock per second of the wall clock."""
         return speed_of(self.unasked)
 
     def rates(self) -> dict[str, float]:
-        """Return how often each message came, in a second of the vehicle's clock [Hz]."""
+        """Return the rate of each unasked message by the vehicle's clock [Hz]."""
         counts = Counter(heard.kind for heard in self.unasked)
         return {kind: n / (self.seconds * self.speed) for kind, n in counts.items()}
 
 
 def speed_of(heard: tuple[Heard, ...]) -> float:
-    """Return how many seconds of the vehicle's clock go by in one of ours; 1 if it shows none.
+    """Return the seconds of the vehicle's clock per second of the wall clock; 1 if it sends no time.
 
     Parameters
     ----------
     heard : tuple of Heard
-        In their order.
+        Messages in the order of reception.
 
     Returns
     -------
     float
-        From the boot times in the messages.
+        Ratio by the boot times in the messages.
     """
     clocked = [(h.time, h.message.time_boot_ms * 1e-3) for h in heard if hasattr(h.message, "time_boot_ms")]
     if len(clocked) < 2 or clocked[-1][0] <= clocked[0][0] or clocked[-1][1] <= clocked[0][1]:
@@ -94,9 +94,9 @@ def speed_of(heard: tuple[Heard, ...]) -> float:
 
 @dataclass(frozen=True)
 class Check:
-    """A named check, and whose way of working needs it."""
+    """A named check, and the ground stations that need it."""
 
     name: str
     clients: tuple[str, ...]
     run: Callable[[Subject], Outcome]
-    writes: bool = False  # it arms, steers, or changes the mission
+    writes: bool = False  # True if it arms, steers, or changes the mission

@@ -1,4 +1,4 @@
-"""Parameters: the list, single ones, their file, and what is refused."""
+"""Checks of parameters: the list, single ones, their file, and refusals."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ROUNDING = 1e-6  # of a float32
 
 
 def parameter_list(subject: Subject) -> Outcome:
-    """Check that the list comes whole, without a gap, each with a name and an index of its own."""
+    """Check that the list is complete, with a unique name and index for each parameter."""
     started = time.monotonic()
     values, count, retries = fetch_parameters(subject.client)
     received = f"{len(values)} of {count} in {time.monotonic() - started:.2f} s, {retries} retries"
@@ -32,7 +32,7 @@ def parameter_list(subject: Subject) -> Outcome:
 
 
 def parameter_read(subject: Subject) -> Outcome:
-    """Check that a parameter can be read by its name and by its index, and is the same."""
+    """Check that reading a parameter by name and by index gives the same value."""
     first = _read(subject, index=0)
     if first is None:
         return failed("index 0: nothing", "PARAM_VALUE")
@@ -45,7 +45,7 @@ def parameter_read(subject: Subject) -> Outcome:
 
 
 def parameter_unknown(subject: Subject) -> Outcome:
-    """Check that a parameter that is not there is refused at once, or MAVSDK waits for 3 s."""
+    """Check that an unknown parameter is refused at once, or MAVSDK waits for 3 s."""
     m, client = subject.mavlink, subject.client
     client.forget()
     client.send(m.MAVLink_param_request_read_message(*client.target, _UNKNOWN.encode(), -1))
@@ -56,7 +56,7 @@ def parameter_unknown(subject: Subject) -> Outcome:
 
 
 def parameter_set(subject: Subject) -> Outcome:
-    """Check that setting is answered with the value that counts; what is set is what was there."""
+    """Check that PARAM_SET is answered with the effective value; it sets the present value."""
     value = _read(subject, index=0)
     if value is None:
         return failed("index 0: nothing", "PARAM_VALUE")
@@ -68,7 +68,7 @@ def parameter_set(subject: Subject) -> Outcome:
 
 
 def parameter_change(subject: Subject) -> Outcome:
-    """Check that one parameter can be changed and changed back, and no other one answers."""
+    """Check that one parameter can be changed and changed back, and that reading it shows both."""
     listed, _, _ = fetch_parameters(subject.client)
     refusals = 0
     for value in listed.values():
@@ -92,7 +92,7 @@ def parameter_change(subject: Subject) -> Outcome:
 
 
 def parameter_nan(subject: Subject) -> Outcome:
-    """Check that a value that is no number is refused, and the old one stays."""
+    """Check that NaN is refused, and the old value stays."""
     value = _read(subject, index=0)
     if value is None:
         return failed("index 0: nothing", "PARAM_VALUE")
@@ -110,7 +110,7 @@ def parameter_nan(subject: Subject) -> Outcome:
 
 
 def parameter_file(subject: Subject) -> Outcome:
-    """Check that the parameters' file comes by MAV-FTP with as many as the list has, or is cleanly refused."""
+    """Check that MAV-FTP serves the parameter file with as many as the list has, or refuses it at once."""
     started = time.monotonic()
     file = download(subject.client, _FILE)
     took = time.monotonic() - started
@@ -128,7 +128,7 @@ def parameter_file(subject: Subject) -> Outcome:
 
 
 def missing_file(subject: Subject) -> Outcome:
-    """Check that a file that is not there is refused at once."""
+    """Check that a missing file is refused at once."""
     started = time.monotonic()
     file = download(subject.client, "no/such/file")
     took = time.monotonic() - started
@@ -137,7 +137,7 @@ def missing_file(subject: Subject) -> Outcome:
 
 
 def cached_hash(subject: Subject) -> Outcome:
-    """Check that _HASH_CHECK, which QGroundControl asks PX4 for, is answered one way or the other."""
+    """Check that _HASH_CHECK, which QGroundControl requests of PX4, is answered by a value or an error."""
     m, client = subject.mavlink, subject.client
     if client.vehicle is None or client.vehicle.autopilot != m.MAV_AUTOPILOT_PX4:
         return skipped("not PX4")
@@ -162,7 +162,7 @@ def _read(subject: Subject, name: str = "", index: int = -1) -> Any:
 
 
 def _set(subject: Subject, parameter: Any, value: float) -> tuple[Any, bool]:
-    """Set a parameter; return its PARAM_VALUE, or None, and whether an error came too."""
+    """Set a parameter; return its PARAM_VALUE, or None, and True if an error came too."""
     m, client = subject.mavlink, subject.client
     errors = []
 
@@ -175,7 +175,7 @@ def _set(subject: Subject, parameter: Any, value: float) -> tuple[Any, bool]:
     name = parameter.param_id.encode()
     client.send(m.MAVLink_param_set_message(*client.target, name, value, parameter.param_type))
     echo = client.wait(is_echo, _TIMEOUT)
-    client.wait(is_echo, 0.1)  # an error may come behind the value
+    client.wait(is_echo, 0.1)  # an error may follow the value
     return echo, bool(errors)
 
 

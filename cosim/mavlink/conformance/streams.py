@@ -1,4 +1,4 @@
-"""What the vehicle sends of its own accord, and how it lets that be changed."""
+"""Checks of the streams that the vehicle sends unasked, and of changing their rates."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from cosim.mavlink.conformance.outcome import Check, Outcome, Subject, failed, judged, passed, skipped, speed_of
 
-# message: times a second of the vehicle's clock, for whom
+# message: least rate by the vehicle's clock [Hz]
 _NEEDED = {
     "SYS_STATUS": 1.0, "SYSTEM_TIME": 1.0, "ATTITUDE": 10.0, "ATTITUDE_QUATERNION": 10.0, "LOCAL_POSITION_NED": 10.0,
     "GLOBAL_POSITION_INT": 5.0, "VFR_HUD": 5.0, "NAV_CONTROLLER_OUTPUT": 2.0, "SERVO_OUTPUT_RAW": 5.0,
@@ -22,7 +22,7 @@ _GREATEST_SEVERITY = 7
 
 
 def stream_rates(subject: Subject) -> Outcome:
-    """Check that every message that a ground station counts on comes at its rate."""
+    """Check that every message that ground stations need comes at its rate."""
     rates = subject.rates()
     enough = {kind: max(_TOLERANCE * rate - 1.0 / (subject.seconds * subject.speed), 0.01) for kind, rate in
               _NEEDED.items()}  # fmt: skip
@@ -41,7 +41,7 @@ def boot_clock(subject: Subject) -> Outcome:
 
 
 def sensors_healthy(subject: Subject) -> Outcome:
-    """Check that SYS_STATUS has the sensors there and healthy, on which MAVSDK and QGroundControl rest."""
+    """Check that SYS_STATUS has the sensors that MAVSDK and QGroundControl need present and healthy."""
     m, status = subject.mavlink, subject.client.last("SYS_STATUS")
     if status is None:
         return failed("no SYS_STATUS", "one a second")
@@ -63,7 +63,7 @@ def sensors_healthy(subject: Subject) -> Outcome:
 
 
 def no_fence_breach(subject: Subject) -> Outcome:
-    """Check that the bit of the fence is healthy, or MAVProxy cries "fence breach"."""
+    """Check that the geofence bit is healthy, or MAVProxy reports "fence breach"."""
     m, status = subject.mavlink, subject.client.last("SYS_STATUS")
     if status is None:
         return failed("no SYS_STATUS", "one a second")
@@ -73,7 +73,7 @@ def no_fence_breach(subject: Subject) -> Outcome:
 
 
 def home_position(subject: Subject) -> Outcome:
-    """Check that HOME_POSITION comes by itself and when asked for; without it MAVSDK's health is never all ok."""
+    """Check that HOME_POSITION is streamed and comes on request; without it MAVSDK's health is never all ok."""
     m, rate = subject.mavlink, subject.rates().get("HOME_POSITION", 0.0)
     home = subject.client.request(m.MAVLINK_MSG_ID_HOME_POSITION)
     ack = subject.client.command(m.MAV_CMD_GET_HOME_POSITION)
@@ -83,7 +83,7 @@ def home_position(subject: Subject) -> Outcome:
 
 
 def statustext(subject: Subject) -> Outcome:
-    """Check that texts are printable and have a severity; the banner is answered, which Mission Planner asks for."""
+    """Check that texts are printable and have a severity, and that Mission Planner's banner request is answered."""
     m, client = subject.mavlink, subject.client
     ack = client.command(m.MAV_CMD_DO_SEND_BANNER)
     client.collect(0.5)
@@ -95,7 +95,7 @@ def statustext(subject: Subject) -> Outcome:
 
 
 def message_interval(subject: Subject) -> Outcome:
-    """Check that SET_MESSAGE_INTERVAL is obeyed, told of by GET_MESSAGE_INTERVAL, and undone."""
+    """Check that SET_MESSAGE_INTERVAL changes the rate and can be undone, and GET_MESSAGE_INTERVAL reports it."""
     m, client = subject.mavlink, subject.client
     number, asked = m.MAVLINK_MSG_ID_ATTITUDE, 1e6 / _ASKED
     ack = client.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, [number, asked, 0, 0, 0, 0, 0])
@@ -106,18 +106,18 @@ def message_interval(subject: Subject) -> Outcome:
     client.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, [number, 0, 0, 0, 0, 0, 0])
     again = _rate_of(subject, "ATTITUDE")
     received = (
-        f"ack {ack and ack.result}, {rate:.1f} Hz, told {interval and interval.interval_us} us, then {again:.1f} Hz"
+        f"ack {ack and ack.result}, {rate:.1f} Hz, reported {interval and interval.interval_us} us, then {again:.1f} Hz"
     )
     good = (
         ack is not None and ack.result == m.MAV_RESULT_ACCEPTED and interval is not None
         and abs(interval.interval_us - asked) <= 0.2 * asked and _TOLERANCE * _ASKED <= rate <= 1.3 * _ASKED
         and again < _TOLERANCE * _ASKED
     )  # fmt: skip
-    return judged(good, received, f"ack 0, about {_ASKED:g} Hz, told {asked:g} us, then less")
+    return judged(good, received, f"ack 0, about {_ASKED:g} Hz, reported {asked:g} us, then less")
 
 
 def greedy_interval(subject: Subject) -> Outcome:
-    """Check that an interval of a microsecond floods nobody: it is refused, or held at a bound."""
+    """Check that an interval of a microsecond is refused, or limited."""
     m, client = subject.mavlink, subject.client
     number = m.MAVLINK_MSG_ID_ATTITUDE
     ack = client.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, [number, 1, 0, 0, 0, 0, 0])
@@ -128,7 +128,7 @@ def greedy_interval(subject: Subject) -> Outcome:
 
 
 def unknown_interval(subject: Subject) -> Outcome:
-    """Check that an interval for a message that the vehicle lacks is acknowledged, as Cockpit asks for many."""
+    """Check that an interval for an unknown message is acknowledged, as Cockpit requests many."""
     m, client = subject.mavlink, subject.client
     number = m.MAVLINK_MSG_ID_HIGH_LATENCY
     ack = client.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, [number, 1e6, 0, 0, 0, 0, 0])
@@ -150,8 +150,8 @@ def data_stream(subject: Subject) -> Outcome:
 
 
 def _rate_of(subject: Subject, kind: str) -> float:
-    """Return how often a message comes now, in a second of the vehicle's clock [Hz]."""
-    subject.client.collect(0.2)  # what is on its way
+    """Return the present rate of a message by the vehicle's clock [Hz]."""
+    subject.client.collect(0.2)  # messages under way
     heard = tuple(subject.client.collect(_WINDOW))
     return sum(h.kind == kind for h in heard) / (_WINDOW * speed_of(heard))
 

@@ -1,4 +1,4 @@
-"""Results of checks as text, and as JSON."""
+"""Format results of checks as text, and as JSON."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cosim.mavlink.listening.watch import printable
 
 
 def as_text(result: Result) -> str:
-    """Return a result as a line."""
+    """Format a result as one line."""
     check, outcome = result.check, result.outcome
     expected = f"; expected {outcome.expected}" if outcome.expected else ""
     clients = ", ".join(check.clients)
@@ -20,26 +20,27 @@ def as_text(result: Result) -> str:
 
 
 def summary(results: Sequence[Result]) -> str:
-    """Return how many of the `results` passed, failed and were skipped."""
+    """Format the numbers of passed, failed and skipped `results`, and their time."""
     counts = Counter(result.outcome.status for result in results)
     took = sum(result.seconds for result in results)
-    return f"{counts['pass']} passed, {counts['fail']} failed, {counts['skip']} skipped, {took:.1f} s"
+    differ = f"{counts['differs']} differ as known, " if counts["differs"] else ""
+    return f"{counts['pass']} passed, {counts['fail']} failed, {differ}{counts['skip']} skipped, {took:.1f} s"
 
 
 def as_json(name: str, results: Sequence[Result]) -> str:
-    """Return all results as JSON.
+    """Format all results as JSON.
 
     Parameters
     ----------
     name : str
-        Of the link.
+        Name of the link.
     results : sequence of Result
-        In their order.
+        Results in the order of the checks.
 
     Returns
     -------
     str
-        An object with the endpoint, whether nothing failed, and a list of checks.
+        An object with the endpoint, ``passed`` (true if nothing failed), and a list of checks.
     """
     checks = [
         {

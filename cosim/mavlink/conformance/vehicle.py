@@ -23,12 +23,12 @@ from plant_fmu import PlantError
 
 _SCENARIO = "paper-limited"
 _OVERRIDES = ("commands.enabled=true", "time.duration=3600")
-_STARTING = 120.0  # s, for what has to be compiled
+_STARTING = 120.0  # s, includes compilation
 _HOST = "127.0.0.1"
 
 
 class _Begun:
-    """Observer that tells when the first step is done."""
+    """Observer that sets an event at the first step."""
 
     def __init__(self) -> None:
         self.event = threading.Event()
@@ -44,21 +44,21 @@ def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions, rate
     Parameters
     ----------
     endpoints : sequence of Endpoint
-        Where it is to be seen.
+        Endpoints of its links.
     options : MavlinkOptions
-        As what.
+        Identity and profile.
     rate : float
-        Simulated seconds a second.
+        Simulated seconds per second of the wall clock.
 
     Yields
     ------
     LinkThread
-        Of the vehicle, which moves already.
+        Thread of the vehicle's links, after its first step.
 
     Raises
     ------
     TelemetryError
-        If a link cannot be opened, or the vehicle does not begin to move.
+        If a link cannot be opened, or the vehicle does not start within 120 s.
     """
     scenario = load_scenario(_SCENARIO, _OVERRIDES)
     commands, begun = CommandQueue(), _Begun()
@@ -90,19 +90,19 @@ def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions, rate
 
 @contextlib.contextmanager
 def own_vehicle(profile: ProfileName) -> Iterator[GroundLink]:
-    """Run a vehicle that heeds commands, and give a link to it.
+    """Run a vehicle that accepts commands, and yield a link to it.
 
     Parameters
     ----------
     profile : str
-        As what it shows itself.
+        Profile of the vehicle.
 
     Yields
     ------
     GroundLink
-        Open until the context ends.
+        Link to the vehicle, open until the context ends.
     """
-    ground = Endpoint("udpin", f"own vehicle, profile {profile}", host=_HOST)  # port 0: any that is free
+    ground = Endpoint("udpin", f"own vehicle, profile {profile}", host=_HOST)  # port 0: any free port
     with GroundLink(ground) as link:
         assert isinstance(link.channel, UdpIn)
         port = link.channel.port

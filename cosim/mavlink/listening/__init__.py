@@ -1,4 +1,4 @@
-"""Any vehicle's telemetry as a live table.
+"""Live table of a vehicle's telemetry.
 
 The ground's side of a link, for `cosim listen`.
 

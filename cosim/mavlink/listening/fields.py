@@ -8,18 +8,18 @@ from typing import Any, NamedTuple
 from cosim.mavlink.listening.watch import printable
 
 _DEG = 180.0 / math.pi
-_LISTED = 8  # fields of a message that has no line of its own
-_OF_ARRAY = 8  # numbers of an array
+_LISTED = 8  # fields shown of a message without an entry below
+_OF_ARRAY = 8  # numbers shown of an array
 
 
 class _Group(NamedTuple):
-    """Fields that are shown with one unit behind them."""
+    """Fields that share a unit."""
 
     names: tuple[str, ...]
     factor: float
     digits: int
     unit: str
-    unknown: int | None  # what stands for a value that is not known
+    unknown: int | None  # value of an unknown field
 
 
 def _group(names: str, factor: float = 1.0, digits: int = 2, unit: str = "", unknown: int | None = None) -> _Group:
@@ -66,17 +66,17 @@ _CLOCKS = ("time_boot_ms", "time_usec", "time_unix_usec")
 
 
 def values(message: Any) -> str:
-    """Return the main values of a message.
+    """Format the main values of a message.
 
     Parameters
     ----------
     message : Any
-        Of the dialect.
+        Message of the dialect.
 
     Returns
     -------
     str
-        In usual units; without anything that could steer a terminal.
+        Values in usual units, without control characters.
     """
     shown = _SHOWN.get(message.get_type())
     if shown is not None:

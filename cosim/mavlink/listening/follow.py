@@ -1,4 +1,4 @@
-"""Listening for as long as it is wanted."""
+"""Listen to a link for a time, for a number of messages, or until interrupted."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ _SLICE = 0.1  # s
 def follow(
     link: GroundLink, watch: Watch, period: float, seconds: float | None = None, count: int | None = None
 ) -> Iterator[float]:
-    """Listen, and say when a picture is due.
+    """Receive messages, and yield whenever the table is due to be shown.
 
     Parameters
     ----------
     link : GroundLink
-        Where to listen. Where a vehicle has to be spoken to before it speaks, our heartbeat goes out once a second.
+        Link to listen on. A link that speaks first also sends a heartbeat once a second.
     watch : Watch
-        Takes what is heard.
+        Receives the messages.
     period : float
-        Between pictures [s].
+        Time between two yields [s].
     seconds : float, optional
-        For how long; default: until it is interrupted.
+        Duration [s]; default: until interrupted.
     count : int, optional
-        Messages after which to end.
+        Messages after which it ends.
 
     Yields
     ------
     float
-        Monotonic time [s], once a period, and at the end.
+        Monotonic time [s], once per period, and at the end.
     """
     started = now = time.monotonic()
     due, beat = started + period, started

@@ -1,4 +1,4 @@
-"""The table and what stands above it, as lines of text."""
+"""The table of messages and its header, as lines of text."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.ground_end import GroundLink
 
 _DEG = 180.0 / math.pi
-_SILENT = 3.5  # s without a heartbeat, after which QGroundControl gives a vehicle up
+_SILENT = 3.5  # s without a heartbeat, after which QGroundControl reports a lost vehicle
 _LEAST_WIDTH = 40
 
 
 def picture(link: GroundLink, watch: Watch, now: float, width: int = 120, height: int | None = None) -> list[str]:
-    """Return the lines of a snapshot.
+    """Format the received messages as lines of text.
 
     Parameters
     ----------
     link : GroundLink
-        Whose name and bad frames are told.
+        Link whose name and bad frames are shown.
     watch : Watch
-        What was heard.
+        The received messages.
     now : float
         Monotonic time [s].
     width : int
-        Characters of a line at the most.
+        Characters of a line at most.
     height : int, optional
-        Lines at the most; rows that find no room are counted in the last one.
+        Lines at most; the last one counts the rows left out.
 
     Returns
     -------
     list of str
-        Without anything that could steer a terminal.
+        Lines without control characters.
     """
     width = max(width, _LEAST_WIDTH)
     lines = [_link_line(link, watch, now), *_vehicle_lines(watch, now), *_text_lines(watch, now)]
@@ -100,6 +100,6 @@ def _text_lines(watch: Watch, now: float) -> list[str]:
 
 
 def _enum(name: str, value: int) -> str:
-    """Return the name of a value of an enumeration, without what all of them share."""
+    """Return the name of a value of an enumeration without its prefix; the number if unknown."""
     entries: dict[int, Any] = dialect().enums[name]
     return entries[value].name.removeprefix(f"{name}_") if value in entries else str(value)

@@ -1,4 +1,4 @@
-"""What is known of the vehicles that were heard; it never grows beyond a bound, whatever comes."""
+"""Received messages by kind and sender, in bounded memory for any input."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.ground_end import Heard
 
 ROWS = 300  # kinds of messages that have a row
-TEXTS = 5  # that are kept
-_SAMPLES = 40  # of the count
+TEXTS = 5  # status texts that are kept
+_SAMPLES = 40  # samples of the count, for the rate
 _SAMPLING = 0.25  # s
 _NAMED = ("NAMED_VALUE_FLOAT", "NAMED_VALUE_INT", "DEBUG_VECT", "DEBUG_FLOAT_ARRAY")
 
 
 class Key(NamedTuple):
-    """Which row a message belongs to."""
+    """Key of a row: sender and kind of message."""
 
     system: int
     component: int
-    label: str  # the message's name, or NAME:name where many share it
+    label: str  # the message's name, or NAME:name for named values
 
 
 @dataclass
@@ -29,31 +29,31 @@ class Row:
     """Messages of one kind from one sender."""
 
     message: Any  # the newest
-    last: float  # s, when it came
+    last: float  # s, its time of reception
     count: int = 0
     samples: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_SAMPLES))
 
     def rate(self, now: float) -> float:
-        """Return how often it came in the last 10 s, or since it came first [Hz]."""
+        """Return the rate over the last 10 s, or since the first message [Hz]."""
         then, count = self.samples[0]
         return (self.count - count) / (now - then) if now > then else 0.0
 
 
 class Watch:
-    """Rows of messages, recent texts, and who the vehicle is.
+    """Rows of messages, recent texts, and the vehicle's identity.
 
     Attributes
     ----------
     rows : dict of Key to Row
-        At most 300, in the order in which they came first.
+        At most 300, in the order of first reception.
     texts : deque of (float, Any)
-        When recent STATUSTEXT messages came [s], and these.
+        Time of reception [s] and message of recent STATUSTEXTs.
     vehicle : (int, int) or None
-        System and component of the autopilot that was heard first.
+        System and component id of the first autopilot received.
     modes : dict of int to str
-        Names of its modes, if it told them.
+        Names of its modes by custom mode, from AVAILABLE_MODES.
     total, beyond : int
-        Messages heard, and those that found no room for a row.
+        Messages received, and those without a row because there were 300.
     """
 
     def __init__(self) -> None:
@@ -66,7 +66,7 @@ class Watch:
         self._sampled = 0.0
 
     def take(self, heard: Heard) -> None:
-        """Take a message that was `heard`."""
+        """Add a received message."""
         self.total += 1
         label, message = heard.kind, heard.message
         if label in _NAMED:
@@ -89,7 +89,7 @@ class Watch:
             self.modes[message.custom_mode] = printable(message.mode_name)
 
     def sample(self, now: float) -> None:
-        """Note the counts at a time `now` [s], from which the rates are; at most every quarter of a second."""
+        """Sample the counts for the rates at time `now` [s], at most every 0.25 s."""
         if now - self._sampled < _SAMPLING:
             return
         self._sampled = now
@@ -102,7 +102,7 @@ class Watch:
         return None if row is None else row.message
 
     def silence(self, now: float) -> float | None:
-        """Return for how long [s], at a time `now`, there was no heartbeat of the vehicle; None if there never was."""
+        """Return the time since the vehicle's last heartbeat [s] at time `now`; None before the first."""
         row = self.rows.get(Key(*self.vehicle, "HEARTBEAT")) if self.vehicle else None
         return None if row is None else now - row.last
 
@@ -112,5 +112,5 @@ class Watch:
 
 
 def printable(text: object) -> str:
-    """Return what can be shown of a text from outside: nothing in it can steer a terminal."""
+    """Replace unprintable characters by "?", so that received text cannot control a terminal."""
     return "".join(c if c.isprintable() else "?" for c in str(text).rstrip("\0 "))

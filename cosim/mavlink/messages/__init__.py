@@ -1,4 +1,4 @@
-"""What the vehicle sends.
+"""Messages that the vehicle sends.
 
 One table of messages with their builders, rates and groups, and the streams that send them unasked.
 

@@ -1,4 +1,4 @@
-"""What law, arbiter and thrusters do. Each function returns the messages of one kind."""
+"""Messages about law, arbiter and thrusters. Each function returns the messages of one kind."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from cosim.mavlink.messages.pose import degrees
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.encode import wrapped
 
-_CENTRE, _SWING = 1500, 400  # µs of PWM: at rest, and to either end
+_CENTER, _SWING = 1500, 400  # µs of PWM: at rest, and to either end
 _SERVOS, _OUTPUTS = 16, 32
 _LONGEST_NAME = 10  # characters of a named value
 _POSITION_AND_VELOCITY = 0b110111000000  # type_mask: all but these is ignored
 
-# what a law reports of itself that is worth watching, if it does
+# reports of laws that are sent as named values
 _WATCHED = {
     "law.constraint_slack": "qp_slack",
     "law.barriers": "barriers",
@@ -29,7 +29,7 @@ WEIGHTS, VALUES, CLEARANCES, THRUSTS, REPORTS = 1, 2, 3, 4, 5
 
 
 def nav_controller_output(context: VehicleContext) -> list[Any]:
-    """NAV_CONTROLLER_OUTPUT: bearing and distance of the target's middle; the altitude error is that of its depth."""
+    """NAV_CONTROLLER_OUTPUT: bearing and distance of the target's center; the altitude error is that of its depth."""
     view = context.view
     north, east, down = (a - b for a, b in zip(view.target, view.position_ned, strict=True))
     bearing = degrees(math.atan2(east, north))
@@ -40,27 +40,27 @@ def nav_controller_output(context: VehicleContext) -> list[Any]:
 
 
 def servo_output_raw(context: VehicleContext) -> list[Any]:
-    """SERVO_OUTPUT_RAW: what is asked of the thrusters as pulses [µs], 0 where there is none; its time wraps."""
+    """SERVO_OUTPUT_RAW: thruster commands as pulses [µs], 0 for unused outputs; its time wraps."""
     pulses = (context.servo_pulses() + [0] * _SERVOS)[:_SERVOS]
     return [context.make("SERVO_OUTPUT_RAW", wrapped(context.view.boot_us, 1), 0, *pulses)]
 
 
 def actuator_output_status(context: VehicleContext) -> list[Any]:
-    """ACTUATOR_OUTPUT_STATUS: what each thruster gives, as a part of its limit, from -1 to 1."""
+    """ACTUATOR_OUTPUT_STATUS: force of each thruster as a fraction of its limit, from -1 to 1."""
     parts = context.thrust_parts()[:_OUTPUTS]
     return [context.make("ACTUATOR_OUTPUT_STATUS", context.view.boot_us, (1 << len(parts)) - 1, parts)]
 
 
 def rc_channels(context: VehicleContext) -> list[Any]:
-    """RC_CHANNELS: the sticks as they were heeded last, in the order of ArduSub: pitch roll up yaw forward lateral."""
+    """RC_CHANNELS: the last applied sticks, in the order of ArduSub: pitch roll up yaw forward lateral."""
     surge, sway, heave, roll, pitch, yaw = context.sticks
     order = pitch, roll, -heave, yaw, surge, sway
-    pulses = [_CENTRE + _SWING * stick for stick in order] + [0xFFFF] * 12
+    pulses = [_CENTER + _SWING * stick for stick in order] + [0xFFFF] * 12
     return [context.make("RC_CHANNELS", wrapped(context.view.boot_us), len(order), *pulses, 0xFF)]
 
 
 def position_target_local_ned(context: VehicleContext) -> list[Any]:
-    """POSITION_TARGET_LOCAL_NED: the middle of the target region."""
+    """POSITION_TARGET_LOCAL_NED: the center of the target region."""
     m, view = context.mavlink, context.view
     none = (0.0,) * 8
     mask = _POSITION_AND_VELOCITY | 0b111000
@@ -72,7 +72,7 @@ def position_target_local_ned(context: VehicleContext) -> list[Any]:
 
 
 def named_values(context: VehicleContext) -> list[tuple[str, float]]:
-    """Return the few quantities to be watched, by a name of up to ten characters."""
+    """Return names of up to ten characters and values of the main quantities."""
     view = context.view
     values = list(zip(weight_names(view.criteria), view.weights, strict=True))
     values += [(f"phi{i}", phi) for i, phi in enumerate(view.estimate, 1)]
@@ -89,9 +89,9 @@ def named_values(context: VehicleContext) -> list[tuple[str, float]]:
 
 
 def weight_names(criteria: Sequence[str]) -> list[str]:
-    """Return what the weights of criteria are called, in ten characters: ``w_obstacle``, ``w_visibili``.
+    """Return names of the criteria's weights, of up to ten characters: ``w_obstacle``, ``w_visibili``.
 
-    A name that is taken ends in a number.
+    A number at the end distinguishes equal names.
     """
     names: list[str] = []
     for criterion in criteria:
@@ -109,12 +109,11 @@ def named_value_float(context: VehicleContext) -> list[Any]:
 
 
 def debug_float_array(context: VehicleContext) -> list[Any]:
-    """DEBUG_FLOAT_ARRAY: all that law and arbiter say, by array_id.
+    """DEBUG_FLOAT_ARRAY: all outputs and reports of law and arbiter, by array_id.
 
-    1, ``weights``: memberships, then weights, of the criteria by their order. 2, ``values``: g of the goal, then of
-    each region as the scenario has them. 3, ``clearances``: in the same order. 4, ``thrusts``: the force of each
-    thruster [N], then what is asked of each. 5, ``law``: what the law reports of itself, in the order of the columns.
-    58 numbers at the most.
+    1, ``weights``: memberships, then weights, in the order of the criteria. 2, ``values``: g of the goal, then of
+    each region of the scenario. 3, ``clearances``: in the same order. 4, ``thrusts``: the force of each thruster [N],
+    then its command. 5, ``law``: reports of the law, in the order of the columns. Each has 58 numbers at most.
     """
     view = context.view
     arrays: list[tuple[int, str, Sequence[float]]] = [

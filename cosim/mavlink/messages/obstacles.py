@@ -1,4 +1,4 @@
-"""Obstacles near the vehicle, as proximity sensors would see them."""
+"""Obstacles near the vehicle, as measured by ideal proximity sensors."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _INCREMENT = 360 // SECTORS  # degrees
 
 
 def obstacle_distance(context: VehicleContext) -> list[Any]:
-    """OBSTACLE_DISTANCE: a level scan, sector by sector clockwise from where the vehicle heads.
+    """OBSTACLE_DISTANCE: a level scan, sector by sector clockwise from the vehicle's heading.
 
-    A sector's angle is that of its middle. In cm: one more than `max_distance` where there is nothing, 65535 where
-    position, heading or an obstacle's place is no number.
+    A sector's angle is that of its center. In cm: `max_distance` plus one without an obstacle, 65535 if position,
+    heading or an obstacle's position is NaN.
     """
     m, view, proximity = context.mavlink, context.view, context.proximity
     proximity.update(view, context.settings)
@@ -34,9 +34,9 @@ def obstacle_distance(context: VehicleContext) -> list[Any]:
 
 
 def obstacle_distance_3d(context: VehicleContext) -> list[Any]:
-    """OBSTACLE_DISTANCE_3D: the nearest point, in the body's axes, of each region that stands for an obstacle.
+    """OBSTACLE_DISTANCE_3D: the nearest point, in the body frame, of each region that is an obstacle.
 
-    `obstacle_id` is the region's number in the scenario, from 1. None is known before the first snapshot.
+    `obstacle_id` is the region's number in the scenario, from 1. No message before the first snapshot.
     """
     m, view, proximity = context.mavlink, context.view, context.proximity
     if not context.has_view:
@@ -55,7 +55,7 @@ def obstacle_distance_3d(context: VehicleContext) -> list[Any]:
 
 
 def _nearest_point(clearance: float, inwards: list[float]) -> Vector3 | None:
-    """Return the way to the nearest point of a surface [m, NED], or None where its direction is unknown."""
+    """Return the vector to the nearest point of a surface [m, NED], or None if its direction is undefined."""
     length = math.hypot(*inwards)
     if not 0.0 < length < math.inf:
         return None

@@ -1,4 +1,4 @@
-"""Where the vehicle is and how it moves. Each function returns the messages of one kind."""
+"""Messages about position, attitude and motion. Each function returns the messages of one kind."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def local_position_ned(context: VehicleContext) -> list[Any]:
 
 
 def global_position_int(context: VehicleContext) -> list[Any]:
-    """GLOBAL_POSITION_INT: its relative altitude is the depth, negative."""
+    """GLOBAL_POSITION_INT: its relative altitude is the negative depth."""
     view = context.view
     latitude, longitude, altitude = globe(context, view.position_ned)
     speeds = [v * _CM for v in view.velocity_ned]
@@ -55,7 +55,7 @@ def global_position_int(context: VehicleContext) -> list[Any]:
 
 
 def vfr_hud(context: VehicleContext) -> list[Any]:
-    """VFR_HUD: throttle is the greatest part of its limit that a thruster gives."""
+    """VFR_HUD: throttle is the greatest ratio of a thruster's force to its limit."""
     view = context.view
     north, east, down = view.velocity_ned
     speed = math.hypot(*view.velocity_body)
@@ -66,7 +66,7 @@ def vfr_hud(context: VehicleContext) -> list[Any]:
 
 
 def gps_raw_int(context: VehicleContext) -> list[Any]:
-    """GPS_RAW_INT: the position as a fix, for stations that know no other; its accuracy is not known."""
+    """GPS_RAW_INT: the position as a fix, for stations that read no other message; accuracy unknown."""
     view = context.view
     latitude, longitude, altitude = globe(context, view.position_ned)
     north, east, _ = view.velocity_ned
@@ -86,12 +86,12 @@ def home_position(context: VehicleContext) -> list[Any]:
 
 
 def gps_global_origin(context: VehicleContext) -> list[Any]:
-    """GPS_GLOBAL_ORIGIN: where on the globe position 0 is."""
+    """GPS_GLOBAL_ORIGIN: global position of the local origin."""
     return [context.make("GPS_GLOBAL_ORIGIN", *globe(context, (0.0, 0.0, 0.0)), context.view.boot_us)]
 
 
 def odometry(context: VehicleContext) -> list[Any]:
-    """ODOMETRY: the whole state; no covariance is known."""
+    """ODOMETRY: pose and twist; covariances unknown."""
     m, view = context.mavlink, context.view
     frames = m.MAV_FRAME_LOCAL_NED, m.MAV_FRAME_BODY_FRD
     covariances = _COVARIANCE_UNKNOWN, _COVARIANCE_UNKNOWN
@@ -103,7 +103,7 @@ def odometry(context: VehicleContext) -> list[Any]:
 
 
 def altitude(context: VehicleContext) -> list[Any]:
-    """ALTITUDE: over the surface, and over the bottom where there is one."""
+    """ALTITUDE: above the surface, and above the bottom if there is one."""
     view = context.view
     up = -view.position_ned[2]
     above_bottom = view.altitude if view.altitude < 1e5 else math.nan
@@ -112,7 +112,7 @@ def altitude(context: VehicleContext) -> list[Any]:
 
 
 def ahrs2(context: VehicleContext) -> list[Any]:
-    """AHRS2, from which Cockpit takes the altitude."""
+    """AHRS2: Cockpit reads the altitude from it."""
     view = context.view
     latitude, longitude, millimetres = globe(context, view.position_ned)
     return [context.make("AHRS2", *view.euler, millimetres / _MM, latitude, longitude)]

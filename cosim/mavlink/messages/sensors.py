@@ -1,4 +1,4 @@
-"""What the vehicle's sensors say. Each function returns the messages of one kind."""
+"""Messages of sensors. Each function returns the messages of one kind."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.encode import wrapped
 
 SURFACE_PRESSURE = 1013.25  # hPa
-WATER_DENSITY = 1000.0  # kg/m3, as ArduSub's default has it for fresh water
+WATER_DENSITY = 1000.0  # kg/m3, fresh water, ArduSub's default
 GRAVITY = 9.80665  # m/s2
 _PASCAL = 100.0  # in a hPa
-_DEEPEST_BOTTOM = 655.0  # m below the vehicle; beyond it no distance can be told
+_DEEPEST_BOTTOM = 655.0  # m below the vehicle; the range of DISTANCE_SENSOR
 _CENTI = 100  # in a unit
 _HIGHRES_FIELDS = 0b111111 | 1 << 9 | 1 << 11  # accelerations, rates, pressure, pressure altitude
 
@@ -24,12 +24,12 @@ def pressure_at(depth: float) -> float:
 
 
 def scaled_pressure(context: VehicleContext) -> list[Any]:
-    """SCALED_PRESSURE: within the hull, that of the surface."""
+    """SCALED_PRESSURE: inside the hull, equal to that of the surface."""
     return [context.make("SCALED_PRESSURE", wrapped(context.view.boot_us), SURFACE_PRESSURE, 0.0, 0)]
 
 
 def scaled_pressure2(context: VehicleContext) -> list[Any]:
-    """SCALED_PRESSURE2: of the water, from the depth sensor, as ArduSub has it."""
+    """SCALED_PRESSURE2: of the water, from the depth sensor, as in ArduSub."""
     view = context.view
     pressure = pressure_at(view.depth)
     return [context.make("SCALED_PRESSURE2", wrapped(view.boot_us), pressure, pressure - SURFACE_PRESSURE, 0)]
@@ -53,12 +53,12 @@ def highres_imu(context: VehicleContext) -> list[Any]:
 
 
 def has_bottom(context: VehicleContext) -> bool:
-    """Return whether there is a bottom near enough to be measured."""
+    """Return True if the bottom is within 655 m below the vehicle."""
     return context.view.altitude <= _DEEPEST_BOTTOM
 
 
 def distance_sensor(context: VehicleContext) -> list[Any]:
-    """DISTANCE_SENSOR: down to the bottom, where there is one."""
+    """DISTANCE_SENSOR: down to the bottom, if it is within range."""
     if not has_bottom(context):
         return []
     m, view = context.mavlink, context.view
@@ -68,12 +68,12 @@ def distance_sensor(context: VehicleContext) -> list[Any]:
 
 
 def rangefinder(context: VehicleContext) -> list[Any]:
-    """RANGEFINDER: the same, for stations that know no other."""
+    """RANGEFINDER: the same, for stations that read no other message."""
     return [context.make("RANGEFINDER", context.view.altitude, 0.0)] if has_bottom(context) else []
 
 
 def water_depth(context: VehicleContext) -> list[Any]:
-    """WATER_DEPTH: the height above the bottom, where there is one."""
+    """WATER_DEPTH: the height above the bottom, if it is within range."""
     if not has_bottom(context):
         return []
     view = context.view
@@ -83,7 +83,7 @@ def water_depth(context: VehicleContext) -> list[Any]:
 
 
 def battery_status(context: VehicleContext) -> list[Any]:
-    """BATTERY_STATUS: nothing is known of it, for the plant has none."""
+    """BATTERY_STATUS: all unknown, since the plant has no battery."""
     m = context.mavlink
     kind = 0, m.MAV_BATTERY_FUNCTION_ALL, m.MAV_BATTERY_TYPE_UNKNOWN, 0x7FFF
     return [context.make("BATTERY_STATUS", *kind, [0xFFFF] * 10, -1, -1, -1, -1)]
@@ -94,7 +94,7 @@ def _position_known(context: VehicleContext) -> bool:
 
 
 def estimator_status(context: VehicleContext) -> list[Any]:
-    """ESTIMATOR_STATUS: what is known of the pose; innovations are not."""
+    """ESTIMATOR_STATUS: flags of the known states; innovations are unknown."""
     m = context.mavlink
     flags = m.ESTIMATOR_ATTITUDE | m.ESTIMATOR_VELOCITY_HORIZ | m.ESTIMATOR_VELOCITY_VERT
     if _position_known(context):
@@ -103,7 +103,7 @@ def estimator_status(context: VehicleContext) -> list[Any]:
 
 
 def ekf_status_report(context: VehicleContext) -> list[Any]:
-    """EKF_STATUS_REPORT, the same as ArduPilot has it."""
+    """EKF_STATUS_REPORT: the same flags for ArduPilot's stations."""
     m = context.mavlink
     flags = m.EKF_ATTITUDE | m.EKF_VELOCITY_HORIZ | m.EKF_VELOCITY_VERT
     if _position_known(context):

@@ -1,4 +1,4 @@
-"""What the vehicle is, and how it is. Each function returns the messages of one kind."""
+"""Messages about identity and status. Each function returns the messages of one kind."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def beat(context: VehicleContext, state: int) -> Any:
 
 
 def sys_status(context: VehicleContext) -> list[Any]:
-    """SYS_STATUS: no fence can be broken, and whatever is there is healthy; the battery is not known."""
+    """SYS_STATUS: the fence and all present sensors are healthy; the battery is unknown."""
     m = context.mavlink
     present = (
         m.MAV_SYS_STATUS_SENSOR_3D_GYRO
@@ -57,16 +57,16 @@ def sys_status(context: VehicleContext) -> list[Any]:
 
 
 def system_time(context: VehicleContext) -> list[Any]:
-    """SYSTEM_TIME: the date goes on from that of the beginning, by simulated time."""
+    """SYSTEM_TIME: the date at the start plus simulated time."""
     boot = context.view.boot_us
     return [context.make("SYSTEM_TIME", context.unix_start_us + boot, wrapped(boot))]
 
 
 def extended_sys_state(context: VehicleContext) -> list[Any]:
-    """EXTENDED_SYS_STATE: under way while armed, else as if on the ground.
+    """EXTENDED_SYS_STATE: in the air while armed, else on the ground.
 
-    QGroundControl offers by it what can be done: while flying neither disarming nor a mission's start, else neither a
-    pause nor a place to go to. The bottom is no ground to it: the heartbeat of an armed vehicle says that it flies.
+    QGroundControl selects its actions by it: in the air it offers neither disarming nor the start of a mission, on the
+    ground neither pause nor go-to. Contact with the bottom does not count as on the ground.
     """
     m = context.mavlink
     landed = m.MAV_LANDED_STATE_IN_AIR if context.armed else m.MAV_LANDED_STATE_ON_GROUND
@@ -74,13 +74,13 @@ def extended_sys_state(context: VehicleContext) -> list[Any]:
 
 
 def current_mode(context: VehicleContext) -> list[Any]:
-    """CURRENT_MODE, and the one that is commanded."""
+    """CURRENT_MODE: the current mode and the commanded one."""
     numbers, mode = context.profile.numbers, context.mode
     return [context.make("CURRENT_MODE", STANDARD_MODES[mode], numbers[mode], numbers[context.mode_ahead])]
 
 
 def available_modes(context: VehicleContext, index: int = 0) -> list[Any]:
-    """AVAILABLE_MODES: one of them, from 1, or all for index 0; none for an index that is not there."""
+    """AVAILABLE_MODES: the mode of an index from 1, or all for index 0; none for an unknown index."""
     chosen = range(1, len(MODES) + 1) if index == 0 else [index] if 1 <= index <= len(MODES) else []
     messages = []
     for i in chosen:
@@ -91,12 +91,12 @@ def available_modes(context: VehicleContext, index: int = 0) -> list[Any]:
 
 
 def available_modes_monitor(context: VehicleContext) -> list[Any]:
-    """AVAILABLE_MODES_MONITOR: they never change."""
+    """AVAILABLE_MODES_MONITOR: constant, since the modes never change."""
     return [context.make("AVAILABLE_MODES_MONITOR", 0)]
 
 
 def capabilities(context: VehicleContext) -> int:
-    """Return MAV_PROTOCOL_CAPABILITY: what it really understands."""
+    """Return the MAV_PROTOCOL_CAPABILITY bits of the implemented protocols."""
     m = context.mavlink
     return int(
         m.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
@@ -113,10 +113,9 @@ def capabilities(context: VehicleContext) -> int:
 def autopilot_version(context: VehicleContext) -> list[Any]:
     """AUTOPILOT_VERSION: this package's version as middleware; the unique id follows from vehicle and system id.
 
-    The flight software's is the same, but where the profile stands for another autopilot: that one's then, as a
-    development version. By its number QGroundControl chooses what it shows and what it warns of, and only one that
-    calls itself official is compared with the newest. The custom version is the name, or for PX4, where it is shown as
-    numbers, the package's version again.
+    The flight software's version is the same, or, if the profile imitates an autopilot, a development version of that
+    autopilot. QGroundControl selects views and warnings by it, and compares only official versions with the newest.
+    The custom version is the name, or for PX4, where it is shown as numbers, the package's version again.
     """
     version, profile = Version(metadata.version("subreach")), context.profile
     own = version.major, version.minor, version.micro

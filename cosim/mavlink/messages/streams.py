@@ -1,4 +1,4 @@
-"""What goes out unasked on one link, and when."""
+"""The schedule of messages that one link streams."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from cosim.mavlink.messages.table import HEARTBEAT
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.message_sink import MessageSink
 
-SHORTEST_US = 10_000  # between two of the same message
+SHORTEST_US = 10_000  # least interval of a message
 _LONGEST_US = 3_600_000_000
-GREATEST_LOAD = 250_000.0  # bytes in a simulated second, of all streams of a link
-_FRAME = 12  # bytes about a payload
+GREATEST_LOAD = 250_000.0  # bytes per simulated second, of all streams of a link
+_FRAME = 12  # bytes of header and checksum
 _SECOND = 1_000_000
 
 
 class Streams:
-    """The schedule of a link, in whole microseconds of a clock that only goes on; nothing drifts.
+    """The schedule of a link, in whole microseconds of a monotonic clock, without drift.
 
     Parameters
     ----------
     context : VehicleContext
-        What is told.
+        The vehicle whose messages are sent.
     link : MessageSink
-        To whom.
+        The link that sends them.
     clock_us : int
-        When it begins; everything is due then.
+        Start time [µs]; every message is due then.
 
     Attributes
     ----------
     beaten : bool
-        Whether a heartbeat went out since this was last set to False.
+        True if a heartbeat was sent since this was last set to False.
     """
 
     def __init__(self, context: VehicleContext, link: MessageSink, clock_us: int) -> None:
@@ -62,7 +62,7 @@ class Streams:
 
     @property
     def load(self) -> float:
-        """Bytes that go out in a simulated second."""
+        """Bytes sent per simulated second."""
         return sum(self._load(MESSAGES[i], interval) for i, interval in self._intervals.items())
 
     def interval(self, message_id: int) -> int:
@@ -75,13 +75,12 @@ class Streams:
         Parameters
         ----------
         changes : iterable of (int, int)
-            Message and interval [µs]: 0 for its default, below 0 to end it. Others are brought within 10 ms and an
-            hour.
+            Message id and interval [µs]: 0 for its default, below 0 to end it. Others are limited to 10 ms to an hour.
 
         Returns
         -------
         bool
-            False, if a message is unknown, or the link would carry more than `GREATEST_LOAD`.
+            False if a message is unknown, or the load would exceed `GREATEST_LOAD`.
         """
         new: dict[int, int] = {}
         for message_id, interval_us in changes:
@@ -101,12 +100,12 @@ class Streams:
         return True
 
     def advance(self, clock_us: int) -> None:
-        """Send what is due; what was missed is not sent twice.
+        """Send each message that is due, once, even if several of its intervals have passed.
 
         Parameters
         ----------
         clock_us : int
-            The clock now.
+            Present time of the clock [µs].
         """
         self._clock = clock_us
         if clock_us < self._earliest:

@@ -18,17 +18,17 @@ RAW_SENSORS, EXTENDED_STATUS, RC, POSITION, EXTRA1, EXTRA2, EXTRA3 = 1, 2, 3, 6,
 
 @dataclass(frozen=True)
 class Spec:
-    """A message that the vehicle sends by itself, or when asked."""
+    """A message that the vehicle streams, or sends on request."""
 
     id: int
     build: Callable[[VehicleContext], list[Any]]
     rate: float  # Hz, in simulated time; 0: on request only
-    group: int = 0  # of REQUEST_DATA_STREAM; 0: in none
-    profiles: tuple[ProfileName, ...] = PROFILES  # in which it is streamed unasked
-    several: int = 1  # messages at once, about
+    group: int = 0  # of REQUEST_DATA_STREAM; 0: no group
+    profiles: tuple[ProfileName, ...] = PROFILES  # profiles that stream it by default
+    several: int = 1  # approximate number of messages at once
 
     def default_rate(self, profile: ProfileName) -> float:
-        """Return the rate [Hz] at which a `profile` streams it unasked."""
+        """Return the default rate [Hz] of a `profile`; 0 for none."""
         return self.rate if profile in self.profiles else 0.0
 
 

@@ -1,4 +1,4 @@
-"""Commands: each is answered once, to whom sent it."""
+"""Commands: each gets one ack, to its sender."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from cosim.mavlink.services.service import Call, Command, Service, unscaled
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 
-_NOWHERE = 0x7FFFFFFF  # of a COMMAND_INT that names no place
+_NOWHERE = 0x7FFFFFFF  # x or y of a COMMAND_INT without a position
 
 
 class Commands(Service):
@@ -18,9 +18,9 @@ class Commands(Service):
     Parameters
     ----------
     context : VehicleContext
-        Whom it serves.
+        The vehicle.
     services : iterable of Service
-        Whose commands are understood.
+        Services with the handlers of commands.
     """
 
     def __init__(self, context: VehicleContext, services: Iterable[Service]) -> None:

@@ -1,4 +1,4 @@
-"""File transfer: a read-only server with one file, the packed parameters. There is no file system behind it."""
+"""File transfer: a read-only server of one file, the packed parameters, without access to the file system."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _HEADER = struct.Struct("<HBBBBBBI")  # seq, session, opcode, size, req_opcode, 
 _ROOM = 239  # bytes of data in a payload
 _PAYLOAD = 251
 _FOLDER, _FILE = "@PARAM", "param.pck"
-_CLIENTS = 8  # each with one file open; who came first goes when there are more
+_CLIENTS = 8  # each with one open file; a further client replaces the one unused for longest
 _BURST = 16  # packets
 _LONGEST_PATH = 100
 
@@ -29,7 +29,7 @@ _INVALID_SIZE, _INVALID_SESSION, _EOF, _UNKNOWN, _PROTECTED, _NOT_FOUND = 3, 4, 
 
 @dataclass(frozen=True)
 class _Request:
-    """A request, of which all fields are numbers, and data."""
+    """A decoded request."""
 
     seq: int
     session: int
@@ -41,7 +41,7 @@ class _Request:
 
 @dataclass
 class _Client:
-    """What a station has open, in the session that it chose."""
+    """The session and open file of a ground station."""
 
     session: int = 0
     content: bytes | None = None
@@ -50,7 +50,7 @@ class _Client:
 
 
 class RefusedError(Exception):
-    """A request that is not met; its number is MAV_FTP_ERR."""
+    """Raised for a refused request; `error` is its MAV_FTP_ERR."""
 
     def __init__(self, error: int) -> None:
         super().__init__(error)
@@ -63,9 +63,9 @@ class FileServer(Service):
     Parameters
     ----------
     context : VehicleContext
-        Whom it serves.
+        The vehicle.
     parameters : Parameters
-        What the file holds.
+        Parameters that the file contains.
     """
 
     def __init__(self, context: VehicleContext, parameters: Parameters) -> None:
@@ -80,7 +80,7 @@ class FileServer(Service):
         if opcode in (_ACK, _NAK):
             return
         client = self._client_of(sender)
-        if raw == client.last_request:  # it did not arrive
+        if raw == client.last_request:  # repeated: the reply was lost
             replies = client.last_replies
         else:
             request = _Request(seq, session, opcode, size, offset, raw[_HEADER.size : _HEADER.size + size])
@@ -140,7 +140,7 @@ class FileServer(Service):
             _packet(request, i, _ACK, data, offset, complete=i == last) for i, (offset, data) in enumerate(parts, 1)
         ]
 
-    # ---- what there is ----
+    # ---- files ----
 
     def _content(self, path: str) -> bytes:
         name, _, query = path.lstrip("/").partition("?")
@@ -190,7 +190,7 @@ def _part(content: bytes, offset: int, size: int) -> bytes:
 
 
 def _packet(request: _Request, after: int, opcode: int, data: bytes, offset: int, complete: bool = False) -> bytes:
-    """Return a reply; it echoes the session of the request, by which a station knows that it is its own."""
+    """Return a reply; it echoes the session of the request, by which a station recognizes it."""
     seq = (request.seq + after) & 0xFFFF
     header = _HEADER.pack(seq, request.session, opcode, len(data), request.opcode, complete, 0, offset)
     return (header + data).ljust(_PAYLOAD, b"\0")

@@ -1,4 +1,4 @@
-"""The watch over the ground station that commands, by the wall clock."""
+"""Failsafe for the loss of the commanding ground station, by the wall clock."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _REMINDER = 30.0  # s
 
 
 class GcsFailsafe(Service):
-    """Acts when the heartbeats of the system that commands stay away; one that never sent any is not missed."""
+    """Apply the loss action when heartbeats of the commanding system stop; a system that never sent one is ignored."""
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
@@ -24,7 +24,7 @@ class GcsFailsafe(Service):
         self.context.operator.beat(sender.system, self.context.now)
 
     def tick(self) -> None:
-        """See whether the station is still there."""
+        """Check the silence of the station, report it, and apply the loss action."""
         context = self.context
         silence = context.operator.silence(context.now)
         lost = context.loss_action != "none" and silence > context.loss_timeout
@@ -50,7 +50,7 @@ class GcsFailsafe(Service):
         context.say(text, context.mavlink.MAV_SEVERITY_CRITICAL)
 
     def _act(self) -> bool:
-        """Order what was asked for, and return whether the order found room."""
+        """Submit the command of the loss action; return False if the queue was full."""
         context = self.context
         command: Command
         match context.loss_action:

@@ -1,4 +1,4 @@
-"""Log files: the vehicle has none and answers so at once. The record is in the run folder."""
+"""Log files: the vehicle has none, and answers with an empty list. The record is in the run folder."""
 
 from __future__ import annotations
 

@@ -4,32 +4,41 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from cosim.mavlink.services.service import Service
+from cosim.mavlink.vehicle.sticks import CLIMB_DEAD_ZONE, YAW_DEAD_ZONE, MotorMixer, beyond_dead_zone
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector6
-from cosim.simulation.commands.commands import STICK_MODES, ManualControl
+from cosim.simulation.commands.command_handler import greatest_wrench
+from cosim.simulation.commands.commands import STICK_MODES, ManualControl, Mode
 
 _FULL = 1000.0
 _INVALID = 0x7FFF
 _TIMEOUT = 3.0  # s of the wall clock
 _PITCH, _ROLL = 1, 2  # enabled_extensions
-_CENTRE, _SWING = 1500, 400  # us of a channel
+_CENTER, _SWING = 1500, 400  # us of a channel
 _CHANNELS = 6  # pitch, roll, up, yaw, forward, right, as ArduSub has them
 _RELEASED, _IGNORED = 0, 0xFFFF  # a channel that is given back, and one that stays as it is
+_PUSHES: dict[Mode, int] = {"manual": 6, "stabilize": 3, "depth_hold": 2}  # axes that do; the others ask for something
 _NEUTRAL: Vector6 = (0.0,) * 6
 
 
 class Manual(Service):
-    """Sticks become parts of the greatest wrench, while the mode is one that they steer in."""
+    """Convert sticks to fractions of the greatest wrench, in the modes of manual control."""
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
         self.messages = {"MANUAL_CONTROL": self._manual_control, "RC_CHANNELS_OVERRIDE": self._override}
+        vehicle = context.scenario.vehicle
+        reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+        self._mixer = None if vehicle.autopilot is None else MotorMixer(vehicle)
+        self._reciprocal = np.divide(1.0, reach, out=np.zeros(6), where=reach > 0.0)
         self._heard: float | None = None
         self._state = (context.armed, context.mode)
 
     def restart(self) -> None:
-        """Let go of the sticks."""
+        """Release the sticks."""
         self._heard = None
 
     def on_snapshot(self) -> None:
@@ -39,30 +48,30 @@ class Manual(Service):
             self._state, self.context.sticks = state, _NEUTRAL
 
     def tick(self) -> None:
-        """Let go of sticks that nobody holds any more."""
+        """Release the sticks after 3 s without a message."""
         context = self.context
         if self._heard is None or context.now - self._heard < _TIMEOUT:
             return
         self._heard = None
         if context.mode_ahead in STICK_MODES:
-            self._order(_NEUTRAL)
+            self._submit(_NEUTRAL, by_gain=True)
             context.say("Lost manual control", context.mavlink.MAV_SEVERITY_CRITICAL, "sticks", _TIMEOUT)
 
     def _manual_control(self, sender: Sender, message: Any) -> None:
         if message.target == self.context.options.system_id:
-            self._take(sender, self._wrench(message))
+            self._take(sender, self._wrench(message), by_gain=True)
 
     def _override(self, sender: Sender, message: Any) -> None:
         pulses = [getattr(message, f"chan{i}_raw") for i in range(1, _CHANNELS + 1)]
         surge, sway, heave, roll, pitch, yaw = self.context.sticks
         before = pitch, roll, -heave, yaw, surge, sway
         pitch, roll, up, yaw, surge, sway = (
-            old if pulse == _IGNORED else 0.0 if pulse == _RELEASED else _part((pulse - _CENTRE) / _SWING)
+            old if pulse == _IGNORED else 0.0 if pulse == _RELEASED else _part((pulse - _CENTER) / _SWING)
             for pulse, old in zip(pulses, before, strict=True)
         )
-        self._take(sender, (surge, sway, -up + 0.0, roll, pitch, yaw))
+        self._take(sender, (surge, sway, -up + 0.0, roll, pitch, yaw), by_gain=False)
 
-    def _take(self, sender: Sender, sticks: Vector6) -> None:
+    def _take(self, sender: Sender, sticks: Vector6, by_gain: bool) -> None:
         context = self.context
         if not context.accepts_commands:
             context.submit()
@@ -73,35 +82,43 @@ class Manual(Service):
             context.reject("another station has the vehicle in hand", "active gcs")
             return
         self._heard = context.now
-        self._order(sticks)
+        self._submit(sticks, by_gain)
 
-    def _order(self, sticks: Vector6) -> None:
+    def _submit(self, sticks: Vector6, by_gain: bool) -> None:
         context = self.context
         if sticks == context.sticks:
             return
-        if context.submit(ManualControl(self._parts(sticks))) == context.mavlink.MAV_RESULT_ACCEPTED:
+        command = ManualControl(self._parts(sticks, by_gain), by_gain)
+        if context.submit(command) == context.mavlink.MAV_RESULT_ACCEPTED:
             context.sticks = sticks
 
-    def _parts(self, sticks: Vector6) -> Vector6:
+    def _parts(self, sticks: Vector6, by_gain: bool) -> Vector6:
         """Return which parts of the greatest wrench the sticks ask for, before the pilot's gain.
 
-        An ArduSub asks its thrusters for gain times stick, and their force goes with the square of that.
+        An ArduSub asks its thrusters for gain times stick, and their force goes with the square of the sum. The gain
+        does not scale channels that are overridden.
         """
-        context, table = self.context, self.context.scenario.vehicle.autopilot
-        if context.profile.name != "ardusub" or table is None or table.curve != "quadratic":
+        context, mode = self.context, self.context.mode_ahead
+        if context.profile.name != "ardusub":
             return sticks
         gain = context.settings["commands.pilot_gain"]
-        scales = (gain, gain, gain, 1.0 / gain, 1.0 / gain, gain)  # the gain leaves roll and pitch alone
-        squared = 6 if context.mode_ahead == "manual" else 3  # in other modes the last three ask for angles and rates
-        x, y, z, k, m, n = (
-            scale * s * abs(s) if i < squared else s for i, (scale, s) in enumerate(zip(scales, sticks, strict=True))
-        )
+        scale = gain if by_gain else 1.0
+        scaled = np.array(sticks) * (scale, scale, scale, 1.0, 1.0, scale)  # the gain leaves roll and pitch alone
+        pushes, parts = np.arange(len(scaled)) < _PUSHES[mode], np.array(sticks)
+        if self._mixer is not None:
+            mixed = np.clip(self._mixer.wrench(np.where(pushes, scaled, 0.0)) * self._reciprocal, -1.0, 1.0) / scale
+            parts[pushes] = mixed[pushes]
+        if mode != "manual":  # beyond a dead zone, a rate of turn
+            parts[5] = beyond_dead_zone(scaled[5], gain * YAW_DEAD_ZONE) / scale
+        if mode == "depth_hold":  # likewise of the depth
+            parts[2] = beyond_dead_zone(scaled[2], gain * CLIMB_DEAD_ZONE)
+        x, y, z, k, m, n = np.clip(parts, -1.0, 1.0).tolist()
         return x, y, z, k, m, n
 
     def _wrench(self, message: Any) -> Vector6:
-        """Return X Y Z K M N from -1 to 1; the vertical stick is up where positive, Z is down."""
-        centre = self.context.profile.centred_stick
-        up = 0.0 if message.z == _INVALID else _part((message.z - centre) / (_FULL - centre))
+        """Return X Y Z K M N from -1 to 1; the vertical stick is positive up, Z is positive down."""
+        center = self.context.profile.centred_stick
+        up = 0.0 if message.z == _INVALID else _part((message.z - center) / (_FULL - center))
         full = self.context.profile.full_tilt_stick
         roll = _axis(message.t, full) if message.enabled_extensions & _ROLL else 0.0
         pitch = _axis(message.s, full) if message.enabled_extensions & _PITCH else 0.0

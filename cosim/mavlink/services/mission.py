@@ -1,4 +1,4 @@
-"""Missions: their transfer both ways, and where they are."""
+"""Missions: upload, download, and the current item."""
 
 from __future__ import annotations
 
@@ -19,42 +19,42 @@ _MOST = 500  # items
 _RETRY = 1.0  # s of the wall clock
 _RETRIES = 5
 _OF_REGIONS, _ALL = 0, 255  # MAV_MISSION_TYPE
-_GO_THERE, _CHANGE_DEPTH = 2, 3  # MISSION_ITEM.current, of an item that is no part of a mission
+_GO_THERE, _CHANGE_DEPTH = 2, 3  # MISSION_ITEM.current of guided items, which are not part of a mission
 _KNOWN_TYPES = (0, 1, 2)
 
 
 @dataclass
 class _Upload:
-    """A mission on its way in."""
+    """A mission upload under way."""
 
     sender: Sender
     count: int
-    asked: float  # s, when the item that is missing was asked for
+    asked: float  # s, time of the last request for an item
     items: list[ReceivedMissionItem] = field(default_factory=list)
     decoded: list[MissionItem] = field(default_factory=list)  # without home
     retries: int = 0
 
 
 class Missions(Service):
-    """MISSION_*: one mission of regions; fences and rally points are always none.
+    """MISSION_*: one mission of regions; fences and rally points are always empty.
 
-    In ArduPilot's profile item 0 is home: it is given on download, and not followed when it comes.
+    In ArduPilot's profile item 0 is home: it is added to downloads, and ignored in uploads.
 
     Parameters
     ----------
     context : VehicleContext
-        Whom it serves.
+        The vehicle.
     targets : Targets
-        Where items go that are to be followed at once.
+        Service that executes guided items at once.
     parameters : Parameters
-        Which learns what a mission changes.
+        Service that is updated with the settings that a mission changes.
     """
 
     def __init__(self, context: VehicleContext, targets: Targets, parameters: Parameters) -> None:
         super().__init__(context)
         m = context.mavlink
         self._targets, self._parameters = targets, parameters
-        self._under_way = -1  # item of the snapshot before
+        self._under_way = -1  # item of the last snapshot
         self._upload: _Upload | None = None
         self._first = int(context.profile.home_is_first)
         self.messages = {
@@ -71,11 +71,11 @@ class Missions(Service):
         self.commands = {m.MAV_CMD_MISSION_START: self._start, m.MAV_CMD_DO_SET_MISSION_CURRENT: self._command_current}
 
     def restart(self) -> None:
-        """Break off what is under way."""
+        """Cancel an upload under way."""
         self._upload, self._under_way = None, -1
 
     def on_snapshot(self) -> None:
-        """Learn what the items have changed that were gone through since the snapshot before."""
+        """Update the parameters with settings changed by items passed since the last snapshot."""
         context, before = self.context, self._under_way
         now = self._under_way = context.view.item if context.mode == "mission" else -1
         if now == before or not 0 <= now < len(context.course):
@@ -85,7 +85,7 @@ class Missions(Service):
                 if isinstance(command, ChangeSetting):
                     self._parameters.learn(command.key, command.value)
 
-    # ---- out ----
+    # ---- download ----
 
     def _all_items(self) -> tuple[ReceivedMissionItem, ...]:
         plan = self.context.plan
@@ -120,7 +120,7 @@ class Missions(Service):
     def _ack(self, sender: Sender, result: int, kind: int) -> None:
         sender.link.send(self.context.make("MISSION_ACK", sender.system, sender.component, result, kind))
 
-    # ---- in ----
+    # ---- upload ----
 
     def _begin_upload(self, sender: Sender, message: Any) -> None:
         context, m, kind = self.context, self.context.mavlink, message.mission_type
@@ -139,7 +139,7 @@ class Missions(Service):
             self._go_on(self._upload)
 
     def _go_on(self, upload: _Upload) -> None:
-        """Ask for the next item, or finish."""
+        """Request the next item, or finish the upload."""
         context, sender = self.context, upload.sender
         upload.asked = context.now
         if len(upload.items) < upload.count:
@@ -147,7 +147,7 @@ class Missions(Service):
             sender.link.send(context.make("MISSION_REQUEST_INT", *to, len(upload.items), _OF_REGIONS))
             return
         self._upload = None
-        self._ack(sender, self._taken(sender, upload.items[self._first :], upload.decoded), _OF_REGIONS)
+        self._ack(sender, self._submit_mission(sender, upload.items[self._first :], upload.decoded), _OF_REGIONS)
 
     def _take_item(self, sender: Sender, message: Any) -> None:
         m, upload, kind = self.context.mavlink, self._upload, message.mission_type
@@ -157,10 +157,10 @@ class Missions(Service):
         if upload is None or upload.sender != sender or kind != _OF_REGIONS:
             self._ack(sender, m.MAV_MISSION_DENIED if not self.context.accepts_commands else m.MAV_MISSION_ERROR, kind)
             return
-        if message.seq != len(upload.items):  # one that came before, or too early
+        if message.seq != len(upload.items):  # a repeated item, or one out of order
             return
         result = self._add(upload, message)
-        if result != m.MAV_MISSION_ACCEPTED:  # at once: stations tell which item they sent last
+        if result != m.MAV_MISSION_ACCEPTED:  # at once: stations relate the ack to the last item sent
             self._upload = None
             self._ack(sender, result, kind)
             return
@@ -170,7 +170,7 @@ class Missions(Service):
     def _add(self, upload: _Upload, message: Any) -> int:
         """Add an item to an upload, and return MAV_MISSION_RESULT."""
         context, m, first = self.context, self.context.mavlink, self._first
-        item = _as_it_came(message, m)
+        item = _received_item(message, m)
         if item is None:
             return int(m.MAV_MISSION_INVALID)
         if message.seq >= first:
@@ -183,11 +183,11 @@ class Missions(Service):
         return int(m.MAV_MISSION_ACCEPTED)
 
     def _go(self, sender: Sender, message: Any) -> int:
-        """Follow an item at once, as QGroundControl has ArduPilot go to a place; return MAV_MISSION_RESULT."""
+        """Execute a guided item at once, as of QGroundControl's go-to for ArduPilot; return MAV_MISSION_RESULT."""
         context, m = self.context, self.context.mavlink
         if message.command != m.MAV_CMD_NAV_WAYPOINT:
             return int(m.MAV_MISSION_UNSUPPORTED)
-        item = _as_it_came(message, m)
+        item = _received_item(message, m)
         x, y = (0.0, 0.0) if item is None else unscaled(item.frame, item.x, item.y)
         place = None if item is None else place_of(context, item.frame, x, y, item.z)
         if place is None:
@@ -197,8 +197,8 @@ class Missions(Service):
         accepted = self._targets.go(sender, place) == m.MAV_RESULT_ACCEPTED
         return int(m.MAV_MISSION_ACCEPTED if accepted else m.MAV_MISSION_DENIED)
 
-    def _taken(self, sender: Sender, items: list[ReceivedMissionItem], course: list[MissionItem]) -> int:
-        """Order a mission, and return MAV_MISSION_RESULT."""
+    def _submit_mission(self, sender: Sender, items: list[ReceivedMissionItem], course: list[MissionItem]) -> int:
+        """Submit a mission, and return MAV_MISSION_RESULT."""
         context, m = self.context, self.context.mavlink
         result = context.submit(SetMission(tuple(course)))
         if result == m.MAV_RESULT_ACCEPTED:
@@ -211,12 +211,12 @@ class Missions(Service):
         return int(m.MAV_MISSION_DENIED if result == m.MAV_RESULT_DENIED else m.MAV_MISSION_ERROR)
 
     def _acknowledged(self, sender: Sender, message: Any) -> None:
-        """MISSION_ACK: the end of a download, or of an upload that its sender breaks off."""
+        """MISSION_ACK: the end of a download, or of an upload that its sender cancels."""
         if self._upload is not None and self._upload.sender == sender:
             self._upload = None
 
     def tick(self) -> None:
-        """Ask again for an item that does not come, and give up in the end."""
+        """Request a missing item again each second; cancel the upload after five retries."""
         upload, context = self._upload, self.context
         if upload is None or context.now - upload.asked < _RETRY:
             return
@@ -236,11 +236,11 @@ class Missions(Service):
             self._ack(sender, m.MAV_MISSION_DENIED, kind)
         elif kind in (_OF_REGIONS, _ALL):
             self._upload = None
-            self._ack(sender, self._taken(sender, [], []), kind)
+            self._ack(sender, self._submit_mission(sender, [], []), kind)
         else:
             self._ack(sender, m.MAV_MISSION_ACCEPTED, kind)
 
-    # ---- where it is ----
+    # ---- current item ----
 
     def _begin(self, sender: Sender, seq: int | None, *more: Command) -> int:
         context, m = self.context, self.context.mavlink
@@ -267,12 +267,12 @@ class Missions(Service):
 
 
 def _scale(frame: int, mavlink: Any) -> float:
-    """Return what stands for a unit of a place in an item's integers."""
+    """Return the integer scale of an item's position in a frame: 1e7 per degree, 1e4 per metre, or 1."""
     return {mavlink.MAV_FRAME_LOCAL_NED: 1e4, mavlink.MAV_FRAME_MISSION: 1.0}.get(frame, 1e7)
 
 
-def _as_it_came(message: Any, mavlink: Any) -> ReceivedMissionItem | None:
-    """Return an item, or None if its place is no number that an item can hold."""
+def _received_item(message: Any, mavlink: Any) -> ReceivedMissionItem | None:
+    """Return a received item, or None if its position is not finite or exceeds the integer fields."""
     x, y = message.x, message.y
     if message.get_type() == "MISSION_ITEM":
         x, y = (whole(v * _scale(message.frame, mavlink)) for v in (x, y))

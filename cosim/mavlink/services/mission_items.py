@@ -1,4 +1,4 @@
-"""What an item of a mission means here: a region to be reached, for how long to stay, or something done at once."""
+"""Decode mission items: a region to reach, a time to stay, or a command executed at once."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from cosim.simulation.commands.commands import ChangeSetting, MissionItem, SetHe
 
 _LONGEST_STAY = 1e9  # s
 _LARGEST = 1e5  # m
-_MOST_JUMPS = 32767  # as ArduPilot has it
+_MOST_JUMPS = 32767  # as in ArduPilot
 
 
 class ItemError(Exception):
-    """An item that cannot be flown; its number is MAV_MISSION_RESULT."""
+    """Raised for an invalid item; `result` is its MAV_MISSION_RESULT."""
 
     def __init__(self, result: int, reason: str) -> None:
         super().__init__(reason)
@@ -31,32 +31,32 @@ class ItemError(Exception):
 def decode_mission_item(
     context: VehicleContext, item: ReceivedMissionItem, before: Sequence[MissionItem], count: int
 ) -> MissionItem:
-    """Return what an item asks for.
+    """Decode a received mission item.
 
-    NAV_WAYPOINT is a sphere about its place, of its acceptance radius (parameter 2), or for 0 the scenario's goal
-    region moved there; parameter 1 says for how long to stay. NAV_SPLINE_WAYPOINT is the goal region, without its
-    spline. NAV_LOITER_TIME and NAV_LOITER_UNLIM are that region, for a time and for good. NAV_LAND is a sphere at the
-    depth of surfacing above its place, or for 0, 0 above the place before; NAV_RETURN_TO_LAUNCH is the same at home.
-    Both are for good.
+    NAV_WAYPOINT is a sphere about its position, of its acceptance radius (parameter 2), or for 0 the scenario's goal
+    region moved there; parameter 1 is the time to stay. NAV_SPLINE_WAYPOINT is the goal region, without its spline.
+    NAV_LOITER_TIME and NAV_LOITER_UNLIM are that region, for a time and without end. NAV_LAND is a sphere at the
+    surfacing depth above its position, or for 0, 0 above the previous one; NAV_RETURN_TO_LAUNCH is the same at home.
+    Both are without end.
 
-    NAV_DELAY and CONDITION_DELAY stay for parameter 1 where the item before is. DO_CHANGE_SPEED is the law's speed, if
-    it has one, CONDITION_YAW a heading, and DO_JUMP another item, as often as it says.
+    NAV_DELAY and CONDITION_DELAY stay at the previous item for parameter 1. DO_CHANGE_SPEED sets the law's speed, if
+    it has one, CONDITION_YAW a heading, and DO_JUMP continues at another item, a given number of times.
 
     Parameters
     ----------
     context : VehicleContext
-        Where the globe's frame and home are.
+        The vehicle, with its global frame and home.
     item : ReceivedMissionItem
-        As it came.
+        Item to decode.
     before : sequence of MissionItem
-        What the items before it ask for.
+        Decoded previous items.
     count : int
         Items of the mission.
 
     Raises
     ------
     ItemError
-        If there is no such item here, or a number of it cannot be.
+        If the command is not supported, or a parameter is invalid.
     """
     m = context.mavlink
     settings = context.settings
@@ -79,9 +79,9 @@ def decode_mission_item(
         case m.MAV_CMD_NAV_DELAY | m.MAV_CMD_CONDITION_DELAY:
             return MissionItem(None, stay=_stay(context, item))
         case m.MAV_CMD_DO_CHANGE_SPEED:
-            return _another_speed(context, item)
+            return _change_speed(context, item)
         case m.MAV_CMD_CONDITION_YAW:
-            return _another_heading(context, item)
+            return _change_heading(context, item)
         case m.MAV_CMD_DO_JUMP:
             return _jump(context, item, count)
     entry = m.enums["MAV_CMD"].get(item.command)
@@ -89,7 +89,7 @@ def decode_mission_item(
     raise ItemError(m.MAV_MISSION_UNSUPPORTED, f"command {item.command}{name} is not known in a mission")
 
 
-def _another_speed(context: VehicleContext, item: ReceivedMissionItem) -> MissionItem:
+def _change_speed(context: VehicleContext, item: ReceivedMissionItem) -> MissionItem:
     m = context.mavlink
     before = getattr(context.settings.gains, "speed", math.nan)
     if math.isnan(before) and item.param2 != -1.0:
@@ -105,7 +105,7 @@ def _another_speed(context: VehicleContext, item: ReceivedMissionItem) -> Missio
     return MissionItem(None, commands=(ChangeSetting(SPEED, speed),))
 
 
-def _another_heading(context: VehicleContext, item: ReceivedMissionItem) -> MissionItem:
+def _change_heading(context: VehicleContext, item: ReceivedMissionItem) -> MissionItem:
     m = context.mavlink
     if item.param4 != 0.0 and not math.isnan(item.param4):
         raise ItemError(
@@ -158,7 +158,7 @@ def _acceptance(context: VehicleContext, item: ReceivedMissionItem) -> float | N
 
 
 def home_item(context: VehicleContext) -> ReceivedMissionItem:
-    """Return home as ArduPilot has it, the first item of every mission."""
+    """Return the home item, the first of every mission in ArduPilot's profile."""
     latitude, longitude, altitude = context.frame.to_global(context.home_ned())
     m = context.mavlink
     x, y = round(latitude * 1e7), round(longitude * 1e7)

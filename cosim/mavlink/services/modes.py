@@ -15,7 +15,7 @@ _MODES_BY_STANDARD: dict[int, Mode] = {number: mode for mode, number in STANDARD
 
 
 class Modes(Service):
-    """What changes who steers."""
+    """Commands that arm, disarm, restart, or change the mode."""
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
@@ -34,7 +34,7 @@ class Modes(Service):
             m.MAV_CMD_DO_PAUSE_CONTINUE: self._pause,
         }
 
-    def _give(self, sender: Sender, *commands: Command) -> int:
+    def _submit(self, sender: Sender, *commands: Command) -> int:
         result = self.context.submit(*commands)
         if result == self.context.mavlink.MAV_RESULT_ACCEPTED:
             self.context.operator.commanded(sender.system)
@@ -44,7 +44,7 @@ class Modes(Service):
         wanted = call[1]
         if wanted not in (0.0, 1.0):
             return int(self.context.mavlink.MAV_RESULT_DENIED)
-        return self._give(call.sender, Arm(wanted == 1.0))
+        return self._submit(call.sender, Arm(wanted == 1.0))
 
     def _set_mode(self, sender: Sender, message: Any) -> None:
         if is_custom(message.base_mode) and self.context.profile.is_return(message.custom_mode):
@@ -81,7 +81,7 @@ class Modes(Service):
         if mode == "mission" and not context.plan and context.accepts_commands:
             context.reject("there is no mission", "mission")
             return int(context.mavlink.MAV_RESULT_FAILED)
-        return self._give(sender, SetMode(mode))
+        return self._submit(sender, SetMode(mode))
 
     def _return_home(self, sender: Sender) -> int:
         north, east, _ = self.context.home_ned()
@@ -89,7 +89,7 @@ class Modes(Service):
         if not self.context.accepts_commands:
             return self.context.submit()
         depth, radius = settings["commands.surface_depth"], settings["commands.hold_radius"]
-        return self._give(sender, SetTarget((north, east, depth), radius))
+        return self._submit(sender, SetTarget((north, east, depth), radius))
 
     # ---- pause ----
 
@@ -115,7 +115,7 @@ class Modes(Service):
             self._paused_from = mode
         return self._steer(sender, "hold")
 
-    # ---- from the beginning ----
+    # ---- restart ----
 
     def _reboot(self, call: Call) -> int:
         m, context = self.context.mavlink, self.context
@@ -124,4 +124,4 @@ class Modes(Service):
         if context.armed and call[6] != _FORCE and context.accepts_commands:
             context.reject("armed: disarm before a restart", "restart")
             return int(m.MAV_RESULT_DENIED)
-        return self._give(call.sender, Reset())
+        return self._submit(call.sender, Reset())

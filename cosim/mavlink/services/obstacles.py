@@ -1,4 +1,4 @@
-"""Obstacles that others see: OBSTACLE_DISTANCE_3D."""
+"""Obstacles that other systems detect: OBSTACLE_DISTANCE_3D."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import AddObstacle, RemoveObstacle
 
-_UNMOVED = 0.05  # m: what moved less makes no command
-_FORGOTTEN = 5.0  # s of the wall clock without a word, after which another may take the place
+_UNMOVED = 0.05  # m, displacement below which no command is submitted
+_FORGOTTEN = 5.0  # s of the wall clock without a message, after which another obstacle may replace it
 _LOCAL_NED, _BODY_FRD, _LOCAL_FRD = 1, 12, 20
 _RADIUS = "commands.obstacle_radius"
 
 
 @dataclass
 class _Known:
-    """An obstacle that was commanded."""
+    """An obstacle that was added by a command."""
 
     position: Vector3  # m, NED
     radius: float  # m
-    heard: float  # s, of the wall clock
+    heard: float  # s, wall clock at its last message
 
 
 class Obstacles(Service):
-    """Each becomes a sphere to keep out of, about the point that is told.
+    """Add each obstacle as a sphere to keep out of, about the received point.
 
-    In LOCAL_FRD forward is where the vehicle looked at time 0.
+    In LOCAL_FRD forward is the vehicle's heading at time 0.
     """
 
     def __init__(self, context: VehicleContext) -> None:
@@ -79,7 +79,7 @@ class Obstacles(Service):
         return None
 
     def _has_room(self) -> bool:
-        """Return whether one more fits, once the one that was silent longest is forgotten if it may be."""
+        """Return True if one more fits; to make room, remove the obstacle silent for longest, if for over 5 s."""
         context = self.context
         if len(self._known) < context.scenario.commands.obstacles:
             return True

@@ -1,4 +1,4 @@
-"""The origin on the globe, and home."""
+"""The global origin, and home."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Origin(Service):
         return int(self.context.mavlink.MAV_RESULT_ACCEPTED)
 
     def _set_home(self, call: Call) -> int:
-        """DO_SET_HOME: home goes to another place at the surface."""
+        """DO_SET_HOME: move home to another position at the surface."""
         m, context = self.context.mavlink, self.context
         if not context.accepts_commands:
             return context.submit()

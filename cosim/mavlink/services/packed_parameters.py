@@ -1,4 +1,4 @@
-"""The packed parameter file of ArduPilot, ``@PARAM/param.pck``, and the hash by which PX4's stations know a list."""
+"""The packed parameter file of ArduPilot, ``@PARAM/param.pck``, and the hash of a list for PX4's stations."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from collections.abc import Mapping, Sequence
 
 _MAGIC = 0x671B
 _FLOAT = 4  # AP_PARAM_FLOAT
-_SHARED = 15  # characters of a name that can be taken from the one before
+_SHARED = 15  # most characters of a name shared with the previous one
 _ALL_ONES = 0xFFFFFFFF
 
 
 def packed(parameters: Sequence[tuple[str, float]], total: int) -> bytes:
-    """Return the file of some parameters.
+    """Encode parameters as a packed file.
 
-    Each is its type, the lengths of what its name shares with the one before and of what is new, the new part of the
-    name, and its value, little-endian; before them a magic number, how many they are, and how many there are.
+    Each has its type, the lengths of the prefix shared with the previous name and of the rest, the rest of the name,
+    and its value, little-endian. A header has a magic number, their number, and the number of all parameters.
 
     Parameters
     ----------
     parameters : sequence of (str, float)
         Names, all different, of up to sixteen characters, and values.
     total : int
-        Of all parameters.
+        Number of all parameters.
     """
     parts = [struct.pack("<HHH", _MAGIC, len(parameters), total)]
     before = ""
@@ -38,12 +38,12 @@ def packed(parameters: Sequence[tuple[str, float]], total: int) -> bytes:
 
 
 def bare_crc32(data: bytes, state: int = 0) -> int:
-    """Return the CRC-32 that begins with 0 and is not inverted at the end, as MAVLink's stations reckon it."""
+    """Return the CRC-32 with initial value 0 and without final inversion, as MAVLink's stations compute it."""
     return zlib.crc32(data, state ^ _ALL_ONES) ^ _ALL_ONES
 
 
 def hash_check(parameters: Mapping[str, float]) -> int:
-    """Return the hash of a list: over names and values, in the names' order."""
+    """Return the hash of a parameter list: CRC-32 over names and values, in the order of names."""
     state = 0
     for name in sorted(parameters):
         state = bare_crc32(name.encode("ascii"), state)

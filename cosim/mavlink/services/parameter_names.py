@@ -16,7 +16,7 @@ _PREFIXES = (
     ("plant.parameters.", "PLANT."),
     ("regions.", ""),
 )
-# for words that would otherwise lose their vowels; taken only where a name is too long
+# abbreviations, used only in names that are too long, before vowels are removed
 _SHORT = {
     "ACCELERATION": "ACCEL",
     "ATTITUDE": "ATT",
@@ -43,13 +43,13 @@ _AXES = {"0": "X", "1": "Y", "2": "Z"}
 def parameter_names(keys: Iterable[str]) -> dict[str, str]:
     """Return a name for each key: ``law.gains.k_p1`` is LAW_K_P1, ``regions.SR1.shape.radius`` SR1_RADIUS.
 
-    In what is too long the longest words are shortened one by one: by a table, then by their vowels, then from
-    their ends. A name that is taken ends in a number.
+    In names that are too long the longest words are shortened one by one: by a table, then by removing vowels, then
+    from their ends. A number at the end distinguishes equal names.
 
     Parameters
     ----------
     keys : iterable of str
-        Of settings.
+        Keys of settings.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def _words(key: str, known: list[str]) -> list[str]:
             text = short + text.removeprefix(prefix)
             break
     stem, _, last = key.rpartition(".")
-    if last in _AXES and f"{stem}.2" in known and f"{stem}.3" not in known:  # a vector in space
+    if last in _AXES and f"{stem}.2" in known and f"{stem}.3" not in known:  # component of a vector in space
         text = text.rpartition(".")[0] + "." + _AXES[last]
     return [word for word in re.split(r"[^A-Z0-9]+", text.upper()) if word] or ["P"]
 
@@ -93,6 +93,6 @@ def _fitted(words: list[str], longest: int = LONGEST) -> str:
             parts[at] = bare
         elif len(word) > 1 and not word.isdecimal():
             parts[at] = word[:-1]
-        else:  # more words than letters fit
+        else:  # too many words
             return "_".join(parts)[:longest]
     return "_".join(parts)

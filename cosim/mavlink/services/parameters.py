@@ -1,4 +1,4 @@
-"""Parameters: the live numbers of the scenario, by short names, and a few that stations expect."""
+"""Parameters: the live settings of the scenario, by short names, and a few that stations expect."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ _SLICE = 50  # values in each tick
 
 @dataclass(frozen=True)
 class _Own:
-    """A parameter that is no setting of the scenario."""
+    """A parameter that is not a setting of the scenario."""
 
     read: Callable[[], float]
-    write: Callable[[float], str | None] | None = None  # returns what was expected, if the value cannot be
+    write: Callable[[float], str | None] | None = None  # returns the expected range for an invalid value
 
 
 class Parameters(Service):
     """PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET; all parameters are REAL32.
 
-    The list goes out in slices, one in each tick and once at a time on a link: who asks while it is under way has it go
-    round once more from there. It waits where a link has no room, so that on a slow line none is lost, and on any line
-    who asks again and again takes nothing from others.
+    The list is sent in slices, one per tick, and at most once at a time on a link: a request while it is under way
+    restarts the count from the present parameter. It pauses while a link has no room, so that a slow line loses none,
+    and repeated requests do not displace other messages.
     """
 
     def __init__(self, context: VehicleContext) -> None:
@@ -52,7 +52,7 @@ class Parameters(Service):
         self._own = self._make_own()
         self.names = sorted({*self._key_of, *self._own})
         self._index = {name: i for i, name in enumerate(self.names)}
-        self._bursts: dict[MessageSink, tuple[int, int]] = {}  # where it is, and how many are left
+        self._bursts: dict[MessageSink, tuple[int, int]] = {}  # next index, and number left, by link
         self.restart()
 
     def _make_own(self) -> dict[str, _Own]:
@@ -78,27 +78,27 @@ class Parameters(Service):
         return None
 
     def restart(self) -> None:
-        """Take the numbers as the vehicle's settings have them."""
+        """Reset the values to the vehicle's settings."""
         self._values = {setting.key: setting.value for setting in self.context.settings}
 
-    # ---- what others use ----
+    # ---- for other services ----
 
     def value(self, name: str) -> float:
-        """Return a parameter's value, as a float32 can hold it."""
+        """Return a parameter's value, limited to the range of float32."""
         own = self._own.get(name)
         value = self._values[self._key_of[name]] if own is None else own.read()
         return float32(value)
 
     def all(self) -> list[tuple[str, float]]:
-        """Return names and values, in the order of the list."""
+        """Return names and values of all parameters, in the order of the list."""
         return [(name, self.value(name)) for name in self.names]
 
     def has(self, key: str) -> bool:
-        """Return whether there is a setting of a key."""
+        """Return True if there is a setting with a key."""
         return key in self._values
 
     def change(self, key: str, value: float) -> int:
-        """Order another value of a setting, and return MAV_RESULT; a value that cannot be is denied with the reason."""
+        """Submit a new value of a setting, and return MAV_RESULT; an invalid value is denied with the reason."""
         context, before = self.context, self._values[key]
         if not context.accepts_commands:
             return context.submit()
@@ -115,7 +115,7 @@ class Parameters(Service):
         return result
 
     def learn(self, key: str, value: float) -> None:
-        """Note another value of a setting, that a mission brought about."""
+        """Record the value of a setting that a mission has changed."""
         with contextlib.suppress(CommandError):  # as the command handler does, which logs it
             self.context.settings.change(key, value)
             self._values[key] = value
@@ -159,7 +159,7 @@ class Parameters(Service):
             m.MAVLink_param_value_message(_HASH.encode(), bits, m.MAV_PARAM_TYPE_UINT32, len(self.names), _NO_INDEX)
         )
 
-    # ---- one ----
+    # ---- single parameters ----
 
     def _read(self, sender: Sender, message: Any) -> None:
         m, index, name = self.context.mavlink, message.param_index, message.param_id
@@ -185,13 +185,13 @@ class Parameters(Service):
         if name not in self._index:
             self._refuse(sender, name, -1, m.MAV_PARAM_ERROR_DOES_NOT_EXIST)
             return
-        error = self._taken(name, value, message.param_type)
+        error = self._write(name, value, message.param_type)
         if error != m.MAV_PARAM_ERROR_NO_ERROR:
             self._refuse(sender, name, self._index[name], error)
         self._send_value(sender.link, name)
 
-    def _taken(self, name: str, value: float, kind: int) -> int:
-        """Take a value, and return MAV_PARAM_ERROR."""
+    def _write(self, name: str, value: float, kind: int) -> int:
+        """Write a value, and return MAV_PARAM_ERROR."""
         m, context = self.context.mavlink, self.context
         own = self._own.get(name)
         if own is not None and own.write is None:

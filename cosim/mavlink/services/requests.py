@@ -22,7 +22,7 @@ class Requests(Service):
     Parameters
     ----------
     context : VehicleContext
-        Whom it serves.
+        The vehicle.
     streams : mapping of MessageSink to Streams
         The schedule of each link.
     """
@@ -60,7 +60,7 @@ class Requests(Service):
         return int(m.MAV_RESULT_ACCEPTED if interval else m.MAV_RESULT_FAILED)
 
     def _message(self, call: Call) -> int:
-        """REQUEST_MESSAGE: any of the table; parameter 2 says which of several. As ArduPilot, others fail."""
+        """REQUEST_MESSAGE: any message of the table; parameter 2 is a mode's index. Others fail, as in ArduPilot."""
         m, context, link = self.context.mavlink, self.context, call.sender.link
         message_id = call.whole(1)
         spec = None if message_id is None else MESSAGES.get(message_id)
@@ -96,7 +96,7 @@ class Requests(Service):
 
 
 def banner(context: VehicleContext) -> list[str]:
-    """Return who this is, line by line: a simulation, whatever autopilot it shows itself as."""
+    """Return the lines of the banner: simulation and profile, vehicle, scenario, and restrictions."""
     scenario = context.scenario
     lines = [f"subreach co-simulation, profile {context.profile.name}", f"Vehicle {scenario.vehicle.name}"]
     lines.append(f"Scenario {scenario.name}, law {scenario.law.name}")

@@ -1,4 +1,4 @@
-"""What a micro-service is: the messages and the commands that it handles, and what it does as time goes on."""
+"""The base of a micro-service: handlers of messages and commands, and periodic work."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _LOCAL_NED = 1
 
 @dataclass(frozen=True)
 class Call:
-    """A command, whichever message it came in.
+    """A command of a COMMAND_LONG or COMMAND_INT.
 
     Attributes
     ----------
     numbers : tuple of float
-        Parameters 1 to 7; those that a client leaves out are NaN, or 0.
+        Parameters 1 to 7; clients fill unused ones with NaN or 0.
     frame : int
-        MAV_FRAME of 5 to 7; global, where the message does not say.
+        MAV_FRAME of parameters 5 to 7; global for COMMAND_LONG.
     """
 
     sender: Sender
@@ -41,7 +41,7 @@ class Call:
         return self.numbers[i - 1]
 
     def whole(self, i: int) -> int | None:
-        """Return parameter `i`, from 1, as an integer, or None if it is no finite number."""
+        """Return parameter `i`, from 1, as an integer, or None if it is not finite."""
         return whole(self.numbers[i - 1])
 
 
@@ -54,14 +54,14 @@ class Service:
     Parameters
     ----------
     context : VehicleContext
-        Whom it serves.
+        The vehicle.
 
     Attributes
     ----------
     messages : mapping of str to callable
-        What it does with the messages of a name.
+        Handlers by the name of the message.
     commands : mapping of int to callable
-        What it does for a MAV_CMD.
+        Handlers by MAV_CMD.
     """
 
     messages: Mapping[str, Handler]
@@ -73,31 +73,31 @@ class Service:
         self.commands = {}
 
     def tick(self) -> None:
-        """Do what goes by the wall clock, `context.now`."""
+        """Run periodic work at wall clock `context.now`."""
 
     def on_snapshot(self) -> None:
-        """Do what a new snapshot asks for."""
+        """Handle a new snapshot."""
 
     def restart(self) -> None:
-        """Forget what belongs to a run, as at its beginning."""
+        """Reset the state that belongs to a run."""
 
 
 def place_of(context: VehicleContext, frame: int, x: float, y: float, z: float) -> Vector3 | None:
-    """Return a place that a station names as a position [m, NED]; NaN where it is not finite.
+    """Convert a received position to the local frame [m, NED]; NaN where it is not finite.
 
     Parameters
     ----------
     context : VehicleContext
-        Where the globe's frame is.
+        The vehicle, with its global frame.
     frame : int
         MAV_FRAME.
     x, y, z : float
-        Latitude and longitude [deg] and altitude [m], over the sea or over home; or north, east, down [m].
+        Latitude and longitude [deg] and altitude [m], above sea level or above home; or north, east, down [m].
 
     Returns
     -------
     tuple of float or None
-        None for a frame that is not known here.
+        Position [m, NED]; None for an unsupported frame.
     """
     if frame == _LOCAL_NED:
         position = x, y, z
@@ -113,6 +113,6 @@ def place_of(context: VehicleContext, frame: int, x: float, y: float, z: float) 
 
 
 def unscaled(frame: int, x: int, y: int) -> tuple[float, float]:
-    """Return the integers of a place as degrees, or as metres in a local frame."""
+    """Convert the integers of a position to degrees, or to metres in a local frame."""
     scale = _E4 if frame == _LOCAL_NED else _E7
     return x * scale, y * scale

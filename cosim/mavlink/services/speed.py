@@ -1,4 +1,4 @@
-"""DO_CHANGE_SPEED, as a command and as an item of a mission: which speeds there are."""
+"""Validate the speed of DO_CHANGE_SPEED, as a command and as a mission item."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from plant_fmu import Vehicle
 
 SPEED = "law.gains.speed"  # key of the setting
 
-_AS_IT_IS, _AS_AT_FIRST = -1.0, -2.0  # as the protocol has them
+_AS_IT_IS, _AS_AT_FIRST = -1.0, -2.0  # special values of the protocol
 
 
 def resolve_speed(context: VehicleContext, speed: float) -> float | None:
-    """Return the speed [m/s] that a change of speed asks for, or None where it is to stay as it is.
+    """Return the speed [m/s] that a change of speed commands, or None for no change.
 
     Parameters
     ----------
     context : VehicleContext
-        Whose law has a speed.
+        The vehicle, whose law has a speed.
     speed : float
         Parameter 2: -1 for no change, -2 for the scenario's, else [m/s].
 
     Raises
     ------
     CommandError
-        If the vehicle cannot go at that speed.
+        If the vehicle cannot reach that speed.
     """
     if speed == _AS_IT_IS:
         return None
@@ -40,12 +40,12 @@ def resolve_speed(context: VehicleContext, speed: float) -> float | None:
 
 
 def terminal_speed(vehicle: Vehicle) -> float:
-    """Return the speed through still water at which drag takes all thrust, along the best of the body's axes [m/s].
+    """Return the greatest speed in still water at full thrust along a body axis, where drag equals thrust [m/s].
 
     Parameters
     ----------
     vehicle : Vehicle
-        Its thrusters' limits and damping count. Infinite where an axis has no damping.
+        Vehicle with thruster limits and damping; without damping of an axis the speed is infinite.
     """
     thrust = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)[:3].tolist()
     speeds = []

@@ -1,7 +1,7 @@
-"""Parameters that ground stations look for by name: what of an autopilot's there is, and what there is not.
+"""Read-only parameters that ground stations read by name.
 
-QGroundControl asks for them as it connects and as it shows its summary of a vehicle. One that is missing makes it say
-that the firmware has a bug; a sensor that looks uncalibrated, that the vehicle needs to be set up.
+QGroundControl reads them when it connects and in its summary of a vehicle. It reports a missing one as a bug of the
+firmware, and a sensor without calibration as a vehicle that needs setup.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ _ON_LOSS: dict[LossAction, float] = {
 
 
 def station_parameters(context: VehicleContext) -> dict[str, Callable[[], float]]:
-    """Return what can be read, by name, in the vehicle's profile; none of it can be set.
+    """Return functions that read the read-only parameters of the vehicle's profile, by name.
 
     Parameters
     ----------
     context : VehicleContext
-        Whose profile and vehicle it is.
+        The vehicle, with its profile.
     """
     match context.profile.name:
         case "ardusub":
@@ -66,7 +66,7 @@ def _of_ardusub(context: VehicleContext) -> dict[str, float]:
         **{f"COMPASS_OFS{i}_{axis}": 0.0 for i in numbers for axis in "XYZ"},
         "COMPASS_DEC": 0.0,
         "BATT_MONITOR": 0.0,
-        # nor is there what would see these fail
+        # these failures are not detected
         "FS_EKF_ACTION": 0.0,
         "FS_LEAK_ENABLE": 0.0,
         "FS_OPTIONS": 0.0,
@@ -86,7 +86,7 @@ def _of_px4(context: VehicleContext) -> dict[str, float]:
         "SYS_HAS_MAG": 0.0,
         **{f"CAL_MAG{i}_ID": 0.0 for i in range(3)},
         "COM_LOW_BAT_ACT": 0.0,
-        # sticks come by MAVLink alone, and choose no modes
+        # sticks come only by MAVLink, and select no modes
         "COM_RC_IN_MODE": _JOYSTICK_ALONE,
         "COM_RC_LOSS_T": _STICKS_LAST,
         "NAV_RCL_ACT": 0.0,

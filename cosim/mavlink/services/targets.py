@@ -1,4 +1,4 @@
-"""Set-points: where the target region goes."""
+"""Set-points: commands that move the target region."""
 
 from __future__ import annotations
 
@@ -16,33 +16,33 @@ from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import Command, SetHeading, SetMode, SetTarget
 
-_X_Y, _Z = 0b011, 0b100  # type_mask: what is ignored
+_X_Y, _Z = 0b011, 0b100  # type_mask: bits of ignored fields
 _VELOCITY, _ACCELERATION, _FORCE, _YAW, _YAW_RATE = 0b111000, 0b111 << 6, 1 << 9, 1 << 10, 1 << 11
 _LOCAL, _OFFSET, _BODY, _BODY_OFFSET, _BODY_FRD = 1, 7, 8, 9, 12
 _FROM_HERE = (_OFFSET, _BODY, _BODY_OFFSET, _BODY_FRD)
 _TURNED = (_BODY, _BODY_OFFSET, _BODY_FRD)
-_ANEW = 1.0  # s of silence, after which the same way from here is another one
-_EARLY = 1.0  # s, for which a set-point that came before its mode may be followed once that mode is on
-_PATIENCE = 3.0  # s of set-points in another mode, after which that is worth a word
-_VELOCITY_LASTS = 3.0  # s without another set-point, after which a velocity ends, as ArduSub has it
+_ANEW = 1.0  # s without set-points, after which an equal relative set-point is a new one
+_EARLY = 1.0  # s, for which a set-point received before its mode is kept
+_PATIENCE = 3.0  # s of set-points in another mode, after which a status text is sent
+_VELOCITY_LASTS = 3.0  # s without another set-point, after which a velocity ends, as in ArduSub
 _SAME_SPEED = 0.01  # m/s
 _WARNING_PERIOD = 2.0  # s
 
 
 class Targets(Service):
-    """SET_POSITION_TARGET_*, and the commands that move, turn and pace the vehicle.
+    """SET_POSITION_TARGET_*, and commands of position, heading and speed.
 
-    Set-points are followed while the region is to be reached, as ArduSub follows them in GUIDED alone. One that comes
-    before that mode, as PX4's stations send it, waits for it. One that says what the last one said makes no command,
-    unless it is a way from here and none came for a second: QGroundControl's change of depth, made twice. A velocity
-    without a position is a sphere about the vehicle that travels; it ends when no set-point comes for three seconds.
+    Set-points apply only in mode ``reach``, as in ArduSub only in GUIDED. A set-point received before that mode, as
+    PX4's stations send it, is kept for 1 s. A repeated set-point makes no command, unless it is relative and follows
+    1 s of silence: QGroundControl's change of depth, made twice. A velocity without a position moves a sphere about
+    the vehicle; it ends after 3 s without a set-point.
 
     Parameters
     ----------
     context : VehicleContext
-        Whom it serves.
+        The vehicle.
     parameters : Parameters
-        Through which the speed is set.
+        Service that sets the speed.
     """
 
     def __init__(self, context: VehicleContext, parameters: Parameters) -> None:
@@ -51,12 +51,11 @@ class Targets(Service):
         m = context.mavlink
         self._last: tuple[object, ...] = ()
         self._last_at = -math.inf
-        self._drifting: Vector3 | None = None  # the velocity [m/s, NED] that a set-point without a position asked for
-        self._early: tuple[float, float, Callable[[], None]] | None = None  # the first, the last, and what it asks for
+        self._drifting: Vector3 | None = None  # velocity [m/s, NED] of a set-point without a position
+        self._early: tuple[float, float, Callable[[], None]] | None = None  # times of first and last, action
         self.messages = {
             "SET_POSITION_TARGET_LOCAL_NED": self._local,
             "SET_POSITION_TARGET_GLOBAL_INT": self._global,
-            "SET_ATTITUDE_TARGET": self._attitude,
         }
         self.commands = {
             m.MAV_CMD_DO_REPOSITION: self._reposition,
@@ -65,7 +64,7 @@ class Targets(Service):
         }
 
     def on_snapshot(self) -> None:
-        """Forget the last set-point once another mode is on, and follow one that came before its mode."""
+        """Clear the last set-point in another mode; apply one that was received before its mode."""
         context, early = self.context, self._early
         if context.mode_ahead != "reach":
             self._last, self._drifting = (), None
@@ -75,7 +74,7 @@ class Targets(Service):
                 early[2]()
 
     def tick(self) -> None:
-        """End a velocity that is not sent any more, and say of set-points that wait for their mode."""
+        """End a velocity after 3 s without set-points; report set-points that wait for their mode."""
         context, early = self.context, self._early
         if self._drifting is not None and context.now - self._last_at >= _VELOCITY_LASTS:
             moving, self._drifting, self._last = any(self._drifting), None, ()
@@ -91,7 +90,7 @@ class Targets(Service):
             context.say(text, context.mavlink.MAV_SEVERITY_NOTICE, "early", 10.0)
 
     def restart(self) -> None:
-        """Forget the last set-point."""
+        """Clear the last set-point."""
         self._last, self._drifting, self._early = (), None, None
 
     # ---- set-points ----
@@ -116,14 +115,14 @@ class Targets(Service):
         self._set_point(sender, message, frame, place, (message.lat_int, message.lon_int, message.alt))
 
     def _from_local(self, frame: int, raw: Vector3) -> Vector3:
-        """Return a position [m, NED]; the body's frames lie level, and are turned by yaw alone, as ArduPilot's."""
+        """Return a position [m, NED]; body frames are level, rotated only by yaw, as in ArduPilot."""
         if frame == _LOCAL:
             return raw
-        north, east, down = self._levelled(frame, raw)
+        north, east, down = self._rotate_by_heading(frame, raw)
         x, y, z = self.context.view.position_ned
         return x + north, y + east, z + down
 
-    def _levelled(self, frame: int, vector: Vector3) -> Vector3:
+    def _rotate_by_heading(self, frame: int, vector: Vector3) -> Vector3:
         if frame not in (_BODY, _BODY_OFFSET, _BODY_FRD):
             return vector
         yaw = self.context.view.heading
@@ -149,12 +148,12 @@ class Targets(Service):
         self._follow(message, frame, place, raw)
 
     def _follow(self, message: Any, frame: int, place: Vector3, raw: Vector3) -> None:
-        """Follow a set-point, unless the last one said the same."""
+        """Apply a set-point, unless it equals the last one."""
         context, mask = self.context, message.type_mask
         going = (0.0, 0.0, 0.0) if mask & _VELOCITY else (message.vx, message.vy, message.vz)
         yaw = None if mask & _YAW or not math.isfinite(message.yaw) else message.yaw
         since, self._last_at = context.now - self._last_at, context.now
-        velocity = self._levelled(frame, going)
+        velocity = self._rotate_by_heading(frame, going)
         commands: list[Command] = []
         if mask & _X_Y and mask & _Z:
             said: tuple[object, ...] = ("velocity", yaw)
@@ -176,20 +175,15 @@ class Targets(Service):
             if self._drifting is None:
                 self.warn_of(place)
 
-    def _attitude(self, sender: Sender, message: Any) -> None:
-        self.context.reject(
-            "attitude set-points: the law keeps the attitude; CONDITION_YAW turns the vehicle", "attitude"
-        )
-
     def warn_of(self, place: Vector3, of: str = "target") -> None:
-        """Say what stands against a target, which is followed all the same.
+        """Send a warning for each objection to a target, which is accepted nevertheless.
 
         Parameters
         ----------
         place : tuple of float
-            Its middle [m, NED].
+            Its center [m, NED].
         of : str
-            What is placed there.
+            Its name in the text.
         """
         context = self.context
         for words in self._keep_in.objections(place, context.view, context.settings):
@@ -218,14 +212,14 @@ class Targets(Service):
         return self.go(call.sender, place, call[4])
 
     def go(self, sender: Sender, place: Vector3, yaw: float = math.nan) -> int:
-        """Move the target region, and reach it; without any place, hold this one: so QGroundControl pauses PX4.
+        """Move the target region, and reach it; without a finite coordinate, hold, as QGroundControl pauses PX4.
 
         Parameters
         ----------
         sender : Sender
-            Who wants it.
+            Sender of the command.
         place : tuple of float
-            Its middle [m, NED]; what is not finite stays as it is.
+            Its center [m, NED]; a coordinate that is not finite stays at the vehicle's.
         yaw : float
             Heading [rad]; NaN for none.
 
@@ -275,7 +269,7 @@ class Targets(Service):
 
 
 def _fault(message: Any) -> str:
-    """Return what of a set-point cannot be followed, in words; empty where all can."""
+    """Return the reason why a set-point is unsupported, in words; empty if it is supported."""
     mask = message.type_mask
     position, velocity, acceleration = mask & (_X_Y | _Z), mask & _VELOCITY, mask & _ACCELERATION
     if mask & _FORCE and acceleration != _ACCELERATION:  # QGroundControl sets all bits but those

@@ -11,13 +11,13 @@ _NANO = 1000  # ns in a µs
 
 
 class Timing(Service):
-    """Answers with the time since boot."""
+    """Answer TIMESYNC with the time since boot, and PING."""
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
-        self.messages = {"TIMESYNC": self._synchronise, "PING": self._ping}
+        self.messages = {"TIMESYNC": self._synchronize, "PING": self._ping}
 
-    def _synchronise(self, sender: Sender, message: Any) -> None:
+    def _synchronize(self, sender: Sender, message: Any) -> None:
         if message.tc1 == 0:
             boot = max(1, self.context.view.boot_us * _NANO)  # 0 would be a request
             sender.link.send(self.context.make("TIMESYNC", boot, message.ts1))

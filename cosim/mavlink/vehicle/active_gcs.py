@@ -1,18 +1,18 @@
-"""Whose set-points and sticks count, and whose silence matters."""
+"""The active ground station: whose set-points and sticks apply, and whose silence triggers the failsafe."""
 
 from __future__ import annotations
 
-_KEEPS = 3.0  # s of silence, after which another system may take over
-_KNOWN = 64  # systems whose heartbeats are remembered
+_KEEPS = 3.0  # s without commands, after which another system may take over
+_KNOWN = 64  # systems whose heartbeats are kept
 
 
 class ActiveGcs:
-    """Who has the vehicle in hand: the first that comes keeps it until it is silent.
+    """The system that steers: the first to send set-points or sticks keeps control until it is silent for 3 s.
 
     Attributes
     ----------
     commander : int or None
-        System id whose command was heeded last: the one whose loss matters.
+        System id of the last accepted command, whose loss triggers the failsafe.
     """
 
     def __init__(self) -> None:
@@ -21,7 +21,7 @@ class ActiveGcs:
         self._beats: dict[int, float] = {}
 
     def may_steer(self, system: int, now: float) -> bool:
-        """Return whether set-points or sticks of a system count, and keep the vehicle for it if so.
+        """Return True if set-points or sticks of a system apply, and give it control if so.
 
         Parameters
         ----------
@@ -39,18 +39,18 @@ class ActiveGcs:
         return True
 
     def commanded(self, system: int) -> None:
-        """Note that a command of a system was heeded."""
+        """Record the system of an accepted command."""
         self.commander = system
 
     def beat(self, system: int, now: float) -> None:
-        """Note a heartbeat of a system."""
+        """Record a heartbeat of a system."""
         if system not in self._beats and len(self._beats) >= _KNOWN:
             others = [known for known in self._beats if known != self.commander]
             del self._beats[min(others, key=lambda known: self._beats[known])]
         self._beats[system] = now
 
     def silence(self, now: float) -> float:
-        """Return for how long the commanding system has sent no heartbeat [s]; 0 if it never sent one."""
+        """Return the time since the commanding system's last heartbeat [s]; 0 if it never sent one."""
         if self.commander is None or self.commander not in self._beats:
             return 0.0
         return now - self._beats[self.commander]

@@ -1,4 +1,4 @@
-"""What can be said of the watch over the ground station, numbered as ArduSub's parameters have it."""
+"""Values of the ground station failsafe's settings, as in ArduSub's parameters."""
 
 from __future__ import annotations
 

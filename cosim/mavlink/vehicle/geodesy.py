@@ -1,4 +1,4 @@
-"""Between the local frame and the globe: a plane that touches the ellipsoid WGS84 at an origin."""
+"""Conversion between local and global positions, by the plane tangent to the WGS84 ellipsoid at an origin."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from cosim.scenario.tables import Vector3
 
 _SEMI_MAJOR = 6_378_137.0  # m, WGS84
 _ECCENTRICITY_SQUARED = 6.69437999014e-3
-_LEAST_COSINE = 1e-6  # at the poles east has no direction; there longitudes are kept finite
+_LEAST_COSINE = 1e-6  # keeps longitudes finite at the poles
 
 
 class LocalFrame:
@@ -17,9 +17,9 @@ class LocalFrame:
     Parameters
     ----------
     latitude, longitude : float
-        Of position 0 [deg].
+        Latitude and longitude of the origin [deg].
     altitude : float
-        Of position 0 above the ellipsoid [m].
+        Altitude of the origin above the ellipsoid [m].
     """
 
     def __init__(self, latitude: float, longitude: float, altitude: float = 0.0) -> None:

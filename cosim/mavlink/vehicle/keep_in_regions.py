@@ -1,4 +1,4 @@
-"""Whether a target lies where the vehicle may be: below the surface, and in the regions that it is to stay in."""
+"""Check that a target is below the surface and in the regions that the vehicle must stay in."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 class KeepInRegions:
-    """The regions in space that a vehicle is to stay in.
+    """The regions in space that a vehicle must stay in.
 
-    Making one loads the library that evaluates them, which may take seconds: not to be done beside a simulation.
+    The constructor loads the library that evaluates them, which may take seconds: call it before the simulation.
 
     Parameters
     ----------
     scenario : Scenario
-        Which regions.
+        Scenario with the regions.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -35,16 +35,16 @@ class KeepInRegions:
         self._clearances_at((0.0, 0.0, 0.0), {}, [])
 
     def objections(self, position_ned: Vector3, view: View, settings: LiveSettings) -> list[str]:
-        """Return what stands against a target, in words; nothing for one that is well placed.
+        """Return a text for each violated region of a target, and for one above the surface.
 
         Parameters
         ----------
         position_ned : tuple of float
-            Its middle [m].
+            Center of the target [m].
         view : View
-            Where moving regions are.
+            Snapshot with the positions of moving regions.
         settings : LiveSettings
-            The present shapes.
+            Settings with the present shapes.
         """
         shifts = [view.shift(region.name) for region in self._regions]
         clearances = self._clearances_at(position_ned, settings.shapes, shifts)

@@ -1,4 +1,4 @@
-"""Where in a row of the run the quantities are, and the row before there is one."""
+"""Column indices of the quantities in a row of the run, and the initial row."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from cosim.simulation.signals import Array, Column
 
 
 class Layout:
-    """Where in a row the quantities are.
+    """Column indices of the quantities in a row.
 
     Parameters
     ----------
     scenario : Scenario
-        Of the run.
+        Scenario of the run.
     columns : sequence of Column
-        Of its rows.
+        Columns of its rows.
     """
 
     def __init__(self, scenario: Scenario, columns: Sequence[Column]) -> None:
@@ -38,12 +38,12 @@ class Layout:
         )
 
     def first_row(self, scenario: Scenario) -> Array:
-        """Return the row before the first step: the vehicle as the scenario has it at time 0, and nothing else known.
+        """Return the row before the first step: the vehicle's initial state, 0 in other columns.
 
         Parameters
         ----------
         scenario : Scenario
-            Of the run.
+            Scenario of the run.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""One item of a mission, as it came."""
+"""A mission item as received."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names of the modes that vehicles of other makers show in their heartbeat."""
+"""Names of modes by the heartbeat of any autopilot."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def mode_name(heartbeat: Any, names: Mapping[int, str]) -> str:
     heartbeat : Any
         Its HEARTBEAT.
     names : mapping of int to str
-        Names that the vehicle sent, by their custom mode; these come first.
+        Names that the vehicle sent, by custom mode; they take precedence.
 
     Returns
     -------
     str
-        The custom mode's number where no name is known.
+        Name of the mode, or the custom mode's number if unknown.
     """
     number = heartbeat.custom_mode
     if names.get(number):

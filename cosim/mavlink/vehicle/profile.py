@@ -1,4 +1,4 @@
-"""Profiles: as which autopilot the vehicle shows itself, and how its modes are numbered there."""
+"""Profiles: the autopilot that the vehicle imitates, with the numbers of its modes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MODE_NAMES: dict[Mode, str] = {
     "depth_hold": "Depth hold",
 }
 
-# MAV_STANDARD_MODE, for the modes that are like one
+# MAV_STANDARD_MODE of the modes; 0 for none
 STANDARD_MODES: dict[Mode, int] = {
     "manual": 0,
     "hold": 1,
@@ -40,7 +40,7 @@ _BASE_MODES: dict[Mode, int] = {
     "stabilize": 81,
     "depth_hold": 81,
 }
-# ArduSub's, of which each mode is stabilised and has manual input
+# ArduSub's: each mode has the stabilized and manual input bits
 _BASE_MODES_OF_ARDUSUB: dict[Mode, int] = {
     "manual": 81,
     "hold": 89,
@@ -65,15 +65,15 @@ class Profile:
     numbers : dict of str to int
         ``custom_mode`` of each mode.
     packed : bool
-        Whether a mode's number is PX4's: main mode shifted by 16 bits, sub-mode by 24.
+        True if a mode's number is PX4's: main mode shifted by 16 bits, sub-mode by 24.
     centred_stick : int
-        Where the vertical stick of MANUAL_CONTROL rests.
+        Value of MANUAL_CONTROL's vertical stick at rest.
     full_tilt_stick : int
-        What the sticks of roll and pitch of MANUAL_CONTROL, its extensions, ask all with.
+        Value of MANUAL_CONTROL's roll and pitch extensions at full deflection.
     home_is_first : bool
-        Whether item 0 of a mission is home, as ArduPilot has it.
+        True if item 0 of a mission is home, as in ArduPilot.
     stands_for : tuple of int or None
-        Release of the autopilot whose ways these are; None where it stands for itself.
+        Release of the imitated autopilot, or None.
     """
 
     name: ProfileName
@@ -90,14 +90,14 @@ class Profile:
         return next((mode for mode in MODES if self.numbers[mode] == number), None)
 
     def mode_of_command(self, first: int, second: int) -> Mode | None:
-        """Return the mode that MAV_CMD_DO_SET_MODE asks for, or None if there is none.
+        """Return the mode that MAV_CMD_DO_SET_MODE selects, or None if there is none.
 
         Parameters
         ----------
         first, second : int
-            Its parameters 2 and 3. PX4's encoding has main mode and sub-mode there; ArduPilot's the number alone. A
-            number of ArduSub is none of PX4's main modes with a sub-mode 0 that means another of the modes here, but
-            for 1 and 7, ACRO and CIRCLE there, MANUAL and STABILIZED here, which sticks steer.
+            Its parameters 2 and 3: main mode and sub-mode of PX4, or ArduPilot's number. With sub-mode 0 a number of
+            ArduSub is no other mode of PX4 here, except 1 and 7: ACRO and CIRCLE in ArduSub, MANUAL and STABILIZED
+            in PX4.
         """
         if not self.packed:
             return self.mode_of(first)
@@ -106,17 +106,17 @@ class Profile:
         return self.mode_of(_px4(first, second))
 
     def is_return(self, number: int) -> bool:
-        """Return whether a ``custom_mode`` is PX4's return: no mode here, but a command to surface at home."""
+        """Return True if a ``custom_mode`` is PX4's return, which is no mode here but a command to surface at home."""
         return self.packed and number == _RETURN
 
     def base_mode(self, mode: Mode, armed: bool) -> int:
-        """Return MAV_MODE_FLAG bits: custom mode always, then who steers, and whether the thrusters may work."""
+        """Return MAV_MODE_FLAG bits: custom mode, the bits of the mode, and armed."""
         modes = _BASE_MODES_OF_ARDUSUB if self.name == "ardusub" else _BASE_MODES
         return modes[mode] | (_ARMED if armed else 0)
 
 
 def is_custom(base_mode: int) -> bool:
-    """Return whether a base mode says that the custom mode counts."""
+    """Return True if a base mode has the custom mode bit."""
     return bool(base_mode & _CUSTOM)
 
 

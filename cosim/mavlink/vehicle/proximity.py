@@ -1,4 +1,4 @@
-"""What is near the vehicle: regions that stand for obstacles, where they are now, and a level scan of them."""
+"""Proximity sensing: present positions of the regions that are obstacles, and a level scan of them."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from cosim.simulation.commands.settings import LiveSettings
 
 SECTORS = 72
 REACH = 20.0  # m
-_RAYS = 3  # in each sector, so that at the end of its reach nothing wider than 0.6 m slips through
+_RAYS = 3  # in each sector: at full range the scan detects anything wider than 0.6 m
 _AT_REST = (0.0, 0.0, 0.0)
 
 
 class Proximity:
-    """Obstacles, packed once; only what changed is written anew.
+    """Obstacles, packed once; an update writes only changes.
 
-    Making one loads the libraries that it uses, which may take seconds: not to be done beside a running simulation.
+    The constructor loads libraries, which may take seconds: call it before the simulation.
 
     Parameters
     ----------
     scenario : Scenario
-        Which regions; of those to be kept out of for the criterion ``obstacle``, the ones in space stand for obstacles.
+        Scenario whose regions in space to keep out of, of the criterion ``obstacle``, are the obstacles.
 
     Attributes
     ----------
@@ -41,14 +41,14 @@ class Proximity:
     def __init__(self, scenario: Scenario) -> None:
         every = [(i, secondary) for i, secondary in enumerate(scenario.regions, 1) if _is_obstacle(secondary)]
         self.ids = tuple(i for i, _ in every)
-        self._seen = tuple(secondary.is_dynamic for _, secondary in every)
+        self._dynamic = tuple(secondary.is_dynamic for _, secondary in every)
         self._names = tuple(secondary.region.name for _, secondary in every)
         self._shapes: list[Shape] = [secondary.region.shape for _, secondary in every]
         self._shifts: list[Vector3] = [_AT_REST] * len(every)
         self._regions = pack([secondary.region for _, secondary in every])
         n = len(every)
         self._values, self._clearances = np.zeros(n), np.zeros(n)
-        self._gradients, self._turnings = np.zeros((n, 3)), np.zeros((n, 3))
+        self._gradients, self._rotation_gradients = np.zeros((n, 3)), np.zeros((n, 3))
         self._angles = (np.arange(SECTORS * _RAYS) - _RAYS // 2) * (2.0 * math.pi / (SECTORS * _RAYS))
         self._directions, self._distances = np.zeros((SECTORS * _RAYS, 3)), np.zeros(SECTORS * _RAYS)
         self._position, self._level = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
@@ -57,14 +57,14 @@ class Proximity:
         self.scan(_AT_REST, 0.0)
 
     def update(self, view: View, settings: LiveSettings) -> None:
-        """Put the obstacles where a snapshot has them, in the shapes that they have now.
+        """Update positions of the obstacles from a snapshot, and their shapes from the settings.
 
         Parameters
         ----------
         view : View
             The snapshot.
         settings : LiveSettings
-            The present shapes.
+            Settings with the present shapes.
         """
         regions, clearances = self._regions, view.clearances
         for k, name in enumerate(self._names):
@@ -72,21 +72,21 @@ class Proximity:
             if shift != self._shifts[k]:
                 self._shifts[k] = shift
                 regions.shifts[k] = shift
-            if self._seen[k]:
-                if shift != _AT_REST:  # it has come; only its clearance tells the radius
-                    centre = [a + b for a, b in zip(PARKED_POSITION, shift, strict=True)]
-                    regions.numbers[first + 3] = math.dist(centre, view.position_ned) - clearances[self.ids[k]]
+            if self._dynamic[k]:
+                if shift != _AT_REST:  # present: its radius follows from its clearance
+                    center = [a + b for a, b in zip(PARKED_POSITION, shift, strict=True)]
+                    regions.numbers[first + 3] = math.dist(center, view.position_ned) - clearances[self.ids[k]]
             elif (shape := settings.shapes[name]) is not self._shapes[k]:
                 self._shapes[k] = shape
                 regions.numbers[first : regions.offsets[k + 1]] = shape.packed()
 
     def inwards(self, position_ned: Vector3) -> list[list[float]]:
-        """Return in which direction the clearance of each obstacle falls.
+        """Return the direction in which the clearance of each obstacle decreases.
 
         Parameters
         ----------
         position_ned : tuple of float
-            Of the vehicle [m].
+            Position of the vehicle [m].
 
         Returns
         -------
@@ -95,26 +95,26 @@ class Proximity:
         """
         self._position[:] = position_ned
         self._regions.evaluate(
-            self._position, self._level, self._values, self._gradients, self._turnings, self._clearances
+            self._position, self._level, self._values, self._gradients, self._rotation_gradients, self._clearances
         )
         directions: list[list[float]] = self._gradients.tolist()
         return directions
 
     def scan(self, position_ned: Vector3, heading: float) -> list[float]:
-        """Look around in the level plane of the vehicle.
+        """Scan the horizontal plane of the vehicle.
 
         Parameters
         ----------
         position_ned : tuple of float
-            Of the vehicle [m].
+            Position of the vehicle [m].
         heading : float
-            From north, clockwise [rad].
+            Heading from north, clockwise [rad].
 
         Returns
         -------
         list of float
-            The distance to what is nearest in each sector [m], that about the heading first, then clockwise; infinite
-            where nothing is met within `REACH`, 0 everywhere for a vehicle inside an obstacle, NaN where unknown.
+            Distance to the nearest obstacle in each sector [m], from the sector about the heading clockwise; infinite
+            beyond `REACH`, 0 everywhere for a vehicle inside an obstacle, NaN where unknown.
         """
         self._position[:] = position_ned
         np.cos(self._angles + heading, out=self._directions[:, 0])

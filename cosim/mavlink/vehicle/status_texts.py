@@ -1,4 +1,4 @@
-"""STATUSTEXT messages of the vehicle: not too many at once, and no refusal is lost."""
+"""STATUSTEXT messages of the vehicle, limited in rate; repeated refusals are counted."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from cosim.mavlink.wire.message_sink import MessageSink
 
 _CHUNK = 50  # characters of a STATUSTEXT
 _LONGEST_TEXT = 200  # characters
-_TEXTS = 12  # in each _PERIOD at the most
+_TEXTS = 12  # texts in each _PERIOD at most
 _PERIOD = 1.0  # s
 _WAITING = 48  # texts that wait for the next period
-_REFUSALS_PERIOD = 2.0  # s, between two times at which refusals of a kind are said
-_REASONS = 8  # of a kind that wait to be said, by their words; further ones are counted
+_REFUSALS_PERIOD = 2.0  # s, between two reports of refusals of a kind
+_REASONS = 8  # different reasons of a kind that are kept; further ones are only counted
 
 
 class StatusTexts:
-    """Sends texts on every link.
+    """Send texts on every link.
 
     Parameters
     ----------
@@ -28,21 +28,21 @@ class StatusTexts:
     make : Encoder
         Makes messages.
     links : sequence of MessageSink
-        That are attached; may grow.
+        Attached links; the list may grow.
     clock : callable
         Returns the wall clock [s].
     """
 
     def __init__(self, mavlink: Any, make: Encoder, links: Sequence[MessageSink], clock: Callable[[], float]) -> None:
         self._mavlink, self._make, self._links, self._clock = mavlink, make, links, clock
-        self._said: dict[str, float] = {}  # when, by key
+        self._said: dict[str, float] = {}  # time of the last text, by key
         self._said_lately: deque[float] = deque(maxlen=_TEXTS)
         self._waiting: deque[list[Any]] = deque(maxlen=_WAITING)
-        self._refusals: dict[str, dict[str, int]] = {}  # how often each reason was not said yet, by kind
+        self._refusals: dict[str, dict[str, int]] = {}  # count of each unreported reason, by kind
         self._text_id = 0
 
     def say(self, text: str, severity: int | None = None, key: str = "", every: float = 0.0) -> None:
-        """Send a text on every link, in parts if it is long; at once, or when fewer were sent lately.
+        """Send a text on every link, in parts if it is long; at once, or later if the rate is at its limit.
 
         Parameters
         ----------
@@ -51,9 +51,9 @@ class StatusTexts:
         severity : int, optional
             MAV_SEVERITY; default: information.
         key : str
-            Of texts of the same key, one is said in a while, and others are dropped.
+            Key of texts of which one is sent in `every` seconds, and others are dropped.
         every : float
-            Seconds of the wall clock between two of a key.
+            Least time between two texts of a key [s, wall clock].
         """
         now = self._clock()
         if every and now - self._said.get(key, -every) < every:
@@ -64,14 +64,14 @@ class StatusTexts:
         self._send_waiting()
 
     def reject(self, reason: str, key: str) -> None:
-        """Say why something is refused: at once, or after two seconds where a refusal of that kind was said lately.
+        """Report a refusal: at once, or up to 2 s later if one of that kind was reported in the last 2 s.
 
         Parameters
         ----------
         reason : str
-            In a few words.
+            Reason in a few words.
         key : str
-            The kind of refusal. What repeats is said once, with how often it came.
+            Kind of refusal. Equal reasons are reported once, with their count.
         """
         if self._clock() - self._said.get(f"reject {key}", -_REFUSALS_PERIOD) >= _REFUSALS_PERIOD:
             self._said[f"reject {key}"] = self._clock()
@@ -111,5 +111,5 @@ class StatusTexts:
         self._text_id = self._text_id % 0xFFFF + 1
         parts = [text[i : i + _CHUNK] for i in range(0, len(text), _CHUNK)]
         if len(parts[-1]) == _CHUNK:
-            parts.append("")  # a part that is not full is the last one
+            parts.append("")  # the last part is the one that is not full
         return [self._make("STATUSTEXT", level, part, self._text_id, i) for i, part in enumerate(parts)]

@@ -1,4 +1,4 @@
-"""What all micro-services share: the latest snapshot, the links, the way to give commands, and the status texts."""
+"""State shared by all micro-services: the latest snapshot, the links, submission of commands, and status texts."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ from plant_fmu.autopilot import Autopilot, pulse_of_effort
 
 COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1: ground stations listen to no other
 
-_WISH_LASTS = 0.5  # s, that a command may take until a snapshot shows it
+_WISH_LASTS = 0.5  # s, until a snapshot shows the effect of a command
 
 
 @dataclass(frozen=True)
 class Sender:
-    """Who sent a message, and on which link."""
+    """Link, system and component of the sender of a message."""
 
     link: MessageSink
     system: int
@@ -43,18 +43,18 @@ class Sender:
 
 
 class VehicleContext:
-    """The vehicle as the micro-services see it.
+    """State of the vehicle for the micro-services.
 
     Parameters
     ----------
     scenario : Scenario
-        What is run.
+        Scenario of the run.
     columns : sequence of Column
-        Of the rows.
+        Columns of its rows.
     options : MavlinkOptions
-        As whom it shows itself, and whom it heeds.
+        Identity, profile, and accepted systems.
     commands : CommandQueue or None
-        Where commands go; None for a vehicle that takes none.
+        Queue that receives the commands; None for a read-only vehicle.
     live : bool
         False for a recorded run.
 
@@ -67,33 +67,33 @@ class VehicleContext:
     view : View
         The latest snapshot.
     waited_us : int
-        For how long arming is awaited [µs], which counts as time since boot.
+        Wall time spent waiting for arming [µs], which counts as time since boot.
     has_view : bool
-        Whether a snapshot came at all.
+        True after the first snapshot.
     links : list of MessageSink
-        That are attached.
+        Attached links.
     settings : LiveSettings
-        The numbers as they are once all commands are followed.
+        Settings after all submitted commands.
     proximity : Proximity
-        What a scan of the water about it shows.
+        Proximity sensing of obstacles.
     frame : LocalFrame
-        Where on the globe position 0 is.
+        Conversion between local and global positions.
     home : tuple of float
-        North and east of home [m], which is at the surface.
+        North and east of home [m]; home is at the surface.
     status_texts : StatusTexts
-        Sends texts; `say`, `reject` and `text` are its own.
+        Sender of texts; `say`, `reject` and `text` are its methods.
     now : float
-        The wall clock, as it was told last [s].
+        Wall clock at the last call [s].
     failsafe : bool
-        Whether the ground station that commands is lost.
+        True while the commanding ground station is lost.
     loss_timeout, loss_action : float, str
-        For how long it may be silent [s], and what is done then.
+        Silence of the commanding station [s] after which the action is taken, and the action.
     plan : tuple of ReceivedMissionItem
         The mission, without home.
     course : tuple of MissionItem
-        What its items ask for.
+        Its decoded items.
     sticks : tuple of float
-        As commanded last, X Y Z K M N, from -1 to 1.
+        Last commanded sticks, X Y Z K M N, from -1 to 1.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ class VehicleContext:
         self.restart()
 
     def restart(self) -> None:
-        """Forget what belongs to a run, as at its beginning."""
+        """Reset the state that belongs to a run."""
         self.waited_us = 0
         self.view = View(self.layout, self.layout.first_row(self.scenario))
         self.has_view = False
@@ -143,53 +143,53 @@ class VehicleContext:
         self._armed_before = self.view.armed
         self._mode_before: Mode = self.view.mode
 
-    # ---- how things stand ----
+    # ---- state ----
 
     @property
     def accepts_commands(self) -> bool:
-        """Whether it takes commands at all."""
+        """True if the vehicle accepts commands."""
         return self._commands is not None
 
     @property
     def outlived(self) -> bool:
-        """Whether the run is over that it knows: it gives commands again once it has seen the next one."""
+        """True if the run has ended and no snapshot of the next one was received; commands are rejected until then."""
         return self._commands is not None and self._commands.run != self._run
 
     @property
     def armed(self) -> bool:
-        """As the snapshot has it; before there is one, as commanded."""
+        """Armed state of the snapshot; before the first, as commanded."""
         return self.view.armed if self.has_view else self._armed_before
 
     @property
     def mode(self) -> Mode:
-        """As the snapshot has it; before there is one, as commanded."""
+        """Mode of the snapshot; before the first, as commanded."""
         return self.view.mode if self.has_view else self._mode_before
 
     @property
     def mode_ahead(self) -> Mode:
-        """The mode once the commands on their way are followed."""
+        """Mode after the submitted commands are applied."""
         if self._wished is not None and self.now - self._wished[0] <= _WISH_LASTS:
             return self._wished[1]
         return self.mode
 
     def look(self, row: Array) -> None:
-        """Take the next snapshot."""
+        """Update from the next snapshot."""
         self.view, self.has_view = View(self.layout, row, self.waited_us), True
         if self._wished is not None and self._wished[1] == self.view.mode:
             self._wished = None
 
     def home_ned(self) -> Vector3:
-        """Return where home is [m, NED]."""
+        """Return the position of home [m, NED]."""
         return self.home[0], self.home[1], 0.0
 
     def thrust_parts(self) -> list[float]:
-        """Return what each thruster gives, as a part of the vehicle's limit on that side, from -1 to 1."""
+        """Return the force of each thruster as a fraction of its limit in that direction, from -1 to 1."""
         return self._parts(self.view.thruster_forces)
 
     def servo_pulses(self) -> list[float]:
-        """Return what each servo output says [us], by the vehicle's table ``autopilot``; 0 for an output of none.
+        """Return the pulse of each servo output [us], by the vehicle's table ``autopilot``; 0 for unused outputs.
 
-        Without that table, and as PX4, a thruster's output has its number, and pulses go straight with the force.
+        Without that table, and as PX4, a thruster's output has its number, and pulses are linear in the force.
         """
         pulses = [0.0] * max(self._outputs, default=0)
         for part, output, pulse in zip(
@@ -209,18 +209,18 @@ class VehicleContext:
     # ---- commands ----
 
     def submit(self, *commands: Command) -> int:
-        """Give commands, which are followed at the next step.
+        """Submit commands, which are applied at the next step.
 
         Parameters
         ----------
         *commands : Command
-            In this order.
+            Commands in the order of application.
 
         Returns
         -------
         int
-            MAV_RESULT: accepted, denied where no commands can be given or the numbers cannot be, or temporarily
-            rejected where the queue is full or the run is over.
+            MAV_RESULT: accepted; denied for a read-only vehicle or an invalid command; temporarily rejected if the
+            queue is full or the run is over.
         """
         m = self.mavlink
         if self._commands is None:

@@ -11,28 +11,28 @@ from cosim.simulation.commands.commands import MODES, Mode
 from cosim.simulation.signals import Array
 
 _MICRO = 1e6
-_LONGEST = 1e12  # s; a time beyond it is none
+_LONGEST = 1e12  # s; later times are invalid
 _HALF_TURN = 2.0 * math.pi
 
 
 class View:
-    """One row, by named quantities; whatever the numbers are, none of them raises.
+    """One row, by named quantities; no property raises for any numbers.
 
     Parameters
     ----------
     layout : Layout
-        Of the row.
+        Column indices of the row.
     row : ndarray, shape (n,)
-        Of a step; copied.
+        Row of a step; copied.
     waited_us : int
-        For how long arming was awaited before simulated time began [µs].
+        Wall time spent waiting for arming before simulated time started [µs].
     """
 
     def __init__(self, layout: Layout, row: Array, waited_us: int = 0) -> None:
         self._layout, self._row, self._waited_us = layout, row.tolist(), waited_us
 
     def number(self, name: str, otherwise: float = 0.0) -> float:
-        """Return a column's value, or something else where the row has no such column."""
+        """Return a column's value, or `otherwise` if the row has no such column."""
         at = self._layout.at.get(name)
         return otherwise if at is None else self._row[at]
 
@@ -46,12 +46,12 @@ class View:
 
     @cached_property
     def boot_us(self) -> int:
-        """Time since boot [µs]: what was waited, and simulated time, unless that is no number."""
+        """Time since boot [µs]: time of waiting plus simulated time."""
         return self._waited_us + self.simulated_us
 
     @cached_property
     def simulated_us(self) -> int:
-        """Simulated time [µs]; 0 if it is no number."""
+        """Simulated time [µs]; 0 if it is NaN, negative or above 1e12 s."""
         time = self._row[0]
         return round(time * _MICRO) if 0.0 <= time <= _LONGEST else 0
 
@@ -59,12 +59,12 @@ class View:
 
     @property
     def position_ned(self) -> Vector3:
-        """Of the body origin [m]."""
+        """Position of the body origin [m]."""
         return self._three("position.x")
 
     @property
     def quaternion(self) -> list[float]:
-        """From body to world, scalar first."""
+        """Unit quaternion from body to world, scalar first."""
         return self._several("quaternion.e0", 4)
 
     @property
@@ -74,17 +74,17 @@ class View:
 
     @property
     def velocity_body(self) -> Vector3:
-        """Over ground [m/s]."""
+        """Velocity over ground, body frame [m/s]."""
         return self._three("velocity.u")
 
     @property
     def rates(self) -> Vector3:
-        """About the body's axes [rad/s]."""
+        """Angular velocity, body frame [rad/s]."""
         return self._three("velocity.p")
 
     @cached_property
     def _rotation(self) -> tuple[Vector3, Vector3, Vector3]:
-        """R from body to world, (3): plain numbers, since arrays of nine take longer."""
+        """R from body to world, (3), as floats, which are faster here than arrays."""
         e0, e1, e2, e3 = self.quaternion
         return (
             (1.0 - 2.0 * (e2 * e2 + e3 * e3), 2.0 * (e1 * e2 - e0 * e3), 2.0 * (e1 * e3 + e0 * e2)),
@@ -93,33 +93,33 @@ class View:
         )
 
     def to_world(self, vector_body: Vector3) -> Vector3:
-        """Turn a vector from the body's axes into the world's, NED."""
+        """Rotate a vector from the body frame to the world, NED."""
         (a, b, c), (d, e, f), (g, h, i) = self._rotation
         x, y, z = vector_body
         return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
 
     def to_body(self, vector_ned: Vector3) -> Vector3:
-        """Turn a vector from the world's axes, NED, into the body's."""
+        """Rotate a vector from the world, NED, to the body frame."""
         (a, b, c), (d, e, f), (g, h, i) = self._rotation
         x, y, z = vector_ned
         return a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z
 
     @cached_property
     def velocity_ned(self) -> Vector3:
-        """Over ground [m/s], (15)."""
+        """Velocity over ground, NED [m/s], (15)."""
         return self.to_world(self.velocity_body)
 
     @cached_property
     def heading(self) -> float:
-        """Yaw from 0 to 2 pi [rad]; NaN if it is no number."""
+        """Yaw from 0 to 2 pi [rad]; NaN if it is not finite."""
         yaw = self.euler[2]
         return yaw % _HALF_TURN if math.isfinite(yaw) else math.nan
 
-    # ---- what sensors say ----
+    # ---- sensors ----
 
     @property
     def depth(self) -> float:
-        """From the pressure sensor [m]."""
+        """Depth from the pressure sensor [m]."""
         return self.number("measured.depth", self.position_ned[2])
 
     @property
@@ -129,103 +129,103 @@ class View:
 
     @property
     def measured_rates(self) -> Vector3:
-        """From the IMU's gyros [rad/s]."""
+        """Angular velocity from the IMU, body frame [rad/s]."""
         return self._three("measured.angular_velocity.p")
 
     @property
     def altitude(self) -> float:
-        """From the DVL: height above the bottom [m]."""
+        """Height above the bottom from the DVL [m]."""
         return self.number("measured.altitude", math.inf)
 
     @property
     def touches_bottom(self) -> bool:
-        """Whether the hull is on the bottom."""
+        """True if the hull is in contact with the bottom."""
         return self.number("bottom_contact") > 0.0
 
-    # ---- what drives it ----
+    # ---- forces ----
 
     @property
     def thruster_forces(self) -> list[float]:
-        """Of each thruster [N]."""
+        """Force of each thruster [N]."""
         return self._several("thruster_force[1]", self._layout.thrusters)
 
     @property
     def thruster_commands(self) -> list[float]:
-        """Asked of each thruster [N]."""
+        """Commanded force of each thruster [N]."""
         return self._several("thrust[1]", self._layout.thrusters)
 
     @property
     def wrench(self) -> list[float]:
-        """That the law asks for, body frame [N, N m], shape (6,)."""
+        """Commanded wrench of the law, body frame [N, N m], shape (6,)."""
         return self._several("command.X", 6)
 
     @property
     def saturated(self) -> bool:
-        """Whether a limit cuts what is asked for."""
+        """True if a limit is active."""
         return any(self._row[i] > 0.0 for i in self._layout.saturations)
 
-    # ---- what law and arbiter say ----
+    # ---- law and arbiter ----
 
     @property
     def region_values(self) -> list[float]:
-        """Of the goal, then of each region: g, above 0 where violated."""
+        """Region function g of the goal, then of each region: above 0 where violated."""
         return self._several("goal.value", 1 + len(self._layout.regions))
 
     @property
     def clearances(self) -> list[float]:
-        """Of the goal, then of each region: 0 or above where satisfied [m or rad]."""
+        """Clearance of the goal, then of each region: 0 or above where satisfied [m or rad]."""
         return self._several("goal.clearance", 1 + len(self._layout.regions))
 
     @property
     def criteria(self) -> tuple[str, ...]:
-        """Names of the criteria, the first in priority first."""
+        """Names of the criteria, in order of priority."""
         return self._layout.criteria
 
     @property
     def memberships(self) -> list[float]:
-        """Of the criteria, the first in priority first."""
+        """Memberships of the criteria, in order of priority."""
         return self._several(f"membership.{self.criteria[0]}", len(self.criteria))
 
     @property
     def weights(self) -> list[float]:
-        """Of the criteria, likewise."""
+        """Weights of the criteria, in order of priority."""
         return self._several(f"weight.{self.criteria[0]}", len(self.criteria))
 
     @property
     def estimate(self) -> list[float]:
-        """Of phi in (12) [N, N m], shape (4,)."""
+        """Estimate of phi in (12) [N, N m], shape (4,)."""
         return self._several("estimate.phi1", 4)
 
     def reports(self) -> list[tuple[str, float]]:
-        """Return what the law says of itself, by column."""
+        """Return the law's reports as pairs of column name and value."""
         return [(name, self.number(name)) for name in self._layout.reports]
 
     def shift(self, region: str) -> Vector3:
-        """Return how far a region, or ``"goal"``, is from where the scenario has it [m, NED]."""
+        """Return the displacement of a region, or ``"goal"``, from its position in the scenario [m, NED]."""
         return self._three(f"{region}.shift.x")
 
     # ---- the command handler ----
 
     @property
     def armed(self) -> bool:
-        """Whether the thrusters may work."""
+        """True if the thrusters are enabled."""
         return self.number("commands.armed", 1.0) > 0.0
 
     @property
     def mode(self) -> Mode:
-        """Who steers."""
+        """Mode of the command handler."""
         number = self.number("commands.mode", float(MODES.index("reach")))
         return MODES[int(number)] if 0.0 <= number < len(MODES) else "reach"
 
     @property
     def item(self) -> int:
-        """Item of the mission; -1 for none."""
+        """Current item of the mission; -1 for none."""
         number = self.number("commands.item", -1.0)
         return int(number) if 0.0 <= number < 1e6 else -1
 
     @property
     def target(self) -> Vector3:
-        """Middle of the target region [m, NED]."""
+        """Center of the target region [m, NED]."""
         if "target.x" in self._layout.at:
             return self._three("target.x")
         x, y, z = self._layout.goal_middle

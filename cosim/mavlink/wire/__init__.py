@@ -1,6 +1,6 @@
 """Frames on links.
 
-Endpoints, framing, signing, and links that number and limit what they send.
+Endpoints, framing, signing, and links that number frames and limit their rate.
 
 Imports: io, mavlink.channels.
 """

@@ -1,4 +1,4 @@
-"""The MAVLink dialect that everything here speaks."""
+"""The MAVLink dialect of this package."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 def dialect() -> Any:
     """Return pymavlink's module of the dialect ``all``, MAVLink 2.
 
-    It is the only one that has the messages of ArduPilot and of modes both. Its import takes a tenth of a second, so it
-    waits until somebody speaks MAVLink.
+    It is the only dialect with both the messages of ArduPilot and those of modes. It is imported at the first call,
+    since the import takes 0.1 s.
     """
     from pymavlink.dialects.v20 import all as mavlink
 

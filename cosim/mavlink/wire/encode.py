@@ -1,4 +1,4 @@
-"""The one place where numbers become fields: whatever comes is brought to what the field can hold."""
+"""Encode numbers as fields of messages, limited to the range of the field."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 _GREATEST_FLOAT = 3.4028234e38  # of a float32
 _BITS = {"int8_t": 8, "int16_t": 16, "int32_t": 32, "int64_t": 64}
 
-# what stands for "unknown" where it is not 0, by message and field
+# value of "unknown" where it is not 0, by message and field
 _UNKNOWN: dict[tuple[str, str], int] = {
     ("GLOBAL_POSITION_INT", "hdg"): 0xFFFF,
     ("GPS_RAW_INT", "cog"): 0xFFFF,
@@ -26,29 +26,29 @@ Encode = Callable[[Any], Any]
 
 
 def float32(x: float) -> float:
-    """Return a number that a float32 field can hold: too great ones cut; NaN stays."""
+    """Limit a number to the range of float32; NaN stays."""
     if -_GREATEST_FLOAT <= x <= _GREATEST_FLOAT or x != x:
         return x
     return math.copysign(_GREATEST_FLOAT, x)
 
 
 def whole(x: float) -> int | None:
-    """Return a number from the link as an integer, or None if it is not finite; clients fill unused ones with NaN."""
+    """Round a received number to an integer; None if it is not finite, as clients fill unused ones with NaN."""
     return round(x) if math.isfinite(x) else None
 
 
 def wrapped(microseconds: int, per_unit: int = 1000) -> int:
-    """Return a time since boot in a 32-bit field: in units of so many microseconds, from 0 again when it is full."""
+    """Convert a time since boot to units of `per_unit` microseconds, modulo 2**32."""
     return microseconds // per_unit & 0xFFFFFFFF
 
 
 class Encoder:
-    """Makes messages of a dialect; no number is refused.
+    """Make messages of a dialect from any numbers.
 
     Parameters
     ----------
     mavlink : module
-        Of pymavlink.
+        Dialect of pymavlink.
     """
 
     def __init__(self, mavlink: Any) -> None:

@@ -1,4 +1,4 @@
-"""Where a MAVLink link leads, as the user writes it."""
+"""Endpoints of MAVLink links, and their text form."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ Kind = Literal["udpout", "udpin", "tcpin", "tcp", "serial", "tlog"]
 
 _FORMS = "udpout:, udpin:, tcpin: or tcp:HOST:PORT, serial:DEVICE[:BAUD], or a file ending in .tlog"
 _NETWORK: dict[str, Kind] = {"udpout": "udpout", "udpin": "udpin", "tcpin": "tcpin", "tcp": "tcp", "tcpout": "tcp"}
-_BAUD = 57600  # what telemetry radios come with
+_BAUD = 57600  # default of telemetry radios
 _MOST_BAUD = 4_000_000
 
 
 @dataclass(frozen=True)
 class Endpoint:
-    """One way out of the process.
+    """A network address, serial device or log file.
 
-    `host` and `port` are those of networks, the host as an IPv4 address; `path` is that of a serial device, with its
-    `baud`, or of a file. `text` is what the user wrote.
+    `host` and `port` are for networks, the host as an IPv4 address; `path` is that of a serial device, with its
+    `baud`, or of a file. `text` is the user's text.
     """
 
     kind: Kind
@@ -34,27 +34,27 @@ class Endpoint:
 
 
 def parse_endpoint(text: str, allow_remote: bool = False) -> Endpoint:
-    """Return what an endpoint such as ``udpout:127.0.0.1:14550`` says.
+    """Parse an endpoint such as ``udpout:127.0.0.1:14550``.
 
-    ``udpout`` and ``tcp`` speak to an address, ``udpin`` and ``tcpin`` listen on one. The spellings with ``//``
+    ``udpout`` and ``tcp`` send to an address, ``udpin`` and ``tcpin`` listen on one. The spellings with ``//``
     (``udpin://127.0.0.1:14550``, ``tcpout://``, ``serial:///dev/ttyUSB0:57600``) mean the same.
 
     Parameters
     ----------
     text : str
-        As pymavlink, MAVProxy and MAVSDK write it.
+        Endpoint in the notation of pymavlink, MAVProxy or MAVSDK.
     allow_remote : bool
-        Accept addresses beyond this machine, and listening for them: MAVLink has no privacy.
+        True to accept addresses beyond this machine, to send to or listen on: MAVLink is not encrypted.
 
     Returns
     -------
     Endpoint
-        Host names are resolved in it.
+        The endpoint, with a resolved host.
 
     Raises
     ------
     TelemetryError
-        If it is none, leaves this machine without leave, or names a file that exists.
+        If the text is invalid, the address is beyond this machine and not allowed, or the file exists.
 
     Examples
     --------
@@ -78,7 +78,7 @@ def parse_endpoint(text: str, allow_remote: bool = False) -> Endpoint:
 
 
 def _address(text: str, host: str, allow_remote: bool) -> str:
-    """Return the IPv4 address of a host, which is this machine unless others are allowed."""
+    """Return the IPv4 address of a host; raise for other machines unless they are allowed."""
     try:
         address, here = resolved(host)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Bytes to frames to messages: the cheapest checks first, and nothing that comes can raise."""
+"""Decode bytes to frames and messages: cheap checks first; no input raises."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from typing import Any, NamedTuple
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.signing import Verifier
 
-V1, V2 = 0xFE, 0xFD  # what a frame begins with
-_SIGNED = 0x01  # of the flags that one must understand
+V1, V2 = 0xFE, 0xFD  # first byte of a frame
+_SIGNED = 0x01  # bit of the incompatibility flags
 _SIGNATURE = 13  # bytes
 _CRC = 2  # bytes
 _SETUP_SIGNING = 256
 _LAST_OF_V1 = 255  # id of a message
 _V2_HEADER = struct.Struct("<BBBxxBBHB")  # marker, length, flags, system, component, id in two parts
-_V2_WHOLE = struct.Struct("<BBBBBBBHB")  # the same with what is skipped there: further flags and sequence number
+_V2_WHOLE = struct.Struct("<BBBBBBBHB")  # the same with the compatibility flags and sequence number
 _V1_HEADER = struct.Struct("<BBxBBB")  # marker, length, system, component, id
 _HEADERS = {b"\xfd": _V2_HEADER.size, b"\xfe": _V1_HEADER.size}
 _MARKER = re.compile(rb"[\xfd\xfe]")
 
 
 class Kind(NamedTuple):
-    """What the cheap checks know of a message."""
+    """Properties of a message for the checks before decoding."""
 
     crc_extra: int
-    size: int  # bytes of the payload at the most
-    target: int | None  # where in it the system is named that it is meant for
+    size: int  # most bytes of the payload
+    target: int | None  # offset of the target system in it
     old_size: int  # bytes of the payload in MAVLink 1, which has no extension fields
 
 
 class Header(NamedTuple):
-    """Who sent a frame, and what it is; offsets are from its first byte."""
+    """Sender and message of a frame; offsets are from its first byte."""
 
     size: int  # bytes of the whole frame
-    payload: int  # where it begins
-    end: int  # where it ends, and the checksum begins
+    payload: int  # offset of its start
+    end: int  # offset of its end, where the checksum starts
     signed: bool
     system: int
     component: int
@@ -48,7 +48,7 @@ class Header(NamedTuple):
 
 @dataclass(slots=True)
 class Counts:
-    """Frames that came, by what became of them."""
+    """Received frames, by their outcome."""
 
     accepted: int = 0
     foreign: int = field(default=0, metadata={"words": "for another system"})
@@ -66,7 +66,7 @@ class Counts:
     setup_signing: int = field(default=0, metadata={"words": "that would change the key"})
 
     def refused(self) -> dict[str, int]:
-        """Return how many were refused for a reason that is worth a word, by that reason."""
+        """Return the counts of reported refusals, by reason."""
         innocent = ("accepted", "foreign", "own", "unknown")
         reasons = [item for item in fields(self) if item.name not in innocent]
         return {item.metadata["words"]: getattr(self, item.name) for item in reasons if getattr(self, item.name)}
@@ -74,7 +74,7 @@ class Counts:
 
 @cache
 def kinds() -> dict[int, Kind]:
-    """Return what is known of each message of the dialect, by its id."""
+    """Return the properties of each message of the dialect, by its id."""
     return {
         number: Kind(message.crc_extra, message.unpacker.size, _target(message), _old_size(message))
         for number, message in dialect().mavlink_map.items()
@@ -82,7 +82,7 @@ def kinds() -> dict[int, Kind]:
 
 
 def _target(message: Any) -> int | None:
-    """Return where in a payload the target system stands."""
+    """Return the offset of the target system in a payload, or None if it has none."""
     name = "target" if message.msgname == "MANUAL_CONTROL" else "target_system"
     if name not in message.fieldnames:
         return None
@@ -96,7 +96,7 @@ def _target(message: Any) -> int | None:
 
 
 def _old_size(message: Any) -> int:
-    """Return how long a payload is without extension fields, which stand last and are no part of CRC_EXTRA."""
+    """Return the bytes of a payload without extension fields, which are last and not part of CRC_EXTRA."""
     crc, size, found = dialect().x25crc(f"{message.msgname} ".encode()), 0, int(message.unpacker.size)
     for name, array in zip(message.ordered_fieldnames, message.array_lengths, strict=True):
         kind = message.fieldtypes[message.fieldnames.index(name)]
@@ -112,7 +112,7 @@ _SIZES = {"char": 1, "uint8_t": 1, "int8_t": 1, "uint16_t": 2, "int16_t": 2, "ui
 
 
 def header_at(data: bytes, at: int) -> Header | None:
-    """Return what the header at an offset says, None if there is no whole one."""
+    """Parse the header at an offset; None if it is incomplete or has unknown flags."""
     marker, left = data[at], len(data) - at
     if marker == V2 and left >= _V2_HEADER.size:
         _, length, flags, system, component, low, high = _V2_HEADER.unpack_from(data, at)
@@ -130,17 +130,17 @@ def header_at(data: bytes, at: int) -> Header | None:
 
 
 class Framer:
-    """Makes frames of messages, unsigned, as pymavlink makes them, in less than half the time.
+    """Encode messages as unsigned frames, as pymavlink does, in less than half the time.
 
     Parameters
     ----------
     source : (int, int)
-        System and component that sends them.
+        System and component id of the sender.
 
     Attributes
     ----------
     seq, old_seq : int
-        Of the next frame of MAVLink 2 and of MAVLink 1, 0 to 255.
+        Sequence number of the next frame of MAVLink 2 and of MAVLink 1, 0 to 255.
     """
 
     def __init__(self, source: tuple[int, int]) -> None:
@@ -150,12 +150,12 @@ class Framer:
         self.seq = self.old_seq = 0
 
     def count(self, old: bytes | None) -> None:
-        """Go on to the next frame, also of MAVLink 1 unless `old` is None."""
+        """Advance the sequence number, also that of MAVLink 1 unless `old` is None."""
         self.seq = (self.seq + 1) % 256
         self.old_seq = (self.old_seq + (old is not None)) % 256
 
     def frame(self, message: Any) -> bytes:
-        """Return a message as a frame.
+        """Encode a message as a frame of MAVLink 2.
 
         Raises
         ------
@@ -165,7 +165,7 @@ class Framer:
         return self._packed(message, self._framed)
 
     def old_frame(self, message: Any) -> bytes | None:
-        """Return a message as a frame of MAVLink 1, without its extension fields; None for one that it has not.
+        """Encode a message as a frame of MAVLink 1, without extension fields; None for ids above 255.
 
         It raises as `frame` does.
         """
@@ -200,19 +200,19 @@ class Framer:
 
 
 class Gate:
-    """Decides which frames are heeded, and decodes these.
+    """Accept or refuse frames, and decode the accepted ones.
 
     Parameters
     ----------
     counts : Counts
-        Told of each frame.
+        Counts of the frames by outcome.
     own : (int, int), optional
-        System and component that we are: frames of ourselves, and those for other systems, are not for us. Default:
-        whatever comes is looked at.
+        Own system and component id: frames from them, and those for other systems, are ignored. Default: frames for
+        all systems are accepted.
     allowed : frozenset of int, optional
-        Systems that are heeded; default: all.
+        System ids that are accepted; default: all.
     verifier : Verifier, optional
-        Of signatures; with it, what is not signed with its key is refused, and so is all of MAVLink 1.
+        Verifier of signatures; with it, frames not signed with its key are refused, and so is all of MAVLink 1.
     """
 
     def __init__(
@@ -230,10 +230,9 @@ class Gate:
         self._codec = mavlink.MAVLink(None)
 
     def datagram(self, data: bytes) -> Iterator[tuple[bytes, Any]]:
-        """Yield the frames of a datagram that are heeded, and what they say.
+        """Yield the accepted frames of a datagram with their messages.
 
-        Frames stand in it one after the other. Nothing is looked for between them: what is broken costs no more than
-        the rest of its own datagram.
+        Frames follow one another without gaps. A malformed one ends the datagram.
         """
         at = 0
         while at < len(data):
@@ -252,12 +251,12 @@ class Gate:
             at += header.size
 
     def frame(self, frame: bytes, header: Header) -> Iterator[tuple[bytes, Any]]:
-        """Yield an intact frame, and what it says, if it is heeded."""
+        """Yield an intact frame with its message, if it is accepted."""
         if self._is_for_us(frame, header):
             yield from self._judged(frame, header)
 
     def is_intact(self, frame: bytes, header: Header) -> bool:
-        """Return whether the checksum of a frame of a known message is right, and in MAVLink 1 its length can be."""
+        """Return True if the checksum of a known message's frame is right, and in MAVLink 1 its length is valid."""
         if frame[0] == V1 and header.end - header.payload > self.kinds[header.message].size:
             return False
         crc = self._crc(frame[1 : header.end])
@@ -269,7 +268,7 @@ class Gate:
         if self._own is not None and target is not None:
             where = header.payload + target
             system = frame[where] if where < header.end else 0  # zeros at the end of a payload are not sent
-            if system not in (0, self._own[0]):  # 0 is everybody; each component of ours is answered for
+            if system not in (0, self._own[0]):  # 0 is broadcast; all own components are answered for
                 self.counts.foreign += 1
                 return False
         if (header.system, header.component) == self._own:
@@ -281,7 +280,7 @@ class Gate:
         return True
 
     def _judged(self, frame: bytes, header: Header) -> Iterator[tuple[bytes, Any]]:
-        """Yield a frame, and what it says, if it is signed as it must be and can be decoded."""
+        """Yield a frame with its message, if it is signed as required and can be decoded."""
         counts = self.counts
         if self._verifier is not None:
             refusal = self._verifier.judge(frame, header.system, header.component, header.signed)
@@ -301,21 +300,21 @@ class Gate:
 
 
 class StreamReader:
-    """Finds the frames in a stream of bytes; what is none costs no frame behind it.
+    """Find the frames in a stream of bytes; invalid bytes do not lose a following frame.
 
     Parameters
     ----------
     gate : Gate
-        Which they must pass.
+        Gate that accepts the frames.
     """
 
     def __init__(self, gate: Gate) -> None:
         self._gate = gate
-        self._rest = b""  # the beginning of a frame, less than the greatest one
-        self._lost = False  # since the last frame; each loss counts once
+        self._rest = b""  # an incomplete frame, shorter than the longest
+        self._lost = False  # True if bytes were lost since the last frame; each loss counts once
 
     def read(self, data: bytes) -> Iterator[tuple[bytes, Any]]:
-        """Yield the heeded frames that `data` completes, and what they say. Exhaust it before the next call."""
+        """Yield the accepted frames that `data` completes, with their messages. Exhaust it before the next call."""
         data, at = self._rest + data, 0
         self._rest = b""
         while True:

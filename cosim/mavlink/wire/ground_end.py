@@ -1,4 +1,4 @@
-"""The ground's end of a link: hears any vehicle, and speaks to it."""
+"""The ground station's end of a link: receives from any vehicle, and sends to it."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from cosim.mavlink.wire.framing import V2, Counts, Gate
 from cosim.mavlink.wire.link import Link, Signer, open_channel
 from cosim.mavlink.wire.signing import SigningClock, Verifier
 
-_AT_ONCE = 512  # messages that one call takes
-_PAUSE = 0.001  # s, between two looks at a link on which nothing is
-_LONGEST = 0.05  # s, that reading goes on without a pause
+_AT_ONCE = 512  # most messages of one call
+_PAUSE = 0.001  # s, polling period of an idle link
+_LONGEST = 0.05  # s, of reading without a pause
 
 Identity = tuple[int, int]
 GROUND_STATION: Identity = (255, 190)  # QGroundControl's system and component
 
 
 class Heard(NamedTuple):
-    """A message, and where it came from."""
+    """A received message with its time and sender."""
 
     time: float  # s, time.monotonic()
     system: int
@@ -39,18 +39,18 @@ class GroundLink:
     endpoint : Endpoint
         A network or a serial device.
     key : bytes, optional
-        To sign with; then only what is signed with it is heard. Default: all is.
+        Signing key; with it, only frames signed with it are accepted. Default: all are.
     identity : (int, int)
-        System and component that we are.
+        Own system and component id.
 
     Attributes
     ----------
     channel : Channel
-        That carries the frames.
+        Channel that carries the frames.
     old : int
-        Frames of MAVLink 1 that were heard.
+        Accepted frames of MAVLink 1.
     counts : Counts
-        What became of the frames that came.
+        Counts of received frames by outcome.
 
     Raises
     ------
@@ -66,22 +66,22 @@ class GroundLink:
         self.channel, _ = open_channel(endpoint)
         signer = None if key is None else Signer(key, clock, link=0)
         self._link = Link(endpoint.text, self.channel, gate, identity, signer=signer)
-        self.speaks_first = endpoint.kind in ("udpout", "tcp", "serial")  # the vehicle may not know of us before
+        self.speaks_first = endpoint.kind in ("udpout", "tcp", "serial")  # else the vehicle may not know this address
         m = dialect()
         self._beat = m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, m.MAV_STATE_ACTIVE, 3)
 
     def receive(self, timeout: float) -> list[Heard]:
-        """Return what has come, waiting for the first of it.
+        """Return received messages, waiting for the first.
 
         Parameters
         ----------
         timeout : float
-            For how long at the most [s].
+            Longest wait [s].
 
         Returns
         -------
         list of Heard
-            In the order in which it came; empty if nothing did.
+            Messages in the order of reception; empty if there are none.
         """
         deadline = time.monotonic() + timeout
         while True:
@@ -99,7 +99,7 @@ class GroundLink:
             time.sleep(min(_PAUSE, max(0.0, deadline - now)))
 
     def send(self, message: Any) -> bool:
-        """Send a message; return whether it went out."""
+        """Send a message; return False if it could not be sent."""
         return self._link.send(message)
 
     def beat(self) -> None:
@@ -107,7 +107,7 @@ class GroundLink:
         self._link.send(self._beat)
 
     def troubles(self) -> list[str]:
-        """Return what did not go out or come in, and how often, in words."""
+        """Return a text for each kind of frame lost or refused, with its count."""
         return self._link.troubles()
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""One endpoint as a link: frames of its own sequence, signed if asked for, within a budget."""
+"""A link on one endpoint: frames with their own sequence numbers, signed with a key, within a budget."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from cosim.mavlink.wire.signing import SigningClock, Verifier
 
 log = logging.getLogger(__name__)
 
-COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1, the only one that ground stations take for a vehicle
+COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1, the only component that ground stations accept as a vehicle
 BUDGET = 200_000.0  # bytes/s, of the wall clock, into a network
-_BURST = 0.5  # s of the budget, that can go at once
-_RESERVED = 0.25  # of it, which streams and lists leave to answers
-_ANSWERS = frozenset(  # that go to the link on which they were asked for alone
+_BURST = 0.5  # s of the budget, that can be sent at once
+_RESERVED = 0.25  # fraction of it reserved for answers
+_ANSWERS = frozenset(  # sent only on the link of the request
     ("AUTOPILOT_VERSION", "AVAILABLE_MODES", "COMMAND_ACK", "FILE_TRANSFER_PROTOCOL", "LOG_DATA", "LOG_ENTRY",
      "MESSAGE_INTERVAL", "MISSION_ACK", "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_REQUEST_INT", "PARAM_ERROR",
      "PARAM_VALUE", "PING", "TIMESYNC")
@@ -41,12 +41,12 @@ _UNENCODABLE = (struct.error, OverflowError, IndexError, TypeError, ValueError) 
 
 
 class Budget:
-    """Bytes that may be sent now: so many a second, and some at once.
+    """A token bucket of bytes that may be sent.
 
     Parameters
     ----------
     rate : float
-        [bytes/s].
+        Refill rate [bytes/s].
     """
 
     def __init__(self, rate: float) -> None:
@@ -56,7 +56,7 @@ class Budget:
 
     @property
     def plenty(self) -> bool:
-        """Whether more is there than what is left to answers."""
+        """True if more is left than the part reserved for answers."""
         self._refill()
         return self._left >= _RESERVED * self._most
 
@@ -66,7 +66,7 @@ class Budget:
         self._last = now
 
     def take(self, size: int, first: bool) -> bool:
-        """Take some, if there are; what does not come first leaves a quarter of the most to what does."""
+        """Take `size` bytes, and return True, if they are left; without `first` the reserved quarter must remain."""
         self._refill()
         if self._left - size < (0.0 if first else _RESERVED * self._most):
             return False
@@ -75,16 +75,16 @@ class Budget:
 
 
 class Signer:
-    """Signs what goes out on one link.
+    """Sign the frames of one link.
 
     Parameters
     ----------
     key : bytes
-        32 of them.
+        Key of 32 bytes.
     clock : SigningClock
-        Of the vehicle.
+        Clock of the vehicle's timestamps.
     link : int
-        Id of the link: to a peer, each is a stream of its own.
+        Id of the link, which has its own sequence of timestamps.
     """
 
     def __init__(self, key: bytes, clock: SigningClock, link: int) -> None:
@@ -92,38 +92,38 @@ class Signer:
         self._key, self._link = key, link % 256
 
     def set_up(self, signing: Any) -> None:
-        """Tell a codec of pymavlink to sign."""
+        """Enable signing in a codec of pymavlink."""
         signing.secret_key, signing.link_id, signing.sign_outgoing = self._key, self._link, True
 
     def stamp(self, signing: Any) -> None:
-        """Give the next frame its timestamp."""
+        """Set the timestamp of the next frame."""
         signing.timestamp = self._clock.next()
 
 
 class Link:
-    """An endpoint with its peers; an Outlet.
+    """An endpoint with its peers; a `MessageSink`.
 
     Parameters
     ----------
     name : str
-        Such as ``udpout:127.0.0.1:14550``.
+        Name such as ``udpout:127.0.0.1:14550``.
     channel : Channel
-        Carries the frames; the link closes it.
+        Channel of the frames.
     gate : Gate
-        Lets in what is heeded.
+        Gate that accepts received frames.
     source : (int, int)
-        System and component that we are.
+        Own system and component id.
     budget : float, optional
-        Bytes a second of the wall clock; default: as many as come.
+        Most bytes per second of the wall clock; default: no limit.
     signer : Signer, optional
-        Default: nothing is signed.
+        Signer of the frames; default: none are signed.
 
     Attributes
     ----------
     logs : list of Link
-        Logs that answers to what came on this link go into too; streams each link has of its own.
+        Logs that also get the answers sent on this link; streams are sent on each link anyway.
     sent, dropped, unencodable : int
-        Messages that went to the channel, that the budget had no room for, and that have a value no field can hold.
+        Messages passed to the channel, dropped for the budget, and with a value that no field can hold.
     """
 
     def __init__(
@@ -147,27 +147,27 @@ class Link:
         if signer is not None:
             signer.set_up(self._codec.signing)
         self._readers: WeakKeyDictionary[Any, StreamReader] = WeakKeyDictionary()
-        self._frames: Iterator[tuple[bytes, Any]] = iter(())  # of the bytes that came last
-        self._peer: Any = None  # where they came from
-        self._old_peers = False  # whether any has spoken MAVLink 1
-        self._told: set[str] = set()  # of messages that could not be encoded
+        self._frames: Iterator[tuple[bytes, Any]] = iter(())  # of the last received bytes
+        self._peer: Any = None  # their sender
+        self._old_peers = False  # True once a peer has sent MAVLink 1
+        self._reported: set[str] = set()  # kinds of messages that could not be encoded
 
     def has_room(self) -> bool:
-        """Return whether what can wait should go now."""
+        """Return True if messages of low priority may be sent now."""
         return self._budget is None or self._budget.plenty
 
     def send(self, message: Any) -> bool:
-        """Encode, sign where that is asked for, and send a message; return whether it went to all peers."""
+        """Encode, sign if there is a signer, and send a message; return False if it was not sent to all peers."""
         try:
-            if self._signer is not None:  # what speaks MAVLink 1 cannot sign, and is not heard
+            if self._signer is not None:  # frames of MAVLink 1 are unsigned, so such peers are refused
                 frame, old = self._signed(message, self._signer), None
             else:
                 frame = self._framer.frame(message)
                 old = self._framer.old_frame(message) if self._old_peers else None
         except _UNENCODABLE as error:
             self.unencodable += 1
-            if message.get_type() not in self._told:
-                self._told.add(message.get_type())
+            if message.get_type() not in self._reported:
+                self._reported.add(message.get_type())
                 log.warning("MAVLink: %s cannot be encoded: %s", message.get_type(), error)
             return False
         if self._budget is not None and not self._budget.take(len(frame), message.get_type() in _FIRST):
@@ -188,9 +188,9 @@ class Link:
         return frame
 
     def receive(self, until: float) -> Iterator[tuple[bytes, Any]]:
-        """Yield frames that are heeded, and what they say, until nothing is left or a moment of `time.perf_counter`.
+        """Yield accepted frames with their messages, until none is left or a time of `time.perf_counter`.
 
-        What is left by then comes at the next call.
+        The rest follows at the next call.
         """
         while time.perf_counter() < until:
             found = next(self._frames, None)
@@ -207,14 +207,14 @@ class Link:
             self._frames = self._gate.datagram(data) if self.channel.datagrams else self._reader().read(data)
 
     def _reader(self) -> StreamReader:
-        """Return the reader of the peer whose bytes came last."""
+        """Return the reader of the peer of the last received bytes."""
         reader = self._readers.get(self._peer)
         if reader is None:
             reader = self._readers[self._peer] = StreamReader(self._gate)
         return reader
 
     def troubles(self) -> list[str]:
-        """Return what did not go out or come in, and how often, in words."""
+        """Return a text for each kind of frame lost or refused, with its count."""
         lost = {"messages over the budget": self.dropped, "messages that could not be encoded": self.unencodable}
         refused = {f"frames {reason}": n for reason, n in self.counts.refused().items()}
         return [f"{n} {what}" for what, n in (lost | refused | self.channel.trouble).items() if n]
@@ -226,19 +226,19 @@ def open_links(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> list[L
     Parameters
     ----------
     endpoints : sequence of Endpoint
-        Where they lead.
+        Endpoints to open.
     options : MavlinkOptions
-        Who the vehicle is, whom it heeds, and the key, if there is one.
+        Identity of the vehicle, accepted systems, and the key, if there is one.
 
     Returns
     -------
     list of Link
-        In their order.
+        Links in the order of the endpoints.
 
     Raises
     ------
     TelemetryError
-        If one cannot be opened; then none is.
+        If one cannot be opened; the others are closed again.
     """
     source, key, clock = (options.system_id, COMPONENT_ID), options.key, SigningClock()
     verifier = None if key is None else Verifier(key, clock)
@@ -257,7 +257,7 @@ def open_links(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> list[L
 
 
 def open_channel(endpoint: Endpoint) -> tuple[Channel, float | None]:
-    """Return what carries the frames of an endpoint, and how many bytes a second it may carry.
+    """Open the channel of an endpoint; return it and its limit [bytes/s], None for no limit.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""One link as the protocol sees it: a place to send messages to."""
+"""The interface of a link for the protocol: a destination of messages."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from typing import Any, Protocol
 
 
 class MessageSink(Protocol):
-    """Takes messages; what cannot be sent is counted, and never raises."""
+    """Send messages; those that cannot be sent are counted, and never raise."""
 
     name: str  # such as udpout:127.0.0.1:14550
 
     def has_room(self) -> bool:
-        """Return whether what can wait should go now."""
+        """Return True if messages of low priority may be sent now."""
         ...
 
     def send(self, message: Any) -> bool:
-        """Encode, sign where that is asked for, and send a message of the dialect; return whether it went out."""
+        """Encode, sign if required, and send a message of the dialect; return False if it was not sent."""
         ...

@@ -1,4 +1,4 @@
-"""Signatures of frames: who does not have the key is not heeded, and nothing counts twice."""
+"""Signatures of frames: frames without a valid signature, and repeated ones, are refused."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from cosim.errors import TelemetryError
 
 KEY_BYTES = 32
 _LONGEST_KEY = 4096  # bytes of its file
-STREAMS = 64  # of senders, that are kept in mind
-_EPOCH = 1_420_070_400  # s, 2015-01-01 in Unix time, where MAVLink's timestamps begin
+STREAMS = 64  # senders whose last timestamps are kept
+_EPOCH = 1_420_070_400  # s, 2015-01-01 in Unix time, the epoch of MAVLink's timestamps
 _PER_SECOND = 100_000  # timestamps count 10 us
 _MINUTE = 60 * _PER_SECOND
 _LAST = (1 << 48) - 1
-_SIGNATURE, _STAMP, _HASH = 13, 6, 6  # bytes: all of it, its timestamp, its hash
+_SIGNATURE, _STAMP, _HASH = 13, 6, 6  # bytes of a signature, its timestamp, its hash
 
 
 class Refusal(Enum):
-    """Why a frame is refused; the values are names in `Counts`."""
+    """Reasons to refuse a frame; the values are names in `Counts`."""
 
     UNSIGNED = "unsigned"
     FORGED = "forged"
@@ -34,20 +34,20 @@ class Refusal(Enum):
 
 
 def read_key(path: Path) -> bytes:
-    """Return the signing key that a file holds.
+    """Read the signing key from a file.
 
-    32 bytes that are no text, or 64 hexadecimal digits, are the key itself. Any other text is a passphrase, and its
-    SHA-256 is the key, as MAVProxy, QGroundControl and Mission Planner do; white space around it does not count.
+    32 bytes that are not text, or 64 hexadecimal digits, are the key itself. Any other text is a passphrase, and its
+    SHA-256 is the key, as in MAVProxy, QGroundControl and Mission Planner; white space around it is ignored.
 
     Parameters
     ----------
     path : Path
-        Of a file that its owner alone can read.
+        File that only its owner can read.
 
     Returns
     -------
     bytes
-        32 of them.
+        Key of 32 bytes.
 
     Raises
     ------
@@ -61,9 +61,7 @@ def read_key(path: Path) -> bytes:
     except OSError as error:
         raise TelemetryError(f"{path}: the key cannot be read: {error.strerror or error}") from error
     if os.name == "posix" and mode & 0o077:
-        raise TelemetryError(
-            f"{path}: mode is {mode & 0o777:o}, expected 600: whoever reads it can command the vehicle"
-        )
+        raise TelemetryError(f"{path}: mode is {mode & 0o777:o}, expected 600: its readers can command the vehicle")
     if len(content) > _LONGEST_KEY:
         raise TelemetryError(f"{path}: more than {_LONGEST_KEY} bytes, expected a key or a passphrase")
     try:
@@ -85,25 +83,25 @@ def _is_hexadecimal(text: str) -> bool:
 
 
 class SigningClock:
-    """Timestamps of all signed frames of this vehicle: each is later than all before, also before a restart.
+    """Strictly increasing timestamps of all signed frames of this vehicle, also across restarts.
 
-    They go by the wall clock, and by whoever is at most a minute ahead of it: to a peer whose clock is ahead ours would
-    look old.
+    They follow the wall clock, or the latest verified timestamp of a peer, at most a minute ahead: a peer whose clock
+    is ahead would refuse earlier ones as old.
     """
 
     def __init__(self) -> None:
         self._last = 0
-        self._offset = time.time() - time.monotonic()  # s: a wall clock that is set back does not make all others early
+        self._offset = time.time() - time.monotonic()  # s: guards against a wall clock that is set back
 
     @property
     def latest_accepted(self) -> int:
-        """Timestamp [10 us since 2015] beyond which nobody is believed: a minute after the wall clock."""
+        """Latest accepted timestamp [10 us since 2015]: a minute after the wall clock."""
         wall = max(time.time(), self._offset + time.monotonic())
         return int((wall - _EPOCH) * _PER_SECOND) + _MINUTE
 
     @property
     def now(self) -> int:
-        """Time [10 us since 2015], that of the latest frame at least."""
+        """Time [10 us since 2015], at least that of the latest frame."""
         return max(self._last, int((time.time() - _EPOCH) * _PER_SECOND))
 
     def next(self) -> int:
@@ -112,19 +110,19 @@ class SigningClock:
         return self._last
 
     def heard(self, stamp: int) -> None:
-        """Go no longer behind a timestamp that came with a good signature."""
+        """Advance to a timestamp with a valid signature."""
         self._last = max(self._last, stamp)
 
 
 class Verifier:
-    """Judges what comes. One for all links, so that nothing heard on one can be repeated on another.
+    """Verify signatures. All links share one, so that a frame of one link cannot be replayed on another.
 
     Parameters
     ----------
     key : bytes
-        32 of them.
+        Key of 32 bytes.
     clock : SigningClock
-        Of the vehicle.
+        Clock of the vehicle's timestamps.
     """
 
     def __init__(self, key: bytes, clock: SigningClock) -> None:
@@ -133,9 +131,9 @@ class Verifier:
         self._latest: dict[tuple[int, int, int], int] = {}  # timestamps, by system, component and link
 
     def judge(self, frame: bytes, system: int, component: int, signed: bool) -> Refusal | None:
-        """Return why a whole frame of that sender is refused, None if it is not.
+        """Return the reason to refuse a frame, or None to accept it.
 
-        Only a frame with a good signature changes what is known of its sender.
+        Only a frame with a valid signature updates the sender's last timestamp.
         """
         if not signed:
             return Refusal.UNSIGNED
@@ -148,7 +146,7 @@ class Verifier:
         latest = self._latest.get(sender)
         if latest is not None and stamp <= latest:
             return Refusal.REPLAYED
-        if stamp > self._clock.latest_accepted:  # it would make all others look old
+        if stamp > self._clock.latest_accepted:  # it would make later valid frames look old
             return Refusal.AHEAD
         oldest = self._clock.now - _MINUTE
         if latest is None and stamp < oldest:
@@ -160,7 +158,7 @@ class Verifier:
         return None
 
     def _forget(self, oldest: int) -> bool:
-        """Forget the sender that is silent for longest, if a repeated frame of it would be too old anyway."""
+        """Remove the sender silent for longest, if its frames would be refused as too old; return True if removed."""
         sender = min(self._latest, key=self._latest.__getitem__)
         if self._latest[sender] >= oldest:
             return False

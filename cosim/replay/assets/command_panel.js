@@ -149,7 +149,7 @@ class CommandPanel {
       // what stands there rounded is left as it is
       return !Number.isFinite(written) || Math.abs(written - from[axis]) <= 0.005 ? from[axis] : written;
     });
-    if (Vec.norm(Vec.sub(to, from)) > 0) this.link.command(commandToMove(run, index, from, to, run.end));
+    if (Vec.norm(Vec.sub(to, from)) > 0) this.link.move(index, from, to);
   }
 
   /** A new obstacle stands ahead of the vehicle, from where it may be dragged. */

@@ -158,6 +158,17 @@ function chartsOf(runs) {
       key: "attitude", title: "Attitude", unit: "rad",
       signals: inTurn(["attitude.roll", "attitude.pitch", "attitude.yaw"], ["roll", "pitch", "yaw"]),
     },
+    { key: "sticks", title: "Sticks that were sent", unit: "", fixed: [-1, 1], signals: axes("stick", "XYZKMN") },
+    { key: "targets", title: "Velocity that was asked for, NED", unit: "m/s", signals: axes("velocity_target", "xyz") },
+    {
+      key: "ages", title: "Ages on the autopilot's link", unit: "s",
+      signals: inTurn(["autopilot.age", "companion.lateness", "companion.round_trip"], ["estimate", "late step", "round trip"]),
+    },
+    {
+      key: "states", title: "State of the companion: 5 steers, 6 holds, 7 leaves it to the pilot", unit: "", fixed: [0, 7],
+      signals: [signal("companion.state", "state", "blue")],
+    },
+    { key: "modes", title: "Mode of the autopilot, its own number", unit: "", signals: [signal("autopilot.mode", "mode", "blue")] },
   ].filter((spec) => {
     spec.signals = spec.signals.filter((one) => runs.some((run) => one.values(run)));
     return spec.signals.some((one) => !one.context);

@@ -11,6 +11,11 @@ class Run {
     this._room = this.rows;
   }
 
+  /** A run of the same numbers with another header, of the same signals. */
+  withHeader(header) {
+    return new Run(header, this._columns.map((column) => column.subarray(0, this.rows)));
+  }
+
   /** The times of all rows [s], rising. */
   get time() {
     return this.column("time");

@@ -1,4 +1,4 @@
-// Target and regions of a live run, dragged in the scene.
+// Target and regions, dragged in the scene: of a live run, or of a run that is flown again with other numbers.
 
 const BEGINS = 4; // pixels, below which a press is a click
 const EDGE_ON = 0.12; // sine of the angle below which a level plane is seen too much from its side to be dragged on
@@ -7,7 +7,10 @@ const SETTLES = 250; // ms, for which the ghost stays after its region was let g
 
 /** Lets a pointer drag regions, and draws where they will be. */
 class Dragging {
-  /** @param {LiveLink} link */
+  /**
+   * @param {LiveLink|WhatIf} link with page, run, heeded; time, at which regions are where they are taken; refusal, why
+   * nothing can be moved now; canMove(region); move(region, from, to)
+   */
   constructor(link) {
     this.link = link;
     this.canvas = link.page.canvas;
@@ -41,7 +44,7 @@ class Dragging {
     const scene = link.page.scene();
     if (!link.heeded || !scene) return null;
     const found = scene.pick(x, y);
-    if (!found || !canMove(link.run, found.region) || isFlat(link.run, found.region)) return null;
+    if (!found || !link.canMove(found.region) || isFlat(link.run, found.region)) return null;
     // the walls of what is to be kept within are all around; its name alone is a handle
     const { keep } = link.run.header.regions[found.region];
     const named = scene.labels.nameAt(x, y) !== null; // a name is picked before what is behind it
@@ -53,16 +56,16 @@ class Dragging {
     const { offsetX: x, offsetY: y } = event;
     const region = this._under(x, y);
     if (region === null) return;
-    const { run, page } = this.link;
-    if (!page.player.live) {
-      page.say("What is in the past cannot be moved: go to the end (End) to drag regions.", "info");
+    const { run, page, refusal, time } = this.link;
+    if (refusal) {
+      page.say(refusal, "info");
       return;
     }
     event.preventDefault();
     this.canvas.focus();
     this.canvas.setPointerCapture(event.pointerId);
-    const from = placeOf(run, region, run.end);
-    this.held = { run, region, from, to: from, x, y, last: [x, y], upright: null, moved: false };
+    const from = placeOf(run, region, time);
+    this.held = { run, region, time, from, to: from, x, y, last: [x, y], upright: null, moved: false };
   }
 
   _move(event) {
@@ -105,7 +108,7 @@ class Dragging {
     this.canvas.style.cursor = "";
     if (held.moved && held.run === link.run) {
       const round = held.to.map((x, i) => (x === held.from[i] ? x : Number(x.toFixed(3))));
-      link.command(commandToMove(link.run, held.region, held.from, round, link.run.end));
+      link.move(held.region, held.from, round);
     }
     setTimeout(() => {
       if (!this.held) this.ghost.clear();

@@ -16,7 +16,7 @@ class Ghost {
   }
 
   /** Draw a region of a run where it is held. */
-  draw(scene, { run, region, from, to }) {
+  draw(scene, { run, region, time, from, to }) {
     const { context } = this;
     const { clientWidth: width, clientHeight: height } = this.below;
     const ratio = window.devicePixelRatio || 1;
@@ -32,7 +32,7 @@ class Ghost {
     context.lineWidth = 2;
 
     context.setLineDash([6, 4]);
-    const outline = this._outline(scene, run, region, Vec.sub(to, placeOf(run, region, run.end) ?? from));
+    const outline = this._outline(scene, run, region, time, Vec.sub(to, placeOf(run, region, time) ?? from));
     if (outline.length > 2) {
       this._path(outline);
       context.closePath();
@@ -77,11 +77,11 @@ class Ghost {
   }
 
   /** The hull about the picture of a surface, moved by so much from where it is now; empty for what has none. */
-  _outline(scene, run, region, by) {
-    const shape = run.shape(region, run.end);
+  _outline(scene, run, region, time, by) {
+    const shape = run.shape(region, time);
     const solid = surfaceOf(shape);
     if (!solid) return [];
-    const shift = Vec.add(run.shift(region, run.end), by);
+    const shift = Vec.add(run.shift(region, time), by);
     const { points } = solid;
     const seen = [];
     for (let i = 0; i < points.length; i += 3) seen.push(scene.project([points[i] + shift[0], points[i + 1] + shift[1], points[i + 2] + shift[2]]));

@@ -1,7 +1,7 @@
 // The keyboard: one table that the handler obeys and the help tells.
 
-/** Keys of the page: how each is told, what it does, and the events it answers to. */
-function keysOf(page) {
+/** Keys of the page: how each is told, what it does, and the events it answers to; `whatIf` where it flies. */
+function keysOf(page, whatIf = null) {
   const { player, stage, board } = page;
   const turn = (dx, dy) => () => stage.camera("orbit", dx, dy);
   const move = (dx, dy) => () => stage.camera("pan", dx, dy);
@@ -46,7 +46,12 @@ function keysOf(page) {
     { group: "Scene", keys: "L", text: "Names of the regions, or none", does: { l: () => page.setLabels(!stage.labels) } },
     { group: "Charts", keys: "Z, Shift Z", text: "Shorter, longer window of time", does: { z: () => board.zoom(0.5), "Shift+z": () => board.zoom(2) } },
     { group: "Charts", keys: "X", text: "The whole run", does: { x: () => board.whole() } },
-    { group: "Page", keys: "R", text: "The next run into the panel", does: { r: () => page.select((page.selected + 1) % Math.max(1, page.runs.length)) } },
+    ...(whatIf
+      ? [
+          { group: "What if", keys: "R", text: "Reset: the run as it was recorded", does: { r: () => whatIf.reset() } },
+          { group: "What if", keys: "S", text: "Save as a scenario", does: { s: () => saveScenario(whatIf) } },
+        ]
+      : [{ group: "Page", keys: "R", text: "The next run into the panel", does: { r: () => page.select((page.selected + 1) % Math.max(1, page.runs.length)) } }]),
     { group: "Page", keys: "V", text: "Several runs side by side, or in one scene", does: { v: () => page.setSide(!stage.side) } },
     { group: "Page", keys: "T", text: "Light or dark", does: { t: () => page.setTheme(page.theme === "dark" ? "light" : "dark") } },
     { group: "Page", keys: "Esc", text: "Close the menu that is open", does: { Escape: closeMenu } },
@@ -80,9 +85,9 @@ function wants(target, name) {
 }
 
 /** Listen to the keyboard for as long as the page lives. */
-function listenToKeys(page, keys) {
-  const does = Object.assign({}, ...keys.map((key) => key.does));
+function listenToKeys(page) {
   document.addEventListener("keydown", (event) => {
+    const does = Object.assign({}, ...page.keys.map((key) => key.does));
     if (event.ctrlKey || event.metaKey || event.defaultPrevented) return;
     const name = keyName(event);
     if (!(name in does) || wants(event.target, name) || document.querySelector("dialog[open]")) return;

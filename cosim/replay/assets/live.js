@@ -20,6 +20,25 @@ class LiveLink {
     return Boolean(this.run?.header.commands) && !this.over && this._socket?.readyState === WebSocket.OPEN;
   }
 
+  /** When regions are where they are dragged from. */
+  get time() {
+    return this.run.end;
+  }
+
+  /** Why nothing can be dragged now; empty where it can. */
+  get refusal() {
+    return this.page.player.live ? "" : "What is in the past cannot be moved: go to the end (End) to drag regions.";
+  }
+
+  canMove(region) {
+    return canMove(this.run, region);
+  }
+
+  /** Move the place of a region from one point to another [m, NED]. */
+  move(region, from, to) {
+    return this.command(commandToMove(this.run, region, from, to, this.run.end));
+  }
+
   /** Connect; resolves when the first message came, or nobody answered. */
   connect() {
     return new Promise((settled) => {

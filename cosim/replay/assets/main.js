@@ -33,10 +33,12 @@ async function main() {
    * - charts: Chart[]; each has series() -> [{run (index in runs), name, label, time, values}], the arrays that are
    *   drawn, paint(), setWindow(from, to), spec.key
    * - show(runs): other runs in place of these; paint(): paint now, not with the next frame of the screen
+   * - whatIf: the WhatIf of a page that flies, else null: set(key, value), move(region, from, to), fail(), reset(), last
    * - page: the Page, as startLive() gets it (theme, setTheme, setSide, showRun, select, refresh, say)
    */
   window.subreach = {
     ready: false,
+    whatIf: null,
     page,
     player: page.player,
     get runs() {
@@ -58,6 +60,7 @@ async function main() {
   if (runs?.length) await page.show(runs);
   else if (runs && location.protocol.startsWith("http")) await startLive(page);
   else if (runs) page.nothing(NO_RUN);
+  if (runs?.length) window.subreach.whatIf = await startWhatIf(page);
   window.subreach.ready = true;
 }
 

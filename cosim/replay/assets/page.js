@@ -30,8 +30,10 @@ class Page {
     return this.runs[this.selected];
   }
 
-  /** Show some runs in place of those before. */
-  async show(all) {
+  /** Show some runs in place of those before; of the same scenario, where cursor and camera are to stay. */
+  async show(all, same = false) {
+    const { t } = this.player;
+    const { azimuth, elevation, distance, target, fitted } = this.scene()?.camera ?? {};
     const runs = all.filter(timed);
     if (runs.length < all.length) {
       const names = runNames(all).filter((_, i) => !timed(all[i]));
@@ -46,7 +48,24 @@ class Page {
     this._laid();
     this.board.window = null;
     this.board.setRuns(runs, this.shown, this.selected);
+    if (same) {
+      this.player.seek(t);
+      if (this.scene() && !fitted) {
+        Object.assign(this.scene().camera, { azimuth, elevation, distance });
+        this.scene().camera.aim(target);
+      }
+    }
     this.paint();
+  }
+
+  /** Show other runs of the same scenario in place of these, as many; cursor and camera stay. */
+  replace(runs) {
+    this.runs = runs;
+    this.player.replaceRuns(runs);
+    this.stage.replaceRuns(runs);
+    this._select();
+    this.board.setRuns(runs, this.shown, this.selected);
+    this.later();
   }
 
   /** Rows were appended to the runs, or events to their headers. */
@@ -213,8 +232,13 @@ class Page {
     this.dark.addEventListener("change", () => this.setTheme(this.dark.matches ? "dark" : "light"));
     listenToSplitter();
     this._print();
-    const keys = keysOf(this);
-    listenToKeys(this, keys);
+    this.setKeys(keysOf(this));
+    listenToKeys(this);
+  }
+
+  /** Answer to these keys, and tell of them in the help. */
+  setKeys(keys) {
+    this.keys = keys;
     fillHelp(document.getElementById("help"), keys);
   }
 

@@ -24,6 +24,13 @@ class Player {
     this._tell();
   }
 
+  /** Take other runs of the same time; the cursor stays. */
+  replaceRuns(runs) {
+    this.runs = runs;
+    this.t = Math.min(this.t, this.end);
+    this._tell();
+  }
+
   get start() {
     const filled = this.runs.filter((run) => run.rows);
     return filled.length ? Math.min(...filled.map((run) => run.start)) : 0;

@@ -59,6 +59,18 @@ class Scene {
     this.camera.look("iso");
   }
 
+  /** Show other runs in place of those, as many, from where the camera is. */
+  replaceRuns(runs) {
+    this.runs = runs;
+    this._trails = runs.map((run) => new Trail(run));
+    this._forces = runs.map((run) => new Forces(run));
+    this._regions = new Regions(runs);
+    const { target, distance, fitted } = this.camera;
+    this._measure();
+    Object.assign(this.camera, { target, distance, fitted });
+    this._later();
+  }
+
   /** Take the size that the page gives to the canvas. */
   resize() {
     const { clientWidth, clientHeight } = this.canvas;

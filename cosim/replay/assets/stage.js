@@ -73,6 +73,13 @@ class Stage {
     this.scene.camera.fit();
   }
 
+  /** Show other runs in place of these, as many, from where the cameras are. */
+  replaceRuns(runs) {
+    this.runs = runs;
+    for (const { blank, scene, indices } of this.views) if (!blank) scene.replaceRuns(indices.map((index) => runs[index]));
+    this.changed();
+  }
+
   setSide(on) {
     this.side = on;
     this.setRuns(this.runs, this.shown);

@@ -1,7 +1,7 @@
 """The figures of a report.
 
-One kind of figure a file, with a common style and fixed layout. All draw from rows of the record that are few enough to
-draw.
+A module for each kind of figure, with a common style and a fixed layout. Figures are drawn from a bounded number of
+rows of the record.
 
 Imports: controller, replay, results, scenario, simulation, simulation.commands.
 """

@@ -1,4 +1,4 @@
-"""A box of water as it is seen from outside and above, without perspective: far faces, scales, names of axes."""
+"""Axes of a box in parallel projection, seen from outside and above: far faces, scales, names of axes."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from cosim.report.figures.layout import written
 from cosim.report.figures.shape_outlines import hull_of
 from cosim.simulation.signals import Array
 
-_HEADING, _DOWN = np.deg2rad(-62.0), np.deg2rad(22.0)  # in which the viewer looks, and how steeply
-_LEFT, _BOTTOM, _ROUND = 0.62, 0.52, 0.12  # inches around the box: for numbers and names, and at the other sides
+_HEADING, _DOWN = np.deg2rad(-62.0), np.deg2rad(22.0)  # viewing direction: heading, and angle below the horizon
+_LEFT, _BOTTOM, _ROUND = 0.62, 0.52, 0.12  # inches, margins for numbers and names, and at the other sides
 _FACE, _GRID = "#f6f6f6", "#d8d8d8"
 
 
@@ -30,7 +30,7 @@ class Box:
     view : ndarray, shape (2, 3)
         The directions [NED] that point right and up in the picture.
     outline : ndarray, shape (n, 2)
-        Of the box in the picture, closed.
+        Closed outline of the box in the picture.
     """
 
     def __init__(self, low: Array, high: Array) -> None:
@@ -43,14 +43,14 @@ class Box:
         self._scale = 1.0  # inches a metre
 
     def height_for(self, width: float, most: float) -> float:
-        """Return how high the picture is that is so wide and at most so high [inch]."""
+        """Scale the box to a picture of a `width` and at most the height `most`; return its height [inch]."""
         across, up = self._most - self._least
         self._scale = min((width - _LEFT - _ROUND) / across, (most - _BOTTOM - _ROUND) / up)
         self._aside = (width - _LEFT - _ROUND - self._scale * across) / 2.0  # inches
         return float(self._scale * up + _BOTTOM + _ROUND)
 
     def draw(self, ax: Axes) -> Labels:
-        """Draw it into axes of that size, and return what places names in it."""
+        """Draw the box into axes of that size, and return the placer of labels in it."""
         scale, low, high = self._scale, self._low, self._high
         left, right = (_LEFT + self._aside) / scale, (_ROUND + self._aside) / scale
         ax.set_xlim(self._least[0] - left, self._most[0] + right)
@@ -92,7 +92,7 @@ class Box:
             ax.plot(*np.vstack(lines).T, color=_GRID, linewidth=0.5)
 
     def _axis(self, ax: Axes, axis: int, corner: Array, aside: Array, name: str) -> None:
-        """Write numbers and a name along an edge; `aside` points away from the box in the picture."""
+        """Draw ticks and name of an axis along an edge; `aside` points away from the box in the picture."""
         aside = aside / np.linalg.norm(aside) / self._scale
         point = corner.copy()
         horizontal = "right" if axis else "center"

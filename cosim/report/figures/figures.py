@@ -1,4 +1,4 @@
-"""The figures of a run, in the order of its report: the paper's, and what stands behind them."""
+"""The figures of a run, in the order of its report: those of the paper, and further ones."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _AFTER = {figure: f" (after Fig. {figure})" for figure in ("5a", "5b", "7")}  # 
 
 
 def drawings(data: FigureData) -> Iterator[NamedFigure]:
-    """Yield every figure that the run has something to show for.
+    """Yield every figure for which the run has data.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def drawings(data: FigureData) -> Iterator[NamedFigure]:
 
 
 def _figures(data: FigureData) -> Iterator[tuple[str, str, Callable[[FigureData], Figure]]]:
-    """Yield name, caption, and what draws it."""
+    """Yield name, caption, and drawing function of each figure."""
     moved = ""
     if data.scenario.moving:
         moved = (

@@ -1,4 +1,4 @@
-"""What pushed the vehicle, and what the law believes of its weight: forces, thrusters and estimates over time."""
+"""Figures of forces, thrusters and estimates over time."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from cosim.results.record import Rows
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
-_FLOOR = 1e-2  # N; less is drawn as that on a logarithmic axis
+_FLOOR = 1e-2  # N, least value on a logarithmic axis
 _ESTIMATES = ("W − B", "x_G W − x_B B", "y_G W − y_B B", "z_G W − z_B B")
 
 
 def norms_of(record: Rows) -> dict[str, Array]:
-    """Return the norm of the body force as it acted and as it was asked for, each of shape (rows,) [N].
+    """Return the norms of the acting and the commanded body force, each of shape (rows,) [N].
 
     Parameters
     ----------
     record : Rows
-        Any rows of a run.
+        Rows of a run, or a part of them.
 
     Returns
     -------
     dict
-        By words.
+        By label.
     """
     of = {"acting": "actuation", "asked for": "command"}
     forces = {words: record.stack([f"{name}.{axis}" for axis in "XYZ"]) for words, name in of.items()}
@@ -51,7 +51,7 @@ def forces(data: FigureData) -> Figure:
         entries[name] = curve(parts, data, acting[:, i], color=colour, linestyle=dashes)
     size = norms["acting"][np.isfinite(norms["acting"])]
     largest, typical = (float(size.max()), float(np.percentile(size, 90))) if size.size else (0.0, 0.0)
-    if largest > 20.0 * max(typical, 1.0):  # a spike would flatten all the rest
+    if largest > 20.0 * max(typical, 1.0):  # on a linear axis a spike would hide the rest
         symlog_axis(parts, largest, max(typical, 1.0))
     else:
         parts.set_ylim(*limits_of([acting], least=1.0))
@@ -61,7 +61,7 @@ def forces(data: FigureData) -> Figure:
 
 
 def thruster_caption(scenario: Scenario) -> str:
-    """Return what the thruster figure shows."""
+    """Return the caption of the figure of thrusters."""
     if scenario.actuation.through == "thrusters":
         return "Force of each thruster, and the least and greatest of any of them (dashed black)."
     return (
@@ -71,14 +71,14 @@ def thruster_caption(scenario: Scenario) -> str:
 
 
 def thrusts_of(scenario: Scenario, record: Rows) -> Array:
-    """Return the force of each thruster, or what it would have to give, shape (rows, thrusters) [N].
+    """Return the force of each thruster, or the one that the wrench would require, shape (rows, thrusters) [N].
 
     Parameters
     ----------
     scenario : Scenario
-        What was run.
+        The scenario of the run.
     record : Rows
-        Any rows of it.
+        Rows of the run, or a part of them.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def thrusts_of(scenario: Scenario, record: Rows) -> Array:
 
 
 def thrusters(data: FigureData) -> Figure:
-    """Draw the force of each thruster, or what it would have to give."""
+    """Draw the force of each thruster, or the one that the wrench would require."""
     vehicle = data.scenario.vehicle
     force = thrusts_of(data.scenario, data.record)
     labels = [f"thruster {i + 1}" for i in range(vehicle.n_thrusters)]

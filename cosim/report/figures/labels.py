@@ -1,4 +1,4 @@
-"""Names beside what they name, where there is room for them: never over another name or over the path."""
+"""Placement of labels at regions and features, without overlap of other labels or of the path."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from matplotlib.path import Path
 from cosim.report.figures.layout import short
 from cosim.simulation.signals import Array
 
-_LETTER, _HIGH = 0.066, 0.130  # inches, of a letter and of a line of the size below
-_MARK = 0.06  # inches, from the middle of a mark to its edge
-_MOST = 0.7  # of the picture; what is larger both ways fills it
+_LETTER, _HIGH = 0.066, 0.130  # inches, width of a letter and height of a line at the size below
+_MARK = 0.06  # inches, radius of a marker
+_MOST = 0.7  # fraction of the picture; larger areas get their label in a corner
 _SIZE = 7
 _COLOUR = "#333333"
 _CORNERS = np.array([[i, j] for i in (-1.0, 1.0) for j in (-1.0, 1.0)])
 
 
 class Labels:
-    """Gathers names and places them.
+    """Collects labels and places them.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class Labels:
     scale : float
         [inch/m], the same along both axes.
     frame : ndarray, shape (n, 2)
-        Convex outline of what names may cover [m, in the picture].
+        Convex outline of the area for labels [m, in the picture].
     """
 
     def __init__(self, ax: Axes, scale: float, frame: Array) -> None:
@@ -35,12 +35,12 @@ class Labels:
         self._offered: list[tuple[str, Array, Array, Path]] = []
 
     def offer(self, name: str, outline: Array) -> None:
-        """Ask for a name at what has an outline, or is a mark at a point; shape (n, 2) [m, in the picture]."""
+        """Request a label for an outline, or for a marker at a point; shape (n, 2) [m, in the picture]."""
         room = _MARK / self._scale if len(outline) == 1 else 0.0
         self._offered.append((short(name), outline.min(axis=0) - room, outline.max(axis=0) + room, Path(outline)))
 
     def put(self, path: Array) -> None:
-        """Place the names that find room, of small things first, clear of a path of shape (n, 2)."""
+        """Place the labels that fit, those of small outlines first, clear of a path of shape (n, 2)."""
         floor, ceiling, frame = self._frame.min(axis=0), self._frame.max(axis=0), Path(self._frame)
         taken: list[tuple[Array, Array]] = []
         for name, low, high, outline in sorted(self._offered, key=lambda of: float(np.prod(of[2] - of[1]))):
@@ -62,7 +62,7 @@ class Labels:
 
 
 def _candidates(low: Array, high: Array, size: Array, wide: bool) -> list[Array]:
-    """Return middles for a name, best first: within, then beside; of what fills the picture, in its corners alone."""
+    """Return centres for a label, best first: within, then beside; for a large outline in its corners only."""
     middle, half = (low + high) / 2.0, size / 2.0
     inner, outer = (high - low) / 2.0 - 1.1 * half, (high - low) / 2.0 + 1.2 * half
     corners = list(middle + inner * _CORNERS[::-1])

@@ -1,4 +1,4 @@
-"""Where things stand in a figure: axes, legend and labels at fixed places, which costs no search for them."""
+"""Layout of figures: axes, legend and labels at fixed positions, which needs no layout engine."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ WIDTH = 6.8  # inches, of every figure
 LEFT, RIGHT, BOTTOM, TOP = 0.80, 0.14, 0.46, 0.10  # inches around the axes
 LEGEND_ROW = 0.19  # inches
 _GAP = 0.14  # inches between axes
-_LABEL = 0.17  # inches from the figure's edge to the middle of an axis label
-_LONGEST = 34  # letters of a name in a legend
-_LETTERS, _MARK = 104, 7  # letters across a figure in a legend's size, that a line and the gap beside it are as wide as
+_LABEL = 0.17  # inches from the figure's edge to the centre of an axis label
+_LONGEST = 34  # greatest number of letters of a name in a legend
+_LETTERS, _MARK = 104, 7  # widths in letters of a legend: of the figure, and of a line with its gap
 
-# names come from users: their $ and _ are no mathematics
+# names are given by users: their $ and _ are not mathematics
 FIGURE_STYLE: Any = STYLE | {"text.parse_math": False, "xtick.labelsize": 8, "ytick.labelsize": 8}
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def new_figure(height: float) -> Figure:
-    """Return a figure of a height [inch], `WIDTH` wide."""
+    """Create a figure of a height [inch] and the width `WIDTH`."""
     return Figure(figsize=(WIDTH, height))
 
 
@@ -40,7 +40,7 @@ def panels(
     titles: float = 0.0,
     sharey: bool = True,
 ) -> tuple[Figure, Any]:
-    """Return a figure and its axes, those of a column on one x axis.
+    """Create a figure and its axes; axes of a column share their x axis.
 
     Parameters
     ----------
@@ -49,16 +49,16 @@ def panels(
     widths : sequence of float
         Of the columns, relative to each other.
     labels : sequence of str
-        Of the legend that will stand above all.
+        Labels of the legend above all axes.
     titles : float
-        Room above the axes [inch].
+        Height of titles above the axes [inch].
     sharey : bool
-        Whether axes of a row have one y axis.
+        Axes of a row share their y axis.
 
     Returns
     -------
     Figure, ndarray of Axes, shape (rows, columns)
-        Ticks have numbers at the left and at the bottom only.
+        With tick labels at the left and at the bottom only.
     """
     top = TOP + LEGEND_ROW * legend_rows(labels) + titles
     total = top + sum(heights) + _GAP * (len(heights) - 1) + BOTTOM
@@ -84,25 +84,25 @@ def panels(
 
 
 def plain_numbers(ax: Axes) -> None:
-    """Give the axes some ticks at round numbers, written out."""
+    """Set few ticks at round numbers, without exponents."""
     for axis, most in ((ax.xaxis, 8), (ax.yaxis, 5)):
         axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]))
         axis.set_major_formatter(FuncFormatter(written))
 
 
 def written(value: float, _: object = None) -> str:
-    """Return a number as it stands at an axis."""
+    """Format a number for an axis."""
     return f"{value:.6g}".replace("-", "−") if value else "0"
 
 
 def log_axis(ax: Axes, signals: Sequence[Array]) -> None:
-    """Make the y axis logarithmic, with powers of ten written as such, to show all of some signals above 0."""
+    """Make the y axis logarithmic, with powers of ten as tick labels, to show signals above 0."""
     ax.set_yscale("log")
     ax.yaxis.set_major_locator(LogLocator(numticks=6))
     ax.yaxis.set_minor_locator(NullLocator())
     ax.yaxis.set_major_formatter(FuncFormatter(_power))
     low, high = limits_of([np.log10(signal) for signal in signals])
-    if np.floor(high) - np.ceil(low) < 1.0:  # else hardly a power of ten would be in sight
+    if np.floor(high) - np.ceil(low) < 1.0:  # the axis has to span two powers of ten
         low, high = np.floor(low), max(np.ceil(high), np.floor(low) + 1.0)
     ax.set_ylim(10.0**low, 10.0**high)
 
@@ -128,21 +128,21 @@ def _power(value: float, _: object = None) -> str:
 
 
 def limits_of(signals: Sequence[Array], *, least: float = 0.0, room: float = 0.06) -> tuple[float, float]:
-    """Return limits of an axis that show all of some signals.
+    """Return limits of an axis that contain all values of signals.
 
     Parameters
     ----------
     signals : sequence of ndarray
-        What is no finite number is left out.
+        NaN and infinity are ignored.
     least : float
-        What the axis spans at the least.
+        Least span of the axis.
     room : float
-        Beyond the signals, of what they span.
+        Margin beyond the signals, as a fraction of their span.
 
     Returns
     -------
     float, float
-        From -1 to 1 where there is nothing to show.
+        From -1 to 1, with margin, without finite values.
     """
     finite = [s[np.isfinite(s)] for s in map(np.asarray, signals)]
     shown = np.concatenate([f for f in finite if f.size] or [np.array([-1.0, 1.0])])
@@ -153,12 +153,12 @@ def limits_of(signals: Sequence[Array], *, least: float = 0.0, room: float = 0.0
 
 
 def short(name: str) -> str:
-    """Return a name that fits into a legend."""
+    """Shorten a name for a legend."""
     return name if len(name) <= _LONGEST else name[: _LONGEST - 1].rstrip() + "…"
 
 
 def _rows_of(labels: Sequence[str], across: float = _LETTERS) -> list[list[str]]:
-    """Return labels in rows that fit across a figure, about as long as each other."""
+    """Arrange labels in rows of about the same length that fit the width of a figure."""
     rows: list[list[str]] = []
     room = 0.0
     for label in labels:
@@ -176,12 +176,12 @@ def _rows_of(labels: Sequence[str], across: float = _LETTERS) -> list[list[str]]
 
 
 def legend_rows(labels: Sequence[str]) -> int:
-    """Return how many rows a legend of these labels has."""
+    """Return the number of rows of a legend with these labels."""
     return len(_rows_of(labels))
 
 
 def legend(figure: Figure, entries: Mapping[str, Artist]) -> None:
-    """Put a legend above all axes, with names as they are: Matplotlib would leave out those that begin with _."""
+    """Add a legend above all axes, also for names that begin with _, which Matplotlib would omit."""
     height = figure.bbox.height / figure.dpi
     for i, row in enumerate(_rows_of(list(entries))):
         made = figure.legend(

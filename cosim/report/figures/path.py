@@ -1,4 +1,4 @@
-"""Where the vehicle went: its path among the regions, in space and in the planes."""
+"""Figures of the vehicle's path among the regions, in space and in planes."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ from cosim.report.figures.trajectory import SampledPath, way_of
 from cosim.scenario.colours import GOAL_COLOUR
 from cosim.simulation.signals import Array
 
-SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # north and depth, as one looks west
+SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # north and depth, looking west
 ABOVE = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # north and east
 _TALLEST = 7.6  # inches, of both planes together
 _FAINT = 0.35  # opacity of a region where it began or ended
 _GAP = 0.34  # inches between the planes
-_NAMED = 8  # regions whose names stand in the picture in space
+_NAMED = 8  # greatest number of regions that are labelled in space
 
 
 def path_3d(data: FigureData) -> Figure:
     """Draw the path, regions and goal in space, as seen from the south-east and above."""
     way = way_of(data)
     low, high = _extent(data, way)
-    wide = np.maximum(high - low, 0.4 * (high - low).max())  # a flat path still gets a box with some depth
+    wide = np.maximum(high - low, 0.4 * (high - low).max())  # least relative extent of the box along an axis
     middle = (low + high) / 2.0
     low, high = middle - wide / 2.0, middle + wide / 2.0
     entries = _entries(data, way)
@@ -60,7 +60,7 @@ def path_3d(data: FigureData) -> Figure:
     ax = figure.add_axes((0.1 / WIDTH, 0.0, 1.0 - 0.2 / WIDTH, height / (height + top)))
     labels = box.draw(ax)
     clip = Path(box.outline)
-    few = len(data.scenario.regions) <= _NAMED  # of more, no one could tell which name is whose
+    few = len(data.scenario.regions) <= _NAMED  # labels of more regions could not be assigned
     for place in places_of(data):
         seen = _region(ax, place, low, high, box.view, clip)
         if seen and not place.faint and few:
@@ -85,7 +85,7 @@ def path_plane(data: FigureData) -> Figure:
     top = TOP + LEGEND_ROW * legend_rows(list(entries)) + 0.16
     across = WIDTH - LEFT - RIGHT
     scale = min(across / along, _TALLEST / (side + above))  # inches a metre
-    # a narrow picture is drawn with more of the water beside it, not with a gap
+    # a narrow picture shows more of the surroundings to fill the width
     room = (across / scale - along) / 2.0
     low, high = low - np.array([room, 0.0, 0.0]), high + np.array([room, 0.0, 0.0])
     total = top + scale * (side + above) + _GAP + BOTTOM
@@ -123,7 +123,7 @@ def path_plane(data: FigureData) -> Figure:
 
 
 def _region(ax: Axes, place: Place, low: Array, high: Array, view: Array, clip: Path | None = None) -> list[Array]:
-    """Draw a region as it is seen, with edges where it is clipped; return the areas in sight."""
+    """Draw a region in a view, in 3D with its edges; return its visible areas."""
     lines = lines_of_shape(place.region.shape, low - place.shift, high - place.shift, view)
     if lines is None:
         return []
@@ -131,7 +131,7 @@ def _region(ax: Axes, place: Place, low: Array, high: Array, view: Array, clip: 
         [line + view @ place.shift for line in part] for part in (lines.areas, lines.outline, lines.edges)
     )
     if clip is None and cover(areas, view @ low, view @ high):
-        return []  # what leaves nothing of a picture free would tell nothing
+        return []  # a region that covers the whole picture is not drawn
     alpha = _FAINT if place.faint else 1.0
     whole = Path.make_compound_path(*(Path(area, closed=True) for area in areas))
     dashes = "-" if place.region.keep == "out" else "--"
@@ -148,18 +148,18 @@ def _region(ax: Axes, place: Place, low: Array, high: Array, view: Array, clip: 
 
 
 def _frame(low: Array, high: Array) -> Array:
-    """Return the corners of a picture, closed."""
+    """Return the closed outline of a picture."""
     return np.array([low, [high[0], low[1]], high, [low[0], high[1]], low])
 
 
 def _path(ax: Axes, data: FigureData, way: SampledPath, view: Array) -> None:
-    """Draw where the vehicle went, in the colour of a criterion while the arbiter gives way to a region of it."""
+    """Draw the path, in the colour of a criterion while one of its regions is active."""
     flat = way.points @ view.T
     ax.plot(*flat.T, color=PATH_COLOUR, linewidth=1.6)
     for i, criterion in enumerate(data.scenario.criteria):
         there = way.given_way == i
         if there.any():
-            there[:-1] |= there[1:]  # up to where the next piece begins
+            there[:-1] |= there[1:]  # up to the beginning of the next piece
             ax.plot(*np.where(there[:, None], flat, np.nan).T, color=criterion.colour, linewidth=2.4)
     if way.overlap.any():
         ax.plot(*np.where(way.overlap[:, None], flat, np.nan).T, color=BLACK, linewidth=3)
@@ -168,7 +168,7 @@ def _path(ax: Axes, data: FigureData, way: SampledPath, view: Array) -> None:
 
 
 def _targets(ax: Axes, way: SampledPath, view: Array) -> None:
-    """Draw the targets that were commanded before the last one, faint, with their number in the order they came."""
+    """Draw the targets that were commanded before the last one, faint, with their numbers in order."""
     for i, (middle, radius) in enumerate(way.targets):
         centre = view @ middle
         if radius > 0.0:
@@ -184,7 +184,7 @@ def _targets(ax: Axes, way: SampledPath, view: Array) -> None:
 
 
 def _entries(data: FigureData, way: SampledPath) -> dict[str, Artist]:
-    """Return what the legend of a picture in space tells, only of what there is."""
+    """Return the legend entries of a path figure, for elements that are drawn."""
     shown = {secondary.criterion for secondary in data.scenario.regions}
     entries: dict[str, Artist] = {}
     if data.scenario.has_goal:
@@ -204,14 +204,14 @@ def _entries(data: FigureData, way: SampledPath) -> dict[str, Artist]:
 
 
 def _with_gaps(lines: list[Array]) -> Array:
-    """Return lines as one, with NaN between them, shape (2, n)."""
+    """Join lines with NaN between them, shape (2, n)."""
     gap = np.full((1, 2), np.nan)
     joined: Array = np.vstack([part for line in lines for part in (line, gap)]).T
     return joined
 
 
 def _extent(data: FigureData, way: SampledPath) -> tuple[Array, Array]:
-    """Return the corners of a box about the path and the goal, with some room."""
+    """Return the corners of a box around path, goal and near regions, with a margin."""
     path = way.points
     places = list(places_of(data))
     all_bounds = [np.array(place.region.shape.bounds()) + place.shift for place in places]
@@ -221,10 +221,10 @@ def _extent(data: FigureData, way: SampledPath) -> tuple[Array, Array]:
         if place.region.name == "goal" and not place.faint
     ]
     targets = [np.array([middle - radius, middle + radius]) for middle, radius in way.targets]
-    points = np.vstack([path, *goals, *targets])  # an endless goal needs no room
+    points = np.vstack([path, *goals, *targets])  # infinite bounds of the goal are ignored
     low, high = points.min(axis=0), points.max(axis=0)
     size = (high - low).max()
-    for place, bounds in zip(places, all_bounds, strict=True):  # with the regions that are not far away
+    for place, bounds in zip(places, all_bounds, strict=True):  # include near regions
         near = (0.1 if place.faint else 0.5) * size
         if np.isfinite(bounds).all() and (bounds[1] >= low - near).all() and (bounds[0] <= high + near).all():
             points = np.vstack([points, np.clip(bounds, low - near, high + near)])

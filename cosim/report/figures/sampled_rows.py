@@ -1,4 +1,4 @@
-"""What figures draw from: a run's record, or of a long one those rows that tell."""
+"""Selection of the rows from which figures are drawn: all of a short record, significant ones of a long record."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from cosim.results.run_result import Run
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
-_WHOLE = 200_000  # rows of a record that is drawn as a whole
-_MOST = 80_000  # rows of extremes
-_EVEN = 2_000  # rows that are evenly spaced
-_CHANGES = 100  # by commands that are looked at in a block of rows, and a hundred times as many in all
+_WHOLE = 200_000  # greatest number of rows of a record that is used as a whole
+_MOST = 80_000  # greatest number of rows with extremes
+_EVEN = 2_000  # evenly spaced rows
+_CHANGES = 100  # greatest number of changes by commands in a block of rows; in all a hundred times as many
 _DRAWN = (
     "time", "position.", "attitude.", "membership.", "weight.", "estimate.", "command.", "actuation.",
     "thruster_force[", "commands.", "target.", "lyapunov.",
@@ -30,21 +30,21 @@ _EXTREME = ("attitude.", "membership.", "weight.", "estimate.", "lyapunov.")
 
 
 def story_of(run: Run) -> FigureData:
-    """Return what the figures of a run draw from.
+    """Select the data from which the figures of a run are drawn.
 
-    Of a long record these are the rows at which what is drawn is least and greatest in each of some hundred parts of
-    the time, and of those spans that figures show enlarged; evenly spaced rows, in time and along the way; and those at
-    which commands changed something.
+    Of a long record these are the rows with the minimum and maximum of each drawn signal in each of some hundred parts
+    of the run and of the enlarged spans; rows evenly spaced in time and along the path; and rows at which commands
+    changed a signal.
 
     Parameters
     ----------
     run : Run
-        What is drawn.
+        The run.
 
     Returns
     -------
-    Story
-        Its record, if it is long, has those rows alone, in memory.
+    FigureData
+        With the whole record if it is short, else with the selected rows in memory.
 
     Raises
     ------
@@ -59,22 +59,22 @@ def story_of(run: Run) -> FigureData:
 
 
 def _rows(data: FigureData, names: list[str]) -> NDArray[np.intp]:
-    """Return the rows of a long record that tell."""
+    """Return the selected rows of a long record."""
     scenario, record = data.scenario, data.record
     n, spans = len(record), enlarged(data)
     bounds = rows_at(record, [time for span in spans for time in span]).clip(0, n - 1)
-    signals = len(_telling(scenario, record.take([0], names)))
+    signals = len(_signals_with_extremes(scenario, record.take([0], names)))
     parts = max(1, _MOST // (2 * signals * (1 + len(spans))))
     edges = [even_edges(n, parts)]
     edges += [first + even_edges(end - first, parts) for first, end in bounds.reshape(-1, 2)]
-    blocks = (_telling(scenario, block) for block in record.blocks(names))
+    blocks = (_signals_with_extremes(scenario, block) for block in record.blocks(names))
     extremes = extreme_rows(blocks, signals, np.unique(np.concatenate(edges)))
     even = np.linspace(0, n - 1, _EVEN).astype(np.intp)
     return np.unique(np.concatenate([even, bounds, extremes, _along(record), _ordered(record)]))
 
 
-def _telling(scenario: Scenario, rows: Rows) -> list[Array]:
-    """Return the signals whose extremes a figure must not miss."""
+def _signals_with_extremes(scenario: Scenario, rows: Rows) -> list[Array]:
+    """Return the signals whose extremes the figures must show."""
     names = [name for name in rows.units if name.startswith(_EXTREME) or name.endswith(_DRAWN_OF_REGIONS)]
     names += [f"actuation.{axis}" for axis in "XYZ"]
     _, error = error_of(scenario, rows)
@@ -82,7 +82,7 @@ def _telling(scenario: Scenario, rows: Rows) -> list[Array]:
 
 
 def _along(record: Rows) -> NDArray[np.intp]:
-    """Return rows that are evenly along the way of the vehicle."""
+    """Return rows that are evenly spaced along the path of the vehicle."""
     found, total = [], 0.0
     for wanted in (0, POINTS):  # the length first
         marks, first, length, passed = np.linspace(0.0, total, wanted), 0, 0.0, -1.0
@@ -103,7 +103,7 @@ def _along(record: Rows) -> NDArray[np.intp]:
 
 
 def _ordered(record: Rows) -> NDArray[np.intp]:
-    """Return the rows at which commands changed something, and the ones before them; of very many only some."""
+    """Return the rows at which commands changed a signal, and the rows before them; thinned if there are many."""
     names = [name for name in record.units if name.startswith(("commands.", "target."))]
     found, first, before = [np.empty(0, np.intp)], 0, np.full((1, len(names)), np.nan)
     for block in record.blocks(names) if names else ():

@@ -1,6 +1,6 @@
-"""Shapes of regions as lines: what of them is seen from some side, their outlines, and edges that show them as solids.
+"""Projection of shapes to lines: visible areas, outlines, and edges that show them as solids.
 
-All comes from the entry of a shape: its mesh, or what makes finer lines, its half axes or its planes.
+The input is the entry of a shape: its mesh, or for finer lines its half axes or planes.
 """
 
 from __future__ import annotations
@@ -20,30 +20,30 @@ _TURN = np.linspace(0.0, 2.0 * np.pi, 73)  # rad
 _AROUND = np.column_stack([np.cos(_TURN), np.sin(_TURN)])
 _CORNERS = np.array([[i, j, k] for i in (-1.0, 1.0) for j in (-1.0, 1.0) for k in (-1.0, 1.0)])
 _BOX_EDGES = [(a, b) for a in range(8) for b in range(a) if (_CORNERS[a] != _CORNERS[b]).sum() == 1]
-_SHARP = np.cos(np.radians(31.0))  # faces that turn more from each other have an edge between them
-_BESIDE = 1e-3  # of a shape's size, from its outline
-_GRID = 12  # points a side
-_PIECES = 4  # of an edge of an outline, each hidden or not
+_SHARP = np.cos(np.radians(31.0))  # cosine of the angle between faces from which on their edge is drawn
+_BESIDE = 1e-3  # of a shape's size, distance from its outline of test points
+_GRID = 12  # points per side
+_PIECES = 4  # pieces of an edge of an outline whose visibility is tested
 
 
 @dataclass(frozen=True)
 class ShapeLines:
-    """A shape as it is seen, in lines of the picture, shape (n, 2)."""
+    """Projection of a shape: lines in the picture, shape (n, 2) each."""
 
-    areas: list[Array]  # closed: what any of them goes around is filled
-    outline: list[Array]  # NaN where it is hidden
+    areas: list[Array]  # closed outlines of filled areas
+    outline: list[Array]  # NaN in hidden parts
     edges: list[Array]
 
 
 def lines_of_shape(shape: Shape, low: Array, high: Array, view: Array) -> ShapeLines | None:
-    """Return a shape as it is seen.
+    """Project a shape to lines.
 
     Parameters
     ----------
     shape : Shape
-        At some place, not of attitude.
+        A shape in space.
     low, high : ndarray, shape (3,)
-        Corners of a box [m, NED], where what has no end is cut.
+        Corners of a box [m, NED], at which infinite shapes are cut.
     view : ndarray, shape (2, 3)
         Orthonormal rows: the directions [NED] that point right and up in the picture.
 
@@ -66,14 +66,14 @@ def lines_of_shape(shape: Shape, low: Array, high: Array, view: Array) -> ShapeL
 
 
 def hull_of(points: Array, view: Array) -> Array:
-    """Return the closed line about points [m, NED], shape (n, 3), in a view as of `lines_of_shape`."""
+    """Return the closed convex hull of points [m, NED], shape (n, 3), in a view as for `lines_of_shape`."""
     flat = points @ view.T
     farthest: Array = flat[np.argmax(_AROUND @ flat.T, axis=1)]  # in each direction
     return farthest
 
 
 def cover(areas: Sequence[Array], low: Array, high: Array) -> bool:
-    """Return whether areas of a `ShapeLines` leave nothing free of a rectangle, as far as a grid of points tells."""
+    """Return True if the areas of a `ShapeLines` cover all points of a grid in a rectangle."""
     shares = np.linspace(0.01, 0.99, _GRID)
     points = np.array([[x, y] for x in low[0] + shares * (high - low)[0] for y in low[1] + shares * (high - low)[1]])
     return bool(_within(points, areas).all())
@@ -105,19 +105,19 @@ def _between_planes(planes: Sequence[tuple[Array, Array]], low: Array, high: Arr
 
 
 def _cut(corners: Array, point: Array, normal: Array) -> Array:
-    """Return corners of the part of a convex body that is behind a plane."""
+    """Return the corners of the part of a convex body behind a plane."""
     out = (corners - point) @ normal
     behind, before = out <= 0.0, out > 0.0
     crossing = [
         a + (b - a) * (da / (da - db))
         for a, da in zip(corners[behind], out[behind], strict=True)
         for b, db in zip(corners[before], out[before], strict=True)
-    ]  # of all pairs: those within the face change no hull
+    ]  # of all pairs: points within a face do not change the hull
     return np.vstack([corners[behind], *crossing]) if behind.any() else np.empty((0, 3))
 
 
 def _section(low: Array, high: Array, point: Array, normal: Array) -> Array:
-    """Return the polygon in which a plane cuts a box, closed; empty if it does not."""
+    """Return the closed polygon of the intersection of a plane and a box; empty if there is none."""
     corners = (low + high) / 2.0 + (high - low) / 2.0 * _CORNERS
     out = (corners - point) @ normal
     met = [
@@ -142,7 +142,7 @@ def _normals(mesh: Mesh) -> Array:
 
 
 def _silhouettes(mesh: Mesh, view: Array) -> list[Array]:
-    """Return the closed lines about the faces of a mesh that look to one side, each with those faces on its left."""
+    """Return the closed outlines of the faces of a mesh that point to one side, with these faces on their left."""
     away = np.cross(view[0], view[1])
     facing = mesh.triangles[_normals(mesh) @ away > 1e-9].tolist()
     onward: dict[int, list[int]] = {}
@@ -161,7 +161,7 @@ def _silhouettes(mesh: Mesh, view: Array) -> list[Array]:
 
 
 def _seen_part(outline: Array, areas: Sequence[Array]) -> Array:
-    """Return an outline with NaN where the shape is on both of its sides."""
+    """Return an outline with NaN where the shape is on both sides of it."""
     share = np.linspace(0.0, 1.0, _PIECES, endpoint=False)[:, None]
     starts = np.vstack([(1.0 - share) * a + share * b for a, b in zip(outline, outline[1:], strict=False)])
     ends = np.roll(starts, -1, axis=0)
@@ -171,7 +171,7 @@ def _seen_part(outline: Array, areas: Sequence[Array]) -> Array:
     hidden = _within(beside, areas)
     pieces = np.stack([starts, ends, np.full_like(starts, np.nan)], axis=1)
     pieces[hidden] = np.nan
-    joined = ~hidden & ~np.roll(hidden, -1)  # goes on in the next piece
+    joined = ~hidden & ~np.roll(hidden, -1)  # the next piece is visible too
     keep = np.ones(pieces.shape[:2], dtype=bool)
     keep[joined, 1:] = False
     keep[-1] = True
@@ -180,14 +180,14 @@ def _seen_part(outline: Array, areas: Sequence[Array]) -> Array:
 
 
 def _within(points: Array, areas: Sequence[Array]) -> NDArray[np.bool_]:
-    """Return of each point whether the closed lines about areas go around it, shape (n,)."""
+    """Return a mask of the points within the closed outlines, shape (n,)."""
     turns = np.sum([_turns_about(points, area) for area in areas], axis=0)
     within: NDArray[np.bool_] = turns != 0
     return within
 
 
 def _turns_about(points: Array, line: Array) -> NDArray[np.intp]:
-    """Return how often a closed line goes around each point, shape (n,)."""
+    """Return the winding number of a closed line around each point, shape (n,)."""
     x, y = points[:, :1], points[:, 1:]
     (ax, ay), (bx, by) = line[:-1].T, line[1:].T
     left = (bx - ax) * (y - ay) - (x - ax) * (by - ay)
@@ -206,4 +206,4 @@ def _sharp_edges(mesh: Mesh, view: Array) -> Iterator[Array]:
                 faces[a, b] = i
             elif normals[i] @ normals[other] < _SHARP:
                 yield flat[[a, b]]
-    yield from (flat[[a, b]] for a, b in faces)  # where it is cut
+    yield from (flat[[a, b]] for a, b in faces)  # borders of an open mesh

@@ -1,4 +1,4 @@
-"""What all figures share: the run they draw from, colours, style, and curves with few enough points."""
+"""Shared code of all figures: data of the run, colours, style, and thinning of curves."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from cosim.scenario.colours import colours_of_regions
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
-# Okabe & Ito: told apart by colour-blind readers too
+# Okabe & Ito, safe for colour blindness
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, RED, PURPLE = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 )  # fmt: skip
@@ -42,16 +42,16 @@ STYLE: Any = {
 
 DPI = 160  # of figures as PNG
 
-_LEGEND_WIDTH, _LEGEND_MARK = 100, 7  # letters that fit across a figure, that a line or marker is as wide as
-POINTS = 1000  # of a drawn curve: about what a figure's width resolves
+_LEGEND_WIDTH, _LEGEND_MARK = 100, 7  # widths in letters: of a figure, and of a line or marker
+POINTS = 1000  # of a drawn curve, about the resolution of a figure's width
 
 
 @dataclass(frozen=True)
 class FigureData:
-    """What the figures draw from."""
+    """Data from which figures are drawn."""
 
     scenario: Scenario
-    record: Rows  # of a long run those rows alone that tell
+    record: Rows  # selected rows of a long run
     summary: dict[str, Any]
 
 
@@ -64,7 +64,7 @@ class NamedFigure:
     figure: Figure
 
     def write(self, folder: Path, png: bool = False) -> str:
-        """Write it into a folder as SVG, and as PNG if that is asked for; return the SVG."""
+        """Write the figure into a folder as SVG, and as PNG if `png`; return the SVG."""
         svg = io.StringIO()
         self.figure.savefig(svg, format="svg", metadata={"Date": None})
         (folder / f"{self.name}.svg").write_text(svg.getvalue(), encoding="utf-8")
@@ -74,14 +74,14 @@ class NamedFigure:
 
 
 def thin(time: Array, signal: Array) -> tuple[Array, Array]:
-    """Return a signal with few enough points to draw, of each part of the time the least and the greatest.
+    """Thin a signal for drawing to the least and the greatest value in each part of the time.
 
     Parameters
     ----------
     time : ndarray, shape (n,)
         [s].
     signal : ndarray, shape (n,)
-        On that time; a gap of NaN stays one.
+        Values at these times; gaps of NaN are kept.
 
     Returns
     -------
@@ -106,7 +106,7 @@ def regions_of(scenario: Scenario) -> Iterator[tuple[Region, str]]:
     Parameters
     ----------
     scenario : Scenario
-        What was run.
+        The scenario of the run.
 
     Yields
     ------
@@ -121,19 +121,19 @@ def regions_of(scenario: Scenario) -> Iterator[tuple[Region, str]]:
 
 @dataclass(frozen=True)
 class Place:
-    """A region in space, where it was at some time."""
+    """A region in space at one time."""
 
     region: Region
     colour: str
-    shift: Array  # (3,) m, NED, from where the scenario has it
-    faint: bool  # where it began or ended
+    shift: Array  # (3,) m, NED, from its place in the scenario
+    faint: bool  # True at the start or end of its motion
 
 
 def places_of(data: FigureData) -> Iterator[Place]:
-    """Yield where the goal was at the end, and each region when the vehicle had least clearance to it.
+    """Yield the goal at the end of the run, and each region at the time of its least clearance.
 
-    Those that move come before it, faint, where they began and where they ended. Regions of attitude are at no place
-    and left out.
+    Each moving one is preceded by its places at the start and the end, marked as faint. Regions of attitude have no
+    place and are skipped.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def places_of(data: FigureData) -> Iterator[Place]:
 
 
 def features_of(data: FigureData) -> Iterator[tuple[str, str, Array]]:
-    """Yield name, colour and place [m, NED], shape (3,), of every feature that is to be seen, as it was at the end.
+    """Yield name, colour and final position [m, NED], shape (3,), of the feature of every visibility region.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def features_of(data: FigureData) -> Iterator[tuple[str, str, Array]]:
 
 
 def shifts_of(record: Rows, name: str) -> Array:
-    """Return how far a region was from where the scenario has it at each step, shape (steps, 3) [m, NED].
+    """Return the shift of a region from its place in the scenario at each step, shape (steps, 3) [m, NED].
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def shifts_of(record: Rows, name: str) -> Array:
 
 
 def legend_columns(labels: Iterable[str]) -> int:
-    """Return how many columns a legend may have across a figure, as all are as wide as the longest label.
+    """Return the number of columns of a legend across a figure, all as wide as the longest label.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ def legend_columns(labels: Iterable[str]) -> int:
 
 
 def overlap_of(data: FigureData) -> NDArray[np.bool_]:
-    """Return when the scenario's regions overlapped about the vehicle, shape (steps,).
+    """Return a mask of the steps at which the vehicle was in the overlap of regions, shape (steps,).
 
     Parameters
     ----------
@@ -227,6 +227,6 @@ def overlap_of(data: FigureData) -> NDArray[np.bool_]:
         True within the windows of the summary.
     """
     time, windows = data.record["time"], np.array(data.summary["intersection_windows"]).reshape(-1, 2)
-    begun = np.searchsorted(windows[:, 0], time, "right")  # windows until then; they come one after the other
+    begun = np.searchsorted(windows[:, 0], time, "right")  # number of windows begun; they do not overlap
     inside: NDArray[np.bool_] = (begun > 0) & (time <= np.append(windows[:, 1], 0.0)[begun - 1])
     return inside

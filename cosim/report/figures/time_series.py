@@ -1,4 +1,4 @@
-"""What the vehicle did and why: errors, attitude, weights, clearances, and who steered, over time."""
+"""Figures over time: errors, attitude, velocities, weights, clearances, control modes, and V."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.commands import MODES
 from cosim.simulation.signals import Array
 
-_AWAY = 1e4  # m; regions further off have not come yet
-_NAMED = 8  # regions that a legend names one by one
-_NEAREST = 5  # of more, besides the goal
+_AWAY = 1e4  # m; regions further away are free obstacle slots
+_NAMED = 8  # greatest number of regions that a legend names one by one
+_NEAREST = 5  # regions named beside the goal if there are more
 DASHES = ("-", "--", "-.", ":")
-_WINDOWS = 3  # that are shown one by one
-_WIDER = 1.6  # than up to the end of the overlap
+_WINDOWS = 3  # greatest number of windows that are shown
+_WIDER = 1.6  # end of the enlarged span, relative to the end of the first overlap
 _TIME = "time [s]"
 
 
 def zooms(data: FigureData) -> bool:
-    """Return whether the first overlap is so early that figures over the whole run would not show it."""
+    """Return True if the first overlap is so early that figures over the whole run would not show it."""
     windows = data.summary["intersection_windows"]
     return bool(windows) and 0.0 < _WIDER * windows[0][1] <= 0.4 * data.summary["simulated_time"]
 
@@ -58,13 +58,13 @@ def enlarged(data: FigureData) -> list[tuple[float, float]]:
 
 
 def _around(data: FigureData, start: float, end: float) -> tuple[float, float]:
-    """Return what is shown of a window in which the regions overlap."""
+    """Return the span [s] that is shown around a window of overlap."""
     room = max(0.5 * (end - start), 5 * data.scenario.time.step)
     return start - room, end + room
 
 
 def _zoomed(data: FigureData, heights: Sequence[float], labels: Sequence[str]) -> tuple[Figure, Any]:
-    """Return axes for the whole run, shape (rows, 1), or (rows, 2) with the time of the overlap on the left."""
+    """Create axes for the whole run, shape (rows, 1), or (rows, 2) with the time of the overlap on the left."""
     if not zooms(data):
         figure, axes = over_time(data, heights, labels)
         return figure, axes[:, None]
@@ -81,7 +81,7 @@ def _zoomed(data: FigureData, heights: Sequence[float], labels: Sequence[str]) -
 
 
 def over_time(data: FigureData, heights: Sequence[float], labels: Sequence[str]) -> tuple[Figure, Any]:
-    """Return axes over the whole run, shape (rows,)."""
+    """Create axes over the whole run, shape (rows,)."""
     figure, axes = panels(heights, labels=labels)
     axes[0, 0].set_xlim(0.0, data.summary["simulated_time"] or data.scenario.time.step)
     axes[-1, 0].set_xlabel(_TIME)
@@ -89,7 +89,7 @@ def over_time(data: FigureData, heights: Sequence[float], labels: Sequence[str])
 
 
 def curve(axes: Any, data: FigureData, signal: Array, **style: Any) -> Line2D:
-    """Draw a signal into one axes, or into several that show different spans of time; return a line of it."""
+    """Draw a signal into one axes, or into several with different spans of time; return one of its lines."""
     time = data.record["time"]
     marker = "o" if len(time) == 1 else ""
     for ax in np.atleast_1d(axes):
@@ -103,14 +103,14 @@ def _zero_line(ax: Axes) -> None:
 
 
 def error_of(scenario: Scenario, record: Rows) -> tuple[str, Array]:
-    """Return the RMS error to the goal's centre, or the distance to the goal where it has none, and what it is.
+    """Return name and values of the RMS error to the goal's centre, or of the distance to a goal without one.
 
     Parameters
     ----------
     scenario : Scenario
-        What was run.
+        The scenario of the run.
     record : Rows
-        Any rows of it.
+        Rows of the run, or a part of them.
 
     Returns
     -------
@@ -126,7 +126,7 @@ def error_of(scenario: Scenario, record: Rows) -> tuple[str, Array]:
 
 
 def position_error(data: FigureData) -> Figure:
-    """Draw the RMS error to the goal's centre, or the distance to the goal where it has none."""
+    """Draw the RMS error to the goal's centre, or the distance to a goal without one."""
     what, error = error_of(data.scenario, data.record)
     sphere = data.scenario.goal if isinstance(data.scenario.goal, Sphere) else None
     labels = [what, "tolerance r_v/√3"] if sphere else [what]
@@ -209,7 +209,7 @@ def weights(data: FigureData) -> Figure:
 
 
 def clearance(data: FigureData) -> Figure:
-    """Draw the clearance to each region and to the goal: distances, and angles below them where there are any."""
+    """Draw the clearance to each region and to the goal: distances, and angles of attitude regions below."""
     regions = list(regions_of(data.scenario))
     of_places = [of for of in regions if not of_attitude(of[0].shape)]
     of_angles = [of for of in regions if of_attitude(of[0].shape)]
@@ -233,7 +233,7 @@ def clearance(data: FigureData) -> Figure:
             else:
                 entries[rest[0]] = curve(row, data, signal, color=colour, alpha=0.3, linewidth=0.6)
         low, high = limits_of(signals)
-        low = min(low, -0.08 * (high - min(low, 0.0)))  # below 0 is always in sight
+        low = min(low, -0.08 * (high - min(low, 0.0)))  # always shows some of the range below 0
         row[0].set_ylim(low, max(high, -0.2 * low))
         for ax in row:
             ax.axhspan(low, 0.0, color=RED, alpha=0.06, linewidth=0)
@@ -244,7 +244,7 @@ def clearance(data: FigureData) -> Figure:
 
 
 def _named(data: FigureData, names: list[str]) -> set[str]:
-    """Return which of the goal and the regions a legend names: all, or of many those that came nearest."""
+    """Return the names for the legend: all, or of many regions the goal and the nearest ones."""
     if len(names) <= _NAMED:
         return set(names)
     least = data.summary["min_clearance"]
@@ -252,7 +252,7 @@ def _named(data: FigureData, names: list[str]) -> set[str]:
 
 
 def control_mode(data: FigureData) -> Figure:
-    """Draw who steers, and whether the thrusters may work."""
+    """Draw the control mode, and the times at which the vehicle is disarmed."""
     figure, (ax,) = over_time(data, [1.3], [])
     time, mode = data.record["time"], data.record["commands.mode"]
     armed = data.record["commands.armed"] > 0.0
@@ -280,7 +280,7 @@ def lyapunov(data: FigureData) -> Figure:
     for row, signal, bad in ((axes[0], forms["normalized"], -1.0), (axes[1], rate, 1.0)):
         size = np.abs(signal[np.isfinite(signal)])
         largest, typical = (float(size.max()), float(np.percentile(size, 50))) if size.size else (0.0, 0.0)
-        if largest > 20.0 * max(typical, 1.0):  # the beginning would flatten all the rest
+        if largest > 20.0 * max(typical, 1.0):  # on a linear axis the beginning would hide the rest
             symlog_axis(row[0], largest, max(typical, 1e-3 * largest))
         else:
             row[0].set_ylim(*limits_of([signal, np.zeros(1)]))

@@ -1,4 +1,4 @@
-"""The way that a vehicle went, with few enough points to draw: where, past what, and to which targets."""
+"""The path of a vehicle, thinned for drawing, with active criteria, overlap and targets."""
 
 from __future__ import annotations
 
@@ -11,37 +11,37 @@ from cosim.replay.activity import RESTS_ON, active_regions, rests
 from cosim.report.figures.style import POINTS, FigureData, overlap_of
 from cosim.simulation.signals import Array
 
-_TARGETS = 12  # that are drawn on the way at the most
+_TARGETS = 12  # greatest number of targets that are drawn
 POSITION = ("position.x", "position.y", "position.z")
 
 
 @dataclass(frozen=True)
 class SampledPath:
-    """Some points of a path, evenly along its length."""
+    """Points of a path, evenly spaced along its length."""
 
     points: Array  # (n, 3) m, NED
-    given_way: NDArray[np.intp]  # (n,) criterion of the region that the arbiter gives way to, -1 for the goal
-    overlap: NDArray[np.bool_]  # (n,) whether the scenario's regions overlap there
+    given_way: NDArray[np.intp]  # (n,) index of the active region's criterion, -1 for the goal
+    overlap: NDArray[np.bool_]  # (n,) True in the overlap of the scenario's regions
     targets: list[tuple[Array, float]]  # before the last one: middle [m, NED], and radius [m], 0 for that of the goal
 
 
 def is_known(data: FigureData) -> bool:
-    """Return whether the record has any place of the vehicle that is a number."""
+    """Return True if the record has a finite position of the vehicle."""
     return bool(np.isfinite(data.record.stack(POSITION)).all(axis=1).any())
 
 
 def way_of(data: FigureData) -> SampledPath:
-    """Return the way of a run.
+    """Sample the path of a run.
 
     Parameters
     ----------
     data : FigureData
-        The run; its record has some place of the vehicle.
+        The run; its record has a finite position.
 
     Returns
     -------
-    Way
-        Of about as many points as a figure resolves.
+    SampledPath
+        With about as many points as a figure resolves.
     """
     path = data.record.stack(POSITION)
     known = np.flatnonzero(np.isfinite(path).all(axis=1))
@@ -52,7 +52,7 @@ def way_of(data: FigureData) -> SampledPath:
 
 
 def targets_of(data: FigureData) -> list[tuple[Array, float]]:
-    """Return where the target region was commanded to before the last command: middle [m, NED] and radius [m].
+    """Return the targets that were commanded before the last one: centre [m, NED] and radius [m].
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def targets_of(data: FigureData) -> list[tuple[Array, float]]:
     Returns
     -------
     list of (ndarray of shape (3,), float)
-        The radius is 0 where the target was the scenario's goal. A target that moves on its own gives few of them.
+        The radius is 0 for the scenario's goal. Of a target that moves by itself there are at most 12.
     """
     if not data.scenario.commands.enabled:
         return []
@@ -74,7 +74,7 @@ def targets_of(data: FigureData) -> list[tuple[Array, float]]:
 
 
 def _given_way(data: FigureData, at: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return in some rows the criterion of the region that the arbiter gives way to, -1 for the goal."""
+    """Return the index of the active region's criterion at rows `at`, -1 for the goal."""
     regions = data.scenario.regions
     if not regions:
         return np.full(len(at), -1)

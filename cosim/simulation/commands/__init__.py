@@ -1,6 +1,6 @@
 """Commands to a running vehicle.
 
-What can be asked of a vehicle from outside, applied between two steps, logged, and replayed from the log.
+The types of commands, and how they are applied between two steps, logged, and replayed from the log.
 
 Imports: controller, plant_fmu, scenario.
 """

@@ -1,4 +1,4 @@
-"""Commands to a running vehicle, applied: armed or not, by hand or by the law, and where the target region is."""
+"""Applies commands to a running vehicle: arming, modes, manual control, target region, obstacles and missions."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from cosim.simulation.commands.commands import (
     Mode,
     RemoveObstacle,
     Reset,
+    SetAttitude,
     SetCurrentItem,
     SetHeading,
     SetMission,
@@ -45,36 +46,35 @@ log = logging.getLogger(__name__)
 
 
 class CommandHandler:
-    """Follows commands, and carries the target region from one item of a mission to the next.
+    """Applies commands, and moves the target region from one mission item to the next.
 
     Parameters
     ----------
     scenario : Scenario
-        What is run; its commands are enabled.
+        The scenario of the run, with commands enabled.
     environment : RegionEnvironment
-        Whose target and obstacles are moved.
+        Its target and obstacles are moved.
     actuators : Actuators
-        Whose limits are changed.
+        Their limits are changed.
     state : VehicleState
-        The vehicle as the law is told.
+        The state that the law receives.
     out : ndarray, shape (7,)
-        Receives armed, mode, item of the mission (-1 for none), and the target's middle [m, NED] and radius [m].
+        Receives armed, mode, item of the mission (-1 for none), and the target's centre [m, NED] and radius [m].
 
     Attributes
     ----------
     settings : LiveSettings
-        The numbers as they are now.
+        The present settings.
     armed : bool
         Whether the thrusters may work.
     mode : Mode
-        Who steers, and whither.
+        The present mode.
     heading : float or None
-        Heading to be kept [rad], once one is commanded.
+        Desired heading [rad], None until one is commanded.
     control_regained, turned, changed : bool
-        Whether the law steers from now on and did not before, another heading was commanded, and settings were changed,
-        since `mark_applied`.
+        True if the law has taken over control, a heading was commanded, or settings were changed since `mark_applied`.
     reset : bool
-        Whether the run is to begin again.
+        True if the run is to begin again.
     """
 
     def __init__(
@@ -91,68 +91,78 @@ class CommandHandler:
         self.control_regained = self.turned = self.changed = self.reset = False
         self._environment, self._actuators, self._state, self._out = environment, actuators, state, out
         vehicle = scenario.vehicle
-        # greatest wrench along and about each axis, which full sticks are parts of
+        # greatest wrench along and about each axis, which a full stick commands
         self._reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
         self._manual: Array = np.zeros(6)
+        self._by_gain = True  # whether the pilot's gain scales the sticks
+        self._attitude: SetAttitude | None = None
         self._stabilizer = StickStabilizer(vehicle, state, scenario.time.control, self._reach)
         self._mission = MissionExecutor()
         self._slots = ObstacleSlots(scenario.commands.obstacles)
 
     @property
     def automatic_control(self) -> bool:
-        """Whether the law says what the thrusters do; otherwise `wrench` does."""
-        return self.armed and self.mode not in STICK_MODES
+        """Whether the law computes the forces; otherwise `wrench` does."""
+        return self.armed and self.mode not in STICK_MODES and not self._pushed
+
+    @property
+    def _pushed(self) -> bool:
+        """Whether an attitude with a force is commanded in the law's place."""
+        return self.mode == "reach" and self._attitude is not None and self._attitude.force is not None
 
     def wrench(self) -> Array:
-        """Return what the sticks ask for in a control period, shape (6,) [N, N m], body frame; nothing unless armed."""
-        gain = self.settings["commands.pilot_gain"] if self.armed else 0.0
-        if self.armed and self.mode != "manual":
-            return self._stabilizer.wrench(self._manual, gain, self.mode == "depth_hold")
-        wrench: Array = gain * self._manual * self._reach
-        return wrench
+        """Return the wrench by the sticks for a control period, shape (6,) [N, N m], body frame; 0 unless armed."""
+        if not self.armed:
+            return np.zeros(6)
+        gain = self.settings["commands.pilot_gain"] if self._by_gain else 1.0
+        if self.mode == "manual":
+            wrench: Array = gain * self._manual * self._reach
+            return wrench
+        sticks, attitude, rate = self._manual, self._attitude, None
+        if attitude is not None and attitude.force is not None:
+            sticks, gain, rate = np.array([*attitude.force, 0.0, 0.0, 0.0]), 1.0, attitude.rate_down
+        return self._stabilizer.wrench(sticks, gain, self.mode == "depth_hold", rate)
 
     def apply(self, command: Command, time: float) -> None:
-        """Follow a command, at the beginning of a step; what cannot be followed is logged and changes nothing.
+        """Apply a command at the beginning of a step; one that is invalid is logged and changes nothing.
 
         Parameters
         ----------
         command : Command
-            What is asked of the vehicle.
+            The command.
         time : float
             Of the step [s].
         """
-        steered = self.automatic_control
+        was_automatic = self.automatic_control
         try:
             self._dispatch(command, time)
         except CommandError as error:
             log.warning("%s: %s", type(command).__name__.lower(), error)
-        self.control_regained |= self.automatic_control and not steered
+        self.control_regained |= self.automatic_control and not was_automatic
 
     def _dispatch(self, command: Command, time: float) -> None:
         match command:
             case Arm():
                 self.armed = command.armed
-                self._manual[:] = 0.0
-                self._stabilizer.begin()
+                self._release()
             case SetMode():
                 self._set_mode(command.mode, time)
             case SetTarget():
                 self._environment.set_target(command.position, command.radius, command.velocity, time)
                 self._environment.save_target()
                 self.mode = "reach"
+                self._release()
             case SetHeading():
                 self.heading, self.turned = command.heading, True
             case ManualControl():
-                self._manual[:] = command.wrench
-            case AddObstacle():
-                slot = self._slots.take(command.number)
-                self._environment.add_obstacle(slot, command.position, command.radius, command.velocity, time)
-            case RemoveObstacle():
-                left = self._slots.leave(command.number)
-                if left is not None:
-                    self._environment.remove_obstacle(left)
-            case ShiftRegion():
-                self._environment.shift_region(command.region, command.by)
+                self._manual[:], self._by_gain = command.wrench, command.by_gain
+            case SetAttitude():
+                if self._attitude is None:
+                    self._stabilizer.begin()
+                self._attitude = command if command.quaternion is not None else None
+                self._stabilizer.attitude = None if command.quaternion is None else np.array(command.quaternion)
+            case AddObstacle() | RemoveObstacle() | ShiftRegion():
+                self._move_regions(command, time)
             case ChangeSetting():
                 self.settings.change(command.key, command.value)
                 self.changed = True
@@ -170,12 +180,24 @@ class CommandHandler:
             case _:
                 assert_never(command)
 
+    def _move_regions(self, command: AddObstacle | RemoveObstacle | ShiftRegion, time: float) -> None:
+        match command:
+            case AddObstacle():
+                slot = self._slots.take(command.number)
+                self._environment.add_obstacle(slot, command.position, command.radius, command.velocity, time)
+            case RemoveObstacle():
+                left = self._slots.leave(command.number)
+                if left is not None:
+                    self._environment.remove_obstacle(left)
+            case ShiftRegion():
+                self._environment.shift_region(command.region, command.by)
+
     def mark_applied(self) -> None:
-        """Note that whoever steps the run has taken over what is new."""
+        """Clear `control_regained`, `turned` and `changed`, once the master has applied them."""
         self.control_regained = self.turned = self.changed = False
 
     def _apply_setting(self, key: str) -> None:
-        """Bring a changed setting to regions and actuators; the law's gains and the arbiter's ramp the master takes."""
+        """Apply a changed setting to regions or actuators; gains of the law and the arbiter's ramp are the master's."""
         settings, region = self.settings, self.settings.region_of(key)
         if region is not None and key.endswith(".gain"):
             self._environment.set_gain(region, settings[key])
@@ -192,7 +214,7 @@ class CommandHandler:
         if mode == "mission" and not self._mission.items:
             raise CommandError("mode mission: there is no mission")
         self.mode = mode
-        self._manual[:] = 0.0
+        self._release()
         match mode:
             case "hold":
                 self._environment.set_target(here, radius)
@@ -201,14 +223,17 @@ class CommandHandler:
                 self._environment.set_target(up, radius)
             case "reach":
                 self._environment.restore_target()
-            case "stabilize" | "depth_hold":
-                self._stabilizer.begin()
             case "mission":
                 self._mission.enter(max(self._mission.at, 0))
                 self._resume(time)
 
+    def _release(self) -> None:
+        """Clear sticks and attitude; the stabilizer keeps the present heading and depth, and levels."""
+        self._manual[:], self._attitude = 0.0, None
+        self._stabilizer.begin()
+
     def _resume(self, time: float) -> None:
-        """Go on with the present item of the mission, from wherever the vehicle is."""
+        """Continue the present mission item from the vehicle's present position."""
         region, item = self._mission.region(), self._mission.items[self._mission.at]
         if region is not None and region is not item:
             self._set_target_of(region)
@@ -224,19 +249,19 @@ class CommandHandler:
             self._environment.set_target(item.position, item.radius)
 
     def update(self, time: float, clearance: float) -> bool:
-        """Write how things stand, and go on with the mission once its region was reached.
+        """Write the outputs, and begin the next mission item once the present one is done.
 
         Parameters
         ----------
         time : float
             Of the step [s].
         clearance : float
-            Of the target region, as the law is told [m]; 0 or above within it.
+            Of the target region at the measured pose [m]; 0 or above within it.
 
         Returns
         -------
         bool
-            Whether another item is under way now; what it changed is for `mark_applied` to note.
+            True if another item has begun; the master then applies its changes.
         """
         following = None
         if self.armed and self.mode == "mission":
@@ -249,7 +274,7 @@ class CommandHandler:
 
 
 def greatest_wrench(matrix: Array, lower: Array, upper: Array) -> Array:
-    """Return the greatest wrench along and about each axis alone that the least thruster forces give, both ways.
+    """Return the greatest wrench along and about each single axis, in both directions, by least-norm allocation.
 
     Parameters
     ----------
@@ -261,7 +286,7 @@ def greatest_wrench(matrix: Array, lower: Array, upper: Array) -> Array:
     Returns
     -------
     ndarray, shape (6,)
-        [N, N m]; 0 about an axis that the thrusters cannot turn.
+        [N, N m]; 0 for an axis that the thrusters cannot actuate.
     """
     inverse = np.linalg.pinv(matrix)
     limit = np.minimum(-lower, upper)

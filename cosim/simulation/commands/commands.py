@@ -1,4 +1,4 @@
-"""Commands: what can be asked of a running vehicle. Each is a value that stands as one line of JSON in a log."""
+"""Commands to a running vehicle. Each is a frozen value, and one line of JSON in a log."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from cosim.scenario.tables import Vector3, Vector6
 Mode = Literal["manual", "hold", "reach", "mission", "surface", "stabilize", "depth_hold"]
 
 MODES: tuple[Mode, ...] = get_args(Mode)  # a mode's index is its number in the record
-STICK_MODES: tuple[Mode, ...] = ("manual", "stabilize", "depth_hold")  # in which sticks steer, and no law
+STICK_MODES: tuple[Mode, ...] = ("manual", "stabilize", "depth_hold")  # manual control by sticks, without the law
 
-NOT_A_COMMAND = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)  # what msgspec raises at a text that is none
+NOT_A_COMMAND = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)  # raised by msgspec for an invalid text
 
 _FAR = 1e5  # m; beyond it nothing is commanded
 _FAST = 1e2  # m/s
 _LONG = 1e9  # s
+_UNIT = 1e-2  # by which a quaternion's length may differ from 1
 
 
 def _tag(name: str) -> str:
@@ -29,20 +30,20 @@ def _tag(name: str) -> str:
 
 
 class _Command(msgspec.Struct, frozen=True, tag_field="command", tag=_tag, forbid_unknown_fields=True):
-    """What all commands share: the log tells them apart by their name."""
+    """Base of all commands; in the log, the key ``command`` holds the command's name."""
 
 
 class Arm(_Command, frozen=True):
-    """Let the thrusters work, or stop them."""
+    """Arm or disarm: enable the thrusters, or stop them."""
 
     armed: bool
 
 
 class SetMode(_Command, frozen=True):
-    """Change the mode: who steers, and whither.
+    """Change the mode.
 
-    By hand, hold the place, reach the target region, follow the mission, surface, by hand with the attitude kept, or by
-    hand with attitude and depth kept.
+    ``manual``, ``hold`` the present position, ``reach`` the target region, follow the ``mission``, ``surface``,
+    ``stabilize`` (manual, attitude kept), or ``depth_hold`` (manual, attitude and depth kept).
     """
 
     mode: Mode
@@ -52,7 +53,7 @@ class SetTarget(_Command, frozen=True):
     """Move the target region, and reach it.
 
     With a radius the target is a sphere about `position` [m, NED]; otherwise the scenario's goal region, moved so that
-    its middle is there. It goes on from there at `velocity` [m/s, NED].
+    its centre is there. It travels from there at `velocity` [m/s, NED].
     """
 
     position: Vector3  # m, NED
@@ -67,15 +68,27 @@ class SetHeading(_Command, frozen=True):
 
 
 class ManualControl(_Command, frozen=True):
-    """Push by hand: a part, from -1 to 1, of the greatest wrench along and about each body axis."""
+    """Control manually: a fraction, from -1 to 1, of the greatest wrench along and about each body axis."""
 
-    wrench: Vector6  # parts, [-]
+    wrench: Vector6  # fractions, [-]
+    by_gain: bool = True  # the pilot's gain scales them
+
+
+class SetAttitude(_Command, frozen=True):
+    """Keep an attitude in the modes in which sticks steer, or with a force in place of the law while it reaches.
+
+    Another mode, another target, or an attitude of None ends it.
+    """
+
+    quaternion: tuple[float, float, float, float] | None  # from body to world, scalar first
+    force: Vector3 | None = None  # fractions of the greatest force along each body axis, -1 to 1; None: the sticks'
+    rate_down: float | None = None  # m/s, of the depth, in place of a vertical force
 
 
 class AddObstacle(_Command, frozen=True):
     """Keep out of a sphere about `position` [m, NED] that travels at `velocity` [m/s, NED].
 
-    What comes with a number that is known already moves that one.
+    The number of an obstacle that exists moves that obstacle.
     """
 
     number: int
@@ -85,47 +98,47 @@ class AddObstacle(_Command, frozen=True):
 
 
 class RemoveObstacle(_Command, frozen=True):
-    """Take away an obstacle that came from outside."""
+    """Remove an obstacle that a command has added."""
 
     number: int
 
 
 class ShiftRegion(_Command, frozen=True):
-    """Move a region by so much [m, NED], in the shape it has; one that travels goes on from there."""
+    """Move a region by the displacement `by` [m, NED]; its shape and velocity do not change."""
 
     region: str
     by: Vector3
 
 
 class ChangeSetting(_Command, frozen=True):
-    """Change a number of the scenario while it runs; `LiveSettings` says which."""
+    """Change a number of the scenario during the run; `LiveSettings` lists the keys."""
 
     key: str
     value: float
 
 
 class MissionItem(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One item of a mission: a region to be reached, and for how long to stay within it.
+    """One item of a mission: a region to be reached, and how long to stay within it.
 
-    Without a place there is no region, and what the item commands is done at once; the region before is kept to.
+    An item without a position has no region: its commands are applied at once, and the target stays as it is.
     """
 
     position: Vector3 | None  # m, NED
     radius: float | None = None  # m, of a sphere; None: the scenario's goal region, moved there
-    stay: float | None = 0.0  # s, within the region before the next item; None: for good
-    commands: tuple[SetHeading | ChangeSetting, ...] = ()  # followed as the item begins
-    jump: int | None = None  # item that is next instead, from 0
-    times: int | None = None  # as often, each time the mission is begun; None: always
+    stay: float | None = 0.0  # s, within the region before the next item; None: forever
+    commands: tuple[SetHeading | ChangeSetting, ...] = ()  # applied when the item begins
+    jump: int | None = None  # index of the item that comes next instead, from 0
+    times: int | None = None  # number of jumps, each time the mission is begun; None: no limit
 
 
 class SetMission(_Command, frozen=True):
-    """Follow these items, one after the other, whenever the mode is that of the mission."""
+    """Set the items of the mission, which the mode ``mission`` follows in order."""
 
     items: tuple[MissionItem, ...]
 
 
 class SetCurrentItem(_Command, frozen=True):
-    """Go on with an item of the mission, from 0."""
+    """Continue the mission with an item, from 0."""
 
     item: int
 
@@ -140,6 +153,7 @@ Command = (
     | SetTarget
     | SetHeading
     | ManualControl
+    | SetAttitude
     | AddObstacle
     | RemoveObstacle
     | ShiftRegion
@@ -151,17 +165,17 @@ Command = (
 
 
 def validate_command(command: Command) -> None:
-    """Raise unless the numbers of an order can be.
+    """Raise a CommandError if a number of a command is out of range.
 
     Parameters
     ----------
     command : Command
-        What is checked.
+        The command.
 
     Raises
     ------
     CommandError
-        If a number is not finite, absurdly great, or without a meaning.
+        If a number is not finite or out of range.
     """
     match command:
         case SetTarget() | AddObstacle():
@@ -176,6 +190,13 @@ def validate_command(command: Command) -> None:
                 _check_item(item, len(command.items))
         case ManualControl():
             _require(all(abs(x) <= 1.0 for x in command.wrench), "wrench", command.wrench, "six numbers from -1 to 1")
+        case SetAttitude(quaternion=q) if q is not None:
+            unit = abs(math.hypot(*q) - 1.0) <= _UNIT
+            _require(unit, "quaternion", q, "four numbers of length 1")
+            parts = command.force or ()
+            _require(all(abs(x) <= 1.0 for x in parts), "force", parts, "three numbers from -1 to 1")
+            rate = command.rate_down or 0.0
+            _require(abs(rate) <= _FAST, "rate_down", rate, f"up to {_FAST:g} m/s")
         case SetHeading():
             _require(math.isfinite(command.heading), "heading", command.heading, "a finite angle")
         case ChangeSetting():

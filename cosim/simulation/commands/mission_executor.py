@@ -1,4 +1,4 @@
-"""The course of a mission: which item is under way, and which one follows."""
+"""Execution of a mission: the present item, and the one that follows."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from cosim.simulation.commands.commands import MissionItem
 
 
 class MissionExecutor:
-    """A mission under way.
+    """Executes the items of a mission.
 
     Attributes
     ----------
     items : tuple of MissionItem
         Of the mission.
     at : int
-        The item under way, from 0; -1 before there is one.
+        Index of the present item, from 0; -1 before the mission begins.
     """
 
     def __init__(self) -> None:
         self.take(())
 
     def take(self, items: tuple[MissionItem, ...]) -> None:
-        """Take another mission, which has not begun."""
+        """Replace the mission; the new one has not begun."""
         self.items, self.at = items, -1
-        self._jumps: dict[int, int] = {}  # made so far, by item
+        self._jumps: dict[int, int] = {}  # number of jumps made, by item
         self._since = math.inf  # s, within the region of the present item
 
     def begin(self, item: int) -> None:
-        """Go on with an item; all jumps can be made again.
+        """Continue with an item, and reset the counts of jumps.
 
         Raises
         ------
@@ -43,23 +43,23 @@ class MissionExecutor:
         self.enter(item)
 
     def enter(self, item: int) -> MissionItem:
-        """Let an item be under way, and return it."""
+        """Make an item the present one, and return it."""
         self.at, self._since = item, math.inf
         return self.items[item]
 
     def region(self) -> MissionItem | None:
-        """Return the item whose region counts: the present one, or the last one before it that has a place."""
+        """Return the item whose region is the target: the present one, or the last before it with a position."""
         return next((item for item in self.items[self.at :: -1] if item.position is not None), None)
 
     def following(self, time: float, clearance: float) -> int | None:
-        """Return the item that follows now, or None if the present one is not done, or is the last one.
+        """Return the index of the next item; None while the present one is not done, or if it is the last one.
 
         Parameters
         ----------
         time : float
             [s].
         clearance : float
-            Of the region to be reached [m]; 0 or above within it. It does not count for an item without a place.
+            Of the target region [m]; 0 or above within it. It is not used for an item without a position.
         """
         if not 0 <= self.at < len(self.items):
             return None
@@ -76,21 +76,21 @@ class MissionExecutor:
 
 
 def way(items: Sequence[MissionItem], before: int, now: int) -> list[int] | None:
-    """Return the items that a mission went through from one to another that is under way now.
+    """Return the items that a mission passed through from one item to the present one.
 
-    Only those are gone through at once that have no place.
+    Only items without a position are passed through at once.
 
     Parameters
     ----------
     items : sequence of MissionItem
         Of the mission.
     before, now : int
-        Items.
+        Indices of the item before and of the present one.
 
     Returns
     -------
     list of int or None
-        `now` is the last of them; None, if `before` does not lead there by itself.
+        Ends with `now`; None if the mission does not lead there from `before`.
     """
     ways, seen = [[before + 1]], set[int]()
     while ways:

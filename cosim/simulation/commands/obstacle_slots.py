@@ -1,4 +1,4 @@
-"""Which of the places for obstacles that come while a run goes on each of them has."""
+"""Slots for the obstacles that commands add during a run."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from cosim.errors import CommandError
 
 
 class ObstacleSlots:
-    """Places for obstacles, given out by the lowest free one.
+    """Slots for obstacles, of which the lowest free one is assigned next.
 
     Parameters
     ----------
     count : int
-        How many there are.
+        Number of slots.
     """
 
     def __init__(self, count: int) -> None:
@@ -19,12 +19,12 @@ class ObstacleSlots:
         self._free = list(range(count))
 
     def take(self, number: int) -> int:
-        """Return the place of an obstacle, from 0; a free one, if it has none yet.
+        """Return the slot of an obstacle, from 0; assign a free one if it has none yet.
 
         Raises
         ------
         CommandError
-            If there is none.
+            If no slot is free.
         """
         if number not in self._taken:
             if not self._free:
@@ -33,7 +33,7 @@ class ObstacleSlots:
         return self._taken[number]
 
     def leave(self, number: int) -> int | None:
-        """Return the place that an obstacle gives up, None if it has none."""
+        """Free the slot of an obstacle and return it; None if it has none."""
         slot = self._taken.pop(number, None)
         if slot is not None:
             self._free = sorted([*self._free, slot])

@@ -1,4 +1,4 @@
-"""Numbers of a scenario that can be changed while it runs: gains, regions and limits."""
+"""Settings: numbers of a scenario that can be changed during a run, such as gains, regions and limits."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _OF_COMMANDS = {  # unit, least, greatest
 
 @dataclass(frozen=True)
 class Setting:
-    """A number as it is now."""
+    """A setting and its present value."""
 
     key: str  # as `cosim run --set` takes it
     unit: str
@@ -34,14 +34,14 @@ class Setting:
 
 
 class LiveSettings:
-    """The present numbers; each change is checked before it is taken.
+    """The present settings; each change is checked before it is applied.
 
-    Whoever makes the same changes to another one of the same scenario has the same numbers.
+    They depend on the scenario and the sequence of changes alone.
 
     Parameters
     ----------
     scenario : Scenario
-        What is run.
+        The scenario of the run.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class LiveSettings:
         self._units[key], self._ranges[key] = unit, (least, greatest)
 
     def _add_limits(self, scenario: Scenario) -> None:
-        """Add the limits of what drives the vehicle: the direct wrench's, or each thruster's."""
+        """Add the limits of the actuation: of the direct wrench, or of each thruster."""
         table = {v.name: v for v in variables(scenario.vehicle)}
         wrench = {"wrench_force_limit": scenario.limit.force, "wrench_time_constant": scenario.limit.time_constant}
         keys = {"limit.force": "wrench_force_limit", "limit.time_constant": "wrench_time_constant"}
@@ -83,7 +83,7 @@ class LiveSettings:
             variable = table[name]
             value = float(scenario.plant.parameters.get(name, wrench.get(name, variable.start)))
             least, greatest = variable.quantity.minimum, variable.quantity.maximum
-            # a thruster's limits hold 0 between them
+            # 0 stays between a thruster's limits
             least = 0.0 if name.startswith("thrust_max") else least
             greatest = 0.0 if name.startswith("thrust_min") else greatest
             self._add(key, variable.quantity.unit, value, least, greatest)
@@ -107,23 +107,23 @@ class LiveSettings:
                     yield Setting(f"{where}.{field.name}", "", float(value))
 
     def __getitem__(self, key: str) -> float:
-        """Return the present value of one of the numbers that stand alone."""
+        """Return the present value of a setting that is neither a law's gain nor part of a shape."""
         return self._numbers[key]
 
     def change(self, key: str, value: float) -> None:
-        """Take another value.
+        """Change the value of a setting.
 
         Parameters
         ----------
         key : str
             Of a setting.
         value : float
-            In its unit.
+            New value, in the setting's unit.
 
         Raises
         ------
         CommandError
-            If there is no such setting, or the value cannot be; then nothing is changed.
+            If there is no such setting, or the value is out of range; then nothing is changed.
         """
         try:
             if key.startswith("law.gains."):
@@ -168,12 +168,12 @@ class LiveSettings:
             return None
 
     def _part(self, key: str) -> tuple[str, str, int | None]:
-        """Return of which region a key of a shape is, which field of the shape it is, and which number of that.
+        """Split a key of a shape into region, field of the shape, and index in that field (None for a scalar).
 
         Raises
         ------
         CommandError
-            If it is none.
+            If the key is not one of a shape.
         """
         for name, shape in self.shapes.items():
             where = "goal." if name == "goal" else f"regions.{name}.shape."

@@ -1,4 +1,4 @@
-"""Where commands come from: a queue that another thread fills, or the log of an earlier run."""
+"""Sources of commands: a queue that another thread fills, or the log of an earlier run."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ QUEUED = 256  # commands between two steps; further ones are refused
 
 
 class CommandSource(Protocol):
-    """Gives the commands of each step."""
+    """Returns the commands of each step."""
 
     def take(self, k: int) -> Sequence[Command]:
         """Return the commands to be applied at the beginning of step `k`."""
@@ -27,17 +27,17 @@ class CommandSource(Protocol):
 
     @property
     def exhausted(self) -> bool:
-        """Whether no command will come any more."""
+        """Whether the source will return no more commands."""
         ...
 
 
 class CommandQueue:
-    """Commands from another thread, in the order in which they were given. Bounded: a flood is refused, not kept.
+    """Commands from another thread, in the order of submission. Bounded: further commands are rejected.
 
     Attributes
     ----------
     run : int
-        Which run takes them; the next one after a reset.
+        Number of the run that takes them, from 0; a reset begins the next one.
     """
 
     exhausted = False
@@ -55,17 +55,17 @@ class CommandQueue:
         command : Command
             To be applied.
         run : int, optional
-            The run that it is meant for; default: whichever takes it.
+            Number of the run for which it is; default: any.
 
         Returns
         -------
         bool
-            Whether there was room for it, and that run is not over.
+            False if the queue is full, or that run is over.
 
         Raises
         ------
         CommandError
-            If its numbers cannot be.
+            If a number of it is out of range.
         """
         validate_command(command)
         with self._lock:
@@ -75,20 +75,20 @@ class CommandQueue:
         return True
 
     def end_run(self) -> None:
-        """Forget what is queued, and refuse what still comes for the run that is over."""
+        """Clear the queue, and reject later commands for the run that is over."""
         with self._lock:
             self.run += 1
             self._commands.clear()
 
     def take(self, k: int) -> Sequence[Command]:
-        """Return what is queued, whatever the step `k`."""
+        """Return the queued commands, for any step `k`."""
         taken = []
         while self._commands:
             taken.append(self._commands.popleft())
         return taken
 
 
-_OLDER = re.compile(rb'\{"step": ?\d+, ?"order"')  # how a log of older versions begins
+_OLDER = re.compile(rb'\{"step": ?\d+, ?"order"')  # beginning of a log of older versions
 
 
 class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -101,7 +101,7 @@ class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def read_log(file: Path) -> list[tuple[int, Command]]:
     """Return the commands of an earlier run, each with the step that took it, in their order.
 
-    A last line that was cut off, by a kill or a full disk, does not count: that run did not follow it either.
+    A last line that is incomplete, after a kill or on a full disk, is skipped: that run did not apply it either.
 
     Parameters
     ----------
@@ -111,12 +111,12 @@ def read_log(file: Path) -> list[tuple[int, Command]]:
     Returns
     -------
     list of (int, Command)
-        As they were followed.
+        In the order in which they were applied.
 
     Raises
     ------
     RunError
-        If it cannot be read, or a line is no command.
+        If it cannot be read, or a line is not a command.
     """
     try:
         content = file.read_bytes()
@@ -139,7 +139,7 @@ def read_log(file: Path) -> list[tuple[int, Command]]:
 
 
 class ScheduledCommands:
-    """Commands that are known beforehand.
+    """Commands that are known before the run.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ class ScheduledCommands:
         return not self._entries
 
     def take(self, k: int) -> Sequence[Command]:
-        """Return the commands of step `k`, and of earlier ones that were not taken."""
+        """Return the commands of step `k`, and those of earlier steps that were not taken."""
         taken = []
         while self._entries and self._entries[0][0] <= k:
             taken.append(self._entries.popleft()[1])
@@ -174,7 +174,7 @@ class ReplayedCommands(ScheduledCommands):
     Raises
     ------
     RunError
-        If it cannot be read, or a line is no command.
+        If it cannot be read, or a line is not a command.
     """
 
     def __init__(self, file: Path) -> None:
@@ -182,16 +182,16 @@ class ReplayedCommands(ScheduledCommands):
 
 
 class LoggedCommands:
-    """Another source, of which each command that is taken is written down at once, so that a killed run has its log.
+    """Wraps a source, and logs each command as it is taken, so that a killed run has its log.
 
     Parameters
     ----------
     source : CommandSource
-        Where the commands come from.
+        Source of the commands.
     file : Path
         The log; made when the first command is taken.
     tell : callable, optional
-        Told of each step that takes commands, and of these, once they are written.
+        Called with the step and its commands once they are written.
     """
 
     def __init__(
@@ -201,11 +201,11 @@ class LoggedCommands:
 
     @property
     def exhausted(self) -> bool:
-        """Whether no command will come any more."""
+        """Whether the source will return no more commands."""
         return self._source.exhausted
 
     def take(self, k: int) -> Sequence[Command]:
-        """Return the commands of step `k`, once they are written."""
+        """Return the commands of step `k` after writing them to the log."""
         commands = self._source.take(k)
         if commands:
             self._write(_Entry(k, command) for command in commands)

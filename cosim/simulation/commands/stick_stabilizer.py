@@ -1,4 +1,4 @@
-"""Sticks with help, as ArduSub's STABILIZE and ALT_HOLD: the vehicle keeps level and its heading, and its depth too."""
+"""Stabilized manual control, as ArduSub's STABILIZE and ALT_HOLD: attitude, heading and optionally depth are kept."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from controller.quaternion import error, from_axis_angle, multiply, rotation_mat
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
-_CENTERED = 0.02  # part of a stick's way that counts as released
+_CENTERED = 0.02  # fraction of full stick below which it counts as released
 _GREATEST_TILT = math.radians(30.0)  # of full roll and pitch sticks
 YAW_RATE = math.radians(
     202.5
 )  # rad/s of a full stick at a pilot gain of 1, as ArduSub has it: 45 deg/s by ACRO_YAW_P of 4.5
-_CLIMB_RATE = 0.3  # m/s of a full stick
-_FARTHEST = math.radians(20.0), 0.3  # rad, m: by which heading and depth that are asked for lead the vehicle
+CLIMB_RATE = 0.3  # m/s of a full stick
+_FARTHEST = math.radians(20.0), 0.3  # rad, m: bounds by which desired heading and depth may lead the vehicle's
 _ATTITUDE, _DEPTH, _INTEGRAL = 2.5, 1.5, 0.3  # rad/s of both loops, 1/s of the depth's integral
 _NORTH, _EAST, _DOWN = np.eye(3)
 
 
 class StickStabilizer:
-    """Turns sticks into a wrench: surge and sway push, the others ask for angles and rates that are kept.
+    """Computes a wrench from sticks: surge and sway command forces, the others angles and rates.
 
-    It knows the vehicle's mass and inertia, as an autopilot that is tuned for it does, and nothing of the water.
+    Its model has the vehicle's mass and inertia, like a tuned autopilot, but no hydrodynamic damping or current.
 
     Parameters
     ----------
     vehicle : Vehicle
-        That is steered.
+        The vehicle.
     state : VehicleState
-        As the law is given it; read at each step.
+        The state that the law receives; read at each step.
     period : float
         Between two steps [s].
     reach : ndarray, shape (6,)
@@ -47,59 +47,68 @@ class StickStabilizer:
         self.begin()
 
     def begin(self) -> None:
-        """Keep heading and depth as they are now."""
+        """Keep the present heading and depth from now on, and no other attitude."""
+        self.attitude: Array | None = None  # quaternion that is kept in place of the sticks' attitude
         self._heading, self._depth = self._yaw(), float(self._state.position[2])
         self._integral = 0.0  # N
 
-    def wrench(self, sticks: Array, gain: float, keep_depth: bool) -> Array:
+    def wrench(self, sticks: Array, gain: float, keep_depth: bool, rate_down: float | None = None) -> Array:
         """Return the wrench of a control period.
 
         Parameters
         ----------
         sticks : ndarray, shape (6,)
-            Parts of X Y Z K M N, -1 to 1.
+            Fractions of X Y Z K M N, -1 to 1.
         gain : float
             The pilot's, 0 to 1.
         keep_depth : bool
-            Whether the vertical stick asks for a rate, and the depth is kept once it is released; else it pushes.
+            True: the vertical stick commands a vertical speed, and the depth is kept once it is released. False: it
+            commands a force.
+        rate_down : float, optional
+            Desired rate of the depth [m/s], in place of the vertical stick.
 
         Returns
         -------
         ndarray, shape (6,)
-            [N, N m], body frame; nothing where the state that it needs is not known.
+            [N, N m], body frame; 0 in elements whose state is NaN.
         """
-        if math.isnan(self._heading):  # not known so far, or not any more
+        if math.isnan(self._heading):  # there was no measurement when it was set
             self._heading = self._yaw()
         if math.isnan(self._depth):
             self._depth = float(self._state.position[2])
         wrench: Array = gain * sticks * self._reach
         wrench[3:] = self._moment(sticks, gain)
-        if keep_depth:
+        if keep_depth or rate_down is not None:
             wrench[2] = 0.0
+            stick = float(sticks[2])
+            asked = stick * CLIMB_RATE if abs(stick) > _CENTERED else 0.0
             R = rotation_matrix(self._state.quaternion)
-            wrench[:3] += R.T @ (self._heave(float(sticks[2]), R) * _DOWN)
+            wrench[:3] += R.T @ (self._heave(asked if rate_down is None else rate_down, R) * _DOWN)
         result: Array = np.clip(np.where(np.isfinite(wrench), wrench, 0.0), -self._reach, self._reach)
         return result
 
     def _moment(self, sticks: Array, gain: float) -> Array:
-        rate, turn = np.zeros(3), float(sticks[5])
-        if abs(turn) > _CENTERED:
-            rate[2] = gain * turn * YAW_RATE
-            ahead = math.remainder(self._heading + rate[2] * self._period - self._yaw(), math.tau)
-            self._heading = self._yaw() + min(max(ahead, -_FARTHEST[0]), _FARTHEST[0])
-        tilt = multiply(
-            from_axis_angle(_EAST, float(sticks[4]) * _GREATEST_TILT),
-            from_axis_angle(_NORTH, float(sticks[3]) * _GREATEST_TILT),
-        )
-        angle = 2.0 * error(multiply(from_axis_angle(_DOWN, self._heading), tilt), self._state.quaternion)[1:]
+        rate, turn, asked = np.zeros(3), float(sticks[5]), self.attitude
+        if asked is None:
+            if abs(turn) > _CENTERED:
+                rate[2] = gain * turn * YAW_RATE
+                ahead = math.remainder(self._heading + rate[2] * self._period - self._yaw(), math.tau)
+                self._heading = self._yaw() + min(max(ahead, -_FARTHEST[0]), _FARTHEST[0])
+            tilt = multiply(
+                from_axis_angle(_EAST, float(sticks[4]) * _GREATEST_TILT),
+                from_axis_angle(_NORTH, float(sticks[3]) * _GREATEST_TILT),
+            )
+            asked = multiply(from_axis_angle(_DOWN, self._heading), tilt)
+        else:
+            self._heading = self._yaw()  # kept once the attitude is free again
+        angle = 2.0 * error(asked, self._state.quaternion)[1:]
         moment: Array = -self._inertia * _ATTITUDE * (_ATTITUDE * angle + 2.0 * (self._state.velocity_body[3:] - rate))
         return moment
 
-    def _heave(self, stick: float, R: Array) -> float:
-        """Return the force down [N], world axes."""
-        depth, rate = float(self._state.position[2]), 0.0
-        if abs(stick) > _CENTERED:
-            rate = stick * _CLIMB_RATE
+    def _heave(self, rate: float, R: Array) -> float:
+        """Return the force down [N], world axes, for a rate of the depth [m/s]."""
+        depth = float(self._state.position[2])
+        if rate:
             ahead = self._depth + rate * self._period - depth
             self._depth = depth + min(max(ahead, -_FARTHEST[1]), _FARTHEST[1])
         error_down = self._depth - depth

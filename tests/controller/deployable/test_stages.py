@@ -112,13 +112,17 @@ def test_violated_soft_regions_repel():
         push = min(regions[i].gain * weights[i] * sight.values[i], most)
         count += push < most
         expected[:3] += TURNED.T @ out * push
-    law._soft_forces(sight, pack(regions), weights, np.zeros(3), TURNED, dynamics, wrench)
+    law._soft_forces(sight, pack(regions), weights, np.zeros(3), 0.0, TURNED, dynamics, wrench)
     assert wrench == pytest.approx(expected, rel=1e-12)
     assert count == 1
 
 
-def test_moving_vehicle_is_repelled_sideways_but_not_backwards():
-    """At rest in full; at 0.3 m/s and more without the part against the desired velocity; in between in proportion."""
+@pytest.mark.parametrize("entered", [0.0, 0.4, 1.0])
+def test_moving_vehicle_is_repelled_sideways_but_not_backwards(entered):
+    """At rest in full; else without the part against the desired velocity, of which the goal region gives some back.
+
+    Where the vehicle is as deep in it as the path ends, all of it at rest, none from 0.3 m/s on.
+    """
     dynamics, region = (
         askew(np.random.default_rng(4)),
         Region("wall", HalfSpace((0.5, 0.0, 0.0), (1.0, 1.0, 0.0)), "out", gain=10.0, hard=False),
@@ -129,6 +133,7 @@ def test_moving_vehicle_is_repelled_sideways_but_not_backwards():
     along = np.array([1.0, 1.0, 0.0]) / np.sqrt(2.0) * push  # out of it, along its normal
     for desired in (
         [0.0, 0.0, 0.0],
+        [-1e-4, 0.0, 0.0],
         [-0.1, 0.0, 0.0],
         [-0.3, 0.0, 0.0],
         [-2.0, 0.0, 0.0],
@@ -137,8 +142,8 @@ def test_moving_vehicle_is_repelled_sideways_but_not_backwards():
     ):
         wrench, expected, desired = np.zeros(6), along.copy(), np.array(desired)
         if desired[0] < 0.0:  # against the push in x
-            expected[0] -= min(-desired[0] / 0.3, 1.0) * along[0]
-        law._soft_forces(sight, pack([region]), np.ones(1), desired, TURNED, dynamics, wrench)
+            expected[0] *= min(1.0 - min(-desired[0] / 0.3, 1.0), entered)
+        law._soft_forces(sight, pack([region]), np.ones(1), desired, entered, TURNED, dynamics, wrench)
         assert TURNED @ wrench[:3] == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 

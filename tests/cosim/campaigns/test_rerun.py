@@ -9,6 +9,7 @@ import pytest
 
 from cosim.campaigns import Design, run_campaign, run_sweep, vary_from
 from cosim.campaigns.reruns.rerun import rerun
+from cosim.campaigns.scenes.conflicts import make_conflict
 from cosim.campaigns.store.folder import RESULTS
 from cosim.campaigns.workers.dispatch import KILLED
 from cosim.command_line.cli import main
@@ -152,3 +153,16 @@ def test_scene_rerun_is_bit_identical(tmp_path, capsys):
     assert list(rerun(out, 20001, tmp_path / "again").differing) == ["effort"]
     with pytest.raises(RunError, match="has no row 7, expected one from 20000 to 20002"):
         rerun(out, 7)
+
+
+@pytest.mark.slow
+def test_soft_regions_do_not_count_as_violated_when_a_scene_comes_again(tmp_path, capsys):
+    scene = next(made for made in map(make_conflict, range(100)) if made["kind"].startswith("squeeze"))
+    scene["scenario"]["time"]["duration"] = 1.0
+    assert not any(region["hard"] for region in scene["scenario"]["regions"])
+    out = tmp_path / "out"
+    run_campaign(write(tmp_path / "s.jsonl", [scene]), "deployable", out)
+    (row,) = pq.read_table(out / RESULTS).to_pylist()
+    assert row["weighted_violation"] > 0.0 and not row["violation"] and row["min_clearance"] is None
+    assert main(["rerun", str(out), str(scene["seed"]), "--out", str(tmp_path / "run")]) == 0
+    assert "step by step" not in capsys.readouterr().err

@@ -135,7 +135,7 @@ def test_rows_that_crash_dask_workers_are_rejected_and_others_complete(tmp_path,
 @pytest.mark.slow
 def test_unreachable_scheduler_gives_one_line_error(tmp_path, capsys, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("cosim.campaigns.workers.cluster._PATIENCE_WITH_SCHEDULER", 0.5)
+    monkeypatch.setattr("cosim.campaigns.workers.cluster._SCHEDULER_TIMEOUT", 0.5)
     words = ["sweep", "docking", "--vary", "law.gains.k_p1=1:2", "--samples", "3", "--out", str(tmp_path / "out")]
     assert main([*words, "--scheduler", "tcp://127.0.0.1:9"]) == 2
     (line,) = capsys.readouterr().err.splitlines()

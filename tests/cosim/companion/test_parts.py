@@ -9,15 +9,21 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.companion.clock_sync import ClockSync
+from cosim.companion.companion import Companion
 from cosim.companion.failsafes import Failsafes
 from cosim.companion.frame_alignment import FrameAlignment, SceneOrigin
 from cosim.companion.link import NetworkLink
-from cosim.companion.outputs import VelocityLead, manual_control, scale_of, velocity_target
+from cosim.companion.options import CompanionOptions
+from cosim.companion.outputs import require_taken
 from cosim.companion.safety import CONDITIONS, Observation, Supervisor
+from cosim.companion.set_points import TurnLead, VelocityLead, attitude_target, velocity_target
+from cosim.companion.sticks import channels_override, channels_released, manual_control, scale_of
 from cosim.companion.vehicle_state import ReportedState
+from cosim.errors import RunError
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.wire.endpoint import parse_endpoint
+from cosim.mavlink.wire.thrust_body import thrust_body_of
 from cosim.simulation.commands.commands import ManualControl
 from plant_fmu import load_vehicle
 from tests.cosim.mavlink.station import Station, scenario
@@ -94,7 +100,7 @@ def test_inconsistent_positions_give_no_frame_offset():
 
 def test_full_surge_of_a_bluerov2_at_half_gain_is_28_newtons():
     """As a real ArduSub was measured to give; and no stick asks for more."""
-    scale = scale_of(HEAVY, ARDUSUB, 0.5)
+    scale = scale_of(HEAVY, ARDUSUB, 0.5, "manual-control")
     sticks = scale.sticks(np.array([28.28, 0.0, 0.0, 0.0, 0.0, 0.0]))
     assert sticks[0] == pytest.approx(1.0, abs=0.01)
     assert np.abs(scale.sticks(np.full(6, -1e3))).max() <= 1.0
@@ -115,7 +121,7 @@ VECTORED_6DOF = np.array(
 )
 def test_ardusub_motor_mix_realizes_the_desired_wrench(wrench):
     """It adds the sticks in each motor, and its force goes with the square; our thrusters push the other way."""
-    scale = scale_of(HEAVY, ARDUSUB, 0.5)
+    scale = scale_of(HEAVY, ARDUSUB, 0.5, "manual-control")
     sticks = scale.sticks(0.25 * np.array(wrench, dtype=float))
     pilot = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 0.5])  # the gain leaves roll and pitch alone
     motors = VECTORED_6DOF @ (pilot * sticks)
@@ -128,12 +134,88 @@ def test_manual_control_realizes_the_desired_wrench(profile):
     """Through the vehicle's own service for sticks, whose parts of the greatest wrench the pilot's gain scales."""
     station = Station(profile, of=scenario("vehicle='bluerov2_heavy'", name="pipe-inspection"))
     station.look(1.0, **{"commands.mode": 0.0})
-    scale = scale_of(HEAVY, PROFILES[profile], 0.5)
+    scale = scale_of(HEAVY, PROFILES[profile], 0.5, "manual-control")
     wrench = np.array([10.0, -5.0, 8.0, 0.5, -0.8, 1.2])
     station.send(manual_control(mavlink, 1, PROFILES[profile], scale.sticks(wrench), all_axes=True))
     (command,) = station.commanded()
     assert isinstance(command, ManualControl)
     assert 0.5 * np.array(command.wrench) / np.diag(scale.efforts) == pytest.approx(wrench, rel=0.02)
+
+
+@pytest.mark.parametrize("sticks_by", ["manual-control", "rc-override"])
+def test_an_ardusub_makes_of_rate_sticks_the_rates_that_they_were_made_for(sticks_by):
+    """As its Sub::get_pilot_desired_climb_rate and pwm_to_angle_dz have it, at a pilot gain of 0.5."""
+    scale, gain = scale_of(HEAVY, ARDUSUB, 0.5, sticks_by), 0.5
+    scaled = gain if sticks_by == "manual-control" else 1.0
+    for rate in (0.02, -0.1, 0.2):
+        throttle = 500.0 - 500.0 * scaled * scale.climb_stick(rate)
+        top, bottom = 500.0 + 100.0 * gain, 500.0 - 100.0 * gain
+        climb = (throttle - top) / (1000.0 - top) if throttle > top else (throttle - bottom) / bottom
+        assert -0.5 * climb == pytest.approx(rate)
+        pulse, dead = 400.0 * scaled * scale.yaw_rate_stick(rate), 40.0 * gain
+        angle = 45.0 * math.copysign(abs(pulse) - dead, pulse) / (400.0 - dead)
+        assert math.radians(4.5 * angle) == pytest.approx(rate)
+    assert scale.climb_stick(0.0) == scale.yaw_rate_stick(0.0) == scale.yaw_rate_stick(math.nan) == 0.0
+
+
+def test_overridden_channels_are_in_ardusubs_order_and_are_given_back_by_zero():
+    message = decoded(channels_override(mavlink, 1, np.array([1.0, -1.0, 0.5, 0.25, -0.25, 0.1])))
+    pulses = [getattr(message, f"chan{i}_raw") for i in range(1, 9)]
+    assert pulses == [1400, 1600, 1300, 1540, 1900, 1100, 0xFFFF, 0xFFFF]  # pitch roll up yaw ahead right
+    message = decoded(channels_released(mavlink, 1))
+    assert [getattr(message, f"chan{i}_raw") for i in range(1, 9)] == [0] * 6 + [0xFFFF] * 2
+
+
+@pytest.mark.parametrize("wrench", [(20, 0, 0, 0, 0, 0), (28, -20, 10, 0, 0, 1)])
+def test_overridden_channels_give_the_wrench_that_they_were_made_for(wrench):
+    """As sticks do, but for the pilot's gain, which does not scale them."""
+    sticks = scale_of(HEAVY, ARDUSUB, 0.5, "rc-override").sticks(np.array(wrench, dtype=float))
+    motors = VECTORED_6DOF @ sticks
+    made = HEAVY.thruster_matrix @ (-40.0 * motors * np.abs(motors))
+    assert made == pytest.approx(np.array(wrench), rel=0.1, abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("profile", "steer_by", "sticks_by", "word"),
+    [
+        ("px4", "wrench", "manual-control", "no roll and pitch"),
+        ("px4", "velocity", "manual-control", "positions alone"),
+        ("px4", "sticks", "rc-override", "RC_MAP_"),
+        ("ardusub", "velocity", "rc-override", "no sticks are sent"),
+        ("generic", "attitude", "rc-override", "no sticks are sent"),
+    ],
+)
+def test_what_an_autopilot_does_not_take_is_refused_by_name(profile, steer_by, sticks_by, word):
+    with pytest.raises(RunError, match=word):
+        require_taken(profile, steer_by, sticks_by)
+    with pytest.raises(RunError, match=word):
+        Companion(scenario(name="pipe-inspection"), None, CompanionOptions(profile, steer_by, sticks_by))
+
+
+def test_an_attitude_leads_by_what_the_moment_turns():
+    """A second-order loop that is asked for it accelerates as the moment does."""
+    lead, state = TurnLead(HEAVY), reported((0.0, 0.0, 0.0))
+    inertia = np.diag(HEAVY.inertia) + np.diag(HEAVY.added_mass)[3:]
+    state.rates[:] = 0.0, 0.1, 0.2
+    asked = lead.attitude(np.array([0, 0, 0, 0.1, 0.0, -0.2]), state)
+    angle = 2.0 * asked[1:]  # small
+    acceleration = (angle / 0.3 - state.rates) / 0.3
+    assert acceleration * inertia == pytest.approx([0.1, 0.0, -0.2], abs=0.01)
+    far = lead.attitude(np.array([0, 0, 0, 1e3, 0.0, 0.0]), state)
+    assert 2.0 * math.acos(far[0]) == pytest.approx(0.35)
+    assert lead.attitude(np.full(6, math.nan), reported((0.0, 0.0, 0.0))) == pytest.approx([1.0, 0.0, 0.0, 0.0])
+
+
+def test_a_thrust_along_each_axis_is_the_published_extension_of_an_attitude_target():
+    """MAVLink's common.xml: three floats behind type_mask, which leave the checksum as it is."""
+    message = attitude_target(mavlink, 1, np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.25, -0.5, 0.125]))
+    frame = message.pack(mavlink.MAVLink(None, 255, 191))
+    assert frame[1] == 51 and struct.unpack("<3f", frame[10 + 39 : 10 + 51]) == (0.25, -0.5, 0.125)
+    (found,) = mavlink.MAVLink(None).parse_buffer(frame)
+    assert found.type_mask == 0b100111 and thrust_body_of(found) == (0.25, -0.5, 0.125)
+    assert frame == message.pack(mavlink.MAVLink(None, 255, 191))  # it can be sent again
+    without = attitude_target(mavlink, 1, np.array([1.0, 0.0, 0.0, 0.0]), None)
+    assert decoded(without).type_mask == 0b1000111 and thrust_body_of(decoded(without)) == (0.0, 0.0, 0.0)
 
 
 def test_velocity_setpoint_leads_by_the_desired_acceleration():

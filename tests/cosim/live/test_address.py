@@ -5,7 +5,7 @@ import socket
 import pytest
 
 from cosim.errors import TelemetryError
-from cosim.live.address import LiveAddress, bound, parse_live, stranger
+from cosim.live.address import LiveAddress, bound, foreign_origin, parse_live
 
 
 def test_an_address_is_a_port_or_a_host_with_one():
@@ -41,7 +41,7 @@ HERE = LiveAddress("127.0.0.1", "127.0.0.1", 8765)
     ],
 )
 def test_own_pages_and_programs_are_accepted(host, origin):
-    assert stranger(HERE, host, origin) is None
+    assert foreign_origin(HERE, host, origin) is None
 
 
 @pytest.mark.parametrize(
@@ -59,14 +59,14 @@ def test_own_pages_and_programs_are_accepted(host, origin):
     ],
 )
 def test_foreign_origins_are_rejected(host, origin):
-    assert stranger(HERE, host, origin)
+    assert foreign_origin(HERE, host, origin)
 
 
 def test_remote_host_header_must_be_an_address_or_own_name():
     there = LiveAddress("0.0.0.0", "0.0.0.0", 8765, loopback=False)
-    assert stranger(there, "192.0.2.7:8765", "http://192.0.2.7:8765") is None
-    assert stranger(there, f"{socket.gethostname()}:8765", None) is None
-    assert stranger(there, "evil.example:8765", None)
+    assert foreign_origin(there, "192.0.2.7:8765", "http://192.0.2.7:8765") is None
+    assert foreign_origin(there, f"{socket.gethostname()}:8765", None) is None
+    assert foreign_origin(there, "evil.example:8765", None)
 
 
 def test_occupied_port_is_an_error_only_if_requested():

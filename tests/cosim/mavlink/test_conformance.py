@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.command_line.cli import main
 from cosim.mavlink.conformance import (
+    CHECKS,
     Client,
     Result,
     as_json,
@@ -22,7 +23,8 @@ from cosim.mavlink.conformance import (
     qgc_connect,
     summary,
 )
-from cosim.mavlink.conformance.outcome import Check, failed, judged, passed, skipped, speed_of
+from cosim.mavlink.conformance.baselines import baseline_of
+from cosim.mavlink.conformance.outcome import Check, Subject, failed, judged, passed, skipped, speed_of
 from cosim.mavlink.wire.ground_end import Heard
 
 QUICK = {
@@ -192,6 +194,58 @@ def test_ftp_download_survives_lost_burst_packets(lost):
     data = bytes(range(256)) * 5
     found = ftp.download(client_of(FileServer(data, lost)), "@PARAM/param.pck")
     assert found.data == data and found.retries == 0
+
+
+def test_a_file_that_ends_before_its_announced_size_ends_there():
+    """As ArduPilot's of parameters, of which it announces twelve bytes each: the end is what it refuses to read."""
+
+    class Estimating(FileServer):
+        def __call__(self, message):
+            replies = super().__call__(message)
+            request = ftp._packet(message)
+            if request.opcode == ftp._OPEN:
+                return [self.reply(request, ftp._ACK, (len(self.data) + 500).to_bytes(4, "little"))]
+            if request.opcode in (ftp._READ, ftp._BURST) and request.offset >= len(self.data):
+                return [self.reply(request, ftp._NAK, bytes([ftp._END_OF_FILE]))]
+            return replies
+
+    data = bytes(range(256)) * 5
+    for lost in ((), (2,)):
+        assert ftp.download(client_of(Estimating(data, lost)), "@PARAM/param.pck").data == data
+
+
+def ardupilot(custom=b"d3adbeef"):
+    """Return a client that has found an ArduSub with a custom version."""
+
+    def answer(message):
+        if message.get_type() != "COMMAND_LONG" or message.param1 != mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
+            return None
+        return [mavlink.MAVLink_autopilot_version_message(0x2004, *[0] * 4, list(custom), *[[0] * 8] * 2, 0, 0, 0)]
+
+    link = Scripted(answer, beat=False)
+    link.come(mavlink.MAVLink_heartbeat_message(12, 3, 81, 19, 4, 3))
+    client = Client(link)
+    client.find(1.0)
+    return client
+
+
+def test_an_ardusub_may_fail_what_it_is_known_to_and_nothing_else():
+    baseline = baseline_of(Subject(ardupilot(), (), 1.0, False))
+    assert set(baseline.differences) <= {check.name for check in CHECKS}
+    known = baseline.judge("parameter-unknown", failed("nothing", "an answer"))
+    assert known.status == "differs" and known.expected.startswith("an answer; ArduSub: it is silent")
+    assert baseline.judge("parameter-unknown", passed("fine")).status == "pass"
+    assert baseline.judge("one-ack", failed("two", "one")).status == "fail"
+    result = Result(CHECKS[0], known, 0.1)
+    assert as_text(result).startswith("DIFFERS heartbeat-identity")
+    assert summary([result]) == "0 passed, 0 failed, 1 differ as known, 0 skipped, 0.1 s"
+    assert json.loads(as_json("x", [result]))["passed"] is True
+
+
+def test_our_own_vehicle_and_other_autopilots_may_fail_nothing():
+    ours = baseline_of(Subject(ardupilot(b"subreach"), (), 1.0, False))
+    px4 = baseline_of(Subject(client_of(lambda message: None), (), 1.0, False))
+    assert not ours.differences and not px4.differences
 
 
 def test_missing_ftp_file_is_reported():

@@ -9,6 +9,7 @@ from cosim.errors import ScenarioError
 from cosim.results.record import load_record
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
+from plant_fmu import load_vehicle
 
 PLACES = [(0.0, 0.0, 2.0), (2.0, 1.0, 2.5), (0.0, 0.0, 2.0)]
 TOUR = [
@@ -57,6 +58,23 @@ def test_fused_loop_equals_the_master(run):
                 assert outcome[name] == run.summary[name]
         else:
             assert not outcome["reached"] and np.isnan(outcome["closest_to_goal"])
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("net_weight", [-50.0, 0.0, 50.0])
+def test_a_soft_region_keeps_no_light_vehicle_out_of_a_goal_that_lies_in_it(net_weight):
+    """The top of the goal is 0.6 m deep in a soft region, whose push there is more than what brings the vehicle on."""
+    shape = "{type='half_space', point=[0.0, 0.0, 3.3], normal=[0.0, 0.0, 1.0]}"
+    changes = [
+        "goal={type='sphere', centre=[2.0, 0.0, 4.8], radius=0.9}",
+        f"regions=[{{name='greatest', criterion='depth', keep='in', hard=false, gain=100.0, shape={shape}}}]",
+        f"plant.parameters.buoyancy={load_vehicle('bluerov2_heavy').weight - net_weight}",
+        "arbiter.engine=closed",
+    ]
+    scenario = load_scenario("paper", [*TOUR, *changes])
+    with FusedFlyer(Variation(scenario, [])) as flyer:
+        outcome, _ = flyer.fly_one(scenario)
+    assert outcome["settled"] and 0.0 <= -outcome["closest_to_goal"] < 0.5
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""A path from the vehicle into the goal region: the planner that keeps one, its cost, and the search for another.
+"""A path from the vehicle into the goal region: the planner that improves it, its cost, and the tree search.
 
 Imports: regions.
 """

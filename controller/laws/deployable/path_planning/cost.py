@@ -1,8 +1,8 @@
-"""Cost of a path: its length, and what passing close to hard regions, or through soft ones, adds.
+"""Cost of a path: its length, and penalties for passing close to hard regions, or through soft ones.
 
-Regions are evaluated along the path, each at the place to which it will have moved by then. A clearance changes by at
-most the distance travelled: so strides are long where there is room, and a region that is far is not evaluated before
-it could be near. An evaluation may take several periods, each with a bounded number of strides.
+Regions are evaluated along the path, each at its predicted position. A clearance changes by at most the distance
+travelled: so strides are long where clearances are large, and a far region is not evaluated before it could be near. An
+evaluation may take several periods, each with a bounded number of strides.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ _SAMPLES = (
     512,
 )  # evaluations of the regions along a path at most: in a call, and before the rest counts as blocked
 _STRIDE = (0.08, 3.0)  # m, least and greatest distance between two
-_TRUST = 0.7  # of the clearance beyond the desired one, travelled before the next evaluation
-_INSIDE = 200.0  # m of path, cost of a metre within a hard region, by
-_EDGE = 0.1  # m, or more; in proportion where by less, so that the cost does not depend on where the strides end
+_TRUST = 0.7  # stride as a fraction of the clearance beyond the desired one
+_INSIDE = 200.0  # m of path, cost of a metre inside a hard region at depth
+_EDGE = 0.1  # m or more; proportional at less depth, so that the cost does not depend on where strides end
 _NEAR = 3.0  # m of path, cost of a metre on the surface
-_ENTERED = 0.5  # m of depth that being in a soft region costs as much as, in full from a depth of
-_SHALLOW = 0.2  # m on; in proportion where it is less deep
-_STAY = 3.0  # m of path that the stay at its end costs as much as
-_AWAY = 0.05  # m outside a soft region, from where on a stay counts as being in it: it keeps clear of the surface
+_ENTERED = 0.5  # m of depth, equivalent cost of being in a soft region at a depth of
+_SHALLOW = 0.2  # m or more; proportional at less depth
+_STAY = 3.0  # m of path, equivalent cost of the stay at its end
+_AWAY = 0.05  # m outside a soft region, within which a stay counts as inside: keeps the end off its surface
 _COARSE = 0.25  # m, least distance between two evaluations near the surface of a soft region
 _SPHERE = Sphere.kind
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on do not depend on position alone
@@ -44,14 +44,14 @@ class PathCost(NamedTuple):
     """The cost of a path, complete or not yet."""
 
     start: Array  # (3,) m, NED: of the path, when the evaluation began
-    counts: NDArray[np.int64]  # (2,) leg that is evaluated next, evaluations so far
-    travelled: Array  # (2,) m: of the legs before, and of this leg
-    cost: Array  # (3,) m: so far, what of it hard regions add, and soft ones on the way
-    clear_until: Array  # (n,) m of path until which each region is far
+    counts: NDArray[np.int64]  # (2,) next leg to evaluate, evaluations so far
+    travelled: Array  # (2,) m: along previous legs, and along this leg
+    cost: Array  # (3,) m: so far; part by hard regions; part by soft regions on the way
+    clear_until: Array  # (n,) m of path before which each region needs no evaluation
 
 
 def empty_cost(n_regions: int) -> PathCost:
-    """Return the cost of no path, among `n_regions`."""
+    """Return the state before the first evaluation, for `n_regions`."""
     return PathCost(np.zeros(3), np.zeros(2, dtype=np.int64), np.zeros(2), np.zeros(3), np.zeros(n_regions))
 
 
@@ -65,14 +65,14 @@ def begin_cost(cost: PathCost, start: Array) -> None:
 
 
 def add_cost(cost: PathCost, path: Array, count: int, regions: PackedRegions, limits: PathLimits, most: float) -> bool:
-    """Evaluate a path further, and return whether that is done: all of it, or a cost above `most`.
+    """Continue the evaluation of a path; return True once it is complete, or the cost exceeds `most`.
 
     Parameters
     ----------
     cost : PathCost
-        Begun by `begin_cost`; updated.
+        State started by `begin_cost`; updated.
     path : ndarray, shape (k, 3)
-        Points [m, NED].
+        Points of the path [m, NED].
     count : int
         Number of points in use.
     regions : PackedRegions
@@ -80,7 +80,7 @@ def add_cost(cost: PathCost, path: Array, count: int, regions: PackedRegions, li
     limits : PathLimits
         Clearance, margin, speed.
     most : float
-        Cost [m] beyond which no more is asked.
+        Cost [m] above which the evaluation stops.
 
     Returns
     -------
@@ -122,7 +122,7 @@ def add_cost(cost: PathCost, path: Array, count: int, regions: PackedRegions, li
 
 
 def _add_stride(cost: PathCost, stride: float, soft: float, penalty: float) -> None:
-    """Add a stride [m], each metre of which costs so much more."""
+    """Add a stride [m] with the extra cost per metre of `soft` regions and `penalty` of hard ones."""
     cost.travelled[1] += stride
     cost.cost[0] += stride * (1.0 + soft + penalty)
     cost.cost[1] += stride * penalty
@@ -132,7 +132,7 @@ def _add_stride(cost: PathCost, stride: float, soft: float, penalty: float) -> N
 def _evaluate_place(
     cost: PathCost, place: Array, regions: PackedRegions, limits: PathLimits
 ) -> tuple[float, float, float]:
-    """Return the least clearance of hard regions [m], what soft ones cost a metre, and the longest stride [m]."""
+    """Return the least clearance of hard regions [m], the cost of soft ones per metre, and the longest stride [m]."""
     travelled = cost.travelled[0] + cost.travelled[1]
     later = travelled / limits.speed  # s
     far = limits.clearance + _STRIDE[1] / _TRUST  # m, of clearance, beyond which it does not matter
@@ -162,15 +162,15 @@ def _evaluate_place(
 
 
 def _depth_cost(depth: float, away: float) -> float:
-    """Return what the crossing cost of a soft region is multiplied with at a depth [m] in it, below 0 outside.
+    """Return the factor of a soft region's crossing cost at a depth [m] in it, negative outside.
 
-    Being in it counts from a distance `away` [m] on, and in full `_SHALLOW` deeper.
+    The part `_ENTERED` starts at a distance `away` [m] outside, and is full `_SHALLOW` deeper.
     """
     return _ENTERED * min((depth + away) / _SHALLOW, 1.0) + max(depth, 0.0) if depth > -away else 0.0
 
 
 def _stay_cost(end: Array, regions: PackedRegions) -> float:
-    """Return what soft regions cost a metre at the end of a path [m, NED], where they are now."""
+    """Return the cost of soft regions per metre at the end of a path [m, NED], at their present positions."""
     total, room = 0.0, zeros(3)
     for i in range(regions.kinds.size):
         if not regions.hard[i] and regions.kinds[i] < _ATTITUDE:

@@ -1,10 +1,10 @@
 """Path planner: a polyline from the vehicle into the goal region that keeps clear of the hard regions.
 
-A potential alone leads into pockets between obstacles. So the law keeps a path of a few corners, and tries one change
-after the other: a corner moved, added or dropped, or another end in the goal region. While the path is blocked, or soft
-regions make it costly, what `search.py` finds is a change, too. The path that costs less stays, by `cost.py`. Each
-period does a bounded part of the work. The random numbers are the law's own, so that a run repeats bit for bit. The
-path only sets the direction: the barriers keep the vehicle out of hard regions, whatever the path.
+A potential alone leads into pockets between obstacles. So the law keeps a path of a few corners, and tries random
+changes: a corner moved, added or dropped, or another end in the goal region. While the path is blocked, or soft regions
+make it costly, paths found by `search.py` are candidates, too. The path of lower cost by `cost.py` stays. Each period
+does a bounded part of the work. The law has its own random numbers, so that a run repeats bit for bit. The path only
+sets the direction: the barriers keep the vehicle out of hard regions for any path.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ Array = NDArray[np.float64]
 _LN_30 = 3.4011973816621555
 CORNERS = 8  # at most
 _BETTER = 0.03  # m, and
-_BETTER_PART = 0.01  # of its cost, that a candidate must save to be taken
+_BETTER_PART = 0.01  # of its cost, that a candidate must save to replace the path
 _BLOCKED = 0.3  # of its length, cost of passing regions above which the trees search for another path
-_HARD, _ALL, _COSTLY = 0, 1, 2  # regions that they keep out of: hard ones; soft ones, too; of these the costlier ones
-_LOOKS = (100, 800)  # for a path, before the trees keep out of others: at first, and at most
+_HARD, _ALL, _COSTLY = 0, 1, 2  # closed regions: the hard ones; also all soft ones; also the costlier soft ones
+_LOOKS = (100, 800)  # calls of the search before other regions are closed: at first, and at most
 _PASSED = 0.25  # m from a corner, within which it counts as passed
 _CLIMBS = 12  # towards the inside of the goal region
-_PAYS = 0.05  # m deeper for each metre that a climb must bring; straight up it brings 1
+_PAYS = 0.05  # m, least gain in depth per metre of a climb; along the gradient it is 1
 _DEEP_ENOUGH = 1e-3  # m, tolerance of the depth of an end
-_BEGIN, _PATH, _CANDIDATE = 0, 1, 2  # phases: what the next evaluation is of
+_BEGIN, _PATH, _CANDIDATE = 0, 1, 2  # phases: subject of the next evaluation
 _USED = -1  # points of a found path that was the last candidate
-_LESS = 0.5  # m, by which corners are drawn nearer to start and end than nodes of the trees
+_LESS = 0.5  # m, by which the room for corners is smaller than that for nodes of the trees
 
 
 class PathPlan(NamedTuple):
@@ -54,18 +54,18 @@ class PathPlan(NamedTuple):
     candidate: Array  # (CORNERS + 1, 3)
     found: Array  # (CORNERS + 1, 3), by the search
     counts: NDArray[np.int64]  # (3,) points of path, candidate and found, the end included; 0: none yet
-    cost: Array  # (3,) m, of the path, what of it hard regions add, and soft ones on the way
-    new_cost: PathCost  # of path or candidate, whichever is evaluated
+    cost: Array  # (3,) m: of the path; part by hard regions; part by soft regions on the way
+    new_cost: PathCost  # of path or candidate, as evaluated in this phase
     search: Search
-    closed: NDArray[np.bool_]  # (n,) which regions the search keeps out of
-    turn: NDArray[np.int64]  # (3,) what is closed: `_HARD`, `_ALL` or `_COSTLY`; looks for a path, left and in all
+    closed: NDArray[np.bool_]  # (n,) True for regions that the search keeps out of
+    turn: NDArray[np.int64]  # (3,) closed: `_HARD`, `_ALL` or `_COSTLY`; calls of the search left, and in total
     random_numbers: Array  # (5,) in [0, 1)
     phase: NDArray[np.int64]  # (1,) `_BEGIN`, `_PATH` or `_CANDIDATE`
     random: NDArray[np.uint64]  # (1,) state of the generator
 
 
 def empty_plan(n_regions: int, seed: int) -> PathPlan:
-    """Return a planner without a path, for `n_regions`, whose random numbers follow from a seed."""
+    """Return a planner without a path, for `n_regions`, with random numbers from a seed."""
     n = CORNERS + 1
     state = np.array([seed * 2 + 0x9E3779B97F4A7C15], dtype=np.uint64)
     return PathPlan(
@@ -102,12 +102,12 @@ def _bell_shaped(random: NDArray[np.uint64]) -> float:
 def nearest_goal_point(goal: PackedRegions, position: Array, depth: float, end: Array) -> None:
     """Write the point of the goal region nearest to a position, `depth` [m] inside where the region is that deep.
 
-    Ascends the gradient of the clearance, and halves the step wherever that gains little: in a shallower region, to
-    about its middle.
+    Ascends the gradient of the clearance, and halves the step wherever that gains little. In a shallower region it ends
+    near the center.
     """
     copy(position, end)
     value, gradient, turning, clearance = zeros(1), zeros(1, 3), zeros(1, 3), zeros(1)
-    level = zeros(4)  # a goal is a region of position: any attitude will do
+    level = zeros(4)  # a goal is a region of position: the attitude has no effect
     level[0] = 1.0
     candidate, other_gradient, other_clearance = zeros(3), zeros(1, 3), zeros(1)
     evaluate_packed(goal, end, level, value, gradient, turning, clearance)
@@ -131,7 +131,7 @@ def nearest_goal_point(goal: PackedRegions, position: Array, depth: float, end: 
 def improve_path(
     plan: PathPlan, start: Array, goal: PackedRegions, regions: PackedRegions, limits: PathLimits, period: float
 ) -> None:
-    """Update the path to vehicle and regions, and try a candidate; to be called once a period [s]."""
+    """Update the path for vehicle and regions, and try a candidate; call it once a period [s]."""
     _follow(plan, start, goal, limits, period)
     _evaluate(plan, start, goal, regions, limits)
     blocked = is_blocked(plan, start)
@@ -150,7 +150,7 @@ def improve_path(
 
 
 def go_straight(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits) -> None:
-    """Make the path a straight line to the nearest end in the goal region, whatever is in between."""
+    """Set the path to a straight line to the nearest end in the goal region, without regard to regions."""
     plan.counts[0] = 1
     nearest_goal_point(goal, start, limits.depth, plan.path[0])
 
@@ -158,10 +158,10 @@ def go_straight(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathL
 def _choose_closed(
     plan: PathPlan, blocked: bool, start: Array, end: Array, regions: PackedRegions, margin: float
 ) -> None:
-    """Choose the regions that the trees keep out of; with others than before, they begin anew.
+    """Choose the regions that the trees keep out of; a change of the choice restarts the trees.
 
-    While hard ones block the path, these alone. Else the costlier ones, and all, in turns that grow longer; but none
-    that start or end of the path is within.
+    While hard regions block the path, only these. Else also the costlier soft ones, and all, in turns that grow longer;
+    but none that contains start or end of the path.
     """
     turn, room = plan.turn[0], zeros(3)
     if blocked:
@@ -203,7 +203,7 @@ def _follow(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimit
         nearest_goal_point(goal, start, limits.depth, path[0])
     else:
         end = plan.counts[0] - 1
-        for axis in range(3):  # the end moves with the goal, and is corrected where the goal moved otherwise
+        for axis in range(3):  # the end moves with the goal, and is corrected if the goal moved otherwise
             path[end, axis] += goal.velocities[0, axis] * period
         if not clearance_at(goal, 0, path[end]) > 0.0:
             nearest_goal_point(goal, path[end], limits.depth, path[end])
@@ -216,7 +216,7 @@ def _follow(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimit
 
 
 def _evaluate(plan: PathPlan, start: Array, goal: PackedRegions, regions: PackedRegions, limits: PathLimits) -> None:
-    """Go on with the evaluation of path or candidate, in turn; the candidate becomes the path if it costs less."""
+    """Continue the evaluation of path or candidate, in turn; the candidate becomes the path if it costs less."""
     cost = plan.new_cost
     if plan.phase[0] == _BEGIN:
         begin_cost(cost, start)
@@ -238,7 +238,7 @@ def _evaluate(plan: PathPlan, start: Array, goal: PackedRegions, regions: Packed
 
 
 def is_blocked(plan: PathPlan, start: Array) -> bool:
-    """Return whether passing hard regions is so much of the cost that the trees search for another path."""
+    """Return True if the cost by hard regions is above `_BLOCKED` of the path's length."""
     return bool(plan.cost[1] > _BLOCKED * _length(plan.path, plan.counts[0], start))
 
 
@@ -260,13 +260,13 @@ def search_path(
     start : ndarray, shape (3,)
         Position of the vehicle [m, NED].
     goal, regions : PackedRegions
-        As they are.
+        Goal and secondary regions at their present positions.
     limits : PathLimits
-        What the path shall keep.
+        Clearance, margin, speed and depth of the path.
     period : float
-        [s].
+        Control period [s].
     periods : ndarray, shape (2,)
-        How many at most; receives how many it took.
+        Periods at most; the second number receives the periods that it took.
     """
     periods[1] = 0
     while periods[1] < periods[0]:
@@ -277,7 +277,7 @@ def search_path(
 
 
 def _choose_candidate(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits) -> None:
-    """Make what the search found the candidate, and then, or else, a mutation of the path."""
+    """Choose the next candidate: the path that the search found, once, or else a mutation of the path."""
     if plan.counts[2] > 0:
         _copy_path(plan.found, plan.candidate)
         plan.counts[1] = plan.counts[2]

@@ -1,7 +1,7 @@
 """Tree search out of pockets: two trees of free straight lines, one from the goal and one from the vehicle.
 
 Changing one corner at a time finds no path that needs several changes at once. So while the path is blocked, two trees
-(RRT-Connect: Kuffner and LaValle, ICRA 2000) grow in turn, each by at most one node a look. A new node connects to the
+(RRT-Connect: Kuffner and LaValle, ICRA 2000) grow in turn, by at most one node per call. A new node connects to the
 farthest visible one of its ancestors, which saves corners. When it sees the nearest node of the other tree, the two
 chains are a path. The tree of the vehicle gets a new root as the vehicle moves.
 """
@@ -25,33 +25,33 @@ Array = NDArray[np.float64]
 
 _SPHERE = Sphere.kind
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on do not depend on position alone
-_NODES = 512  # of a tree, after which it starts anew
+_NODES = 512  # of a tree, after which it restarts
 _CHAIN = 64  # points of a path before it is shortened, at most
-_REACH = (1.5, 0.1)  # m, longest edge; or as part of the distance from start to end, where that is more
+_REACH = (1.5, 0.1)  # m, longest edge; or fraction of the distance from start to end, if that is longer
 ROOM = (3.0, 32.0)  # m beyond start and end, in which nodes are drawn: at first, and at most
-_GROWS = 1.003  # that room, with each look
+_GROWS = 1.003  # factor of that room per call
 _STRIDE = 0.05  # m, least distance between two evaluations along a line
 _LOOKS = 32  # evaluations along a line at most
-_ANCESTORS = 2  # tested beside its parent
+_ANCESTORS = 2  # ancestors tested beside the parent of a new node
 _SLACK = 0.005  # m
 _MOVED = 0.3  # m, by which start or end may move before the root of its tree does
 _TO_OTHER = 0.2  # probability that a tree grows towards the root of the other one
-_NEAR_A_NODE = 0.4  # and towards a place near one of its nodes, for narrow passages
-_ALL = 1.0 - 1e-9  # part of a length that is all of it, but for rounding
-_BEFORE_A_WALL = 0.8  # part of the free length of a line at which a node stands that would reach farther
+_NEAR_A_NODE = 0.4  # and towards a point near one of its nodes, for narrow passages
+_ALL = 1.0 - 1e-9  # fraction of a length that is all of it, with rounding
+_BEFORE_A_WALL = 0.8  # fraction of the free length of a blocked line at which a node is placed
 
 
 class PathLimits(NamedTuple):
-    """What a path shall keep."""
+    """Requirements of a path."""
 
-    clearance: float  # m, of hard regions where there is room, beside the margin
-    margin: float  # m, at least
+    clearance: float  # m, desired clearance of hard regions
+    margin: float  # m, least clearance of hard regions
     speed: float  # m/s, of the vehicle
     depth: float  # m, in the goal region at which it ends
 
 
 def line_margin(limits: PathLimits) -> float:
-    """Return the clearance [m] that the trees' lines keep: with more, they find no narrow passage."""
+    """Return the clearance [m] of the trees' edges; a greater one would close narrow passages."""
     return limits.margin + 0.4 * limits.clearance
 
 
@@ -71,7 +71,7 @@ class Search(NamedTuple):
     of_vehicle: Tree
     turn: NDArray[np.int64]  # (1,) 0: the tree of the goal grows next, 1: that of the vehicle
     room: Array  # (1,) m beyond start and end, in which nodes are drawn
-    chain: Array  # (_CHAIN, 3) m, NED: the path found last, before it is shortened
+    chain: Array  # (_CHAIN, 3) m, NED: the last path found, before it is shortened
 
 
 def empty_search() -> Search:
@@ -85,7 +85,7 @@ def _empty_tree() -> Tree:
 
 
 def uncertainty(regions: PackedRegions, i: int) -> float:
-    """Return how far [m] the place of region `i` may be off, in the direction in which that is farthest."""
+    """Return the uncertainty [m] of region `i`'s position, `SPREADS` times its greatest standard deviation."""
     deviations = regions.deviations
     return float(SPREADS * max(deviations[i, 0], deviations[i, 1], deviations[i, 2]))
 
@@ -104,22 +104,22 @@ def clearance_of_all(point: Array, regions: PackedRegions, room: Array) -> float
 
 
 def free_length(start: Array, end: Array, regions: PackedRegions, margin: float) -> float:
-    """Return up to which length a straight line keeps a clearance of all hard regions at their present places.
+    """Return the length up to which a straight line keeps a clearance of all hard regions at their present positions.
 
     Parameters
     ----------
     start, end : ndarray, shape (3,)
         Ends of the line [m, NED].
     regions : PackedRegions
-        The hard ones among them count.
+        Regions; only the hard ones apply.
     margin : float
         Clearance [m].
 
     Returns
     -------
     float
-        [m]: the whole length where the line is free; -1 if its start is not. No more is known than `_LOOKS` evaluations
-        show.
+        Length [m]: the whole if the line is free; -1 if its start is not. It is at most the part that `_LOOKS`
+        evaluations cover.
     """
     point, room = zeros(3), zeros(3)
     length = length3(end[0] - start[0], end[1] - start[1], end[2] - start[2])
@@ -138,12 +138,12 @@ def free_length(start: Array, end: Array, regions: PackedRegions, margin: float)
 
 
 def is_line_free(start: Array, end: Array, regions: PackedRegions, margin: float) -> bool:
-    """Return whether a straight line keeps a clearance all along, as `free_length` measures it."""
+    """Return True if a straight line keeps a clearance over its whole length, by `free_length`."""
     return free_length(start, end, regions, margin) >= length3(end[0] - start[0], end[1] - start[1], end[2] - start[2])
 
 
 def limits_along(axis: int, start: Array, end: Array, room: float) -> tuple[float, float]:
-    """Return within what places are drawn along an axis [m, NED]: `room` beyond both ends, but not out of the water."""
+    """Return the range of random points along an axis [m, NED]: `room` beyond both ends, but below the surface."""
     low, high = min(start[axis], end[axis]), max(start[axis], end[axis])
     if axis == 2:
         return max(low - room, min(low, 0.0)), high + room
@@ -159,18 +159,18 @@ def look_for_path(
     limits: PathLimits,
     path: Array,
 ) -> int:
-    """Grow one of the trees by at most one node, and return the number of points of a path that it found, 0 for none.
+    """Grow one of the trees by at most one node; return the number of points of a path if one is found, else 0.
 
     Parameters
     ----------
     search : Search
-        Its trees grow in place, in turn.
+        State of the search; its trees grow in turn.
     start, end : ndarray, shape (3,)
         Positions of the vehicle and of the end of the path [m, NED].
     random_numbers : ndarray, shape (5,)
         Random numbers in [0, 1).
     regions : PackedRegions
-        At their present places.
+        Regions at their present positions.
     limits : PathLimits
         Clearance and margin.
     path : ndarray, shape (k, 3)
@@ -212,7 +212,7 @@ def look_for_path(
 def _draw_target(
     tree: Tree, start: Array, end: Array, other: Array, room: float, reach: float, random_numbers: Array, target: Array
 ) -> None:
-    """Write a place towards which a tree grows: the root of the other one, near any of its nodes, or anywhere."""
+    """Write a point towards which a tree grows: the root of the other one, one near any of its nodes, or any point."""
     if random_numbers[3] < _TO_OTHER:
         copy(other, target)
     elif random_numbers[3] < _TO_OTHER + _NEAR_A_NODE:
@@ -226,7 +226,7 @@ def _draw_target(
 
 
 def move_root(tree: Tree, place: Array, regions: PackedRegions, margin: float) -> None:
-    """Make a place the root of a tree: one more node if the old root sees it, else of a new tree."""
+    """Set the root of a tree to a point: add it if its line to the old root is free, else restart the tree."""
     nodes, parents, root = tree.nodes, tree.parents, tree.root[0]
     if tree.size[0] > 0:
         moved = length3(nodes[root, 0] - place[0], nodes[root, 1] - place[1], nodes[root, 2] - place[2])
@@ -248,19 +248,19 @@ def move_root(tree: Tree, place: Array, regions: PackedRegions, margin: float) -
 
 
 def _sees(tree: Tree, node: int, place: Array, regions: PackedRegions, margin: float) -> bool:
-    """Return whether the line from a node to a place is free, as `_margin_at` asks of the node."""
+    """Return True if the line from a node to a point keeps the clearance `_margin_at` of the node."""
     return is_line_free(tree.nodes[node], place, regions, _margin_at(tree, node, regions, margin))
 
 
 def _margin_at(tree: Tree, node: int, regions: PackedRegions, margin: float) -> float:
-    """Return the clearance [m] asked of lines from a node: a root may be closer, its lines must not come closer."""
+    """Return the clearance [m] required of lines from a node: a root may be closer, its lines not closer than it."""
     if node != tree.root[0]:
         return margin
     return min(margin, clearance_of_all(tree.nodes[node], regions, zeros(3)) - _SLACK)
 
 
 def nearest_node(tree: Tree, place: Array) -> int:
-    """Return the node of a tree nearest to a place [m, NED]."""
+    """Return the index of a tree's node nearest to a point [m, NED]."""
     nearest, least = 0, np.inf
     for i in range(tree.size[0]):
         squared = 0.0
@@ -272,7 +272,7 @@ def nearest_node(tree: Tree, place: Array) -> int:
 
 
 def extend_tree(tree: Tree, target: Array, reach: float, regions: PackedRegions, margin: float) -> int:
-    """Add a node on the way from the nearest node to a target, and return it; -1 where there is no room for one.
+    """Add a node on the line from the nearest node to a target, and return its index; -1 if the line is blocked.
 
     `reach` is the longest edge, and `margin` the clearance of edges, both in m.
     """
@@ -308,10 +308,10 @@ def extend_tree(tree: Tree, target: Array, reach: float, regions: PackedRegions,
 def _write_path(
     search: Search, of_goal: int, of_vehicle: int, start: Array, regions: PackedRegions, margin: float, path: Array
 ) -> int:
-    """Write the path through two nodes that see each other, without the corners that it does not need.
+    """Write the path through two nodes with a free line between them, without redundant corners.
 
-    A corner goes if the one before it, or the vehicle at its `start`, sees the one behind it. Return the number of
-    points, 0 if there are too many.
+    A corner is redundant if the line from the one before it, or from the `start`, to the one after it is free. Return
+    the number of points, 0 if there are too many.
     """
     chain, tree = search.chain, search.of_vehicle
     count, node = 0, of_vehicle

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from controller import quaternion
 from cosim.results.as_flown import scenario_as_flown
 from cosim.results.record import load_record
 from cosim.run.run import run_scenario
@@ -18,6 +19,7 @@ from cosim.simulation.commands.commands import (
     MissionItem,
     RemoveObstacle,
     Reset,
+    SetAttitude,
     SetCurrentItem,
     SetHeading,
     SetMission,
@@ -138,6 +140,43 @@ def test_yaw_stick_sets_a_rate_and_heading_is_held_afterwards(fly):
     yaw = np.unwrap(fly(commands, "time.duration=10", *OPEN)["attitude.yaw"])
     assert np.diff(yaw[200:400]).mean() * STEPS == pytest.approx(np.radians(0.5 * 0.25 * 202.5), rel=0.1)
     assert np.ptp(yaw[700:]) < 0.02
+
+
+def tilted(yaw, pitch):
+    return quaternion.multiply(
+        quaternion.from_axis_angle(np.array([0.0, 0.0, 1.0]), yaw),
+        quaternion.from_axis_angle(np.array([0.0, 1.0, 0.0]), pitch),
+    )
+
+
+@pytest.mark.medium
+def test_an_attitude_is_kept_beside_the_sticks_and_ends_with_the_mode(fly):
+    attitude = SetAttitude(tuple(tilted(0.5, 0.1)))
+    commands = {0: [SetMode("depth_hold"), attitude, sticks(0.3, 0, 0, 0, 0, 0.9)], 1500: [SetMode("depth_hold")]}
+    run = fly(commands, "time.duration=25", *OPEN)
+    assert run["attitude.yaw"][1490] == pytest.approx(0.5, abs=0.03)
+    assert run["attitude.pitch"][1490] == pytest.approx(0.1, abs=0.05)  # it rights itself and the loop has no integral
+    assert run["velocity.u"][1490] > 0.2
+    assert run["attitude.pitch"][-1] == pytest.approx(0.0, abs=0.02)
+
+
+@pytest.mark.medium
+def test_an_attitude_with_a_force_takes_the_laws_place_until_another_target_comes(fly):
+    attitude = SetAttitude(tuple(tilted(0.4, 0.0)), (0.2, 0.0, 0.0))
+    run = fly({100: [attitude], 900: [SetMode("hold")]}, "time.duration=20", *OPEN)
+    vehicle = load_vehicle("bluerov2_heavy")
+    reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+    assert run["command.X"][100:900] == pytest.approx(0.2 * reach[0])
+    assert run["attitude.yaw"][890] == pytest.approx(0.4, abs=0.03)
+    place = run.stack("target.x", "target.y", "target.z")[-1]
+    assert np.linalg.norm(run.position[-1] - place) < 0.3
+
+
+def test_channels_that_are_overridden_push_without_the_pilots_gain(fly):
+    run = fly({0: [SetMode("manual"), ManualControl((0.5, 0, 0, 0, 0, 0), by_gain=False)]}, "time.duration=0.1", *OPEN)
+    vehicle = load_vehicle("bluerov2_heavy")
+    greatest = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+    assert run["command.X"][-1] == pytest.approx(0.5 * greatest[0])
 
 
 def test_greatest_wrench_puts_one_thruster_at_its_limit():

@@ -1,0 +1,144 @@
+"""Sticks: what full ones give, and the messages that carry them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from cosim.mavlink.vehicle.profile import Profile
+from cosim.mavlink.vehicle.sticks import CLIMB_DEAD_ZONE, YAW_DEAD_ZONE, MotorMixer, deflection_of
+from cosim.simulation.commands.command_handler import greatest_wrench
+from cosim.simulation.commands.stick_stabilizer import YAW_RATE
+from cosim.simulation.signals import Array
+from plant_fmu import Vehicle
+
+SticksBy = Literal["manual-control", "rc-override"]
+STICKS_BY: tuple[SticksBy, ...] = get_args(SticksBy)
+
+PILOT_SPEED = 0.5  # m/s, of a full vertical stick where the depth is kept: ArduSub's PILOT_SPEED_UP
+_FULL = 1000.0
+_PITCH, _ROLL = 1, 2  # enabled_extensions
+_CENTER, _SWING, _AXES = 1500, 400, 6  # us of a channel; channels
+_RELEASED, _LEFT_ALONE = 0, 0xFFFF  # what channels 1 to 8 are told so by
+
+
+@dataclass(frozen=True)
+class StickScale:
+    """What full sticks give.
+
+    Attributes
+    ----------
+    efforts : ndarray, shape (n, 6)
+        Each thruster's part of its greatest force for a wrench along or about each body axis [1/N, 1/(N m)].
+    mixer : ndarray, shape (n, 6)
+        What a full stick of each axis, at a gain of 1, asks of each thruster: 1, 0 or -1 of its greatest force. Of an
+        autopilot that allocates forces by itself, both are of axes instead of thrusters.
+    gain : float
+        What scales the sticks of surge, sway, heave and yaw: the pilot's; 1 for channels that are overridden.
+    scales_all : bool
+        Whether it scales those of roll and pitch, too.
+    quadratic : bool
+        Whether a thruster's force goes with the square of what the autopilot asks of it.
+    dead_zones : float
+        What scales the dead zones of the sticks that ask for rates: the pilot's gain; 0 where there are none.
+    """
+
+    efforts: Array
+    mixer: Array
+    gain: float
+    scales_all: bool
+    quadratic: bool
+    dead_zones: float
+
+    def sticks(self, wrench: Array) -> Array:
+        """Return the sticks that ask for a wrench, shape (6,), X Y Z K M N from -1 to 1.
+
+        An autopilot adds what all sticks ask of a thruster, and where its force goes with the square, it goes with the
+        square of that sum. So each thruster's force is turned into what it is to be asked for, and that into sticks.
+
+        Parameters
+        ----------
+        wrench : ndarray, shape (6,)
+            [N, N m], body frame; what is not finite asks for nothing.
+        """
+        share = self.efforts @ np.where(np.isfinite(wrench), wrench, 0.0)
+        if self.quadratic:
+            share = np.copysign(np.sqrt(np.abs(share)), share)
+        asked = np.linalg.lstsq(self.mixer, share, rcond=None)[0]
+        asked[[0, 1, 2, 5]] /= self.gain
+        if self.scales_all:
+            asked[3:5] /= self.gain
+        clipped: Array = np.clip(asked, -1.0, 1.0)
+        return clipped
+
+    def yaw_rate_stick(self, rate: float) -> float:
+        """Return the yaw stick that asks for a rate of turn [rad/s]; 0 for one that is not finite."""
+        return self._rate_stick(rate / YAW_RATE, YAW_DEAD_ZONE)
+
+    def climb_stick(self, rate_down: float) -> float:
+        """Return the stick Z that asks for a rate of the depth [m/s], likewise."""
+        return self._rate_stick(rate_down / PILOT_SPEED, CLIMB_DEAD_ZONE)
+
+    def _rate_stick(self, part: float, dead_zone: float) -> float:
+        if not math.isfinite(part):
+            return 0.0
+        deflection = deflection_of(part, dead_zone * self.dead_zones)
+        return min(max(deflection / self.gain, -1.0), 1.0)
+
+
+def scale_of(vehicle: Vehicle, profile: Profile, pilot_gain: float, sticks_by: SticksBy) -> StickScale:
+    """Return what full sticks give of a vehicle.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Its thrusters' limits count, and as ArduSub the curve of its table ``autopilot``.
+    profile : Profile
+        Which autopilot it is.
+    pilot_gain : float
+        Above 0 to 1.
+    sticks_by : str
+        Which message carries them.
+    """
+    gain = pilot_gain if sticks_by == "manual-control" else 1.0
+    reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+    if profile.name != "ardusub":  # it brings each axis to the thrusters by itself
+        share = np.diag(np.divide(1.0, reach, out=np.zeros(6), where=reach > 0.0))
+        return StickScale(share, np.eye(6), gain, True, False, 0.0)
+    mixer = MotorMixer(vehicle)
+    made = (vehicle.thruster_matrix * mixer.greatest) @ mixer.asked  # by full sticks, one axis a column
+    efforts = mixer.asked @ np.linalg.pinv(made)
+    return StickScale(efforts, mixer.asked, gain, False, mixer.is_quadratic, pilot_gain)
+
+
+def manual_control(mavlink: Any, system: int, profile: Profile, sticks: Array, all_axes: bool) -> Any:
+    """Return MANUAL_CONTROL; roll and pitch are in it where `all_axes` are steered."""
+    surge, sway, heave, roll, pitch, yaw = sticks.tolist()
+    center = profile.centred_stick
+    x, y, r = (round(_FULL * part) for part in (surge, sway, yaw))
+    z = round(center - (_FULL - center) * heave)
+    message = mavlink.MAVLink_manual_control_message(system, x, y, z, r, 0)
+    if all_axes:
+        message.enabled_extensions = _PITCH | _ROLL
+        full = profile.full_tilt_stick
+        message.s, message.t = round(full * pitch), round(full * roll)
+    return message
+
+
+def channels_override(mavlink: Any, system: int, sticks: Array) -> Any:
+    """Return RC_CHANNELS_OVERRIDE in ArduSub's order: pitch, roll, up, yaw, forward, right."""
+    surge, sway, heave, roll, pitch, yaw = sticks.tolist()
+    pulses = [round(_CENTER + _SWING * part) for part in (pitch, roll, -heave, yaw, surge, sway)]
+    return _override(mavlink, system, pulses)
+
+
+def channels_released(mavlink: Any, system: int) -> Any:
+    """Return RC_CHANNELS_OVERRIDE that gives the channels back to the radio."""
+    return _override(mavlink, system, [_RELEASED] * _AXES)
+
+
+def _override(mavlink: Any, system: int, pulses: list[int]) -> Any:
+    return mavlink.MAVLink_rc_channels_override_message(system, 1, *pulses, _LEFT_ALONE, _LEFT_ALONE)

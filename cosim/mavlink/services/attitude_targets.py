@@ -1,0 +1,114 @@
+"""SET_ATTITUDE_TARGET: an attitude, and what pushes beside it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from cosim.mavlink.services.service import Service
+from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
+from cosim.mavlink.wire.thrust_body import THRUST_BODY_SET, thrust_body_of
+from cosim.scenario.tables import Vector3
+from cosim.simulation.commands.commands import Mode, SetAttitude, SetTarget
+from cosim.simulation.commands.stick_stabilizer import CLIMB_RATE
+
+_THRUST_IGNORED, _ATTITUDE_IGNORED = 1 << 6, 1 << 7  # type_mask
+_LASTS: dict[Mode, float] = {"reach": 3.0, "depth_hold": 5.0}  # s without another one, after which it ends
+_PATIENCE, _AGAIN = 3.0, 10.0  # s of set-points in another mode, after which that is worth a word; until the next one
+_STILL: Vector3 = (0.0, 0.0, 0.0)
+
+
+class AttitudeTargets(Service):
+    """Attitudes are kept as the autopilot keeps them whose profile the vehicle has.
+
+    As ArduSub: in ALT_HOLD a set-point without thrust leaves surge, sway and the rate of depth to the sticks. In GUIDED
+    thrust is a rate of climb, and nothing pushes ahead or aside. As PX4: in OFFBOARD, with a thrust along each body
+    axis, or along the first one.
+    """
+
+    def __init__(self, context: VehicleContext) -> None:
+        super().__init__(context)
+        self.messages = {"SET_ATTITUDE_TARGET": self._attitude}
+        self._last: SetAttitude | None = None
+        self._heard = self._waits_since = -math.inf
+
+    def restart(self) -> None:
+        """Forget the last set-point."""
+        self._last, self._heard = None, -math.inf
+
+    def on_snapshot(self) -> None:
+        """Forget the last set-point once another mode is on."""
+        if self.context.mode_ahead not in _LASTS:
+            self._last = None
+
+    def tick(self) -> None:
+        """End an attitude that is not sent any more."""
+        context, mode = self.context, self.context.mode_ahead
+        if self._last is None or mode not in _LASTS or context.now - self._heard < _LASTS[mode]:
+            return
+        self._last = None
+        if mode == "reach":
+            context.submit(SetTarget(context.view.position_ned, context.settings["commands.hold_radius"]))
+        else:
+            context.submit(SetAttitude(None))
+        text = f"No attitude for {_LASTS[mode]:g} s: {'the vehicle stays' if mode == 'reach' else 'sticks steer'}"
+        context.say(text, context.mavlink.MAV_SEVERITY_WARNING)
+
+    def _attitude(self, sender: Sender, message: Any) -> None:
+        context = self.context
+        if not context.accepts_commands:
+            context.submit()
+            return
+        if not context.operator.may_steer(sender.system, context.now):
+            context.reject("another station has the vehicle in hand", "active gcs")
+            return
+        fault = self._fault(message)
+        if fault:
+            context.reject(f"attitude set-point with mask {message.type_mask}: {fault}", "attitude")
+            return
+        if not self._counts(message):
+            self._wait()
+            return
+        self._waits_since, self._heard = -math.inf, context.now
+        command = self._command(message)
+        if command != self._last and context.submit(command) == context.mavlink.MAV_RESULT_ACCEPTED:
+            self._last = command
+
+    def _fault(self, message: Any) -> str:
+        """Return what of a set-point cannot be followed, in words; empty where all can."""
+        mask, thrust = message.type_mask, message.thrust
+        if mask & _ATTITUDE_IGNORED:
+            return "rates alone are not followed; an attitude is"
+        if not abs(math.hypot(*message.q) - 1.0) < 1e-2:
+            return "its quaternion is not of length 1"
+        if mask & THRUST_BODY_SET and self.context.profile.name == "ardusub":
+            return "thrust along each axis is not followed; a rate of climb is"
+        if mask & _THRUST_IGNORED and self.context.profile.name != "ardusub":
+            return "a thrust is needed"
+        asked = thrust_body_of(message) if mask & THRUST_BODY_SET else (0.0 if mask & _THRUST_IGNORED else thrust,)
+        return "" if all(-1.0 <= part <= 1.0 for part in asked) else "a thrust is beyond -1 to 1"
+
+    def _counts(self, message: Any) -> bool:
+        sticks_push = self.context.profile.name == "ardusub" and message.type_mask & _THRUST_IGNORED
+        return bool(self.context.mode_ahead == ("depth_hold" if sticks_push else "reach"))
+
+    def _wait(self) -> None:
+        """Say of set-points that wait for their mode, once they have come for a while."""
+        context = self.context
+        if self._waits_since == -math.inf or context.now - self._heard > 1.0:
+            self._waits_since = context.now
+        self._heard = context.now
+        if context.now - self._waits_since >= _PATIENCE:
+            modes = "ALT_HOLD without thrust, in GUIDED with it" if context.profile.name == "ardusub" else "offboard"
+            text = f"Attitude set-points wait: they count in {modes}"
+            context.say(text, context.mavlink.MAV_SEVERITY_NOTICE, "early attitude", _AGAIN)
+
+    def _command(self, message: Any) -> SetAttitude:
+        q0, q1, q2, q3 = message.q
+        attitude, mask = (q0, q1, q2, q3), message.type_mask
+        if self.context.profile.name != "ardusub":
+            ahead, right, down = thrust_body_of(message) if mask & THRUST_BODY_SET else (message.thrust, 0.0, 0.0)
+            return SetAttitude(attitude, (ahead, right, down))
+        if mask & _THRUST_IGNORED:
+            return SetAttitude(attitude)
+        return SetAttitude(attitude, _STILL, -2.0 * (max(message.thrust, 0.0) - 0.5) * CLIMB_RATE)

@@ -1,0 +1,47 @@
+"""The field ``thrust_body`` of SET_ATTITUDE_TARGET, an extension of MAVLink 2 that pymavlink's dialects lack."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+THRUST_BODY_SET = 1 << 5  # type_mask
+
+_FIELD = struct.Struct("<3f")
+_AT = 39  # bytes of the payload before it
+_HEADER = 10  # bytes of MAVLink 2
+
+
+def with_thrust_body(mavlink: Any, *fields: Any, thrust_body: tuple[float, float, float]) -> Any:
+    """Return SET_ATTITUDE_TARGET with a thrust along each body axis, as parts of the greatest.
+
+    Parameters
+    ----------
+    mavlink : module
+        The dialect.
+    fields
+        Of the message before the extension, in pymavlink's order.
+    thrust_body : tuple of float
+        Ahead, right and down, -1 to 1.
+    """
+    message = mavlink.MAVLink_set_attitude_target_message(*fields)
+    whole = message.pack
+
+    def pack(mav: Any, force_mavlink1: bool = False) -> Any:
+        framed, extension = message._pack, b"" if force_mavlink1 else _FIELD.pack(*thrust_body)
+        message._pack = lambda mav, crc, payload, **more: framed(mav, crc, payload + extension, **more)
+        try:
+            return whole(mav, force_mavlink1)
+        finally:
+            message._pack = framed
+
+    message.pack = pack
+    return message
+
+
+def thrust_body_of(message: Any) -> tuple[float, float, float]:
+    """Return the thrust along each body axis of a SET_ATTITUDE_TARGET that came; 0 where it has none."""
+    frame = bytes(message.get_msgbuf() or b"")
+    payload = frame[_HEADER : _HEADER + frame[1]] if len(frame) > _HEADER else b""
+    ahead, right, down = _FIELD.unpack(payload[_AT : _AT + _FIELD.size].ljust(_FIELD.size, b"\0"))
+    return ahead, right, down

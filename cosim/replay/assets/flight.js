@@ -1,0 +1,137 @@
+// The flight of the page's scenario with other numbers: what goes to the worker, and what comes back as a run.
+
+/** Flies in a worker, one flight at a time. */
+class Flight {
+  /** @param {object} data as cosim/replay/interactive/data.py makes it */
+  constructor(data) {
+    this.data = data;
+    this.slots = new Map(data.slots.map((slot) => [slot.key, slot]));
+  }
+
+  /** Start the worker; rejects where the browser has no WebAssembly, or no workers for pages from disk. */
+  async start() {
+    if (typeof WebAssembly === "undefined") throw new Error("no WebAssembly");
+    const packed = Uint8Array.from(atob(this.data.wasm), (letter) => letter.charCodeAt(0));
+    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
+    const module = await new Response(stream).arrayBuffer();
+    const code = new Blob([document.getElementById("flier").textContent], { type: "text/javascript" });
+    this._worker = new Worker(URL.createObjectURL(code));
+    const { refused } = await this._ask({ module }, [module]);
+    if (refused) throw new Error(refused);
+  }
+
+  /**
+   * Fly with other numbers.
+   * @param {Map<string, number>} values by key  @param {?{thruster: number, time: number}} failure one more, from 1
+   * @returns {Promise<object>} arrays as the worker gives them, or {refused}
+   */
+  fly(values, failure) {
+    const { data } = this;
+    const job = { numbers: [], integers: [], gains: [], starts: [], noise: [...data.noise], metrics: data.metrics, sizes: {} };
+    for (const [name, width] of Object.entries(data.widths)) job.sizes[name] = width * data.rows;
+    const to = { number: job.numbers, gain: job.gains, start: job.starts };
+    for (const [key, value] of values) {
+      for (const [kind, place] of this.slots.get(key).places) {
+        if (kind === "noise") job.noise[place] = value;
+        else to[kind].push([place, value]);
+      }
+    }
+    if (failure && data.failures) this._fail(job, failure);
+    return this._ask(job);
+  }
+
+  /** All failures in the order of their steps, and the limits that allocation goes by once they are reported. */
+  _fail({ numbers, integers }, { thruster, time }) {
+    const { failed, steps, remaining, own, tell, lower, upper, limits } = this.data.failures;
+    const step = Math.ceil(time / this.data.step - 1e-6); // as cosim/batch/fused.py has it
+    const all = [...own, [step, thruster - 1, 0]].sort((a, b) => a[0] - b[0] || a[1] - b[1] || (a[2] ?? NaN) - (b[2] ?? NaN));
+    all.forEach(([at, which, left], i) => {
+      integers.push([steps + i, at], [failed + i, which]);
+      numbers.push([remaining + i, left ?? NaN]);
+    });
+    if (!tell) return;
+    const health = limits[0].map(() => 1);
+    let stage = 0;
+    for (const [, which, left] of all) {
+      if (left > 0) continue;
+      health[which] = 0;
+      stage += 1;
+      [lower, upper].forEach(([place, , count], side) => health.forEach((h, i) => numbers.push([place + stage * count + i, limits[side][i] * h])));
+    }
+  }
+
+  _ask(message, transfer = []) {
+    return new Promise((settled, failed) => {
+      this._worker.onmessage = ({ data }) => settled(data);
+      this._worker.onerror = (event) => failed(new Error(event.message || "no worker"));
+      this._worker.postMessage(message, transfer);
+    });
+  }
+}
+
+const MOST_ROWS = 6000; // of a run that is flown here; more would not be seen
+
+/** The numbers of a flight as a run that the page shows; `header` is that of the scenario as it was flown. */
+function runOfFlight(data, result, header) {
+  const refused = result.metrics[12];
+  const rows = refused >= 0 ? Math.max(1, Math.ceil(refused / data.every)) : data.rows;
+  const stride = Math.ceil(rows / MOST_ROWS);
+  const kept = Array.from({ length: Math.ceil(rows / stride) }, (_, i) => i * stride);
+  if (kept.at(-1) !== rows - 1) kept.push(rows - 1);
+  const signals = header.signals.filter(({ name }) => name in data.signals);
+  const number = (array, place) => (row) => result[array][row * data.widths[array] + place];
+  const columns = signals.map(({ name }) => Float64Array.from(kept, signalOf(data, data.signals[name], number, header)));
+  const run = new Run({ ...header, signals }, columns);
+  const active = signals.findIndex((signal) => signal.name === "active");
+  if (active >= 0) columns[active].set(activeRegions(run, data.criteria));
+  return run;
+}
+
+/** A function from a row to a signal there; of what rests on others, zeros. */
+function signalOf(data, [kind, ...rest], number, header) {
+  if (kind === "sum") {
+    const [array, first, factors] = rest;
+    const parts = factors.map((_, i) => number(array, first + i));
+    return (row) => factors.reduce((sum, factor, i) => sum + factor * parts[i](row), 0);
+  }
+  if (kind === "shift") {
+    const [region, axis] = rest;
+    const [time, place] = [number("trace", 0), number("reasons", data.place)];
+    return (row) => {
+      const at = region === 0 ? place(row) : 0;
+      return data.velocities[region][axis] * time(row) + (at > 0 ? data.goal_places[at - 1][axis] : 0);
+    };
+  }
+  if (kind === "attitude") {
+    const [w, x, y, z] = [4, 5, 6, 7].map((place) => number("trace", place));
+    return {
+      roll: (row) => Math.atan2(2 * (w(row) * x(row) + y(row) * z(row)), 1 - 2 * (x(row) ** 2 + y(row) ** 2)),
+      pitch: (row) => Math.asin(Math.max(-1, Math.min(1, 2 * (w(row) * y(row) - x(row) * z(row))))),
+      yaw: (row) => Math.atan2(2 * (w(row) * z(row) + x(row) * y(row)), 1 - 2 * (y(row) ** 2 + z(row) ** 2)),
+    }[rest[0]];
+  }
+  return kind === "active" ? () => 0 : number(kind, rest[0]);
+}
+
+const LEADS = 0.5; // weight from which on a criterion leads though the vehicle rests in the goal
+
+/** Which region the arbiter gives way to at each row, as cosim/replay/activity.py has it. */
+function activeRegions(run, criteria) {
+  const column = (name) => run.column(name);
+  const names = run.header.criteria.map(({ name }) => name);
+  const [weights, memberships] = ["weight", "membership"].map((kind) => names.map((name) => column(`${kind}.${name}`)));
+  const clearances = run.header.regions.map(({ name }) => column(`${name}.clearance`));
+  const speeds = ["u", "v", "w"].map((axis) => column(`velocity.${axis}`));
+  return run.time.map((_, row) => {
+    if (!criteria.length) return 0;
+    const leads = weights.reduce((best, weight, i) => (weight[row] > (weights[best][row] ?? -Infinity) ? i : best), 0);
+    let region = 0;
+    criteria.forEach((of, i) => {
+      const gap = clearances[i + 1][row];
+      if (of === leads && !Number.isNaN(gap) && !(region && gap >= clearances[region][row])) region = i + 1;
+    });
+    if (!region || !(memberships[leads][row] > 0)) return 0;
+    const rests = clearances[0][row] >= 0 && Math.hypot(...speeds.map((speed) => speed[row])) < 0.02;
+    return rests && weights[leads][row] < LEADS && clearances[region][row] >= 0 ? 0 : region;
+  });
+}

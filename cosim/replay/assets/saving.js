@@ -1,0 +1,29 @@
+// The scenario of the page with its reader's numbers, as the file that `cosim run` repeats.
+
+/** A number as TOML writes those with a point. */
+function tomlNumber(x) {
+  return Number.isInteger(x) ? x.toFixed(1) : String(x);
+}
+
+/** The text of the scenario as it is now. */
+function scenarioText(whatIf) {
+  const { toml, title } = whatIf.flight.data;
+  const changed = whatIf.words();
+  const more = changed.length > 3 ? ` and ${changed.length - 3} more` : "";
+  const words = changed.length ? `${title} (what if: ${changed.slice(0, 3).join(", ")}${more})` : title;
+  const filled = toml.keys.map((key) => (key === "title" ? JSON.stringify(words) : tomlNumber(whatIf.value(key))));
+  const text = toml.parts.map((part, i) => part + (filled[i] ?? "")).join("");
+  if (!whatIf.failure) return text;
+  const { thruster, time } = whatIf.failure;
+  return `${text}\n[[failures]]\nthruster = ${thruster}\ntime = ${tomlNumber(time)}\n`;
+}
+
+/** Let the browser save it. */
+function saveScenario(whatIf) {
+  const link = element("a");
+  link.href = URL.createObjectURL(new Blob([scenarioText(whatIf)], { type: "application/toml" }));
+  link.download = `${whatIf.flight.data.name}-what-if.toml`;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+  whatIf.page.say(`Saved as ${link.download}: “cosim run ${link.download}” flies it again.`, "good");
+}

@@ -1,0 +1,206 @@
+// What if: the page's run flown again with other numbers, beside the run as it was recorded.
+
+const LATER = 120; // ms, for which a number that is being written waits
+
+/** The scenario with the numbers that its reader has changed, and the flight that they make. */
+class WhatIf {
+  /** @param {Page} page  @param {Run} recorded  @param {Flight} flight that has started */
+  constructor(page, recorded, flight) {
+    Object.assign(this, { page, recorded, flight, values: new Map(), failure: null, flown: null, repeats: null });
+    this.run = recorded; // with its regions where they are now: what is dragged
+    this.panel = new WhatIfPanel(this);
+    this.dragging = new Dragging(this);
+  }
+
+  // ---- what Dragging asks ----
+
+  get heeded() {
+    return true;
+  }
+
+  get refusal() {
+    return "";
+  }
+
+  get time() {
+    return this.page.player.t;
+  }
+
+  canMove(region) {
+    return this.flight.data.moves[region] !== null;
+  }
+
+  /** Move the place of a region from one point to another [m, NED]. */
+  move(region, from, to) {
+    const axes = this.flight.data.moves[region];
+    const by = Vec.sub(to, from);
+    axes.forEach((keys, axis) => {
+      for (const key of keys) if (by[axis]) this._put(key, Number((this.value(key) + by[axis]).toFixed(4)));
+    });
+    this.later(0);
+  }
+
+  // ---- numbers ----
+
+  /** The number of a key, as it is now. */
+  value(key) {
+    return this.values.get(key) ?? this.flight.slots.get(key).value;
+  }
+
+  set(key, value) {
+    this._put(key, value);
+    this.later();
+  }
+
+  /** Fail a thruster, from 1, at a time [s]; null: none beyond those of the scenario. */
+  fail(failure) {
+    this.failure = failure;
+    this.later();
+  }
+
+  get changed() {
+    return this.values.size > 0 || this.failure !== null;
+  }
+
+  /** Back to the scenario as it was recorded. */
+  reset() {
+    this.values.clear();
+    this.failure = null;
+    this.later(0);
+  }
+
+  _put(key, value) {
+    if (value === this.flight.slots.get(key).value) this.values.delete(key);
+    else this.values.set(key, value);
+  }
+
+  // ---- flights ----
+
+  /** Fly soon: once the numbers have rested for a moment, and the flight before has come back. */
+  later(wait = LATER) {
+    this.run = this.recorded.withHeader(this._header());
+    this.panel.tell();
+    clearTimeout(this._next);
+    this._next = setTimeout(() => this._fly(), wait);
+  }
+
+  async _fly() {
+    if (this._flying) {
+      this._again = true;
+      return;
+    }
+    this._flying = true;
+    this.panel.say("flying …");
+    const [values, failure, header] = [new Map(this.values), this.failure, this._header()];
+    const changed = this.changed;
+    const result = await this.flight.fly(values, failure);
+    this._flying = false;
+    this.last = result;
+    if (result.refused) this._refuse(result.refused);
+    else this._show(runOfFlight(this.flight.data, result, header), result, changed, failure);
+    if (this._again) {
+      this._again = false;
+      this._fly();
+    }
+  }
+
+  _refuse(text) {
+    this.page.say(`These numbers cannot be flown: ${text}`, "error");
+    this.panel.say("refused");
+  }
+
+  _show(run, result, changed, failure) {
+    Object.assign(run.header, outcomeOf(this.flight.data, result, run, failure));
+    this.took = result.took;
+    this.page.say("");
+    if (!changed) {
+      this._compare(run);
+      this.flown = null;
+      if (this.page.runs.length > 1) this.page.show([this.recorded], true);
+    } else if (this.flown) {
+      this.flown = run;
+      this.page.replace([this._asRecorded(), run]);
+    } else {
+      this.flown = run;
+      this.page.show([this._asRecorded(), run], true);
+      this.page.select(1);
+    }
+    const repeats = this.repeats === 0 ? "as recorded, to the last bit" : `as recorded, within ${this.repeats?.toExponential(0)} m`;
+    this.panel.say(changed ? `flown in ${(result.took / 1000).toFixed(2)} s` : repeats);
+  }
+
+  _asRecorded() {
+    return this.recorded.withHeader({ ...this.recorded.header, name: "as recorded" });
+  }
+
+  /** How far this browser's flight of the same numbers is from the record, at the most [m]. */
+  _compare(run) {
+    const { recorded } = this;
+    let row = 0;
+    let most = 0;
+    for (let i = 0; i < recorded.rows; i++) {
+      while (row < run.rows - 1 && run.time[row] < recorded.time[i]) row++;
+      if (run.time[row] !== recorded.time[i]) continue;
+      for (const axis of ["x", "y", "z"]) most = Math.max(most, Math.abs(run.column(`position.${axis}`)[row] - recorded.column(`position.${axis}`)[i]));
+    }
+    this.repeats = most;
+  }
+
+  /** The header of the recorded run, with the numbers of now. */
+  _header() {
+    const { header } = this.recorded;
+    const { moves, restoring } = this.flight.data;
+    const regions = header.regions.map((region, i) => {
+      const by = (moves[i] ?? []).map((keys) => (keys.length ? this.value(keys[0]) - this.flight.slots.get(keys[0]).value : 0));
+      return by.some((x) => x !== 0) ? { ...region, shape: movedShape(region.shape, by) } : region;
+    });
+    const more = this.flight.slots.has(restoring.key) ? this.value(restoring.key) - this.flight.slots.get(restoring.key).value : 0;
+    const truth = { ...header.truth, estimate: restoring.truth.map((phi, i) => phi + more * restoring.slopes[i]) };
+    const asked = this.changed ? `With ${this.words().join(", ")}.` : header.asked;
+    return { ...header, name: "what if", asked, regions, truth, changes: [], gaps: {} };
+  }
+
+  /** What is changed, in words. */
+  words() {
+    const { slots, data: { moves } } = this.flight;
+    const moved = moves.flatMap((axes, i) => (axes?.flat().some((key) => this.values.has(key)) ? [`${this.recorded.header.regions[i].name} moved`] : []));
+    const placed = new Set(moves.flatMap((axes) => axes?.flat() ?? []));
+    const numbers = [...this.values].filter(([key]) => !placed.has(key)).map(([key, value]) => `${slots.get(key).words} ${shortNumber(value)} ${slots.get(key).unit}`.trim());
+    const failed = this.failure ? [`thruster ${this.failure.thruster} failing at ${this.failure.time} s`] : [];
+    return [...moved, ...numbers, ...failed];
+  }
+}
+
+/** A shape of a header, moved [m, NED]. */
+function movedShape(shape, by) {
+  const add = (point) => point.map((x, axis) => x + by[axis]);
+  const moved = { ...shape };
+  for (const name of ["centre", "feature", "point", "start", "end"]) if (moved[name]) moved[name] = add(moved[name]);
+  for (const name of ["points", "corners"]) if (moved[name]) moved[name] = moved[name].map(add);
+  for (const name of ["top", "bottom", "depth"]) if (Number.isFinite(moved[name])) moved[name] += by[2];
+  const { drawing } = shape;
+  if (drawing) {
+    moved.drawing = { ...drawing };
+    if (drawing.centre) moved.drawing.centre = add(drawing.centre);
+    if (drawing.points) moved.drawing.points = drawing.points.map(add);
+    if (drawing.planes) moved.drawing.planes = drawing.planes.map((plane) => ({ ...plane, point: add(plane.point) }));
+  }
+  return moved;
+}
+
+/** Offer it, where the page holds a flight and the browser can fly. */
+async function startWhatIf(page) {
+  const data = JSON.parse(document.getElementById("flight").textContent);
+  if (!data || page.runs.length !== 1) return null;
+  const flight = new Flight(data);
+  try {
+    await flight.start();
+  } catch (error) {
+    page.say(`This browser shows the run, but cannot fly it again: ${error.message}.`, "info");
+    return null;
+  }
+  const whatIf = new WhatIf(page, page.runs[0], flight);
+  page.setKeys(keysOf(page, whatIf));
+  whatIf.later(0);
+  return whatIf;
+}

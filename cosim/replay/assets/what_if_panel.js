@@ -1,0 +1,174 @@
+// The numbers that a reader may change, as fields over the scene: for who has no mouse, and for what has no place in it.
+
+/** Fields and buttons of a `WhatIf`. */
+class WhatIfPanel {
+  /** @param {WhatIf} whatIf */
+  constructor(whatIf) {
+    this.whatIf = whatIf;
+    this.slots = whatIf.flight.slots;
+    this._fields = []; // each with a function that writes what it is now
+    this.holder = element("details", "commands");
+    this.holder.id = "commands";
+    this.holder.open = matchMedia("(min-width: 960px)").matches;
+    this.state = element("span", "note");
+    const summary = element("summary", "", "What if ");
+    summary.append(this.state);
+    this.body = element("div", "command-body");
+    this.body.append(this._buttons(), this._water(), this._noise(), this._thruster(), this._gain(), this._places());
+    this.holder.append(summary, this.body);
+    document.getElementById("stage").append(this.holder);
+    whatIf.page.stage.coveredBy(this.holder);
+    this.tell();
+  }
+
+  say(text) {
+    setText(this.state, text);
+  }
+
+  /** Write how things stand, but for what its reader writes. */
+  tell() {
+    for (const { field, now } of this._fields) {
+      if (field === document.activeElement && field.tagName === "INPUT") continue;
+      const text = now();
+      if (field.value !== text) field.value = text;
+    }
+    this.resetting.disabled = !this.whatIf.changed;
+  }
+
+  _buttons() {
+    const group = element("div", "command-buttons of-two");
+    const button = (text, title, does) => {
+      const made = element("button", "", text);
+      Object.assign(made, { type: "button", title });
+      made.addEventListener("click", does);
+      group.append(made);
+      return made;
+    };
+    this.resetting = button("Reset", "Back to the run as it was recorded (R)", () => this.whatIf.reset());
+    button("Save scenario", "A file that “cosim run” repeats (S)", () => saveScenario(this.whatIf));
+    return group;
+  }
+
+  /** A number in a set of fields. */
+  _number(set, label, said, step, now, changed) {
+    const holder = element("label", "", label);
+    const field = element("input");
+    Object.assign(field, { type: "number", step: String(step) });
+    field.setAttribute("aria-label", said);
+    field.addEventListener("input", () => {
+      if (Number.isFinite(field.valueAsNumber)) changed(field.valueAsNumber);
+    });
+    field.addEventListener("blur", () => this.tell());
+    holder.append(field);
+    set.append(holder);
+    this._fields.push({ field, now });
+    return field;
+  }
+
+  _ofKey(set, label, said, step, key) {
+    const least = key.startsWith("plant.current") || key.includes("centre") ? null : 0;
+    const field = this._number(set, label, said, step, () => shortNumber(this.whatIf.value(key)), (value) => this.whatIf.set(key, value));
+    if (least !== null) field.min = String(least);
+  }
+
+  _set(title) {
+    const set = element("fieldset");
+    set.append(element("legend", "", title));
+    return set;
+  }
+
+  _water() {
+    const both = element("div", "command-list");
+    const current = this._set("Current, m/s");
+    ["N", "E", "D"].forEach((letter, axis) => this._ofKey(current, letter, `current ${["north", "east", "down"][axis]} in metres a second`, 0.05, `plant.current.${axis}`));
+    both.append(current);
+    const { key, weight } = this.whatIf.flight.data.restoring;
+    if (!this.slots.has(key)) return both;
+    const set = this._set("Weight less buoyancy, N");
+    set.classList.add("of-two");
+    const now = () => shortNumber(weight - this.whatIf.value(key));
+    this._number(set, "W−B", "weight less buoyancy in newtons", 0.5, now, (value) => this.whatIf.set(key, Number((weight - value).toFixed(4))));
+    both.append(set);
+    return both;
+  }
+
+  _noise() {
+    const set = this._set("Noise of what is measured");
+    const keys = ["sensing.position_noise", "sensing.velocity_noise"];
+    set.hidden = !keys.every((key) => this.slots.has(key));
+    set.classList.add("of-two");
+    if (!set.hidden) keys.forEach((key, i) => this._ofKey(set, ["m", "m/s"][i], this.slots.get(key).words, [0.005, 0.005][i], key));
+    return set;
+  }
+
+  _thruster() {
+    const { whatIf } = this;
+    const set = this._set("Thruster that fails");
+    const { failures } = whatIf.flight.data;
+    set.hidden = !failures;
+    if (!failures) return set;
+    set.classList.add("of-two");
+    let time = Number((0.25 * whatIf.recorded.end).toFixed(1));
+    const choice = element("select");
+    choice.setAttribute("aria-label", "thruster that fails");
+    choice.append(new Option("none", "0"), ...failures.limits[0].map((_, i) => new Option(`thruster ${i + 1}`, String(i + 1))));
+    const tell = () => whatIf.fail(choice.value === "0" ? null : { thruster: Number(choice.value), time });
+    choice.addEventListener("change", tell);
+    set.append(choice);
+    this._fields.push({ field: choice, now: () => String(whatIf.failure?.thruster ?? 0) });
+    this._number(set, "at s", "time at which it fails, in seconds", 0.5, () => String(time), (value) => {
+      time = Math.min(Math.max(0, value), whatIf.recorded.header.duration);
+      if (whatIf.failure) tell();
+    }).min = "0";
+    return set;
+  }
+
+  _gain() {
+    const { whatIf } = this;
+    const set = this._set("Gain of the law");
+    const keys = [...this.slots.keys()].filter((key) => key.startsWith("law.gains."));
+    set.hidden = !keys.length;
+    if (!keys.length) return set;
+    set.classList.add("of-two");
+    const choice = element("select");
+    choice.setAttribute("aria-label", "gain");
+    const options = keys.map((key) => new Option("", key));
+    choice.append(...options);
+    choice.addEventListener("change", () => this.tell());
+    set.append(choice);
+    const names = () => options.forEach((option, i) => setText(option, `${whatIf.values.has(keys[i]) ? "• " : ""}${keys[i].slice(10).replaceAll("_", " ")}`));
+    const now = () => {
+      names();
+      return shortNumber(whatIf.value(choice.value));
+    };
+    this._number(set, "", "value of the gain", "any", now, (value) => whatIf.set(choice.value, value));
+    return set;
+  }
+
+  _places() {
+    const { whatIf } = this;
+    const list = element("div", "command-list");
+    list.append(element("p", "hint", "Drag the goal and regions in the scene (Shift: up and down), or give their places in metres."));
+    whatIf.recorded.header.regions.forEach(({ name }, region) => {
+      const axes = whatIf.flight.data.moves[region];
+      if (!axes) return;
+      const set = this._set(name);
+      axes.forEach((keys, axis) => {
+        if (!keys.length) return;
+        const place = () => placeOf(whatIf.run, region, whatIf.run.start)?.[axis] ?? whatIf.value(keys[0]);
+        const said = `${name}, ${["north", "east", "down"][axis]} in metres`;
+        this._number(set, ["N", "E", "D"][axis], said, 0.1, () => shortNumber(place()), (value) => {
+          const from = [0, 0, 0].map((_, i) => (i === axis ? place() : 0));
+          whatIf.move(region, from, from.map((x, i) => (i === axis ? value : x)));
+        });
+      });
+      list.append(set);
+    });
+    return list;
+  }
+}
+
+/** A number as a field has it. */
+function shortNumber(x) {
+  return String(Number(x.toFixed(4)));
+}

@@ -1,0 +1,214 @@
+"""Which numbers of a scenario a page may change, and where they stand in the WebAssembly of its flight.
+
+Each key is tried: what changes in the flight's arrays with it says whether its number stands there as it is. A key
+whose number something else is made of is not offered: the page puts numbers in, and works nothing out of them.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller import ControllerError
+from cosim.errors import ScenarioError
+from cosim.replay.interactive.flight import Flight
+from cosim.scenario.changes import value_at
+from cosim.scenario.key_names import PARAMETERS, key_name
+from cosim.scenario.scenario import Scenario, validate_scenario
+from cosim.scenario.toml_file import place_of
+from cosim.ssp.memory import Memory
+from plant_fmu import PlantFmuError
+from plant_fmu.variables import variables
+
+CURRENT = tuple(f"plant.current.{axis}" for axis in range(3))
+BUOYANCY = f"{PARAMETERS}buoyancy"
+NOISE = ("sensing.position_noise", "sensing.velocity_noise")
+_POINTS = ("centre", "feature", "point", "start", "end")  # of shapes: vectors that say where they are
+_LISTS = ("points", "corners")  # lists of such
+_DEPTHS = ("top", "bottom", "depth")
+_STEP, _APART = (
+    0.0037291,
+    1.7e-5,
+)  # by which numbers that are tried differ from the scenario's, and these steps from each other
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A number that a page may change.
+
+    Attributes
+    ----------
+    key : str
+        As ``--set`` takes it.
+    words, unit : str
+        What it is called.
+    value : float
+        As the scenario has it.
+    places : tuple of (str, int)
+        Where it stands: ``number`` or ``gain`` with a place in the module's arrays, ``start`` with a value reference of
+        the plant, ``noise`` with 0 or 1.
+    """
+
+    key: str
+    words: str
+    unit: str
+    value: float
+    places: tuple[tuple[str, int], ...]
+
+
+def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[tuple[tuple[str, ...], ...] | None]]:
+    """Return what a page may change.
+
+    Parameters
+    ----------
+    flight : Flight
+        Of the scenario.
+    memory : Memory
+        With the places of its arrays.
+
+    Returns
+    -------
+    list of Slot
+        Numbers.
+    list of three tuples of str, or None
+        Of each region, the goal first: the keys that change when it moves north, east and down; None where it cannot be
+        moved.
+    """
+    scenario, table = flight.scenario, flight.scenario.table
+    noise = NOISE if flight.exact or (flight.noisy and not scenario.sensing.exact) else ()
+    numbers = [*CURRENT, BUOYANCY, *noise, *(f"law.gains.{name}" for name in scenario.law.gains._fields)]
+    shapes = [("goal", table["goal"]), *((f"regions.{i}.shape", r["shape"]) for i, r in enumerate(table["regions"]))]
+    moving = [_moving_keys(path, shape) for path, shape in shapes]
+    of_moves = [key for axes in moving for keys in axes for key in keys]
+    places = dict(_search(flight, memory, [*numbers, *of_moves]))
+    moves = [axes if any(axes) and all(key in places for keys in axes for key in keys) else None for axes in moving]
+    offered = {key for axes in moves if axes for keys in axes for key in keys}.union(numbers)
+    slots = []
+    for key in (key for key in places if key in offered):
+        name = key_name(key, table, scenario.vehicle)
+        slots.append(Slot(key, name.words, name.unit, _value(scenario, key), places[key]))
+    return slots, moves
+
+
+def changed_scenario(scenario: Scenario, changes: Mapping[str, float]) -> Scenario:
+    """Return a scenario with other numbers at some keys.
+
+    Raises
+    ------
+    ScenarioError
+        If it cannot be.
+    """
+    table = _copied(scenario.table)
+    for key, value in changes.items():
+        if key.startswith(PARAMETERS):
+            table["plant"]["parameters"][key.removeprefix(PARAMETERS)] = value
+        else:
+            at, last = place_of(table, key)
+            at[last] = value
+    try:
+        return validate_scenario(table, scenario.name, scenario.vehicle)
+    except (PlantFmuError, ControllerError) as error:
+        raise ScenarioError(str(error)) from error
+
+
+def _moving_keys(path: str, shape: dict[str, Any]) -> tuple[tuple[str, ...], ...]:
+    axes: tuple[list[str], ...] = ([], [], [])
+    for name, value in shape.items():
+        if name in _POINTS and isinstance(value, list | tuple):
+            vectors = [(f"{path}.{name}", value)]
+        elif name in _LISTS:
+            vectors = [(f"{path}.{name}.{i}", vector) for i, vector in enumerate(value)]
+        elif name in _DEPTHS:
+            axes[2].append(f"{path}.{name}")
+            continue
+        else:
+            continue
+        for at, vector in vectors:
+            for axis in range(len(vector)):
+                axes[axis].append(f"{at}.{axis}")
+    return tuple(map(tuple, axes))
+
+
+def _search(flight: Flight, memory: Memory, keys: Sequence[str]) -> Iterator[tuple[str, tuple[tuple[str, int], ...]]]:
+    """Yield keys with where their numbers stand; many are tried at once, and fewer where that does not tell."""
+    for sign in (1.0, -1.0):
+        changes = {key: _value(flight.scenario, key) + sign * (_STEP + _APART * i) for i, key in enumerate(keys)}
+        try:
+            other = Flight(changed_scenario(flight.scenario, changes))
+        except ScenarioError:
+            continue
+        places = _places(flight, memory, other, {value: key for key, value in changes.items()})
+        if places is not None and len(places) == len(keys):
+            yield from ((key, tuple(dict.fromkeys(found))) for key, found in places.items())
+            return
+    if len(keys) > 1:
+        half = len(keys) // 2
+        yield from _search(flight, memory, keys[:half])
+        yield from _search(flight, memory, keys[half:])
+
+
+def _value(scenario: Scenario, key: str) -> float:
+    return float(value_at(scenario.table, key, scenario.vehicle))
+
+
+def _places(
+    flight: Flight, memory: Memory, other: Flight, keys: Mapping[float, str]
+) -> dict[str, list[tuple[str, int]]] | None:
+    """Return where numbers stand in the flight, of which another one has those of `keys` there.
+
+    None if anything else differs: then some number is not put in as it is.
+    """
+    found: dict[str, list[tuple[str, int]]] = {}
+
+    def put(value: float, kind: str, place: int) -> bool:
+        if value in keys:
+            found.setdefault(keys[value], []).append((kind, place))
+        return value in keys
+
+    for array, changed in zip(flight.arrays(), other.arrays(), strict=True):
+        if array.shape != changed.shape:
+            return None
+        differs = np.flatnonzero(~_equal(array, changed).ravel())
+        if differs.size and (array.dtype != np.float64 or memory.is_named(array)):
+            return None
+        for i in differs.tolist():
+            if not put(float(changed.ravel()[i]), "number", memory.keep(array) + i):
+                return None
+    for i, (one, new) in enumerate(zip(flight.law.gains, other.law.gains, strict=True)):
+        if one != new and not put(new, "gain", i):
+            return None
+    references = {v.name: (i, v.type) for i, v in enumerate(variables(flight.scenario.vehicle))}
+    for name, new in other.start.items():
+        place, kind = references[name]
+        if flight.start.get(name) != new and not (kind == "real" and put(new, "start", place)):
+            return None
+    for value, key in keys.items():
+        if key in NOISE:
+            put(value, "noise", NOISE.index(key))
+    return found if list(_numbers(flight.fly)) == list(_numbers(other.fly)) else None
+
+
+def _numbers(value: Any) -> Iterator[Any]:
+    """Yield what of the loop's arguments is no array."""
+    if isinstance(value, tuple):
+        for item in value:
+            yield from _numbers(item)
+    elif not isinstance(value, np.ndarray) and value == value:
+        yield value
+
+
+def _equal(one: np.ndarray, other: np.ndarray) -> NDArray[np.bool_]:
+    same = np.asarray(one == other)
+    return np.asarray(same | (np.isnan(one) & np.isnan(other))) if one.dtype == np.float64 else same
+
+
+def _copied(value: Any) -> Any:
+    """Return a table of its own, with lists for what a scenario keeps as tuples."""
+    if isinstance(value, dict):
+        return {key: _copied(item) for key, item in value.items()}
+    return [_copied(item) for item in value] if isinstance(value, list | tuple) else copy.copy(value)

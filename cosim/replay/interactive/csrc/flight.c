@@ -1,0 +1,94 @@
+/* Flights of one scenario, for a host that sets numbers before each: the fused loop, the law, the arbiter's rules, and the
+ * plant behind FMI 3.0's functions. The host reads and writes the arrays in place. */
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "fmi3Functions.h"
+#include "normal.h"
+
+#define EXPORT(name) __attribute__((export_name(#name)))
+
+static fmi3Instance PLANT;
+
+#include "loop.h" /* generated: the translated functions, their arrays in a Model, and the scene */
+
+static Model MODEL;
+static double STRENGTHS[N_ROWS][N_RULES]; /* of the rules, at each control step */
+static char MESSAGE[512]; /* why the last flight did not begin, or ended before its time */
+
+static void hear(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category, fmi3String message)
+{
+    (void)environment, (void)category;
+    if (status > fmi3Warning)
+        snprintf(MESSAGE, sizeof MESSAGE, "%s", message);
+}
+
+/* Puts all to what the scenario has at the beginning. */
+EXPORT(begin) int begin(void)
+{
+    MESSAGE[0] = '\0';
+    rewind_model(&MODEL);
+    if (PLANT)
+        fmi3FreeInstance(PLANT);
+    PLANT = fmi3InstantiateCoSimulation("plant", PLANT_TOKEN, NULL, false, true, false, false, NULL, 0, NULL, hear, NULL);
+    if (!PLANT)
+        return 0;
+    for (int i = 0; i < N_STARTS; i++)
+        if (fmi3SetFloat64(PLANT, &START_REFERENCES[i], 1, &START_VALUES[i], 1) > fmi3Warning)
+            return 0;
+    for (int i = 0; i < N_WHOLE_STARTS; i++)
+        if (fmi3SetInt32(PLANT, &WHOLE_REFERENCES[i], 1, &WHOLE_VALUES[i], 1) > fmi3Warning)
+            return 0;
+    for (int i = 0; i < N_FLAG_STARTS; i++)
+        if (fmi3SetBoolean(PLANT, &FLAG_REFERENCES[i], 1, &FLAG_VALUES[i], 1) > fmi3Warning)
+            return 0;
+    return 1;
+}
+
+/* Tells the plant a number before it starts. */
+EXPORT(set_start) int set_start(unsigned reference, double value)
+{
+    return fmi3SetFloat64(PLANT, &reference, 1, &value, 1) <= fmi3Warning;
+}
+
+/* The numbers that NumPy's generator draws, but for those of the tail, which are made of logarithms: these are a table. */
+static void draw_noise(double position, double velocity)
+{
+    Normal random = SCENE_RANDOM;
+    int next = 0;
+
+    for (int i = 0; i < 6 * N_NOISE; i++) {
+        double drawn = normal_draw(&random);
+        if (i == TAIL_PLACES[next])
+            drawn = TAIL_VALUES[next++];
+        NOISE[i] = (i % 6 < 3 ? position : velocity) * drawn;
+    }
+}
+
+/* Flies from start to end, with noise of these standard deviations [m, m/s] if the state is measured. Returns 0 if the plant
+ * refused its start; a refusal on the way is in the metrics. */
+EXPORT(fly) int fly(double position_noise, double velocity_noise)
+{
+    MODEL.exact = position_noise == 0.0 && velocity_noise == 0.0;
+    draw_noise(position_noise, velocity_noise);
+    memset(TRACE, 0, sizeof TRACE);
+    memset(REASONS, 0, sizeof REASONS);
+    if (fmi3EnterInitializationMode(PLANT, false, 0.0, 0.0, false, 0.0) > fmi3Warning ||
+        fmi3ExitInitializationMode(PLANT) > fmi3Warning)
+        return 0;
+    control_fly(&MODEL);
+    for (int i = 0; i < N_ROWS; i++)
+        strengths_evaluate(REASONS + i * REASONS_WIDTH + AT_REASONED_INPUTS, STRENGTHS[i]);
+    return 1;
+}
+
+EXPORT(numbers) double *numbers(void) { return MODEL.numbers; }
+EXPORT(integers) int64_t *integers(void) { return MODEL.integers; }
+EXPORT(gains) double *gains(void) { return MODEL.gains; }
+EXPORT(trace) double *trace(void) { return TRACE; }
+EXPORT(reasons) double *reasons(void) { return REASONS; }
+EXPORT(strengths) double *strengths(void) { return STRENGTHS[0]; }
+EXPORT(message) char *message(void) { return MESSAGE; }

@@ -1,0 +1,124 @@
+"""What a page needs to fly its run again: the WebAssembly, and what its numbers mean."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import zlib
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from cosim.errors import RunError
+from cosim.io.strict_json import nan_to_none
+from cosim.replay.interactive.adjustable import BUOYANCY, changed_scenario, find_slots
+from cosim.replay.interactive.flight import Flight
+from cosim.replay.interactive.module import flight_module
+from cosim.replay.interactive.scenario_template import scenario_template
+from cosim.replay.interactive.signals import sources_of
+from cosim.results.run_result import Run
+from cosim.results.summary import SETTLED_FOR
+from cosim.simulation.signals import Array, Column
+from cosim.ssp.memory import Memory
+
+
+def flight_data(run: Run, columns: Sequence[Column]) -> dict[str, Any]:
+    """Return what a page needs to fly a run again, with other numbers.
+
+    Parameters
+    ----------
+    run : Run
+        Of a scenario that the fused loop flies.
+    columns : sequence of Column
+        That a view of the run has.
+
+    Returns
+    -------
+    dict
+        As JSON knows it. The WebAssembly is deflated without a header, in base64.
+
+    Raises
+    ------
+    RunError
+        If the run cannot be flown in a page; it names the key.
+    TranslationError, UnsupportedError
+        If a law or the arbiter's rules have no C.
+    BuildError
+        If the WebAssembly is to be compiled, and the ziglang package is not there.
+    """
+    scenario = run.scenario
+    if scenario.log:
+        raise RunError(
+            f"{run.folder}: is imported from {scenario.log}, expected a run that was simulated for a page that flies"
+        )
+    made = flight_module(scenario)
+    flight, memory = made.flight, made.memory
+    slots, moves = find_slots(flight, memory)
+    deflate = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
+    template = scenario_template(scenario, slots)
+    regions = [scenario.goal_velocity, *(secondary.region.velocity for secondary in scenario.regions)]
+    data: dict[str, Any] = nan_to_none({
+        "wasm": base64.b64encode(deflate.compress(made.binary) + deflate.flush()).decode(),
+        "name": scenario.name,
+        "title": scenario.title,
+        "rows": len(flight.trace),
+        "widths": {
+            "trace": flight.trace.shape[1],
+            "reasons": flight.reasons.shape[1],
+            "rules": len(scenario.rules.system.rules),
+        },
+        "metrics": [memory.keep(flight.metrics), flight.metrics.size],
+        "place": 11 + len(scenario.regions) + len(scenario.criteria) + flight.workspace.signals.inputs.size,
+        "step": scenario.time.step,
+        "every": scenario.control_every,
+        "settled_for": SETTLED_FOR,
+        "slots": [dataclasses.asdict(slot) for slot in slots],
+        "moves": moves,
+        "noise": [scenario.sensing.position_noise, scenario.sensing.velocity_noise],
+        "signals": sources_of(flight, columns),
+        "velocities": [list(velocity) for velocity in regions],
+        "goal_places": flight.setup.goal_places.tolist(),
+        "criteria": list(scenario.criterion_places),
+        "restoring": _restoring(flight),
+        "failures": _failures(flight, memory),
+        "toml": dataclasses.asdict(template),
+    })  # fmt: skip
+    return data
+
+
+def _restoring(flight: Flight) -> dict[str, Any]:
+    """Return how the true restoring parameters (12) go with buoyancy."""
+    scenario = flight.scenario
+    begun, more = (
+        s.true_restoring_parameters
+        for s in (scenario, changed_scenario(scenario, {BUOYANCY: _buoyancy(scenario) + 1.0}))
+    )
+    weight = scenario.plant.parameters.get("weight", scenario.vehicle.weight)
+    return {"key": BUOYANCY, "weight": weight, "truth": begun.tolist(), "slopes": (more - begun).tolist()}
+
+
+def _buoyancy(scenario: Any) -> float:
+    return float(scenario.plant.parameters.get("buoyancy", scenario.vehicle.buoyancy))
+
+
+def _failures(flight: Flight, memory: Memory) -> dict[str, Any] | None:
+    """Return where failures of thrusters stand; None where the wrench acts on the body itself."""
+    setup, allocator = flight.setup, flight.allocator
+    if not setup.thrusters:
+        return None
+
+    def places(array: Array) -> list[int]:
+        return [memory.keep(array), *array.shape]
+
+    own = zip(setup.failure_steps, setup.failed, setup.remaining, strict=True)
+    return {
+        "failed": memory.keep(setup.failed),
+        "steps": memory.keep(setup.failure_steps),
+        "remaining": memory.keep(setup.remaining),
+        "own": [[int(step), int(thruster), float(left)] for step, thruster, left in own if step >= 0],
+        "tell": bool(setup.tell),
+        "lower": places(allocator.lower),
+        "upper": places(allocator.upper),
+        "limits": [np.asarray(side[0]).tolist() for side in (allocator.lower, allocator.upper)],
+    }

@@ -1,0 +1,69 @@
+"""The WebAssembly of a scenario's flight: compiled once, then kept in the user's cache."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import platformdirs
+
+from controller.compiling.library import is_whole, keep
+from cosim.replay.interactive.flight import Flight
+from cosim.replay.interactive.sources import flight_sources
+from cosim.scenario.scenario import Scenario
+from cosim.ssp.memory import Memory
+from plant_fmu.compiling.compiler import FLAGS
+from plant_fmu.compiling.libraries import digest
+from plant_fmu.compiling.sources import c_sources, header
+from plant_fmu.compiling.webassembly import module
+from plant_fmu.description import token
+from plant_fmu.vehicle_component import of_vehicle
+
+
+@dataclass(frozen=True)
+class FlightModule:
+    """A flight with its WebAssembly, and where its arrays stand in that."""
+
+    flight: Flight
+    memory: Memory
+    binary: bytes
+
+
+def flight_module(scenario: Scenario) -> FlightModule:
+    """Return the WebAssembly of a scenario's flight.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With a built-in law.
+
+    Returns
+    -------
+    FlightModule
+        From the cache where it is there.
+
+    Raises
+    ------
+    RunError
+        If the scenario has what the fused loop does not fly; with the key.
+    TranslationError, UnsupportedError
+        If a law or the arbiter's rules have no C.
+    BuildError
+        If the ziglang package is not there, or its compiler fails.
+    """
+    flight, memory = Flight(scenario), Memory()
+    component = of_vehicle(scenario.vehicle)
+    key = token(component, 3)
+    sources = flight_sources(flight, memory, key)
+    made_from = {**c_sources(component, 3), component.header: header(component, key).encode(), **sources}
+    name = f"{scenario.vehicle.name}-{digest(made_from, *FLAGS)[:32]}.wasm"
+    kept = Path(platformdirs.user_cache_dir("subreach")) / "pages" / name
+    if is_whole(kept):
+        return FlightModule(flight, memory, kept.read_bytes())
+    binary = module(component, key, sources)
+    with tempfile.TemporaryDirectory(prefix="flight-") as scratch:
+        built = Path(scratch) / name
+        built.write_bytes(binary)
+        keep(built, kept.parent)
+    return FlightModule(flight, memory, binary)

@@ -1,0 +1,61 @@
+"""The scenario of a page as TOML with gaps, which the page fills with its numbers."""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from cosim.replay.interactive.adjustable import Slot
+from cosim.scenario.key_names import PARAMETERS
+from cosim.scenario.scenario import VEHICLE_COPY, Scenario
+from cosim.scenario.toml_file import place_of
+from cosim.scenario.toml_text import scenario_text
+
+_MARK = 730000000.5  # begins a row of numbers that stand for what the page fills in, all equally long as text
+_TITLE = "title-of-what-if"
+
+
+@dataclass(frozen=True)
+class ScenarioTemplate:
+    """Parts of a text, and what goes between them: the keys of numbers, and ``title``."""
+
+    parts: tuple[str, ...]
+    keys: tuple[str, ...]
+
+
+def scenario_template(scenario: Scenario, slots: Sequence[Slot]) -> ScenarioTemplate:
+    """Return the file of a scenario with gaps for its title and some numbers; failures can be added at its end.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        That the page is of.
+    slots : sequence of Slot
+        Numbers that the page may change.
+    """
+    table = copy.deepcopy(dict(scenario.table))
+    table = _listed(table)
+    if not table["failures"]:
+        del table["failures"]
+    if scenario.vehicle_file:
+        table["vehicle"] = VEHICLE_COPY
+    marks = {repr(_MARK + i): slot.key for i, slot in enumerate(slots)}
+    for mark, key in marks.items():
+        if key.startswith(PARAMETERS):
+            table["plant"]["parameters"][key.removeprefix(PARAMETERS)] = float(mark)
+        else:
+            at, last = place_of(table, key)
+            at[last] = float(mark)
+    table["title"] = _TITLE
+    marks[f'"{_TITLE}"'] = "title"
+    parts = re.split(f"({'|'.join(map(re.escape, marks))})", scenario_text(table, {}))
+    return ScenarioTemplate(tuple(parts[::2]), tuple(marks[mark] for mark in parts[1::2]))
+
+
+def _listed(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _listed(item) for key, item in value.items()}
+    return [_listed(item) for item in value] if isinstance(value, list | tuple) else value

@@ -1,0 +1,195 @@
+"""The C of a flight: translated functions, where their arrays stand, and what the plant is given before it starts."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from controller.law import NOTHING_EXPECTED
+from controller.translator.operands import number
+from controller.translator.program import Program
+from controller.translator.types import type_of
+from cosim.batch.fused_loop import fly
+from cosim.replay.interactive.flight import Flight
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.sensor import STREAM
+from cosim.ssp.c_sources import c_files
+from cosim.ssp.memory import Memory, Named
+from cosim.ssp.normal_tables import OUTERMOST, generator_state, ziggurat
+from fuzzy_arbiter import Constant, Output, Rule, System, Term
+from fuzzy_arbiter.export import to_c
+from plant_fmu.variables import variables
+
+_MODEL = """\
+typedef struct {
+    double numbers[N_NUMBERS], gains[N_GAINS];
+    int64_t integers[N_INTEGERS];
+    uint64_t words[N_WORDS];
+    bool flags[N_FLAGS];
+    int64_t exact; /* nothing but the true state is measured */
+} Model;
+
+static double NOISE[6 * N_NOISE + 1], TRACE[N_TRACE], REASONS[N_REASONS];
+static double NOTHING[6] = {NAN, NAN, NAN, NAN, NAN, NAN};
+int rules_evaluate(const double inputs[], double outputs[]);
+int strengths_evaluate(const double inputs[], double outputs[]);
+static int call_law(void *model), call_rules(void *model);
+"""
+
+_CALLS = """\
+static int call_law(void *model)
+{
+    control_law(model);
+    return 0;
+}
+
+static int call_rules(void *model)
+{
+    const Model *m = model;
+
+    return rules_evaluate(m->numbers + AT_RULE_INPUTS, (double *)m->numbers + AT_WEIGHTS);
+}
+
+static void rewind_model(Model *m)
+{
+    memcpy(m->numbers, FIRST_NUMBERS, sizeof FIRST_NUMBERS);
+    memcpy(m->integers, FIRST_INTEGERS, sizeof FIRST_INTEGERS);
+    memcpy(m->words, FIRST_WORDS, sizeof FIRST_WORDS);
+    memcpy(m->flags, FIRST_FLAGS, sizeof FIRST_FLAGS);
+    memcpy(m->gains, FIRST_GAINS, sizeof FIRST_GAINS);
+}
+"""
+
+
+def flight_sources(flight: Flight, memory: Memory, token: str) -> dict[str, bytes]:
+    """Return the C files of a flight, to be compiled with those of the plant's FMU.
+
+    Parameters
+    ----------
+    flight : Flight
+        What is flown.
+    memory : Memory
+        An empty one: arrays get their places.
+    token : str
+        Of the plant's description.
+
+    Returns
+    -------
+    dict of str to bytes
+        Contents by name.
+
+    Raises
+    ------
+    TranslationError
+        If a function is beyond what is translated.
+    UnsupportedError
+        If the arbiter's rules have no C.
+    """
+    program, calls, law = Program(), [], flight.law
+    _name_arrays(flight, memory)
+    for name, function, arguments in (("law", type(law).function, flight.decide), ("fly", fly, flight.fly)):
+        program.export(f"translated_{name}", function, tuple(map(type_of, arguments)))
+        given = (Named(a, "gains") if a is law.gains else a for a in arguments)
+        calls.append(f"static {memory.call(program, name, tuple(given))}")
+    scenario, signals = flight.scenario, flight.workspace.signals
+    system = scenario.rules.system
+    gains = ", ".join(map(number, law.gains)) or "0.0"
+    sizes = memory.sizes() | {
+        "N_GAINS": max(len(law.gains), 1), "N_NOISE": len(flight.noise), "N_TRACE": flight.trace.size,
+        "N_REASONS": flight.reasons.size, "N_ROWS": len(flight.trace), "N_RULES": len(system.rules),
+        "N_RULE_INPUTS": len(system.inputs), "REASONS_WIDTH": flight.reasons.shape[1],
+        "AT_REASONED_INPUTS": 1 + len(scenario.regions) + len(scenario.criteria),
+        "AT_RULE_INPUTS": memory.keep(signals.inputs), "AT_WEIGHTS": memory.keep(flight.workspace.by_criterion),
+    }  # fmt: skip
+    text = "\n".join([
+        "/* A scenario's flight: generated. */",
+        *(f"#define {key} {value}" for key, value in sizes.items()),
+        _MODEL,
+        program.text(),
+        *memory.definitions,
+        *memory.starts(),
+        f"static const double FIRST_GAINS[] = {{{gains}}};",
+        *calls,
+        *_scene(flight, token),
+        _CALLS,
+    ])  # fmt: skip
+    normal = c_files("cosim.ssp", "csrc/controller")
+    return {
+        **c_files("cosim.replay.interactive", "csrc"),
+        "loop.h": text.encode(),
+        "rules.c": to_c(dataclasses.replace(system, name="rules")).encode(),
+        "strengths.c": to_c(_strengths(system)).encode(),
+        "ziggurat.h": ziggurat().encode(),
+        **{name: normal[name] for name in ("normal.c", "normal.h")},
+    }
+
+
+def _name_arrays(flight: Flight, memory: Memory) -> None:
+    """Give those arrays their places that are no part of the model, or not always."""
+    for array, name in ((flight.noise, "NOISE"), (flight.trace, "TRACE"), (flight.reasons, "REASONS")):
+        memory.name(array, name)
+    memory.name(NOTHING_EXPECTED, "NOTHING")
+    if flight.exact:
+        expected = flight.law.expected
+        own = "NOTHING" if expected is NOTHING_EXPECTED else f"m->numbers + {memory.keep(expected)}"
+        memory.name(flight.expected, f"(m->exact ? NOTHING : {own})")
+    for native in (flight.native, flight.effectiveness, flight.losses):
+        memory.fix(native.input_references, native.output_references)
+
+
+def _strengths(system: System) -> System:
+    """Return a system of the same conditions, whose outputs are the strengths of the rules."""
+    one = (Term("one", Constant(1.0)),)
+    outputs = tuple(Output(f"r{i}", (0.0, 1.0), one, 0.0, "sum") for i in range(len(system.rules)))
+    rules = (
+        Rule(rule.condition, (output["one"],), rule.weight, rule.operators)
+        for rule, output in zip(system.rules, outputs, strict=True)
+    )
+    return System(
+        system.inputs, outputs, tuple(rules), name="strengths", conjunction=system.conjunction,
+        disjunction=system.disjunction, implication=system.implication, outside="clip",
+    )  # fmt: skip
+
+
+def _scene(flight: Flight, token: str) -> Iterator[str]:
+    """Yield what is told to the plant, and what noise is drawn, as C."""
+    scenario = flight.scenario
+    table = {v.name: (i, v.type) for i, v in enumerate(variables(scenario.vehicle))}
+    yield f'#define PLANT_TOKEN "{token}"'
+    for kind, prefix, names, c in (
+        ("real", "START", "STARTS", "fmi3Float64"),
+        ("integer", "WHOLE", "WHOLE_STARTS", "fmi3Int32"),
+        ("boolean", "FLAG", "FLAG_STARTS", "fmi3Boolean"),
+    ):
+        told = [(table[name][0], value) for name, value in flight.start.items() if table[name][1] == kind]
+        values = [number(float(value)) if kind == "real" else str(int(value)) for _, value in told]
+        yield f"#define N_{names} {len(told)}"
+        references = [str(at) for at, _ in told] or ["0"]
+        yield f"static const fmi3ValueReference {prefix}_REFERENCES[] = {_braced(references)};"
+        yield f"static const {c} {prefix}_VALUES[] = {_braced(values or ['0'])};"
+    upper, lower, increment, rest = generator_state(scenario.sensing.seed, STREAM)
+    words = [f"UINT64_C({word})" for word in (upper, lower, increment, rest)]
+    yield f"#define SCENE_RANDOM {{{{{words[0]}, {words[1]}}}, {{{words[2]}, {words[3]}}}}}"
+    drawn = tail_draws(scenario, len(flight.noise))
+    yield f"static const int TAIL_PLACES[] = {_braced([*(str(at) for at, _ in drawn), '-1'])};"
+    yield f"static const double TAIL_VALUES[] = {_braced([*(number(x) for _, x in drawn), '0.0'])};"
+
+
+def tail_draws(scenario: Scenario, rows: int) -> list[tuple[int, float]]:
+    """Return the places and values of those numbers of the noise that NumPy's generator takes logarithms for.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Whose seed counts.
+    rows : int
+        Control steps, of six numbers each.
+    """
+    drawn = np.random.default_rng([scenario.sensing.seed, STREAM]).standard_normal(6 * rows)
+    return [(int(i), float(drawn[i])) for i in np.flatnonzero(np.abs(drawn) >= OUTERMOST)]
+
+
+def _braced(values: Sequence[str]) -> str:
+    return f"{{{', '.join(values)}}}"

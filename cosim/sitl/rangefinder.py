@@ -1,0 +1,73 @@
+"""A rangefinder that looks down the body's vertical axis, on the plant's bottom or on the scenario's hard regions."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from controller.compiling.function import CompiledFunction
+from controller.quaternion import rotation_matrix
+from controller.regions import pack
+from controller.regions.rays import ray_distances
+from controller.regions.region_set import of_attitude
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.signals import Array
+
+FARTHEST = 100.0  # m, that it says where it meets nothing
+_LEVEL = 0.1  # cosine of the tilt, from which on a flat bottom is met at all
+
+
+class Rangefinder:
+    """Measures how far it is to what is below.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Its plant's ``bottom_depth`` is met; without one, hard regions that stand still are: their surfaces, which have
+        the vehicle's own size added where the scenario adds it.
+
+    Attributes
+    ----------
+    is_fitted : bool
+        Whether there is anything to be met at all.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> import numpy as np
+    >>> from cosim.sitl.rangefinder import Rangefinder
+    >>> below = Rangefinder(cosim.load_scenario("pipe-inspection"))
+    >>> round(below.measure(np.array([0.0, 0.0, 3.0]), np.array([1.0, 0.0, 0.0, 0.0]), 0.0), 3)  # over a bed in 4.6 m
+    1.6
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._has_bottom = "bottom_depth" in scenario.plant.parameters
+        hard = [
+            secondary.region for secondary in scenario.regions if secondary.region.hard and not secondary.is_dynamic
+        ]
+        met = [] if self._has_bottom else [region for region in hard if not of_attitude(region.shape)]
+        self.is_fitted = self._has_bottom or bool(met)
+        self._regions = pack(met)
+        self._distances, self._beam = np.zeros(1), np.zeros((1, 3))
+        self._ray_distances = CompiledFunction(ray_distances)
+
+    def measure(self, position_ned: Array, quaternion: Array, altitude: float) -> float:
+        """Return the distance along the body's vertical axis [m], `FARTHEST` at the most; 0 inside a region.
+
+        Parameters
+        ----------
+        position_ned : ndarray, shape (3,)
+            [m].
+        quaternion : ndarray, shape (4,)
+            From body to world, scalar first.
+        altitude : float
+            Above the plant's bottom, as its sensor measures it [m]; only where there is one.
+        """
+        self._beam[0] = rotation_matrix(quaternion)[:, 2]
+        if self._has_bottom:
+            down = float(self._beam[0, 2])
+            return min(altitude / down, FARTHEST) if down > _LEVEL or math.isnan(down) else FARTHEST
+        self._ray_distances(self._regions, position_ned, self._beam, FARTHEST, self._distances)
+        return min(float(self._distances[0]), FARTHEST)

@@ -1,0 +1,1 @@
+"""Pages that fly their run again."""

@@ -1,0 +1,108 @@
+"""Flights in a page are those of `cosim run`, to the last bit: of the recorded scenario, and of what a reader saves."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller.laws.deployable.gains import DeployableGains
+from cosim.campaigns.scenes.as_scenario import scene_scenario
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.scene_file import read_scenes
+from cosim.replay.viewing import Viewing
+from cosim.results.run_result import load_run
+from cosim.results.wording import verdict
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]  # the first build compiles a C library too
+
+HARD = Path(__file__).parents[3] / "data" / "scenes" / "hard.jsonl"
+MOVED = {"goal.centre.1": 0.05, "goal.centre.2": 4.02, "regions.3.shape.centre.0": 7.15}
+WATER = {"plant.current.0": 0.05, "plant.current.1": -0.12, "plant.parameters.buoyancy": 127.3}
+NOISE = {"sensing.position_noise": 0.02, "sensing.velocity_noise": 0.0}
+GAINS = {"law.gains.speed": 0.7, "law.gains.barriers": 0.0}
+FAILS = {"thruster": 3, "time": 4.31}
+
+SCENES = {
+    "docking": ("docking", ()),
+    "a moving view": ("pipe-inspection", ("time.duration=20",)),
+    "through sensors": ("harbour", ("time.duration=30",)),
+    "exact, a wrench": ("paper-limited", ("arbiter.engine=closed", "time.duration=5")),
+    "exact, allocated": (
+        "paper",
+        ("arbiter.engine=closed", "time.duration=5", "actuation.through=thrusters", "vehicle=bluerov2_heavy"),
+    ),
+    "goals in turn": (
+        "docking",
+        ("goal.then=[[6.0, -2.5, 3.0]]", "goal.stay=1", "time.duration=40", "plant.current=[0,0,0]"),
+    ),
+    "known failures": (
+        "docking",
+        ("tell_failures=true", "failures=[{thruster = 2, time = 3.0}, {thruster = 5, time = 1.0, stuck = true}]",
+         "time.duration=15", "sensing.dead_from=8", "sensing.dead_for=1"),
+    ),
+}  # fmt: skip
+ROUNDED = ("attitude.", "command.", "actuation.", ".shift.")  # what the page works out
+
+
+def flown_run(scenario, folder):
+    return load_run(run_scenario(scenario, folder, report=False).folder)
+
+
+def assert_same(flown, run):
+    """Hold every signal of a flight against the record, to the last bit but for what the page works out itself."""
+    viewing = Viewing(run.scenario, run.record.columns)
+    names = [run.record.columns[i].name for i in viewing.picked]
+    picked = viewing.extended(np.column_stack([run.record[name] for name in names]))
+    recorded = dict(zip((column.name for column in viewing.columns), picked.T, strict=True))
+    every = run.scenario.control_every
+    assert len(flown.columns) > 30 and {"active", "rule.R1", "position.x", "estimate.phi1"} <= set(flown.columns)
+    for name, column in flown.columns.items():
+        expected = recorded[name][: run.scenario.steps : every]
+        if any(part in name for part in ROUNDED):
+            np.testing.assert_allclose(column, expected, rtol=1e-12, atol=1e-9, err_msg=name)
+        else:
+            np.testing.assert_array_equal(column, expected, err_msg=name)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_page_repeats_its_run_to_the_last_bit(scene, fly, tmp_path):
+    name, overrides = SCENES[scene]
+    run = flown_run(load_scenario(name, overrides), tmp_path / "run")
+    flown = fly(run)
+    assert_same(flown, run)
+    assert verdict(run.summary).startswith(flown.verdict.removesuffix(".").split(";")[0])
+
+
+@pytest.mark.parametrize(
+    ("values", "failure"), [(MOVED | WATER, None), (NOISE | GAINS, FAILS)], ids=["places and water", "noise and gains"]
+)
+def test_a_saved_scenario_repeats_the_flight_to_the_last_bit(values, failure, fly, shipped_run, tmp_path):
+    flown = fly(load_run(shipped_run("docking").folder), values, failure)
+    (tmp_path / "saved.toml").write_text(flown.toml)
+    saved = load_scenario(tmp_path / "saved.toml")
+    assert "as a test has it" in saved.title
+    assert_same(flown, flown_run(saved, tmp_path / "run"))
+
+
+def test_noise_can_be_added_to_an_exact_run(fly, tmp_path):
+    run = flown_run(
+        load_scenario("docking", ["sensing.position_noise=0", "sensing.velocity_noise=0", "time.duration=8"]),
+        tmp_path / "exact",
+    )
+    flown = fly(run, {"sensing.position_noise": 0.01, "sensing.velocity_noise": 0.005})
+    noisy = load_scenario("docking", ["time.duration=8"])
+    assert_same(flown, flown_run(noisy, tmp_path / "noisy"))
+
+
+def test_a_hard_scene_is_flown_as_scored_scenes_are(fly, tmp_path):
+    scene = list(read_scenes(HARD))[1]
+    run = flown_run(scene_scenario(scene, "deployable", DeployableGains(), Conditions(duration=20.0)), tmp_path / "run")
+    assert_same(fly(run), run)
+
+
+def test_a_number_that_the_plant_refuses_is_said(fly, shipped_run):
+    run = load_run(shipped_run("docking").folder)
+    refused = fly(run, {"plant.parameters.buoyancy": -5.0})
+    assert "buoyancy" in refused

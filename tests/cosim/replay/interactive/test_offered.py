@@ -1,0 +1,136 @@
+"""What a page that flies offers, before anything is compiled: numbers and their places, and what it refuses."""
+
+import importlib.util
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cosim.command_line.cli import main
+from cosim.errors import RunError
+from cosim.replay.interactive.adjustable import changed_scenario, find_slots
+from cosim.replay.interactive.data import flight_data
+from cosim.replay.interactive.flight import Flight
+from cosim.replay.interactive.module import flight_module
+from cosim.replay.interactive.scenario_template import scenario_template
+from cosim.replay.interactive.sources import flight_sources, tail_draws
+from cosim.scenario.scenario import load_scenario
+from cosim.ssp.memory import Memory
+from cosim.ssp.normal_tables import OUTERMOST, ziggurat
+from plant_fmu.errors import BuildError
+
+pytestmark = pytest.mark.medium
+
+
+@pytest.fixture(scope="module")
+def docking():
+    flight, memory = Flight(load_scenario("docking")), Memory()
+    flight_sources(flight, memory, "token")
+    return flight, memory, *find_slots(flight, memory)
+
+
+def test_every_gain_the_water_the_noise_and_all_that_has_a_place_are_offered(docking):
+    flight, _, slots, moves = docking
+    keys = {slot.key for slot in slots}
+    assert keys > {f"law.gains.{name}" for name in flight.scenario.law.gains._fields}
+    assert keys > {"plant.current.0", "plant.parameters.buoyancy", "sensing.position_noise", "sensing.velocity_noise"}
+    names = ["goal", *(secondary.region.name for secondary in flight.scenario.regions)]
+    assert [name for name, axes in zip(names, moves, strict=True) if axes is None] == ["heading"]
+
+
+def test_numbers_put_into_their_places_make_the_flight_of_the_scenario_that_has_them(docking):
+    flight, memory, slots, _ = docking
+    changes = {slot.key: slot.value + 1.3e-4 * (i + 1) for i, slot in enumerate(slots)}
+    other = Flight(changed_scenario(flight.scenario, changes))
+    numbers = {place: changes[slot.key] for slot in slots for kind, place in slot.places if kind == "number"}
+    seen = set()
+    for array, changed in zip(flight.arrays(), other.arrays(), strict=True):
+        if array.dtype == np.float64 and array.size and not memory.is_named(array):
+            at = memory.keep(array)
+            put = [numbers.get(at + i, x) for i, x in enumerate(array.ravel())]
+            seen |= {at + i for i in range(array.size)} & numbers.keys()
+            np.testing.assert_array_equal(put, changed.ravel())
+    assert seen == numbers.keys() and len(seen) >= 18
+    gains = {place: changes[slot.key] for slot in slots for kind, place in slot.places if kind == "gain"}
+    assert [gains[i] for i in range(len(gains))] == list(other.law.gains)
+
+
+def test_a_number_that_others_are_made_of_is_not_offered():
+    ends = "type = 'cylinder', start = [9,5,1], end = [9,5,6], radius = 0.3"
+    cylinder = f"{{name = 'leg', criterion = 'obstacle', keep = 'out', gain = 100.0, shape = {{{ends}}}}}"
+    flight, memory = Flight(load_scenario("docking", [f"regions=[{cylinder}]", "intersection=[]"])), Memory()
+    flight_sources(flight, memory, "token")
+    slots, moves = find_slots(flight, memory)
+    assert moves[0] is not None and moves[1] is None  # the law is given middle and half length, not the ends
+    assert not [slot.key for slot in slots if slot.key.startswith("regions")]
+
+
+def test_the_template_filled_with_its_own_numbers_is_the_scenario(docking, tmp_path):
+    flight, _, slots, _ = docking
+    template, values = scenario_template(flight.scenario, slots), {slot.key: repr(slot.value) for slot in slots}
+    filled = [values.get(key, '"Again"') for key in template.keys]
+    parts = [part for pair in zip(template.parts, [*filled, ""], strict=True) for part in pair]
+    (tmp_path / "again.toml").write_text("".join(parts))
+    again = load_scenario(tmp_path / "again.toml")
+    assert again.title == "Again"
+    assert again.table | {"title": ""} == flight.scenario.table | {"title": ""}
+
+
+def test_widths_of_the_noise_are_those_that_numpy_draws_by():
+    text, checked = ziggurat(), 0
+    widths = [float(x) for x in text.partition("WIDTHS[] = {")[2].partition("}")[0].split(",")]
+    inner = [int(x) for x in re.findall(r"UINT64_C\((\d+)\)", text)]
+    for seed in range(30):
+        generator = np.random.Generator(np.random.PCG64(seed))
+        for word in np.random.PCG64(seed).random_raw(400).tolist():
+            size, layer = word >> 9 & 0xFFFFFFFFFFFFF, word & 0xFF
+            drawn = generator.standard_normal()
+            if size >= inner[layer]:  # it may be refused, and another word drawn
+                break
+            checked += 1
+            assert drawn == (-1) ** (word >> 8 & 1) * size * widths[layer]
+    assert checked > 1000
+
+
+def test_the_tail_of_the_noise_is_a_table():
+    scenario = load_scenario("docking")
+    drawn = np.random.default_rng([scenario.sensing.seed, 1]).standard_normal(18000)
+    tail = dict(tail_draws(scenario, 3000))
+    assert tail == {i: x for i, x in enumerate(drawn.tolist()) if abs(x) >= OUTERMOST} and tail
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "said"),
+    [
+        ("paper", [], "arbiter.engine is 'skfuzzy', expected 'closed' for a page that flies"),
+        ("docking", ["master.order=jacobi"], "master.order is 'jacobi', expected 'gauss-seidel' for a page that flies"),
+        ("docking", ["plant.fmi=2"], "plant.fmi is 2, expected 3 for a page that flies"),
+        ("docking", ["commands.enabled=true"], "commands.enabled is True, expected False for a page that flies"),
+    ],
+)
+def test_what_a_page_cannot_fly_is_refused_by_its_key(name, changes, said):
+    with pytest.raises(RunError, match=said):
+        Flight(load_scenario(name, changes))
+
+
+def test_several_runs_are_refused_and_no_file_is_written(tmp_path, capsys):
+    assert main(["replay", "one", "other", "--interactive", "--out", str(tmp_path / "page.html")]) != 0
+    assert "2 runs, expected one for a page that flies" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_a_compiler_for_webassembly_one_line_says_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.setattr("platformdirs.user_cache_dir", lambda *_: str(tmp_path))
+    found = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name, *rest: None if name == "ziglang" else found(name, *rest)
+    )
+    with pytest.raises(BuildError, match=r"pip install .*ziglang"):
+        flight_module(load_scenario("docking", ["time.duration=0.1"]))
+
+
+def test_an_imported_log_is_refused():
+    run = SimpleNamespace(folder="dive", scenario=SimpleNamespace(log="dive.tlog"))
+    with pytest.raises(RunError, match=r"imported from dive\.tlog"):
+        flight_data(run, ())

@@ -1,0 +1,136 @@
+"""The page that flies in real browsers: dragged, by keyboard, on a phone, and without WebAssembly."""
+
+import pytest
+
+from cosim.replay.pages import replay
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
+from tests.cosim.replay.browser import ARTEFACTS
+from tests.cosim.replay.firefox import FIREFOX, Firefox
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
+
+FLOWN = "subreach.whatIf.took !== null && !subreach.whatIf._flying && subreach.runs.length === 2"
+NAME = """
+const { scene } = subreach;
+for (let y = 60; y < scene.canvas.clientHeight; y += 3) {
+  for (let x = 0; x < scene.canvas.clientWidth; x += 3) if (scene.labels.nameAt(x, y)?.region === arguments[0]) return [x, y];
+}"""
+OVERLAP = """
+const boxes = [...document.querySelectorAll("#scene-bar .group"), document.getElementById("commands")].map((e) => e.getBoundingClientRect());
+const apart = (a, b) => a.right <= b.left || b.right <= a.left || a.bottom <= b.top || b.bottom <= a.top;
+return boxes.some((a, i) => boxes.slice(i + 1).some((b) => !apart(a, b)))"""
+
+
+@pytest.fixture(scope="module")
+def page(builds, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("flies")
+    run_scenario(load_scenario("docking", ["time.duration=12"]), folder / "run", report=False)
+    return replay([folder / "run"], folder / "page.html", interactive=True)
+
+
+def opened(browser, page, size=(1280, 720)):
+    browser.open(page, size)
+    wait_until(browser, "subreach.whatIf?.repeats !== null")
+    return browser
+
+
+def wait_until(browser, condition):
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    WebDriverWait(browser.driver, 120).until(lambda _: browser.js(f"return Boolean({condition})"))
+    browser.settle()
+
+
+def end_of(browser, run):
+    return browser.js("const r = subreach.runs[arguments[0]]; return r.pose(r.end).position", run)
+
+
+def test_the_page_is_small_asks_nobody_and_repeats_its_record_to_the_last_bit(browser, page):
+    assert page.stat().st_size < 1_000_000
+    opened(browser, page)
+    asked, complaints = browser.logs()
+    assert not complaints and all(url.startswith(("file:", "data:", "blob:", "about:")) for url in asked)
+    assert browser.js("return subreach.whatIf.repeats") == 0.0
+    assert browser.js("return subreach.runs.length") == 1
+
+
+def test_a_goal_that_is_dragged_is_flown_to_and_r_goes_back(browser, page):
+    from selenium.webdriver.common.action_chains import ActionChains
+
+    opened(browser, page)
+    x, y = browser.js(NAME, 0)
+    width, height = browser.js("const c = subreach.scene.canvas; return [c.clientWidth, c.clientHeight]")
+    scene = browser.driver.find_element("id", "scene")
+    drag = ActionChains(browser.driver).move_to_element_with_offset(scene, x - width / 2, y - height / 2)
+    drag.click_and_hold().move_by_offset(-40, -10).move_by_offset(-60, -20).release().perform()
+    wait_until(browser, FLOWN)
+    moved = dict(browser.js("return [...subreach.whatIf.values]"))
+    assert moved and set(moved) <= {f"goal.centre.{axis}" for axis in range(3)}
+    goal = browser.js("return subreach.runs[1].header.regions[0].shape.centre")
+    assert goal[:2] == [moved.get("goal.centre.0", 7.1), moved.get("goal.centre.1", 0.0)]
+    assert max(abs(a - b) for a, b in zip(end_of(browser, 0), end_of(browser, 1), strict=True)) > 0.3
+    assert browser.js("return document.getElementById('panel').textContent").count("what if") == 1
+    browser.press("r")
+    wait_until(browser, "subreach.runs.length === 1")
+    assert not browser.js("return subreach.whatIf.changed")
+
+
+def test_numbers_and_keys_do_without_a_mouse(browser, page):
+    from selenium.webdriver.common.keys import Keys
+
+    opened(browser, page)
+    field = browser.driver.find_element("css selector", "[aria-label='current east in metres a second']")
+    field.send_keys(Keys.ARROW_UP, Keys.ARROW_UP)
+    wait_until(browser, FLOWN)
+    assert dict(browser.js("return [...subreach.whatIf.values]")) == {"plant.current.1": pytest.approx(0.2)}
+    assert "current y 0.2 m/s" in browser.js("return document.getElementById('asked').textContent")
+    choice = browser.driver.find_element("css selector", "[aria-label='thruster that fails']")
+    browser.js("subreach.whatIf.took = null")
+    choice.send_keys("thruster 3")
+    wait_until(browser, FLOWN)
+    assert "failure" in browser.js("return subreach.runs[1].header.events.map((event) => event.kind)")
+    browser.js("subreach.whatIf.took = null")
+    place = browser.driver.find_element("css selector", "[aria-label='port wall, east in metres']")
+    place.send_keys(Keys.ARROW_UP)
+    wait_until(browser, FLOWN)
+    assert "regions.1.shape.centre.1" in dict(browser.js("return [...subreach.whatIf.values]"))
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (390, 844)], ids=["desktop", "phone"])
+def test_the_numbers_hide_no_button(size, browser, page):
+    opened(browser, page, size)
+    assert not browser.js(OVERLAP)
+    browser.js("subreach.whatIf.set('plant.current.1', 0.3)")
+    wait_until(browser, FLOWN)
+    assert not browser.js(OVERLAP)
+    browser.shoot(f"what-if-{size[0]}")
+
+
+def test_without_webassembly_it_is_the_plain_replay(browser, page):
+    hide = browser.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": "delete window.WebAssembly"})
+    try:
+        browser.open(page)
+        assert browser.js("return subreach.whatIf === null && document.getElementById('commands') === null")
+        assert "cannot fly" in browser.js("return document.getElementById('status').textContent")
+        browser.press("]")
+        assert browser.js("return subreach.runs.length === 1 && subreach.player.speed > 1")
+    finally:
+        browser.driver.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", hide)
+
+
+@pytest.mark.skipif(FIREFOX is None, reason="no Firefox: apt install firefox-esr")
+def test_firefox_flies_too(page, tmp_path):
+    firefox = Firefox(tmp_path)
+    try:
+        firefox.open(page, (1280, 806))
+        firefox.wait_until("subreach.whatIf?.repeats !== null")
+        assert firefox.js("return subreach.whatIf.repeats") == 0.0
+        firefox.js("subreach.whatIf.set('plant.current.1', 0.3)")
+        firefox.wait_until(FLOWN)
+        ends = firefox.js("return subreach.runs.map((run) => run.pose(run.end).position)")
+        assert max(abs(a - b) for a, b in zip(*ends, strict=True)) > 0.01
+        ARTEFACTS.mkdir(parents=True, exist_ok=True)
+        firefox.shoot(ARTEFACTS / "what-if-firefox.png")
+    finally:
+        firefox.close()
