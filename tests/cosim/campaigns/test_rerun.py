@@ -156,7 +156,7 @@ def test_scene_rerun_is_bit_identical(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_soft_regions_do_not_count_as_violated_when_a_scene_comes_again(tmp_path, capsys):
+def test_rerun_ignores_violations_of_soft_regions(tmp_path, capsys):
     scene = next(made for made in map(make_conflict, range(100)) if made["kind"].startswith("squeeze"))
     scene["scenario"]["time"]["duration"] = 1.0
     assert not any(region["hard"] for region in scene["scenario"]["regions"])

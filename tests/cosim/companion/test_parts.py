@@ -143,7 +143,7 @@ def test_manual_control_realizes_the_desired_wrench(profile):
 
 
 @pytest.mark.parametrize("sticks_by", ["manual-control", "rc-override"])
-def test_an_ardusub_makes_of_rate_sticks_the_rates_that_they_were_made_for(sticks_by):
+def test_rate_sticks_realize_the_desired_rates_in_ardusub(sticks_by):
     """As its Sub::get_pilot_desired_climb_rate and pwm_to_angle_dz have it, at a pilot gain of 0.5."""
     scale, gain = scale_of(HEAVY, ARDUSUB, 0.5, sticks_by), 0.5
     scaled = gain if sticks_by == "manual-control" else 1.0
@@ -158,7 +158,7 @@ def test_an_ardusub_makes_of_rate_sticks_the_rates_that_they_were_made_for(stick
     assert scale.climb_stick(0.0) == scale.yaw_rate_stick(0.0) == scale.yaw_rate_stick(math.nan) == 0.0
 
 
-def test_overridden_channels_are_in_ardusubs_order_and_are_given_back_by_zero():
+def test_rc_override_follows_the_ardusub_order_and_zero_releases():
     message = decoded(channels_override(mavlink, 1, np.array([1.0, -1.0, 0.5, 0.25, -0.25, 0.1])))
     pulses = [getattr(message, f"chan{i}_raw") for i in range(1, 9)]
     assert pulses == [1400, 1600, 1300, 1540, 1900, 1100, 0xFFFF, 0xFFFF]  # pitch roll up yaw ahead right
@@ -167,7 +167,7 @@ def test_overridden_channels_are_in_ardusubs_order_and_are_given_back_by_zero():
 
 
 @pytest.mark.parametrize("wrench", [(20, 0, 0, 0, 0, 0), (28, -20, 10, 0, 0, 1)])
-def test_overridden_channels_give_the_wrench_that_they_were_made_for(wrench):
+def test_rc_override_realizes_the_desired_wrench(wrench):
     """As sticks do, but for the pilot's gain, which does not scale them."""
     sticks = scale_of(HEAVY, ARDUSUB, 0.5, "rc-override").sticks(np.array(wrench, dtype=float))
     motors = VECTORED_6DOF @ sticks
@@ -185,14 +185,14 @@ def test_overridden_channels_give_the_wrench_that_they_were_made_for(wrench):
         ("generic", "attitude", "rc-override", "no sticks are sent"),
     ],
 )
-def test_what_an_autopilot_does_not_take_is_refused_by_name(profile, steer_by, sticks_by, word):
+def test_unsupported_setpoints_are_rejected_by_name(profile, steer_by, sticks_by, word):
     with pytest.raises(RunError, match=word):
         require_taken(profile, steer_by, sticks_by)
     with pytest.raises(RunError, match=word):
         Companion(scenario(name="pipe-inspection"), None, CompanionOptions(profile, steer_by, sticks_by))
 
 
-def test_an_attitude_leads_by_what_the_moment_turns():
+def test_attitude_setpoint_leads_by_the_desired_moment():
     """A second-order loop that is asked for it accelerates as the moment does."""
     lead, state = TurnLead(HEAVY), reported((0.0, 0.0, 0.0))
     inertia = np.diag(HEAVY.inertia) + np.diag(HEAVY.added_mass)[3:]
@@ -206,7 +206,7 @@ def test_an_attitude_leads_by_what_the_moment_turns():
     assert lead.attitude(np.full(6, math.nan), reported((0.0, 0.0, 0.0))) == pytest.approx([1.0, 0.0, 0.0, 0.0])
 
 
-def test_a_thrust_along_each_axis_is_the_published_extension_of_an_attitude_target():
+def test_three_axis_thrust_uses_the_published_attitude_target_extension():
     """MAVLink's common.xml: three floats behind type_mask, which leave the checksum as it is."""
     message = attitude_target(mavlink, 1, np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.25, -0.5, 0.125]))
     frame = message.pack(mavlink.MAVLink(None, 255, 191))

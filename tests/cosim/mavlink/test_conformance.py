@@ -196,7 +196,7 @@ def test_ftp_download_survives_lost_burst_packets(lost):
     assert found.data == data and found.retries == 0
 
 
-def test_a_file_that_ends_before_its_announced_size_ends_there():
+def test_ftp_file_shorter_than_announced_is_read_completely():
     """As ArduPilot's of parameters, of which it announces twelve bytes each: the end is what it refuses to read."""
 
     class Estimating(FileServer):
@@ -229,7 +229,7 @@ def ardupilot(custom=b"d3adbeef"):
     return client
 
 
-def test_an_ardusub_may_fail_what_it_is_known_to_and_nothing_else():
+def test_only_known_differences_of_ardusub_are_tolerated():
     baseline = baseline_of(Subject(ardupilot(), (), 1.0, False))
     assert set(baseline.differences) <= {check.name for check in CHECKS}
     known = baseline.judge("parameter-unknown", failed("nothing", "an answer"))
@@ -242,7 +242,7 @@ def test_an_ardusub_may_fail_what_it_is_known_to_and_nothing_else():
     assert json.loads(as_json("x", [result]))["passed"] is True
 
 
-def test_our_own_vehicle_and_other_autopilots_may_fail_nothing():
+def test_own_vehicle_and_other_autopilots_have_no_tolerated_differences():
     ours = baseline_of(Subject(ardupilot(b"subreach"), (), 1.0, False))
     px4 = baseline_of(Subject(client_of(lambda message: None), (), 1.0, False))
     assert not ours.differences and not px4.differences

@@ -62,7 +62,7 @@ def test_fused_loop_equals_the_master(run):
 
 @pytest.mark.medium
 @pytest.mark.parametrize("net_weight", [-50.0, 0.0, 50.0])
-def test_a_soft_region_keeps_no_light_vehicle_out_of_a_goal_that_lies_in_it(net_weight):
+def test_soft_region_does_not_block_a_goal_inside_it(net_weight):
     """The top of the goal is 0.6 m deep in a soft region, whose push there is more than what brings the vehicle on."""
     shape = "{type='half_space', point=[0.0, 0.0, 3.3], normal=[0.0, 0.0, 1.0]}"
     changes = [

@@ -150,7 +150,7 @@ def tilted(yaw, pitch):
 
 
 @pytest.mark.medium
-def test_an_attitude_is_kept_beside_the_sticks_and_ends_with_the_mode(fly):
+def test_commanded_attitude_is_held_with_sticks_until_the_mode_ends(fly):
     attitude = SetAttitude(tuple(tilted(0.5, 0.1)))
     commands = {0: [SetMode("depth_hold"), attitude, sticks(0.3, 0, 0, 0, 0, 0.9)], 1500: [SetMode("depth_hold")]}
     run = fly(commands, "time.duration=25", *OPEN)
@@ -161,7 +161,7 @@ def test_an_attitude_is_kept_beside_the_sticks_and_ends_with_the_mode(fly):
 
 
 @pytest.mark.medium
-def test_an_attitude_with_a_force_takes_the_laws_place_until_another_target_comes(fly):
+def test_attitude_with_force_replaces_the_law_until_the_next_target(fly):
     attitude = SetAttitude(tuple(tilted(0.4, 0.0)), (0.2, 0.0, 0.0))
     run = fly({100: [attitude], 900: [SetMode("hold")]}, "time.duration=20", *OPEN)
     vehicle = load_vehicle("bluerov2_heavy")
@@ -172,7 +172,7 @@ def test_an_attitude_with_a_force_takes_the_laws_place_until_another_target_come
     assert np.linalg.norm(run.position[-1] - place) < 0.3
 
 
-def test_channels_that_are_overridden_push_without_the_pilots_gain(fly):
+def test_rc_override_is_not_scaled_by_the_pilot_gain(fly):
     run = fly({0: [SetMode("manual"), ManualControl((0.5, 0, 0, 0, 0, 0), by_gain=False)]}, "time.duration=0.1", *OPEN)
     vehicle = load_vehicle("bluerov2_heavy")
     greatest = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
