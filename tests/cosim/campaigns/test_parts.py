@@ -81,12 +81,14 @@ def test_copied_part_duplicates_no_row(tmp_path):
 def test_foreign_files_are_ignored(tmp_path):
     found, _ = opened(tmp_path)
     found.add(table([0, 1]))
-    strangers = [tmp_path / "parts" / name for name in ("notes.parquet", "1-2-3.parquet", "copy of 00000000.parquet")]
-    for stranger in strangers:
-        stranger.write_text("no part")
+    foreign_files = [
+        tmp_path / "parts" / name for name in ("notes.parquet", "1-2-3.parquet", "copy of 00000000.parquet")
+    ]
+    for file in foreign_files:
+        file.write_text("no part")
     found, keys = opened(tmp_path)
     assert keys == [0, 1] and joined(found, tmp_path)["row"].to_pylist() == [0, 1]
-    assert all(stranger.exists() for stranger in strangers)
+    assert all(file.exists() for file in foreign_files)
 
 
 def test_failed_merge_on_full_disk_loses_no_row(tmp_path, monkeypatch):

@@ -68,9 +68,9 @@ def test_malformed_requests_do_not_affect_the_run(live, tmp_path, caplog):
         b"POST /ws HTTP/1.1\r\nHost: a\r\n\r\n",
         b"\r\n" * 999,
     ):
-        with socket.create_connection(place, timeout=WAIT) as stranger, contextlib.suppress(OSError):
-            stranger.sendall(garbage)
-            stranger.recv(100)
+        with socket.create_connection(place, timeout=WAIT) as foreign, contextlib.suppress(OSError):
+            foreign.sendall(garbage)
+            foreign.recv(100)
     with connect(url) as client:  # more than a message may have
         with contextlib.suppress(ConnectionClosed):
             client.send("x" * (LONGEST + 1))

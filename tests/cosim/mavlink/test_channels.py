@@ -46,12 +46,12 @@ def closed_port():
 
 
 def test_udpout_accepts_only_its_configured_peer():
-    with udp_socket() as peer, udp_socket() as stranger:
+    with udp_socket() as peer, udp_socket() as foreign:
         link = link_of(UdpOut(*peer.getsockname()))
         tended(link, heartbeat())
         data, address = peer.recvfrom(1000)
         assert Station().parse(data)[0].get_type() == "HEARTBEAT"
-        stranger.sendto(Station().pack(attitude(1)), address)
+        foreign.sendto(Station().pack(attitude(1)), address)
         peer.sendto(Station().pack(attitude(2)), address)
         assert [m.time_boot_ms for m in received(link)] == [2]
         link.channel.close()
