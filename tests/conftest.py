@@ -73,7 +73,7 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture(autouse=True, scope="session")
 def fmu_cache(tmp_path_factory):
-    """Build FMUs afresh in each session, once for all its workers, whatever the user's cache holds."""
+    """Build FMUs afresh in each session, once for all its workers, independent of the user's cache."""
     base = tmp_path_factory.getbasetemp()
     folder = (base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base) / "cache"
     folder.mkdir(exist_ok=True)

@@ -1,4 +1,4 @@
-"""How many examples Hypothesis tries: all of them with --slow, a quarter without."""
+"""The number of Hypothesis examples: all of them with --slow, a quarter without."""
 
 from hypothesis import settings
 

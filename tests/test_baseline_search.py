@@ -1,4 +1,4 @@
-"""The search for the gains of the laws for comparison: its draws, its order, and what it found."""
+"""The gain search of the baseline laws: its draws, its ranking, and its result."""
 
 import math
 import re
@@ -39,7 +39,7 @@ def score(reached=True, reach_time=20.0, min_clearance=0.1, effort=1000.0, faile
     return Score(reached, reach_time, min_clearance, effort, 1.0, 1e-6, failed_step)
 
 
-def test_medians_are_over_what_was_reached_without_violation():
+def test_medians_use_only_reached_scenes_without_violation():
     scores = [
         score(reach_time=10.0, effort=1.0),
         score(reach_time=30.0, effort=3.0),
@@ -75,7 +75,7 @@ class Landscape:
         return Candidate(gains, scores | flown)
 
 
-def test_the_search_finds_the_best_and_gives_up_what_falls_behind(monkeypatch):
+def test_search_finds_the_optimum_and_prunes_candidates(monkeypatch):
     landscape = Landscape(monkeypatch, lambda i: 0.4)
     found = baselines.search("pd", 80, 0, 2)
     assert 0.4 <= found.gains.reach < 0.8 and len(found.scores) == baselines.SCENES
@@ -84,19 +84,19 @@ def test_the_search_finds_the_best_and_gives_up_what_falls_behind(monkeypatch):
     assert baselines.search("pd", 80, 0, 1).gains == found.gains
 
 
-def test_safety_is_found_though_one_late_scene_asks_for_it_and_it_takes_longer(monkeypatch):
+def test_safety_outranks_time_even_for_one_late_scene(monkeypatch):
     Landscape(monkeypatch, lambda i: 1.0 if i == baselines.SCENES - 7 else 0.06)
     found = baselines.search("pd", 80, 0, 1)
     assert found.outcome.violations == 0 and found.gains.reach >= 1.0
 
 
-def test_the_scenes_are_plain_and_hard_by_turns():
+def test_scenes_alternate_between_plain_and_hard():
     plain, hard, more = (baselines._scene(i) for i in range(3))
     assert (plain.seed, hard.seed, more.seed) == (10_000, 10_000, 10_001)
     assert plain.failed_thruster is None and more.failed_thruster is None and hard.failed_thruster is not None
 
 
-def test_other_laws_begin_with_what_was_found_for_pd(monkeypatch):
+def test_other_laws_start_from_the_pd_result(monkeypatch):
     begun = []
     landscape = Landscape(monkeypatch, lambda i: 0.0)
     fly_on = landscape.fly_on
@@ -106,7 +106,7 @@ def test_other_laws_begin_with_what_was_found_for_pd(monkeypatch):
     assert {(gains.k_p1, gains.reach) for gains in begun[:10]} == {(77.0, 0.7)}
 
 
-def test_a_law_that_has_no_ranges_is_refused(capsys):
+def test_law_without_ranges_is_rejected(capsys):
     with pytest.raises(SystemExit):
         main(["baselines", "ismail_dunnigan"])
     assert "'ismail_dunnigan'" in capsys.readouterr().err
@@ -114,7 +114,7 @@ def test_a_law_that_has_no_ranges_is_refused(capsys):
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)  # 600 flights by each law
-def test_the_documents_table_is_what_the_default_gains_come_to(capsys):
+def test_documented_table_matches_the_default_gains(capsys):
     main(["baselines", "--draws", "0", "--workers", "1"])
     printed = re.findall(
         r"^(\w+), (\w+), in full: (\d+) violations and (\d+) reached .*: ([\d.]+) s, (\d+) N s$",

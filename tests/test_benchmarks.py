@@ -1,4 +1,4 @@
-"""The benchmarks run, and what they compare is one plant. No test asserts a time."""
+"""The benchmarks run and compare the same plant. No test asserts a time."""
 
 import json
 import re
@@ -28,7 +28,7 @@ from tests.plant_fmu.conftest import STATES
 
 @pytest.fixture
 def here(monkeypatch):
-    """Take the Python of the tests for that of the peers, and install nothing."""
+    """Use the Python of the tests as that of the peers, without installing."""
     monkeypatch.setattr(peer_environment, "install", lambda again=False: pytest.fail("installs"))
     return Environment(sys.executable)
 
@@ -52,7 +52,7 @@ def test_each_benchmark_prints_a_table(name, capsys, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_memory_of_long_runs_is_a_table(capfd, tmp_path):
+def test_long_record_memory_is_printed_as_a_table(capfd, tmp_path):
     work = ["record", "summary", "export csv"]
     main(["long-record", "--rows", "300", "900", "--work", *work, "--folder", str(tmp_path)])
     lines = capfd.readouterr().out.splitlines()
@@ -64,7 +64,7 @@ def test_the_memory_of_long_runs_is_a_table(capfd, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("subject", ["plant", "deciding", "link"])
-def test_all_is_one_table_of_ratios(here, subject, capsys, tmp_path):
+def test_all_benchmarks_print_one_table_of_ratios(here, subject, capsys, tmp_path):
     arguments = ["--budget", "1e-4", "--repeats", "2", "--peers-python", sys.executable]
     main(["all", subject, *arguments, "--json", str(tmp_path / "figures.json")])
     assert capsys.readouterr().out.count("ratio") == 2
@@ -79,14 +79,14 @@ def test_all_is_one_table_of_ratios(here, subject, capsys, tmp_path):
 
 
 @pytest.mark.slow
-def test_growth_is_told_below_each_curve(capsys, monkeypatch):
+def test_growth_exponent_is_printed_for_each_curve(capsys, monkeypatch):
     monkeypatch.setattr("benchmarks.scaling.OBSTACLES", (1, 3, 10))
     monkeypatch.setattr("benchmarks.scaling.HORIZONS", (1.0, 2.0, 4.0))
     main(["scaling", "horizon", "obstacles", "--budget", "1e-4", "--repeats", "1"])
     assert capsys.readouterr().out.count("exponent") >= 6
 
 
-def test_a_row_of_a_duel_says_how_many_times_as_long_the_peer_takes(capsys):
+def test_comparison_row_shows_the_time_ratio(capsys):
     row = Row("ours", Timing((2e-6, 1e-6, 3e-6)), "theirs", Timing((8e-6, 8e-6, 6e-6)), duel=True)
     assert row.ratio == 4.0
     assert row.range == (2.0, 8.0)
@@ -99,7 +99,7 @@ def test_a_row_of_a_duel_says_how_many_times_as_long_the_peer_takes(capsys):
     assert second.endswith("– not installed: no such thing")
 
 
-def test_parts_are_told_as_multiples_of_their_base():
+def test_parts_are_shown_as_multiples_of_their_base():
     assert Row("part", Timing((3.0,)), "whole", Timing((2.0,))).ratio == 1.5
     assert Row("part", Timing((3.0,)), "whole", Timing((2.0,))).range is None
 
@@ -108,7 +108,7 @@ def test_parts_are_told_as_multiples_of_their_base():
     ("seconds", "text"),
     [(1.0, "1.00 s"), (0.0123, "12.3 ms"), (4.5678e-6, "4.57 µs"), (250e-9, "250 ns"), (0.9999, "1.00 s")],
 )
-def test_figures_have_their_unit(seconds, text):
+def test_figures_are_printed_with_units(seconds, text):
     assert figure(seconds) == text
 
 
@@ -116,7 +116,7 @@ def test_figures_have_their_unit(seconds, text):
 
 
 class KnownScene:
-    """A contestant that takes what it is told, and notes when it had its turn."""
+    """A contestant with a given duration that logs its turns."""
 
     def __init__(self, name, log, each=1.0, fails_at=None):
         self.name, self.log, self.each, self.fails_at = name, log, each, fails_at
@@ -128,7 +128,7 @@ class KnownScene:
         return self.each * count
 
 
-def test_contestants_take_turns_and_one_that_fails_leaves_the_others_alone():
+def test_contestants_alternate_and_a_failure_is_isolated():
     log = []
     found = take_turns(
         [KnownScene("a", log), "missing", KnownScene("b", log, 2.0), KnownScene("c", log, fails_at=2)], 0.0, 3, count=1
@@ -137,14 +137,14 @@ def test_contestants_take_turns_and_one_that_fails_leaves_the_others_alone():
     assert "".join(log) == "abcabcab"
 
 
-def test_items_are_counted_for_the_budget():
+def test_item_count_fits_the_time_budget():
     log = []
     count = count_for(KnownScene("a", log, 1e-6), 0.25)
     assert 0.25 <= 1e-6 * count < 1.0
     assert len(log) < 10
 
 
-def test_one_that_cannot_begin_is_told_in_its_row():
+def test_failed_start_is_shown_in_its_row():
     def no(_):
         raise OSError("no such device")
 
@@ -153,14 +153,14 @@ def test_one_that_cannot_begin_is_told_in_its_row():
     assert row.base_timing == "OSError: no such device"
 
 
-def test_the_exponent_of_a_growth_is_found():
+def test_growth_exponent_is_estimated():
     assert growth([1, 10, 100], [3.0, 3e2, 3e4]) == pytest.approx(2.0)
     log = []
     curve = Curve("a step", "things", {n: lambda _, n=n: KnownScene("a", log, n**1.5) for n in (1, 4, 16)}, count=1)
     assert curve.measure(0.0, 2).notes[0] == "exponent 1.50; from one size to the next 1.50, 1.50"
 
 
-def test_a_straight_growth_has_a_fixed_part_and_one_for_each():
+def test_linear_growth_has_a_fixed_and_a_proportional_part():
     assert straight([1, 10, 100], [5e-6 + 2e-7 * n for n in (1, 10, 100)]) == pytest.approx(
         (5e-6, 2e-7, 0.0), abs=1e-12
     )
@@ -173,13 +173,13 @@ def test_a_straight_growth_has_a_fixed_part_and_one_for_each():
 
 
 @pytest.mark.medium
-def test_a_peer_answers_from_its_own_process(here):
+def test_peer_runs_in_its_own_process(here):
     with peer(here, "numpy", "numpy_body", "steps", _setup()) as contestant:
         assert contestant.seconds(3) > 0.0
 
 
 @pytest.mark.medium
-def test_a_peer_that_is_missing_or_breaks_says_so(here):
+def test_missing_or_failing_peer_is_reported(here):
     with pytest.raises(NotMeasuredError, match="not installed: no-such-peer"):
         here.python("no-such-peer")
     with pytest.raises(NotMeasuredError, match="KeyError"), peer(here, "numpy", "numpy_body", "steps", {}):
@@ -193,7 +193,7 @@ def _setup():
 
 
 @pytest.mark.slow
-def test_the_bodies_of_numpy_and_numba_are_the_same_plant():
+def test_numpy_and_numba_bodies_match_the_plant():
     setup = _setup() | {"wrench": [0.5, 1.0, 4.0, 2.0, 0.3, -1.0]}
     theirs = numpy_body.Body(setup["vehicle"])
     state, *others = numba_body.arguments(setup)
@@ -231,7 +231,7 @@ def test_the_numpy_plant_is_the_same_plant(tmp_path):
 # ---- the page ----
 
 
-def test_the_page_takes_new_figures_and_keeps_the_rest(tmp_path):
+def test_page_update_replaces_only_figures(tmp_path):
     duel = Row("ours", Timing((1e-6, 2e-6)), "a|b", Timing((4e-6, 4e-6)), duel=True)
     missing = Row("ours", Timing((1e-6,)), "nobody", "not installed", duel=True)
     plain = Row("3 obstacles", Timing((2.0,)), "1 obstacles", Timing((1.0,)))
@@ -252,7 +252,7 @@ def test_the_page_takes_new_figures_and_keeps_the_rest(tmp_path):
     assert page.rewrite(new, figures[:1]) == new  # each part by itself
 
 
-def test_what_is_no_figures_is_refused(tmp_path):
+def test_invalid_figures_are_rejected(tmp_path):
     (tmp_path / "a").write_text('{"verb": "step", "tables": []}')
     for path, why in ((tmp_path / "a", "figures of 'step'"), (tmp_path / "b", "no figures")):
         with pytest.raises(page.PageError, match=why):
@@ -261,7 +261,7 @@ def test_what_is_no_figures_is_refused(tmp_path):
         page.rewrite("no marks", [{"verb": "all"}])
 
 
-def test_peers_are_installed_one_by_one_and_a_failure_is_kept(monkeypatch, fmu_cache):
+def test_peers_are_installed_individually_and_failures_are_recorded(monkeypatch, fmu_cache):
     asked = []
 
     def run(command, **_):

@@ -1,4 +1,4 @@
-"""What the documents say is what the code does."""
+"""The documents match the code."""
 
 import importlib.util
 import re
@@ -15,12 +15,12 @@ PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglo
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
-def test_links_lead_somewhere(page):
+def test_links_have_existing_targets(page):
     for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
         assert target.startswith("http") or (page.parent / target).exists(), target
 
 
-def test_places_that_the_page_on_the_architecture_names_are_there():
+def test_paths_in_the_architecture_page_exist():
     text = (ROOT / "docs" / "architecture.md").read_text()
     places = re.findall(r"`((?:fuzzy_arbiter|plant_fmu|controller|cosim|tests)/[\w./]*)(?:: (\w+))?`", text)
     assert len(places) > 40

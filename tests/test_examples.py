@@ -1,4 +1,4 @@
-"""Each example runs from an empty folder, says something, and stays as short as it claims to be."""
+"""Each example runs from an empty folder, prints something, and is short."""
 
 import ast
 import runpy
@@ -29,7 +29,7 @@ PACKAGES = ("controller", "cosim", "fuzzy_arbiter", "plant_fmu")
 
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.name)
-def test_runs_and_writes_what_it_says(example, tmp_path):
+def test_example_runs_and_writes_its_documented_files(example, tmp_path):
     done = subprocess.run([sys.executable, example], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
@@ -38,7 +38,7 @@ def test_runs_and_writes_what_it_says(example, tmp_path):
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.name)
-def test_importing_it_writes_and_says_nothing(example, tmp_path, monkeypatch, capfd):
+def test_importing_an_example_has_no_effect(example, tmp_path, monkeypatch, capfd):
     if example.name == "telemetry.py":
         pytest.importorskip("pymavlink")
     monkeypatch.chdir(tmp_path)
@@ -48,20 +48,20 @@ def test_importing_it_writes_and_says_nothing(example, tmp_path, monkeypatch, ca
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.name)
-def test_opens_with_what_it_teaches(example):
+def test_example_docstring_explains_its_purpose(example):
     assert len((ast.get_docstring(ast.parse(example.read_text())) or "").split()) > 10
 
 
-def test_the_master_fits_on_a_page():
+def test_master_example_is_short():
     assert len((EXAMPLES[0].parent / "master.py").read_text().splitlines()) <= 40
 
 
-def test_a_stream_takes_twenty_lines():
+def test_stream_example_is_short():
     code = ast.parse((EXAMPLES[0].parent / "telemetry.py").read_text()).body[1:]  # behind the docstring
     assert sum(statement.end_lineno - statement.lineno + 1 for statement in code) <= 20
 
 
-def test_the_fmu_alone_imports_nothing_of_ours():
+def test_standalone_fmu_example_imports_no_own_package():
     tree = ast.parse((EXAMPLES[0].parent / "fmu_alone.py").read_text())
     imported = [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
     imported += [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]

@@ -1,4 +1,4 @@
-"""The pictures of the documents: each is drawn by a maker, and each maker runs."""
+"""The pictures of the documents are drawn by scripts that run."""
 
 import re
 import sys
@@ -34,18 +34,18 @@ def shown():
     return {name for page in PAGES for name in re.findall(r"\((?:docs/)?images/(.*?)\)", page.read_text())}
 
 
-def test_every_picture_that_is_shown_is_there_and_every_one_there_is_shown():
+def test_shown_pictures_and_existing_pictures_coincide():
     assert shown() == {path.name for suffix in ("png", "svg") for path in IMAGES.glob(f"*.{suffix}")}
 
 
-def test_the_rooms_that_are_drawn_are_those_of_the_code(draw):
+def test_architecture_diagram_matches_the_code(draw):
     drawn = draw("architecture")["architecture.svg"].read_text()
     assert drawn == (IMAGES / "architecture.svg").read_text(), "python docs/images architecture draws it anew"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("maker", ["arbiter", "criteria", "fmu"])
-def test_pictures_are_those_that_their_script_draws(maker, draw):
+def test_pictures_match_their_script(maker, draw):
     from PIL import Image
 
     drawn = draw(maker)

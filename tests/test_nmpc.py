@@ -1,4 +1,4 @@
-"""The predictive controller of the benchmarks with another planner in its place: what it is given, and when."""
+"""The predictive controller of the benchmarks with a stub planner: its inputs and their timing."""
 
 import contextlib
 import json
@@ -42,7 +42,7 @@ def flown(monkeypatch):
 
 
 @pytest.mark.medium
-def test_it_is_given_what_laws_are_given_ten_times_a_second(flown):
+def test_planner_receives_law_inputs_at_10_hz(flown):
     scene, planner, _ = flown
     assert len(planner.given) == 20 and len(nmpc.NmpcLaw.function.times) == 20
     assert [given["again"] for given in planner.given] == [True] + [False] * 19
@@ -58,13 +58,13 @@ def test_it_is_given_what_laws_are_given_ten_times_a_second(flown):
 
 
 @pytest.mark.medium
-def test_its_forces_hold_until_the_next_plan(flown):
+def test_planned_forces_are_held_until_the_next_plan(flown):
     _, _, score = flown
     assert score.effort == pytest.approx(4 * 3.0 * 2.0)
     assert score.thrust_variation == pytest.approx(4 * 3.0)
 
 
-def test_its_observer_finds_the_vertical_force(monkeypatch, flown):
+def test_observer_estimates_the_vertical_force(monkeypatch, flown):
     scene, planner, _ = flown
     mass = 187.5
     disturbance = planner.given[-1]["disturbance"][2] * mass
@@ -84,7 +84,7 @@ def test_the_search_ranks_by_safety_then_reached_then_time(monkeypatch):
     assert (found.stages, found.interval) == (12.0, 0.3)
 
 
-def test_a_kind_that_there_is_not_is_refused(capsys):
+def test_unknown_kind_is_rejected(capsys):
     with pytest.raises(SystemExit):
         main(["nmpc", "conflict"])
     assert "'conflict'" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""The page on laws of one's own, followed to the letter in a copy of the packages: its law flies."""
+"""The page on custom laws, followed in a copy of the packages: its law runs."""
 
 import json
 import re
@@ -53,7 +53,7 @@ def cosim(copy, *words):
     return python(copy, "-m", "cosim", *words)
 
 
-def test_the_law_of_the_page_reaches_the_goal_past_an_obstacle(copy):
+def test_documented_law_reaches_the_goal_past_an_obstacle(copy):
     (copy / "past.toml").write_text(SCENARIO)
     done = cosim(copy, "run", "past.toml", "--no-report", "--out", "run")
     assert done.returncode == 0, done.stderr
@@ -65,7 +65,7 @@ def test_the_law_of_the_page_reaches_the_goal_past_an_obstacle(copy):
     assert np.linalg.norm(place - [2.0, 0.2, 2.0], axis=1).min() > 0.5
 
 
-def test_it_is_compared_over_scenes(copy):
+def test_custom_law_is_compared_over_scenes(copy):
     scenes = cosim(copy, "scenes", "--count", "4", "--seed", "3", "--out", "scenes.jsonl")
     assert scenes.returncode == 0, scenes.stderr
     words = ["scenes.jsonl", "--laws", "sliding_mode,pd", "--replays", "0", "--out", "side"]
@@ -75,7 +75,7 @@ def test_it_is_compared_over_scenes(copy):
 
 
 @pytest.mark.parametrize("words", [["package", "--to", "ssp", "--out", "x.ssp"], ["sweep", "--engine", "lanes"]])
-def test_where_it_has_no_c_it_is_refused_by_name(copy, words):
+def test_law_without_c_code_is_rejected_by_name(copy, words):
     verb, *options = words
     more = ["--vary", "initial.position.1=0:1", "--samples", "4", "--out", "swept"] if verb == "sweep" else []
     done = cosim(copy, verb, "paper", "--set", "law.name=sliding_mode", *options, *more)

@@ -1,4 +1,4 @@
-"""The page on regions of one's own, followed to the letter in a copy of the packages: its shape flies."""
+"""The page on custom regions, followed in a copy of the packages: its shape runs."""
 
 import re
 
@@ -132,7 +132,7 @@ def copy(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_the_torus_of_the_page_flies(copy):
+def test_documented_torus_region_is_avoided(copy):
     done = python(copy, "-c", FLY)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["True", "True", "True", "True"]

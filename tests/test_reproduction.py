@@ -1,4 +1,4 @@
-"""What docs/reproduction.md says of each claim of the paper, against runs of the shipped scenarios."""
+"""The figures of docs/reproduction.md against runs of the shipped scenarios."""
 
 from pathlib import Path
 
@@ -41,7 +41,7 @@ def position(record):
 
 
 @pytest.mark.slow
-def test_attitude(records):
+def test_documented_attitude_errors_match_the_runs(records):
     angles = {name: turned(record) for name, record in records.items()}
     said = [
         f"{a.max():.1f}° at {records[n]['time'][a.argmax()]:.{2 if n == 'paper' else 1}f} s" for n, a in angles.items()
@@ -50,7 +50,7 @@ def test_attitude(records):
 
 
 @pytest.mark.slow
-def test_root_mean_square_error(records):
+def test_documented_root_mean_square_errors_match_the_runs(records):
     errors = [np.linalg.norm(position(record) - CENTRE, axis=1) / np.sqrt(3.0) for record in records.values()]
     ends = "; ".join(f"{error[-1]:.3f}" for error in errors)
     assert row("The root-mean-square error") == f"from {errors[0][0]:.3f} m to {ends} m at the end"
@@ -58,7 +58,7 @@ def test_root_mean_square_error(records):
 
 
 @pytest.mark.slow
-def test_goal_region(records):
+def test_documented_goal_region_times_match_the_runs(records):
     said = row("The vehicle converges")
     switches = {}
     for name, record in records.items():
@@ -73,7 +73,7 @@ def test_goal_region(records):
 
 
 @pytest.mark.slow
-def test_weights_in_the_intersection_and_their_sum(flown, records):
+def test_documented_intersection_weights_match_the_runs(flown, records):
     for name, record in records.items():
         ((start, end), *_) = flown[name].summary["intersection_windows"]
         within = (record["time"] >= start - 1e-9) & (record["time"] < end - 1e-9)
@@ -85,7 +85,7 @@ def test_weights_in_the_intersection_and_their_sum(flown, records):
 
 
 @pytest.mark.slow
-def test_estimates(flown):
+def test_documented_estimates_match_the_runs(flown):
     ends = [run.summary["estimate_final"] for run in flown.values()]
     first, second, third = (f"{end[0]:.2f}" if i == 0 else f"{end[0]:.1f}" for i, end in enumerate(ends))
     assert f"at the end {first}; {second}; {third} N".replace("-", "−") in row("The uncertain restoring forces")
@@ -124,7 +124,7 @@ class SampledPath:
 @pytest.mark.parametrize(
     ("name", "said"), [("paper", "1.1 mm (`paper`)"), ("paper-limited", "0.6 mm (`paper-limited`)")]
 )
-def test_what_the_arbiter_changes_at_the_printed_gains(name, said):
+def test_arbiter_effect_at_the_papers_gains_matches_the_document(name, said):
     ways = []
     for all_on in (False, True):
         scenario = load_scenario(name, ["arbiter.engine=closed", "time.duration=20"])
@@ -140,7 +140,7 @@ def test_what_the_arbiter_changes_at_the_printed_gains(name, said):
 
 
 @pytest.mark.slow
-def test_deployable(shipped_run):
+def test_documented_deployable_run_matches_the_run(shipped_run):
     run = shipped_run("paper-deployable", "arbiter.engine=closed")
     summary, record = run.summary, load_record(run.folder)
     clear = " and ".join(f"{summary['min_clearance'][name]:.3f}" for name in ("SR1", "SR2"))

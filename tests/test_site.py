@@ -1,4 +1,4 @@
-"""The site of the documents: navigation, reference, what the pages name, and that it builds without a warning."""
+"""The documentation site: navigation, reference, links into the code, and a build without warnings."""
 
 import ast
 import importlib
@@ -48,19 +48,19 @@ def found(name):
     return thing
 
 
-def test_the_navigation_holds_every_page_once_and_no_other():
+def test_navigation_lists_every_page_exactly_once():
     inside = [name for name in navigation() if not name.startswith("outside/")]
     assert sorted(inside) == PAGES
 
 
-def test_files_outside_that_are_in_the_navigation_are_there():
+def test_external_files_in_the_navigation_exist():
     outside = [name.removeprefix("outside/") for name in navigation() if name.startswith("outside/")]
     assert outside
     for name in outside:
         assert (ROOT / name).is_file()
 
 
-def test_the_reference_names_nothing_twice_and_nothing_that_is_not_there():
+def test_reference_names_are_unique_and_exist():
     told = directives()
     assert len(told) == len(set(told)) > 80
     for name in told:
@@ -77,7 +77,7 @@ WITHIN = {
 }
 
 
-def test_the_reference_names_what_pages_and_examples_import():
+def test_reference_covers_names_imported_by_pages_and_examples():
     told = directives()
     things = [found(name) for name in told]
     code = [(path.name, path.read_text()) for path in (ROOT / "examples").glob("*.py")]
@@ -94,7 +94,7 @@ def test_the_reference_names_what_pages_and_examples_import():
                     assert whole or any(found(name) is thing for thing in things), f"{where}: {name}"
 
 
-def test_the_command_line_page_is_what_the_parsers_say():
+def test_command_line_page_matches_the_parsers():
     path = DOCS / "reference" / "command_line.py"
     spec = importlib.util.spec_from_file_location("command_line", path)
     module = importlib.util.module_from_spec(spec)
@@ -130,7 +130,7 @@ def test_theory_has_every_equation_once():
     assert numbers == list(range(1, 53))
 
 
-def test_every_block_of_numbered_equations_says_where_it_is_computed():
+def test_every_numbered_equation_block_names_its_code():
     for block, after in re.findall(r"```text\n(.*?)```\n\n(.*?)(?=\n\n)", THEORY, re.S):
         if re.search(r"^\(\d+\) ", block, re.M):
             assert after.startswith("Code: `"), block
@@ -141,7 +141,7 @@ def places():
 
 
 @pytest.mark.parametrize("place", places())
-def test_places_in_the_code_that_theory_names_are_there(place):
+def test_code_references_in_theory_exist(place):
     if "/" not in place:
         assert found(place) is not None
         return
@@ -150,7 +150,7 @@ def test_places_in_the_code_that_theory_names_are_there(place):
     assert re.search(rf"\b{function}\(", (ROOT / path).read_text()) if function else True
 
 
-def test_printed_23_with_the_printed_3_is_the_error_that_24_needs():
+def test_papers_equations_23_and_3_give_the_error_of_24():
     from controller.quaternion import error, rotation_matrix
 
     def printed(e):
@@ -166,7 +166,7 @@ def test_printed_23_with_the_printed_3_is_the_error_that_24_needs():
         assert np.abs(R @ R_d.T - rotation_matrix(error(desired, e))).max() > 0.01
 
 
-def test_a_balance_of_pull_and_push_is_an_equilibrium_with_w_0():
+def test_balance_of_attraction_and_repulsion_is_an_equilibrium_with_w_0():
     """On the line to the goal, inside a sphere to be kept out of: y = 0, and e_p is not."""
     from scipy.optimize import brentq
 
@@ -219,7 +219,7 @@ def test_the_site_builds_without_a_warning_and_has_every_page(site):
 
 
 @pytest.mark.slow
-def test_the_site_asks_nobody_for_anything(site):
+def test_site_loads_no_external_resource(site):
     for page in site.rglob("*.html"):
         for tag in re.findall(r"<(?:script|link|img|iframe|source|video)\b[^>]*>", page.read_text()):
             address = re.search(r"\b(?:src|href)=\"?([^\"\s>]*)", tag)

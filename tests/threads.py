@@ -1,10 +1,10 @@
-"""Threads of tests: none may outlive its test, however that ends, since it would hold up the whole session."""
+"""Threads of tests, stopped at the end of each test."""
 
 import ctypes
 
 
 def ended(thread, seconds=120.0):
-    """Wait for a thread and tell whether it ended by itself; interrupt one that does not."""
+    """Wait for a thread and return whether it ended by itself; interrupt it otherwise."""
     thread.join(seconds)
     if not thread.is_alive():
         return True

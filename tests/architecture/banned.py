@@ -1,4 +1,4 @@
-"""Words that the code and the documents no longer use, which ``banned.toml`` lists."""
+"""Words that the code and the documents no longer use, from ``banned.toml``."""
 
 import ast
 import io
@@ -38,7 +38,7 @@ def find_identifiers(source: str, identifiers: tuple[str, ...]) -> list[tuple[in
 
 
 def find_phrases(text: str, phrases: tuple[str, ...]) -> list[str]:
-    """Return the banned phrases that a text has as whole words, whatever its line breaks and capitals."""
+    """Return the banned phrases that a text has as whole words, in any case and across line breaks."""
     plain = " ".join(text.split()).lower()
     return [p for p in phrases if re.search(rf"(?<!\w){re.escape(p.lower())}(?!\w)", plain)]
 

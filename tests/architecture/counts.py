@@ -1,4 +1,4 @@
-"""How large the house is, in numbers: ``python -m tests.architecture.counts``."""
+"""Count modules, lines and words of the repository: ``python -m tests.architecture.counts``."""
 
 import re
 import statistics
@@ -28,7 +28,7 @@ def words_of(page: Path) -> int:
 
 
 def words_by_hand(page: Path) -> int:
-    """Return how many words of a page somebody has written: all but those that the code writes."""
+    """Return the number of handwritten words of a page, without generated ones."""
     if page.relative_to(ROOT).as_posix() in GENERATED:
         return 0
     return len(_GENERATED_PARTS.sub("", page.read_text(encoding="utf-8")).split())

@@ -69,7 +69,7 @@ PARTS = (
 
 
 def measure(part: Part, folder: Path) -> tuple[bool, str]:
-    """Run the tests of a part; return whether they pass and reach its floor, and what there is to say."""
+    """Run the tests of a part; return whether they pass and reach its floor, and a message."""
     data = folder / part.name.replace(" ", "-")
     environment = {**os.environ, "COVERAGE_FILE": str(data), "SUBREACH_INTERPRETED": "" if part.compiled else "1"}
     coverage = [sys.executable, "-m", "coverage"]

@@ -1,4 +1,4 @@
-"""The modules of the four packages, and what each imports."""
+"""The modules of the four packages and their imports."""
 
 import ast
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""The rooms of the house: folders of the four packages, and what each says and does import."""
+"""The subpackages of the four packages: their stated and their actual imports."""
 
 import ast
 import re
@@ -30,11 +30,11 @@ def imports_of(room: str) -> set[str]:
     return used
 
 
-def said_of(room: str) -> set[str]:
-    """What a room's docstring says that it imports, in its line that begins with ``Imports:``."""
-    told = re.search(r"^Imports: ([^.]*(?:\.\w[^.]*)*)\.$", ast.get_docstring(tree_of(ROOMS[room])) or "", re.M)
-    assert told, f"{room}: its __init__.py has no line that says what it imports"
-    return set() if told[1] == "nothing" else set(re.split(r",\s+", told[1]))
+def stated_imports_of(room: str) -> set[str]:
+    """Return the imports that a subpackage's docstring states in its line ``Imports:``."""
+    line = re.search(r"^Imports: ([^.]*(?:\.\w[^.]*)*)\.$", ast.get_docstring(tree_of(ROOMS[room])) or "", re.M)
+    assert line, f"{room}: its __init__.py has no line that states its imports"
+    return set() if line[1] == "nothing" else set(re.split(r",\s+", line[1]))
 
 
 def arrows(package: str) -> dict[str, set[str]]:

@@ -1,4 +1,4 @@
-"""The counts of the house, and the words that do not come back."""
+"""Size counts of the repository and the list of banned words."""
 
 import shutil
 import subprocess
@@ -9,12 +9,12 @@ from tests.architecture import banned, counts
 from tests.architecture.modules import ROOT
 
 
-def test_banned_words_do_not_come_back():
+def test_banned_words_are_absent():
     found = list(banned.find_all())
     assert not found, "\n".join(found)
 
 
-def test_banned_lists_are_sorted_and_hold_nothing_twice():
+def test_banned_lists_are_sorted_without_duplicates():
     for words in (banned.IDENTIFIERS, banned.PHRASES):
         assert list(words) == sorted(set(words))
 
@@ -33,7 +33,7 @@ def test_phrases_are_banned_across_lines_and_in_any_case():
 
 
 @pytest.mark.skipif(shutil.which("wc") is None, reason="there is no wc")
-def test_words_are_counted_as_wc_does():
+def test_word_counts_equal_those_of_wc():
     pages = counts.pages()
     done = subprocess.run(["wc", "-w", *pages], capture_output=True, text=True, check=True, env={"LC_ALL": "C.UTF-8"})
     assert [int(line.split()[0]) for line in done.stdout.splitlines()[:-1]] == [counts.words_of(p) for p in pages]
@@ -47,7 +47,7 @@ def test_counts_are_printed(capsys):
     assert "banned words found" in printed
 
 
-def test_generated_words_are_left_out():
+def test_generated_pages_do_not_count_as_handwritten():
     for page in counts.GENERATED:
         assert counts.words_of(ROOT / page) > 1000 and counts.words_by_hand(ROOT / page) == 0
     for page in ("docs/performance.md", "docs/scenarios.md"):

@@ -1,4 +1,4 @@
-"""Two distributions come from this repository; what both must agree on stands in both."""
+"""Consistency of the two distributions that this repository builds."""
 
 import itertools
 import re
@@ -11,7 +11,7 @@ def project(file):
     return tomllib.loads((ROOT / file).read_text(encoding="utf-8"))["project"]
 
 
-def test_both_have_one_version_and_the_one_needs_the_other_at_it():
+def test_both_distributions_share_one_version_and_pin_it():
     whole, arbiter = project("pyproject.toml"), project("fuzzy_arbiter/pyproject.toml")
     assert whole["version"] == arbiter["version"]
     needed = [text for text in whole["dependencies"] if text.startswith("fuzzy-arbiter")]
@@ -19,7 +19,7 @@ def test_both_have_one_version_and_the_one_needs_the_other_at_it():
     assert re.findall("^version: (.*)$", (ROOT / "CITATION.cff").read_text(), re.M) == [whole["version"]]
 
 
-def test_numpy_is_all_that_the_arbiter_needs_at_one_bound():
+def test_arbiter_depends_on_numpy_alone_with_one_bound():
     whole, arbiter = project("pyproject.toml"), project("fuzzy_arbiter/pyproject.toml")
     assert arbiter["dependencies"] == [text for text in whole["dependencies"] if text.startswith("numpy>=")]
     for texts in arbiter["optional-dependencies"].values():
@@ -29,5 +29,5 @@ def test_numpy_is_all_that_the_arbiter_needs_at_one_bound():
             assert text in others or not any(other.startswith(name) for other in others), text
 
 
-def test_the_licence_is_one():
+def test_both_distributions_have_the_same_licence():
     assert (ROOT / "fuzzy_arbiter" / "LICENSE").read_bytes() == (ROOT / "LICENSE").read_bytes()

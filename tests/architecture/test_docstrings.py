@@ -1,4 +1,4 @@
-"""What docstrings say is what the code has: parameters, errors, what comes back, and units."""
+"""Docstrings match the code: parameters, errors, return values, and units."""
 
 import ast
 import re
@@ -56,8 +56,8 @@ def functions() -> Iterator[griffe.Function]:
     return (what for what in everything() if isinstance(what, griffe.Function))
 
 
-def said(what: griffe.Object) -> str:
-    """A docstring, and those of the functions it leaves the rest to."""
+def docstring_text(what: griffe.Object) -> str:
+    """Return a docstring, with those of the functions that it refers to."""
     words = what.docstring.value if what.docstring else ""
     others = [path for name in ELSEWHERE.findall(words) for path in _paths() if f".{path}".endswith(f".{name}")]
     return "\n".join([words, *(_paths()[path] for path in others)])
@@ -69,7 +69,7 @@ def _paths() -> dict[str, str]:
 
 
 def section(what: griffe.Object, kind: griffe.DocstringSectionKind) -> list[tuple[str, str]]:
-    """Names and all that is said of them, of one section of a docstring."""
+    """Return the names and descriptions of one section of a docstring."""
     parts = what.docstring.parse("numpy") if what.docstring else []
     entries = [entry for part in parts if part.kind is kind for entry in part.value]
     return [
@@ -117,7 +117,7 @@ def body(function: griffe.Function) -> Iterator[ast.AST]:
                 pending.append(child)
 
 
-def test_sections_of_parameters_have_each_parameter_and_no_other():
+def test_parameters_sections_match_signatures():
     wrong = {}
     for function in functions():
         documented = sorted(name for name, _ in section(function, Part.parameters))
@@ -127,7 +127,7 @@ def test_sections_of_parameters_have_each_parameter_and_no_other():
     assert not wrong, shown(wrong)
 
 
-def test_what_is_public_names_each_of_its_parameters():
+def test_public_docstrings_name_every_parameter():
     """In a section, or in the words where there is none."""
     wrong = {}
     for name in public.names():
@@ -135,17 +135,17 @@ def test_what_is_public_names_each_of_its_parameters():
         for function in [what] if what.is_function else public.members(what) if what.is_class else []:
             if function.is_function:
                 listed = {entry for entry, _ in section(function, Part.parameters)}
-                words = set(re.findall(r"\w+", said(function)))
+                words = set(re.findall(r"\w+", docstring_text(function)))
                 if missing := [p.name for p in parameters(function) if p.name not in (listed or words)]:
                     wrong[function.path] = missing
     assert not wrong, shown(wrong)
 
 
-def test_what_comes_back_is_said():
+def test_return_values_are_documented():
     wrong = []
     for function in functions():
         kinds = {part.kind for part in function.docstring.parse("numpy")} if function.docstring else set()
-        summary = said(function).partition("\n\n")[0]
+        summary = docstring_text(function).partition("\n\n")[0]
         if any(isinstance(node, ast.Yield | ast.YieldFrom) for node in body(function)):
             context = any("contextmanager" in str(d.value) for d in function.decorators)
             right = context or Part.yields in kinds or summary.startswith("Yield")
@@ -157,7 +157,7 @@ def test_what_comes_back_is_said():
     assert not wrong, "\n".join(wrong)
 
 
-def test_what_a_function_raises_is_said():
+def test_raised_exceptions_are_documented():
     wrong = {}
     for function in functions():
         if function.path.startswith("cosim.command_line."):
@@ -169,20 +169,20 @@ def test_what_a_function_raises_is_said():
         raised = [n.exc for n in own if isinstance(n, ast.Raise) and n.exc and id(n) not in caught]
         names = {ast.unparse(e.func if isinstance(e, ast.Call) else e).split(".")[-1] for e in raised}
         types = {name for name in names if name.isidentifier() and name[0].isupper()} - UNSAID
-        if silent := {name for name in types if name not in said(function)}:
+        if silent := {name for name in types if name not in docstring_text(function)}:
             wrong[function.path] = silent
     assert not wrong, shown(wrong)
 
 
-def test_physical_quantities_have_units():
-    """Parameters and what comes back: where they are listed, there; else somewhere in the docstring."""
+def test_physical_quantities_have_documented_units():
+    """Parameters and return values: in their section if there is one, else anywhere in the docstring."""
     wrong = {}
     for function in functions():
         entries = dict(section(function, Part.parameters))
         for p in parameters(function):
-            if physical(p.name, p.annotation) and not UNIT.search(entries.get(p.name, said(function))):
-                wrong[f"{function.path}({p.name})"] = entries.get(p.name, said(function))
-        back = " ".join(text for _, text in section(function, Part.returns)) or said(function)
+            if physical(p.name, p.annotation) and not UNIT.search(entries.get(p.name, docstring_text(function))):
+                wrong[f"{function.path}({p.name})"] = entries.get(p.name, docstring_text(function))
+        back = " ".join(text for _, text in section(function, Part.returns)) or docstring_text(function)
         if physical(function.name, function.returns) and not UNIT.search(back):
             wrong[function.path] = back
     assert not wrong, shown(wrong)
@@ -195,21 +195,21 @@ def test_fields_and_properties_that_are_physical_quantities_have_units():
         field = isinstance(attribute, griffe.Attribute) and attribute.parent.is_class
         if field and physical(attribute.name, attribute.annotation):
             about = dict(section(attribute.parent, Part.attributes) + section(attribute.parent, Part.parameters))
-            words = " ".join([said(attribute), comment_on(attribute), about.get(attribute.name, "")])
+            words = " ".join([docstring_text(attribute), comment_on(attribute), about.get(attribute.name, "")])
             if not UNIT.search(words):
                 wrong[attribute.path] = words
     assert not wrong, shown(wrong)
 
 
-def test_the_rule_of_units_can_fail():
+def test_unit_check_detects_missing_units():
     for words in ("", "A thruster fails.", "Where the vehicle is, shape (3,).", "a thing of its own", "(6, 6)"):
         assert not UNIT.search(words), words
     for words in ("[m]", "m, NED", "# s", "(3,) m/s", "float [N m]", "[-]", "shape (6,) [N, N m]", "in seconds"):
         assert UNIT.search(words), words
 
 
-def test_a_first_line_is_imperative_and_no_parameter_is_any():
-    """What a function does, not what it is about; properties say what they are."""
+def test_summaries_are_imperative_and_no_parameter_is_described_as_any():
+    """Functions begin with an imperative verb; properties may begin with a noun."""
     wrong = {}
     for function in functions():
         words = function.docstring.value if function.docstring else ""

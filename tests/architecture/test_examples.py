@@ -1,4 +1,4 @@
-"""Every public function and class has an example in its docstring, and each gives what it shows."""
+"""Every public function and class has a docstring example with correct output."""
 
 import doctest
 import importlib
@@ -21,7 +21,7 @@ def with_examples():
 
 @pytest.mark.medium(fast=2)
 @pytest.mark.parametrize(("name", "text"), [*with_examples(), ("cosim", importlib.import_module("cosim").__doc__)])
-def test_the_example_gives_what_it_shows(name, text, tmp_path, monkeypatch):
+def test_docstring_example_output_is_reproduced(name, text, tmp_path, monkeypatch):
     if ".pictures." in name:
         pyplot = pytest.importorskip("matplotlib.pyplot")
         pyplot.switch_backend("agg")

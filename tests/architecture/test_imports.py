@@ -1,4 +1,4 @@
-"""Who may import whom, what stays out until it is asked for, and how long a file is."""
+"""Import layering, lazy imports, and file sizes."""
 
 import graphlib
 import subprocess
@@ -8,7 +8,7 @@ from collections import Counter, defaultdict
 import pytest
 
 from tests.architecture.modules import FILES, PACKAGES, ROOT, imported
-from tests.architecture.rooms import ROOMS, arrows, imports_of, room_of, said_of
+from tests.architecture.rooms import ROOMS, arrows, imports_of, room_of, stated_imports_of
 
 MAY_IMPORT = {
     "fuzzy_arbiter": {"fuzzy_arbiter"},
@@ -92,23 +92,23 @@ for module in {modules!r}:
 """
 
 
-def test_imports_run_one_way():
+def test_packages_import_only_allowed_packages():
     packages = {module: {name.split(".")[0] for name in imported(module)} & set(PACKAGES) for module in FILES}
     assert {module: used for module, used in packages.items() if not used <= MAY_IMPORT[module.split(".")[0]]} == {}
 
 
-def test_nothing_imports_itself_by_a_way_round():
-    """Import cycles, those inside functions left out: Python meets only the others."""
+def test_imports_have_no_cycles():
+    """Import cycles, without imports inside functions, which Python resolves late."""
     graph = {module: imported(module, at_once=True) & FILES.keys() for module in FILES}
     graphlib.TopologicalSorter(graph).prepare()  # raises CycleError, which names the ring
 
 
 @pytest.mark.parametrize("room", ROOMS)
-def test_a_room_imports_what_its_docstring_says(room):
-    assert imports_of(room) == said_of(room)
+def test_package_imports_match_its_docstring(room):
+    assert imports_of(room) == stated_imports_of(room)
 
 
-def test_the_rooms_of_cosim_stand_on_each_other():
+def test_cosim_subpackages_are_layered():
     used = arrows("cosim")
     assert used.keys() == set(FLOORS)
     backwards = {(one, other) for one, others in used.items() for other in others}
@@ -116,23 +116,23 @@ def test_the_rooms_of_cosim_stand_on_each_other():
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_no_two_rooms_import_each_other(package):
+def test_subpackages_do_not_import_each_other_mutually(package):
     graphlib.TopologicalSorter(arrows(package)).prepare()  # raises CycleError, which names the ring
 
 
-def test_rooms_hold_few_modules():
+def test_subpackages_hold_a_bounded_number_of_modules():
     held = Counter(room_of(module) for module in FILES)
     assert {room: count for room, count in held.items() if count > MOST_MODULES} == {}
     assert held["cosim"] <= MOST_AT_THE_ROOT
 
 
-def test_the_controller_knows_neither_fmi_nor_mavlink_and_the_arbiter_no_vehicle():
+def test_controller_and_arbiter_import_neither_fmpy_nor_pymavlink():
     for module in FILES:
         if module.split(".")[0] in ("controller", "fuzzy_arbiter"):
             assert not {name.split(".")[0] for name in imported(module)} & {"fmpy", "pymavlink"}
 
 
-def test_what_is_optional_or_heavy_is_taken_in_one_place():
+def test_optional_libraries_are_imported_in_one_module_each():
     users = defaultdict(set)
     for module in FILES:
         for name in imported(module):
@@ -142,7 +142,7 @@ def test_what_is_optional_or_heavy_is_taken_in_one_place():
 
 
 @pytest.mark.slow
-def test_the_base_install_imports_all_but_what_wants_an_extra():
+def test_base_install_imports_all_modules_without_extras():
     modules = [module for module in FILES if not module.endswith("__main__")]
     code = _IMPORT_ALL.format(optional=OPTIONAL, modules=modules)
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
@@ -165,12 +165,12 @@ def test_the_base_install_imports_all_but_what_wants_an_extra():
         ("cosim.run.run", OF_SHOWING),
     ],
 )
-def test_what_is_heavy_waits_until_it_is_asked_for(what, without):
+def test_heavy_libraries_are_imported_lazily(what, without):
     code = f"import sys, {what}; print(*({without!r} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
 
 
-def test_files_fit_in_the_head():
+def test_file_sizes_are_bounded():
     lines = {module: len(path.read_text().splitlines()) for module, path in FILES.items()}
     assert {module: count for module, count in lines.items() if count > 400} == {}

@@ -1,4 +1,4 @@
-"""What says how to install something says it by one helper, with the bounds of ``pyproject.toml``, and pip takes it."""
+"""Install hints come from one helper, use the bounds of ``pyproject.toml``, and are accepted by pip."""
 
 import ast
 import re
@@ -26,7 +26,7 @@ def required():
     return {extra: {text.partition(";")[0] for text in texts} for extra, texts in extras.items()}
 
 
-def test_nothing_else_speaks_of_installing():
+def test_install_commands_occur_only_in_install_hints():
     """Nor of the name of this distribution in an index, which has none there."""
     files = [
         path for package in PACKAGES for path in (ROOT / package).rglob("*") if path.suffix in (".py", ".html", ".txt")
@@ -37,7 +37,7 @@ def test_nothing_else_speaks_of_installing():
 
 
 @pytest.mark.medium
-def test_what_is_named_has_the_bound_that_is_tried():
+def test_requirements_in_hints_match_declared_bounds():
     named = {
         (module, node.value)
         for module, path in FILES.items()
@@ -49,7 +49,7 @@ def test_what_is_named_has_the_bound_that_is_tried():
     assert [(module, text) for module, text in named if text not in known] == []
 
 
-def test_what_an_extra_brings_is_named_whole():
+def test_hints_name_all_requirements_of_an_extra():
     from cosim.export.formats import FORMATS
     from plant_fmu.importers import IMPORTERS
 
@@ -61,7 +61,7 @@ def test_what_an_extra_brings_is_named_whole():
 
 
 @pytest.mark.slow
-def test_pip_takes_it_from_a_shell(monkeypatch):
+def test_hint_is_accepted_by_pip_from_a_shell(monkeypatch):
     """For what is there already, without a network."""
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     done = subprocess.run(install_hint("numpy>=2.1.3", "rich>=13"), shell=True, capture_output=True, text=True)
@@ -72,7 +72,7 @@ def test_pip_takes_it_from_a_shell(monkeypatch):
 @pytest.mark.parametrize("short", [True, False])
 @pytest.mark.parametrize("name", ["python", "python3"])
 @pytest.mark.parametrize("folder", ["env", "my env"])
-def test_the_python_is_the_one_that_runs(monkeypatch, tmp_path, folder, name, short):
+def test_hint_names_the_running_python(monkeypatch, tmp_path, folder, name, short):
     """Its short name stands there where the shell knows it: in an environment that is active."""
     bins = tmp_path / folder / "bin"
     bins.mkdir(parents=True)
@@ -84,7 +84,7 @@ def test_the_python_is_the_one_that_runs(monkeypatch, tmp_path, folder, name, sh
     assert shlex.split(install_hint("mcap>=1.2")) == [shown, "-m", "pip", "install", "mcap>=1.2"]
 
 
-def test_another_python_of_the_same_folder_is_another(monkeypatch, tmp_path):
+def test_hint_distinguishes_pythons_in_one_folder(monkeypatch, tmp_path):
     for name in ("python", "python3"):
         (tmp_path / name).touch(0o755)
     monkeypatch.setattr(sys, "executable", str(tmp_path / "python3"))
@@ -92,7 +92,7 @@ def test_another_python_of_the_same_folder_is_another(monkeypatch, tmp_path):
     assert install_hint("mcap>=1.2").startswith(f"{tmp_path / 'python3'} -m pip")
 
 
-def test_a_place_on_windows_stands_as_it_is(monkeypatch):
+def test_windows_paths_are_kept_unquoted(monkeypatch):
     monkeypatch.setattr("shutil.which", lambda name: None)
     monkeypatch.setattr(sys, "executable", r"C:\env\Scripts\python.exe")
     assert install_hint("mcap>=1.2") == r'C:\env\Scripts\python.exe -m pip install "mcap>=1.2"'

@@ -1,4 +1,4 @@
-"""What is public changes when somebody means it to."""
+"""The public API changes only with its recorded listing."""
 
 import difflib
 import importlib
@@ -14,7 +14,7 @@ from tests.architecture.modules import ROOT
 REFERENCE = ROOT / "docs" / "reference"
 
 
-def test_what_is_public_is_what_is_written_down():
+def test_public_api_matches_recorded_listing():
     written = public.WRITTEN.read_text().splitlines()
     changed = list(difflib.unified_diff(written, public.text().splitlines(), "written", "now", lineterm="", n=0))
     assert not changed, "if it is meant so, `python -m tests.architecture.public` writes it anew:\n" + "\n".join(
@@ -22,7 +22,7 @@ def test_what_is_public_is_what_is_written_down():
     )
 
 
-def test_public_names_are_there():
+def test_public_names_are_importable():
     without = () if importlib.util.find_spec("rich") else ("cosim.live.watching",)
     homes = [name.rpartition(".")[::2] for name in public.names()]
     gone = [home for home in homes if home[0] not in without and not hasattr(importlib.import_module(home[0]), home[1])]
@@ -30,13 +30,13 @@ def test_public_names_are_there():
 
 
 @pytest.mark.skipif(not REFERENCE.is_dir(), reason="the pages of the reference are not there")
-def test_the_reference_shows_what_is_public():
+def test_reference_pages_list_the_public_api():
     shown = {name for page in REFERENCE.glob("*.md") for name in re.findall(r"^::: ([\w.]+)", page.read_text(), re.M)}
     behind = {public.target(name).path for name in shown}
     assert behind == {public.target(name).path for name in public.names()}
 
 
-def test_nothing_public_takes_keywords_that_nobody_knows():
+def test_public_functions_accept_no_arbitrary_keywords():
     """So Python itself refuses an unknown one; an arbiter's inputs alone may be keywords, and it refuses others."""
     by_input = {f"fuzzy_arbiter.arbiter.Arbiter.{method}" for method in ("batch", "centroids", "explain")}
     for name in public.names():

@@ -1,4 +1,4 @@
-"""A key that nothing knows is refused by name, in every table of every file that somebody writes by hand or sends."""
+"""Unknown keys are rejected by name in every table of every handwritten or received file."""
 
 import copy
 import json
@@ -129,7 +129,7 @@ def cases():
 
 @pytest.mark.medium(fast=18)
 @pytest.mark.parametrize(("read", "table", "path"), list(cases()))
-def test_unknown_keys_are_refused_by_name(read, table, path, tmp_path):
+def test_unknown_keys_are_rejected_by_name(read, table, path, tmp_path):
     inner = at(table, path)
     near = [key + key[-1] for key in inner][:1]
     for key in [LIKE_NONE, *near]:
@@ -143,25 +143,25 @@ def test_unknown_keys_are_refused_by_name(read, table, path, tmp_path):
 
 
 @pytest.mark.parametrize("read", list(dict.fromkeys(read for read, _ in examples())), ids=lambda read: read.__name__)
-def test_the_examples_are_good(read, tmp_path):
+def test_example_tables_are_valid(read, tmp_path):
     for reader, table in examples():
         if reader is read:
             reader(table, tmp_path)
 
 
-def test_every_shape_is_among_them():
+def test_every_shape_has_an_example():
     assert {f"regions.shape.{name}" for name in SHAPES} <= {
         kind_of(table, path) for read, table in examples() if read is scenario for path in tables(table)
     }
 
 
-def test_every_law_has_its_gains_refused():
+def test_unknown_gains_are_rejected_for_every_law():
     for law in LAWS:
         with pytest.raises(RunError, match=LIKE_NONE):
             gains_from(law, [f"{LIKE_NONE}=1"])
 
 
 @pytest.mark.parametrize("table", ["", "time.", "law.gains.", "arbiter.", "plant.", "plant.parameters.", "goal."])
-def test_unknown_keys_that_are_set_are_refused_by_name(table):
+def test_unknown_override_keys_are_rejected_by_name(table):
     with pytest.raises((ScenarioError, PlantFmuError), match=rf"\b{table}{LIKE_NONE}\b"):
         load_scenario("paper", [f"{table}{LIKE_NONE}=1"])

@@ -1,4 +1,4 @@
-"""The quadratic program solved in fractions, without any rounding, and what rounding may make of a solution."""
+"""The quadratic program solved exactly in fractions, with bounds of rounding errors."""
 
 import math
 from fractions import Fraction

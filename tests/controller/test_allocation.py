@@ -20,7 +20,7 @@ def allocate(tau, limits="direction", low=LOW, high=HIGH):
     return forces
 
 
-def test_a_small_wrench_is_given_exactly_and_with_least_effort():
+def test_feasible_wrench_is_allocated_exactly_with_least_effort():
     tau = np.array([10.0, -5.0, 8.0, 1.0, -2.0, 3.0])
     forces = allocate(tau)
     assert B @ forces == pytest.approx(tau)
@@ -28,7 +28,7 @@ def test_a_small_wrench_is_given_exactly_and_with_least_effort():
 
 
 @given(wrenches)
-def test_direction_is_kept_within_limits(tau):
+def test_direction_mode_scales_the_wrench_within_limits(tau):
     forces = allocate(tau)
     assert np.all(forces >= LOW - 1e-9) and np.all(forces <= HIGH + 1e-9)
     given_wrench = B @ forces
@@ -40,7 +40,7 @@ def test_direction_is_kept_within_limits(tau):
 
 
 @given(wrenches)
-def test_each_thruster_on_its_own_is_cut_at_its_limit(tau):
+def test_per_thruster_mode_clips_each_force(tau):
     assert allocate(tau, "per-thruster") == pytest.approx(np.clip(np.linalg.pinv(B) @ tau, LOW, HIGH), abs=1e-9)
 
 
@@ -52,7 +52,7 @@ def test_limits_may_differ_by_direction():
     assert forces.max() == pytest.approx(20.0)
 
 
-def test_a_dead_thruster_in_the_way_stops_the_wrench_that_needs_it():
+def test_one_sided_thruster_limits_can_block_a_wrench():
     high = HIGH.copy()
     high[4:] = 0.0
     assert B @ allocate([0.0, 0.0, -50.0, 0.0, 0.0, 0.0], high=high) == pytest.approx(np.zeros(6))
@@ -60,7 +60,7 @@ def test_a_dead_thruster_in_the_way_stops_the_wrench_that_needs_it():
 
 @pytest.mark.parametrize("dead", range(8))
 @pytest.mark.parametrize("limits", ["direction", "per-thruster"])
-def test_the_rest_goes_on_without_a_dead_thruster(dead, limits):
+def test_healthy_thrusters_compensate_for_a_dead_one(dead, limits):
     rov = load_vehicle("bluerov2_heavy")
     low, high = rov.thrust_min.copy(), rov.thrust_max.copy()
     low[dead] = high[dead] = 0.0
@@ -72,7 +72,7 @@ def test_the_rest_goes_on_without_a_dead_thruster(dead, limits):
         assert forces[dead] == 0.0
 
 
-def test_allocation_says_whether_it_cut():
+def test_allocation_reports_saturation():
     forces = np.empty(8)
     for limits in ("direction", "per-thruster"):
         allocation = Allocation(B, LOW, HIGH, limits)
@@ -83,6 +83,6 @@ def test_allocation_says_whether_it_cut():
 @pytest.mark.parametrize(
     "arguments", [(B, LOW[:7], HIGH), (B, LOW + 30.0, HIGH), (B[:5], LOW, HIGH), (B, LOW, HIGH, "some")]
 )
-def test_set_up_that_cannot_be_is_refused(arguments):
+def test_invalid_setup_is_rejected(arguments):
     with pytest.raises(LawError):
         Allocation(*arguments)

@@ -39,12 +39,12 @@ def exact_arctangent(t):
 @example(math.pi / 2.0)
 @example(3.0 * math.pi / 4.0)
 @example(0.0)
-def test_cosines(x):
+def test_cosine_matches_reference(x):
     with localcontext(prec=60):
         assert abs(Decimal(arithmetic.cosine(x)) - exact_cosine(x)) < 2e-16
 
 
-def test_cosines_of_many_turns():
+def test_cosine_of_large_angles_matches_reference():
     for x in (1e4, -99_999.5, 123_456.789):
         assert arithmetic.cosine(x) == pytest.approx(math.cos(x), abs=3e-16)
 
@@ -52,7 +52,7 @@ def test_cosines_of_many_turns():
 @given(st.floats(-700.0, 700.0))
 @example(0.0)
 @example(-6.0 * math.log(10.0))
-def test_exponentials(x):
+def test_exponential_matches_reference(x):
     with localcontext(prec=60):
         exact = Decimal(x).exp()
         assert abs(Decimal(arithmetic.exponential(x)) / exact - 1) < Decimal(2.0 * EPSILON)
@@ -62,13 +62,13 @@ def test_exponentials(x):
 @example(1.0, 1.0)
 @example(0.125, 1.0)
 @example(1.0, 0.125)
-def test_arctangents(y, x):
+def test_arctangent_matches_reference(y, x):
     with localcontext(prec=60):
         exact = exact_arctangent(Decimal(y) / Decimal(x))
         assert abs(Decimal(arithmetic.arctangent(y, x)) / exact - 1) < Decimal(3.0 * EPSILON)
 
 
-def test_arctangents_of_all_quadrants_and_of_odd_numbers_are_those_of_c():
+def test_arctangent_matches_c_in_all_quadrants_and_special_values():
     numbers = (-math.inf, -2.0, -1.0, -1e-300, 0.0, 1e-300, 0.5, 1.0, 3.0, math.inf)
     for y in numbers:
         for x in numbers:
@@ -79,7 +79,7 @@ def test_arctangents_of_all_quadrants_and_of_odd_numbers_are_those_of_c():
     assert math.isnan(arithmetic.arctangent(math.nan, 1.0)) and math.isnan(arithmetic.arctangent(1.0, math.nan))
 
 
-def test_lengths_and_integers():
+def test_lengths_and_rounding_are_exact():
     assert arithmetic.square(-3.0) == 9.0
     assert arithmetic.hypotenuse(3.0, -4.0) == 5.0
     assert arithmetic.length3(2.0, -3.0, 6.0) == 7.0

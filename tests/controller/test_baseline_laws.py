@@ -1,4 +1,4 @@
-"""The laws for comparison against plain matrices, and what each is good for on a simple vehicle in still water."""
+"""The baseline laws against plain matrices, and their behavior on a simple vehicle in still water."""
 
 import math
 
@@ -127,7 +127,7 @@ def fly(law, net_weight, seconds, start=(0.0, 0.0, 2.0), regions=(), drag=60.0, 
 
 @pytest.mark.medium
 @pytest.mark.parametrize("name", NAMES)
-def test_each_reaches_a_free_goal_and_stays(name):
+def test_every_law_reaches_a_free_goal_and_stays(name):
     positions, _ = fly(law_of(name), net_weight=0.0, seconds=100.0)
     assert np.linalg.norm(positions[-500:] - [8.0, 1.0, 3.0], axis=1).max() < 0.5
 
@@ -150,8 +150,8 @@ def test_adaptive_set_points_cancel_the_net_weight(name, net_weight):
 
 
 @pytest.mark.medium
-def test_the_unarbitrated_law_cancels_the_net_weight_to_what_its_region_forgives():
-    """Its pull ends within the region, wherever it came to rest: there the estimate alone carries the weight."""
+def test_unarbitrated_law_cancels_net_weight_within_its_goal_region():
+    """Attraction is zero within the region, where the estimate alone balances the weight."""
     law = law_of("unarbitrated", k_p1=100.0, k_v1=150.0, limit=40.0, margin=0.2, **QUICK)
     positions, estimates = fly(law, net_weight=10.0, seconds=200.0)
     assert np.linalg.norm(positions[-500:] - [8.0, 1.0, 3.0], axis=1).max() < 0.5
@@ -171,7 +171,7 @@ def test_only_antonellis_law_cancels_a_current():
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("name", ADAPTIVE)
-def test_estimates_stay_within_their_bounds_however_long_something_holds_the_vehicle(name):
+def test_estimates_stay_bounded_while_the_vehicle_is_held(name):
     law = law_of(name, bound=20.0, k_p1=100.0, limit=40.0, **ADAPTING[name])
     _, estimates = fly(law, net_weight=0.0, seconds=30.0, start=(7.9, 1.0, 1.0), held=True)
     assert np.abs(estimates[:, 0]).max() == 20.0
@@ -179,7 +179,7 @@ def test_estimates_stay_within_their_bounds_however_long_something_holds_the_veh
 
 @pytest.mark.medium
 @pytest.mark.parametrize("name", NAMES)
-def test_an_obstacle_beside_the_way_is_passed_without_a_touch(name):
+def test_obstacle_beside_the_path_is_passed_without_contact(name):
     rock = Region("rock", Sphere((4.0, 0.9, 2.5), 0.8), "out")
     positions, _ = fly(law_of(name, (rock, BAND)), 0.0, seconds=110.0, regions=(rock, BAND))
     from_rock = np.linalg.norm(positions - [4.0, 0.9, 2.5], axis=1)
@@ -188,7 +188,7 @@ def test_an_obstacle_beside_the_way_is_passed_without_a_touch(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_weights_of_the_arbiter_change_nothing(name):
+def test_arbiter_weights_do_not_affect_the_law(name):
     taus = []
     for weight in (0.0, 1.0):
         law, tau = law_of(name, (ROCK,)), np.empty(6)
@@ -199,7 +199,7 @@ def test_weights_of_the_arbiter_change_nothing(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_lost_position_asks_for_no_number(name):
+def test_missing_position_gives_nan_force(name):
     law, tau = law_of(name, (ROCK,)), np.empty(6)
     state = VehicleState(np.array([math.nan, 0.0, 2.0]), IDENTITY, np.zeros(6), np.ones(8))
     law.step(state, pack([GOAL]), pack([ROCK]), np.ones(1), tau)
@@ -207,7 +207,7 @@ def test_a_lost_position_asks_for_no_number(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_gains_that_cannot_be_are_named(name):
+def test_invalid_gains_are_rejected_by_name(name):
     fields = LAWS[name].gains_type._fields
     for gain in fields:
         for value in (-1.0, math.nan, math.inf):
@@ -219,7 +219,7 @@ def test_gains_that_cannot_be_are_named(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_set_up_that_cannot_be_is_refused(name):
+def test_invalid_setup_is_rejected(name):
     law = LAWS[name]
     for attitude, period in ((np.ones(4), PERIOD), (IDENTITY, 0.0)):
         with pytest.raises(LawError):

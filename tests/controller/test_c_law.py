@@ -237,14 +237,14 @@ def test_regions_are_those_of_python(library, name, keep):
         np.testing.assert_allclose(ours, theirs, rtol=1e-12, atol=1e-12)
 
 
-def test_a_kind_without_c_code_is_read_as_no_other(library):
+def test_region_kind_without_c_code_is_nan(library):
     packed = pack([Region("r", Sphere((0.0, 0.0, 0.0), 1.0), "out")])
     unknown = packed._replace(kinds=np.array([max(kind.kind for kind in ALL.values()) + 1]))
     for numbers in in_c(library, unknown, np.ones((4, 3)), unit_rows(np.random.default_rng(5), 4)):
         assert np.isnan(numbers).all()
 
 
-def test_regions_of_a_scene_are_each_their_own(library):
+def test_regions_of_a_scene_are_evaluated_independently(library):
     """All shapes at once, each at a place of its own."""
     rng = np.random.default_rng(4)
     packed = pack([Region(name, shape, ("in", "out")[i % 2]) for i, (name, (shape, _)) in enumerate(SHAPES.items())])
@@ -257,7 +257,7 @@ def test_regions_of_a_scene_are_each_their_own(library):
 
 
 @pytest.mark.parametrize("name", SHAPES)
-def test_a_lost_position_is_lost_to_every_region(library, name):
+def test_missing_position_gives_nan_for_every_region(library, name):
     shape, _ = SHAPES[name]
     packed = pack([Region("r", shape, "out")])
     places, attitudes = np.full((4, 3), np.nan), np.full((4, 4), np.nan)

@@ -1,4 +1,4 @@
-"""A function as a law: told copies of what is, and held to what it returns."""
+"""A function as a law: it receives copies of its inputs, and its output is validated."""
 
 import numpy as np
 import pytest
@@ -20,16 +20,16 @@ def state():
     return VehicleState(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(6), np.ones(8))
 
 
-def test_a_function_is_told_where_regions_stand():
-    told = []
+def test_function_receives_region_positions_and_velocities():
+    inputs = []
 
     def steer(*arguments):
-        told.extend(arguments)
+        inputs.extend(arguments)
         return np.arange(6.0)
 
     forces = np.zeros(6)
     FunctionLaw(steer).step(state(), GOAL, ROCKS, WEIGHTS, forces)
-    seen, goal, regions, weights = told
+    seen, goal, regions, weights = inputs
     assert forces.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
     assert seen.position.tolist() == [0.0, 0.0, 0.0] and weights.tolist() == [0.75, 0.25]
     # of spheres by hand: |p - c| - r, 2 (p - c), outside of the goal, outside of both others
@@ -41,10 +41,10 @@ def test_a_function_is_told_where_regions_stand():
     assert regions.velocities.tolist() == [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]
 
 
-def test_what_a_function_is_told_is_its_own():
+def test_function_receives_copies_of_its_inputs():
     def careless(state, goal, regions, weights):
-        for told in (*state, *regions, *goal, weights):
-            told[...] = 1
+        for array in (*state, *regions, *goal, weights):
+            array[...] = 1
         return np.zeros(6)
 
     now, weights = state(), WEIGHTS.copy()
@@ -60,7 +60,7 @@ def test_what_a_function_is_told_is_its_own():
         ["1"] * 6, [10**400] * 6, np.zeros((6, 1)), list(range(10_000)), [[1.0, 2.0], [3.0]],
     ],
 )  # fmt: skip
-def test_what_are_no_forces_is_refused(came):
+def test_invalid_forces_are_rejected(came):
     forces = np.ones(6)
     with pytest.raises(LawError, match=r"law .*:steer returned .*, expected 6 finite numbers \[N and N m\]") as caught:
         FunctionLaw(named("steer", came)).step(state(), GOAL, ROCKS, WEIGHTS, forces)
@@ -76,7 +76,7 @@ def named(name, result):
     return function
 
 
-def test_forces_of_thrusters_are_as_many_as_there_are():
+def test_thruster_output_has_one_force_per_thruster():
     law, forces = FunctionLaw(named("steer", [2.0] * 8), output="thrusters"), np.zeros(8)
     law.step(state(), GOAL, ROCKS, WEIGHTS, forces)
     assert law.output == "thrusters" and forces.tolist() == [2.0] * 8
@@ -94,6 +94,6 @@ def test_an_object_that_can_be_called_is_named_by_its_class():
     ("function", "output", "words"),
     [(3, "wrench", "law is 3"), (dict, "wrench", "law is <class"), (print, "force", "'force'")],
 )
-def test_what_is_no_law_is_refused(function, output, words):
+def test_invalid_law_is_rejected(function, output, words):
     with pytest.raises(LawError, match=words):
         FunctionLaw(function, output)

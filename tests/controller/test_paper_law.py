@@ -20,7 +20,7 @@ def random_unit():
     return e / np.linalg.norm(e)
 
 
-def ask(e, nu, goal, regions, alphas, e_d=None, gains=GAINS, period=0.001, phi=(0.0, 0.0, 0.0, 0.0)):
+def evaluate_law(e, nu, goal, regions, alphas, e_d=None, gains=GAINS, period=0.001, phi=(0.0, 0.0, 0.0, 0.0)):
     """Return the wrench and the next estimate; goal and regions are pairs of values and gradients."""
     (f, df), (gs, dgs) = goal, regions
     estimate, tau = np.array(phi, float), np.empty(6)
@@ -64,7 +64,7 @@ def test_wrench_and_adaptation_are_the_equations():
         e, e_d, nu, phi = random_unit(), random_unit(), rng.normal(size=6), rng.normal(size=4)
         f, df = rng.normal() * 5, rng.normal(size=3)
         gs, dgs, alphas = rng.normal(size=4), rng.normal(size=(4, 3)), rng.uniform(0, 100, 4)
-        tau, estimate = ask(e, nu, (f, df), (gs, dgs), alphas, e_d, period=0.01, phi=phi)
+        tau, estimate = evaluate_law(e, nu, (f, df), (gs, dgs), alphas, e_d, period=0.01, phi=phi)
         expected, rate = textbook(e, e_d, nu, f, df, gs, dgs, alphas, phi)
         assert tau == pytest.approx(expected, rel=1e-12, abs=1e-10)
         assert estimate == pytest.approx(phi + 0.01 * rate, rel=1e-12, abs=1e-12)
@@ -76,14 +76,14 @@ def test_force_in_the_world_does_not_depend_on_attitude():
     forces = []
     for _ in range(5):
         e = random_unit()
-        tau, _ = ask(e, np.zeros(6), (f, df), (gs, dgs), alphas)
+        tau, _ = evaluate_law(e, np.zeros(6), (f, df), (gs, dgs), alphas)
         forces.append(Rotation.from_quat(np.roll(e, -1)).as_matrix() @ tau[:3])
     assert np.ptp(forces, axis=0) == pytest.approx(np.zeros(3), abs=1e-10)
 
 
 def test_force_at_the_papers_start():
     """26.82 kN: k_p1 f |grad f| with f = 79.75 m2 and |grad f| = 2 sqrt(80) m; SR3 pushes with 0.5 (1.8^2 - 1.5^2)."""
-    tau, _ = ask(IDENTITY, np.zeros(6), (79.75, [-16.0, 0.0, -8.0]), NOTHING, np.empty(0))
+    tau, _ = evaluate_law(IDENTITY, np.zeros(6), (79.75, [-16.0, 0.0, -8.0]), NOTHING, np.empty(0))
     assert np.linalg.norm(tau[:3]) == pytest.approx(18.8 * 79.75 * 2 * math.sqrt(80.0), rel=1e-12)
     assert tau[0] > 0.0 and tau[2] > 0.0
 
@@ -99,17 +99,17 @@ def test_errors_are_gradients_of_the_potentials():
     assert slopes == pytest.approx(100.0 * secondary_error(values, unit, alphas / 100.0), abs=1e-8)
 
 
-def test_a_lost_measurement_is_no_peace():
+def test_missing_measurement_gives_nan_errors():
     assert np.isnan(primary_error(math.nan, np.ones(3))).all()
     assert np.isnan(secondary_error(np.array([math.nan]), np.ones((1, 3)), np.ones(1))).all()
 
 
-def test_k_q_cancels():
+def test_k_q_has_no_effect():
     taus = []
     for k_q in (0.1, 100.0, 1e5):
         slope = [1.0, 2.0, 3.0]
         gains = GAINS._replace(k_q=k_q)
-        tau, estimate = ask(
+        tau, estimate = evaluate_law(
             IDENTITY, np.zeros(6), (0.2, slope), ([0.2], [slope]), np.array([50.0]), gains=gains, period=0.01
         )
         taus.append([*tau, *estimate])
@@ -129,7 +129,7 @@ def test_the_law_evaluates_its_regions_and_weighs_them():
     assert law.estimate[0] == pytest.approx(0.0) and law.report.shape == (0,)
 
 
-def test_satisfied_regions_push_not():
+def test_satisfied_regions_give_zero_error():
     assert primary_error(-1.0, np.ones(3)) == pytest.approx(np.zeros(3))
     assert secondary_error(np.array([-0.1]), np.ones((1, 3)), np.array([5.0])) == pytest.approx(np.zeros(3))
 
@@ -142,7 +142,7 @@ def test_a_repulsive_sphere_pushes_at_most_gain_times_radius_squared():
     """Inside SR1, at its centre, 100 * 0.25 = 25 N: against 26.8 kN there is no avoidance."""
     depth = 1e-9  # from the centre
     sphere = ([0.25 - depth**2], [[-2.0 * depth, 0.0, 0.0]])
-    tau, _ = ask(IDENTITY, np.zeros(6), (-1.0, np.zeros(3)), sphere, np.array([100.0]))
+    tau, _ = evaluate_law(IDENTITY, np.zeros(6), (-1.0, np.zeros(3)), sphere, np.array([100.0]))
     assert tau[:3] == pytest.approx([25.0, 0.0, 0.0])
 
 
@@ -154,7 +154,7 @@ def test_defaults_are_those_of_section_vii():
     ("change", "words"),
     [({"k_p1": 0.0}, "k_p1"), ({"gamma": -1.0}, "gamma"), ({"k_v1": math.nan}, "k_v1"), ({"sigma_p": -0.1}, "sigma_p")],
 )
-def test_gains_that_cannot_be_are_named(change, words):
+def test_invalid_gains_are_rejected_by_name(change, words):
     with pytest.raises(LawError, match=words):
         IsmailDunniganLaw(GAINS._replace(**change), IDENTITY, 0.001, 0)
 
@@ -168,6 +168,6 @@ def test_gains_that_cannot_be_are_named(change, words):
         (IDENTITY, np.inf),
     ],
 )
-def test_set_up_that_cannot_be_is_refused(attitude, period):
+def test_invalid_setup_is_rejected(attitude, period):
     with pytest.raises(LawError):
         IsmailDunniganLaw(GAINS, attitude, period, 0)

@@ -1,4 +1,4 @@
-"""The PD law with observer and barriers: its observer's poles, its barriers along a motion, and what it is good for."""
+"""The PD law with observer and barriers: observer poles, barrier inequality, and closed-loop behavior."""
 
 import math
 
@@ -32,7 +32,7 @@ def fly(law, sea, seconds, regions=(), goal=GOAL):
 
 
 @pytest.mark.medium
-def test_both_poles_of_the_observer_are_where_its_bandwidth_says():
+def test_observer_poles_lie_at_its_bandwidth():
     """At rest in still water, held by no force, with a push that the model lacks: two equal real poles."""
     omega, net_weight, kept = 3.0, 6.0, []
     law, goal = law_of(k_p1=1e-9, k_v1=0.0, repulsion=0.0, limit=0.0, observer=omega), pack([GOAL])
@@ -63,7 +63,7 @@ def test_net_weight_and_current_leave_no_steady_error(net_weight):
 @pytest.mark.parametrize(
     ("velocity", "center"), [((0.0, 0.0, 0.0), (2.5, 0.05, 2.5)), ((-0.1, 0.05, 0.0), (3.0, -0.2, 2.4))]
 )
-def test_along_the_motion_each_clearance_keeps_the_barriers_inequality(velocity, center):
+def test_clearances_satisfy_the_barrier_inequality(velocity, center):
     """h'' by differences of true clearances, of a plant integrated apart: never below, and equal while it acts."""
     gains = {"pull_in": 0.6, "brake": 1.5, "margin": 0.1, "repulsion": 0.0, "limit": 60.0}
     region = Region("ball", Sphere(center, 0.7), "out", velocity)
@@ -81,14 +81,14 @@ def test_along_the_motion_each_clearance_keeps_the_barriers_inequality(velocity,
 
 
 @pytest.mark.medium
-def test_without_the_barrier_it_would_run_into_the_same_obstacle():
+def test_without_barrier_the_same_obstacle_is_hit():
     region = Region("ball", Sphere((2.5, 0.05, 2.5), 0.7), "out", hard=False)
     positions, _, _ = fly(law_of((region,), repulsion=0.0, limit=60.0), Sea((0.0, 0.0, 0.0), 0.0), 14.0, (region,))
     assert np.linalg.norm(positions - [2.5, 0.05, 2.5], axis=1).min() < 0.6
 
 
 @pytest.mark.medium
-def test_it_passes_obstacles_in_noise_and_reaches_the_goal():
+def test_obstacles_are_avoided_under_noise_and_goal_is_reached():
     regions = (BALL, Region("drifting", Sphere((5.8, -0.9, 2.2), 0.5), "out", (-0.03, 0.05, 0.0)), BAND)
     positions, _, forces = fly(law_of(regions), Sea(noise=(0.02, 0.01), seed=3), 60.0, regions)
     assert np.linalg.norm(positions - BALL.shape.centre, axis=1).min() > 0.7
@@ -97,7 +97,7 @@ def test_it_passes_obstacles_in_noise_and_reaches_the_goal():
 
 
 @pytest.mark.medium
-def test_attitude_is_kept_against_a_righting_moment():
+def test_attitude_is_held_against_a_righting_moment():
     law, sea = law_of(observer=3.0), Sea(current=(0.0, 0.0, 0.0), restoring=0.0)
     sea.quaternion = np.array([math.cos(0.2), math.sin(0.2), 0.0, 0.0])
     list(fly(law, sea, 45.0))
@@ -105,7 +105,7 @@ def test_attitude_is_kept_against_a_righting_moment():
 
 
 @pytest.mark.medium
-def test_weights_of_the_arbiter_change_nothing():
+def test_arbiter_weights_do_not_affect_the_law():
     taken = []
     for weight in (0.0, 1.0):
         law, forces = law_of((BALL,)), np.zeros(8)
@@ -115,14 +115,14 @@ def test_weights_of_the_arbiter_change_nothing():
     assert (taken[0] == taken[1]).all() and np.abs(taken[0]).max() > 1.0
 
 
-def test_a_thruster_that_is_reported_lost_is_not_asked():
+def test_reported_failed_thruster_gets_zero_command():
     law, forces, health = law_of(), np.zeros(8), np.ones(8)
     health[2] = 0.0
     law.step(VehicleState(np.zeros(3), LEVEL, np.zeros(6), health), pack([GOAL]), pack([]), np.zeros(0), forces)
     assert forces[2] == 0.0 and np.abs(forces).max() > 1.0
 
 
-def test_a_lost_position_is_carried_on_by_the_model():
+def test_missing_position_is_propagated_by_the_model():
     law, sea, goal, forces = law_of(), Sea(current=(0.0, 0.0, 0.0), restoring=5.0), pack([GOAL]), np.zeros(8)
     list(fly(law, sea, 5.0))
     for _ in range(50):
@@ -134,7 +134,7 @@ def test_a_lost_position_is_carried_on_by_the_model():
     assert law.memory.position == pytest.approx(sea.position, abs=0.05)
 
 
-def test_gains_that_cannot_be_are_named():
+def test_invalid_gains_are_rejected_by_name():
     for gain in LAWS["pid_cbf"].gains_type._fields:
         for value in (-1.0, math.nan, math.inf):
             with pytest.raises(LawError, match=rf"law\.gains\.{gain} is"):
@@ -144,7 +144,7 @@ def test_gains_that_cannot_be_are_named():
             law_of(**{gain: 0.0})
 
 
-def test_set_up_that_cannot_be_is_refused():
+def test_invalid_setup_is_rejected():
     law = LAWS["pid_cbf"]
     for attitude, period in ((np.ones(4), PERIOD), (LEVEL, 0.0)):
         with pytest.raises(LawError):

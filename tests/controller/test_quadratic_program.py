@@ -49,7 +49,7 @@ def _solve(work, count, inverse, lower, upper, forces, steps):
     steps[0] = solve(work, count, inverse, lower, upper, forces)
 
 
-def ask(thrusters, rows, right, price, wanted):
+def solve_program(thrusters, rows, right, price, wanted):
     """Return forces, multipliers and steps of our own solver."""
     count, m = rows.shape
     work, forces = empty_workspace(count + 2, m), np.full(m, np.nan)
@@ -78,7 +78,7 @@ def solved_exactly(programs):
         rng = np.random.default_rng(seed)
         for _ in range(programs):
             given = program(rng, kind)
-            ours = ask(*given)
+            ours = solve_program(*given)
             found.append((given, ours, exact_solution(*given, start=ours[1])))
     return found
 
@@ -133,7 +133,7 @@ def test_multipliers_are_the_exact_ones(programs):
         assert np.all(error(y, exact.multipliers)[held] <= size / length + 2.0 * ROUNDING * y[held])
 
 
-def test_products_are_added_in_twice_the_precision():
+def test_products_are_summed_in_double_double_precision():
     """In plain Python: total and rest hold what the fractions do, but for a rounding of a rounding."""
     add, rng = getattr(_add_product, "py_func", _add_product), np.random.default_rng(3)
     for total, rest, a, b in rng.normal(size=(300, 4)) * 10.0 ** rng.integers(-6, 7, (300, 4)):
@@ -145,7 +145,7 @@ def test_products_are_added_in_twice_the_precision():
         assert off <= 8 * ROUNDING**2 * (abs(total) + abs(a * b) + abs(rest) / ROUNDING)
 
 
-def test_what_a_row_lacks_is_right_where_nearly_all_of_it_cancels():
+def test_row_residual_is_accurate_under_cancellation():
     work, rng = empty_workspace(1, 8), np.random.default_rng(4)
     for _ in range(100):
         forces, work.rows[0] = rng.normal(size=8) * 20.0, rng.normal(size=8)
@@ -157,18 +157,18 @@ def test_what_a_row_lacks_is_right_where_nearly_all_of_it_cancels():
         assert lack == pytest.approx(float(expected), rel=1e-9, abs=1e-28)
 
 
-def test_a_row_that_no_thruster_moves_is_paid_for():
+def test_uncontrollable_row_is_paid_by_slack():
     """Of right - price y <= 0 with the least y: right / price, and forces as they were wanted."""
     thrusters, wanted = make_thrusters(MODELS["odin"]), np.linspace(-3.0, 4.0, 8)
-    forces, y, _ = ask(thrusters, np.zeros((1, 8)), np.array([0.5]), np.array([1e-6]), wanted)
+    forces, y, _ = solve_program(thrusters, np.zeros((1, 8)), np.array([0.5]), np.array([1e-6]), wanted)
     assert forces == pytest.approx(wanted)
     assert y[0] == pytest.approx(0.5e6)
 
 
-def test_a_row_that_thrusters_hardly_move_is_paid_for_in_part():
+def test_weakly_controllable_row_is_partly_paid_by_slack():
     """(right - row u) = price y and u = wanted + H^-1 row y."""
     thrusters, wanted, row = make_thrusters(MODELS["odin"]), np.linspace(-3.0, 4.0, 8), np.full((1, 8), 1e-3)
-    forces, y, _ = ask(thrusters, row, np.array([0.5]), np.array([0.02]), wanted)
+    forces, y, _ = solve_program(thrusters, row, np.array([0.5]), np.array([0.02]), wanted)
     shaped = thrusters.inverse @ row[0]
     expected = (0.5 - row[0] @ wanted) / (row[0] @ shaped + 0.02)
     assert 0.0 < row[0] @ shaped < 0.02
@@ -186,7 +186,7 @@ def test_the_solution_fulfils_the_conditions_of_kuhn_and_tucker(kind):
     rng = np.random.default_rng(100 + KINDS.index(kind))
     for _ in range(1000):
         thrusters, rows, right, price, wanted = given = program(rng, kind)
-        forces, y, steps = ask(*given)
+        forces, y, steps = solve_program(*given)
         count, m = rows.shape
         scale = 1.0 + np.abs(wanted).max()
         assert 0 <= steps <= 3 * (count + 2 * m)
@@ -204,10 +204,10 @@ def test_the_solution_fulfils_the_conditions_of_kuhn_and_tucker(kind):
         assert forces[high > 0.0] == pytest.approx(thrusters.upper[high > 0.0], abs=1e-6 * scale)
 
 
-def test_a_wanted_force_that_hurts_nothing_is_given_to_the_last_bit():
+def test_unconstrained_desired_force_is_returned_exactly():
     thrusters = make_thrusters(MODELS["odin"])
     wanted = np.linspace(-20.0, 20.0, 8)
-    forces, y, steps = ask(thrusters, np.ones((1, 8)), np.array([-1e3]), np.array([1e-6]), wanted)
+    forces, y, steps = solve_program(thrusters, np.ones((1, 8)), np.array([-1e3]), np.array([1e-6]), wanted)
     assert steps == 0 and not y.any()
     assert np.array_equal(forces, wanted)
 
@@ -217,25 +217,25 @@ def test_the_barrier_of_greater_price_yields_less():
     thrusters = make_thrusters(MODELS["odin"])
     along = thrusters.matrix[0] / 187.5
     price = np.array([1e-3, 1e-5]) / 187.5**2
-    forces, y, _ = ask(thrusters, np.array([along, -along]), np.array([0.2, 0.2]), price, np.zeros(8))
+    forces, y, _ = solve_program(thrusters, np.array([along, -along]), np.array([0.2, 0.2]), price, np.zeros(8))
     yielding = y[:2] * price
     assert yielding[0] / yielding[1] == pytest.approx(100.0, rel=0.02)
     assert yielding == pytest.approx([0.2 - along @ forces, 0.2 + along @ forces], rel=1e-6)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_what_is_not_finite_moves_nothing(bad):
+def test_non_finite_rows_are_ignored(bad):
     thrusters = make_thrusters(MODELS["odin"])
     rows, right, price = np.ones((3, 8)) / 187.5, np.full(3, 0.3), np.full(3, 1e-8)
-    alone, _, _ = ask(thrusters, rows[:1], right[:1], price[:1], np.zeros(8))
+    alone, _, _ = solve_program(thrusters, rows[:1], right[:1], price[:1], np.zeros(8))
     rows[1, 3], right[2] = bad, bad
-    forces, _, steps = ask(thrusters, rows, right, price, np.r_[bad, np.zeros(7)])
+    forces, _, steps = solve_program(thrusters, rows, right, price, np.r_[bad, np.zeros(7)])
     assert steps > 0
     assert np.array_equal(forces, alone)
 
 
 @pytest.mark.medium
-def test_forces_stay_within_their_limits_whatever_the_numbers():
+def test_forces_stay_within_limits_for_extreme_numbers():
     """Whose products may be beyond the greatest number."""
     rng, far = np.random.default_rng(2), np.array([1.0, 1.0, 1.0, 1e-300, 1e-150, 1e-30, 1e30, 1e150, 1e300])
     ended = 0
@@ -245,14 +245,14 @@ def test_forces_stay_within_their_limits_whatever_the_numbers():
         rows, wanted = rows * rng.choice(far, (n, 1)), wanted * rng.choice(far, 8)
         with np.errstate(over="ignore", invalid="ignore"):
             right, price = right * rng.choice(far, n), price * rng.choice(far, n)
-            forces, y, steps = ask(thrusters, rows, right, price, wanted)
+            forces, y, steps = solve_program(thrusters, rows, right, price, wanted)
         ended += steps < 0
         assert np.all(forces >= thrusters.lower) and np.all(forces <= thrusters.upper)
         assert np.all(y >= 0.0)
     assert 0 < ended < 50
 
 
-def test_steps_are_negative_where_the_search_was_cut_short(monkeypatch):
+def test_step_count_is_negative_if_the_search_is_truncated(monkeypatch):
     """In plain Python, with one step allowed where four limits are in the way."""
     plain = getattr(solve, "py_func", solve)
     thrusters = make_thrusters(MODELS["odin"])
@@ -264,7 +264,7 @@ def test_steps_are_negative_where_the_search_was_cut_short(monkeypatch):
         assert np.all(forces >= thrusters.lower) and np.all(forces <= thrusters.upper)
 
 
-def test_steps_are_counted_when_rows_come_and_when_they_go(monkeypatch):
+def test_steps_count_row_additions_and_removals(monkeypatch):
     """In plain Python: each moves the multipliers once, where no row depends on those before."""
     plain, moves, rng = getattr(solve, "py_func", solve), [], np.random.default_rng(0)
     advance = plain.__globals__["_advance"]

@@ -30,7 +30,7 @@ def test_rotation_matrix_is_scipys(e):
 
 
 @given(units())
-def test_rotation_matrix_is_the_printed_form_with_the_sign_mended(e):
+def test_rotation_matrix_is_the_papers_form_with_corrected_sign(e):
     """(3): (e0^2 - e.e) I + 2 e e^T + 2 e0 S(e)."""
     v = e[1:]
     printed = (e[0] ** 2 - v @ v) * np.eye(3) + 2 * np.outer(v, v) + 2 * e[0] * q.skew(v)

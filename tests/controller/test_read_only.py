@@ -1,4 +1,4 @@
-"""Measurements that may only be read, as an FMU's outputs are: laws and regions take them as any others."""
+"""Laws and regions accept read-only measurements, such as an FMU's outputs."""
 
 import numpy as np
 import pytest

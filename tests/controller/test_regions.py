@@ -1,4 +1,4 @@
-"""Regions: values, gradients and distances, each shape against what its definition says."""
+"""Regions: values, gradients and distances of each shape against its definition."""
 
 import dataclasses
 import inspect
@@ -117,7 +117,7 @@ def winding(corners, p):
     return round((angles[-1] - angles[0]) / (2 * math.pi))
 
 
-def test_all_shapes_are_here():
+def test_every_shape_has_an_example():
     assert {type(shape) for shape in EXAMPLES} == set(SHAPES.values())
     assert sorted(cls.kind for cls in SHAPES.values()) == list(range(len(SHAPES)))
 
@@ -125,7 +125,7 @@ def test_all_shapes_are_here():
 @pytest.mark.medium(fast=4)
 @each_shape
 @given(p=points, e=attitudes)
-def test_sign_says_inside_or_outside(shape, p, e):
+def test_sign_of_clearance_matches_containment(shape, p, e):
     g, _, _, clearance = evaluated(shape, p, e)
     assert g * clearance <= 0.0
     if abs(clearance) > 1e-6:
@@ -135,7 +135,7 @@ def test_sign_says_inside_or_outside(shape, p, e):
 @pytest.mark.medium(fast=2)
 @each_shape
 @given(p=points, e=attitudes)
-def test_gradient_and_turning_are_those_of_the_value(shape, p, e):
+def test_gradients_match_central_differences(shape, p, e):
     h = 1e-6
     g, gradient, turning, _ = evaluated(shape, p, e)
     derivatives = np.concatenate([gradient, turning])
@@ -152,7 +152,7 @@ def test_gradient_and_turning_are_those_of_the_value(shape, p, e):
 
 @pytest.mark.medium(fast=6)
 @each_shape
-def test_most_places_and_attitudes_are_no_ridge(shape):
+def test_most_poses_are_away_from_ridges(shape):
     """Keep the test above from passing by looking away."""
     rng = np.random.default_rng(3)
     h, smooth = 1e-6, 0
@@ -170,7 +170,7 @@ def test_most_places_and_attitudes_are_no_ridge(shape):
 @pytest.mark.medium(fast=3)
 @each_shape_in_space
 @given(p=points, e=attitudes)
-def test_shapes_in_space_do_not_look_at_the_attitude(shape, p, e):
+def test_spatial_shapes_do_not_depend_on_attitude(shape, p, e):
     g, gradient, turning, clearance = evaluated(shape, p, e)
     level = at(shape, p)
     assert (g, *gradient, clearance) == (level[0], *level[1], level[2])
@@ -214,7 +214,7 @@ def test_distance_is_that_of_the_nearest_point_of_the_surface(shape):
 @pytest.mark.medium(fast=4)
 @each_shape
 @given(p=points, e=attitudes)
-def test_keeping_out_is_the_opposite_of_keeping_in(shape, p, e):
+def test_keep_out_negates_keep_in(shape, p, e):
     for kept_in, kept_out in zip(evaluated(shape, p, e, "in"), evaluated(shape, p, e, "out"), strict=True):
         assert np.array_equal(kept_in, -kept_out)
 
@@ -238,7 +238,7 @@ def test_keeping_out_is_the_opposite_of_keeping_in(shape, p, e):
         (Cone((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), math.pi / 2, 2.0), (-1.0, 0.0, 0.0)),
     ],
 )
-def test_centres_axes_and_corners_give_numbers(shape, p):
+def test_values_are_finite_at_centres_axes_and_corners(shape, p):
     g, gradient, clearance = at(shape, p)
     assert np.isfinite([g, *gradient, clearance]).all()
 
@@ -297,7 +297,7 @@ def test_paper_regions_have_the_paper_values():
         (lambda: Region("r", Orientation((1.0, 0.0, 0.0, 0.0), 1.0), "in", (0.1, 0.0, 0.0)), "velocity"),
     ],
 )
-def test_regions_that_cannot_be_are_named(make, words):
+def test_invalid_regions_are_rejected_by_name(make, words):
     with pytest.raises(RegionError, match=words):
         make()
 
@@ -344,7 +344,7 @@ def test_visibility_has_numbers_on_its_axis(feature, angle):
 @pytest.mark.medium(fast=3)
 @each_shape
 @given(p=points, e=attitudes, velocity=points)
-def test_a_moving_region_is_where_it_would_be_seen_from_its_own_place(shape, p, e, velocity):
+def test_moving_region_is_evaluated_at_its_present_position(shape, p, e, velocity):
     if isinstance(shape, Orientation):
         return  # at no place
     packed = pack([Region("r", shape, "in", tuple(velocity))])
@@ -358,12 +358,12 @@ def test_a_moving_region_is_where_it_would_be_seen_from_its_own_place(shape, p, 
 
 
 @pytest.mark.parametrize("shape", [shape for shape in EXAMPLES if of_attitude(shape)])
-def test_shapes_of_attitude_close_no_place(shape):
+def test_attitude_shapes_bound_no_position(shape):
     assert np.all(clearances_at(np.zeros((2, 3)), Region("r", shape, "out")) == math.inf)
 
 
 @pytest.mark.parametrize("shape", [shape for shape in EXAMPLES if of_attitude(shape)])
-def test_a_lost_attitude_never_looks_safe(shape):
+def test_missing_attitude_gives_nan_clearance(shape):
     for keep in ("in", "out"):
         g, _, _, clearance = evaluated(shape, (0.0, 0.0, 0.0), np.full(4, math.nan), keep)
         assert math.isnan(g)
@@ -371,7 +371,7 @@ def test_a_lost_attitude_never_looks_safe(shape):
 
 
 @each_shape
-def test_a_lost_position_never_looks_safe(shape):
+def test_missing_position_gives_nan_clearance(shape):
     if isinstance(shape, Orientation):
         assert np.isfinite(at(shape, [math.nan] * 3)[0])  # which does not ask where it is
         return
@@ -396,7 +396,7 @@ def test_bounds_hold_the_shape(shape):
     assert np.all(inside <= high + 1e-12)
 
 
-def test_no_regions_at_all_is_a_scene_too():
+def test_empty_scene_is_valid():
     packed = pack([])
     nothing = np.empty(0)
     packed.evaluate(np.zeros(3), LEVEL, nothing, np.empty((0, 3)), np.empty((0, 3)), nothing)

@@ -4,6 +4,6 @@ import pytest
 
 
 @pytest.fixture(autouse=True)
-def untold_compiling(monkeypatch):
-    """Leave out what the command says where laws are compiled: whether they are depends on what earlier runs kept."""
+def compilation_notice(monkeypatch):
+    """Silence the notice of a compilation, which depends on the cache of earlier runs."""
     monkeypatch.setattr("cosim.run.progress._Notice.emit", lambda *_: None)

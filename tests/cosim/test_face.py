@@ -1,4 +1,4 @@
-"""The names of `cosim` itself: what a script or a notebook does with them."""
+"""The public names of `cosim`, as scripts and notebooks use them."""
 
 import ast
 import json
@@ -23,7 +23,7 @@ def run(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_every_name_is_what_it_says_whatever_was_imported_before():
+def test_public_names_are_not_shadowed_by_submodules():
     modules = sorted(module for module in FILES if not module.endswith("__main__"))
     code = (
         f"import importlib, types, cosim\nfor name in {modules!r}:\n    importlib.import_module(name)\n"
@@ -33,13 +33,13 @@ def test_every_name_is_what_it_says_whatever_was_imported_before():
     assert done.stdout == "[]\n"
 
 
-def test_there_is_nothing_else():
+def test_dir_lists_only_public_names():
     assert dir(cosim) == sorted(cosim.__all__)
     with pytest.raises(AttributeError, match="module 'cosim' has no attribute 'anything'"):
         _ = cosim.anything
 
 
-def test_numbers_are_replaced_as_set_does():
+def test_replace_equals_command_line_overrides():
     paper = cosim.load_scenario("paper")
     changed = paper.replace({"limit.force": 500.0, "regions.SR1.gain": 5000, "initial.position": np.array([1.0, 2, 3])})
     words = ["limit.force=500.0", "regions.SR1.gain=5000", "initial.position=[1.0,2.0,3.0]"]
@@ -59,13 +59,13 @@ def test_numbers_are_replaced_as_set_does():
         ({"title": object()}, "paper: .*title"),
     ],
 )
-def test_what_cannot_be_replaced_is_one_line(changes, words):
+def test_invalid_replacements_give_one_line_errors(changes, words):
     with pytest.raises(ScenarioError, match=words) as refused:
         cosim.load_scenario("paper").replace(changes)
     assert "\n" not in str(refused.value)
 
 
-def test_a_run_is_the_same_from_its_folder(run):
+def test_loaded_run_equals_the_returned_run(run):
     again = cosim.load_run(run.folder)
     assert type(again) is type(run) is cosim.Run
     assert again.summary == run.summary == json.loads((run.folder / "summary.json").read_text())
@@ -73,7 +73,7 @@ def test_a_run_is_the_same_from_its_folder(run):
     assert run.replay() == run.folder / "replay.html" and len(repr(run).splitlines()) == 1
 
 
-def test_its_record_is_a_table_with_units_and_a_data_frame(run):
+def test_record_is_a_table_with_units_and_a_data_frame(run):
     table, frame = run.table(), run.frame()
     assert table.column_names == list(frame.columns) == list(run.record.units)
     assert table.schema.field("goal.clearance").metadata[b"unit"] == b"m"
@@ -81,7 +81,7 @@ def test_its_record_is_a_table_with_units_and_a_data_frame(run):
     assert np.array_equal(table["time"].to_numpy(), run.record["time"])
 
 
-def test_it_draws_signals(run):
+def test_signals_can_be_plotted(run):
     ax = run.plot("weight.*")
     assert [line.get_label() for line in ax.lines] == ["weight.obstacle", "weight.shape", "weight.depth"]
     assert run.plot(ax=ax) is ax and len(ax.lines) > 3
@@ -90,18 +90,18 @@ def test_it_draws_signals(run):
     plt.close("all")
 
 
-def test_a_notebook_shows_it_as_text_and_nothing_of_it_is_markup(run, monkeypatch):
+def test_notebook_representation_is_escaped(run, monkeypatch):
     monkeypatch.setitem(run.summary, "status", "<script>")
     assert "<script>" not in run._repr_html_() and "&lt;script&gt;" in run._repr_html_()
 
 
-def test_without_pandas_it_says_what_to_install(run, monkeypatch):
+def test_missing_pandas_error_names_the_install_command(run, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(RunError, match=r"a data frame needs pandas: .*pip install"):
         run.frame()
 
 
-def test_a_cell_can_be_run_twice(tmp_path, monkeypatch):
+def test_notebook_cell_can_be_rerun(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     scenario = cosim.load_scenario("paper").replace(SHORT)
     first, second = (cosim.run_scenario(scenario, report=False) for _ in range(2))

@@ -1,4 +1,4 @@
-"""Whether what a page shows is what came."""
+"""Comparison of a page's shown output with the actual output."""
 
 import ast
 import doctest

@@ -44,7 +44,7 @@ def whole(block: Block) -> str:
 
 
 def check_data(block: Block) -> None:
-    """Check a block that is no program; a PageError says what is wrong."""
+    """Check a block that is no program; a PageError names the error."""
     check = _CHECKS.get(block.language)
     if check is None:
         raise PageError(

@@ -39,12 +39,12 @@ _WORDS = re.compile(
 
 
 class PageError(AssertionError):
-    """A page says what is not so, or what the runner cannot check."""
+    """A page is incorrect, or cannot be checked by the runner."""
 
 
 @dataclass
 class Directives:
-    """What is said of a block; in pairs a prefix comes first, "" for all commands."""
+    """The directives of a block; pairs begin with a prefix, "" for all commands."""
 
     not_run: list[tuple[str, str]] = field(default_factory=list)
     run_with: list[tuple[str, str]] = field(default_factory=list)
@@ -61,7 +61,7 @@ class Directives:
 
     @classmethod
     def read(cls, where: str, comments: Iterable[str], everywhere: Iterable[str] = ()) -> Self:
-        """Return what comments say; one of an unknown form is a PageError."""
+        """Parse directives from comments; an unknown form is a PageError."""
         found = cls()
         for text in (*everywhere, *comments):
             found._add(where, text)

@@ -1,4 +1,4 @@
-"""What of the documents no test runs: ``python -m tests.docs.ledger`` writes the list anew."""
+"""The list of unrun parts of the documents: ``python -m tests.docs.ledger`` writes it anew."""
 
 from pathlib import Path
 

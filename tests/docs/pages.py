@@ -48,7 +48,7 @@ def blocks(page: Path) -> list[Block]:
 
 
 def _beside(page: Path) -> dict[str, list[str]]:
-    """Return what is said of a page's blocks in a file of the tests, by how a block begins."""
+    """Return the directives of a page's blocks from a separate file, by the beginning of a block."""
     path = (BESIDE / page_name(page)).with_suffix(".toml")
     return tomllib.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
 

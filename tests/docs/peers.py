@@ -1,4 +1,4 @@
-"""Who comes when a command of the documents waits for somebody."""
+"""Peers for commands of the documents that wait for a connection."""
 
 import contextlib
 import socket
@@ -62,7 +62,7 @@ def arming(endpoint: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def flying(port: int) -> Iterator[None]:
-    """Be an ArduPilot that flies the plant behind a port, from when that listens until the context ends."""
+    """Act as an ArduPilot that controls the plant behind a port, until the context ends."""
     ended = threading.Event()
 
     def fly() -> None:

@@ -1,4 +1,4 @@
-"""Free ports in the place of those that the documents name, so that pages can run side by side."""
+"""Replace the ports that the documents name by free ones, so that pages can run in parallel."""
 
 import re
 import socket

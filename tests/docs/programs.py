@@ -31,7 +31,7 @@ MODULES = {
 
 
 def program(words: Sequence[str]) -> tuple[str, list[str]] | None:
-    """Return which of our programs a command calls, and its arguments; None for others."""
+    """Return the project's program that a command calls, and its arguments; None for others."""
     if words[:1] in (["cosim"], [".venv/bin/cosim"]):
         return "cosim", list(words[1:])
     if list(words[:2]) in (["python", "-m"], ["python3", "-m"]) and len(words) > 2 and words[2] in MODULES:

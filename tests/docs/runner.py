@@ -1,4 +1,4 @@
-"""Pages, run: their blocks in order, in one folder and one namespace of Python."""
+"""Run the blocks of a page in order, in one folder and one Python namespace."""
 
 import shutil
 from collections.abc import Sequence
@@ -82,7 +82,7 @@ class _PageRun:
             raise PageError(f"{block.where}: {type(error).__name__}: {error}") from error
 
     def _set_up(self, block: Block, setups: list[tuple[str, str, str]], words: list[str]) -> None:
-        """Do the setups that come before a command, or with no words before the block, and strike them out."""
+        """Run and remove the setups of a command, or without words those of the block."""
         for setup in [one for one in setups if one[0].split() == words[: len(one[0].split())]]:
             setups.remove(setup)
             hidden = Block(block.page, block.line, setup[1], setup[2], Directives())

@@ -1,4 +1,4 @@
-"""Commands and flags in running text, in tables and in comments of commands are those of the programs."""
+"""Commands and flags in running text, in tables and in comments exist in the programs."""
 
 import re
 import shlex
@@ -52,7 +52,7 @@ def test_verbs_and_flags_in_the_text_exist(page):
 
 @pytest.mark.medium(fast=33)
 @pytest.mark.parametrize("page", PAGES, ids=page_name)
-def test_flags_that_stand_alone_are_of_some_program(page):
+def test_standalone_flags_belong_to_a_known_program(page):
     named = [
         (line, word.partition("=")[0])
         for line, text in inline_code(page)
@@ -70,7 +70,7 @@ def test_extras_and_targets_in_the_text_exist(page):
 
 
 @pytest.mark.parametrize("name", MODULES)
-def test_examples_of_the_help_are_understood(name):
+def test_help_examples_parse(name):
     examples = (MODULES[name]._parser().epilog or "").partition("examples:")[2]
     assert examples.count("\n") > 2 or name in ("plant_fmu", "benchmarks"), "examples of a program that has some"
     for line in filter(None, map(str.strip, examples.splitlines())):
@@ -78,7 +78,7 @@ def test_examples_of_the_help_are_understood(name):
         assert ours is not None and parses(*ours) == "", line
 
 
-def test_a_verb_or_a_flag_that_does_not_exist_is_found():
+def test_nonexistent_verbs_and_flags_are_detected():
     assert wrong_flags(["cosim", "fly", "paper"]) == ["fly"]
     assert wrong_flags(["cosim", "run", "paper", "--quick"]) == ["--quick"]
     assert wrong_flags(["cosim", "replay", "A", "B"]) == []

@@ -1,4 +1,4 @@
-"""Every block and command of every page is run, or checked as far as it goes with a reason that stands in the page."""
+"""Every block and command of every page is run, or checked with a stated reason."""
 
 import re
 from pathlib import Path
@@ -21,23 +21,23 @@ def _marks(page: Path) -> list[pytest.MarkDecorator]:
 
 @pytest.mark.medium
 @pytest.mark.parametrize("page", [pytest.param(page, marks=_marks(page), id=page_name(page)) for page in PAGES])
-def test_blocks_run_and_show_what_they_give(page, tmp_path):
+def test_code_blocks_run_with_their_shown_output(page, tmp_path):
     run_blocks(blocks(page), tmp_path)
 
 
 @pytest.mark.medium(fast=9)
 @pytest.mark.parametrize("page", PAGES, ids=page_name)
-def test_blocks_are_understood_and_those_not_run_say_why(page):
+def test_unrun_code_blocks_are_valid_and_give_a_reason(page):
     for block in blocks(page):
         check_unrun(block)
 
 
-def test_all_that_is_not_run_stands_in_the_ledger():
+def test_unrun_code_blocks_are_in_the_ledger():
     found = [entry for page in PAGES for entry in entries(page)]
     assert found == LEDGER.read_text(encoding="utf-8").splitlines(), "python -m tests.docs.ledger writes it anew"
 
 
-def test_no_block_is_overlooked():
+def test_every_code_block_is_found():
     """A line that begins with a fence opens or closes a block, and every page of the documents is among the pages."""
     assert {"README.md", "docs/arbiter.md", "docs/fmu-variables.md"} <= set(map(page_name, PAGES))
     for page in PAGES:

@@ -1,4 +1,4 @@
-"""The runner itself: what a page says wrongly is found, and what is right passes."""
+"""The page runner: incorrect pages fail, and correct ones pass."""
 
 import re
 
@@ -130,22 +130,22 @@ WRONG = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("text", RIGHT.values(), ids=RIGHT)
-def test_what_is_right_passes(text, run):
+def test_correct_blocks_pass(text, run):
     run(text)
 
 
 @pytest.mark.parametrize(("text", "why"), WRONG.values(), ids=WRONG)
-def test_what_is_wrong_is_found(text, why, run):
+def test_incorrect_blocks_fail(text, why, run):
     with pytest.raises(PageError, match=why):
         run(text)
 
 
-def test_a_file_is_there_as_merged(run):
+def test_file_block_is_written_with_its_base_scenario(run):
     folder = run(fence("toml", "[time]\nduration = 5.0", "scenario onto: docking", "file: mine.toml"))
     assert (folder / "mine.toml").read_text().startswith('base = "docking"\n[time]')
 
 
-def test_a_page_says_what_it_does_not_run(tmp_path):
+def test_ledger_lists_unrun_blocks_with_reasons(tmp_path):
     page = tmp_path / "page.md"
     page.write_text(
         fence("sh", "ardusub --model JSON\nls", 'not run "ardusub": needs ArduPilot')
@@ -159,7 +159,7 @@ def test_a_page_says_what_it_does_not_run(tmp_path):
     ]
 
 
-def test_commands_are_looked_at_without_being_run(tmp_path):
+def test_unrun_commands_are_checked_for_unknown_flags(tmp_path):
     page = tmp_path / "page.md"
     page.write_text(fence("sh", "cosim run paper --outt runs/a"))
     (block,) = blocks(page)
@@ -186,11 +186,11 @@ def test_commands_are_looked_at_without_being_run(tmp_path):
         ("[1, 2, 3]", [1, 2], False),
     ],
 )
-def test_values_are_compared_to_the_digits_that_are_shown(shown, value, same):
+def test_values_are_compared_to_their_shown_digits(shown, value, same):
     assert same_value(shown, value) is same
 
 
-def test_only_literals_are_results():
+def test_only_literals_in_comments_are_results():
     assert shown_result("array([1.0, 2.0])") == "array([1.0, 2.0])"
     assert shown_result("inside: (1, 2)") == "(1, 2)"
     assert shown_result("metres") is None
@@ -205,13 +205,13 @@ def test_output_is_compared_by_lines():
     assert not same_output("a", "a\nb\n")
 
 
-def test_directives_may_stand_in_a_file_beside_the_tests(run, tmp_path, monkeypatch):
+def test_directives_may_be_in_a_separate_file(run, tmp_path, monkeypatch):
     monkeypatch.setattr("tests.docs.pages.BESIDE", tmp_path)
     (tmp_path / "page.toml").write_text('"cosim show" = ["exits: 2"]\n')
     run(fence("sh", "cosim show nothing"))
 
 
-def test_each_of_them_has_its_block(tmp_path, monkeypatch):
+def test_separate_directive_without_a_block_is_rejected(tmp_path, monkeypatch):
     monkeypatch.setattr("tests.docs.pages.BESIDE", tmp_path)
     (tmp_path / "page.toml").write_text('"cosim show" = ["slow"]\n"cosim fly" = ["slow"]\n')
     (tmp_path / "page.md").write_text(fence("sh", "cosim show paper"))

@@ -1,4 +1,4 @@
-"""The tour itself: it does what a page says as a reader would, and what is not so fails."""
+"""The tour: it runs a page's commands as a reader would, and failures are reported."""
 
 import itertools
 import re
@@ -43,7 +43,7 @@ def sh(*lines):
     return "\n".join(["```sh", *lines, "```", ""])
 
 
-def test_a_shell_goes_on_from_command_to_command(go):
+def test_shell_state_persists_between_commands(go):
     failed, table = go(
         sh("export A='1 2'", "mkdir there", "cd there   # a comment", "echo $A > a.txt")
         + "\nwords\n\n"
@@ -56,37 +56,37 @@ def test_a_shell_goes_on_from_command_to_command(go):
     assert "page.md:4 " in table and "  cd there  [ok]" in table
 
 
-def test_what_another_environment_gives_is_not_there(go, monkeypatch):
+def test_inherited_environment_variables_are_removed(go, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", "/nowhere")
     monkeypatch.setenv("NUMBA_CACHE_DIR", "/nowhere")
     assert go(sh('test -z "$PYTHONPATH$NUMBA_CACHE_DIR$VIRTUAL_ENV"', 'test ! -e "$XDG_CACHE_HOME"'))[0] == 0
 
 
-def test_what_sets_up_an_environment_begins_in_a_clone_of_its_own(go, monkeypatch):
+def test_environment_setup_starts_in_a_fresh_clone(go, monkeypatch):
     monkeypatch.setattr(tour, "FRESH", ("mkdir env",))
     assert go(sh("mkdir env", "mkdir of-the-first", "mkdir env", "test ! -e of-the-first", "test -f given.txt"))[0] == 0
 
 
-def test_what_fails_is_told_with_what_it_said(go):
+def test_failed_command_is_reported_with_its_output(go):
     failed, table = go(sh("cat nowhere.txt", "true"))
     assert failed == 1
     assert re.search(r"\[FAILED: expected 0\]\n    \| .*nowhere.txt.*\n", table) and "[ok]" in table
 
 
-def test_ctrl_c_ends_what_goes_on_and_the_status_counts(go):
+def test_long_running_commands_are_interrupted_and_their_status_checked(go):
     failed, table = go(sh("touch waiting", "sleep 1000"))
     assert failed == 0 and re.search(r" 130 .*sleep 1000  \[stopped by Ctrl-C after \d s\]", table)
     failed, table = go(sh("trap 'exit 7' INT; echo ready; sleep 1000"))
     assert failed == 1 and "[FAILED: expected 130]" in table
 
 
-def test_what_should_go_on_and_ends_by_itself_fails(go):
+def test_long_running_command_that_exits_fails(go):
     failed, table = go(sh("true for-ever"))
     assert failed == 1 and "[FAILED: ended by itself]" in table
 
 
 @pytest.mark.medium
-def test_what_hangs_is_ended(go, monkeypatch):
+def test_hanging_command_is_killed(go, monkeypatch):
     monkeypatch.setattr(tour, "LIMIT", 0.2)
     failed, table = go(sh("sh -c 'sleep 1000'"))
     assert failed == 1 and "[FAILED: still there after 0.2 s]" in table

@@ -37,7 +37,7 @@ FRESH = ("make run", "python3 -m venv .venv")
 
 @dataclass(frozen=True)
 class Endless:
-    """What goes on until somebody stops it: here Ctrl-C, so many seconds after a sign that it is under way."""
+    """A command that runs until Ctrl-C, sent some seconds after its sign of readiness."""
 
     begins: str
     seconds: float
@@ -68,7 +68,7 @@ _OF_NETWORK = ("PIP_", "SSL_", "REQUESTS_", "HTTP_", "HTTPS_", "NO_PROXY", "http
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a command: `why` is empty if it did what the page says."""
+    """The result of a command: `why` is empty on success."""
 
     seconds: float
     status: int
@@ -129,7 +129,7 @@ class Reader:
         return Outcome(time.monotonic() - begun, status, why, note, output)
 
     def _under_way(self, process: subprocess.Popen[bytes], endless: Endless) -> bool:
-        """Wait until there is a sign of it, and some seconds more; return whether it still goes on."""
+        """Wait for the sign of readiness and some seconds more; return whether it still runs."""
         until = time.monotonic() + LIMIT
         seen = False
         while process.poll() is None and time.monotonic() < until:
@@ -196,7 +196,7 @@ class Tour:
         self.failed = self.done = 0
 
     def page(self, page: Path) -> None:
-        """Do what a page says, from a fresh clone on."""
+        """Run the commands of a page in a fresh clone."""
         reader = self._fresh()
         used = False
         for block in blocks(page):

@@ -1,4 +1,4 @@
-"""The Mamdani system by its definition, in rational numbers; nothing here knows of the engines."""
+"""The Mamdani system by its definition, in rational numbers, independent of the engines."""
 
 import itertools
 from fractions import Fraction

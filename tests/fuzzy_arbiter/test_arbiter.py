@@ -1,4 +1,4 @@
-"""The arbiter itself: section VI, inputs and their faults, normalization, threads, memory, imports."""
+"""The arbiter: section VI, inputs and their errors, normalization, threads, memory, imports."""
 
 import copy
 import gc
@@ -70,7 +70,7 @@ def test_inputs_may_be_a_sequence_an_array_or_named(inputs):
 @pytest.mark.parametrize(
     "value", [np.float32(0.1), np.float16(0.1), np.float64(0.1), Fraction(1, 10), np.True_, True, np.int8(1)]
 )
-def test_numbers_of_other_types_are_worth_their_value_and_round_as_floats(arbiter, value):
+def test_other_numeric_types_are_converted_to_float(arbiter, value):
     for inputs in ([value, 0.5, 0.0], {"obstacle": value, "shape": 0.5, "depth": 0.0}):
         weights = arbiter(inputs)
         assert weights == arbiter([float(value), 0.5, 0.0])
@@ -105,7 +105,7 @@ def test_numbers_of_other_types_are_worth_their_value_and_round_as_floats(arbite
         ),
     ],
 )
-def test_bad_inputs_are_errors(arbiter, inputs, words):
+def test_invalid_inputs_are_rejected(arbiter, inputs, words):
     with pytest.raises(InputError, match=words):
         arbiter(inputs)
 
@@ -125,7 +125,7 @@ def test_bad_inputs_are_errors(arbiter, inputs, words):
         ([[0.1, 0.2, 0.3], [0.1]], "expected rows of numbers for obstacle"),
     ],
 )
-def test_bad_rows_are_errors(arbiter, inputs, words):
+def test_invalid_rows_are_rejected(arbiter, inputs, words):
     with pytest.raises(InputError, match=words):
         arbiter.batch(inputs)
 
@@ -159,12 +159,12 @@ def test_inputs_outside_may_be_clipped():
         ({"engine": "closed", "form": "complete"}, "engine 'closed'"),
     ],
 )
-def test_bad_definitions_are_errors(arguments, words):
+def test_invalid_definitions_are_rejected(arguments, words):
     with pytest.raises(DefinitionError, match=words):
         Arbiter(**arguments)
 
 
-def test_criteria_that_cannot_be():
+def test_invalid_criteria_are_rejected():
     with pytest.raises(DefinitionError, match="both terms are 'on'"):
         Criterion("a", "on", "on")
     with pytest.raises(DefinitionError, match="without jumps"):
@@ -173,7 +173,7 @@ def test_criteria_that_cannot_be():
         Arbiter(engine="")
 
 
-def test_normalization():
+def test_normalizations_match_their_formulas():
     inputs = [0.5, 0.25, 0.75]  # h = 1/2, 1/4, 1/2
     assert Arbiter(normalization="none")(inputs) == pytest.approx([1 / 2, (1 + 5 / 32) / 3, 1 / 2])
     assert Arbiter()(inputs) == pytest.approx([1 / 2, 5 / 32, 1 / 2])
@@ -184,21 +184,21 @@ def test_normalization():
             assert Arbiter(normalization=normalization, engine=engine)([0, 0, 0]) == (0, 0, 0)  # not 0/0
 
 
-def test_without_scikit_fuzzy_it_is_said(monkeypatch):
+def test_missing_scikit_fuzzy_is_reported(monkeypatch):
     monkeypatch.delitem(sys.modules, "fuzzy_arbiter.engines.scikit", raising=False)
     monkeypatch.setitem(sys.modules, "skfuzzy", None)
     with pytest.raises(EngineError, match="skfuzzy is not installed"):
         Arbiter(engine="skfuzzy")
 
 
-def test_it_says_which_engine_it_took_and_why():
+def test_arbiter_reports_its_engine_and_the_reason():
     assert (Arbiter().engine, Arbiter(form="complete").engine) == ("closed", "exact")
     assert "closed form" in Arbiter().engine_reason
     assert "there is no closed form" in Arbiter(form="complete").engine_reason
     assert Arbiter(engine="grid").engine_reason == "it was asked for"
 
 
-def test_it_does_not_change_and_can_be_copied(arbiter):
+def test_arbiter_is_immutable_and_copyable(arbiter):
     with pytest.raises(AttributeError):
         arbiter.system = prioritised()
     with pytest.raises(AttributeError):
@@ -228,7 +228,7 @@ def test_threads_do_not_disturb_each_other(arbiter):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [20, pytest.param(300, marks=pytest.mark.slow)])
-def test_arbiters_leave_nothing_behind(count):
+def test_arbiters_leak_no_memory(count):
     def build(count):
         for _ in range(count):
             Arbiter()([0.3, 0.6, 0.2])
@@ -257,7 +257,7 @@ def test_ramp_is_one_up_to_the_boundary_and_falls_outside():
 
 
 @pytest.mark.medium
-def test_alone_it_needs_neither_the_vehicle_nor_matplotlib():
+def test_arbiter_imports_no_optional_library():
     code = (
         "import sys, fuzzy_arbiter; a = fuzzy_arbiter.Arbiter();"
         "a([0, 1, 0]); a.batch([[0, 1, 0]]); a.explain([0, 1, 0]); a.verify();"

@@ -1,4 +1,4 @@
-"""The command line: each verb, its exit status, and that bad input costs one line and no file."""
+"""The command line: each verb, its exit status, and one-line errors without files."""
 
 import csv
 import io
@@ -39,7 +39,7 @@ def run(capsys, monkeypatch, tmp_path):
 
 @pytest.fixture
 def refused(run, tmp_path):
-    """Run what must be refused: status 2, one line, nothing printed, no file left."""
+    """Run a command that must fail: status 2, a one-line error, no output, no file."""
 
     def call(*words, stdin=""):
         before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
@@ -64,7 +64,7 @@ def gap(tmp_path):
     return path
 
 
-def test_show_says_all_of_a_definition(run):
+def test_show_prints_the_complete_definition(run):
     status, out, _ = run("show", "section-vi")
     assert status == 0
     for part in (
@@ -134,11 +134,11 @@ def test_eval_of_a_table_takes_columns_by_name(run, tmp_path):
         ('obstacle,shape,depth\n"0' + "1" * 200_000, "line 2: field larger than field limit"),
     ],
 )
-def test_a_bad_table_leaves_no_file(refused, table, fault):
+def test_invalid_table_leaves_no_file(refused, table, fault):
     assert f"standard input: {fault}" in refused("eval", "section-vi", "--csv", "-", "--out", "w.csv", stdin=table)
 
 
-def test_tables_that_cannot_be_read(refused, tmp_path):
+def test_unreadable_tables_are_rejected(refused, tmp_path):
     (tmp_path / "bytes.csv").write_bytes(b"\xff\xfe\x00")
     assert refused("eval", "section-vi", "--csv", "bytes.csv") == "bytes.csv: not UTF-8 text"
     assert refused("eval", "section-vi", "--csv", "none.csv") == "none.csv: No such file or directory"
@@ -163,11 +163,11 @@ def test_tables_that_cannot_be_read(refused, tmp_path):
         (["0", "0", "0", "--engine", "magic"], "argument --engine: invalid choice: 'magic'"),
     ],
 )
-def test_bad_values_are_refused_in_one_line(refused, words, fault):
+def test_invalid_values_give_one_line_errors(refused, words, fault):
     assert fault in refused("eval", "section-vi", *words)
 
 
-def test_bad_commands_are_refused_in_one_line(refused):
+def test_invalid_commands_give_one_line_errors(refused):
     assert "the following arguments are required: verb" in refused()
     assert "invalid choice: 'frob'" in refused("frob", "section-vi")
     assert "show: the following arguments are required: FILE" in refused("show")
@@ -175,14 +175,14 @@ def test_bad_commands_are_refused_in_one_line(refused):
     assert "none.json" in refused("show", "none.json")
 
 
-def test_a_definition_of_no_format_is_refused_in_one_line(refused, tmp_path):
+def test_invalid_definition_gives_one_line_error(refused, tmp_path):
     (tmp_path / "bad.json").write_text('{"a": \n\n')
     assert "bad.json" in refused("verify", "bad.json")
     (tmp_path / "bad.fcl").write_text("FUNCTION_BLOCK\n\n;")
     assert "bad.fcl" in refused("show", "bad.fcl")
 
 
-def test_an_undefined_output_is_nan_and_explained(run, gap):
+def test_undefined_output_is_printed_as_nan_with_a_reason(run, gap):
     assert run("eval", gap, "7")[:2] == (0, "sail = nan\n")
     assert run("eval", gap, "7", "--json")[:2] == (0, '{"sail": null}\n')
     assert run("eval", gap, "--csv", "-", stdin="wind\n1\n7\n")[1].splitlines()[2] == "nan"
@@ -190,14 +190,14 @@ def test_an_undefined_output_is_nan_and_explained(run, gap):
     assert "no rule fired, and no default" in run("explain", gap, "7")[1]
 
 
-def test_explain_says_what_fired(run):
+def test_explain_prints_fired_rules(run):
     status, out, _ = run("explain", "section-vi", "0.75", "1", "0")
     assert status == 0 and "R5" in out
     status, out, _ = run("explain", "section-vi", "obstacle=0.75", "shape=1", "depth=0", "--json")
     assert status == 0 and json.loads(out)
 
 
-def test_verify_tells_by_its_status(run, refused, gap):
+def test_verify_result_is_its_exit_status(run, refused, gap):
     status, out, _ = run("verify", "section-vi")
     assert status == 0 and out
     status, out, _ = run("verify", gap)
@@ -225,7 +225,7 @@ def test_convert_writes_code(run, suffix, tmp_path):
     assert "alpha_1" in text
 
 
-def test_convert_refuses_whole(refused, tmp_path):
+def test_failed_convert_writes_nothing(refused, tmp_path):
     assert "suffix is '.xml', expected .json, .toml, .fcl, .fis, .fll, .c, .py" in refused(
         "convert", "section-vi", "a.xml"
     )
@@ -261,7 +261,7 @@ def test_plot_draws_every_kind(run, tmp_path, words, panels):
 
 
 @pytest.mark.medium
-def test_rules_without_a_sample_are_drawn_at_the_middle_and_say_so(run, tmp_path, gap):
+def test_plot_rules_defaults_to_range_centers_with_a_notice(run, tmp_path, gap):
     status, out, err = run("plot", "section-vi", "rules", "--out", "a.svg")
     assert (status, out) == (0, "a.svg\n") and err.count("\n") == 1
     assert err.endswith("that --at leaves out: obstacle=0.5 shape=0.5 depth=0.5\n")
@@ -276,7 +276,7 @@ def test_rules_without_a_sample_are_drawn_at_the_middle_and_say_so(run, tmp_path
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(("suffix", "magic"), [("png", b"\x89PNG"), ("PDF", b"%PDF")])
-def test_plot_writes_what_the_suffix_says(run, tmp_path, suffix, magic):
+def test_plot_format_follows_the_suffix(run, tmp_path, suffix, magic):
     assert run("plot", "section-vi", "terms", "--input", "depth", "--out", f"a.{suffix}")[0] == 0
     assert (tmp_path / f"a.{suffix}").read_bytes().startswith(magic)
 
@@ -304,7 +304,7 @@ def test_plot_writes_what_the_suffix_says(run, tmp_path, suffix, magic):
         (["terms"], "plot: the following arguments are required: --out"),
     ],
 )
-def test_plot_refuses_in_one_line(refused, words, fault):
+def test_invalid_plot_arguments_give_one_line_errors(refused, words, fault):
     assert fault in refused("plot", "section-vi", *words)
 
 
@@ -322,7 +322,7 @@ def test_bench_times_every_engine(run, monkeypatch):
         assert float(call) > 0.0 and float(batch) >= 0.0 and 1 <= int(n) <= 50
 
 
-def test_bench_says_which_engine_cannot(run, monkeypatch, gap):
+def test_bench_marks_unsupported_engines(run, monkeypatch, gap):
     from fuzzy_arbiter.command_line import bench
 
     monkeypatch.setattr(bench, "_SECONDS", 1e-3)
@@ -331,7 +331,7 @@ def test_bench_says_which_engine_cannot(run, monkeypatch, gap):
     assert status == 0 and "closed" in out.splitlines()[1] and len(out.splitlines()[1].split()) > 6
 
 
-def test_a_reader_that_goes_is_no_error(tmp_path):
+def test_closed_output_pipe_exits_silently_with_141(tmp_path):
     command = [sys.executable, "-m", "fuzzy_arbiter", "show", "section-vi"]
     reading, writing = os.pipe()
     os.close(reading)
@@ -341,14 +341,14 @@ def test_a_reader_that_goes_is_no_error(tmp_path):
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
-def test_a_full_disk_costs_one_line():
+def test_full_standard_output_gives_one_line_error():
     command = [sys.executable, "-m", "fuzzy_arbiter", "show", "section-vi"]
     with open("/dev/full", "wb") as full:
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert (done.returncode, done.stderr) == (2, "fuzzy_arbiter: standard output: No space left on device\n")
 
 
-def test_help_has_examples_that_are_understood(run):
+def test_help_examples_parse(run):
     status, out, _ = run("--help")
     examples = [line.split()[3:] for line in out.splitlines() if line.strip().startswith("python -m")]
     assert status == 0 and len(examples) == 7

@@ -1,4 +1,4 @@
-"""Data frames as inputs, as pandas has them; other columns of theirs are passed over."""
+"""Data frames of pandas as inputs; other columns are ignored."""
 
 import pytest
 
@@ -20,14 +20,14 @@ def frame():
     return pd.DataFrame({"who": ["a", "b", "c"], "food": food, "service": service}, index=[7, 5, 3])
 
 
-def test_a_frame_gives_columns_by_name(tipping, frame):
+def test_data_frame_gives_columns_by_name(tipping, frame):
     columns = tipping.batch(frame)
     assert isinstance(columns, Result)
     assert columns["tip"].tolist() == tipping.batch(ROWS)[:, 0].tolist()
     assert frame.assign(**columns._asdict())["tip"].tolist() == columns["tip"].tolist()
 
 
-def test_a_row_of_a_frame_is_a_sample(tipping, frame):
+def test_data_frame_row_is_a_sample(tipping, frame):
     for i, row in enumerate(ROWS):
         assert tipping(frame.iloc[i]) == tipping(row)
         assert tipping.explain(frame.iloc[i]) == tipping.explain(row)
@@ -51,6 +51,6 @@ def test_a_row_of_a_frame_is_a_sample(tipping, frame):
         (lambda a: a(pd.Series([3.0, 4.0])), "service: input is missing"),
     ],
 )
-def test_frames_that_do_not_fit_are_refused(tipping, ask, fault):
+def test_mismatched_data_frames_are_rejected(tipping, ask, fault):
     with pytest.raises(InputError, match=fault):
         ask(tipping)

@@ -1,4 +1,4 @@
-"""Definitions: whatever cannot be one is refused in a line that says what came and what was expected."""
+"""Definitions: invalid ones are rejected in one line with the given and the expected value."""
 
 import copy
 import pickle
@@ -92,7 +92,7 @@ def nested(depth):
         (lambda: Criterion("a", on=3), "criterion 'a': on name is 3, expected printable text"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line(make, fault):
+def test_invalid_definitions_give_one_line_errors(make, fault):
     with pytest.raises(DefinitionError, match=fault) as error:
         make()
     assert "\n" not in str(error.value)
@@ -108,7 +108,7 @@ def test_numbers_of_other_libraries_become_floats():
     assert str(Shape(((-0.0, 0), (1, 1)))) == str(Shape(((0.0, 0), (1, 1))))
 
 
-def test_lists_and_generators_do_and_cannot_change_it_later():
+def test_definition_copies_lists_and_generators():
     terms, rules = list(TERMS), [Rule(nested(7), [sail["full"]]), "if wind is not calm then sail is reefed with 0.3"]
     made = system(inputs=(v for v in [Variable("wind", [0, 20], terms)]), rules=rules)
     terms.clear()
@@ -119,7 +119,7 @@ def test_lists_and_generators_do_and_cannot_change_it_later():
         assert hash(other) == hash(made)
 
 
-def test_only_systems_are_written_and_only_text_is_read():
+def test_writers_require_systems_and_readers_require_text():
     with pytest.raises(UnsupportedError, match="'x' came, expected a System"):
         writes("x", "json")
     with pytest.raises(FormatError, match=r"b'{}' came, expected text"):

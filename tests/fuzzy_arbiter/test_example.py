@@ -1,4 +1,4 @@
-"""The example of a building's ventilation and those of the manual, against values worked out by other means."""
+"""The ventilation example and those of the manual, against independently computed values."""
 
 import ast
 import re
@@ -37,20 +37,20 @@ def smoothstep(h):
 
 
 @pytest.mark.medium
-def test_the_afternoon_belongs_to_the_room(ran):
+def test_example_afternoon_weights_match_the_closed_form(ran):
     # smoke below 0.5 %/m asks for nothing; air asks to 0.25, the room to 0.75, of which the air leaves all
     assert ran["weights"] == pytest.approx((0.0, smoothstep(0.25), smoothstep(0.75)), abs=1e-15)
 
 
-def test_the_explanation_tells_of_the_rule_that_gives_the_room_the_floor(ran):
+def test_example_explanation_names_the_deciding_rule(ran):
     assert "temperature is hot" in str(ran["explanation"])
 
 
-def test_the_rules_are_proved(ran):
+def test_example_rules_are_verified(ran):
     assert ran["verification"].ok
 
 
-def test_the_day_is_that_of_the_priorities(ran):
+def test_example_day_follows_the_priorities(ran):
     """By the definition of the weights, on numpy alone."""
     low, high = np.array([[0.5, 800.0, 24.0], [3.0, 1400.0, 28.0]])
     m = np.clip((ran["day"] - low) / (high - low), 0.0, 1.0)
@@ -60,7 +60,7 @@ def test_the_day_is_that_of_the_priorities(ran):
     np.testing.assert_allclose(ran["day_weights"], smoothstep(np.minimum(free, m)), rtol=0.0, atol=rounding)
 
 
-def test_the_toast_takes_the_fan_and_gives_it_back(ran):
+def test_example_smoke_takes_priority_temporarily(ran):
     leader, minutes = ran["leader"], ran["minutes"]
     smoke = minutes[leader == 0]
     assert smoke.min() == 850 and 855 < smoke.max() < 870
@@ -68,7 +68,7 @@ def test_the_toast_takes_the_fan_and_gives_it_back(ran):
     assert (leader[9 * 60 : 12 * 60] == 1).all()
 
 
-def test_the_picture_and_the_definition_are_there(ran):
+def test_example_writes_picture_and_definition(ran):
     assert (ran["folder"] / "ventilation.png").read_bytes().startswith(b"\x89PNG")
     assert "present" in (ran["folder"] / "ventilation.toml").read_text()
 
@@ -93,7 +93,7 @@ def test_where_no_rule_fires_the_fan_runs_slowly(ran):
 # ---- the manual ----
 
 
-def test_the_definitions_of_the_manual_are_those_of_its_code():
+def test_manual_definitions_match_their_code():
     names = {}
     for block in re.findall(r"```python\n(.*?)```", MANUAL, re.S):
         for statement in ast.parse(block).body:  # its expressions are compared with what they show where all pages are
@@ -115,7 +115,7 @@ def table(heading):
 
 
 @pytest.mark.medium
-def test_the_forms_have_as_many_rules_as_the_manual_says():
+def test_rule_counts_match_the_manual():
     for form, _, sizes, _ in table("Four forms of the same rules")[1:]:
         for n, size in zip((3, 10), sizes.split(","), strict=True):
             criteria = [Criterion(f"c{i}") for i in range(n)]
@@ -156,7 +156,7 @@ def test_the_complete_table_differs_by_a_sixth_at_the_most():
     assert inputs[gap.max(axis=1).argmax()].tolist() == [1.0, 0.5]
 
 
-def test_scikit_fuzzy_is_off_by_no_more_than_the_manual_says():
+def test_scikit_fuzzy_error_is_within_the_documented_bound():
     inputs = np.random.default_rng(0).random((5000, 3))
     inputs[0] = 1e-4, 0.0, 0.0  # the bound is come near to where h is next to 0
     for points in (3, 11, 101):
@@ -170,7 +170,7 @@ def test_scikit_fuzzy_is_off_by_no_more_than_the_manual_says():
 
 
 def changed(what):
-    """The rules of section VI with one thing that formats may not be able to say."""
+    """The rules of section VI with one feature that some formats do not support."""
     system = prioritised(normalization="none")
     a, b, c = (v.terms[1].name for v in system.inputs)
     obstacle, shape, depth = Is("obstacle", a), Is("shape", b), Is("depth", c)
@@ -217,7 +217,7 @@ def changed(what):
 
 
 @pytest.mark.parametrize("row", table("Formats")[2:-1], ids=lambda row: row[0])
-def test_formats_can_say_what_the_manual_says(row):
+def test_format_support_matches_the_manual(row):
     system = changed(row[0])
     for formats, answer in zip((["json", "toml"], ["fcl"], ["fis"], ["fll"]), row[1:], strict=True):
         for name in formats:

@@ -1,4 +1,4 @@
-"""Explanations: what fired, how strongly, and what decided."""
+"""Explanations: fired rules, their strengths, and the deciding rule."""
 
 import json
 import math
@@ -53,7 +53,7 @@ def test_strengths_and_decisions_by_hand():
         ((0, 0, 0), "R2 R4 R7"),
     ],
 )
-def test_crisp_samples_fire_the_rules_of_the_truth_table(sample, fired):
+def test_crisp_samples_fire_the_truth_table_rules(sample, fired):
     assert " ".join(r.label for r in Arbiter().explain(sample).rules if r.fired) == fired
 
 
@@ -77,7 +77,7 @@ def test_no_winner_where_all_are_zero_and_where_two_tie():
     assert "alike" in str(tie)
 
 
-def test_a_single_output_wins_alone():
+def test_single_output_has_no_runner_up():
     e = lamp(("if light is dark then lamp_1 is high", "if light is bright then lamp_1 is low")).explain([3.0])
     assert (e.winner, e.runner_up, e.margin) == ("lamp_1", None, e.weights[0])
     assert e.outputs[0].runner_up is None
@@ -96,7 +96,7 @@ def test_a_rule_for_two_outputs_decides_both():
     assert [o.runner_up for o in e.outputs] == ["R2", None]  # of lamp_2 both rules conclude the same term
 
 
-def test_weights_of_rules_count():
+def test_rule_weights_scale_strengths():
     e = lamp(("if light is dark then lamp_1 is high with 0.25", "if light is not bright then lamp_1 is low")).explain(
         [0]
     )
@@ -105,7 +105,7 @@ def test_weights_of_rules_count():
     assert e.outputs[0].margin == 0.75
 
 
-def test_a_default_is_said():
+def test_used_default_is_reported():
     arbiter = lamp(("if light is dark then lamp_1 is high",), default=0.25, normalization="none")
     e = arbiter.explain([5.0])
     (output,) = e.outputs
@@ -116,7 +116,7 @@ def test_a_default_is_said():
     assert not arbiter.explain([1.0]).outputs[0].default_used
 
 
-def test_an_output_without_a_firing_rule_says_so_and_the_others_are_decided():
+def test_output_without_a_firing_rule_is_reported_and_others_are_decided():
     rules = ("if light is dark then lamp_1 is high", "if light is bright then lamp_1 is low")
     whole = "if light is dark or light is not dark then lamp_2 is high"
     e = lamp((*rules, whole), outputs=2).explain([5.0])
@@ -130,7 +130,7 @@ def test_an_output_without_a_firing_rule_says_so_and_the_others_are_decided():
     assert (nothing.winner, nothing.tied) == (None, ())
 
 
-def test_text_shows_what_fired_and_nothing_else():
+def test_text_lists_only_fired_rules():
     text = str(Arbiter().explain([0.0, 0.25, 0.0]))
     lines = text.splitlines()
     assert "rules that fired, 5 of 8" in lines

@@ -1,4 +1,4 @@
-"""Exported code gives the arbiter's own bits: C, plain Python, and what Numba makes of it."""
+"""Exported code equals the arbiter bit for bit: C, plain Python, and Numba."""
 
 import ctypes
 import os
@@ -149,7 +149,7 @@ def bad(system):
     [pytest.param(name, marks=pytest.mark.slow) if name == "long" else name for name in SYSTEMS],
     indirect=True,
 )
-def test_c(system, tmp_path):
+def test_exported_c_matches_the_arbiter(system, tmp_path):
     source = tmp_path / "arbiter.c"
     source.write_text(to_c(system))
     name = re.search(r"int (\w+)\(", source.read_text()).group(1)
@@ -180,7 +180,7 @@ def test_systems_of_several_files_go_into_one_program(tmp_path):
 
 
 @pytest.mark.medium(fast=5)
-def test_python(system):
+def test_exported_python_matches_the_arbiter(system):
     module = {}
     exec(compile(to_python(system).encode(), "<arbiter>", "exec"), module)  # from bytes, as of a file
     inputs, outputs = variable_names(system.inputs), variable_names(system.outputs)
@@ -199,7 +199,7 @@ def test_python(system):
 @pytest.mark.parametrize(
     "name", ["section VI", *(pytest.param(name, marks=pytest.mark.slow) for name in ("rational", "wide, shared"))]
 )
-def test_from_a_compiled_loop(name):
+def test_compiled_arbiter_works_in_a_compiled_loop(name):
     numba = pytest.importorskip("numba")
     system = SYSTEMS[name]
     evaluate = Arbiter(system=system).compiled()
@@ -220,7 +220,7 @@ def test_from_a_compiled_loop(name):
     assert all(evaluate(np.array(x), results[0]) == fault for x, fault in bad(system))
 
 
-def test_forty_criteria_in_python():
+def test_forty_criteria_are_exported_to_python():
     system = prioritised([Criterion(f"c{i}") for i in range(40)])
     module = {}
     exec(to_python(system), module)
@@ -228,7 +228,7 @@ def test_forty_criteria_in_python():
     assert module["weights"](x) == Arbiter(system=system)(x)
 
 
-def test_the_python_module_needs_nothing(tmp_path):
+def test_exported_python_module_has_no_dependencies(tmp_path):
     (tmp_path / "mine.py").write_text(to_python(WIDE))
     code = (
         "import sys; n = set(sys.modules); import mine; mine.weights([1.0, 0.5]); print(sorted(set(sys.modules) - n))"
@@ -238,7 +238,7 @@ def test_the_python_module_needs_nothing(tmp_path):
     assert done.stdout.strip() == "['__future__', 'mine']"
 
 
-def test_without_numba_it_is_said(monkeypatch):
+def test_missing_numba_is_reported(monkeypatch):
     monkeypatch.setitem(sys.modules, "numba", None)
     with pytest.raises(EngineError, match="Numba is not installed"):
         Arbiter().compiled()
@@ -340,14 +340,14 @@ def values(first, second):
         (values(Formula("atan2(a, 1)"), Constant(1)), "the function 'atan2' of a formula is not exported"),
     ],
 )  # fmt: skip
-def test_what_is_not_exported_is_named(change, fault):
+def test_unsupported_features_are_rejected_by_name(change, fault):
     changed = replace(CURVED, outputs=(CURVED.outputs[0], replace(CURVED.outputs[1], **change)))
     for export in (to_c, to_python):
         with pytest.raises(UnsupportedError, match=f"export: .*{fault}"):
             export(changed)
 
 
-def test_the_c_says_what_it_returns_by_name():
+def test_exported_c_documents_return_codes_by_name():
     system = Arbiter().system
     (y,) = (Output("y */", (0, 1), {"a": rising(0, 1)}),)
     text = to_c(

@@ -1,4 +1,4 @@
-"""Files appear whole or not at all, with the permissions that other files get."""
+"""Files are written atomically, with the usual permissions."""
 
 import os
 import stat
@@ -9,7 +9,7 @@ from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.files import write_atomic
 
 
-def test_a_file_has_the_permissions_that_the_user_gives_new_ones(tmp_path):
+def test_file_permissions_follow_the_umask(tmp_path):
     before = os.umask(0o027)
     try:
         write_atomic(tmp_path / "a", b"new")
@@ -19,7 +19,7 @@ def test_a_file_has_the_permissions_that_the_user_gives_new_ones(tmp_path):
     assert stat.S_IMODE((tmp_path / "a").stat().st_mode) == 0o640
 
 
-def test_a_link_stays_one(tmp_path):
+def test_symbolic_link_is_preserved(tmp_path):
     (tmp_path / "a").write_text("old")
     (tmp_path / "link").symlink_to(tmp_path / "a")
     write_atomic(tmp_path / "link", b"new")
@@ -27,7 +27,7 @@ def test_a_link_stays_one(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["none/a", "folder", "null\0", "long" * 100])
-def test_what_cannot_be_written_leaves_nothing(name, tmp_path):
+def test_failed_write_leaves_no_file(name, tmp_path):
     (tmp_path / "folder").mkdir()
     with pytest.raises(FormatError, match=name[:4]):
         write_atomic(tmp_path / name, b"new")

@@ -1,4 +1,4 @@
-"""Hysteresis: latches by hand, scans against calls, and the chatter that it takes away."""
+"""Hysteresis: latches by hand, scans against calls, and chatter removal."""
 
 import copy
 import math
@@ -39,7 +39,7 @@ def firsts(h, degrees, step=0.125):
     return [h([degree, 0.0, 0.0], i * step)[0] for i, degree in enumerate(degrees)]
 
 
-def test_a_latch_closes_at_enter_and_opens_at_release():
+def test_latch_sets_at_enter_and_resets_at_release():
     assert firsts(steady(), [0, 0.79, 0.8, 0.5, 0.21, 0.2, 0.5, 0.79, 1, 0]) == [0, 0, 1, 1, 1, 0, 0, 0, 1, 0]
 
 
@@ -51,7 +51,7 @@ def test_weights_are_those_of_crisp_rows():
     assert h([0.1, 0.1, 0.1], 3) == (0, 0, 0)
 
 
-def test_closing_is_never_delayed_and_opening_is_by_dwell():
+def test_dwell_delays_only_the_release():
     degrees = [0, 1, 0, 0, 0, 0, 1, 0]
     #  closed at 0.125, it may open 0.375 later, at 0.5
     assert firsts(steady(dwell=0.375), degrees) == [0, 1, 1, 1, 0, 0, 1, 1]
@@ -59,7 +59,7 @@ def test_closing_is_never_delayed_and_opening_is_by_dwell():
     assert firsts(steady(dwell=0.25), [1, 0.5, 0.5, 0.5, 0.2]) == [1, 1, 1, 1, 0]
 
 
-def test_graded_counts_with_its_degree_until_it_enters():
+def test_graded_mode_uses_the_degree_until_the_latch_sets():
     h = steady(graded=True)
     core = Arbiter()
     assert h([0.5, 0.25, 0.0], 0) == core([0.5, 0.25, 0.0])
@@ -68,7 +68,7 @@ def test_graded_counts_with_its_degree_until_it_enters():
     assert h([0.2, 0.25, 0.0], 3) == core([0.2, 0.25, 0.0])
 
 
-def test_settings_of_each_criterion():
+def test_thresholds_can_differ_by_criterion():
     names = ("obstacle", "shape", "depth")
     h = HysteresisArbiter(
         Arbiter(), enter={"obstacle": 0.5, "shape": 0.9, "depth": 1}, release=dict.fromkeys(names, 0.25), dwell=0.0
@@ -82,7 +82,7 @@ def test_settings_of_each_criterion():
     assert h([0, 0, 0], -5.0) == (0, 0, 0)  # the time begins anew
 
 
-def test_criteria_on_measured_places():
+def test_criteria_with_memberships_accept_measured_values():
     near = Criterion("near", on="yes", off="no", membership=falling(1.0, 2.0))  # m
     deep = Criterion("deep", on="yes", off="no", membership=rising(10.0, 12.0))
     h = HysteresisArbiter(Arbiter([near, deep], outside="clip"), enter=1.0, release=0.0)
@@ -94,7 +94,7 @@ def test_criteria_on_measured_places():
 
 
 @pytest.mark.parametrize("form", ["hierarchical", "minimal", "conjunctive", "complete"])
-def test_the_rules_tell_which_terms_are_on(form):
+def test_active_terms_are_derived_from_the_rules(form):
     criteria = [Criterion("a", on="z", off="b"), Criterion("b", on="c", off="d"), Criterion("c")]
     h = HysteresisArbiter(Arbiter(criteria, form=form), enter=1, release=0)
     assert "on={'a': 'z', 'b': 'c', 'c': 'on'}" in repr(h)
@@ -110,7 +110,7 @@ def plain(rules, shapes=CROSSED):
     return Arbiter(system=System((x,), (y,), rules, normalization="range"))
 
 
-def test_terms_can_be_given_where_the_rules_do_not_determine_them():
+def test_terms_can_be_given_explicitly():
     arbiter = plain(("if x is on or x is off then y is high",))
     with pytest.raises(DefinitionError, match="on: the rules do not determine"):
         HysteresisArbiter(arbiter, enter=1, release=0)
@@ -120,7 +120,7 @@ def test_terms_can_be_given_where_the_rules_do_not_determine_them():
     assert turned.active == {"c": True}
 
 
-def test_forty_criteria():
+def test_forty_criteria_are_supported():
     h = HysteresisArbiter(Arbiter([Criterion(f"c{i}") for i in range(40)]), enter=0.75, release=0.25)
     assert sum(h([0.8] * 40, 0.0)) == 1
 
@@ -132,7 +132,7 @@ def test_forty_criteria():
     st.sampled_from([0.0, 0.1, 0.3]),
     st.booleans(),
 )
-def test_a_scan_is_calls_one_after_the_other(rows, cut, dwell, graded):
+def test_scan_equals_successive_calls(rows, cut, dwell, graded):
     one, other = (steady(dwell=dwell, graded=graded) for _ in range(2))
     inputs = np.array([row[:3] for row in rows], dtype=float).reshape(-1, 3)
     times = np.cumsum([row[3] for row in rows])
@@ -152,7 +152,7 @@ def test_noise_within_the_band_changes_nothing(noise, band):
     assert weights == {(1, 0, 0)}
 
 
-def test_the_arbiter_inside_does_not_change():
+def test_wrapped_arbiter_is_unchanged():
     arbiter = Arbiter()
     before = repr(arbiter)
     h = HysteresisArbiter(arbiter, enter=0.8, release=0.2)
@@ -162,7 +162,7 @@ def test_the_arbiter_inside_does_not_change():
     assert arbiter([0.5, 0, 0]) == Arbiter()([0.5, 0, 0])
 
 
-def test_copies_have_a_state_of_their_own():
+def test_copies_have_independent_state():
     h = steady()
     h([1, 0, 0], 0)
     for twin in (copy.deepcopy(h), pickle.loads(pickle.dumps(h))):
@@ -171,7 +171,7 @@ def test_copies_have_a_state_of_their_own():
         assert h.active["obstacle"]
 
 
-def test_a_scan_goes_on_in_time():
+def test_scan_requires_increasing_time():
     h = steady()
     h.scan([[0.0, 0.0, 0.0]] * 2, [1.0, 2.0])
     with pytest.raises(InputError, match=r"time is 1\.5 after 2"):
@@ -180,7 +180,7 @@ def test_a_scan_goes_on_in_time():
         h.scan([[0.0, 0.0, 0.0]], [1.5])
 
 
-def test_batch_is_refused():
+def test_batch_is_rejected():
     with pytest.raises(InputError, match=r"batch: .*scan"):
         steady().batch([[0, 0, 0]])
 
@@ -199,7 +199,7 @@ def test_batch_is_refused():
         ([0, 0, 0], True, "time is True"),
     ],
 )
-def test_bad_samples_leave_the_state(inputs, time, match):
+def test_invalid_samples_leave_the_state_unchanged(inputs, time, match):
     h = steady()
     h([1, 0, 0], 1)
     with pytest.raises(InputError, match=match):
@@ -220,7 +220,7 @@ def test_bad_samples_leave_the_state(inputs, time, match):
         ([[0, 0, 0]], ["x"], "times: "),
     ],
 )
-def test_bad_scans_leave_the_state(inputs, times, match):
+def test_invalid_scans_leave_the_state_unchanged(inputs, times, match):
     h = steady()
     h([1, 0, 0], 1)
     with pytest.raises(InputError, match=match):
@@ -258,7 +258,7 @@ def test_an_output_without_a_firing_rule_is_nan():
         ({"on": {"obstacle": "exist", "shape": "round", "depth": "maintain"}}, "on: 'round' came for 'shape'"),
     ],
 )  # fmt: skip
-def test_bad_settings(settings, match):
+def test_invalid_settings_are_rejected(settings, match):
     with pytest.raises(DefinitionError, match=match):
         steady(**settings)
 
@@ -272,25 +272,25 @@ def test_bad_settings(settings, match):
         ((Shape(((0, 0.75), (1, 0))), Shape(((0, 0.25), (1, 1)))), "input 'x': it is fully off nowhere"),
     ],
 )
-def test_inputs_that_are_no_criteria(shapes, match):
+def test_systems_without_criteria_are_rejected(shapes, match):
     with pytest.raises(DefinitionError, match=match):
         HysteresisArbiter(
             plain(("if x is on then y is high", "if x is off then y is low"), shapes), enter=0.5, release=0
         )
 
 
-def test_what_is_no_arbiter():
+def test_non_arbiter_is_rejected():
     with pytest.raises(DefinitionError, match="expected an Arbiter"):
         HysteresisArbiter(3, enter=1, release=0)
 
 
-def test_repr_makes_the_same_again():
+def test_repr_round_trips():
     h = steady(dwell=0.5, graded=True)
     names = {name: getattr(fuzzy_arbiter, name) for name in fuzzy_arbiter.__all__}
     assert repr(eval(repr(h), {**names, **vars(propositions)})) == repr(h)
 
 
-def test_hysteresis_takes_the_chatter_away():
+def test_hysteresis_removes_chatter():
     rows = runpy.run_path(str(EXAMPLE), run_name="chatter")["table"]()
     noisy = {name: whole for name, whole, _, _ in rows}
     crisp, narrow, wide, outside, latched, eased, held = noisy.values()

@@ -51,7 +51,7 @@ def tipping():
     return Arbiter(system=TIPPING)
 
 
-def test_a_system_gives_the_quantity_and_prioritised_criteria_a_share(tipping):
+def test_systems_return_quantities_and_prioritised_criteria_return_shares(tipping):
     assert tipping([9.8, 6.5])[0] == pytest.approx(EXACT, abs=1e-13)
     for text in (writes(TIPPING, "toml").replace('normalization = "none"\n', ""), '{"criteria": [{"name": "a"}]}'):
         system = reads(text, "json" if text.startswith("{") else "toml")
@@ -63,7 +63,7 @@ def test_a_system_gives_the_quantity_and_prioritised_criteria_a_share(tipping):
     "sample",
     [(9.8, 6.5), {"food": 6.5, "service": 9.8}, np.array([9.8, 6.5])],
 )
-def test_a_sample_comes_in_any_of_these_forms(tipping, sample):
+def test_samples_are_accepted_in_any_documented_form(tipping, sample):
     assert tipping(sample) == tipping(service=9.8, food=6.5) == tipping([9.8, 6.5])
     assert tipping.centroids(sample) == tipping.centroids(food=6.5, service=9.8)
     assert tipping.explain(sample) == tipping.explain(food=6.5, service=9.8)
@@ -109,7 +109,7 @@ def test_names_of_weights_are_one_for_each_output(names):
 
 
 @pytest.mark.parametrize("format", ["fcl", "fis", "fll"])
-def test_names_of_weights_may_hold_what_the_comment_is_made_of(format):
+def test_weight_names_may_hold_comment_syntax(format):
     system = replace(prioritised(), weights_of=("a, b", "c = d", "fuzzy_arbiter: points = 7"))
     assert reads(writes(system, format), format) == system
     with pytest.raises(ArbiterError, match="weights_of"):
@@ -127,7 +127,7 @@ def test_names_of_weights_may_hold_what_the_comment_is_made_of(format):
         np.array([(6.5, 1, 9.8), (8, 2, 3), (0, 3, 0)], dtype=[("food", "f4"), ("n", "i4"), ("service", "f8")]),
     ],
 )
-def test_columns_go_in_and_come_out_by_name(tipping, table):
+def test_batch_columns_are_named_in_input_and_result(tipping, table):
     rows = tipping.batch(ROWS)
     assert type(rows) is np.ndarray and rows.shape == (3, 1)
     columns = tipping.batch(table)
@@ -135,7 +135,7 @@ def test_columns_go_in_and_come_out_by_name(tipping, table):
     assert [tipping(row)["tip"] for row in ROWS] == pytest.approx(rows[:, 0].tolist(), abs=1e-13)
 
 
-def test_columns_by_keyword_and_one_value_for_all_rows(tipping):
+def test_keyword_columns_broadcast_scalars(tipping):
     assert (
         tipping.batch(service=[9.8, 3.0], food=6.5)["tip"].tolist()
         == tipping.batch([[9.8, 6.5], [3.0, 6.5]])[:, 0].tolist()
@@ -162,12 +162,12 @@ def test_columns_by_keyword_and_one_value_for_all_rows(tipping):
         (lambda a: a(np.ma.array([3, 4], mask=[0, 1])), "food: input is masked, expected a number"),
     ],
 )
-def test_inputs_that_do_not_fit_are_named(tipping, ask, fault):
+def test_mismatched_inputs_are_rejected_by_name(tipping, ask, fault):
     with pytest.raises(InputError, match=fault):
         ask(tipping)
 
 
-def test_what_is_masked_stays_masked(tipping):
+def test_masked_rows_stay_masked(tipping):
     mask = [[0, 0], [1, 0], [0, 0]]
     rows = tipping.batch(np.ma.array([[9.8, 6.5], [99.0, math.nan], [0.0, 0.0]], mask=mask))
     assert rows.mask[:, 0].tolist() == [False, True, False]
@@ -179,7 +179,7 @@ def test_what_is_masked_stays_masked(tipping):
         tipping.batch(np.ma.array([[1.0, 2.0], [1.0, math.nan]], mask=[[1, 0], [0, 0]]))
 
 
-def test_one_output_without_a_firing_rule_refuses_nothing():
+def test_undefined_output_does_not_affect_others():
     wind = Variable("wind", (0, 20), {"calm": falling(2, 6), "strong": rising(10, 12)})
     terms = {"low": falling(0, 100), "high": rising(0, 100)}
     sail, keel = Output("sail", (0, 100), terms), Output("keel", (0, 100), terms, default=40.0)
@@ -240,7 +240,7 @@ def test_automatic_terms_are_those_of_scikit_fuzzy(count):
         assert ours[name](float(peak)) == pytest.approx(1.0, abs=1e-15)
 
 
-def test_automatic_terms_of_ones_own_names_and_what_they_cannot_be():
+def test_automatic_terms_accept_custom_names_and_reject_invalid_ones():
     assert Variable("x", (0, 1), auto_terms(["low", "high"])) == Variable(
         "x", (0, 1), {"low": falling(0, 1), "high": rising(0, 1)}
     )
@@ -250,7 +250,7 @@ def test_automatic_terms_of_ones_own_names_and_what_they_cannot_be():
             auto_terms(bad)
 
 
-def test_a_file_may_be_read_with_another_default_and_outside(tmp_path):
+def test_default_and_outside_can_be_overridden_when_loading(tmp_path):
     lamp = Output("lamp", (0, 10), {"on": rising(0, 10)})
     x = Variable("x", (0, 1), {"low": falling(0, 0.5)})
     Arbiter(system=System((x,), (lamp,), ("if x is low then lamp is on",))).save(tmp_path / "a.fis")
@@ -288,7 +288,7 @@ def test_a_file_may_be_read_with_another_default_and_outside(tmp_path):
         ),
     ],
 )
-def test_what_a_system_shows_makes_it_again_from_public_names(system):
+def test_repr_of_a_system_round_trips_through_public_names(system):
     public = {name: getattr(fuzzy_arbiter, name) for name in fuzzy_arbiter.__all__}
     again = eval(repr(system), {"__builtins__": {}} | public)
     assert again == system and hash(again) == hash(system)

@@ -1,4 +1,4 @@
-"""Other libraries give the same weights, each to within the error of its own way to sum."""
+"""Other libraries give the same weights within their own numerical error."""
 
 import json
 from dataclasses import replace
@@ -31,7 +31,7 @@ def table(library, system):
 
 
 @pytest.mark.parametrize(("library", "system"), TABLES)
-def test_their_centroids_are_ours_within_their_error(library, system):
+def test_other_libraries_match_within_their_error(library, system):
     kept = table(library, system)
     ours = Arbiter(system=SYSTEMS[system], engine="exact").batch(kept["inputs"])
     low, high = SYSTEMS[system].outputs[0].universe
@@ -46,7 +46,7 @@ def test_their_centroids_are_ours_within_their_error(library, system):
 
 @pytest.mark.medium
 @pytest.mark.parametrize(("library", "system"), TABLES)
-def test_the_tables_are_what_the_libraries_give(library, system):
+def test_recorded_tables_match_the_libraries(library, system):
     peers = pytest.importorskip("benchmarks.fuzzy", reason="a source distribution holds no benchmarks")
     python = peers.interpreter(library)
     if python is None:

@@ -1,4 +1,4 @@
-"""Pictures show the numbers that the arbiter gives, and leave everything else alone."""
+"""Pictures show the arbiter's numbers and change no global state."""
 
 import subprocess
 import sys
@@ -88,7 +88,7 @@ def test_every_picture_draws_on_new_axes_or_on_those_given(criteria):
         drawn(ax)
 
 
-def test_pictures_leave_pyplot_alone(arbiter):
+def test_pictures_do_not_use_pyplot_state(arbiter):
     import matplotlib.pyplot as plt
 
     for _, draw in everything(arbiter):
@@ -97,7 +97,7 @@ def test_pictures_leave_pyplot_alone(arbiter):
 
 
 @pytest.mark.medium
-def test_the_package_comes_without_matplotlib():
+def test_package_imports_without_matplotlib():
     code = (
         "import sys; sys.modules['matplotlib'] = None\n"
         "from fuzzy_arbiter import Arbiter, pictures\n"
@@ -125,7 +125,7 @@ def test_the_package_comes_without_matplotlib():
         lambda a: pictures.normalizations(a, "speed"),
     ],
 )
-def test_unknown_inputs_are_answered_with_the_known(arbiter, draw):
+def test_unknown_input_error_lists_known_inputs(arbiter, draw):
     with pytest.raises(DefinitionError, match=r"'speed', expected one of obstacle, shape, depth"):
         draw(arbiter)
 
@@ -137,12 +137,12 @@ def test_unknown_inputs_are_answered_with_the_known(arbiter, draw):
         lambda a: pictures.surface(a, "beta", ("obstacle", "shape")),
     ],
 )
-def test_unknown_outputs_are_answered_with_the_known(arbiter, draw):
+def test_unknown_output_error_lists_known_outputs(arbiter, draw):
     with pytest.raises(DefinitionError, match=r"no output 'beta', expected one of obstacle, shape, depth"):
         draw(arbiter)
 
 
-def test_inputs_that_cannot_be_gone_over(arbiter):
+def test_invalid_axis_inputs_are_rejected(arbiter):
     with pytest.raises(DefinitionError, match="came twice"):
         pictures.decisions(arbiter, ("obstacle", "obstacle"))
     with pytest.raises(DefinitionError, match="the picture goes over it"):
@@ -166,7 +166,7 @@ def test_terms_are_drawn_corner_by_corner(sail):
     assert lines["fresh"].tolist() == [[0, 0], [4, 0], [6, 1], [9, 1], [12, 0], [20, 0]]
 
 
-def test_of_many_terms_no_two_look_alike():
+def test_many_terms_have_distinct_styles():
     lines = {(style["color"], str(style["linestyle"])) for style in map(line_style, range(36))}
     assert len(lines) == 36
     assert len({(colour(i), hatch(i)) for i in range(36)}) == 36
@@ -224,7 +224,7 @@ def texts(ax):
     return [text.get_text() for text in (*ax.texts, *ax.get_yticklabels(), ax.title, ax._right_title)]
 
 
-def test_rules_are_shown_with_strength_term_and_what_decides(arbiter):
+def test_rules_picture_shows_strength_term_and_deciding_rule(arbiter):
     ax = pictures.rules(arbiter, [0.3, 0.8, 0.6], "alpha_2")
     said = texts(ax)
     assert "R3: if obstacle is exist" in said and "R4: if shape is simple" in said
@@ -234,7 +234,7 @@ def test_rules_are_shown_with_strength_term_and_what_decides(arbiter):
     assert any(text.endswith("alpha_2 = 0.784") for text in said)
 
 
-def test_of_many_rules_those_that_do_not_fire_are_left_out():
+def test_rules_picture_omits_idle_rules_of_large_systems():
     criteria = [Criterion(name) for name in "abcd"]
     complete = Arbiter(criteria, form="complete", engine="exact")
     assert [text for text in texts(pictures.rules(complete, [1, 0, 1, 1])) if text.startswith("R")] == [
@@ -244,7 +244,7 @@ def test_of_many_rules_those_that_do_not_fire_are_left_out():
     assert any("(6 rules not drawn)" in text for text in texts(pictures.rules(complete, [0.5] * 4)))
 
 
-def test_rules_that_do_not_fire_are_said(sail):
+def test_rules_picture_reports_that_no_rule_fires(sail):
     said = texts(pictures.rules(sail, [15.0, 0.5], "sail"))
     assert any(text.endswith("sail: no rule fires") for text in said)
     with_default = replace(SAIL, outputs=(replace(SAIL.outputs[0], default=72.0), SAIL.outputs[1]))
@@ -269,7 +269,7 @@ def test_on_three_dimensions_a_surface_is_a_relief(arbiter, sail):
         assert ax.get_zlim()[0] <= 0.0 and ax.get_zlim()[1] >= 0.8
 
 
-def test_a_flat_surface_is_said_in_words(arbiter, sail):
+def test_flat_surface_is_labeled_with_text(arbiter, sail):
     ax = pictures.surface(arbiter, "alpha_3", ("shape", "depth"), {"obstacle": 1.0}, points=11)
     assert "alpha_3 = 0 everywhere" in texts(ax)
     narrow = replace(SAIL, rules=("if wind is calm and not wind is calm then sail is full and keel is up",))
@@ -282,7 +282,7 @@ def keys(ax):
     return [text.get_text() for text in ax.get_legend().get_texts()]
 
 
-def test_decisions_name_the_regions_that_there_are(arbiter, sail):
+def test_decision_legend_lists_present_regions(arbiter, sail):
     assert keys(pictures.decisions(arbiter, ("obstacle", "shape"), {"depth": 0.4})) == ["obstacle", "shape", "depth"]
     assert keys(pictures.decisions(arbiter, ("obstacle", "shape"), {"depth": 0.0})) == ["obstacle", "shape"]
     assert keys(pictures.decisions(arbiter, ("shape", "depth"), {"obstacle": 1.0})) == ["obstacle"]

@@ -54,7 +54,7 @@ def texts(verification, severity):
 # section VI
 
 
-def test_section_six():
+def test_section_six_rules_verify():
     v = Arbiter().verify()
     assert v.ok
     assert verdicts(v) == (True,) * 6
@@ -76,7 +76,7 @@ def test_section_six():
     assert v.stretches == ()
 
 
-def test_the_report_reads_well():
+def test_report_is_readable_text():
     lines = str(Arbiter().verify()).splitlines()
     assert lines[0] == "8 crisp rows"
     assert lines[1].split() == ["obstacle", "shape", "depth", "alpha_1", "alpha_2", "alpha_3", "rules", "that", "fire"]
@@ -94,7 +94,7 @@ def test_as_dict_is_json():
     assert data["rows"][7]["outputs"] == {"alpha_1": ["low"], "alpha_2": ["low"], "alpha_3": ["low"]}
 
 
-def test_a_gap_between_independent_terms_is_found():
+def test_gap_between_independent_terms_is_reported():
     s = prioritised()
     gap = Variable("obstacle", (0, 1), (Term("not_exist", falling(0, 0.25)), Term("exist", rising(0.5, 1))))
     s = System((gap, *s.inputs[1:]), s.outputs, s.rules)
@@ -123,7 +123,7 @@ def test_with_a_default_a_gap_is_no_fault():
 @pytest.mark.medium(fast=8)
 @pytest.mark.parametrize("form", ["hierarchical", "minimal", "conjunctive", "complete"])
 @pytest.mark.parametrize("n", [1, 2, 3, 5])
-def test_all_forms_verify(form, n):
+def test_every_rule_form_verifies(form, n):
     v = verify(prioritised([Criterion(f"c{i}") for i in range(n)], form))
     assert v.ok
     assert verdicts(v) == (True,) * 6
@@ -148,7 +148,7 @@ def test_the_order_of_inputs_does_not_matter():
     assert verdicts(verify(System(s.inputs[::-1], s.outputs, s.rules))) == (True,) * 6
 
 
-def test_what_takes_too_long_is_not_decided():
+def test_exceeding_the_effort_limit_leaves_checks_undecided():
     v = verify(prioritised(), effort=8)
     assert verdicts(v) == (None,) * 6
     assert not v.ok
@@ -183,7 +183,7 @@ def test_a_contradiction_of_weaker_rules_is_no_fault():
 
 
 @pytest.mark.parametrize(("weight", "exclusive"), [(1, False), (0.75, False), (0.5, True)])
-def test_two_outputs_high_at_once(weight, exclusive):
+def test_two_high_outputs_violate_exclusivity(weight, exclusive):
     rules = []
     for name, out in ("ay", "bz"):
         rules += [f"if {name} is on then {out} is high with {weight}", f"if {name} is off then {out} is low"]
@@ -197,7 +197,7 @@ def test_two_outputs_high_at_once(weight, exclusive):
         assert min(Arbiter(system=system(rules, outputs="yz"))([graded.place["a"], graded.place["b"]])) > 0.3
 
 
-def test_the_greatest_term_is_told_by_its_centroid():
+def test_greatest_term_is_identified_by_its_centroid():
     s = system(["if a is on then y is high", "if a is off then y is low"], inputs="a")
     turned = Output("y", (0, 1), LOW_HIGH[::-1])
     other = Output("z", (0, 1), LOW_HIGH)
@@ -216,7 +216,7 @@ def test_products_are_bounded_by_the_minimum():
     assert "never above" in check.how
 
 
-def test_what_the_bound_does_not_settle_is_left_open_or_refuted_by_a_sample():
+def test_inconclusive_bound_is_undecided_or_refuted_by_sampling():
     s = prioritised()
     v = verify(System(s.inputs, s.outputs, s.rules, conjunction="prod", disjunction="probor"))
     assert v.graded_complete is True
@@ -247,14 +247,14 @@ def spans(*shapes, universe=(0, 10)):
     return [(s.kind, s.place, s.least, s.greatest) for s in stretches(v)]
 
 
-def test_partitions_have_no_stretches():
+def test_partitions_report_no_intervals():
     assert spans(falling(2, 6), rising(2, 6)) == []
     assert spans(falling(1, 2), triangle(1, 2, 4), rising(2, 4)) == []
     assert spans(Shape(((0, 0.1), (3, 0.3), (7, 0.9))), Shape(((0, 0.9), (3, 0.7), (7, 1 - 0.9)))) == []
     assert spans(falling(0.1, 0.3), trapezoid(0.1, 0.3, 0.7, 0.9), rising(0.7, 0.9)) == []
 
 
-def test_stretches_by_hand():
+def test_coverage_intervals_match_manual_results():
     assert spans(falling(0, 2), rising(4, 6)) == [("gap", "[2, 4]", 0, 0), ("below", "(0, 6)", 0, 1)]
     # 1 - x/8 + (x - 4)/4 in (4, 8): from 1/2 at 4 to 1 at 8, then 1
     assert spans(falling(0, 8), rising(4, 8)) == [("below", "(0, 8)", 0.5, 1)]
@@ -268,7 +268,7 @@ def test_stretches_by_hand():
     assert spans(trapezoid(0, 0, 3, 3), trapezoid(4, 4, 10, 10)) == [("gap", "(3, 4)", 0, 0), ("below", "(3, 4)", 0, 0)]
 
 
-def test_unused_things_are_named():
+def test_unused_inputs_and_terms_are_named():
     x = Variable(
         "x", (0, 2), (Term("small", falling(0, 1)), Term("middle", triangle(0, 1, 2)), Term("big", rising(1, 2)))
     )
@@ -281,7 +281,7 @@ def test_unused_things_are_named():
     assert "output 'y': no rule concludes its term 'high'" in texts(v, "note")
 
 
-def test_rules_that_never_fire():
+def test_rules_that_never_fire_are_reported():
     x = Variable("x", (0, 4), (Term("small", falling(1, 2)), Term("big", rising(2, 3)), Term("huge", rising(5, 6))))
     rules = (
         "if x is small and x is big then y is high",
@@ -313,7 +313,7 @@ def test_rules_that_never_fire():
     ],
 )
 @pytest.mark.parametrize("conjunction", ["min", "prod"])
-def test_rules_that_add_nothing(rules, finding, conjunction):
+def test_redundant_rules_are_reported(rules, finding, conjunction):
     found = [
         f.text for f in verify(system(rules, outputs="yz", conjunction=conjunction)).findings if f.about == "rules"
     ]
@@ -324,7 +324,7 @@ def test_rules_that_add_nothing(rules, finding, conjunction):
         assert re.search(finding, text)
 
 
-def test_a_square_is_not_its_root():
+def test_repeated_product_condition_is_not_equal_to_its_factor():
     rules = ["if a is on then y is low", "if b is on and (a is on and a is on) then y is low"]
     found = [f.text for f in verify(system(rules, conjunction="prod")).findings if f.about == "rules"]
     assert len(found) == 1
@@ -343,7 +343,7 @@ def test_hundreds_of_rules_with_one_conclusion_are_not_compared():
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_a_degree_that_one_minus_it_cannot_hold_is_not_lost(order):
+def test_tiny_degrees_are_not_lost_in_complements(order):
     """Beside 1e-20 the other term has 1: it is no complement there, and its negation is 0."""
     terms = (Term("seldom", Shape(((0, 1e-20), (1, 1)))), Term("often", falling(0, 1)))[::order]
 
@@ -358,13 +358,13 @@ def test_a_degree_that_one_minus_it_cannot_hold_is_not_lost(order):
 
 
 @pytest.mark.slow
-def test_thousands_of_different_weights():
+def test_thousands_of_rule_weights_are_verified():
     rules = tuple(Rule(Is("a", "on"), Is("y", "low"), 0.5 + 0.5 * (i + 1) / 8401) for i in range(8400))
     v = verify(system([*rules, Rule(Is("a", "off"), Is("y", "high"))], "a"))
     assert (v.graded_complete, v.graded_consistent) == (True, True)
 
 
-def test_a_narrow_overlap_is_found_between_the_places_where_terms_pass_one_half():
+def test_narrow_overlap_above_one_half_is_found():
     """Both terms are above 1/2 from 0.6098 to 0.625 only."""
     x = Variable("x", (0, 1), (Term("a", Shape(((0, 1), (1, 0.2)))), Term("b", Shape(((0, 0), (1, 0.82))))))
     v = verify(System((x,), (output("y"),), ("if x is a then y is low", "if x is b then y is high")))
@@ -373,7 +373,7 @@ def test_a_narrow_overlap_is_found_between_the_places_where_terms_pass_one_half(
     assert 0.6097 < place < 0.625
 
 
-def test_of_a_negated_product_the_minimum_is_no_bound():
+def test_minimum_does_not_bound_a_negated_product():
     """At a = b = 0.6 the one rule fires at 0.64 and the other at 0.6; with the minimum it would be 0.4 and 0.6."""
     rules = ["if not (a is on and b is on) then y is low", "if not (a is off or b is off) then y is high"]
     assert verify(system(rules)).graded_consistent is True
@@ -387,7 +387,7 @@ def test_weaker_rules_are_no_reason_for_a_contradiction():
 
 
 @pytest.mark.parametrize("name", ["complete", "consistent", "graded_complete"])
-def test_what_is_not_decided_is_not_ok(name):
+def test_undecided_check_is_not_ok(name):
     v = Arbiter().verify()
     checks = tuple(replace(check, holds=None) if check.name == name else check for check in v.checks)
     assert not replace(v, checks=checks).ok

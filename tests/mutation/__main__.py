@@ -1,4 +1,4 @@
-"""Turn signs one at a time, ask the tests, and say which they did not notice."""
+"""Mutate signs one at a time, run the tests, and report surviving mutants."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is changed: each arithmetic sign of a source in Python or C, one at a time, by its tokens alone."""
+"""Mutants: each arithmetic sign of a source in Python or C, changed one at a time by its tokens."""
 
 from __future__ import annotations
 

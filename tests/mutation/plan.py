@@ -1,4 +1,4 @@
-"""Which sources are mutated, which tests are asked of each, and which mutants change nothing."""
+"""The mutated sources, the tests for each, and the equivalent mutants."""
 
 from __future__ import annotations
 

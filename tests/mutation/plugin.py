@@ -1,4 +1,4 @@
-"""What is different for tests of a mutant: their order, a limit of time for each, and C that is compiled but once."""
+"""Pytest plugin for tests of a mutant: their order, a time limit for each, and C compiled once."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PLAIN_RUN = subprocess.run
 
 
 class Plugin:
-    """Told by pytest what it does."""
+    """Receive pytest's events."""
 
     def __init__(self, note: Path, words: tuple[str, ...], without: tuple[str, ...], seconds: float):
         self.note = note

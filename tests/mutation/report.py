@@ -1,4 +1,4 @@
-"""What came out, as a table of mutants and a score for each package."""
+"""Results as a table of mutants and a score for each package."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mutants given to processes, each with a copy of the project of its own; what came out is kept as it comes."""
+"""Run mutants in processes with copies of the project, and save each result at once."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from typing import Self
 from tests.mutation.mutants import Mutant
 from tests.mutation.plan import ROOT, part_of, parts
 from tests.mutation.plugin import OBJECTS
-from tests.mutation.server import Order, Outcome
+from tests.mutation.server import Job, Outcome
 
 COPIED = ("controller", "plant_fmu", "fuzzy_arbiter", "cosim", "tests", "examples", "docs", "benchmarks")
 
 
 @dataclass(frozen=True)
 class Result:
-    """What the tests said of a mutant."""
+    """The test result of a mutant."""
 
     key: str
     source: str  # mark of the unchanged source, so that results of an older one are not taken for this one's
@@ -115,10 +115,10 @@ class Server:
             cwd=copy, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         )  # fmt: skip
 
-    def ask(self, order: Order) -> Outcome:
+    def run(self, job: Job) -> Outcome:
         """Return how a run of tests went."""
         assert self.process.stdin and self.process.stdout
-        self.process.stdin.write(json.dumps(asdict(order)) + "\n")
+        self.process.stdin.write(json.dumps(asdict(job)) + "\n")
         self.process.stdin.flush()
         answer = self.process.stdout.readline()
         if not answer:
@@ -146,8 +146,8 @@ def _work(
                 break
             text = mutant.applied((ROOT / mutant.path).read_text(encoding="utf-8"))
             part = part_of(mutant.path)
-            outcome = server.ask(Order(part.tests, _words(mutant), part.without, part.slow, mutant.path, text))
-            if not outcome.passed and not outcome.by and not server.ask(Order(part.tests, collect_only=True)).passed:
+            outcome = server.run(Job(part.tests, _words(mutant), part.without, part.slow, mutant.path, text))
+            if not outcome.passed and not outcome.by and not server.run(Job(part.tests, collect_only=True)).passed:
                 raise RuntimeError(f"{mutant.path}: its tests cannot be collected without any mutant either")
             result = Result(
                 mutant.key, marks[mutant.path], outcome.passed, outcome.by, outcome.how, round(outcome.seconds, 2)
@@ -160,13 +160,13 @@ def _work(
 
 
 def _doubt(results: dict[str, Result], copy: Path) -> None:
-    """Run every test that noticed something without any mutant, and mark what it then says no less."""
+    """Run every failing test without any mutant, and mark those that fail all the same."""
     with Server(copy) as server:
         for slow in (False, True):
             given = [r for r in results.values() if r.by and part_of(r.key.partition(" | ")[0]).slow == slow]
             tests = tuple(sorted({result.by for result in given}))
-            if tests and not server.ask(Order(tests, slow=slow)).passed:
-                failing = {test for test in tests if not server.ask(Order((test,), slow=slow)).passed}
+            if tests and not server.run(Job(tests, slow=slow)).passed:
+                failing = {test for test in tests if not server.run(Job((test,), slow=slow)).passed}
                 results.update((r.key, replace(r, doubtful=True)) for r in given if r.by in failing)
 
 
@@ -213,5 +213,5 @@ def _compile(copy: Path) -> None:
             py_compile.compile(str(source), invalidation_mode=py_compile.PycInvalidationMode.CHECKED_HASH)
     with Server(copy) as server:
         for part in parts():
-            if not server.ask(Order(part.tests, collect_only=True)).passed:
+            if not server.run(Job(part.tests, collect_only=True)).passed:
                 raise RuntimeError(f"tests cannot be collected: {', '.join(part.tests)}")

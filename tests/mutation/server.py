@@ -25,7 +25,7 @@ RUN_SECONDS = 900.0  # by the clock, for all tests of a run
 
 
 @dataclass(frozen=True)
-class Order:
+class Job:
     """A run of tests, of which the first failure ends it."""
 
     tests: tuple[str, ...]
@@ -54,27 +54,27 @@ def main() -> None:
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     for line in sys.stdin:
-        order = Order(**json.loads(line))
-        target = Path(order.path)
-        original = target.read_bytes() if order.path else b""
+        job = Job(**json.loads(line))
+        target = Path(job.path)
+        original = target.read_bytes() if job.path else b""
         try:
-            if order.path:
-                target.write_bytes(order.text.encode())
-            outcome = _run(order)
+            if job.path:
+                target.write_bytes(job.text.encode())
+            outcome = _run(job)
         finally:
-            if order.path:
+            if job.path:
                 target.write_bytes(original)
         answers.write(json.dumps(asdict(outcome)) + "\n")
         answers.flush()
 
 
-def _run(order: Order) -> Outcome:
+def _run(job: Job) -> Outcome:
     note = Path("mutation-note").absolute()
     note.write_text("")
     began = time.monotonic()
     child = os.fork()
     if child == 0:
-        _test(order, note)
+        _test(job, note)
     while True:
         ended, status, used = os.wait4(child, os.WNOHANG)
         if ended:
@@ -99,7 +99,7 @@ def _run(order: Order) -> Outcome:
     return Outcome(False, by, "not imported", seconds)
 
 
-def _test(order: Order, note: Path) -> None:
+def _test(job: Job, note: Path) -> None:
     """Run the tests, in the forked process, which ends here."""
     status = 3
     try:
@@ -117,12 +117,12 @@ def _test(order: Order, note: Path) -> None:
         options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of what is imported before
         options += ["-W", "ignore::RuntimeWarning"]  # of overflow and the like, of which compiled code says nothing
         options += ["--basetemp", str(Path("mutation-scratch").absolute())]
-        options.append("--slow" if order.slow else "--medium")
-        if order.collect_only:
+        options.append("--slow" if job.slow else "--medium")
+        if job.collect_only:
             options.append("--collect-only")
             sys.dont_write_bytecode = False
-        plugin = Plugin(note, tuple(order.words), tuple(order.without), TEST_SECONDS)
-        status = int(pytest.main([*options, *order.tests], plugins=[plugin]))
+        plugin = Plugin(note, tuple(job.words), tuple(job.without), TEST_SECONDS)
+        status = int(pytest.main([*options, *job.tests], plugins=[plugin]))
     except BaseException:  # noqa: BLE001 - nothing may go on behind the fork
         traceback.print_exc()
     finally:

@@ -1,4 +1,4 @@
-"""The mutation test itself: which signs it finds, what it does with them, that its plan fits the sources."""
+"""The mutation test: found signs, their mutants, and a plan that fits the sources."""
 
 import ast
 import shutil
@@ -42,7 +42,7 @@ def signs(path, source):
     return [(m.function, m.before, m.unary) for m in mutants_of(path, source)]
 
 
-def test_signs_of_python():
+def test_python_operators_are_found():
     assert signs("a.py", PYTHON) == [
         ("", "+", False), ("f", "-", True), ("f", "-", True), ("f", "-", False), ("f", "-", True), ("f", "-", False),
         ("f", "+", False), ("C.g", "+=", False), ("C.g", "-=", False), ("C.g", "-", True), ("C.g", "+", False),
@@ -50,7 +50,7 @@ def test_signs_of_python():
     ]  # fmt: skip
 
 
-def test_signs_of_c():
+def test_c_operators_are_found():
     assert signs("a.c", C) == [
         ("", "-", True), ("f", "-", False), ("f", "-", True), ("f", "+", False), ("f", "-", False),
         ("f", "-=", False), ("f", "+=", False), ("f", "-", True), ("f", "-", True), ("f", "-", False),
@@ -59,7 +59,7 @@ def test_signs_of_c():
 
 
 @pytest.mark.parametrize(("path", "source"), [("a.py", PYTHON), ("a.c", C)])
-def test_a_mutant_differs_in_one_sign_and_has_a_name_of_its_own(path, source):
+def test_mutants_differ_in_one_operator_and_have_unique_names(path, source):
     found = mutants_of(path, source)
     assert len({m.key for m in found}) == len(found)
     for mutant in found:
@@ -79,7 +79,7 @@ def nodes(tree):
 
 
 @pytest.mark.medium
-def test_python_signs_are_those_of_the_syntax_tree():
+def test_python_operators_match_the_syntax_tree():
     """Counted once more by Python's own parser, over all sources."""
     kinds = {}
     for mutant in all_mutants():
@@ -97,7 +97,7 @@ def test_python_signs_are_those_of_the_syntax_tree():
 
 
 @pytest.mark.medium
-def test_every_source_of_the_controller_and_the_plants_core_has_a_part():
+def test_every_controller_and_plant_source_is_in_the_plan():
     for path in [*(ROOT / "controller").rglob("*.py"), *(ROOT / "controller").rglob("*.c")]:
         name = path.relative_to(ROOT).as_posix()
         if name not in NO_MATHEMATICS and mutants_of(name, path.read_text(encoding="utf-8")):
@@ -107,7 +107,7 @@ def test_every_source_of_the_controller_and_the_plants_core_has_a_part():
 
 
 @pytest.mark.medium
-def test_tests_of_the_plan_are_there_and_what_is_listed_exists():
+def test_planned_tests_exist_and_equivalent_mutants_have_reasons():
     assert all((ROOT / test).is_file() for part in parts() for test in part.tests)
     assert all(reason for reason in equivalent().values())
 
@@ -122,7 +122,7 @@ def test_a_sample_repeats_and_has_both_languages():
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("cc") is None, reason="needs cc")
-def test_a_turned_sign_is_noticed_and_one_that_nobody_asks_about_survives(tmp_path):
+def test_tested_mutant_is_killed(tmp_path):
     from tests.mutation import running
 
     mutants = {m.key: m for m in all_mutants() if m.path == "controller/restoring.py"}

@@ -27,7 +27,7 @@ def tracked() -> list[str]:
 
 
 def run(*command: object, **more: object) -> str:
-    """Run a command; on failure, show what it said."""
+    """Run a command; on failure, show its output."""
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False, **more)
     assert done.returncode == 0, f"{command}: {done.returncode}\n{done.stdout}\n{done.stderr}"
     return done.stdout
@@ -95,7 +95,7 @@ def program(folder: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def installed(wheel, arbiter_wheel, once) -> Path:
-    """Return an environment with both wheels and what they ask for, and nothing else."""
+    """Return an environment with only both wheels and their requirements."""
 
     def install(folder: Path) -> None:
         run(sys.executable, "-m", "venv", folder / "env")

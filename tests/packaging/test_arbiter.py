@@ -1,4 +1,4 @@
-"""fuzzy-arbiter: what its wheel holds, that NumPy suffices, and that its tests run from its source distribution."""
+"""fuzzy-arbiter: the content of its wheel, its dependencies, and its tests from the source distribution."""
 
 import os
 import subprocess
@@ -37,7 +37,7 @@ def alone(arbiter_wheel, tmp_path_factory):
     return lambda *words: run(python, *words, cwd=folder, env={"PATH": os.environ["PATH"]})
 
 
-def test_the_wheel_holds_the_folder_and_shares_no_file_with_the_other(arbiter_wheel, own_wheel, tracked):
+def test_arbiter_wheel_is_complete_and_disjoint_from_the_main_wheel(arbiter_wheel, own_wheel, tracked):
     own = {name for name in tracked if name.startswith("fuzzy_arbiter/")}
     assert names(arbiter_wheel) == own - {f"fuzzy_arbiter/{name}" for name in BESIDE}
     assert not names(arbiter_wheel) & names(own_wheel)
@@ -47,13 +47,15 @@ def test_the_wheel_holds_the_folder_and_shares_no_file_with_the_other(arbiter_wh
         assert archive.read(next(name for name in archive.namelist() if name.endswith("licenses/LICENSE"))) == (
             (ROOT / "LICENSE").read_bytes()
         )
-        told = message_from_string(archive.read(next(n for n in archive.namelist() if n.endswith("METADATA"))).decode())
-    assert (told["Name"], told["License-Expression"]) == ("fuzzy-arbiter", "BSD-3-Clause")
-    assert [text for text in told.get_all("Requires-Dist") if "extra ==" not in text] == ["numpy>=2.1.3"]
-    assert set(told.get_all("Provides-Extra")) == {"numba", "plot", "skfuzzy", "test"}
+        fields = message_from_string(
+            archive.read(next(n for n in archive.namelist() if n.endswith("METADATA"))).decode()
+        )
+    assert (fields["Name"], fields["License-Expression"]) == ("fuzzy-arbiter", "BSD-3-Clause")
+    assert [text for text in fields.get_all("Requires-Dist") if "extra ==" not in text] == ["numpy>=2.1.3"]
+    assert set(fields.get_all("Provides-Extra")) == {"numba", "plot", "skfuzzy", "test"}
 
 
-def test_numpy_suffices_for_what_the_readme_shows(alone):
+def test_readme_examples_need_only_numpy(alone):
     code = "\n".join(block.text for block in blocks(ROOT / "fuzzy_arbiter" / "README.md") if block.language == "python")
     code += "\nimport sys; print(round(arbiter(asks)['visibility'], 9), arbiter.verify().ok, 'scipy' in sys.modules)"
     assert alone("-c", code).split() == ["0.896", "True", "False"]
@@ -72,7 +74,7 @@ def test_numpy_suffices_for_what_the_readme_shows(alone):
         ("Arbiter().compiled()", "Numba is not installed, expected the extra fuzzy-arbiter[numba]"),
     ],
 )
-def test_what_needs_more_names_its_extra(alone, code, line):
+def test_missing_extra_is_named(alone, code, line):
     words = (
         f"from fuzzy_arbiter import Arbiter, ArbiterError, pictures\ntry: {code}\nexcept ArbiterError as e: print(e)"
     )
@@ -80,7 +82,7 @@ def test_what_needs_more_names_its_extra(alone, code, line):
     assert said.endswith(line)
 
 
-def test_its_tests_run_from_the_source_distribution(arbiter_dist, arbiter_wheel, tmp_path):
+def test_arbiter_tests_run_from_the_source_distribution(arbiter_dist, arbiter_wheel, tmp_path):
     (path,) = arbiter_dist.glob("*.tar.gz")
     with tarfile.open(path) as archive:
         archive.extractall(

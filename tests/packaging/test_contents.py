@@ -1,4 +1,4 @@
-"""What is in the wheel and in the source distribution, and what is not."""
+"""The content of the wheel and of the source distribution."""
 
 import tarfile
 import tomllib
@@ -49,7 +49,7 @@ def of_packages(tracked):
     return {name for name in tracked if PurePosixPath(name).parts[0] in PACKAGES}
 
 
-def test_the_wheel_holds_the_packages_and_nothing_else(wheel, unpacked, tracked, project):
+def test_wheel_holds_only_the_packages(wheel, unpacked, tracked, project):
     info = f"subreach-{project['version']}.dist-info"
     names = {path.relative_to(unpacked).as_posix() for path in unpacked.rglob("*") if path.is_file()}
     own = {name for name in names if not name.startswith(info)}
@@ -70,7 +70,7 @@ def test_the_wheel_holds_the_packages_and_nothing_else(wheel, unpacked, tracked,
     assert wheel.stat().st_size < MOST
 
 
-def test_the_source_distribution_holds_what_a_wheel_is_built_from(dist, tracked):
+def test_source_distribution_holds_the_build_inputs(dist, tracked):
     (path,) = dist.glob("*.tar.gz")
     with tarfile.open(path) as archive:
         names = {member.name.partition("/")[2] for member in archive.getmembers() if member.isfile()}
@@ -80,16 +80,16 @@ def test_the_source_distribution_holds_what_a_wheel_is_built_from(dist, tracked)
     assert path.stat().st_size < MOST
 
 
-def test_what_the_index_is_told(unpacked, project):
+def test_distribution_metadata_is_complete(unpacked, project):
     (path,) = unpacked.glob("*.dist-info/METADATA")
-    told = message_from_string(path.read_text())
-    assert (told["Name"], told["Version"]) == ("subreach", project["version"])
-    assert told["License-Expression"] == "BSD-3-Clause"
-    assert told["Requires-Python"] == ">=3.11"
-    classifiers = told.get_all("Classifier")
+    metadata = message_from_string(path.read_text())
+    assert (metadata["Name"], metadata["Version"]) == ("subreach", project["version"])
+    assert metadata["License-Expression"] == "BSD-3-Clause"
+    assert metadata["Requires-Python"] == ">=3.11"
+    classifiers = metadata.get_all("Classifier")
     assert {f"Programming Language :: Python :: 3.{minor}" for minor in (11, 12, 13)} <= set(classifiers)
-    assert told.get_all("Project-URL") is None  # there is none yet
-    assert set(told.get_all("Provides-Extra")) == set(project["optional-dependencies"])
+    assert metadata.get_all("Project-URL") is None  # there is none yet
+    assert set(metadata.get_all("Provides-Extra")) == set(project["optional-dependencies"])
 
 
 def test_each_dependency_has_a_lower_bound(project):
@@ -101,13 +101,13 @@ def test_each_dependency_has_a_lower_bound(project):
     assert set(everything.removeprefix("subreach[").removesuffix("]").split(",")) == wanted
 
 
-def test_libraries_are_there_for_every_platform(unpacked):
+def test_libraries_exist_for_every_platform(unpacked):
     for path in (unpacked / "plant_fmu" / "prebuilt").iterdir():
         with zipfile.ZipFile(path) as archive:
             assert sorted(archive.namelist()) == sorted(f"{p.name}{p.suffix}" for p in PLATFORMS.values())
 
 
-def test_a_wheel_of_a_checkout_is_for_this_machine_and_says_so(own_wheel, wheel):
+def test_wheel_built_from_a_checkout_is_platform_specific(own_wheel, wheel):
     with zipfile.ZipFile(own_wheel) as ours, zipfile.ZipFile(wheel) as released:
         names, everywhere = (
             {name for name in archive.namelist() if ".dist-info/" not in name} for archive in (ours, released)
@@ -126,22 +126,22 @@ def test_a_checkout_needs_ziglang_for_this_machine_only_without_a_compiler(monke
     monkeypatch.syspath_prepend(str(ROOT))
     import hatch_build
 
-    def asks(what):
+    def build_requirements(what):
         return {text.partition(">")[0] for text in getattr(hatch_build, f"get_requires_for_build_{what}")()}
 
     plant = {"fmpy", "msgspec", "numpy", "platformdirs", "scipy", "tomli-w"}
     monkeypatch.setattr("shutil.which", lambda name: "/usr/bin/cc")
-    assert asks("wheel") == plant
-    assert asks("sdist") == plant | {"ziglang"}
-    assert not asks("editable") & {*plant, "ziglang"}
+    assert build_requirements("wheel") == plant
+    assert build_requirements("sdist") == plant | {"ziglang"}
+    assert not build_requirements("editable") & {*plant, "ziglang"}
     monkeypatch.setattr("shutil.which", lambda name: None)
     monkeypatch.delenv("CC", raising=False)
-    assert asks("wheel") == plant | {"ziglang"}
+    assert build_requirements("wheel") == plant | {"ziglang"}
 
 
 @pytest.mark.parametrize("vehicle", shipped_vehicles())
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_fmus_are_made_of_it_without_a_compiler(unpacked, tmp_path, monkeypatch, vehicle, fmi):
+def test_fmus_are_built_without_a_compiler(unpacked, tmp_path, monkeypatch, vehicle, fmi):
     """They are valid, and fly as those that this machine's compiler makes."""
     compiled = cached_fmu(load_vehicle(vehicle), fmi)
     monkeypatch.setattr(prebuilt, "FOLDER", unpacked / "plant_fmu" / "prebuilt")
@@ -153,7 +153,7 @@ def test_fmus_are_made_of_it_without_a_compiler(unpacked, tmp_path, monkeypatch,
     assert described.modelName == vehicle
 
 
-def test_libraries_are_what_is_built_now(unpacked, prebuilt_of_eight):
+def test_shipped_libraries_equal_a_fresh_build(unpacked, prebuilt_of_eight):
     """Byte for byte, in another place."""
     shipped = unpacked / "plant_fmu" / "prebuilt" / prebuilt_of_eight.name
     assert prebuilt_of_eight.read_bytes() == shipped.read_bytes()

@@ -18,17 +18,17 @@ def bare(installed, tmp_path):
     return lambda *words: run(installed.parent / words[0], *words[1:], cwd=tmp_path, env=env)
 
 
-def test_there_is_no_compiler(bare):
+def test_environment_has_no_compiler(bare):
     code = "import shutil, importlib.util as u; print(shutil.which('cc'), shutil.which('gcc'), u.find_spec('ziglang'))"
     assert bare("python", "-c", code).split() == ["None", "None", "None"]
 
 
-def test_nothing_is_missing(bare):
+def test_installed_requirements_are_consistent(bare):
     assert "No broken requirements found" in bare("python", "-m", "pip", "check")
 
 
 @pytest.mark.parametrize("scenario", ["paper", "docking"])
-def test_a_run_comes_to_a_report(bare, tmp_path, scenario):
+def test_run_writes_a_report(bare, tmp_path, scenario):
     bare("cosim", "run", scenario, "--set", "time.duration=0.5", "--out", "run")
     assert json.loads((tmp_path / "run" / "summary.json").read_text())
     assert all(
@@ -36,7 +36,7 @@ def test_a_run_comes_to_a_report(bare, tmp_path, scenario):
     )
 
 
-def test_scenes_are_flown_by_laws(bare, tmp_path):
+def test_laws_are_compared_on_generated_scenes(bare, tmp_path):
     bare("cosim", "scenes", "--count", "2", "--out", "scenes.jsonl")
     bare("cosim", "compare", "scenes.jsonl", "--laws", "deployable,pd", "--replays", "0", "--out", "side")
     assert (tmp_path / "side" / "deployable" / "results.parquet").exists()
@@ -51,7 +51,7 @@ def test_fmus_are_written_and_load_in_fmpy(bare, fmi):
     assert 0.0 < float(bare("python", "-c", f"import fmpy; print({simulated}['position.x'][-1])")) < 1.0
 
 
-def test_what_needs_more_names_it(bare):
+def test_missing_extra_is_named(bare):
     with pytest.raises(AssertionError, match=r'python -m pip install "distributed>=') as failed:
         bare(
             "cosim", "sweep", "paper", "--vary", "initial.position.1=-1:1", "--samples", "2", "--dask", "--out", "sweep"
@@ -59,6 +59,6 @@ def test_what_needs_more_names_it(bare):
     assert "Traceback" not in str(failed.value)
 
 
-def test_what_needs_a_compiler_names_it(bare):
+def test_missing_compiler_is_named(bare):
     with pytest.raises(AssertionError, match=r'python -m pip install "ziglang>='):
         bare("cosim", "package", "paper-limited", "--set", "arbiter.engine=closed", "--out", "x.ssp")

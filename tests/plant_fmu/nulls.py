@@ -60,7 +60,7 @@ class Argument:
 
     @property
     def is_counted(self) -> bool:
-        """Whether another argument says how many values there are."""
+        """Whether another argument gives the number of values."""
         return self.stars == "[]" and not self.name.startswith("serializedState")
 
     def given(self) -> str:

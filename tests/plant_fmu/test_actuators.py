@@ -10,7 +10,7 @@ from tests.plant_fmu.test_dynamics import MASS, asymmetric
 
 
 @pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
-def test_thrusters_saturate_and_say_so(make_slave, fmi):
+def test_thrusters_saturate_and_set_their_flag(make_slave, fmi):
     slave = make_slave(fmi=fmi).start()
     slave.set_values({"thrust[1]": 30.0, "thrust[2]": -30.0, "thrust[3]": 5.0})
     slave.step(0.01)
@@ -31,7 +31,7 @@ def test_thruster_lag_is_exact_for_any_time_constant(make_slave, time_constant):
         assert slave.get("thruster_force[1]")[0] == pytest.approx(expected, rel=1e-12)
 
 
-def test_lagged_thrust_moves_a_free_body_as_the_integral_says(make_slave):
+def test_lagged_thrust_motion_matches_the_analytic_integral(make_slave):
     """Double integral of f (1 - exp(-t/T)) / m, which the substeps must meet to fourth order."""
     T, f, m, t = 0.4, 15.0, MASS, 3.0
     slave = make_slave().start(**asymmetric(
@@ -112,7 +112,7 @@ def test_a_rate_limit_alone_is_a_ramp(make_slave, fmi):
     assert slave.get("thruster_force[4]")[0] == pytest.approx(-27.0, abs=1e-12)
 
 
-def test_a_failing_thruster_gives_less_or_nothing(make_slave, fmi):
+def test_thruster_effectiveness_scales_the_force(make_slave, fmi):
     slave = make_slave(fmi=fmi).start()
     slave.set_values({"thrust[1]": 20.0, "thrust[2]": 20.0})
     whole = slave.get("actuation.N")[0]
@@ -122,7 +122,7 @@ def test_a_failing_thruster_gives_less_or_nothing(make_slave, fmi):
     assert whole == pytest.approx(0.0) and slave.get("actuation.N")[0] == pytest.approx(-5.08)
 
 
-def test_lags_start_where_they_are_told(make_slave, fmi):
+def test_actuator_states_start_at_their_start_values(make_slave, fmi):
     """Thrusters may be running when a simulation begins."""
     slave = make_slave(fmi=fmi).start(**{"thrust_time_constant[1]": 1.0, "actuator.thrust[1]": 10.0})
     assert slave.get("thruster_force[1]") == [10.0]
@@ -139,7 +139,7 @@ def test_lags_start_where_they_are_told(make_slave, fmi):
         ("thrust_effectiveness[4]", 1.1),
     ],
 )
-def test_impossible_thrusters_are_refused(make_slave, fmi, name, value):
+def test_invalid_thruster_parameters_are_rejected(make_slave, fmi, name, value):
     slave = make_slave(fmi=fmi)
     with pytest.raises(FMICallException):
         slave.set_values({name: value})

@@ -1,4 +1,4 @@
-"""How an autopilot drives the thrusters: what a table of a vehicle's file may say."""
+"""The autopilot table of a vehicle file: validation, and pulses of thrusters."""
 
 import dataclasses
 
@@ -24,13 +24,13 @@ def test_each_thruster_has_a_channel_and_a_sign():
 
 
 @pytest.mark.parametrize("change", [{"signs": 2}, {"signs": 0}, {"channels": (1, 1, 2, 3)}, {"pwm_dead_band": -1}])
-def test_what_cannot_be_is_refused(change):
+def test_invalid_autopilot_parameters_are_rejected(change):
     with pytest.raises(ValueError, match=next(iter(change))):
         checked(**change)
 
 
 @pytest.mark.parametrize(("neutral", "span"), [(1200, 400), (1800, 400), (1500, 700)])
-def test_pulses_reach_as_far_as_speed_controllers_take_them_and_no_farther(neutral, span):
+def test_pulse_range_matches_speed_controller_limits(neutral, span):
     low, high = neutral - span, neutral + span
     assert low == SHORTEST or high == LONGEST
     assert checked(pwm_neutral=neutral, pwm_span=span).pwm_span == span
@@ -42,7 +42,7 @@ def test_pulses_reach_as_far_as_speed_controllers_take_them_and_no_farther(neutr
 
 @pytest.mark.parametrize("curve", ["linear", "quadratic"])
 @pytest.mark.parametrize("sign", [-1, 1])
-def test_a_pulse_asks_for_the_effort_that_it_came_from(curve, sign):
+def test_pulse_and_effort_are_inverse_functions(curve, sign):
     """Outside the dead band each is the other's inverse; beyond the ends a pulse stays at them, and NaN is neutral."""
     table = Autopilot("vectored_6dof", curve=curve)
     pulse, effort = pulse_of_effort(table, sign), effort_of_pulse(table, sign)

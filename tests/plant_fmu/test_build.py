@@ -1,4 +1,4 @@
-"""Building FMUs, and refusing to."""
+"""Building FMUs, and rejected builds."""
 
 import os
 import re
@@ -47,7 +47,7 @@ def written(tmp_path, *changes):
         "cosim run paper",
     ],
 )
-def test_a_checkout_that_is_not_installed_is_one_line(words):
+def test_uninstalled_checkout_gives_one_line_error(words):
     """Without site packages, as the Python of the system has them not."""
     bare = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     command = [sys.executable, "-S", "-m", *words.split()]
@@ -58,7 +58,7 @@ def test_a_checkout_that_is_not_installed_is_one_line(words):
     assert (done.returncode, done.stdout) == (2, "")
 
 
-def test_so_is_one_whose_dependencies_alone_are_there(tmp_path, capsys, monkeypatch):
+def test_checkout_with_only_dependencies_gives_one_line_error(tmp_path, capsys, monkeypatch):
     def version(name):
         raise metadata.PackageNotFoundError(name)
 
@@ -70,7 +70,7 @@ def test_so_is_one_whose_dependencies_alone_are_there(tmp_path, capsys, monkeypa
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_package_has_the_names_that_it_tells():
+def test_package_exports_its_listed_names():
     for name in plant_fmu.__all__:
         assert getattr(plant_fmu, name).__name__ == name
     with pytest.raises(AttributeError, match="module 'plant_fmu' has no attribute 'built_fmu'"):
@@ -79,7 +79,7 @@ def test_the_package_has_the_names_that_it_tells():
 
 @pytest.mark.parametrize("compiler", ["cc", "ziglang"])
 @pytest.mark.slow
-def test_two_builds_give_the_same_bytes(tmp_path, fmi, compiler, monkeypatch, all_platforms):
+def test_builds_are_reproducible(tmp_path, fmi, compiler, monkeypatch, all_platforms):
     """One is of the session, in a folder of another name; a build leaves the environment alone."""
     if compiler == "ziglang":
         before = all_platforms(fmi)
@@ -106,14 +106,14 @@ def test_two_builds_give_the_same_bytes(tmp_path, fmi, compiler, monkeypatch, al
 
 
 @pytest.mark.slow
-def test_command_line_builds(tmp_path, capsys):
+def test_build_command_writes_an_fmu(tmp_path, capsys):
     out = tmp_path / "mine.fmu"
     assert main(["build", "--vehicle", "bluerov2_heavy", "--fmi", "2", "--out", str(out)]) == 0
     assert out.stat().st_size > 10_000
     assert capsys.readouterr().out == f"{out}\n"
 
 
-def test_command_line_lists(capsys):
+def test_list_command_prints_vehicles(capsys):
     assert main(["list"]) == 0
     assert "unsourced" in capsys.readouterr().out
 
@@ -146,7 +146,7 @@ def test_command_line_lists(capsys):
         (("[hydrostatics]", "[hydrostatics"), ("TOML",)),
     ],
 )
-def test_bad_vehicles_are_named_in_one_line(tmp_path, capsys, change, words):
+def test_invalid_vehicles_give_one_line_errors(tmp_path, capsys, change, words):
     out = tmp_path / "boat.fmu"
     path = written(tmp_path, change)
     with pytest.raises((VehicleError, TableError)):
@@ -160,12 +160,12 @@ def test_bad_vehicles_are_named_in_one_line(tmp_path, capsys, change, words):
     assert not out.exists()
 
 
-def test_unknown_vehicle_lists_the_known(capsys):
+def test_unknown_vehicle_error_lists_known_vehicles(capsys):
     assert main(["build", "--vehicle", "odyn"]) == 2
     assert "bluerov2_heavy, bluerov2_heavy_wu, odin, rexrov" in capsys.readouterr().err
 
 
-def test_missing_compiler_is_one_line(tmp_path, capsys, monkeypatch):
+def test_missing_compiler_gives_one_line_error(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
@@ -188,20 +188,20 @@ def test_missing_compiler_is_one_line(tmp_path, capsys, monkeypatch):
         ("no-such-compiler", "not on the PATH"),
     ],
 )
-def test_failing_compiler_leaves_nothing(tmp_path, monkeypatch, compiler, words):
+def test_failing_compiler_leaves_no_file(tmp_path, monkeypatch, compiler, words):
     monkeypatch.setenv("CC", compiler)
     with pytest.raises(BuildError, match=words):
         build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_machines_without_a_name_in_fmi_are_refused(tmp_path, monkeypatch):
+def test_platforms_without_fmi_name_are_rejected(tmp_path, monkeypatch):
     monkeypatch.setattr("platform.machine", lambda: "riscv64")
     with pytest.raises(BuildError, match="riscv64"):
         build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu")
 
 
-def test_only_files_are_replaced(tmp_path):
+def test_only_regular_files_are_replaced(tmp_path):
     (tmp_path / "folder").mkdir()
     os.mkfifo(tmp_path / "pipe")
     for name in ("folder", "pipe"):
@@ -211,7 +211,7 @@ def test_only_files_are_replaced(tmp_path):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="of POSIX")
-def test_a_file_has_the_permissions_that_the_user_gives_new_ones(tmp_path):
+def test_file_permissions_follow_the_umask(tmp_path):
     before = os.umask(0o027)
     try:
         write_atomic(tmp_path / "x.ssv", b"new")
@@ -221,14 +221,14 @@ def test_a_file_has_the_permissions_that_the_user_gives_new_ones(tmp_path):
     assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"new"]
 
 
-def test_unwritable_place_is_one_line(tmp_path, capsys):
+def test_unwritable_path_gives_one_line_error(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     assert main(["build", "--vehicle", "odin", "--out", str(tmp_path / "file" / "x.fmu")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
 
 
 @pytest.mark.slow
-def test_own_vehicle_with_six_thrusters_and_full_added_mass(tmp_path, make_slave):
+def test_custom_vehicle_with_six_thrusters_and_full_added_mass_builds(tmp_path, make_slave):
     rows = "\n".join(f"    [{', '.join('1.0' if i == j else '0.1' for j in range(6))}]," for i in range(6))
     path = written(
         tmp_path,
@@ -245,7 +245,7 @@ def test_own_vehicle_with_six_thrusters_and_full_added_mass(tmp_path, make_slave
     slave.close()
 
 
-def test_a_place_that_cannot_be_written_is_said_before_the_work(tmp_path, monkeypatch):
+def test_unwritable_path_is_rejected_before_compiling(tmp_path, monkeypatch):
     """No compiler has run by then."""
     ran = tmp_path / "ran"
     compiler = tmp_path / "cc"
@@ -259,7 +259,7 @@ def test_a_place_that_cannot_be_written_is_said_before_the_work(tmp_path, monkey
 
 @pytest.mark.slow
 @pytest.mark.parametrize("damage", ["half", "a byte of a third", "a byte of two thirds"])
-def test_a_damaged_file_in_the_cache_is_built_anew(tmp_path, monkeypatch, damage):
+def test_damaged_cached_fmu_is_rebuilt(tmp_path, monkeypatch, damage):
     good = cached_fmu(load_vehicle("odin"), 3)
     whole = good.read_bytes()
     at = len(whole) // 3 * (2 if "two" in damage else 1)
@@ -272,7 +272,7 @@ def test_a_damaged_file_in_the_cache_is_built_anew(tmp_path, monkeypatch, damage
     assert path.read_bytes() == whole
 
 
-def test_a_file_in_the_cache_is_of_its_compiler_or_of_any_where_there_is_none(tmp_path, monkeypatch):
+def test_cached_fmu_is_reused_for_its_compiler_or_without_one(tmp_path, monkeypatch):
     good = cached_fmu(load_vehicle("odin"), 3)
     monkeypatch.setattr("platformdirs.user_cache_dir", lambda *_, **__: str(tmp_path))
     there = tmp_path / "fmu" / good.name
@@ -289,7 +289,7 @@ def test_a_file_in_the_cache_is_of_its_compiler_or_of_any_where_there_is_none(tm
         cached_fmu(load_vehicle("odin"), 3)
 
 
-def test_a_text_that_does_not_fit_leaves_no_part_of_it(tmp_path, monkeypatch, capsys):
+def test_parameter_file_on_a_full_disk_leaves_no_partial_file(tmp_path, monkeypatch, capsys):
     """The disk is full when the last byte comes."""
 
     def full(source, target):

@@ -1,4 +1,4 @@
-"""`plant_fmu check`: files that are no FMUs, importers that fail, crash, hang or are not there."""
+"""`plant_fmu check`: invalid FMUs, and importers that fail, crash, hang or are missing."""
 
 import dataclasses
 import shutil
@@ -71,7 +71,7 @@ def test_times_come_from_the_default_experiment(odin):
 
 
 @pytest.mark.slow
-def test_a_validator_that_finds_something_fails(odin, tmp_path, capsys, monkeypatch):
+def test_validator_finding_fails_the_check(odin, tmp_path, capsys, monkeypatch):
     by_fmpy = tuple(importer for importer in IMPORTERS if importer.name in ("FMPy validation", "FMPy"))
     monkeypatch.setattr("plant_fmu.check.IMPORTERS", by_fmpy)  # the others have nothing to say here
 
@@ -85,7 +85,7 @@ def test_a_validator_that_finds_something_fails(odin, tmp_path, capsys, monkeypa
 
 
 @pytest.mark.slow
-def test_an_importer_that_ends_elsewhere_fails(monkeypatch, odin):
+def test_importer_with_another_result_fails_the_check(monkeypatch, odin):
     def pretend(importer, fmu, task):
         result = run_importer(FMPY, fmu, task)
         values = {name: value + (importer.name == "Ecos") * 1e-6 for name, value in result.values.items()}
@@ -100,13 +100,13 @@ def test_an_importer_that_ends_elsewhere_fails(monkeypatch, odin):
 
 
 @pytest.mark.medium
-def test_what_the_fmu_says_is_in_the_note(odin):
+def test_fmu_log_messages_are_in_the_note(odin):
     result = run_importer(FMPY, read_fmu(odin), Task(stop_time=0.1, start={"mass": -1.0}))
     assert result.status == "failed"
     assert "mass = -1" in result.note and "\n" not in result.note
 
 
-def test_an_importer_that_is_not_there_does_not_fail(odin):
+def test_missing_importer_does_not_fail_the_check(odin):
     absent = dataclasses.replace(FMPY, packages=("no-such-importer>=1",))
     result = run_importer(absent, read_fmu(odin), Task())
     assert (result.status, result.version) == ("not installed", "")
@@ -114,7 +114,7 @@ def test_an_importer_that_is_not_there_does_not_fail(odin):
 
 
 @pytest.mark.medium
-def test_an_importer_that_cannot_be_loaded_is_no_fault_of_the_fmu(odin):
+def test_unloadable_importer_does_not_fail_the_check(odin):
     result = run_importer(dataclasses.replace(FMPY, module="no_such_driver"), read_fmu(odin), Task())
     assert result.status == "not installed"
     assert "cannot be loaded" in result.note
@@ -129,7 +129,7 @@ def test_an_importer_that_cannot_be_loaded_is_no_fault_of_the_fmu(odin):
         ("exit(0);", "ended without an answer"),
     ],
 )
-def test_an_fmu_that_takes_its_importer_down(odin, tmp_path, deed, words):
+def test_fmu_that_crashes_its_importer_fails_the_check(odin, tmp_path, deed, words):
     (tmp_path / "bad.c").write_text(
         f"#include <stdlib.h>\n__attribute__((constructor)) static void loaded(void) {{ {deed} }}\nint nothing;\n"
     )
@@ -146,7 +146,7 @@ def test_an_fmu_that_takes_its_importer_down(odin, tmp_path, deed, words):
 
 
 @pytest.mark.slow
-def test_an_fmu_without_a_binary_for_this_machine(odin, tmp_path):
+def test_check_does_not_apply_without_a_binary_for_this_platform(odin, tmp_path):
     other = tmp_path / "other.fmu"
     with zipfile.ZipFile(odin) as old, zipfile.ZipFile(other, "w") as new:
         new.writestr("modelDescription.xml", old.read("modelDescription.xml"))
@@ -155,7 +155,7 @@ def test_an_fmu_without_a_binary_for_this_machine(odin, tmp_path):
     assert statuses["CS"].status == "does not apply"
 
 
-def test_what_is_no_fmu(tmp_path, capsys):
+def test_invalid_fmu_files_are_rejected(tmp_path, capsys):
     refused(tmp_path / "none.fmu", capsys, "No such file")
     refused(tmp_path, capsys, "directory")
     (tmp_path / "text.fmu").write_text("no zip")
@@ -170,7 +170,7 @@ def test_what_is_no_fmu(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("name", ["../out.txt", "a/../../out.txt", "/out.txt", "C:/out.txt", "a\\..\\out.txt"])
-def test_nothing_is_written_outside_the_folder(tmp_path, capsys, name):
+def test_path_traversal_is_rejected(tmp_path, capsys, name):
     path = write(tmp_path / "slip.fmu", **{"modelDescription.xml": DESCRIPTION, name: "x"})
     refused(path, capsys, "leads out")
 
@@ -184,7 +184,7 @@ def test_links_are_refused(tmp_path, capsys):
     refused(path, capsys, "leads out")
 
 
-def test_absurd_sizes_are_refused(tmp_path, capsys, monkeypatch):
+def test_oversized_members_are_rejected(tmp_path, capsys, monkeypatch):
     path = write(tmp_path / "large.fmu", **{"modelDescription.xml": DESCRIPTION, "resources/zeros": "0" * 10_000})
     monkeypatch.setattr(unpacking, "MAX_SIZE", 9_999)
     refused(path, capsys, "refused", "expected at most 9999")
@@ -201,7 +201,7 @@ def test_damaged_files_are_refused(odin, tmp_path, capsys):
     refused(damaged, capsys)
 
 
-def test_impossible_tasks_are_refused(odin):
+def test_invalid_tasks_are_rejected(odin):
     with pytest.raises(TaskError, match="whole number of steps"):
         check_fmu(odin, 1.0, 0.3)
     with pytest.raises(TaskError, match="positive"):

@@ -1,4 +1,4 @@
-"""What lies in an FMU beside description and binary, against FMPy's schemas and parsers of HTML and of images."""
+"""Files in an FMU beside description and binary, against FMPy's schemas and parsers of HTML and images."""
 
 import re
 import zipfile
@@ -71,13 +71,13 @@ def members(vehicle, fmi):
 
 
 @pytest.mark.slow
-def test_the_fmu_holds_them_and_they_are_the_same_each_time(vehicle, fmi):
+def test_fmu_holds_reproducible_documentation_files(vehicle, fmi):
     made = contents(vehicle, fmi)
     assert made == contents(vehicle, fmi)
     assert made.items() <= members(vehicle, fmi).items()
 
 
-def test_each_fmi_version_has_its_own_places(vehicle):
+def test_file_locations_follow_the_fmi_version(vehicle):
     two, three = contents(vehicle, 2), contents(vehicle, 3)
     assert "model.png" in two and not any(name.startswith("terminalsAndIcons") for name in two)
     assert "model.png" not in three and {TERMINALS, "terminalsAndIcons/icon.png"} <= three.keys()
@@ -96,7 +96,7 @@ def test_the_page_is_well_formed_and_needs_no_network(vehicle, fmi):
     assert "$" not in text
 
 
-def test_the_page_tells_of_every_variable(vehicle, fmi):
+def test_page_documents_every_variable(vehicle, fmi):
     described = read_model_description(cached_fmu(vehicle, fmi)).modelVariables
     rows = {cells[0]: cells for cells in Page(page(vehicle, fmi)).rows if len(cells) >= 4}
     for v in described:
@@ -106,12 +106,12 @@ def test_the_page_tells_of_every_variable(vehicle, fmi):
             assert description.startswith(v.description)
 
 
-def test_the_page_shows_odd_titles_as_they_are(vehicle):
+def test_page_escapes_special_characters_in_titles(vehicle):
     odd = replace(vehicle, title="a < b & $c", source="<script>x</script> ${name}")
     assert {"a < b & $c", "<script>x</script> ${name}"} <= set(Page(page(odd, 3)).text)
 
 
-def test_licences(vehicle, fmi):
+def test_license_files_are_included(vehicle, fmi):
     made = contents(vehicle, fmi)
     licence = made["documentation/licenses/license.txt"].decode()
     assert licence.startswith((ROOT / "LICENSE").read_text().rstrip())
@@ -143,7 +143,7 @@ def test_terminals_are_valid_and_name_inputs_and_outputs(vehicle):
         assert terminal.get("description")
 
 
-def test_terminals_by_hand():
+def test_terminals_match_manual_result():
     document = ET.fromstring(contents(load_vehicle("odin"), 3)[TERMINALS])
 
     def at(*path):
@@ -164,7 +164,7 @@ def test_terminals_by_hand():
     }
 
 
-def test_a_vehicle_with_one_thruster_has_it_all(fmi):
+def test_vehicle_with_one_thruster_has_complete_documentation(fmi):
     odin = load_vehicle("odin")
     short = {key: value[:1] for key, value in vars(odin).items() if key.startswith("thrust_")}
     one = replace(odin, thruster_matrix=odin.thruster_matrix[:, :1], **short)
@@ -174,7 +174,7 @@ def test_a_vehicle_with_one_thruster_has_it_all(fmi):
 
 
 @pytest.mark.parametrize("own", [False, True], ids=["shipped", "own"])
-def test_the_guide_names_the_files_that_are_there(own):
+def test_guide_names_the_existing_files(own):
     """One of the package brings a manoeuvre, one's own brings none."""
     vehicle = load_vehicle("odin")
     if own:

@@ -1,4 +1,4 @@
-"""Inputs by which other components act on the vehicle: each does what the parameters, or the wrench, would do."""
+"""Coupling inputs: each has the effect of the equivalent parameters or wrench."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def fly(fmu, parameters=None, steps=20, **inputs):
         return np.array([plant[name] for name in MOTION])
 
 
-def test_without_them_the_table_of_variables_is_as_before():
+def test_without_coupling_inputs_the_variables_are_unchanged():
     """A coupled plant has the same variables in the same order, and others beside them."""
     vehicle = load_vehicle("odin")
     plain, coupled = variables(vehicle), variables(vehicle, coupled=True)
@@ -39,7 +39,7 @@ def test_without_them_the_table_of_variables_is_as_before():
 
 
 @pytest.mark.slow
-def test_off_they_change_no_bit(coupled):
+def test_zero_coupling_inputs_change_no_bit(coupled):
     np.testing.assert_array_equal(fly(coupled), fly("odin"))
     np.testing.assert_array_equal(
         fly(coupled, {"current.x": 0.2}, **{"thrust[1]": 9.0}), fly("odin", {"current.x": 0.2}, **{"thrust[1]": 9.0})
@@ -53,7 +53,7 @@ def test_a_current_is_that_of_the_parameters(coupled):
 
 
 @pytest.mark.slow
-def test_the_rate_of_a_current_is_felt_within_a_step(coupled):
+def test_current_rate_acts_within_a_step(coupled):
     """Held at each step, its velocity alone lags by half a step; with its rate it is the straight line."""
 
     def drift(step, with_rate):
@@ -112,7 +112,7 @@ def test_commands_of_thrusters_in_other_units(coupled):
 
 
 @pytest.mark.slow
-def test_a_failure_takes_part_of_the_force(coupled):
+def test_failure_reduces_the_thruster_force(coupled):
     got = fly(coupled, {"thrust_effectiveness[1]": 0.8}, **{"thrust[1]": 20.0, "thrust_failure[1]": 0.25})
     np.testing.assert_allclose(
         got, fly("odin", {"thrust_effectiveness[1]": 0.6}, **{"thrust[1]": 20.0}), rtol=0.0, atol=1e-14

@@ -135,7 +135,7 @@ def test_adjoint_is_the_transpose(make_slave):
     assert adjoint == pytest.approx(seed @ slave.jacobian(unknowns, knowns), rel=1e-12, abs=1e-12)
 
 
-def test_seeds_add_up(make_slave, fmi):
+def test_directional_derivatives_are_linear_in_the_seed(make_slave, fmi):
     """One direction in all knowns is the sum of its columns."""
     slave = make_slave("odin", fmi).start(**{"velocity.u": 0.5, "velocity.r": 0.2, "current.x": 0.1})
     knowns, unknowns = [*STATES, "thrust[3]", "mass"], ["der(velocity.u)", "actuation.N", "attitude.yaw"]
@@ -148,7 +148,7 @@ def test_seeds_add_up(make_slave, fmi):
     assert together == pytest.approx(slave.jacobian(unknowns, knowns) @ seed, rel=1e-13)
 
 
-def test_what_drifts_follows_the_time(make_slave):  # in FMI 2.0 the time is no variable
+def test_drifting_current_has_a_time_derivative(make_slave):  # in FMI 2.0 the time is no variable
     slave = make_slave("odin", 3).start(**{"current_variation.y": 0.2, "seed": 42})
     before = slave.get("water_velocity.y")[0]
     (slope,) = slave.jacobian(["water_velocity.y"], ["time"])[0]
@@ -157,18 +157,18 @@ def test_what_drifts_follows_the_time(make_slave):  # in FMI 2.0 the time is no 
     assert slave.get("water_velocity.y")[0] == pytest.approx(before + 0.01 * slope, rel=1e-9)
 
 
-def test_a_command_of_nothing_has_the_slope_of_the_curve(make_slave, fmi):
+def test_zero_command_derivative_is_the_curve_slope(make_slave, fmi):
     slave = make_slave("odin", fmi).start(**{"thrust_curve[1]": 0.3, "thrust_time_constant[1]": 0.0})
     assert slave.jacobian(["thruster_force[1]"], ["thrust[1]"])[0] == pytest.approx([0.7])
 
 
-def test_sampled_values_do_not_follow_the_state(make_slave, fmi):
+def test_sampled_outputs_have_zero_state_derivatives(make_slave, fmi):
     slave = make_slave("odin", fmi).start(**{"depth_sensor.rate": 10.0})
     assert slave.jacobian(["measured.depth", "measured.position.z"], ["position.z"]).tolist() == [[0.0], [1.0]]
 
 
 @pytest.mark.parametrize(("unknown", "known"), [("mass", "mass"), ("der(velocity.u)", "actuation.X")])
-def test_no_derivative_of_what_is_not_calculated(make_slave, fmi, unknown, known):
+def test_derivative_of_non_outputs_is_rejected(make_slave, fmi, unknown, known):
     slave = make_slave("odin", fmi).start()
     with pytest.raises(FMICallException):
         slave.jacobian([unknown], [known])

@@ -1,4 +1,4 @@
-"""modelDescription.xml, the C header and the docs page: one table, one truth."""
+"""Consistency of modelDescription.xml, the C header and the docs page."""
 
 import math
 import re
@@ -31,7 +31,7 @@ def test_fmpy_finds_no_problem(name, fmi):
     assert validate_fmu(str(cached_fmu(load_vehicle(name), fmi))) == []
 
 
-def test_every_variable_has_what_a_user_needs():
+def test_every_variable_has_description_unit_range_and_nominal():
     rows = variables(load_vehicle("odin"))
     assert len({v.name for v in rows}) == len({v.member for v in rows}) == len(rows)
     for v in rows:
@@ -44,7 +44,7 @@ def test_every_variable_has_what_a_user_needs():
 
 
 @pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
-def test_the_fmu_starts_with_what_the_description_says(make_slave, fmi):
+def test_fmu_start_values_match_the_model_description(make_slave, fmi):
     """The XML's start values are compiled into the binary too: a tool that sets none must get the same."""
     slave = make_slave("bluerov2_heavy", fmi)
     numbers = {"true": 1.0, "false": 0.0}
@@ -72,7 +72,7 @@ def test_value_references_reach_the_described_variable(make_slave, fmi):
     assert slave.get(*values) == list(values.values())
 
 
-def test_dependencies_name_what_an_output_follows_from(fmi):
+def test_dependencies_list_the_inputs_of_an_output(fmi):
     description = read_model_description(str(cached_fmu(load_vehicle("odin"), fmi)))
     of = {u.variable.name: {d.name for d in u.dependencies} for u in description.outputs}
     assert of["position.x"] == {"position.x"}
@@ -106,7 +106,7 @@ def test_header_names_each_variable_once():
 
 
 @pytest.mark.slow
-def test_token_changes_with_the_numbers():
+def test_instantiation_token_depends_on_the_parameters():
     descriptions = {model_description(of_vehicle(load_vehicle(name)), 3, "") for name in shipped_vehicles()}
     tokens = {read_model_description(str(cached_fmu(load_vehicle(name), 3))).guid for name in shipped_vehicles()}
     assert len(descriptions) == len(tokens) == len(shipped_vehicles())

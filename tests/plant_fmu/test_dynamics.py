@@ -42,7 +42,7 @@ START = dict(zip(STATES[3:], (0.6, 0.5, -0.4, 0.48, 0.7, -0.3, 0.4, 0.5, -0.6, 0
 
 @pytest.mark.medium
 @pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
-def test_follows_fossens_matrix_equation_with_nothing_symmetric(make_slave, fmi):
+def test_asymmetric_vehicle_follows_fossens_matrix_equation(make_slave, fmi):
     """A direct transcription with C(nu) from the parametrisation theorem (Fossen 2011, 3.46), integrated by SciPy."""
     M_RB, M_A = mass_matrices()
     current, tau = np.array([0.3, -0.2, 0.1]), np.array([3.0, -2.0, 4.0, 0.4, -0.5, 0.3])
@@ -132,7 +132,7 @@ def test_quaternion_is_normalized_when_initialisation_ends(make_slave):
     assert slave.get("quaternion.e0", "quaternion.e1") == pytest.approx([np.sqrt(0.5)] * 2)
 
 
-def test_drifts_with_the_current(make_slave):
+def test_vehicle_drifts_with_the_current(make_slave):
     """At rest in moving water a neutral vehicle is at rest for the water."""
     slave = make_slave().start(**asymmetric(
         weight=196.2, buoyancy=196.2, **{"current.x": 0.4, "current.y": -0.3, "current.z": 0.2},
@@ -157,7 +157,7 @@ def test_euler_angles_are_those_of_the_quaternion(make_slave, initialised):
     assert slave.get("attitude.roll", "attitude.pitch", "attitude.yaw") == pytest.approx([roll, pitch, yaw], abs=1e-12)
 
 
-def test_straight_up_is_pitch_and_yaw(make_slave):
+def test_vertical_attitude_is_expressed_by_pitch_and_yaw(make_slave):
     """Where roll and yaw are one, the angles still give the attitude back."""
     slave = make_slave().start(**dict(zip(STATES[3:7], (0.5, -0.5, 0.5, 0.5), strict=True)))
     roll, pitch, yaw = slave.get("attitude.roll", "attitude.pitch", "attitude.yaw")
@@ -167,7 +167,7 @@ def test_straight_up_is_pitch_and_yaw(make_slave):
 
 
 def test_the_guard_bounds_the_fastest_damping_of_any_mass_matrix(make_slave):
-    """Coupled added mass damps faster than its diagonal tells: such a step is refused, not grown."""
+    """Coupled added mass damps faster than its diagonal suggests: such a step is rejected."""
     coupled = {f"added_mass[{i + 1},{j + 1}]": 0.0 for i in range(6) for j in range(i, 6)}
     coupled |= {f"added_mass[{i},{i}]": 90.0 for i in (1, 2, 3)} | {"added_mass[1,2]": 80.0, "added_mass[2,3]": 80.0}
     coupled |= {"added_mass[1,3]": 80.0, "mass": 10.0, "linear_damping[1]": 1.2e4, "linear_damping[2]": 1.2e4}
@@ -194,7 +194,7 @@ def test_substeps_are_snapped_to_the_step(make_slave):
 
 
 @pytest.mark.slow
-def test_two_hours_keep_energy_and_a_unit_quaternion(make_slave):
+def test_energy_and_quaternion_norm_are_conserved_over_two_hours(make_slave):
     """A tumbling pendulum without damping, in 7.2 million substeps of 1 ms: neither gains nor loses a millionth."""
     slave = make_slave().start(**asymmetric(**START, weight=199.0), substep=0.001)
     before = energy(slave.get(*STATES), 199.0)
@@ -205,7 +205,7 @@ def test_two_hours_keep_energy_and_a_unit_quaternion(make_slave):
 
 
 @pytest.mark.slow
-def test_an_hour_balances_work_and_loss(make_slave):
+def test_work_and_dissipation_balance_over_one_hour(make_slave):
     """Kinetic and potential energy change by what actuators put in and damping takes out."""
     damping = {f"{kind}_damping[{i}]": 4.0 + i for kind in ("linear", "quadratic") for i in range(1, 7)}
     slave = make_slave().start(**asymmetric(**START) | damping, substep=0.005)

@@ -1,4 +1,4 @@
-"""Many instances, one after the other and side by side."""
+"""Many instances in sequence and in parallel."""
 
 import ctypes
 import resource
@@ -61,7 +61,7 @@ def live(library, token):
 
 
 @needs_proc
-def test_a_thousand_instances_leave_nothing_behind(library):
+def test_instances_leak_no_memory(library):
     loaded, token = library
     for _ in range(1000):
         live(loaded, token)
@@ -73,7 +73,7 @@ def test_a_thousand_instances_leave_nothing_behind(library):
 
 @needs_proc
 @pytest.mark.slow
-def test_loading_again_and_again_leaves_little_behind():
+def test_repeated_loading_leaks_little_memory():
     """The whole way: extract, load, step, free, unload."""
     path = cached_fmu(load_vehicle("odin"), 3)
 
@@ -93,7 +93,7 @@ def test_loading_again_and_again_leaves_little_behind():
     assert any(grown(50) < 50 * 20_000 for _ in range(4))
 
 
-def test_a_thousand_at_once_are_a_thousand_of_their_own(library):
+def test_simultaneous_instances_are_independent(library):
     loaded, token = library
     nothing = ctypes.c_void_p()
     made = [
@@ -131,7 +131,7 @@ def run(barrier=None):
 
 
 @pytest.mark.slow
-def test_four_threads_give_the_bits_of_one():
+def test_parallel_threads_give_identical_results():
     alone = run()
     barrier = threading.Barrier(4)
     with ThreadPoolExecutor(4) as threads:

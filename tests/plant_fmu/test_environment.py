@@ -63,7 +63,7 @@ def test_the_variation_is_a_gauss_markov_process(make_slave, fmi):
         slave.fmu.doStep(t, 0.1)
 
 
-def test_an_axis_that_begins_to_vary_later_begins_from_the_process_s_own_distribution(make_slave, fmi):
+def test_axis_variation_switched_on_late_starts_from_the_stationary_distribution(make_slave, fmi):
     """At once, which makes a knot of that time, by numbers of a stream of its own."""
     T, dt, s = 5.0, 0.5, 0.3
     slave = make_slave(fmi=fmi).start(
@@ -78,7 +78,7 @@ def test_an_axis_that_begins_to_vary_later_begins_from_the_process_s_own_distrib
 
 
 @pytest.mark.medium
-def test_its_deviation_and_correlation_are_those_asked_for(make_slave):
+def test_current_variation_has_its_deviation_and_correlation_time(make_slave):
     T, s = 2.0, 0.3
     slave = make_slave().start(
         **{
@@ -107,7 +107,7 @@ def test_buoyancy_is_that_of_the_submerged_cap(make_slave, fmi, depth, part):
     assert slave.get("der(velocity.w)")[0] == pytest.approx(heave, abs=1e-12)
 
 
-def test_a_buoyant_hull_floats_where_archimedes_says(make_slave, fmi):
+def test_floating_hull_draft_follows_archimedes(make_slave, fmi):
     """Afloat with three quarters of the volume under water."""
     r = 0.3
     slave = make_slave(fmi=fmi).start(
@@ -152,7 +152,7 @@ def test_a_heavy_vehicle_comes_to_rest_on_the_bottom(make_slave, fmi):
 @pytest.mark.parametrize("substep", [0.001, 0.02, 0.2])
 @pytest.mark.parametrize("speed", [0.1, 3.0, 100.0])
 @pytest.mark.parametrize("time_constant", [0.0, 0.02, 0.5])
-def test_contact_never_explodes(make_slave, substep, speed, time_constant):
+def test_bottom_contact_is_stable(make_slave, substep, speed, time_constant):
     """Thrown at the bottom, at any speed and substep: no energy is gained, nor depth beyond a flight of T."""
     slave = make_slave().start(
         **SINKING
@@ -177,7 +177,7 @@ def test_contact_never_explodes(make_slave, substep, speed, time_constant):
     assert deepest - 9.7 <= speed * max(time_constant, 4 * substep)
 
 
-def test_friction_stops_a_slide_as_coulomb_says(make_slave):
+def test_coulomb_friction_decelerates_a_slide(make_slave):
     slave = make_slave().start(
         **SINKING,
         **{
@@ -194,13 +194,13 @@ def test_friction_stops_a_slide_as_coulomb_says(make_slave):
     assert slave.get("velocity.u")[0] == pytest.approx(1.0 - slowing * 1.0, abs=0.01)
 
 
-def test_no_bottom_unless_asked_for(make_slave):
+def test_bottom_is_off_by_default(make_slave):
     slave = make_slave().start(**{"position.z": 5e5, "hull_radius": 0.3})
     assert not slave.flag("bottom_contact")
     assert slave.get("altitude")[0] == 5e5
 
 
-def test_a_hull_found_deep_in_the_bottom_leaves_it_slowly(make_slave, fmi):
+def test_hull_starting_inside_the_bottom_is_pushed_out_slowly(make_slave, fmi):
     """However it got there: the bottom's spring is no catapult."""
     slave = make_slave(fmi=fmi, logging_on=True).start(**SINKING | NEUTRAL | {"position.z": 12.0})
     assert "the hull begins 2.3 m deep in the bottom" in [text for _, text in slave.said]
@@ -212,7 +212,7 @@ def test_a_hull_found_deep_in_the_bottom_leaves_it_slowly(make_slave, fmi):
     assert slave.get("altitude")[0] > 0.3
 
 
-def test_a_rolling_float_keeps_its_energy(make_slave):
+def test_energy_of_a_rolling_float_is_conserved(make_slave):
     """Buoyancy fades with the depth of the point it acts at, so that it has a potential."""
     r, B, W = 0.3, 1228.25, 900.0
     r_B = np.array([0.0, 0.1, -0.1])
@@ -245,7 +245,7 @@ def test_a_rolling_float_keeps_its_energy(make_slave):
 VARYING = {"current_variation.x": 1.0, "current_correlation_time": 1000.0, "current_variation_period": 100.0, "seed": 3}
 
 
-def test_a_changed_knot_period_does_not_make_the_water_jump(make_slave, fmi):
+def test_changed_knot_period_keeps_the_current_continuous(make_slave, fmi):
     slave = make_slave(fmi=fmi).start(**VARYING)
     for _ in range(50):
         slave.step(1.0)
@@ -255,7 +255,7 @@ def test_a_changed_knot_period_does_not_make_the_water_jump(make_slave, fmi):
     assert slave.get("water_velocity.x")[0] == pytest.approx(before, abs=1e-6)
 
 
-def test_an_axis_that_begins_later_is_stationary_from_its_beginning(make_slave):
+def test_axis_variation_switched_on_late_is_stationary(make_slave):
     """Over seeds, the deviation just after switching on (again) is the one asked for."""
     first, again, other = [], [], []
     slave = make_slave()

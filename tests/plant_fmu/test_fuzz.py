@@ -43,7 +43,7 @@ def fuzzer(tmp_path_factory):
     ids=["short", "long"],
 )
 @pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
-def test_no_order_of_calls_does_harm(fuzzer, fmi, seed, calls, level):
+def test_any_call_order_is_memory_safe(fuzzer, fmi, seed, calls, level):
     """No fault of memory or arithmetic, and no number out that is none; most functions succeed now and then."""
     done = subprocess.run([fuzzer(fmi, level), str(seed), str(calls)], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-500:] + done.stderr[-3000:]

@@ -1,4 +1,4 @@
-"""The same motion in every importer that pip can install: one vehicle, one end."""
+"""The same motion in every importer that pip can install."""
 
 import functools
 import tomllib
@@ -56,7 +56,7 @@ def difference(ours, theirs):
 
 @pytest.mark.medium
 @pytest.mark.parametrize("name", ["FMPy validation", pytest.param("fmu-manipulation-toolbox", marks=pytest.mark.slow)])
-def test_validators_find_nothing(name, fmu):
+def test_validators_report_no_problems(name, fmu):
     assert "no problems" in answer(name, fmu).note
 
 
@@ -69,7 +69,7 @@ def test_the_motion_is_in_all_six_degrees_of_freedom(fmu):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["libcosim", "Ecos"])
-def test_co_simulation_agrees(name, fmu):
+def test_co_simulation_results_agree_between_importers(name, fmu):
     if objection := IMPORTER[name].objection(fmu):
         assert (name, fmu.fmi) == ("libcosim", 3), objection
         assert _result(name, fmu.path).status in ("does not apply", "not installed")
@@ -127,7 +127,7 @@ def test_casadi_reads_the_directional_derivatives(fmu, tmp_path):
     assert all(felt[name] > 0.0 for name in START if name in felt and not name.startswith("position"))
 
 
-def test_the_extra_asks_for_what_the_drivers_need():
+def test_importers_extra_covers_driver_requirements():
     extra = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]["importers"]
     needed = {package for importer in IMPORTERS for package in importer.packages if not package.startswith("fmpy")}
     assert needed <= {package.split(";")[0] for package in extra}

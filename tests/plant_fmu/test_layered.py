@@ -62,19 +62,19 @@ def gap(fmu, folder, name, **how):
 @pytest.mark.parametrize(
     "name", ["odin", *(pytest.param(v, marks=pytest.mark.slow) for v in shipped_vehicles() if v != "odin")]
 )
-def test_the_fmu_gives_the_results_that_it_carries(name, fmi, unpacked):
+def test_fmu_reproduces_its_reference_results(name, fmi, unpacked):
     fmu = cached_fmu(load_vehicle(name), fmi)
     assert gap(fmu, unpacked(fmu), name, fmi_type="CoSimulation") < 1e-6
 
 
-def test_so_does_model_exchange(fmi, unpacked):
+def test_model_exchange_reproduces_the_reference_results(fmi, unpacked):
     fmu = cached_fmu(load_vehicle("odin"), fmi)
     how = {"fmi_type": "ModelExchange", "solver": "CVode", "relative_tolerance": 1e-8}
     assert gap(fmu, unpacked(fmu), "odin", **how) < 1e-5
 
 
 @pytest.mark.slow
-def test_an_own_vehicle_with_all_that_actuators_can_do(fmi, tmp_path, unpacked):
+def test_custom_vehicle_with_full_actuator_model_matches_reference(fmi, tmp_path, unpacked):
     like = load_vehicle("bluerov2_heavy")
     n = like.n_thrusters
     rng = np.random.default_rng(1)
@@ -100,7 +100,7 @@ def test_an_own_vehicle_with_all_that_actuators_can_do(fmi, tmp_path, unpacked):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", shipped_vehicles())
-def test_the_files_are_what_the_equations_give(name, tmp_path):
+def test_reference_files_match_the_equations(name, tmp_path):
     assert main(["reference", "--vehicle", name, "--out", str(tmp_path)]) == 0
     files = layered_files(load_vehicle(name))
     for end in ("in.csv", "out.csv"):
@@ -118,7 +118,7 @@ def test_the_files_are_what_the_equations_give(name, tmp_path):
 
 @pytest.mark.parametrize("name", shipped_vehicles())
 @pytest.mark.slow
-def test_the_manoeuvre_moves_every_axis_and_meets_the_limits(name):
+def test_maneuver_excites_every_axis_and_reaches_limits(name):
     vehicle = load_vehicle(name)
     made = reference(vehicle)
     moved = dict(zip(COLUMNS, np.ptp(made.results, axis=0), strict=True))
@@ -126,7 +126,7 @@ def test_the_manoeuvre_moves_every_axis_and_meets_the_limits(name):
     assert np.any(made.inputs[:, 1 : 1 + vehicle.n_thrusters] > vehicle.thrust_max)
 
 
-def test_the_manifest(fmi, unpacked):
+def test_manifest_is_valid(fmi, unpacked):
     folder = unpacked(cached_fmu(load_vehicle("odin"), fmi))
     root = etree.parse(folder / "fmi-ls-manifest.xml").getroot()
     assert root.tag == "fmiReferences"
@@ -151,7 +151,7 @@ def test_the_manifest(fmi, unpacked):
     assert labels == {"odin.ssv": [], **dict.fromkeys(("odin_start.ssv", "odin_in.csv", "odin_out.csv"), manoeuvre)}
 
 
-def test_another_vehicle_of_a_shipped_name_carries_no_foreign_results():
+def test_changed_vehicle_carries_no_shipped_reference_results():
     odin = load_vehicle("odin")
     assert "odin_out.csv" in layered_files(odin)
     assert layered_files(replace(odin, weight=1230.0)).keys() == {"fmi-ls-manifest.xml", "odin.ssv"}

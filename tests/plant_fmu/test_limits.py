@@ -1,4 +1,4 @@
-"""What integration cannot follow, and times at the edge of numbers: refused, or done right, never almost right."""
+"""Motions that integration cannot follow, and times at numerical limits: rejected or exact."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ SLOW = {"weight": 131.588, "substep": 0.5}
 
 
 @pytest.mark.slow
-def test_a_step_whose_stages_outrun_the_damping_is_refused(make_slave):
+def test_step_with_unstable_stages_is_rejected(make_slave):
     """Ends may rest by chance while the stages between do not: each accepted run stays near the true speed."""
     accepted = 0
     for force in [5.0, *np.linspace(1.0, 400.0, 60)]:
@@ -34,7 +34,7 @@ def test_a_step_whose_stages_outrun_the_damping_is_refused(make_slave):
     ],
     ids=["spin", "pendulum", "float"],
 )
-def test_motion_too_quick_for_the_substep_is_refused(make_slave, fmi, values, substep):
+def test_motion_too_fast_for_the_substep_is_rejected(make_slave, fmi, values, substep):
     slave = make_slave(fmi=fmi).start(**values, substep=substep)
     with pytest.raises(FMICallException):
         slave.step(10 * substep)
@@ -52,7 +52,7 @@ def begin(slave, time):
     slave.time = time
 
 
-def test_ticks_go_on_through_time_zero(make_slave, fmi):
+def test_sample_ticks_continue_through_time_zero(make_slave, fmi):
     """Rounding is coarser at the start than near zero, where ticks must still come one after the other."""
     model = make_slave(fmi=fmi, interface="me")
     model.set_values({"imu.rate": 1e4})
@@ -72,7 +72,7 @@ def test_ticks_go_on_through_time_zero(make_slave, fmi):
 
 
 @pytest.mark.medium
-def test_a_master_that_adds_up_its_time_gets_every_sample(make_slave, fmi):
+def test_accumulated_step_times_miss_no_sample(make_slave, fmi):
     """A minute and more of 10 ms steps at 100 Hz: each step ends with its own sample."""
     slave = make_slave(fmi=fmi).start(**{"depth_sensor.rate": 100.0, "wrench.Z": 20.0, "substep": 0.01})
     t = 0.0
@@ -84,7 +84,7 @@ def test_a_master_that_adds_up_its_time_gets_every_sample(make_slave, fmi):
 
 
 @pytest.mark.parametrize("start", [1e8, -1e8])
-def test_late_ticks_come_in_time_for_a_master_that_adds_up(make_slave, fmi, start):
+def test_late_ticks_are_on_time_for_accumulated_step_times(make_slave, fmi, start):
     """Each addition of 0.02 s to 1e8 s is 4 ns short of it, and half as many again may be those of the tick."""
     slave = make_slave(fmi=fmi)
     slave.set_values({"depth_sensor.rate": 50.0, "wrench.Z": 200.0, "substep": 0.02})
@@ -95,7 +95,7 @@ def test_late_ticks_come_in_time_for_a_master_that_adds_up(make_slave, fmi, star
         assert abs(measured - true) < 1e-7
 
 
-def test_time_is_where_the_step_ends_though_a_tick_is_almost_there(make_slave):
+def test_time_equals_the_step_end_near_a_tick(make_slave):
     """Eight times a tenth of a second, added up, are a last bit short of the eighth tick."""
     slave = make_slave(fmi=3).start(**{"depth_sensor.rate": 10.0})
     for _ in range(12):
@@ -104,7 +104,7 @@ def test_time_is_where_the_step_ends_though_a_tick_is_almost_there(make_slave):
 
 
 @pytest.mark.parametrize("start", [1e6, 1e8])
-def test_a_step_is_not_taken_twice(make_slave, fmi, start):
+def test_repeated_step_is_rejected(make_slave, fmi, start):
     slave = make_slave(fmi=fmi)
     begin(slave, start)
     slave.fmu.doStep(start, 1e-3)
@@ -113,7 +113,7 @@ def test_a_step_is_not_taken_twice(make_slave, fmi, start):
             slave.fmu.doStep(time, 1e-3)
 
 
-def test_time_ends_where_states_can_still_be_kept(make_slave, fmi):
+def test_time_beyond_the_representable_range_is_rejected(make_slave, fmi):
     slave = make_slave(fmi=fmi)
     begin(slave, 1e9)
     with pytest.raises(FMICallException):
@@ -144,7 +144,7 @@ def test_outputs_of_initialisation_are_those_after_it(make_slave, fmi):
 
 
 @pytest.mark.parametrize("length", [1e-160, 1e-7])
-def test_a_quaternion_without_a_direction_has_derivatives_of_what_it_gives(make_slave, fmi, length):
+def test_zero_quaternion_has_zero_derivatives(make_slave, fmi, length):
     """Identity, whatever its last digits."""
     model = make_slave(fmi=fmi, interface="me").start(**{"velocity.u": 1.0})
     model.update_discrete()
@@ -159,6 +159,6 @@ def test_a_quaternion_without_a_direction_has_derivatives_of_what_it_gives(make_
 
 
 @pytest.mark.parametrize("i", range(4))
-def test_a_quaternion_is_told_by_all_its_parts_from_a_unit_one(make_slave, fmi, i):
+def test_non_unit_quaternion_is_normalized_and_logged(make_slave, fmi, i):
     said = make_slave(fmi=fmi, logging_on=True).start(**{"quaternion.e0": 0.0, f"quaternion.e{i}": 1.5}).said
     assert said[0][1] == "quaternion of length 1.5 made a unit quaternion"

@@ -1,4 +1,4 @@
-"""How the FMU refuses: always with a message that names the variable, and without harm."""
+"""Rejections of the FMU: a message that names the variable, and an unchanged state."""
 
 import ctypes
 import math
@@ -24,7 +24,7 @@ def refused(slave, call, *words):
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("name", ["thrust[3]", "wrench.M", "mass", "position.x"])
-def test_no_nan_or_infinity_gets_in(make_slave, fmi, name, value):
+def test_nan_and_infinity_are_rejected(make_slave, fmi, name, value):
     slave = make_slave(fmi=fmi)
     before = slave.get(name)
     refused(slave, lambda: slave.set_values({name: value}), name, "not a finite number")
@@ -41,7 +41,7 @@ def test_values_out_of_range_are_refused(make_slave, fmi, name, value):
     refused(slave, lambda: slave.set_values({name: value}), name, "outside [")
 
 
-def test_a_refused_value_sets_none_of_its_company(make_slave, fmi):
+def test_rejected_value_leaves_all_values_unchanged(make_slave, fmi):
     slave = make_slave(fmi=fmi)
     refused(slave, lambda: slave.set_values({"weight": 1.0, "mass": -1.0}), "mass")
     assert slave.get("weight") == [1226.25]
@@ -52,7 +52,7 @@ def test_mass_matrix_must_be_positive_definite(make_slave, fmi):
     refused(slave, lambda: slave.start(**{"added_mass[1,2]": 1e6}), "positive definite")
 
 
-def test_a_tunable_parameter_that_makes_no_vehicle_stops_the_step(make_slave, fmi):
+def test_invalid_tunable_parameter_rejects_the_step(make_slave, fmi):
     slave = make_slave(fmi=fmi).start()
     slave.set_values({"thrust_min[1]": 30.0})
     refused(slave, lambda: slave.step(0.1), "thrust_min[1] = 30 is above thrust_max[1] = 27")
@@ -65,12 +65,12 @@ def test_quaternion_must_have_a_direction(make_slave, fmi):
     refused(slave, slave.start, "quaternion")
 
 
-def test_outputs_cannot_be_set(make_slave, fmi):
+def test_setting_outputs_is_rejected(make_slave, fmi):
     slave = make_slave(fmi=fmi)
     refused(slave, lambda: slave.set_values({"attitude.roll": 0.1}), "attitude.roll", "calculated")
 
 
-def test_states_cannot_be_set_once_running(make_slave, fmi):
+def test_setting_states_after_initialization_is_rejected(make_slave, fmi):
     slave = make_slave(fmi=fmi).start()
     refused(slave, lambda: slave.set_values({"position.x": 1.0}), "position.x", "initialisation")
 
@@ -86,17 +86,17 @@ def test_huge_steps_are_refused(make_slave, fmi):
     refused(slave, lambda: slave.fmu.doStep(0.0, 1e9), "substeps")
 
 
-def test_samples_count_as_substeps_do(make_slave, fmi):
+def test_sensor_samples_count_toward_the_substep_limit(make_slave, fmi):
     slave = make_slave(fmi=fmi).start(**{"substep": 1.0, "depth_sensor.rate": 9e3})
     refused(slave, lambda: slave.fmu.doStep(0.0, 200.0), "1.8e+06 substeps", "rates of sensors")
 
 
-def test_a_start_that_is_right_is_not_remarked_upon(make_slave, fmi):
+def test_valid_start_logs_nothing(make_slave, fmi):
     said = make_slave(fmi=fmi, logging_on=True).start().said
     assert [text for status, text in said if status > 0] == []
 
 
-def test_steps_start_where_the_plant_is(make_slave, fmi):
+def test_step_must_start_at_the_current_time(make_slave, fmi):
     slave = make_slave(fmi=fmi).start()
     refused(slave, lambda: slave.fmu.doStep(5.0, 0.1), "the plant is at 0")
 
@@ -111,7 +111,7 @@ def test_steps_start_where_the_plant_is(make_slave, fmi):
         ({"linear_damping[1]": 2e5, "wrench.X": 10.0}, "substep"),
     ],
 )  # fmt: skip
-def test_a_step_that_cannot_be_right_is_not_taken(make_slave, fmi, change, words):
+def test_unstable_step_is_rejected_and_leaves_the_state(make_slave, fmi, change, words):
     slave = make_slave("bluerov2_heavy", fmi).start()
     rest = dict(zip(change, slave.get(*change), strict=True))
     slave.set_values(change)
@@ -122,7 +122,7 @@ def test_a_step_that_cannot_be_right_is_not_taken(make_slave, fmi, change, words
     slave.fmu.doStep(0.0, 0.05)  # and goes on
 
 
-def test_a_step_that_leaves_the_range_is_not_taken(make_slave, fmi):
+def test_step_out_of_range_is_rejected_and_leaves_the_state(make_slave, fmi):
     slave = make_slave(fmi=fmi).start(**{"position.x": 999_999.0, "velocity.u": 100.0})
     refused(slave, lambda: slave.step(0.1), "position.x becomes 10000", "outside [-1000000, 1000000]")
     assert slave.get("position.x") == [999_999.0]
@@ -137,7 +137,7 @@ def test_no_step_beyond_the_stop_time(make_slave):
     refused(slave, lambda: slave.step(0.01), "stop time")
 
 
-def test_times_that_cannot_be_are_refused(make_slave):
+def test_invalid_times_are_rejected(make_slave):
     slave = make_slave(fmi=2)
     refused(slave, lambda: slave.fmu.setupExperiment(startTime=math.nan), "start time")
     refused(slave, lambda: slave.fmu.setupExperiment(startTime=1.0, stopTime=0.5), "stop time")
@@ -145,7 +145,7 @@ def test_times_that_cannot_be_are_refused(make_slave):
 
 @pytest.mark.parametrize(("start", "stop"), [(math.nan, None), (1.0, 0.5), (0.0, math.nan), (-2e9, None)])
 def test_refused_times_block_initialisation(make_slave, fmi, start, stop):
-    """Until there are others: an importer that overlooks the status must not run at times that were not taken."""
+    """Until valid times are set: an importer that ignores the status must not run at rejected times."""
     slave = make_slave(fmi=fmi)
     if fmi == 2:
         with pytest.raises(FMICallException):
@@ -184,7 +184,7 @@ def test_initialisation_is_entered_once(make_slave, fmi):
     refused(slave, slave.fmu.enterInitializationMode, said)
 
 
-def test_reading_nothing_is_no_fault(make_slave):
+def test_reading_no_variables_succeeds(make_slave):
     assert make_slave(fmi=2).fmu.getInteger([]) == []
     assert make_slave(fmi=3).fmu.getInt32([]) == []
 
@@ -194,19 +194,19 @@ def test_no_stepping_before_initialisation(make_slave, fmi):
     refused(slave, lambda: slave.step(0.1), "before initialisation")
 
 
-def test_a_wrong_token_makes_no_instance(make_slave, fmi):
+def test_wrong_token_is_rejected(make_slave, fmi):
     slave = make_slave(fmi=fmi)
     slave.fmu.guid = "{not this one}"
     with pytest.raises(Exception, match="Failed to instantiate"):
         slave.fmu.instantiate()
 
 
-def test_what_is_not_offered_is_logged(make_slave):
+def test_unsupported_functions_are_logged(make_slave):
     slave = make_slave(fmi=3).start()
     refused(slave, slave.fmu.enterConfigurationMode, "fmi3EnterConfigurationMode", "not offered")
 
 
-def test_reset_brings_the_start_back(make_slave, fmi):
+def test_reset_restores_start_values(make_slave, fmi):
     slave = make_slave(fmi=fmi).start(**{"position.z": 3.0})
     fresh = slave.get(*STATES)
     slave.step(1.0)
@@ -216,7 +216,7 @@ def test_reset_brings_the_start_back(make_slave, fmi):
     assert slave.get(*STATES) == fresh
 
 
-def test_time_may_start_anywhere_and_be_added_up(make_slave):
+def test_start_time_is_arbitrary_and_step_times_may_be_accumulated(make_slave):
     slave = make_slave(fmi=3)
     slave.fmu.enterInitializationMode(startTime=100.0)
     slave.fmu.exitInitializationMode()
@@ -226,7 +226,7 @@ def test_time_may_start_anywhere_and_be_added_up(make_slave):
     assert slave.time != 2100.0
 
 
-def test_both_versions_give_the_same_bits(make_slave):
+def test_both_fmi_versions_give_identical_results(make_slave):
     ends = []
     for fmi in (2, 3):
         slave = make_slave("bluerov2_heavy", fmi).start(**{"velocity.p": 0.3})
@@ -250,7 +250,7 @@ def test_instances_do_not_disturb_each_other():
 # ---- logging ----
 
 
-def test_categories_are_logged_when_asked_for(make_slave, fmi):
+def test_log_categories_are_enabled_on_request(make_slave, fmi):
     """Errors and warnings always; the rest when logging is on, or its category."""
     quiet, loud = make_slave(fmi=fmi), make_slave(fmi=fmi, logging_on=True)
     for slave in (quiet, loud):
@@ -261,7 +261,7 @@ def test_categories_are_logged_when_asked_for(make_slave, fmi):
     assert [status for status, _ in loud.said] == [1, 0]
 
 
-def test_one_category_is_switched_on_alone(make_slave, fmi):
+def test_log_categories_are_enabled_individually(make_slave, fmi):
     slave = make_slave(fmi=fmi)
     slave.fmu.setDebugLogging(False, [])
     slave.fmu.setDebugLogging(True, ["logEvents"])
@@ -276,7 +276,7 @@ def test_an_unknown_category_is_refused(make_slave, fmi):
     )
 
 
-def test_a_category_that_is_null_is_refused(make_slave, fmi):
+def test_null_log_category_is_rejected(make_slave, fmi):
     slave = make_slave(fmi=fmi)
     names = (ctypes.c_char_p * 2)(b"logAll", None)
     said = 'log category "NULL" is unknown'
@@ -298,7 +298,7 @@ def test_errors_are_silent_once_switched_off(make_slave, fmi):
     assert slave.said == []
 
 
-def test_asking_for_nothing_is_no_fault(make_slave, fmi):
+def test_zero_length_calls_succeed(make_slave, fmi):
     """Of types that the plant has not, too."""
     slave = make_slave(fmi=fmi).start()
     names = ["fmi2GetString", "fmi2SetString"] if fmi == 2 else ["fmi3GetFloat32", "fmi3GetClock", "fmi3SetUInt64"]
@@ -318,7 +318,7 @@ def test_asking_for_nothing_is_no_fault(make_slave, fmi):
         (False, 1, "requiredIntermediateVariables is NULL"),
     ],
 )
-def test_what_co_simulation_has_not_is_refused_at_once(make_slave, event_mode, n, said):
+def test_unsupported_co_simulation_features_are_rejected_at_instantiation(make_slave, event_mode, n, said):
     slave = make_slave()
     heard = []
     callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)(

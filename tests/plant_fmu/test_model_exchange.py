@@ -59,7 +59,7 @@ def test_cvode_ends_where_co_simulation_does(make_slave, fmi, more):
 
 
 def test_a_drifting_current_is_the_same_in_both(make_slave, fmi):
-    """Its knots are time events: the same numbers at the same times, whoever integrates."""
+    """Its knots are time events: the same values at the same times for any integrator."""
     drift = {
         "current_variation.x": 0.3,
         "current_variation.y": 0.2,
@@ -107,7 +107,7 @@ def test_scipy_integrates_the_derivatives(make_slave, fmi):
     assert np.abs(end[:13] - slave.get(*STATES)).max() < 1e-7
 
 
-def test_events_come_on_the_grid(make_slave, fmi):
+def test_events_occur_on_the_sample_grid(make_slave, fmi):
     model = make_slave(fmi=fmi, interface="me").start(**{"compass.rate": 8.0, "usbl.rate": 3.0})
     changed, following = model.update_discrete()
     times = []
@@ -140,7 +140,7 @@ def test_a_lag_switched_on_starts_from_the_present_force(make_slave, fmi):
     assert model.get("thruster_force[1]", "der(actuator.thrust[1])") == [10.0, -40.0]
 
 
-def test_parameters_change_at_events_alone(make_slave, fmi):
+def test_parameters_change_only_in_event_mode(make_slave, fmi):
     model = make_slave(fmi=fmi, interface="me").start()
     model.set_values({"mass": 130.0})
     model.update_discrete()
@@ -164,8 +164,8 @@ def test_states_may_also_be_set_one_by_one(make_slave, fmi):
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e7])
-def test_states_that_cannot_be_are_discarded(make_slave, fmi, value):
-    """The status tells an integrator to try a shorter step; the model stays as it was."""
+def test_invalid_states_are_discarded(make_slave, fmi, value):
+    """The status makes an integrator try a shorter step; the model is unchanged."""
     model = make_slave(fmi=fmi, interface="me", logging_on=True).start()
     model.update_discrete()
     model.fmu.enterContinuousTimeMode()
@@ -178,7 +178,7 @@ def test_states_that_cannot_be_are_discarded(make_slave, fmi, value):
     assert np.isfinite(model.rates()).all()
 
 
-def test_time_does_not_go_before_the_start(make_slave, fmi):
+def test_time_before_the_start_is_rejected(make_slave, fmi):
     model = make_slave(fmi=fmi, interface="me")
     if fmi == 2:
         model.fmu.setupExperiment(startTime=5.0)
@@ -208,7 +208,7 @@ def test_the_wrong_number_of_states_is_refused(make_slave, fmi):
     assert "5 values, expected 27" in model.said[-1][1]
 
 
-def test_each_interface_has_its_own_functions(make_slave, fmi):
+def test_interfaces_reject_functions_of_the_other(make_slave, fmi):
     slave, model = make_slave(fmi=fmi).start(), make_slave(fmi=fmi, interface="me").start()
     version = f"fmi{fmi}"
     step = model.fmu.dll[f"{version}DoStep"]
@@ -223,7 +223,7 @@ def test_each_interface_has_its_own_functions(make_slave, fmi):
         assert slave.said[-1][1] == f"{action}: not offered in co-simulation"
 
 
-def test_boolean_outputs_change_at_events_alone(make_slave, fmi):
+def test_boolean_outputs_change_only_at_events(make_slave, fmi):
     """As the standards ask of discrete variables."""
     model = make_slave(fmi=fmi, interface="me").start(hull_radius=0.3, bottom_depth=50.0)
     model.update_discrete()
@@ -239,7 +239,7 @@ def test_boolean_outputs_change_at_events_alone(make_slave, fmi):
     assert model.flag("thrust_saturated[1]") and model.flag("bottom_contact")
 
 
-def test_what_is_reinitialised_says_so(make_slave, fmi):
+def test_reinitialized_states_are_declared(make_slave, fmi):
     """Forces without a lag jump with their commands."""
     folder = make_slave(fmi=fmi, interface="me").folder
     root = ElementTree.parse(Path(folder) / "modelDescription.xml").getroot()

@@ -1,4 +1,4 @@
-"""NULL where FMI wants a pointer: an error with a reason, never a crash, in every function of FMI's own headers."""
+"""NULL for each pointer of every FMI function: an error with a reason, never a crash."""
 
 import zipfile
 
@@ -22,13 +22,13 @@ def library(fmi, tmp_path):
     return tmp_path / name, fmpy.read_model_description(str(path))
 
 
-def test_the_sweep_knows_every_function(fmi, library):
+def test_null_sweep_covers_every_exported_function(fmi, library):
     known = {function.name for function in functions(fmi)}
     assert known == exports(fmi) == set().union(*(part.exports for part in read_libraries(library[0].read_bytes())))
 
 
 @pytest.mark.medium(fast=1)
-def test_null_is_refused_everywhere(fmi, library, tmp_path):
+def test_null_pointers_are_rejected(fmi, library, tmp_path):
     path, description = library
     rows = sweep(
         tmp_path, fmi, description.guid, len(description.derivatives), [str(path), f"-Wl,-rpath,{path.parent}"]
@@ -38,7 +38,7 @@ def test_null_is_refused_everywhere(fmi, library, tmp_path):
 
 
 @pytest.mark.slow
-def test_null_does_no_harm_to_memory(fmi, tmp_path):
+def test_null_pointers_are_memory_safe(fmi, tmp_path):
     """The same with the sources, under AddressSanitizer and UndefinedBehaviorSanitizer."""
     vehicle = load_vehicle("odin")
     rows = sweep_sources(tmp_path, fmi, of_vehicle(vehicle))

@@ -1,4 +1,4 @@
-"""Pictures of a vehicle: what they say is what its file says, and nothing covers anything else."""
+"""Pictures of a vehicle: consistent with its file, without overlapping labels."""
 
 import subprocess
 import sys
@@ -19,7 +19,7 @@ VEHICLES = shipped_vehicles()
 
 
 @pytest.mark.parametrize("name", VEHICLES)
-def test_lines_of_action_give_the_wrenches_of_the_file(name):
+def test_thruster_lines_reproduce_the_wrench_matrix(name):
     vehicle = load_vehicle(name)
     lines = thruster_lines(vehicle)
     assert len(lines) == vehicle.n_thrusters
@@ -61,7 +61,7 @@ def extents(figure):
 @pytest.mark.slow
 @pytest.mark.parametrize("picture", PICTURES)
 @pytest.mark.parametrize("name", VEHICLES)
-def test_no_text_is_cut_off_or_covers_another(name, picture):
+def test_labels_are_not_clipped_and_do_not_overlap(name, picture):
     figure = PICTURES[picture](load_vehicle(name))
     boxes = extents(figure)
     whole = figure.bbox
@@ -91,7 +91,7 @@ def test_every_variable_is_counted_once_in_the_map(name):
     assert sorted(found) == sorted(v.name for v in parameters)
 
 
-def test_rows_say_indices_parts_units_and_types():
+def test_variable_rows_show_indices_components_units_and_types():
     rows = {row.text: (row.count, row.units) for row in rows_of(variables(load_vehicle("odin")))}
     assert rows["thrust[1…8]"] == (8, "N")
     assert rows["thruster_matrix[1…6, 1…8]"] == (48, "–, N.m/N")
@@ -102,7 +102,7 @@ def test_rows_say_indices_parts_units_and_types():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["png", "svg"])
-def test_a_picture_is_the_same_file_each_time(suffix):
+def test_pictures_are_reproducible(suffix):
     vehicle = load_vehicle("odin")
     assert image(PICTURES["thrusters"](vehicle), suffix) == image(PICTURES["thrusters"](vehicle), suffix)
 
@@ -117,7 +117,7 @@ def test_the_command_writes_a_picture(picture, tmp_path, capsys):
         assert drawn.width > 1000
 
 
-def test_the_command_refuses_other_files_and_unknown_vehicles(tmp_path, capsys):
+def test_plot_command_rejects_unknown_formats_and_vehicles(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main(["plot", "odin", "thrusters", "--out", str(tmp_path / "out.gif")])
     assert "expected a name that ends in .png, .svg, .pdf" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""`Plant` against FMPy's own calls, and all that a user may do with values and in the wrong order."""
+"""`Plant` against FMPy's own calls, and invalid values and call orders."""
 
 import copy
 import pickle
@@ -21,7 +21,7 @@ WRENCH = tuple(f"wrench.{a}" for a in "XYZKMN")
 # ---- against FMPy's own calls ----
 
 
-def test_steps_as_fmpy_does(make_plant, make_slave, fmi):
+def test_plant_steps_equal_fmpy_steps(make_plant, make_slave, fmi):
     slave, plant = make_slave("odin", fmi).start(), make_plant("odin", fmi)
     for k in range(100):
         inputs = 20.0 * np.sin(0.1 * k + np.arange(14))
@@ -72,7 +72,7 @@ def test_a_plant_is_made_of_a_name_a_file_a_vehicle_or_an_fmu(make_plant, tmp_pa
         (7, 3, PlantError, "plant is 7, expected a vehicle"),
     ],
 )
-def test_what_is_no_plant_is_said(source, fmi, kind, words):
+def test_invalid_plant_sources_are_rejected(source, fmi, kind, words):
     with pytest.raises(kind, match=words):
         Plant(source, fmi)
 
@@ -149,7 +149,7 @@ def test_inputs_act_from_the_start_and_hold(make_plant, fmi):
     assert plant["actuation.X"] == 0.0
 
 
-def test_a_nan_among_the_inputs_stops_the_step_and_nothing_else(make_plant, fmi):
+def test_nan_input_rejects_the_step_and_the_plant_continues(make_plant, fmi):
     plant, other = make_plant("odin", fmi), make_plant("odin", fmi)
     plant.inputs.values[3] = np.nan
     with pytest.raises(PlantError, match=r"^t = 0 s: thrust\[4\] = nan refused"):
@@ -162,7 +162,7 @@ def test_a_nan_among_the_inputs_stops_the_step_and_nothing_else(make_plant, fmi)
 # ---- the order of things ----
 
 
-def test_nothing_but_setting_comes_before_initialise(make_plant, fmi):
+def test_only_setting_is_allowed_before_initialise(make_plant, fmi):
     plant = make_plant("odin", fmi, start=False)
     for act in (
         lambda: plant.step(0.1),
@@ -179,7 +179,7 @@ def test_nothing_but_setting_comes_before_initialise(make_plant, fmi):
         plant.initialise()
 
 
-def test_nothing_comes_after_close(make_plant):
+def test_closed_plant_rejects_every_call(make_plant):
     plant = make_plant()
     state = plant.save()
     plant.close()
@@ -203,7 +203,7 @@ def test_nothing_comes_after_close(make_plant):
 
 
 @pytest.mark.parametrize("step", [0.0, -0.1, float("nan"), float("inf"), "0.1", None])
-def test_steps_that_are_none_are_refused(make_plant, step):
+def test_invalid_steps_are_rejected(make_plant, step):
     plant = make_plant()
     plant.step(0.1)
     with pytest.raises(PlantError, match=r"step is .*, expected seconds above 0"):
@@ -212,7 +212,7 @@ def test_steps_that_are_none_are_refused(make_plant, step):
     assert plant.time == 0.2
 
 
-def test_time_gathers_no_rounding(make_plant):
+def test_time_accumulates_no_rounding_error(make_plant):
     plant = make_plant()
     for k in range(1, 1001):
         plant.step(0.001)
@@ -223,14 +223,14 @@ def test_time_gathers_no_rounding(make_plant):
     assert plant.time == 1.75
 
 
-def test_it_starts_at_any_time(make_plant, fmi):
+def test_start_time_is_arbitrary(make_plant, fmi):
     plant = make_plant("odin", fmi, start=False)
     plant.initialise(time=100.0)
     plant.step(0.5)
     assert plant.time == 100.5
 
 
-def test_parameters_that_contradict_are_refused_when_it_starts(make_plant, fmi):
+def test_contradictory_parameters_are_rejected_at_initialisation(make_plant, fmi):
     plant = make_plant("odin", fmi, start=False)
     plant.set({"added_mass[1,1]": 1.0, "added_mass[1,2]": 1e4})
     with pytest.raises(PlantError, match="positive definite"):
@@ -239,7 +239,7 @@ def test_parameters_that_contradict_are_refused_when_it_starts(make_plant, fmi):
     plant.initialise()
 
 
-def test_reset_takes_it_back_to_the_start(make_plant, fmi):
+def test_reset_restores_the_initial_state(make_plant, fmi):
     plant, fresh = make_plant("odin", fmi), make_plant("odin", fmi)
     drive(plant)
     plant["mass"] = 140.0
@@ -268,13 +268,13 @@ def test_a_step_of_single_precision_leaves_the_time_exact(make_plant):
 
 
 @pytest.mark.parametrize("step", [True, 10**400], ids=["bool", "huge"])
-def test_a_step_that_is_no_number_of_seconds(make_plant, step):
+def test_non_numeric_step_is_rejected(make_plant, step):
     plant = make_plant("odin")
     with pytest.raises(PlantError, match="expected seconds above 0"):
         plant.step(step)
 
 
-def test_a_refused_integer_leaves_the_real_numbers_as_they_were(make_plant):
+def test_rejected_integer_leaves_real_values_unchanged(make_plant):
     plant = make_plant("odin")
     mass = plant["mass"]
     with pytest.raises(PlantError, match="seed"):
@@ -282,7 +282,7 @@ def test_a_refused_integer_leaves_the_real_numbers_as_they_were(make_plant):
     assert plant["mass"] == mass and plant["thrust[1]"] == 0.0
 
 
-def test_a_refused_initialisation_says_the_way_out():
+def test_failed_initialisation_error_names_the_remedy():
     with Plant("odin") as plant:
         plant.set({"dvl.velocity_noise": 0.1})
         with pytest.raises(PlantError, match=r"needs the sensor's rate .*; reset\(\), then set what is right"):

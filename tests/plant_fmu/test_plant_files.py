@@ -1,4 +1,4 @@
-"""Plants beside each other, plants of foreign FMUs and of broken ones, and what they leave on the disk: nothing."""
+"""Several plants, foreign and broken FMUs, and removal of temporary files."""
 
 import gc
 import os
@@ -32,7 +32,7 @@ def edited(tmp_path, edit, fmi=3, drop=()):
 # ---- several at once, and foreign ones ----
 
 
-def test_plants_know_nothing_of_each_other(make_plant):
+def test_plants_are_independent(make_plant):
     plants = [make_plant("odin", fmi) for fmi in (2, 3, 2, 3)]
     plants[1]["wrench.X"] = plants[2]["wrench.X"] = 50.0
     for plant in plants:
@@ -76,7 +76,7 @@ def shuffle(root):
         del interface.attrib[key]
 
 
-def test_other_orders_no_inputs_no_flags_no_states(make_plant, tmp_path):
+def test_reordered_fmu_without_optional_capabilities_works(make_plant, tmp_path):
     plant, ours = make_plant(edited(tmp_path, shuffle)), make_plant()
     assert (len(plant.inputs), len(plant.flags)) == (0, 0)
     assert plant.outputs.names == ours.outputs.names[::-1]
@@ -99,7 +99,7 @@ def test_other_orders_no_inputs_no_flags_no_states(make_plant, tmp_path):
 
 
 @pytest.mark.medium
-def test_a_forgotten_plant_is_freed(scratch):
+def test_unreferenced_plant_is_freed(scratch):
     plant = Plant("odin")
     assert len(list(scratch.iterdir())) == 1
     del plant
@@ -107,7 +107,7 @@ def test_a_forgotten_plant_is_freed(scratch):
     assert list(scratch.iterdir()) == []
 
 
-def test_failing_construction_leaves_nothing(tmp_path, scratch, monkeypatch):
+def test_failed_construction_leaves_no_files(tmp_path, scratch, monkeypatch):
     def without_interface(root):
         root.remove(root.find("CoSimulation"))
 

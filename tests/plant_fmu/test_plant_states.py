@@ -15,7 +15,7 @@ ACCELERATIONS = tuple(f"der(velocity.{a})" for a in "uvwpqr")
 # ---- states ----
 
 
-def test_a_restored_run_goes_on_to_the_last_bit(make_plant, fmi):
+def test_restored_run_continues_bit_for_bit(make_plant, fmi):
     plant = make_plant("odin", fmi, **{"imu.rate": 50.0, "imu.acceleration_noise": 0.1, "seed": 3})
     drive(plant)
     plant["thrust[1]"] = 77.0
@@ -30,7 +30,7 @@ def test_a_restored_run_goes_on_to_the_last_bit(make_plant, fmi):
     assert plant.outputs.values[0] != runs[0][0][-1][0]
 
 
-def test_a_state_from_before_initialise_takes_it_back_there(make_plant, fmi):
+def test_state_saved_before_initialise_can_be_restored(make_plant, fmi):
     plant = make_plant("odin", fmi, start=False)
     plant["mass"] = 130.0
     state = plant.save()
@@ -42,7 +42,7 @@ def test_a_state_from_before_initialise_takes_it_back_there(make_plant, fmi):
     assert plant["mass"] == 130.0 and np.array_equal(drive(plant), first)
 
 
-def test_a_state_travels_as_bytes(make_plant, fmi):
+def test_state_round_trips_as_bytes(make_plant, fmi):
     plant, other = make_plant("odin", fmi), make_plant("odin", fmi, start=False)
     drive(plant)
     data = plant.serialise(plant.save())
@@ -52,7 +52,7 @@ def test_a_state_travels_as_bytes(make_plant, fmi):
     assert np.array_equal(drive(other), drive(plant))
 
 
-def test_bytes_that_are_no_state_are_refused(make_plant):
+def test_invalid_state_bytes_are_rejected(make_plant):
     plant = make_plant()
     data = plant.serialise(plant.save())
     flipped = bytearray(data)
@@ -84,7 +84,7 @@ def test_states_are_freed_once_and_never_used_again(make_plant, fmi):
 
 
 @pytest.mark.medium
-def test_states_that_nobody_holds_are_freed(make_plant, monkeypatch):
+def test_unreferenced_states_are_freed(make_plant, monkeypatch):
     plant = make_plant()
     freed = []
     free = plant._instance.fmu.freeFMUState
@@ -115,7 +115,7 @@ def test_accelerations_by_wrench_are_the_inverse_of_the_mass_matrix(make_plant, 
 
 
 @pytest.mark.medium
-def test_derivatives_see_inputs_that_no_step_has_sent_yet(make_plant):
+def test_derivatives_use_inputs_not_yet_sent_by_a_step(make_plant):
     plant = make_plant()
     assert plant.jacobian(["actuation.X"], ["thrust[1]"])[0, 0] > 0.7
     plant["thrust[1]"] = 1000.0  # far beyond its limit
@@ -133,6 +133,6 @@ def test_derivatives_see_inputs_that_no_step_has_sent_yet(make_plant):
         (["actuation.X"], ["actuation.Y"], "derivatives of actuation.X by actuation.Y: "),
     ],
 )
-def test_derivatives_that_are_none_are_named(make_plant, fmi, unknowns, knowns, words):
+def test_unavailable_derivatives_are_named(make_plant, fmi, unknowns, knowns, words):
     with pytest.raises(PlantError, match=words):
         make_plant("odin", fmi).jacobian(unknowns, knowns)

@@ -1,4 +1,4 @@
-"""FMUs for all platforms: what is in them, what it exports and needs, and what it computes where that can be run."""
+"""FMUs for all platforms: content, exports, dependencies, and results where they can run."""
 
 import hashlib
 import os
@@ -45,7 +45,7 @@ def binaries(path):
         return {name.split("/")[1]: archive.read(name) for name in archive.namelist() if name.startswith("binaries/")}
 
 
-def test_readers_find_what_others_built():
+def test_library_readers_parse_third_party_libraries():
     """The readers of this folder, on libraries that FMPy ships."""
     files = sorted((Path(fmpy.__file__).parent / "sundials").glob("*/sundials_cvode.*"))
     if not files:
@@ -57,7 +57,7 @@ def test_readers_find_what_others_built():
 
 
 @pytest.mark.slow
-def test_each_platform_has_its_folder(all_platforms, fmi):
+def test_every_platform_has_its_binaries_folder(all_platforms, fmi):
     with zipfile.ZipFile(all_platforms(fmi)) as archive:
         names = [name for name in archive.namelist() if name.startswith("binaries/")]
         assert archive.namelist() == sorted(archive.namelist())
@@ -76,7 +76,7 @@ def test_each_library_is_for_its_machine(all_platforms, fmi):
 
 
 @pytest.mark.slow
-def test_the_whole_api_is_exported_and_nothing_else(all_platforms, fmi):
+def test_exactly_the_fmi_api_is_exported(all_platforms, fmi):
     header = (HEADERS / f"fmi{fmi}Functions.h").read_text()
     api = set(re.findall(rf"FMI{fmi}_Export\s+fmi{fmi}\w+TYPE\s+(fmi{fmi}\w+);", header))
     assert len(api) > 40
@@ -86,7 +86,7 @@ def test_the_whole_api_is_exported_and_nothing_else(all_platforms, fmi):
 
 
 @pytest.mark.slow
-def test_libraries_need_what_every_system_has(all_platforms, fmi):
+def test_libraries_depend_only_on_system_libraries(all_platforms, fmi):
     for folder, data in binaries(all_platforms(fmi)).items():
         for library in read_libraries(data):
             assert library.needs
@@ -104,7 +104,7 @@ def test_libraries_need_what_every_system_has(all_platforms, fmi):
 
 
 @pytest.mark.slow
-def test_no_library_names_a_place(all_platforms, fmi):
+def test_libraries_contain_no_paths(all_platforms, fmi):
     places = {"/tmp", "/root", "/home", "/Users", "C:\\", "plant_fmu", ".pdb", str(Path.home()), sys.prefix}
     for folder, data in binaries(all_platforms(fmi)).items():
         assert not [place for place in places if place.encode() in data], folder
@@ -113,7 +113,7 @@ def test_no_library_names_a_place(all_platforms, fmi):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2])  # of 3.0 the tests of packaging compare libraries of all platforms
-def test_two_builds_for_all_give_the_same_bytes(all_platforms, fmi, tmp_path, monkeypatch):
+def test_builds_for_all_platforms_are_reproducible(all_platforms, fmi, tmp_path, monkeypatch):
     (tmp_path / "another place").mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "another place"))
     again = build_fmu(load_vehicle("odin"), fmi, tmp_path / "again.fmu", ",".join(PLATFORMS))
@@ -121,7 +121,7 @@ def test_two_builds_for_all_give_the_same_bytes(all_platforms, fmi, tmp_path, mo
 
 
 @pytest.mark.slow
-def test_arm_macs_find_their_signature_right(all_platforms, fmi):
+def test_arm_mac_signatures_are_valid(all_platforms, fmi):
     """They load no library without one; it holds a hash of each page (Apple's cs_blobs.h)."""
     data = binaries(all_platforms(fmi))["darwin64" if fmi == 2 else "aarch64-darwin"]
     library = parts(data)[1] if fmi == 2 else data
@@ -143,7 +143,7 @@ def test_arm_macs_find_their_signature_right(all_platforms, fmi):
 
 
 @pytest.mark.slow
-def test_macs_find_no_number_left_to_chance(all_platforms, fmi):
+def test_mac_stub_symbols_match_their_pointers(all_platforms, fmi):
     """Each call leaps through a pointer, and both have their symbol's number: ziglang's linker forgets some with -x."""
     found = [data for folder, data in binaries(all_platforms(fmi)).items() if "darwin" in folder]
     for library in [part for data in found for part in (parts(data) if data[0] == 0xCA else [data])]:
@@ -169,7 +169,7 @@ def test_macs_find_no_number_left_to_chance(all_platforms, fmi):
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("file") is None, reason="needs the command file")
-def test_the_command_file_knows_the_universal_library(all_platforms, tmp_path):
+def test_file_command_recognizes_the_universal_library(all_platforms, tmp_path):
     (tmp_path / "odin.dylib").write_bytes(binaries(all_platforms(2))["darwin64"])
     said = subprocess.run(["file", tmp_path / "odin.dylib"], capture_output=True, text=True, check=True).stdout
     assert "universal binary with 2 architectures" in said
@@ -177,7 +177,7 @@ def test_the_command_file_knows_the_universal_library(all_platforms, tmp_path):
 
 
 def command(platform, tmp_path):
-    """Return what starts a program of a platform here; skip where nothing does."""
+    """Return the emulator of a platform's programs; skip if there is none."""
     if platform == "x86_64-windows":
         wine = shutil.which("wine") or shutil.which("wine64")
         return [wine] if wine else pytest.skip("needs wine to run a Windows library")
@@ -193,7 +193,7 @@ def command(platform, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("platform", ["x86_64-linux", "aarch64-linux", "x86_64-windows"])
-def test_libraries_compute_the_same(all_platforms, fmi, platform, tmp_path):
+def test_libraries_of_all_platforms_compute_the_same(all_platforms, fmi, platform, tmp_path):
     """A C program steps the library of another platform; FMPy steps the one that was built for this machine."""
     runner = command(platform, tmp_path)
     path = all_platforms(fmi)
@@ -229,7 +229,7 @@ def test_libraries_compute_the_same(all_platforms, fmi, platform, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_list_of_platforms_holds_those_alone(tmp_path):
+def test_fmu_holds_only_the_listed_platforms(tmp_path):
     pytest.importorskip("ziglang", reason="the build extra is not installed: no binaries for other platforms")
     out = tmp_path / "x.fmu"
     names = "aarch64-linux, x86_64-darwin,aarch64-linux"
@@ -240,7 +240,7 @@ def test_a_list_of_platforms_holds_those_alone(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["amiga", "linux64", "", "all,x86_64-linux", "native,x86_64-linux", "x86_64-linux,"])
-def test_unknown_platforms_are_named_beside_the_known(tmp_path, capsys, text):
+def test_unknown_platform_error_lists_known_platforms(tmp_path, capsys, text):
     assert main(["build", "--vehicle", "odin", "--platforms", text, "--out", str(tmp_path / "x.fmu")]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1

@@ -1,4 +1,4 @@
-"""Libraries that come compiled: what is made of them is what a compiler makes, and what does not fit is left alone."""
+"""Prebuilt libraries: equal to compiled ones, and unused where they do not fit."""
 
 import dataclasses
 import hashlib
@@ -39,7 +39,7 @@ def folder(once):
 
 @pytest.fixture
 def compiled():
-    """Return a function that returns a vehicle's FMU as this machine's compiler makes it, whatever the test patches."""
+    """Return a function that returns a vehicle's FMU as this machine's compiler builds it, regardless of patches."""
     with_compiler = prebuilt.FOLDER, os.environ.get("CC")
 
     def fmu(vehicle, fmi):
@@ -72,7 +72,7 @@ def binary(path):
     "vehicle", [name if name == "odin" else pytest.param(name, marks=pytest.mark.slow) for name in shipped_vehicles()]
 )
 @pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
-def test_the_plant_is_that_of_a_compiler(vehicle, fmi, compiled, no_compiler, tmp_path):
+def test_prebuilt_plant_equals_a_compiled_one(vehicle, fmi, compiled, no_compiler, tmp_path):
     path = build_fmu(load_vehicle(vehicle), fmi, tmp_path / "x.fmu")
     answers = []
     for file in (compiled(vehicle, fmi), path):
@@ -87,14 +87,14 @@ def test_the_plant_is_that_of_a_compiler(vehicle, fmi, compiled, no_compiler, tm
 
 
 @pytest.mark.medium
-def test_numbers_of_an_own_vehicle_go_in(no_compiler, tmp_path):
+def test_prebuilt_library_takes_custom_vehicle_parameters(no_compiler, tmp_path):
     own = dataclasses.replace(load_vehicle("odin"), name="own", mass=130.25)
     slave = CoSimulationInstance(build_fmu(own, 3, tmp_path / "own.fmu")).start()
     assert slave.get("mass") == [130.25]
     slave.close()
 
 
-def test_another_number_of_thrusters_needs_the_compiler(no_compiler, tmp_path):
+def test_other_thruster_count_needs_the_compiler(no_compiler, tmp_path):
     odin = load_vehicle("odin")
     given = {name: value[..., :5] for name, value in vars(odin).items() if name.startswith("thrust")}
     own = dataclasses.replace(odin, name="own", autopilot=None, **given)
@@ -104,7 +104,7 @@ def test_another_number_of_thrusters_needs_the_compiler(no_compiler, tmp_path):
 
 
 @pytest.mark.parametrize("change", ["source", "flag", "header"])
-def test_libraries_of_other_sources_are_not_taken(no_compiler, tmp_path, monkeypatch, change):
+def test_prebuilt_libraries_of_other_sources_are_rejected(no_compiler, tmp_path, monkeypatch, change):
     from plant_fmu.compiling import libraries, sources
 
     if change == "source":
@@ -123,7 +123,7 @@ def test_libraries_of_other_sources_are_not_taken(no_compiler, tmp_path, monkeyp
         build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu")
 
 
-def test_platforms_that_are_not_there_are_compiled(folder, monkeypatch):
+def test_missing_platforms_are_compiled(folder, monkeypatch):
     monkeypatch.setattr(prebuilt, "FOLDER", folder)
     odin = of_vehicle(load_vehicle("odin"))
     key = token(odin, 3)
@@ -160,7 +160,7 @@ def test_damaged_libraries_are_named(folder, tmp_path, monkeypatch, damage):
     assert not (tmp_path / "x.fmu").exists()
 
 
-def test_no_two_vehicles_have_one_token(no_compiler, tmp_path):
+def test_vehicles_have_unique_tokens(no_compiler, tmp_path):
     """What was written in is what the binary compares with."""
     first, second = (build_fmu(load_vehicle(name), 3, tmp_path / f"{name}.fmu") for name in ("odin", "rexrov"))
     slave = CoSimulationInstance(first)
@@ -168,13 +168,13 @@ def test_no_two_vehicles_have_one_token(no_compiler, tmp_path):
     assert slave.description.guid.encode() not in binary(second)
 
 
-def test_libraries_without_a_signature_stay_as_they_are():
+def test_libraries_without_a_signature_are_unchanged():
     assert signed_anew(b"\x7fELF and more") == b"\x7fELF and more"
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)  # the first that needs them compiles for all platforms
-def test_all_platforms_as_their_linkers_make_them(prebuilt_of_eight, monkeypatch):
+def test_prebuilt_libraries_match_linker_output(prebuilt_of_eight, monkeypatch):
     """Even the signature of a Mac's: the linker wrote the one, `signed_anew` the other. But for marks of identity."""
     compilers = [(platform, cross_compiler(platform)) for platform in cross_platforms("all")]
     odin = of_vehicle(load_vehicle("odin"))

@@ -1,4 +1,4 @@
-"""Units and domains: exponents are those that the name of the unit spells."""
+"""Units and ranges: exponents match the name of the unit."""
 
 import re
 
@@ -33,7 +33,7 @@ OF_SCIPY = {
 
 
 @pytest.mark.parametrize(("unit", "display"), [(u, d) for u, factors in DISPLAY_UNITS.items() for d in factors])
-def test_display_units_are_as_great_as_scipy_says(unit, display):
+def test_display_unit_factors_match_scipy(unit, display):
     """FMI: a value in the display unit is the factor times that in the unit."""
     assert unit in UNITS and display not in UNITS
     assert DISPLAY_UNITS[unit][display] == pytest.approx(1 / OF_SCIPY[display], rel=1e-15)
@@ -49,12 +49,12 @@ MADE = {
 
 
 @pytest.mark.parametrize("name", [*(name for name in ALL if name not in ("TIME", "VOLTAGE")), *MADE])
-def test_domains_hold_something_and_are_symmetric_or_of_no_negative_number(name):
+def test_quantity_ranges_are_nonempty_and_symmetric_or_nonnegative(name):
     quantity = {**ALL, **MADE}[name]
     assert quantity.minimum < quantity.maximum
     assert quantity.minimum in (0.0, -quantity.maximum) or 0.0 < quantity.minimum <= 1e-3
 
 
-def test_seeds_are_the_integers_of_32_bits_that_are_not_negative():
+def test_seeds_are_nonnegative_32_bit_integers():
     assert (quantities.SEED.minimum, quantities.SEED.maximum) == (0, np.iinfo(np.int32).max)
     assert [q.minimum < 0.0 for q in MADE.values()] == [True, False, True, False, True]

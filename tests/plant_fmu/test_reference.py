@@ -1,4 +1,4 @@
-"""The FMU against trajectories that this project did not compute."""
+"""The FMU against trajectories computed outside this project."""
 
 import json
 
@@ -31,7 +31,7 @@ def drive(slave, run, rows):
 
 @pytest.mark.medium
 @pytest.mark.parametrize("name", RUNS)
-def test_every_state_at_every_row(name, fmi, make_slave):
+def test_fmu_states_match_reference_trajectories(name, fmi, make_slave):
     rows = np.loadtxt(DATA / f"{name}.csv", delimiter=",", skiprows=1)
     states = drive(make_slave(RUNS[name]["vehicle"], fmi), RUNS[name], rows)
     assert np.abs(states - rows[:, 1:]).max() < 1e-6

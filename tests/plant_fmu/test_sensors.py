@@ -1,4 +1,4 @@
-"""Measured outputs: truth where nothing is switched on, samples with seeded noise where it is."""
+"""Measured outputs: true values by default, and samples with seeded noise."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ TILTED = dict(zip(STATES[3:], (0.6, 0.5, -0.4, 0.48, 0.7, -0.3, 0.4, 0.5, -0.6, 
 
 
 @pytest.mark.parametrize(("counter", "key", "result"), KNOWN)
-def test_the_generator_gives_its_published_answers(counter, key, result):
+def test_random_generator_matches_published_vectors(counter, key, result):
     assert philox(counter, key) == result
 
 
@@ -42,7 +42,7 @@ def test_of_two_uniform_numbers_the_first_is_above_0_and_may_be_1(make_slave, fm
     assert slave.get("measured.depth", "position.z") == [pytest.approx(expected, rel=1e-12, abs=0.0), 0.0]
 
 
-def test_sensors_are_true_where_nothing_is_switched_on(make_slave, fmi):
+def test_sensors_are_ideal_by_default(make_slave, fmi):
     slave = make_slave(fmi=fmi).start(**TILTED, **{"position.z": 5.0, "bottom_depth": 30.0})
     slave.set_values({"wrench.X": 10.0})
     slave.step(1.0)
@@ -85,7 +85,7 @@ def test_specific_force_is_the_second_derivative_of_the_path(make_slave):
     assert attitudes[1].apply(forces[1]) + np.array([0, 0, 9.81]) == pytest.approx(expected, abs=1e-5)
 
 
-def test_every_channel_has_its_noise_from_its_own_stream(make_slave, fmi):
+def test_every_channel_uses_its_own_noise_stream(make_slave, fmi):
     """Sample k of channel i is the standard normal number at that place of the seeded stream."""
     rates = {
         "bottom_depth": 50.0,
@@ -118,7 +118,7 @@ def test_every_channel_has_its_noise_from_its_own_stream(make_slave, fmi):
         clean.fmu.doStep(k * 0.05, 0.05)
 
 
-def test_samples_do_not_hang_on_the_communication_step(make_slave, fmi):
+def test_samples_do_not_depend_on_the_communication_step(make_slave, fmi):
     """A sensor of 7 Hz samples at its own times, within a step or at its end."""
     ends = []
     for n in (1, 10, 100, 997):
@@ -183,7 +183,7 @@ def test_noise_without_samples_is_refused(make_slave, fmi):
     assert "dvl.velocity_noise = 0.1 needs the sensor's rate" in slave.said[-1][1]
 
 
-def test_a_rate_may_change_while_it_runs(make_slave, fmi):
+def test_sensor_rate_may_change_during_a_run(make_slave, fmi):
     """Samples then start anew, and the stream of numbers goes on."""
     slave = make_slave(fmi=fmi).start(**{"depth_sensor.rate": 1.0, "depth_sensor.noise": 1.0, "weight": 1228.25})
     slave.step(2.5)  # samples 0, 1, 2
@@ -194,13 +194,13 @@ def test_a_rate_may_change_while_it_runs(make_slave, fmi):
     assert slave.get("measured.depth")[0] == pytest.approx(normal(0, 0, 4))
 
 
-def test_a_sample_a_hair_behind_the_end_of_a_step_makes_it_no_longer(make_slave):
+def test_sample_just_after_a_step_end_does_not_lengthen_the_step(make_slave):
     slave = make_slave(fmi=3).start(**{"depth_sensor.rate": 100.0 / (1.0 + 5e-10)})
     slave.step(0.01)
     assert slave.get("time") == [0.01]
 
 
-def test_late_in_a_long_run_a_sample_just_before_the_end_of_a_step_keeps_its_time(make_slave):
+def test_sample_just_before_a_step_end_keeps_its_time_at_large_times(make_slave):
     slave = make_slave(fmi=3)
     slave.set_values({"depth_sensor.rate": 1.0 / (0.01 - 1e-6), "velocity.w": 10.0, "position.z": 5.0})
     slave.fmu.enterInitializationMode(startTime=1000.0)
@@ -210,7 +210,7 @@ def test_late_in_a_long_run_a_sample_just_before_the_end_of_a_step_keeps_its_tim
     assert depth - measured == pytest.approx(1e-6 * speed, rel=1e-3)
 
 
-def test_a_sample_is_told_after_its_delay_with_the_time_it_was_taken(make_slave, fmi):
+def test_samples_are_delayed_with_their_sampling_time(make_slave, fmi):
     """Of a vehicle that sinks at 1 m/s, from a USBL of 2 Hz with 0.3 s of delay."""
     slave = make_slave(fmi=fmi).start(
         weight=1228.25, **{"velocity.w": 1.0, "usbl.rate": 2.0, "usbl.delay": 0.3, "depth_sensor.rate": 0.0}
@@ -229,7 +229,7 @@ def test_a_sample_is_told_after_its_delay_with_the_time_it_was_taken(make_slave,
         slave.step(0.01)
 
 
-def test_samples_are_lost_and_outliers_by_their_own_numbers(make_slave, fmi):
+def test_sample_loss_and_outliers_use_their_own_streams(make_slave, fmi):
     """Sample k of sensor i has the chances at that place of stream 21 + i: of being lost, of being an outlier."""
     slave = make_slave(fmi=fmi).start(
         weight=1228.25,
@@ -254,7 +254,7 @@ def test_samples_are_lost_and_outliers_by_their_own_numbers(make_slave, fmi):
     assert lost > 5 and outliers > 5
 
 
-def test_an_outage_begins_and_ends_while_it_runs(make_slave, fmi):
+def test_sensor_outage_can_start_and_end_during_a_run(make_slave, fmi):
     slave = make_slave(fmi=fmi).start(**{"dvl.rate": 10.0, "velocity.u": 1.0})
     slave.step(0.95)
     slave.set_values({"dvl.loss_probability": 1.0})
@@ -266,7 +266,7 @@ def test_an_outage_begins_and_ends_while_it_runs(make_slave, fmi):
     assert slave.get("measured.time.dvl")[0] == pytest.approx(6.0)
 
 
-def test_a_restored_state_has_the_samples_that_were_under_way(make_slave, fmi):
+def test_restored_state_keeps_delayed_samples(make_slave, fmi):
     slave = make_slave(fmi=fmi).start(
         **{"dvl.rate": 20.0, "dvl.delay": 0.3, "dvl.velocity_noise": 0.1, "dvl.loss_probability": 0.3, "wrench.X": 50.0}
     )
@@ -294,7 +294,7 @@ def test_a_restored_state_has_the_samples_that_were_under_way(make_slave, fmi):
         ({"imu.rate": 100.0, "imu.delay": 0.1}, "imu.delay = 0.1 s at 100 Hz leaves more than 8 samples under way"),
     ],
 )
-def test_a_delay_that_cannot_be_is_refused(make_slave, fmi, values, said):
+def test_invalid_delay_is_rejected(make_slave, fmi, values, said):
     slave = make_slave(fmi=fmi)
     with pytest.raises(FMICallException):
         slave.start(**values)

@@ -1,4 +1,4 @@
-"""The sources in an FMU: all that another needs to compile the plant, and the same plant once compiled."""
+"""The sources in an FMU: complete, and equal in results once compiled."""
 
 import re
 import shutil
@@ -46,7 +46,7 @@ def trajectory(path):
     return states
 
 
-def test_listed_are_all_files_to_compile(bare, fmi):
+def test_source_list_is_complete(bare, fmi):
     (configuration, *_) = read_model_description(bare).buildConfigurations
     assert configuration.modelIdentifier == "odin"
     (files,) = configuration.sourceFileSets
@@ -67,7 +67,7 @@ def test_sources_are_complete_but_for_the_headers_of_fmi(bare, fmi):
 
 
 @pytest.mark.parametrize("fmi", [3])
-def test_build_description_keeps_to_the_schema(bare):
+def test_build_description_is_schema_valid(bare):
     schema = etree.XMLSchema(etree.parse(FMPY / "schema" / "fmi3" / "fmi3BuildDescription.xsd"))
     description = etree.parse(bare / "sources" / "buildDescription.xml")
     schema.assertValid(description)
@@ -82,7 +82,7 @@ def test_build_description_keeps_to_the_schema(bare):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3], ids=["fmi2", "fmi3"])
-def test_compiled_by_hand_they_are_the_same_plant(bare, fmi):
+def test_sources_compiled_manually_give_the_same_plant(bare, fmi):
     """With the command that the description asks for, for a shared library, and none of our own options."""
     (configuration, *_) = read_model_description(bare).buildConfigurations
     with zipfile.ZipFile(cached_fmu(load_vehicle("odin"), fmi)) as archive:
@@ -108,7 +108,7 @@ def test_compiled_by_hand_they_are_the_same_plant(bare, fmi):
 
 
 @pytest.mark.slow
-def test_fmpy_compiles_them_to_the_same_plant(bare, fmi, tmp_path, monkeypatch):
+def test_sources_compiled_by_fmpy_give_the_same_plant(bare, fmi, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=":")  # for the cmake of FMPy's own needs
     missing = [
         tools
@@ -148,7 +148,7 @@ int main(int argc, char **argv)
 
 
 @pytest.mark.slow
-def test_two_vehicles_link_into_one_program(tmp_path):
+def test_two_vehicles_can_be_linked_into_one_program(tmp_path):
     """Each under its own names, and each with its own numbers."""
     compiler, tokens, objects, references = find_compiler(), [], [], []
     for name in ("odin", "rexrov"):

@@ -27,7 +27,7 @@ def written(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", shipped_vehicles())
-def test_it_holds_every_parameter_as_the_fmu_has_it(name, fmi, written):
+def test_ssv_holds_every_fmu_parameter(name, fmi, written):
     described = read_model_description(cached_fmu(load_vehicle(name), fmi)).modelVariables
     expected = {v.name: v for v in described if v.causality == "parameter"}
     read = written(name)
@@ -55,7 +55,7 @@ def trajectory(name, fmi, values):
     )  # fmt: skip
 
 
-def test_the_numbers_of_one_vehicle_make_another_one_move_alike(fmi, written):
+def test_ssv_parameters_make_another_vehicle_equal(fmi, written):
     values = {p.name: p.value for p in written("bluerov2_heavy").parameters}
     itself, other = trajectory("bluerov2_heavy", fmi, {}), trajectory("odin", fmi, {})
     dressed = trajectory("odin", fmi, values)
@@ -63,14 +63,14 @@ def test_the_numbers_of_one_vehicle_make_another_one_move_alike(fmi, written):
     assert not np.allclose(np.array(other.tolist()), np.array(itself.tolist()))
 
 
-def test_it_goes_here_by_its_name(tmp_path, monkeypatch, capsys):
+def test_ssv_default_path_is_the_vehicle_name(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["ssv", "--vehicle", "odin"]) == 0
     assert capsys.readouterr().out == "odin.ssv\n"
     assert read_ssv("odin.ssv").name == "odin"
 
 
-def test_a_place_that_cannot_be_written_is_named(tmp_path, capsys):
+def test_unwritable_path_is_named(tmp_path, capsys):
     assert main(["ssv", "--vehicle", "odin", "--out", str(tmp_path / "no" / "odin.ssv")]) == 2
     said = capsys.readouterr()
     assert said.out == "" and said.err.count("\n") == 1

@@ -1,4 +1,4 @@
-"""FMU states: kept, restored, carried over as bytes, and refused where they do not fit."""
+"""FMU states: saved, restored, serialized, and rejected where they do not fit."""
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def drive(slave, k0, k1):
     return rows
 
 
-def test_a_restored_state_continues_bit_by_bit(make_slave, fmi):
+def test_restored_state_continues_bit_for_bit(make_slave, fmi):
     slave = make_slave(fmi=fmi).start(**LIVELY)
     drive(slave, 0, 50)
     state = slave.save()
@@ -59,7 +59,7 @@ def test_a_restored_state_continues_bit_by_bit(make_slave, fmi):
     slave.free(state)
 
 
-def test_a_state_goes_on_in_another_instance(make_slave, fmi):
+def test_state_transfers_to_another_instance(make_slave, fmi):
     """As bytes: what a cluster or a file would carry."""
     slave, other = make_slave(fmi=fmi).start(**LIVELY), make_slave(fmi=fmi)
     drive(slave, 0, 50)
@@ -72,8 +72,8 @@ def test_a_state_goes_on_in_another_instance(make_slave, fmi):
     other.free(arrived)
 
 
-def test_a_state_holds_the_mode(make_slave, fmi):
-    """One saved before initialisation goes back to it."""
+def test_state_includes_the_mode(make_slave, fmi):
+    """A state saved before initialisation restores that mode."""
     slave = make_slave(fmi=fmi)
     slave.set_values({"position.x": 3.0})
     state = slave.save()
@@ -85,7 +85,7 @@ def test_a_state_holds_the_mode(make_slave, fmi):
     slave.free(state)
 
 
-def test_getting_writes_an_existing_state_again(make_slave, fmi):
+def test_get_state_overwrites_an_existing_state(make_slave, fmi):
     slave = make_slave(fmi=fmi).start(**LIVELY)
     state = slave.save()
     drive(slave, 0, 5)
@@ -97,14 +97,14 @@ def test_getting_writes_an_existing_state_again(make_slave, fmi):
     slave.free(state)
 
 
-def test_freeing_nothing_is_no_fault(make_slave, fmi):
+def test_freeing_a_freed_state_succeeds(make_slave, fmi):
     slave = make_slave(fmi=fmi).start()
     state = slave.save()
     slave.free(state)
     slave.free(state)
 
 
-def test_the_first_word_is_zero(make_slave, fmi):
+def test_serialized_state_starts_with_a_zero_word(make_slave, fmi):
     """Some importers hand the block, not its address, to the function that frees it."""
     slave = make_slave(fmi=fmi).start(**LIVELY)
     state = slave.save()
@@ -119,7 +119,7 @@ def refused(slave, data, words):
     assert words in slave.said[-1][1]
 
 
-def test_bytes_that_are_no_state_are_refused(make_slave, fmi):
+def test_invalid_state_bytes_are_rejected(make_slave, fmi):
     slave, foreign = make_slave(fmi=fmi).start(), make_slave("bluerov2_heavy", fmi).start()
     state, strange = slave.save(), foreign.save()
     data = slave.serialise(state)
@@ -140,7 +140,7 @@ def fnv1a(data):
     return value
 
 
-def test_a_forged_state_lets_no_nonsense_in(make_slave, fmi):
+def test_forged_state_with_invalid_values_is_rejected(make_slave, fmi):
     """With a checksum that fits, and a NaN in it."""
     slave = make_slave(fmi=fmi).start(**{"position.x": 123.456})
     state = slave.save()
@@ -159,7 +159,7 @@ def test_a_forged_state_lets_no_nonsense_in(make_slave, fmi):
     slave.free(state)
 
 
-def test_a_state_of_the_other_interface_is_refused(make_slave, fmi):
+def test_state_of_the_other_interface_is_rejected(make_slave, fmi):
     slave, model = make_slave(fmi=fmi).start(), make_slave(fmi=fmi, interface="me").start()
     state = slave.save()
     arrived = model.deserialise(slave.serialise(state))

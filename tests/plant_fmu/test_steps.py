@@ -1,4 +1,4 @@
-"""How many steps a step is made of, and which motion they can follow: by what does not depend on it."""
+"""The number of substeps of a step, and the stability limit on the motion."""
 
 import numpy as np
 import pytest
@@ -54,7 +54,7 @@ def fares(make_slave, substep, **values):
 
 
 @pytest.mark.parametrize("ahead", "xyz")
-def test_damping_counts_by_the_water_along_the_bodys_axes(make_slave, ahead):
+def test_stability_limit_uses_relative_velocity_in_body_axes(make_slave, ahead):
     """Damped along its own x axis alone, which looks along each axis of the world: only a current along that one.
 
     Its thrusters hold it where it is; where it goes with the water, there is nothing to follow.
@@ -74,7 +74,7 @@ def test_damping_counts_by_the_water_along_the_bodys_axes(make_slave, ahead):
 
 @pytest.mark.parametrize("axis", range(6))
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_damping_counts_by_the_velocity(make_slave, axis, sign):
+def test_stability_limit_depends_on_velocity(make_slave, axis, sign):
     """Linear and quadratic add up: h (d1 + 2 d2 |v|) / m on either side of 2.5."""
     mass = 187.5 if axis < 3 else 8.0
     for rate, taken in ((10.0, True), (14.0, False)):
@@ -85,7 +85,7 @@ def test_damping_counts_by_the_velocity(make_slave, axis, sign):
         assert fares(make_slave, 0.2, **damping) == taken
 
 
-def test_the_bottom_counts_where_it_is_touched(make_slave):
+def test_stability_limit_includes_bottom_contact(make_slave):
     """2 / T beside the damping, T four substeps at the least: half of what is allowed."""
     damping = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
     damping |= {"linear_damping[3]": 11.0 * 187.5, "bottom_time_constant": 0.0, "hull_radius": 0.3, "position.z": 9.75}
@@ -94,7 +94,7 @@ def test_the_bottom_counts_where_it_is_touched(make_slave):
 
 
 @pytest.mark.parametrize("free_surface", [False, True])
-def test_swinging_counts_by_what_rights_it(make_slave, free_surface):
+def test_stability_limit_includes_the_righting_frequency(make_slave, free_surface):
     """Upright, at rest: h sqrt(k max M^-1) on either side of 1, with k of the righting arms and of floating."""
     r_G, r_B, W = np.array([0.02, -0.03, 0.05]), np.array([0.02, -0.03, -0.06]), 1226.25
     k = np.linalg.norm(r_G * W - r_B * W)
@@ -112,7 +112,7 @@ def test_swinging_counts_by_what_rights_it(make_slave, free_surface):
     assert not fares(make_slave, 1.01 / swing, **values)
 
 
-def test_spinning_counts_by_the_length_of_the_rate(make_slave):
+def test_stability_limit_includes_the_angular_rate(make_slave):
     values = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
     values |= {f"r_{p}.{a}": 0.0 for p in "GB" for a in "xyz"} | {f"inertia.{a}{a}": 8.0 for a in "xyz"}
     for spin in ((6.0, 0.0, 0.0), (0.0, -6.0, 0.0), (0.0, 0.0, 6.0), (2.0, 4.0, -4.0)):
@@ -121,7 +121,7 @@ def test_spinning_counts_by_the_length_of_the_rate(make_slave):
         assert not fares(make_slave, 1.01 / 6.0, **values, **rates)
 
 
-def test_a_step_in_falling_current_is_judged_by_that_of_its_end(make_slave):
+def test_stability_limit_uses_the_current_at_the_step_end(make_slave):
     """Held in place by its thrusters: the speed through the water is the current's, which falls all the way."""
     damping = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
     values = {"current_variation.x": 1.0, "current_variation_period": 10.0, "current_correlation_time": 20.0}

@@ -17,7 +17,7 @@ def library(processor, content):
     return struct.pack("<III", 0xFEEDFACF, processor, 0) + content
 
 
-def test_apples_tool_writes_the_same_bytes():
+def test_universal_library_equals_apple_lipo_output():
     """FMPy ships libraries for both Macs, put together by others."""
     files = sorted((Path(fmpy.__file__).parent / "sundials").glob("*-darwin/*.dylib"))
     if not files:
@@ -28,7 +28,7 @@ def test_apples_tool_writes_the_same_bytes():
         assert universal_library(parts(data)) == data
 
 
-def test_order_does_not_matter_and_nothing_is_lost():
+def test_universal_library_is_order_independent_and_lossless():
     one, other = library(ARM, b"a" * 20_000), library(INTEL, b"x")
     whole = universal_library([one, other])
     assert whole == universal_library([other, one])
@@ -44,6 +44,6 @@ def test_order_does_not_matter_and_nothing_is_lost():
         ([library(ARM, b"a"), library(ARM, b"b")], "two libraries"),
     ],
 )
-def test_what_cannot_be_joined_is_refused(libraries, words):
+def test_incompatible_libraries_are_rejected(libraries, words):
     with pytest.raises(BuildError, match=words):
         universal_library(libraries)

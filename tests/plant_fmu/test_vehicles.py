@@ -1,4 +1,4 @@
-"""The shipped vehicles: what was published, turned here by other means, and what any sound vehicle does."""
+"""The shipped vehicles: published values converted independently, and physical validity."""
 
 import dataclasses
 from importlib import resources
@@ -37,7 +37,7 @@ REXROV_THRUSTERS_FLU = [  # position m; pitch and yaw of the axis of thrust, deg
 
 
 @pytest.mark.parametrize("name", VEHICLES)
-def test_numbers_are_sound(name):
+def test_vehicle_parameters_are_physically_valid(name):
     vehicle = load_vehicle(name)
     for matrix in (vehicle.mass_matrix, vehicle.added_mass + 1e-12 * np.eye(6)):
         assert np.array_equal(matrix, matrix.T)
@@ -52,8 +52,8 @@ def test_numbers_are_sound(name):
 
 @pytest.mark.parametrize("axis", ["roll", "pitch"])
 @pytest.mark.parametrize("name", ["odin", *(pytest.param(v, marks=pytest.mark.slow) for v in VEHICLES if v != "odin")])
-def test_rights_itself(name, axis, make_slave):
-    """Turned by 60 degrees and let go, a vehicle comes back, and its swings die out."""
+def test_vehicle_rights_itself(name, axis, make_slave):
+    """Released at 60 degrees, a vehicle returns upright, and its oscillation decays."""
     e0, e = Rotation.from_euler("x", 60, degrees=True).as_quat()[[3, 0]]
     slave = make_slave(name).start(**{"quaternion.e0": e0, f"quaternion.e{1 + (axis == 'pitch')}": e})
     angles = []
@@ -69,13 +69,13 @@ def test_rights_itself(name, axis, make_slave):
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_how_an_autopilot_drives_it_changes_no_byte_of_the_fmu(fmi):
+def test_autopilot_table_does_not_change_the_fmu(fmi):
     vehicle = load_vehicle("bluerov2_heavy")
     assert vehicle.autopilot
     assert neutral_members(dataclasses.replace(vehicle, autopilot=None), fmi) == neutral_members(vehicle, fmi)
 
 
-def test_wu_is_what_others_quote():
+def test_bluerov2_wu_parameters_match_the_published_values():
     """Facts as github.com/OsloMet-OceanLab/BlueROV2 gives them, with Fossen's signs."""
     vehicle = load_vehicle("bluerov2_heavy_wu")
     assert (vehicle.mass, vehicle.weight, vehicle.buoyancy) == (11.5, 112.8, 114.8)
@@ -93,7 +93,7 @@ def test_both_sets_of_the_bluerov2_have_the_same_thrusters():
         np.testing.assert_array_equal(getattr(one, key), getattr(other, key))
 
 
-def test_bluerov2_thrusters_stand_where_their_source_says():
+def test_bluerov2_thruster_positions_match_the_source():
     """The level ones at 45 degrees, pushing ahead in front and aback behind; the upright ones push up."""
     level = [((x, y, 0.085), (np.sign(x), -np.sign(y), 0)) for x in (0.156, -0.156) for y in (0.111, -0.111)]
     upright = [((x, y, 0.0), (0, 0, -1)) for x in (0.12, -0.12) for y in (0.218, -0.218)]
@@ -121,8 +121,8 @@ def test_rexrov_added_mass_is_as_published():
     assert np.abs(published - published.T).max() == pytest.approx(0.001)
 
 
-def test_rexrov_added_mass_sits_above_the_centre_of_gravity_where_the_hull_is():
-    """The sign of its coupling terms says whether z is up or down: water is pushed by the hull, about the buoyancy."""
+def test_rexrov_added_mass_center_is_above_the_center_of_gravity():
+    """The sign of its coupling terms shows whether z is up or down: added mass acts at the center of buoyancy."""
     vehicle = load_vehicle("rexrov")
     A = vehicle.added_mass
     for z in (A[0, 4] / A[0, 0], -A[1, 3] / A[1, 1]):  # of masses A11, A22 that sit at z
@@ -130,7 +130,7 @@ def test_rexrov_added_mass_sits_above_the_centre_of_gravity_where_the_hull_is():
         assert abs(z - vehicle.r_B[2]) < 0.1
 
 
-def test_rexrov_thrusters_push_where_uuv_simulator_has_them():
+def test_rexrov_thrusters_match_uuv_simulator():
     columns = []
     for position, pitch, yaw in REXROV_THRUSTERS_FLU:
         axis = Rotation.from_euler("ZY", [yaw, pitch], degrees=True).apply([1, 0, 0])
@@ -144,7 +144,7 @@ def test_rexrov_thrusters_push_where_uuv_simulator_has_them():
 
 
 @pytest.mark.parametrize("name", ["3odin", "", "a" * 65, "int", "Con", "my boat", "bötchen", "../x"])
-def test_names_that_are_no_identifiers_are_refused(tmp_path, name):
+def test_invalid_vehicle_names_are_rejected(tmp_path, name):
     with pytest.raises(VehicleError, match=r"^\S+boat.toml: name is '.*', expected ") as caught:
         load_vehicle(written(tmp_path, ('name = "odin"', f'name = "{name}"')))
     assert len(str(caught.value)) < 400
@@ -174,7 +174,7 @@ def test_names_that_are_no_identifiers_are_refused(tmp_path, name):
         (("radius = 0.315", "radius = -1.0"), "hull.radius is negative"),
     ],
 )
-def test_numbers_that_cannot_be_are_named_by_their_key(tmp_path, change, words):
+def test_invalid_parameters_are_rejected_by_key(tmp_path, change, words):
     with pytest.raises(Exception, match=words) as caught:
         load_vehicle(written(tmp_path, change))
     assert "boat.toml: " in str(caught.value) and "\n" not in str(caught.value)
@@ -188,7 +188,7 @@ def test_a_vehicle_has_a_thruster(tmp_path, rows):
         load_vehicle(written(tmp_path, (matrix, f"matrix = {rows}\n")))
 
 
-def test_a_hull_is_a_frame_unless_its_file_says_sphere(tmp_path):
+def test_hull_shape_defaults_to_frame(tmp_path):
     assert {name: load_vehicle(name).hull_shape for name in ("odin", "rexrov")} == {"odin": "sphere", "rexrov": "frame"}
     odin = (resources.files("plant_fmu") / "vehicles" / "odin.toml").read_text()
     (tmp_path / "egg.toml").write_text(odin.replace('shape = "sphere"', 'shape = "egg"'))

@@ -1,4 +1,4 @@
-"""The WebAssembly component of fmi-ls-wasm and the module alone: interfaces, and the bits of the native library."""
+"""The WebAssembly component of fmi-ls-wasm and the bare module: interfaces, and bit-identical results."""
 
 import json
 import shutil
@@ -101,7 +101,7 @@ def expected():
 
 
 @pytest.mark.slow
-def test_a_flight_with_noise_has_the_bits_of_the_native_library(binaries, importers, expected):
+def test_noisy_run_equals_the_native_library_bit_for_bit(binaries, importers, expected):
     plan, want = expected
     fmu = importers.ComponentInstance(binaries[1], "co-simulation", plan["token"])
     fmu.call("set-float64", plan["start"], plan["values"])
@@ -123,7 +123,7 @@ def test_a_flight_with_noise_has_the_bits_of_the_native_library(binaries, import
 
 
 @pytest.mark.slow
-def test_so_has_the_module_alone_in_node(binaries, expected, tmp_path):
+def test_node_run_equals_the_native_library_bit_for_bit(binaries, expected, tmp_path):
     if shutil.which("node") is None:
         pytest.skip("node is not installed")
     plan, want = expected
@@ -135,7 +135,7 @@ def test_so_has_the_module_alone_in_node(binaries, expected, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("target", ["x86_64-linux-musl", "aarch64-linux-musl"])
-def test_so_have_other_processors_and_c_libraries(expected, target, tmp_path):
+def test_other_processors_equal_the_native_library_bit_for_bit(expected, target, tmp_path):
     pytest.importorskip("ziglang", reason="the build extra is not installed")
     emulator = [] if target.startswith("x86_64") else ["qemu-aarch64"]
     if emulator and shutil.which(*emulator) is None:
@@ -200,7 +200,7 @@ def test_model_exchange_gives_the_native_derivatives(binaries, importers):
 
 
 @pytest.mark.slow
-def test_what_it_refuses_it_says_with_the_name_of_the_instance(binaries, importers):
+def test_rejections_are_logged_with_the_instance_name(binaries, importers):
     _, component, _ = binaries
     right = read_model_description(str(binaries[0]), validate=False).instantiationToken
     wrong = importers.ComponentInstance(component, "co-simulation", "{no}", name="mine")
@@ -227,7 +227,7 @@ def test_what_it_refuses_it_says_with_the_name_of_the_instance(binaries, importe
 
 
 @pytest.mark.slow
-def test_calls_keep_no_memory(binaries, importers):
+def test_calls_leak_no_memory(binaries, importers):
     """An instance may have 8 MiB more than it begins with; 3,000 calls are given and return 36 MB."""
     right = read_model_description(str(binaries[0]), validate=False).instantiationToken
     fmu = importers.ComponentInstance(binaries[1], "co-simulation", right)
@@ -240,7 +240,7 @@ def test_calls_keep_no_memory(binaries, importers):
 
 
 @pytest.mark.slow
-def test_the_fmu_has_what_the_draft_names_and_old_readers_take_it(binaries):
+def test_fmu_follows_the_wasm_draft_and_remains_readable(binaries):
     path = binaries[0]
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
@@ -257,7 +257,7 @@ def test_the_fmu_has_what_the_draft_names_and_old_readers_take_it(binaries):
     np.testing.assert_array_equal(simulate_fmu(str(path), stop_time=1.0), plain)
 
 
-def test_interfaces_are_the_drafts():
+def test_interfaces_match_the_draft():
     """57 functions of co-simulation and 65 of model exchange: counted in the draft's own files."""
     text = wit(model_exchange=True)
     parts = {part.partition(" ")[0]: part.count(": func(") + part.count(": static func(")
@@ -270,18 +270,18 @@ def test_interfaces_are_the_drafts():
     ("text", "rest", "wasm"),
     [("native", "native", False), ("wasm", None, True), ("native, wasm", "native", True), ("wasm,all", "all", True)],
 )
-def test_wasm_stands_beside_the_platforms(text, rest, wasm):
+def test_wasm_is_separated_from_the_platform_list(text, rest, wasm):
     assert without_wasm(text) == (rest, wasm)
 
 
 @pytest.mark.parametrize("text", ["wasm,amiga", "wasm,", "wasm,native,x86_64-linux"])
-def test_wrong_names_beside_it_are_refused(tmp_path, capsys, text):
+def test_invalid_platforms_beside_wasm_are_rejected(tmp_path, capsys, text):
     assert main(["build", "--vehicle", "odin", "--platforms", text, "--out", str(tmp_path / "x.fmu")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
 
 
-def test_fmi_2_has_no_such_standard(tmp_path, capsys):
+def test_wasm_is_rejected_for_fmi_2(tmp_path, capsys):
     assert main(["build", "--vehicle", "odin", "--fmi", "2", "--platforms", "wasm", "--out", str(tmp_path / "x")]) == 2
     assert "expected FMI 3.0" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

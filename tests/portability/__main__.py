@@ -1,4 +1,4 @@
-"""Run the fast tests in other ways than this machine's own: other kernels, processors and Pythons."""
+"""Run the fast tests with other kernels, processors and Pythons than this machine's own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What this process computes with, as JSON: ``python -m tests.portability.kernels``.
+"""Print the numerical kernels of this process as JSON: ``python -m tests.portability.kernels``.
 
 It asks the libraries, and does not believe what the environment was to make of them.
 """

@@ -1,4 +1,4 @@
-"""Runs variants: a Python where it needs one of its own, a look at what it really computes with, then the tests."""
+"""Run variants: install a Python if needed, verify the active kernels, then run the tests."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ FOLDER = ROOT / "build" / "portability"
 
 
 class NotToBeHadError(Exception):
-    """Says why a variant cannot be run here: that is no failure."""
+    """A variant cannot be run here, which is no failure."""
 
 
 class BrokenError(Exception):
-    """Says why a variant that should run here does not come to its tests, or to their end."""
+    """A variant that should run here does not start or finish its tests."""
 
 
 def environment_of(variant: Variant, machine: Machine) -> dict[str, str]:
@@ -36,10 +36,10 @@ def environment_of(variant: Variant, machine: Machine) -> dict[str, str]:
 def look(python: Path, environment: dict[str, str]) -> Machine:
     """Return what a Python computes with in such an environment."""
     command = [str(python), "-m", "tests.portability.kernels"]
-    asked = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=300)
-    if asked.returncode:
-        raise BrokenError(f"what it computes with cannot be told: {_last(asked.stderr)}")
-    about = json.loads(asked.stdout)
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=300)
+    if done.returncode:
+        raise BrokenError(f"what it computes with cannot be determined: {_last(done.stderr)}")
+    about = json.loads(done.stdout)
     return Machine(about["kernels"], frozenset(about["features"]), tuple(about["dispatched"]))
 
 
@@ -97,7 +97,7 @@ def _tested(variant: Variant, python: Path, environment: dict[str, str], tests: 
 
 
 def _ended(command: list[str], environment: dict[str, str], file: object, limit: float) -> bool:
-    """Return whether a command came to its end in time; if not, it and all that it started are ended."""
+    """Return whether a command ended in time; otherwise kill it and its children."""
     process = subprocess.Popen(
         command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stdout=file, stderr=subprocess.STDOUT,
         start_new_session=True,
@@ -137,40 +137,42 @@ def _python_of(version: str, extras: Sequence[str]) -> Path:
     pip = [str(uv.parent / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "uv"]
     folder.mkdir(parents=True, exist_ok=True)
     if not uv.exists():
-        _asked([sys.executable, "-m", "venv", str(uv.parents[1])], BrokenError, "an environment for uv")
-        _asked(pip, BrokenError, "uv")
+        _run_checked([sys.executable, "-m", "venv", str(uv.parents[1])], BrokenError, "an environment for uv")
+        _run_checked(pip, BrokenError, "uv")
     wanted = [word for extra in extras for word in ("--extra", extra)]
     resolve = ["pip", "compile", "--quiet", "--only-binary", ":all:", "--python-version", version, *wanted]
     arbiter = folder / "arbiter.in"  # which is in no index
     arbiter.write_text("./fuzzy_arbiter\n", encoding="utf-8")
     resolve += ["--no-emit-package", "fuzzy-arbiter", "--output-file", str(requirements)]
     resolve += ["pyproject.toml", str(arbiter)]
-    _asked([str(uv), *resolve], NotToBeHadError, f"wheels of all that is needed on Python {version}")
-    _asked(
+    _run_checked([str(uv), *resolve], NotToBeHadError, f"wheels of all that is needed on Python {version}")
+    _run_checked(
         [str(uv), "venv", "--quiet", "--clear", "--seed", "--python", version, str(python.parents[1])],
         NotToBeHadError,
         f"Python {version}",
     )
     install = [str(uv), "pip", "install", "--quiet", "--python", str(python)]
-    _asked([*install, "--only-binary", ":all:", "--requirement", str(requirements)], BrokenError, "the dependencies")
+    _run_checked(
+        [*install, "--only-binary", ":all:", "--requirement", str(requirements)], BrokenError, "the dependencies"
+    )
     own = ["--editable", str(ROOT / "fuzzy_arbiter"), "--editable", str(ROOT)]
-    _asked([*install, "--no-deps", *own], BrokenError, "the project")
+    _run_checked([*install, "--no-deps", *own], BrokenError, "the project")
     return python
 
 
-def _asked(command: list[str], error: type[Exception], what: str) -> None:
-    """Run a command, and raise an error that says what is not to be had where it fails."""
+def _run_checked(command: list[str], error: type[Exception], what: str) -> None:
+    """Run a command; raise an error that names what is missing if it fails."""
     found = os.pathsep.join(str(folder) for folder in sorted(_pyenv().glob("versions/*/bin")))
     environment = {**os.environ, "PATH": os.pathsep.join(filter(None, [os.environ.get("PATH", ""), found]))}
-    asked = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=1800)
-    if asked.returncode:
-        raise error(f"no {what}: {reason_of(asked.stderr)}")
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=1800)
+    if done.returncode:
+        raise error(f"no {what}: {reason_of(done.stderr)}")
 
 
 def reason_of(said: str) -> str:
     """Return why uv gave up: its error, and the first cause that it names; else the last line."""
-    told = [line.strip() for line in said.splitlines() if line.lstrip().startswith(("error: ", "cause: "))]
-    return "; ".join(line.partition(": ")[2] for line in told[:2]) or _last(said)
+    reasons = [line.strip() for line in said.splitlines() if line.lstrip().startswith(("error: ", "cause: "))]
+    return "; ".join(line.partition(": ")[2] for line in reasons[:2]) or _last(said)
 
 
 def _pyenv() -> Path:
@@ -179,6 +181,6 @@ def _pyenv() -> Path:
 
 
 def _last(text: str) -> str:
-    """Return the last line that says something."""
+    """Return the last nonempty line."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     return lines[-1] if lines else "nothing"

@@ -1,4 +1,4 @@
-"""The choice of variants, what a machine lacks for them, whether they were taken, and how results are told."""
+"""The choice of variants, missing requirements, verification, and the report of results."""
 
 import json
 import os
@@ -27,7 +27,7 @@ def test_a_list_of_names_chooses_variants():
         chosen("haswell,west")
 
 
-def test_turns_are_spread_evenly_and_follow_from_the_commit():
+def test_variants_are_rotated_evenly_by_commit():
     commits = [f"{i * 2654435761 % 2**160:040x}" for i in range(20 * len(VARIANTS))]
     first = Counter(by_turns(commit, VARIANTS)[0].name for commit in commits)
     assert set(first.values()) == {20}
@@ -35,7 +35,7 @@ def test_turns_are_spread_evenly_and_follow_from_the_commit():
     assert sorted(order, key=VARIANTS.index) == list(VARIANTS)
 
 
-def test_what_the_processor_lacks_is_named():
+def test_missing_processor_features_are_named():
     assert BY_NAME["skylakex"].reason_to_skip(NEW) == ""
     assert BY_NAME["skylakex"].reason_to_skip(OLD).startswith("the processor lacks avx512f, avx512cd")
     assert BY_NAME["zen"].reason_to_skip(OLD) == ""
@@ -52,7 +52,7 @@ def test_features_are_read_from_linux():
     assert features_of("nothing") == set()
 
 
-def test_a_kernel_of_only_one_package_is_not_enough():
+def test_variant_needs_its_kernel_in_every_package():
     half = Machine({"numpy": "Haswell", "scipy": "SkylakeX"}, AVX512, ())
     assert BY_NAME["haswell"].not_taken(half) == "OpenBLAS of scipy runs its kernels for SkylakeX"
     assert BY_NAME["zen"].not_taken(OLD) == ""
@@ -60,7 +60,7 @@ def test_a_kernel_of_only_one_package_is_not_enough():
     assert BY_NAME[NUMPY].not_taken(NEW) == "NumPy still takes its code for X86_V3, X86_V4"
 
 
-def test_the_environment_is_the_variant_s_alone(monkeypatch):
+def test_variant_environment_excludes_inherited_variables(monkeypatch):
     monkeypatch.setenv("OPENBLAS_CORETYPE", "Zen")
     there = environment_of(BY_NAME[NUMPY], NEW)
     assert there["NPY_DISABLE_CPU_FEATURES"] == "X86_V3,X86_V4"
@@ -78,7 +78,7 @@ def test_results_are_counted():
     assert not counted("zen", "<testsuites><testsuite/></testsuites>", 3.0).good
 
 
-def test_what_was_not_run_is_good_and_told():
+def test_skipped_variants_pass_and_are_reported():
     results = [
         Result("haswell", 5, 0, 1, 12.4, kernels=("Haswell",)),
         Result("skylakex", remark="the processor lacks avx512f", run=False),
@@ -105,14 +105,14 @@ def here(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_variant_runs_its_tests_and_says_what_failed(here):
+def test_variant_runs_its_tests_and_names_failures(here):
     (here / "test_two.py").write_text("import os\ndef test_a(): pass\ndef test_b(): assert 'CORE' in os.environ\n")
     result = run(BY_NAME["haswell"], OLD, ["-p", "no:randomly", "test_two.py"], 60.0)
     assert (result.passed, result.failed, result.kernels) == (1, 1, ("Haswell",))
     assert result.remark == "failed: test_two.test_b"
 
 
-def test_a_variant_that_hangs_is_named_with_what_it_said_last(here, monkeypatch):
+def test_hanging_variant_is_reported_with_its_last_output(here, monkeypatch):
     def hanging(command, environment, file, limit):
         file.write("test_one PASSED\ntest_two \n")
         file.flush()
@@ -124,20 +124,20 @@ def test_a_variant_that_hangs_is_named_with_what_it_said_last(here, monkeypatch)
     assert result.remark == "ended after 4 s; last in haswell/output.txt: test_two"
 
 
-def test_what_takes_too_long_is_ended(here):
+def test_overlong_command_is_killed(here):
     with (here / "output.txt").open("w") as file:
         assert not running._ended([sys.executable, "-c", "import time; time.sleep(300)"], dict(os.environ), file, 0.1)
         assert running._ended([sys.executable, "-c", "pass"], dict(os.environ), file, 300.0)
 
 
-def test_what_was_not_taken_fails_before_any_test(here):
+def test_ineffective_variant_fails_before_any_test(here):
     result = run(BY_NAME["skylakex"], NEW, ["never.py"], 60.0)
     assert result.run and not result.good
     assert result.remark == "OpenBLAS of numpy runs its kernels for Haswell"
 
 
 @pytest.mark.parametrize(("error", "good"), [(NotToBeHadError, True), (BrokenError, False)])
-def test_a_python_that_cannot_be_had_is_no_failure(here, monkeypatch, error, good):
+def test_missing_python_is_not_a_failure(here, monkeypatch, error, good):
     def python_of(version, extras):
         raise error(f"no Python {version}: none")
 
@@ -146,14 +146,14 @@ def test_a_python_that_cannot_be_had_is_no_failure(here, monkeypatch, error, goo
     assert (result.good, result.remark) == (good, "no Python 3.14: none")
 
 
-def test_a_reason_is_the_error_and_its_first_cause():
+def test_reason_is_the_error_and_its_first_cause():
     said = "error: No solution found\n  cause: numba has no usable wheels\n  cause: more\n\nhint: build it\n"
     assert running.reason_of(said) == "No solution found; numba has no usable wheels"
     assert running.reason_of("pip: not found\n\n") == "pip: not found"
 
 
 @pytest.mark.slow
-def test_libraries_are_asked_what_they_run():
+def test_active_blas_kernels_are_queried():
     pytest.importorskip("threadpoolctl")
     command = [sys.executable, "-m", "tests.portability.kernels"]
     about = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)

@@ -1,4 +1,4 @@
-"""What the tests are run with, one at a time: kernels of OpenBLAS, the processor that NumPy sees, Pythons."""
+"""Variants of the test environment: OpenBLAS kernels, the processor that NumPy sees, Pythons."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Variant:
     python: str = ""  # the version, of an environment of its own
 
     def reason_to_skip(self, machine: Machine) -> str:
-        """Return why this machine cannot run it, or nothing."""
+        """Return the reason why this machine cannot run it, or ""."""
         if self.kernel and not machine.kernels:
             return "neither NumPy nor SciPy brings an OpenBLAS along"
         if lacking := [name for name in self.needs if name not in machine.features]:
@@ -45,7 +45,7 @@ class Variant:
         return self.environment
 
     def not_taken(self, seen: Machine) -> str:
-        """Return what of the variant is not so in a process that was to run it, or nothing."""
+        """Return the setting of the variant that a process lacks, or ""."""
         for package, kernel in seen.kernels.items():
             if self.kernel and kernel not in self.kernel:
                 return f"OpenBLAS of {package} runs its kernels for {kernel}"
@@ -90,7 +90,7 @@ def by_turns(commit: str, variants: Sequence[Variant]) -> list[Variant]:
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a variant."""
+    """The result of a variant."""
 
     name: str
     passed: int = 0

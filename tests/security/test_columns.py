@@ -1,4 +1,4 @@
-"""D6: records that lack a column end in one line that names it, unless nothing is made of it."""
+"""D6: records that lack a used column are rejected in one line that names it."""
 
 import shutil
 
@@ -47,8 +47,8 @@ READERS = {
 }  # fmt: skip
 
 
-def said_of(act, *arguments):
-    """Return what an act is refused with, "" if it is not."""
+def error_of(act, *arguments):
+    """Return the message of the RunError that a call raises, "" if none."""
     try:
         act(*arguments)
     except RunError as error:
@@ -72,13 +72,13 @@ def kind(request):
 
 
 @pytest.mark.medium
-def test_d6_each_column_dropped_singly_is_named_or_warned_of(kind, monkeypatch, caplog):
+def test_d6_each_missing_column_is_named(kind, monkeypatch, caplog):
     scenario, names = kind
     monkeypatch.setattr("cosim.simulation.columns.names_of", lambda _: names)
     taken_along = 0
     for name in names:
         caplog.clear()
-        said = said_of(require_columns, scenario, Table([other for other in names if other != name]))
+        said = error_of(require_columns, scenario, Table([other for other in names if other != name]))
         if said:
             assert said == f"{Table.file}: has no column {name!r}, which its scenario calls for"
         else:
@@ -107,7 +107,7 @@ def test_d6_the_names_are_those_of_every_shipped_scenario(name):
 @pytest.mark.parametrize(
     "swapped", [("position.x", "position.y"), ("time", "position.x"), ("commands.mode", "target.z")]
 )
-def test_d6_columns_in_another_order_are_refused(ordered_run, swapped):
+def test_d6_columns_in_another_order_are_rejected(ordered_run, swapped):
     """What is read side by side would be another quantity."""
     scenario = load_scenario(ordered_run / "scenario.toml")
     other = dict(zip(swapped, reversed(swapped), strict=True))
@@ -154,13 +154,13 @@ def test_d6_every_reader_names_the_column_and_the_file(read, lacking):
 
 @pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("read", READERS.values(), ids=READERS)
-def test_d6_every_reader_does_without_what_nothing_is_made_of(read, lacking, caplog):
+def test_d6_readers_work_without_unused_columns(read, lacking, caplog):
     folder = lacking("water_velocity.y", "goal.value")
     read(folder)
     assert "has no columns 'water_velocity.y', 'goal.value'" in caplog.text and str(folder / RECORD) in caplog.text
 
 
-def test_d6_a_run_that_is_still_written_is_looked_at_too(lacking):
+def test_d6_unfinished_run_is_checked(lacking):
     folder = lacking("membership.depth")
     (folder / PARTS).mkdir()
     (folder / SUMMARY).unlink()
@@ -177,7 +177,7 @@ def test_d6_every_column_of_a_file_dropped_singly(lacking, ordered_run, caplog, 
     for name in names:
         caplog.clear()
         folder = lacking(name)
-        if said := said_of(load_run, folder):
+        if said := error_of(load_run, folder):
             refused += 1
             assert said == f"{folder / RECORD}: has no column {name!r}, which its scenario calls for"
         else:

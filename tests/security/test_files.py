@@ -1,4 +1,4 @@
-"""Records that are none, folders with traps in them, and files that are written whole or not at all."""
+"""Invalid records, malicious folders, and atomic writes."""
 
 import json
 import math
@@ -54,19 +54,19 @@ def read_all(folder):
         pa.table([pa.array([1.0])], schema=pa.schema([pa.field("time", pa.float64(), metadata={b"unit": b"\xff"})])),
     ],
 )
-def test_tables_that_are_no_record(tmp_path, table):
+def test_invalid_tables_are_rejected(tmp_path, table):
     with pytest.raises(RunError, match="record"):
         read_all(written(tmp_path, table))
 
 
-def test_a_few_bytes_that_say_a_thousand_million_rows_are_not_believed(tmp_path, monkeypatch):
+def test_excessive_declared_row_count_is_rejected(tmp_path, monkeypatch):
     monkeypatch.setattr("cosim.results.record.MAX_ROWS", 1)
     with pytest.raises(RunError, match="has 2 rows"):
         load_record(written(tmp_path, pa.table(ROWS)))
 
 
 @pytest.mark.parametrize("odd", [pa.table({"time": [1]}), pa.table({"time": [0.0] * 3}), pa.table({"x": [0.0]})])
-def test_each_part_of_a_killed_run_is_looked_at(tmp_path, monkeypatch, odd):
+def test_every_part_of_a_killed_run_is_checked(tmp_path, monkeypatch, odd):
     monkeypatch.setattr("cosim.results.record.MAX_ROWS", 4)
     (tmp_path / PARTS).mkdir()
     for i, table in enumerate((pa.table({"time": [0.0, 1.0]}), odd)):
@@ -77,7 +77,7 @@ def test_each_part_of_a_killed_run_is_looked_at(tmp_path, monkeypatch, odd):
 
 @pytest.mark.medium
 @given(st.data())
-def test_any_change_of_a_record_is_read_or_refused(tmp_path_factory, data):
+def test_mutated_record_is_read_or_rejected(tmp_path_factory, data):
     folder = tmp_path_factory.mktemp("record")
     content = bytearray((written(folder, pa.table(ROWS)) / RECORD).read_bytes())
     for _ in range(data.draw(st.integers(1, 4))):
@@ -93,7 +93,7 @@ def test_any_change_of_a_record_is_read_or_refused(tmp_path_factory, data):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="names of files are no bytes here")
-def test_a_folder_whose_name_is_no_utf_8(tmp_path):
+def test_folder_with_a_non_utf8_name_is_rejected(tmp_path):
     folder = tmp_path / os.fsdecode(b"run\xff")
     try:
         folder.mkdir()
@@ -108,7 +108,7 @@ def test_a_folder_whose_name_is_no_utf_8(tmp_path):
         Record([folder / RECORD])
 
 
-def test_texts_of_a_folder_that_are_no_json_or_endlessly_deep(tmp_path, shipped_run):
+def test_invalid_or_deeply_nested_json_is_rejected(tmp_path, shipped_run):
     folder = tmp_path / "run"
     shutil.copytree(shipped_run("paper", "time.duration=0.1").folder, folder)
     for text in ("[" * 100_000, "{", "[]", "1", '"\udc80"'):
@@ -131,7 +131,7 @@ SUMMARIES = {
 
 
 @pytest.mark.parametrize(("key", "values"), SUMMARIES.items(), ids=SUMMARIES)
-def test_d5_a_summary_of_anothers_names_its_key(tmp_path, ordered_run, key, values):
+def test_d5_invalid_summary_value_is_rejected_by_key(tmp_path, ordered_run, key, values):
     folder = tmp_path / "run"
     shutil.copytree(ordered_run, folder)
     sound = json.loads((folder / SUMMARY).read_text())
@@ -156,7 +156,7 @@ def test_d5_a_summary_that_lacks_a_key_names_it(tmp_path, ordered_run, key):
 
 
 @pytest.mark.medium
-def test_d5_texts_of_a_summary_are_shown_only(tmp_path, shipped_run):
+def test_d5_summary_texts_are_escaped(tmp_path, shipped_run):
     folder = tmp_path / "run"
     shutil.copytree(shipped_run("paper", "time.duration=0.1").folder, folder)
     sound = json.loads((folder / SUMMARY).read_text())
@@ -170,7 +170,7 @@ def test_d5_texts_of_a_summary_are_shown_only(tmp_path, shipped_run):
 
 @pytest.mark.medium
 @pytest.mark.skipif(os.name != "posix", reason="names of files are no bytes here")
-def test_d5_a_scenario_whose_name_commands_a_terminal_has_one_that_is_shown_only(tmp_path):
+def test_d5_scenario_name_with_terminal_codes_is_escaped(tmp_path):
     file = tmp_path / os.fsdecode(b"a\x1b[31m\xff.toml")
     file.write_text('base = "paper"\ntime.duration = 0.01')
     scenario = load_scenario(file)
@@ -183,7 +183,7 @@ def test_d5_a_scenario_whose_name_commands_a_terminal_has_one_that_is_shown_only
 
 
 @pytest.mark.skipif(os.name != "posix", reason="links need rights here")
-def test_links_that_somebody_left_are_not_followed(tmp_path):
+def test_existing_symbolic_links_are_not_followed(tmp_path):
     mine, folder = tmp_path / "mine.txt", tmp_path / "run"
     mine.write_text("precious")
     folder.mkdir()
@@ -194,7 +194,7 @@ def test_links_that_somebody_left_are_not_followed(tmp_path):
     assert not (folder / "replay.html").is_symlink() and (folder / "replay.html").stat().st_size > 1000
 
 
-def test_two_that_write_one_file_do_not_meet(tmp_path):
+def test_concurrent_writers_do_not_interfere(tmp_path):
     place = tmp_path / "it"
     with atomic_file(place) as one:
         with atomic_file(place) as other:
@@ -205,7 +205,7 @@ def test_two_that_write_one_file_do_not_meet(tmp_path):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pipes have names on POSIX alone")
-def test_what_is_no_file_is_not_replaced(tmp_path):
+def test_non_regular_file_is_not_replaced(tmp_path):
     """Else a page written to /dev/null by root would be all that is left of it."""
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "link").symlink_to("pipe")
@@ -217,7 +217,7 @@ def test_what_is_no_file_is_not_replaced(tmp_path):
     assert len(list(tmp_path.iterdir())) == 3
 
 
-def test_what_fails_leaves_what_was(tmp_path):
+def test_failed_write_keeps_the_old_file(tmp_path):
     write_atomic(tmp_path / "it", "before")
     with pytest.raises(TypeError), atomic_file(tmp_path / "it") as file:
         file.write("text where bytes are expected")
@@ -228,7 +228,7 @@ def test_what_fails_leaves_what_was(tmp_path):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="of POSIX")
-def test_code_kept_where_others_write_is_not_loaded(tmp_path, monkeypatch):
+def test_code_cached_in_a_writable_folder_is_not_loaded(tmp_path, monkeypatch):
     folder = tmp_path / "kept"
     folder.mkdir(mode=0o755)
     assert library._is_trusted(folder)

@@ -1,4 +1,4 @@
-"""FMUs made to do harm: each is refused by both readers, with one line, and nothing of it is written or run."""
+"""Malicious FMUs: both readers reject each in one line, and nothing of it is written or run."""
 
 import io
 import os
@@ -30,7 +30,7 @@ SOUND = (
 
 @pytest.fixture(params=["check", "run"])
 def read(request, tmp_path, monkeypatch):
-    """Return a function that opens an FMU that must be refused, and returns what is said."""
+    """Return a function that opens an FMU that must be rejected, and returns the message."""
     scratch = tmp_path / "scratch"
     scratch.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(scratch))
@@ -67,13 +67,13 @@ def described(tmp_path, old, new):
     "name",
     ["../out", "a/../../out", "/out", "C:/out", "C:out", "a\\..\\..\\out", "\\\\host\\out", "..", "a\nb", "a\x1bb"],
 )
-def test_no_member_is_written_elsewhere(tmp_path, read, name):
+def test_path_traversal_is_rejected(tmp_path, read, name):
     said = read(archive(tmp_path / "it.fmu", [(name, "x")]))
     assert "leads out" in said or "no name of a file" in said
     assert not (tmp_path.parent / "out").exists()
 
 
-def test_a_name_that_hides_its_end_is_refused(tmp_path, read):
+def test_member_name_with_a_null_byte_is_rejected(tmp_path, read):
     path = archive(tmp_path / "it.fmu", [("resources/aXb", "x")])
     path.write_bytes(path.read_bytes().replace(b"resources/aXb", b"resources/a\0b"))
     assert "no name of a file" in read(path)
@@ -105,7 +105,7 @@ def test_no_member_is_written_over_another(tmp_path, read, pair):
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
-def test_a_folder_may_be_named_twice(tmp_path):
+def test_duplicate_folder_entries_are_accepted(tmp_path):
     path = archive(tmp_path / "it.fmu", [("resources/", ""), ("resources/a", "x"), ("resources/", "")])
     assert read_fmu(path).fmi == 3
     unpacking.unpack(path, tmp_path / "folder", ())
@@ -113,12 +113,12 @@ def test_a_folder_may_be_named_twice(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
-def test_there_is_one_model_description(tmp_path, read):
+def test_duplicate_model_description_is_rejected(tmp_path, read):
     assert "would be written over" in read(archive(tmp_path / "it.fmu", [("modelDescription.xml", "<other/>")]))
 
 
 @pytest.mark.medium(fast=1)
-def test_bombs_are_refused_unread(tmp_path, read):
+def test_decompression_bombs_are_rejected_unread(tmp_path, read):
     path = tmp_path / "it.fmu"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as made:
         made.writestr("modelDescription.xml", SOUND)
@@ -130,12 +130,12 @@ def test_bombs_are_refused_unread(tmp_path, read):
 
 
 @pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
-def test_methods_that_unpack_without_measure_are_refused(tmp_path, read, method):
+def test_unbounded_compression_methods_are_rejected(tmp_path, read, method):
     assert "neither stored nor deflated" in read(archive(tmp_path / "it.fmu", [], compression=method))
 
 
-def test_a_size_that_lies_is_found_and_no_more_is_written(tmp_path, read):
-    """The list says ten bytes, the member unpacks to ten million."""
+def test_false_member_size_is_detected(tmp_path, read):
+    """The directory states ten bytes, and the member unpacks to ten million."""
     zeros = bytes(10_000_000)
     path = archive(tmp_path / "it.fmu", [("resources/zeros", zeros)], compression=zipfile.ZIP_DEFLATED)
     path.write_bytes(path.read_bytes().replace(struct.pack("<I", len(zeros)), struct.pack("<I", 10)))
@@ -144,7 +144,7 @@ def test_a_size_that_lies_is_found_and_no_more_is_written(tmp_path, read):
     assert "is no FMU" in read(path)
 
 
-def test_a_list_of_files_without_end_is_not_read(tmp_path, read):
+def test_oversized_member_list_is_rejected(tmp_path, read):
     path = tmp_path / "it.fmu"
     entry = struct.pack("<4s4B4HL2L5H2L", b"PK\1\2", 20, 3, 20, 0, *[0] * 14) + b"a"
     entry = entry[:28] + struct.pack("<H", 1) + entry[30:]
@@ -154,13 +154,13 @@ def test_a_list_of_files_without_end_is_not_read(tmp_path, read):
     assert f"larger than {unpacking.MAX_READ} bytes" in read(path)
 
 
-def test_too_many_files(tmp_path, read, monkeypatch):
+def test_excessive_member_count_is_rejected(tmp_path, read, monkeypatch):
     monkeypatch.setattr(unpacking, "MAX_FILES", 5)
     assert "holds 7 files" in read(archive(tmp_path / "it.fmu", [(f"resources/{i}", "") for i in range(6)]))
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes by name")
-def test_a_pipe_is_not_waited_for(tmp_path, read):
+def test_named_pipe_is_rejected_without_blocking(tmp_path, read):
     os.mkfifo(tmp_path / "it.fmu")
     assert "expected a file" in read(tmp_path / "it.fmu")
 
@@ -179,11 +179,11 @@ LAUGHS = "".join(f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 12))
         ('<?xml version="1.0" encoding="UTF-16"?><!DOCTYPE x [<!ENTITY e "ha">]>' + SOUND).encode("utf-16"),
     ],
 )
-def test_no_document_type_so_no_entities(tmp_path, read, document):
+def test_document_type_declarations_are_rejected(tmp_path, read, document):
     assert "document type" in read(archive(tmp_path / "it.fmu", [], document))
 
 
-def test_the_same_holds_of_the_build_description(tmp_path, read):
+def test_build_description_with_document_type_is_rejected(tmp_path, read):
     member = ("sources/buildDescription.xml", '<!DOCTYPE x SYSTEM "file:///etc/passwd"><x/>')
     assert "buildDescription.xml is no XML that can be read" in read(archive(tmp_path / "it.fmu", [member]))
 
@@ -199,7 +199,7 @@ def test_the_same_holds_of_the_build_description(tmp_path, read):
         "",
     ],
 )
-def test_descriptions_that_are_no_xml(tmp_path, read, document):
+def test_invalid_xml_descriptions_are_rejected(tmp_path, read, document):
     assert "no XML that can be read" in read(archive(tmp_path / "it.fmu", [], document))
 
 
@@ -242,7 +242,7 @@ VARIABLE = 'name="time" valueReference="0" causality="independent"/>'
         ('modelName="m"', 'modelName="m" numberOfEventIndicators="1000000000"', "numberOfEventIndicators"),
     ],
 )
-def test_numbers_and_names_that_cannot_be(tmp_path, read, old, new, words):
+def test_invalid_description_numbers_and_names_are_rejected(tmp_path, read, old, new, words):
     assert words in read(described(tmp_path, old, new))
 
 
@@ -265,7 +265,7 @@ def no_fmu(tmp_path_factory):
 
 
 @pytest.mark.skipif(sys.platform != "linux" or platform.machine() != "x86_64", reason="of another machine")
-def test_libraries_that_are_none_of_an_fmu(tmp_path, no_fmu):
+def test_libraries_without_fmi_functions_are_rejected(tmp_path, no_fmu):
     of_another_machine = bytearray(no_fmu)
     of_another_machine[18] = 0xB7  # AArch64
     of_32_bits = bytearray(no_fmu)
@@ -276,7 +276,7 @@ def test_libraries_that_are_none_of_an_fmu(tmp_path, no_fmu):
         assert str(caught.value).startswith(str(tmp_path / "it.fmu")) and "\n" not in str(caught.value)
 
 
-def test_what_is_extracted_is_for_its_owner_alone(monkeypatch):
+def test_extracted_files_are_private_to_the_owner(monkeypatch):
     made = []
     monkeypatch.setattr(instance, "unpack", lambda *of: made.append(of[1]) or unpacking.unpack(*of))
     plant = Plant("odin")
@@ -285,7 +285,7 @@ def test_what_is_extracted_is_for_its_owner_alone(monkeypatch):
     assert not made[0].exists()
 
 
-def test_only_what_a_run_needs_is_extracted(tmp_path):
+def test_only_members_needed_for_a_run_are_extracted(tmp_path):
     members = ["binaries/x86_64-linux/it.so", "binaries/x86_64-linux/of/it.so", "binaries/aarch64-linux/it.so",
                "documentation/index.html", "sources/it.c", "resources/sources/it.c", "extra/it/a.xml"]  # fmt: skip
     path = archive(tmp_path / "it.fmu", [(name, "x") for name in members])
@@ -297,7 +297,7 @@ def test_only_what_a_run_needs_is_extracted(tmp_path):
 
 
 def test_no_binary_of_another_folder_is_loaded(tmp_path):
-    """An identifier that leads out of the FMU would load whatever library lies there."""
+    """An identifier that leads out of the FMU would load a foreign library."""
     with zipfile.ZipFile(cached_fmu(load_vehicle("odin"), 3)) as source:
         description = source.read("modelDescription.xml").decode()
         library = source.read(f"binaries/{fmpy.platform_tuple}/odin{fmpy.sharedLibraryExtension}")
@@ -324,7 +324,7 @@ def read_or_refused(path):
 
 
 @given(st.data())
-def test_any_change_of_an_fmu_is_read_or_refused(tmp_path_factory, data):
+def test_mutated_fmu_is_read_or_rejected(tmp_path_factory, data):
     content = bytearray(_small())
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, len(content) - 1))
@@ -336,7 +336,7 @@ def test_any_change_of_an_fmu_is_read_or_refused(tmp_path_factory, data):
 
 @pytest.mark.medium
 @given(st.data())
-def test_any_change_of_a_description_is_read_or_refused(tmp_path_factory, data):
+def test_mutated_description_is_read_or_rejected(tmp_path_factory, data):
     text = SOUND
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, len(text)))

@@ -1,4 +1,4 @@
-"""D9: a disk that is full before anything is recorded leaves no folder that the same command would refuse."""
+"""D9: a disk that is full before anything is recorded leaves no folder that blocks the same command."""
 
 import contextlib
 import errno
@@ -27,7 +27,7 @@ def scenario():
 
 @contextlib.contextmanager
 def a_full_disk(of, monkeypatch):
-    """Let nothing be written of what is named."""
+    """Make every write of the named functions fail."""
 
     def full(*_, **__):
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -47,7 +47,7 @@ PLACES = {
 @pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("of", PLACES.values(), ids=PLACES)
 @pytest.mark.parametrize("there", [False, True], ids=["new", "of its user"])
-def test_d9_the_same_command_works_once_there_is_room(tmp_path, monkeypatch, of, there):
+def test_d9_command_succeeds_after_disk_space_is_freed(tmp_path, monkeypatch, of, there):
     out, own = tmp_path / "run", scenario()
     if there:
         out.mkdir()
@@ -62,7 +62,7 @@ def test_d9_the_same_command_works_once_there_is_room(tmp_path, monkeypatch, of,
     assert run_scenario(own, out, report=False).summary["status"] == "completed"
 
 
-def test_d9_what_was_recorded_before_stays(tmp_path, monkeypatch):
+def test_d9_rows_recorded_before_a_full_disk_are_kept(tmp_path, monkeypatch):
     """A part is written at once here; the next one finds no room."""
     written, write = 0, pq.write_table
 
@@ -81,7 +81,7 @@ def test_d9_what_was_recorded_before_stays(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("steps", [1, 3])
-def test_d9_a_flight_of_an_autopilot_leaves_nothing_either(tmp_path, monkeypatch, steps):
+def test_d9_autopilot_run_on_a_full_disk_leaves_no_folder(tmp_path, monkeypatch, steps):
     own = scenario_to_fly("sitl", [], None, 400, "ardupilot")
 
     def flight():
@@ -101,7 +101,7 @@ def test_d9_a_flight_of_an_autopilot_leaves_nothing_either(tmp_path, monkeypatch
 
 
 @pytest.mark.skipif(os.name != "posix", reason="such a limit is POSIX's")
-def test_d9_files_that_may_not_grow(tmp_path, monkeypatch):
+def test_d9_run_beyond_the_file_size_limit_leaves_no_folder(tmp_path, monkeypatch):
     """As a quota has it: the system itself refuses what is longer."""
     import resource
 
@@ -123,7 +123,7 @@ def test_d9_files_that_may_not_grow(tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root mounts")
-def test_d9_a_small_disk_that_is_full(tmp_path):
+def test_d9_run_on_a_full_small_disk_is_rejected(tmp_path):
     disk = tmp_path / "disk"
     disk.mkdir()
     if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk], capture_output=True).returncode:

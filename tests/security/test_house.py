@@ -1,4 +1,4 @@
-"""What no file of the product does, beyond what the linter sees."""
+"""Rules for every source file beyond those of the linter."""
 
 import ast
 
@@ -38,7 +38,7 @@ def calls_in(path):
 
 
 @pytest.mark.parametrize("path", FILES.values(), ids=lambda p: str(p.relative_to(ROOT)))
-def test_nothing_runs_what_it_reads(path):
+def test_no_module_executes_data(path):
     name = path.relative_to(ROOT).as_posix()
     tree = tree_of(path)
     imported = {a.name.split(".")[0] for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
@@ -59,7 +59,7 @@ def test_nothing_runs_what_it_reads(path):
 
 
 @pytest.mark.medium
-def test_no_address_but_of_this_machine_is_a_default():
+def test_no_default_address_is_a_wildcard():
     for path in FILES.values():
         for node in ast.walk(tree_of(path)):
             assert not (isinstance(node, ast.Constant) and node.value in ("0.0.0.0", "::")), path

@@ -1,4 +1,4 @@
-"""D11: every message is one printable line that names its file or key and quotes little of what came."""
+"""D11: every message is one printable line that names its file or key and quotes little of the input."""
 
 import inspect
 import logging
@@ -24,27 +24,31 @@ COMMANDS_LOG = "\x1b[31m\x9b2J\u202e\n\r\x07"  # to a terminal
 SHOWN = r"\x1b[31m\x9b2J\u202e"
 
 
-def test_d11_the_packages_that_know_nothing_of_each_other_say_it_alike():
-    def said(module):
+def test_d11_message_sanitizers_of_all_packages_are_identical():
+    def sanitizer_source(module):
         functions = [inspect.getsource(getattr(module, name)) for name in ("one_line", "printable", "_cut")]
         patterns = [module._QUOTED.pattern, module._FILE.pattern]
         return functions + patterns + [module.MAX_QUOTED, module.MAX_WORDS, module.MAX_WHERE]
 
-    assert said(controller.errors) == said(fuzzy_arbiter.errors) == said(plant_fmu.errors)
+    assert (
+        sanitizer_source(controller.errors)
+        == sanitizer_source(fuzzy_arbiter.errors)
+        == sanitizer_source(plant_fmu.errors)
+    )
 
 
 @pytest.mark.parametrize("base", BASES)
 @pytest.mark.parametrize(
     "came", ["a" * 900, repr("a" * 900), repr('"' * 900), repr([1.5] * 900), repr((1, [2] * 900)), "a b " * 900]
 )
-def test_d11_a_message_quotes_little_and_keeps_its_ends(base, came):
+def test_d11_long_quotes_are_truncated_in_the_middle(base, came):
     said = str(base(f"runs/a/it.toml: law.gains is {came}, expected a number"))
     assert said.startswith("runs/a/it.toml: law.gains is ") and said.endswith(", expected a number")
     assert len(said) < 300 and said.count("a") < 300
 
 
 @pytest.mark.parametrize("base", BASES)
-def test_d11_a_message_orders_a_terminal_nothing(base):
+def test_d11_messages_contain_no_terminal_codes(base):
     said = str(base(f"{COMMANDS_LOG}.toml: {COMMANDS_LOG}"))
     assert said.isprintable() and said.count(SHOWN) == 2
 
@@ -86,7 +90,7 @@ COMMANDS = {
 @pytest.mark.parametrize(
     "name", [f"it{COMMANDS_LOG}", "it" + "a" * 900, os.fsdecode(b"it\xff\xfe")], ids=["commands", "long", "bytes"]
 )
-def test_d11_what_commands_say_of_any_name(command, name, tmp_path, monkeypatch, capsys):
+def test_d11_command_errors_are_printable_for_any_name(command, name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     try:
         code = command(name)
@@ -106,6 +110,6 @@ def test_d11_an_error_of_the_system_names_its_file(tmp_path, capsys):
     assert capsys.readouterr().err == f"cosim: {tmp_path / 'it.html'}: No space left on device\n"
 
 
-def test_d11_warnings_order_a_terminal_nothing():
+def test_d11_warnings_contain_no_terminal_codes():
     record = logging.LogRecord("cosim", logging.WARNING, "", 0, "%s: is odd", (COMMANDS_LOG,), None)
     assert _Lines("%(name)s: %(message)s").format(record).startswith(f"cosim: {SHOWN}")

@@ -1,4 +1,4 @@
-"""Names and texts from outside, in the pages and pictures that show them: they are read, never run."""
+"""External names and texts in pages and pictures are escaped, never executed."""
 
 import html.parser
 import json
@@ -95,7 +95,7 @@ def test_texts_of_a_run_do_not_end_the_script(text):
 
 
 @pytest.mark.slow
-def test_a_summary_that_somebody_changed_is_only_read(attacked, plain, tmp_path):
+def test_tampered_summary_is_escaped(attacked, plain, tmp_path):
     import shutil
 
     folder = tmp_path / "run"
@@ -109,14 +109,14 @@ def test_a_summary_that_somebody_changed_is_only_read(attacked, plain, tmp_path)
 
 
 @pytest.mark.slow
-def test_pages_to_print_take_any_title(attacked):
+def test_printable_pages_accept_any_title(attacked):
     _, files = report_again(attacked, ("html", "png"))
     assert files
     assert load_run(attacked).scenario.title == f"{ATTACK} (changed: time.duration = 0.2 s)"
 
 
 @pytest.mark.medium
-def test_the_page_within_an_fmu(tmp_path, attacked):
+def test_page_within_an_fmu_is_escaped(tmp_path, attacked):
     vehicle = load_vehicle(attacked / "vehicle.toml")
     ours, plain = (Elements(page(v, 3)).found for v in (vehicle, load_vehicle("odin")))
     assert ours == plain
@@ -124,14 +124,14 @@ def test_the_page_within_an_fmu(tmp_path, attacked):
 
 @pytest.mark.medium
 @pytest.mark.parametrize("kind", PICTURES)
-def test_pictures_of_a_vehicle_take_any_title(attacked, kind):
+def test_vehicle_pictures_escape_any_title(attacked, kind):
     svg = image(PICTURES[kind](load_vehicle(attacked / "vehicle.toml")), "svg").decode()
     assert "<img" not in svg and "<script" not in svg
 
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("kind", ["terms", "profile", "surface", "decisions"])
-def test_pictures_of_an_arbiter_take_any_name(tmp_path, kind):
+def test_arbiter_pictures_escape_any_name(tmp_path, kind):
     name = r"<img src=x onerror='harm()'>$\frac{$"
     variable = {"name": name, "universe": [0, 1], "terms": {name: [[0, 1], [1, 0]], "b": [[0, 0], [1, 1]]}}
     table = {
@@ -146,7 +146,7 @@ def test_pictures_of_an_arbiter_take_any_name(tmp_path, kind):
     assert "<img" not in svg and "<svg onload" not in svg
 
 
-def test_no_script_of_ours_makes_elements_of_text():
+def test_scripts_never_create_elements_from_text():
     banned = re.compile(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\(|new Function|srcdoc|on\w+=")
     files = [path for package in ("cosim", "plant_fmu") for path in (ROOT / package).rglob("*.js")]
     assert len(files) > 20
@@ -156,7 +156,7 @@ def test_no_script_of_ours_makes_elements_of_text():
 
 @pytest.mark.slow
 @pytest.mark.skipif(not (CHROMIUM and CHROMEDRIVER), reason="chromium and chromedriver are not installed")
-def test_nothing_runs_in_a_browser(attacked, tmp_path):
+def test_injected_text_runs_no_script_in_a_browser(attacked, tmp_path):
     pytest.importorskip("selenium")
     browser = Browser(tmp_path / "profile")
     try:

@@ -1,4 +1,4 @@
-"""Scenarios, vehicles, arbiters, scenes and commands made to do harm end in one short line of a known kind."""
+"""Malicious scenarios, vehicles, arbiters, scenes and commands give one short line of a known kind."""
 
 import json
 import math
@@ -40,8 +40,8 @@ def vehicle(path, text):
     load_vehicle(path)
 
 
-def said_of(read, path, text):
-    """Return what is said of a text, "" where it is taken."""
+def error_of(read, path, text):
+    """Return the error message of a text, "" if it is accepted."""
     content = text if isinstance(text, bytes) else text.encode("utf-8", "surrogatepass")
     said = ""
     try:
@@ -73,15 +73,15 @@ BROKEN = {
 @pytest.mark.medium(fast=9)
 @pytest.mark.parametrize("text", BROKEN.values(), ids=BROKEN)
 @pytest.mark.parametrize("read", [scenario, vehicle])
-def test_files_that_cannot_be(read, tmp_path, text):
-    assert said_of(read, tmp_path / "it.toml", text)
+def test_invalid_files_are_rejected(read, tmp_path, text):
+    assert error_of(read, tmp_path / "it.toml", text)
 
 
 @pytest.mark.medium(fast=32)
 @pytest.mark.parametrize("text", BROKEN.values(), ids=BROKEN)
 @pytest.mark.parametrize("format", ["toml", "json", "fcl", "fis", "fll"])
-def test_arbiters_that_cannot_be(tmp_path, text, format):
-    assert said_of(arbiter, tmp_path / f"it.{format}", text)
+def test_invalid_arbiter_files_are_rejected(tmp_path, text, format):
+    assert error_of(arbiter, tmp_path / f"it.{format}", text)
 
 
 def arbiter(path, text):
@@ -111,10 +111,10 @@ PAPER = tomllib.loads(SCENARIO)
 
 
 @pytest.mark.parametrize("value", [math.nan, -math.inf, 10**399], ids=str)
-def test_no_number_of_a_scenario_may_be_anything(tmp_path, value):
+def test_invalid_scenario_numbers_are_rejected_by_key(tmp_path, value):
     for where in numbers_of(PAPER):
         table = with_value(PAPER, where, value)
-        said = said_of(scenario, tmp_path / "it.toml", tomli_w.dumps(table))
+        said = error_of(scenario, tmp_path / "it.toml", tomli_w.dumps(table))
         key = str(next(part for part in reversed(where) if isinstance(part, str)))
         assert key in said, (where, said)
 
@@ -128,47 +128,47 @@ def test_no_number_of_a_scenario_may_be_anything(tmp_path, value):
         ("commands.enabled=true\ncommands.obstacles=1000000", "commands.obstacles"),
     ],
 )
-def test_absurd_sizes_name_their_key(change, key):
+def test_excessive_sizes_are_rejected_by_key(change, key):
     with pytest.raises(CosimError, match=key):
         load_scenario("paper", change.split("\n"))
 
 
 @pytest.mark.parametrize("name", ["</script>", "../x", "a/b", "a\nb", "", "$\\frac{$", "\u202e", "a" * 41, "\0"])
-def test_names_of_regions_are_plain(name):
+def test_region_names_reject_special_characters(name):
     with pytest.raises(CosimError, match="name"):
         load_scenario("paper", [f"regions.0.name={json.dumps(name)}"])
 
 
 @pytest.mark.parametrize("key", ["title", "law.name"])
 @pytest.mark.parametrize("text", ["a:\x1b[31mred", "a:\nb", "a:\x9b2J", "a:\u202eb", "a:" + "b" * 199])
-def test_texts_that_a_terminal_shows_are_plain(key, text):
+def test_displayed_texts_reject_terminal_codes(key, text):
     with pytest.raises(CosimError, match=f"{key} is .*printable") as caught:
         load_scenario("paper", [f"{key}={json.dumps(text)}"])
     assert str(caught.value).isprintable()
 
 
 @pytest.mark.parametrize("read", [scenario, vehicle])
-def test_a_key_with_commands_to_a_terminal_is_shown_only(read, tmp_path):
-    assert r"\x1b[31mred" in said_of(read, tmp_path / "it.toml", b'"\\u001b[31mred" = 1')
+def test_key_with_terminal_codes_is_escaped(read, tmp_path):
+    assert r"\x1b[31mred" in error_of(read, tmp_path / "it.toml", b'"\\u001b[31mred" = 1')
 
 
 @pytest.mark.parametrize("name", ["../../x", "/etc/passwd", "a/b", "con", "a b", "x" * 65, "é", "$(id)", "-o"])
-def test_names_of_vehicles_are_plain(tmp_path, name):
+def test_vehicle_names_reject_special_characters(tmp_path, name):
     """They become names of files, and of functions in C."""
     from plant_fmu.vehicle import _folder
 
     table = tomllib.loads((_folder() / "odin.toml").read_text(encoding="utf-8"))
-    said = said_of(vehicle, tmp_path / "it.toml", tomli_w.dumps(table | {"name": name}))
+    said = error_of(vehicle, tmp_path / "it.toml", tomli_w.dumps(table | {"name": name}))
     assert "name" in said
 
 
 @pytest.mark.parametrize(
     "line", [b"[" * 100_000, b'{"seed":' * 50_000, b"\xff", b"{}", b"1", b'{"seed":1' + b"0" * 5000]
 )
-def test_scenes_and_commands_that_cannot_be(tmp_path, line):
-    assert said_of(lambda path, text: decode_scene(text), tmp_path, line)
+def test_invalid_scenes_and_commands_are_rejected(tmp_path, line):
+    assert error_of(lambda path, text: decode_scene(text), tmp_path, line)
     (tmp_path / "log").write_bytes(line + b"\n")
-    assert said_of(lambda path, text: read_log(path), tmp_path / "log", line)
+    assert error_of(lambda path, text: read_log(path), tmp_path / "log", line)
 
 
 # ---- any change of a sound text ----
@@ -180,15 +180,15 @@ NASTY = st.sampled_from(
 
 
 @given(st.data())
-def test_any_value_anywhere_in_a_scenario(tmp_path_factory, data):
+def test_any_value_in_a_scenario_is_accepted_or_rejected(tmp_path_factory, data):
     table = with_value(PAPER, data.draw(st.sampled_from(places(PAPER))), data.draw(NASTY))
-    said_of(scenario, tmp_path_factory.getbasetemp() / "it.toml", tomli_w.dumps(table))
+    error_of(scenario, tmp_path_factory.getbasetemp() / "it.toml", tomli_w.dumps(table))
 
 
 @given(st.data())
-def test_any_value_anywhere_in_a_scene(data):
+def test_any_value_in_a_scene_is_accepted_or_rejected(data):
     table = with_value(SCENE, data.draw(st.sampled_from(places(SCENE))), data.draw(NASTY))
-    said_of(lambda path, text: decode_scene(text), "", json.dumps(table))
+    error_of(lambda path, text: decode_scene(text), "", json.dumps(table))
 
 
 def places(value, where=()):
@@ -208,14 +208,14 @@ TOKENS = st.sampled_from(
 @pytest.mark.slow
 @pytest.mark.parametrize("format", ARBITERS)
 @given(st.data())
-def test_any_change_of_an_arbiter(tmp_path_factory, format, data):
+def test_mutated_arbiter_file_is_read_or_rejected(tmp_path_factory, format, data):
     text = changed(ARBITERS[format], data)
-    said_of(arbiter, tmp_path_factory.getbasetemp() / f"it.{format}", text)
+    error_of(arbiter, tmp_path_factory.getbasetemp() / f"it.{format}", text)
 
 
 @given(st.data())
-def test_any_change_of_a_scenario(tmp_path_factory, data):
-    said_of(scenario, tmp_path_factory.getbasetemp() / "it.toml", changed(SCENARIO, data))
+def test_mutated_scenario_is_read_or_rejected(tmp_path_factory, data):
+    error_of(scenario, tmp_path_factory.getbasetemp() / "it.toml", changed(SCENARIO, data))
 
 
 def changed(text, data):

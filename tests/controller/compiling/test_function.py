@@ -1,4 +1,4 @@
-"""Plain functions run as C: the same numbers, arguments that stay alive, and what is no plain function."""
+"""Python functions compiled to C: equal numbers, argument lifetime, and plain callables."""
 
 import copy
 import gc
@@ -42,14 +42,14 @@ def recursive(out):
 
 
 class TestOneFunction:
-    def test_numbers_are_those_of_python(self):
+    def test_compiled_results_equal_python_results(self):
         first, out = np.array([0.1, -3.0, np.inf]), np.empty(3)
         CompiledFunction(scale)(Pair(first, 0.3), 2, out)
         expected = np.empty(3)
         scale(Pair(first, 0.3), 2, expected)
         assert out.tobytes() == expected.tobytes()
 
-    def test_numbers_in_arrays_may_change_between_calls_and_arguments_too(self):
+    def test_array_contents_and_arguments_may_change_between_calls(self):
         function, first, out, other = CompiledFunction(scale), np.ones(2), np.empty(2), np.empty(1)
         pair = Pair(first, 2.0)
         for value in (1.0, 5.0):
@@ -73,31 +73,31 @@ class TestOneFunction:
         with pytest.raises(TypeError, match="argument is dict"):
             CompiledFunction(grow)({})
 
-    def test_what_is_not_in_the_subset_is_named_with_its_line(self):
+    def test_unsupported_constructs_are_rejected_with_their_line(self):
         with pytest.raises(TranslationError, match=r"recursive calls itself"):
             CompiledFunction(recursive)(np.zeros(1))
         with pytest.raises(TypeError, match="without arguments"):
             CompiledFunction(grow)(None)
 
-    def test_a_copy_is_another_one_of_the_same_function(self):
+    def test_copied_function_is_independent(self):
         function, out = CompiledFunction(grow), np.zeros(1)
         function(out)
         copy.deepcopy(function)(out)
         assert out[0] == 2.0
 
-    def test_the_text_is_that_of_the_library(self):
+    def test_c_text_defines_the_entry_function(self):
         assert "void entry(const void *words)" in c_text(grow, (np.zeros(1),))
 
 
 class TestBoundCalls:
-    def test_arguments_live_as_long_as_the_call_alone(self):
+    def test_bound_call_keeps_its_arguments_alive(self):
         out = np.zeros(1)
         call = BoundCall(scale, (Pair(np.array([4.0]), 0.5), 1, out)).call
         gc.collect()
         call()
         assert out[0] == 3.0
 
-    def test_and_no_longer(self):
+    def test_bound_call_releases_its_arguments(self):
         out = np.zeros(1)
         bound, gone = BoundCall(grow, (out,)), weakref.ref(out)
         del out
@@ -113,7 +113,7 @@ class TestBoundCalls:
         call_twice(bound.address, bound.words)
         assert out[0] == 4.0
 
-    def test_what_is_no_plain_function_is_called_as_it_is_even_from_c(self):
+    def test_callable_objects_are_called_through_c(self):
         class Grow:
             def __call__(self, out):
                 out[0] += 1.0
@@ -130,7 +130,7 @@ class TestBoundCalls:
         BoundCall(call_twice, (bound.address, bound.words)).call()
         assert out[0] == 3.0  # what has failed is not called again
 
-    def test_python_runs_all_where_it_is_told_to(self, monkeypatch):
+    def test_interpreted_mode_runs_everything_in_python(self, monkeypatch):
         monkeypatch.setenv(INTERPRETED, "1")
         monkeypatch.setenv("CC", "/nowhere")
         seen, out = [], np.zeros(1)

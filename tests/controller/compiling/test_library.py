@@ -1,4 +1,4 @@
-"""Where C libraries come from, and what becomes of damaged ones, of no compiler, and of no place."""
+"""Compiled C libraries: cache, damage, missing compiler, and missing cache folder."""
 
 import ctypes
 import os
@@ -41,14 +41,14 @@ def answer(text=TEXT):
     return library_of(text).answer()
 
 
-def test_what_was_compiled_once_is_loaded_and_another_text_is_another_library(cache, compiled):
+def test_compiled_library_is_cached_by_its_text(cache, compiled):
     assert [answer(), answer(), answer(TEXT.replace("42", "43"))] == [42, 42, 43]
     assert len(compiled) == 2 and compiled[0] == library_name(TEXT) != compiled[1]
     assert len(list(cache.iterdir())) == 4  # each with its checksum
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9, 0.999])
-def test_a_damaged_library_is_compiled_anew(cache, compiled, caplog, share):
+def test_damaged_library_is_recompiled(cache, compiled, caplog, share):
     answer()
     (path,) = cache.glob("*.so")
     whole = path.read_bytes()
@@ -59,7 +59,7 @@ def test_a_damaged_library_is_compiled_anew(cache, compiled, caplog, share):
     assert path.read_bytes() == whole
 
 
-def test_a_changed_bit_and_a_lost_checksum_are_noticed(cache, compiled):
+def test_corrupted_library_or_missing_checksum_forces_recompilation(cache, compiled):
     answer()
     (path,) = cache.glob("*.so")
     whole = bytearray(path.read_bytes())
@@ -79,14 +79,14 @@ def test_a_cache_that_others_can_write_is_not_used(cache, compiled, caplog):
     assert "others can write there" in caplog.records[0].getMessage() and len(caplog.records) == 1
 
 
-def test_without_a_place_it_is_compiled_for_the_process(tmp_path, monkeypatch, compiled, caplog):
+def test_without_cache_folder_library_is_compiled_per_process(tmp_path, monkeypatch, compiled, caplog):
     (tmp_path / "file").touch()
     monkeypatch.setattr("platformdirs.user_cache_dir", lambda name: str(tmp_path / "file" / name))
     assert answer() == 42 and len(compiled) == 1
     assert caplog.records[0].getMessage().endswith("Not a directory; compiled for this process alone")
 
 
-def test_what_comes_with_the_package_needs_no_compiler(cache, tmp_path, monkeypatch, compiled):
+def test_prebuilt_library_needs_no_compiler(cache, tmp_path, monkeypatch, compiled):
     answer()
     (tmp_path / "prebuilt").mkdir()
     cache.rename(tmp_path / "prebuilt" / library._platform())
@@ -104,7 +104,7 @@ def test_what_comes_with_the_package_needs_no_compiler(cache, tmp_path, monkeypa
         ("false", "C compiler false failed: it wrote no library, and no word"),
     ],
 )
-def test_no_compiler_is_one_line(cache, monkeypatch, command, words):
+def test_missing_compiler_gives_one_line_error(cache, monkeypatch, command, words):
     monkeypatch.setenv("CC", command)
     with pytest.raises(CompilationError) as refused:
         answer()
@@ -112,7 +112,7 @@ def test_no_compiler_is_one_line(cache, monkeypatch, command, words):
     assert not cache.exists()
 
 
-def test_without_any_compiler_it_is_said_what_would_do(monkeypatch):
+def test_missing_compiler_error_names_alternatives(monkeypatch):
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", "/nowhere")
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
@@ -120,7 +120,7 @@ def test_without_any_compiler_it_is_said_what_would_do(monkeypatch):
         library_of("none")
 
 
-def test_an_error_of_the_compiler_is_its_first(cache):
+def test_compilation_error_quotes_first_compiler_error(cache):
     with pytest.raises(CompilationError, match=r"error: .*unknown"):
         library_of("unknown answer;\n")
 

@@ -20,7 +20,7 @@ def lagging(lag, spread):
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.004, 0.05, 0.3])
-def test_forces_follow_their_commands_as_the_equation_says(lag):
+def test_forces_follow_the_first_order_lag(lag):
     rng, (estimate, thrusters) = np.random.default_rng(1), lagging(lag, 1e-6)
     actual = np.zeros(8)
     for _ in range(30):
@@ -40,7 +40,7 @@ def test_forces_follow_their_commands_as_the_equation_says(lag):
         actual = end
 
 
-def test_secant_and_curvature_are_those_between_a_standard_deviation_less_and_more():
+def test_secant_and_curvature_span_one_standard_deviation_of_the_lag():
     rng, (estimate, thrusters) = np.random.default_rng(2), lagging(0.2, 0.1)
     (less, behind_less), (same, behind), (more, behind_more) = (lagging(lag, 1e-7) for lag in (0.1, 0.2, 0.3))
     for _ in range(20):
@@ -54,7 +54,7 @@ def test_secant_and_curvature_are_those_between_a_standard_deviation_less_and_mo
     assert estimate.curvature == pytest.approx(curvature, abs=1e-3) and np.abs(curvature).max() > 0.1
 
 
-def test_where_the_estimate_moves_the_forces_move_with_it():
+def test_lag_estimate_change_moves_the_estimated_forces():
     """As if the lag had always been what it is now taken for: exactly where the forces were propagated for it."""
     for now in (0.1, 0.2, 0.3):
         rng, (estimate, thrusters) = np.random.default_rng(3), lagging(0.2, 0.1)
@@ -70,7 +70,7 @@ def test_where_the_estimate_moves_the_forces_move_with_it():
         assert thrusters.acting_now == pytest.approx(expected.acting_now, abs=1e-3)
 
 
-def test_the_point_ahead_answers_to_commands_at_once():
+def test_predicted_point_responds_to_commands_without_lag():
     """p'' = f, tau f' = u - f: the second derivative of p + tau p' is u, at every instant."""
     lag, ahead = 0.4, empty_prediction()
 
@@ -92,7 +92,7 @@ def test_the_point_ahead_answers_to_commands_at_once():
     assert pushes[5:-5] == pytest.approx(np.array([command(t) for t in times])[5:-5], abs=1e-4)
 
 
-def test_the_attitude_ahead_is_turned_by_the_rate_but_not_beyond_half_a_radian():
+def test_predicted_attitude_rotation_is_limited_to_half_a_radian():
     ahead, still = empty_prediction(), np.zeros(3)
     for rate, angle in ((0.5, 0.1), (9.0, 0.5)):
         predict_state(ahead, still, still, LEVEL, np.array([0.0, 0.0, rate]), np.zeros(6), 0.2)

@@ -56,7 +56,7 @@ def seen_by(rng):
     return estimate
 
 
-def test_the_measured_moment_is_what_the_equation_of_motion_lacks():
+def test_measured_moment_is_the_residual_of_the_equation_of_motion():
     """M nu_r' = wrench without thrust + thrust and weight: the lower half of it, by plain matrices."""
     rng = np.random.default_rng(1)
     for _ in range(30):
@@ -82,7 +82,7 @@ def test_the_measured_moment_is_what_the_equation_of_motion_lacks():
         assert np.array_equal(attitude.last_omega, omega)
 
 
-def test_the_wanted_moment_turns_the_short_way_and_carries_what_is_known():
+def test_desired_moment_takes_the_shortest_rotation_with_feedforward():
     rng, out, w = np.random.default_rng(4), np.empty(3), GAINS.attitude_bandwidth
     for _ in range(20):
         attitude, dynamics, e, omega = loop_of(rng), askew(rng), turned(rng), rng.normal(size=3)
@@ -104,7 +104,7 @@ def apart(e, expected):
     return np.linalg.norm((rotation(e).inv() * expected).as_rotvec())
 
 
-def test_a_turn_is_that_of_the_exponential():
+def test_attitude_integration_matches_the_exponential_map():
     rng = np.random.default_rng(5)
     e, omega = turned(rng), rng.normal(size=3)
     before = rotation(e).as_matrix()
@@ -114,7 +114,7 @@ def test_a_turn_is_that_of_the_exponential():
     assert np.linalg.norm(e) == pytest.approx(1.0, abs=1e-14)
 
 
-def test_the_held_attitude_goes_back_at_a_fifth_of_the_way_a_second():
+def test_held_attitude_returns_at_one_fifth_per_second():
     rng, gains = np.random.default_rng(6), GAINS._replace(tilt=np.pi)
     for _ in range(10):
         attitude = loop_of(rng)
@@ -126,7 +126,7 @@ def test_the_held_attitude_goes_back_at_a_fifth_of_the_way_a_second():
         assert apart(attitude.desired, expected) < 1e-6 * back.magnitude() + 1e-9
 
 
-def test_an_attitude_that_is_kept_stays_to_the_last_bit():
+def test_held_attitude_is_constant_bit_for_bit():
     rng = np.random.default_rng(10)
     for _ in range(50):
         attitude = loop.empty_attitude(turned(rng))
@@ -154,7 +154,7 @@ def asked_turn(attitude, regions, position):
     return turn
 
 
-def test_it_turns_to_where_regions_of_attitude_have_comfort():
+def test_desired_attitude_moves_into_attitude_regions():
     rng = np.random.default_rng(7)
     gains, position = GAINS._replace(tilt=np.pi, turning_rate=1e3), np.array([0.3, -0.2, 0.1])
     for _ in range(20):
@@ -171,7 +171,7 @@ def test_it_turns_to_where_regions_of_attitude_have_comfort():
         assert apart(attitude.desired, expected) < 1e-7
 
 
-def test_it_turns_no_faster_than_allowed():
+def test_turning_rate_is_limited():
     attitude = loop.empty_attitude(np.array([1.0, 0.0, 0.0, 0.0]))
     before = attitude.desired.copy()
     aside = Region("aside", Orientation((np.cos(0.75), 0.0, 0.0, np.sin(0.75)), 0.1), "in")
@@ -179,7 +179,7 @@ def test_it_turns_no_faster_than_allowed():
     assert apart(attitude.desired, after(before, np.array([0.0, 0.0, GAINS.turning_rate]))) < 1e-6
 
 
-def test_half_a_turn_away_it_turns_about_the_vertical():
+def test_half_a_turn_away_the_rotation_is_about_the_vertical():
     for held, away in (((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), ((0.96, 0.28, 0.0, 0.0), (0.0, 0.0, 0.8, -0.6))):
         attitude, regions = loop.empty_attitude(np.array(held)), pack([Region("back", Orientation(away, 0.1), "in")])
         before = attitude.desired.copy()
@@ -187,7 +187,7 @@ def test_half_a_turn_away_it_turns_about_the_vertical():
         assert apart(attitude.desired, after(before, GAINS.turning_rate * down(before))) < 1e-6
 
 
-def test_tilted_as_far_as_allowed_it_turns_about_the_vertical_alone():
+def test_at_maximum_tilt_the_rotation_is_about_the_vertical():
     rng, tried = np.random.default_rng(9), 0
     for _ in range(60):
         attitude = loop.empty_attitude(np.array([1.0, 0.0, 0.0, 0.0]))

@@ -75,7 +75,7 @@ def written(regions, motion, quaternion, weights, limits=(-30.0, 25.0), time=1.5
     return work.rows[:count].copy(), work.right[:count].copy(), work.price[:count].copy()
 
 
-def test_rows_are_those_of_the_equations():
+def test_barrier_rows_match_the_equations():
     rng, n_rows, n_dropped, n_inside = np.random.default_rng(1), 0, 0, 0
     for _ in range(60):
         motion, quaternion = moving(rng, rng.normal(size=6) * 0.4), unit(rng.normal(size=4))
@@ -130,7 +130,7 @@ def test_rows_are_those_of_the_equations():
 
 
 @pytest.mark.parametrize("keep", ["out", "in"])
-def test_the_rate_of_a_gradient_is_the_curvature(keep):
+def test_gradient_rate_equals_the_curvature(keep):
     """Of a ball, (v^2 - (n v)^2) / r; of an ellipsoid, v^T (I - n n^T) A v / |A p| with the level function p^T A p."""
     rng, axes, largest = np.random.default_rng(6), np.array([2.0, 0.6, 0.9]), 0.0
     shapes = Sphere((0.0, 0.0, 0.0), 0.7), Ellipsoid((0.0, 0.0, 0.0), tuple(axes))
@@ -154,7 +154,7 @@ def test_the_rate_of_a_gradient_is_the_curvature(keep):
     assert largest > 3.0
 
 
-def test_the_bound_is_what_clearances_may_fall_to():
+def test_barrier_bound_is_the_least_admissible_clearance():
     """Of a wall: 0 where h and its rate are well; else the clearance less its spread, or psi / kappa."""
     rng, wall, fallen = np.random.default_rng(5), Region("wall", HalfSpace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in"), 0
     for _ in range(60):
@@ -174,7 +174,7 @@ def test_the_bound_is_what_clearances_may_fall_to():
     assert 10 < fallen < 60
 
 
-def test_while_barriers_yield_what_they_ask_for_moves_by_a_share():
+def test_barrier_right_side_is_smoothed_while_violated():
     rng, packed = np.random.default_rng(7), pack([Region("wall", HalfSpace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in")])
     sight, work, limits = (
         barrier.empty_observation(1),
@@ -195,7 +195,7 @@ def test_while_barriers_yield_what_they_ask_for_moves_by_a_share():
         sight = own
 
 
-def test_a_promise_rises_with_the_bound_and_falls_only_where_it_says_why():
+def test_promised_clearance_rises_with_the_bound_and_falls_only_with_slack_or_a_jump():
     promised = np.full(2, np.nan)
 
     def promise(bound, slack=0.0):
@@ -213,7 +213,7 @@ def test_a_promise_rises_with_the_bound_and_falls_only_where_it_says_why():
     assert promise(-0.02) == -0.02
 
 
-def test_the_slope_of_a_flat_face_leaps_and_does_not_turn():
+def test_gradient_rate_is_zero_at_a_switch_of_flat_faces():
     n, later, v = np.eye(6)[0], np.eye(6)[1], np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0])
     for kind in (Box.kind, Sphere.kind):
         assert barrier.gradient_rate(kind, -1.0, n, later, v) == 0.0  # towards: a leap
@@ -234,7 +234,7 @@ def planes(box, position):
     return [(half[a] - s * from_centre[a], -s * np.eye(3)[a]) for a in range(3) for s in (1.0, -1.0)]
 
 
-def test_faces_ahead_are_planes_of_the_box():
+def test_faces_ahead_are_box_planes():
     """Of a box that is kept within: the nearest, then those that the rest of the velocity leads to, with rows each."""
     rng, box, two, three = np.random.default_rng(2), Box((0.5, -0.4, 0.3), (3.0, 4.0, 5.0)), 0, 0
     region = Region("box", box, "in", (0.05, -0.02, 0.03))
@@ -275,7 +275,7 @@ def test_faces_ahead_are_planes_of_the_box():
     assert three > 5
 
 
-def test_no_face_lies_ahead_of_what_does_not_move_or_does_not_reach():
+def test_no_face_is_ahead_without_motion_or_within_reach():
     regions, face = pack([Region("box", Box((0.0, 0.0, 0.0), (4.0, 4.0, 4.0)), "in")]), np.empty(3)
     nearest, at = np.array([-1.0, 0.0, 0.0]), np.array([1.0, 0.2, 0.1])
     assert faces.face_ahead(regions, 0, at, nearest, np.array([0.4, 0.0, 0.0]), 3.0, face) == np.inf

@@ -23,7 +23,7 @@ def isolated(law):
 @pytest.mark.medium
 @pytest.mark.parametrize("lag", [0.0, pytest.param(0.3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("failed", [0, 6, *(pytest.param(j, marks=pytest.mark.slow) for j in (1, 2, 3, 4, 5, 7))])
-def test_a_thruster_that_fails_under_way_is_found_and_in_the_end_no_other(failed, lag):
+def test_failing_thruster_is_isolated_and_finally_no_other(failed, lag):
     law, sea = law_for(REGIONS), Sea(noise=NOISE, seed=failed, lag=lag)
     fly(law, sea, steps=150)
     assert isolated(law) == []
@@ -37,7 +37,7 @@ def test_a_thruster_that_fails_under_way_is_found_and_in_the_end_no_other(failed
 @pytest.mark.medium
 @pytest.mark.parametrize("lag", [0.0, 0.15, 0.6])
 @pytest.mark.parametrize("noise", [(0.0, 0.0), NOISE])
-def test_nothing_is_isolated_where_nothing_fails(noise, lag):
+def test_healthy_thrusters_are_never_isolated(noise, lag):
     """Thrusters that give 70 to 100 % of their force, behind a lag that the law is not given; all start tilted."""
     law, sea = law_for(REGIONS), Sea(noise=noise, current=(-0.3, 0.2, 0.0), restoring=14.0, lag=lag)
     sea.left[:] = np.linspace(0.7, 1.0, 8)[[3, 0, 6, 2, 7, 1, 5, 4]]
@@ -47,7 +47,7 @@ def test_nothing_is_isolated_where_nothing_fails(noise, lag):
 
 
 @pytest.mark.medium
-def test_a_thruster_that_loses_part_of_its_force_goes_on_with_the_rest():
+def test_partial_force_loss_is_estimated_without_isolation():
     for failed in (1, 5):
         law, sea = law_for(REGIONS), Sea(noise=NOISE)
         fly(law, sea, steps=150)
@@ -60,7 +60,7 @@ def test_a_thruster_that_loses_part_of_its_force_goes_on_with_the_rest():
 
 
 @pytest.mark.medium
-def test_a_thruster_that_is_stuck_is_found_with_its_force():
+def test_stuck_thruster_is_isolated_with_its_force():
     for failed in (0, 2):
         law, sea = law_for(REGIONS), Sea(noise=NOISE)
         forces = fly(law, sea, steps=150)
@@ -74,7 +74,7 @@ def test_a_thruster_that_is_stuck_is_found_with_its_force():
 
 
 @pytest.mark.medium
-def test_a_dead_thruster_that_was_taken_for_a_stuck_one_does_not_carry_the_vehicle_away():
+def test_dead_thruster_misjudged_as_stuck_does_not_displace_the_vehicle():
     """The force that it is supposed to give is estimated on, and found to be none."""
     law, sea = law_for([]), Sea(noise=NOISE)
     fly(law, sea, regions=[], steps=100)
@@ -88,7 +88,7 @@ def test_a_dead_thruster_that_was_taken_for_a_stuck_one_does_not_carry_the_vehic
 
 
 @pytest.mark.medium
-def test_it_can_be_switched_off():
+def test_fault_detection_can_be_disabled():
     law, sea = law_for(REGIONS, DeployableGains(failure_threshold=0.0)), Sea()
     sea.left[2] = 0.0
     fly(law, sea, steps=500)
@@ -96,7 +96,7 @@ def test_it_can_be_switched_off():
 
 
 @pytest.mark.medium
-def test_a_thruster_that_was_isolated_wrongly_is_tried_again():
+def test_wrongly_isolated_thruster_is_retried():
     law, sea = law_for(REGIONS), Sea(noise=NOISE)
     fly(law, sea, steps=100)
     memory = law.memory
@@ -107,7 +107,7 @@ def test_a_thruster_that_was_isolated_wrongly_is_tried_again():
     assert isolated(law) == [0]
 
 
-def test_one_that_is_certain_or_was_reported_is_not_tried_again():
+def test_certain_or_reported_failure_is_not_retried():
     for tentative in (0, 2):
         estimate, thrusters, state = started()
         state.tentative[1], thrusters.health[1] = tentative, 0.0
@@ -119,7 +119,7 @@ def test_one_that_is_certain_or_was_reported_is_not_tried_again():
     assert thrusters.stuck[6] == -3.0 and np.isnan(thrusters.stuck[[0, 1, 2, 3, 4, 5, 7]]).all()
 
 
-def test_of_several_isolated_each_is_tried_again_after_a_while_and_ever_more_rarely():
+def test_isolated_thrusters_are_retried_in_turn_at_growing_intervals():
     estimate, thrusters, state = started()
     reported, tried, period = np.ones(8), [], 0.1
     reported[7] = 0.0
@@ -153,7 +153,7 @@ def test_of_several_isolated_each_is_tried_again_after_a_while_and_ever_more_rar
 
 
 @pytest.mark.medium
-def test_two_that_were_isolated_wrongly_work_again():
+def test_two_wrongly_isolated_thrusters_recover():
     """While another one has failed; of the two, one is thought to be stuck."""
     law, sea = law_for(REGIONS), Sea(noise=NOISE)
     fly(law, sea, steps=100)
@@ -199,7 +199,7 @@ def periods(count, rng, left, stuck):
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(("hypothesis", "left", "stuck"), [(3, 0.0, None), (8 + 3, 1.0, 0.95 * 8.0 * np.sin(1.9 + 3))])
-def test_what_a_hypothesis_expects_is_what_is_measured_where_it_holds(hypothesis, left, stuck):
+def test_expected_innovations_match_measured_ones_under_the_true_hypothesis(hypothesis, left, stuck):
     """The deviation, propagated from the failure on, makes the innovations: their products equal its squares."""
     products, squares = 0.0, 0.0
     for k, state, _, estimate in periods(45, np.random.default_rng(1), left, stuck):
@@ -214,7 +214,7 @@ def test_what_a_hypothesis_expects_is_what_is_measured_where_it_holds(hypothesis
     assert products == pytest.approx(squares, rel=0.15)
 
 
-def test_the_evidence_is_the_log_likelihood_ratio():
+def test_evidence_is_the_log_likelihood_ratio():
     """Of one number, by SciPy: a normal density about what is expected, against one about zero."""
     rng = np.random.default_rng(2)
     for _ in range(20):
@@ -231,7 +231,7 @@ def test_the_evidence_is_the_log_likelihood_ratio():
         assert ratio == pytest.approx(densities, rel=1e-9, abs=1e-12)
 
 
-def test_evidence_is_summed_since_the_supposed_failure():
+def test_evidence_is_summed_since_the_hypothetical_failure():
     estimate, thrusters, state = started()
     estimate.evidence[:, 2], estimate.evidence[:, 10] = (3.0, 2.0), (1.5, 1.0)
     for _ in range(2):
@@ -244,7 +244,7 @@ def test_evidence_is_summed_since_the_supposed_failure():
     assert state.ratio[2] == 0.0 and not state.sums[:, 2].any()
 
 
-def test_an_innovation_beyond_three_standard_deviations_counts_as_three():
+def test_innovations_are_clipped_at_three_standard_deviations():
     for sigmas, counted in ((2.9, 2.9), (30.0, 3.0)):
         estimate, _, _ = started()
         estimate.row[:] = np.eye(22)[3]
@@ -257,7 +257,7 @@ def test_an_innovation_beyond_three_standard_deviations_counts_as_three():
         assert estimate.evidence[0, 0] == pytest.approx(counted / effective, rel=1e-9)
 
 
-def test_the_likeliest_must_be_ahead_of_the_next_and_above_the_threshold():
+def test_detection_requires_threshold_and_lead_over_the_next_hypothesis():
     for ratios, found in (
         ({2: 21.0, 5: 12.0}, 2), ({5: 12.0, 2: 21.0, 6: 12.9}, 2), ({2: 19.0, 5: 12.0}, -1), ({6: 11.9}, -1),
         ({1: 20.0, 6: 30.0}, 6), ({1: 24.0, 6: 30.0}, -1), ({3: 12.1}, 3), ({3: 30.0, 11: 29.0}, 3), ({9: 14.0}, 1),
@@ -271,7 +271,7 @@ def test_the_likeliest_must_be_ahead_of_the_next_and_above_the_threshold():
         assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == found
 
 
-def test_nothing_is_found_where_it_is_switched_off():
+def test_zero_threshold_detects_nothing():
     for threshold, found in ((12.0, 3), (0.0, -1)):
         estimate, thrusters, state = started()
         state.ratio[3] = state.sums[0, 3] = state.sums[1, 3] = 100.0
@@ -280,7 +280,7 @@ def test_nothing_is_found_where_it_is_switched_off():
         assert fault_detection.detect_fault(state, estimate, thrusters, gains) == found
 
 
-def test_a_useless_thruster_is_isolated_without_a_jump():
+def test_ineffective_thruster_is_isolated_without_an_estimate_jump():
     estimate, thrusters, state = started()
     estimate.state[EFFECTIVENESS + 5] = 0.05
     estimate.covariance[EFFECTIVENESS:, :EFFECTIVENESS] = 0.0

@@ -23,7 +23,7 @@ NOISE = (0.02, 0.01)
 
 
 @pytest.mark.medium
-def test_the_memory_is_all_that_it_keeps():
+def test_memory_is_the_complete_state_of_the_law():
     """A law that is given a copy of another's memory in mid-flight goes on as that one does, to the last bit."""
     law, sea = law_for(REGIONS), Sea(noise=NOISE)
     fly(law, sea, steps=150)
@@ -38,7 +38,7 @@ def test_the_memory_is_all_that_it_keeps():
 
 
 @pytest.mark.medium
-def test_two_laws_share_nothing():
+def test_laws_share_no_state():
     one, other = law_for(REGIONS), law_for(REGIONS)
     alone = fly(law_for(REGIONS), Sea(noise=NOISE), steps=60)
     broken = Sea(restoring=12.0)
@@ -48,7 +48,7 @@ def test_two_laws_share_nothing():
 
 
 @pytest.mark.slow
-def test_the_law_without_its_compiler_is_the_same_to_rounding():
+def test_interpreted_law_equals_compiled_law_to_rounding():
     """Plain Python in a process of its own; what overflows there is the generator of random numbers, on purpose."""
     code = (
         "import numpy as np\n"
@@ -64,7 +64,7 @@ def test_the_law_without_its_compiler_is_the_same_to_rounding():
 
 
 @pytest.mark.medium
-def test_it_reaches_the_goal_clear_of_the_regions_and_within_the_limits():
+def test_goal_is_reached_without_violation_and_within_force_limits():
     law, sea, clear = law_for(REGIONS), Sea(noise=NOISE), []
 
     def check(t):
@@ -106,7 +106,7 @@ def dead(which):
         "frozen",
     ],
 )
-def test_a_sensor_that_is_dead_for_a_second_is_borne(which):
+def test_one_second_sensor_outage_is_tolerated(which):
     """Forces stay finite and within limits, nothing is touched, no thruster is given up, the goal is reached."""
     law, sea, clear = law_for(REGIONS), Sea(noise=NOISE), []
     ball = REGIONS[0].shape
@@ -122,7 +122,7 @@ def test_a_sensor_that_is_dead_for_a_second_is_borne(which):
 
 
 @pytest.mark.medium
-def test_it_expects_the_vehicle_where_it_is_next_to_a_part_of_the_noise():
+def test_expected_state_error_is_below_the_noise():
     law, sea, errors = law_for(REGIONS), Sea(noise=NOISE), []
     assert np.isnan(law.expected).all()
     for k in range(600):
@@ -136,7 +136,7 @@ def test_it_expects_the_vehicle_where_it_is_next_to_a_part_of_the_noise():
     assert np.isnan(law.expected).all()
 
 
-def test_without_any_measurement_it_pushes_nothing():
+def test_without_measurements_forces_are_zero():
     def nothing(t, state):
         return VehicleState(*(np.full_like(part, np.nan) for part in state[:3]), state.thruster_health)
 
@@ -145,7 +145,7 @@ def test_without_any_measurement_it_pushes_nothing():
 
 @pytest.mark.medium
 @pytest.mark.parametrize("rise", [0.0, 5.0])
-def test_with_all_but_its_attitude_lost_it_holds_its_weight(rise):
+def test_with_attitude_alone_the_weight_is_compensated(rise):
     """The vertical speed settles where drag balances `rise`; without one it is the estimate's error that is left."""
     own, sea = law_for([], gains=DeployableGains(rise=rise)), Sea(current=(0.0, 0.0, 0.0), noise=NOISE)
 
@@ -160,7 +160,7 @@ def test_with_all_but_its_attitude_lost_it_holds_its_weight(rise):
 
 
 @pytest.mark.medium
-def test_an_uncertain_state_is_flown_with_wider_margins():
+def test_state_uncertainty_widens_margins():
     """At a goal that a ball covers it waits at the margin, which grows by three standard deviations."""
     ball, waits = REGIONS[0], []
     goal = Region("goal", Sphere(ball.shape.centre, 0.5), "in")
@@ -174,7 +174,7 @@ def test_an_uncertain_state_is_flown_with_wider_margins():
 
 
 @pytest.mark.medium
-def test_where_regions_exclude_each_other_clearances_keep_what_is_promised():
+def test_conflicting_regions_keep_the_promised_clearances():
     """A plate comes down onto the band in which the vehicle is: one of them must be violated, and says so before."""
     plate = Region("plate", Box((0.0, 0.0, -1.2), (40.0, 40.0, 1.0)), "out", (0.0, 0.0, 0.1))
     band, own, sea, rows = Region("band", DepthBand(2.5, 1.0), "in"), law_for([0, 1]), Sea(noise=NOISE), []
@@ -191,7 +191,7 @@ def test_where_regions_exclude_each_other_clearances_keep_what_is_promised():
 
 
 @pytest.mark.medium
-def test_a_delay_is_taken_for_a_lag_and_regions_are_kept():
+def test_delay_is_estimated_as_lag_and_regions_are_satisfied():
     """Commands come 0.2 s late, and forces follow them behind a lag of 0.15 s; the law is given neither."""
     own, sea, least, packed = law_for(REGIONS), Sea(noise=NOISE, lag=0.15, delay=10), [], pack(REGIONS)
 
@@ -206,7 +206,7 @@ def test_a_delay_is_taken_for_a_lag_and_regions_are_kept():
 
 
 @pytest.mark.medium
-def test_a_region_whose_place_is_uncertain_is_kept_farther_off():
+def test_region_uncertainty_widens_its_clearance():
     clear = []
     for deviation in (0.0, 0.1):
         regions, least, sea = [dataclasses.replace(REGIONS[0], deviation=deviation), *REGIONS[1:]], [], Sea()
@@ -220,7 +220,7 @@ def test_a_region_whose_place_is_uncertain_is_kept_farther_off():
     assert clear[1] > clear[0] + 0.2
 
 
-def test_without_regions_it_reaches_the_goal():
+def test_goal_is_reached_without_regions():
     law, sea = law_for([]), Sea()
     forces = fly(law, sea, regions=[], steps=1200)
     assert np.isfinite(forces).all()
@@ -228,7 +228,7 @@ def test_without_regions_it_reaches_the_goal():
 
 
 @pytest.mark.medium
-def test_regions_that_contradict_each_other_leave_finite_forces_within_limits():
+def test_contradictory_regions_give_finite_forces_within_limits():
     """The vehicle within one ball, and two more closing it in from either side."""
     walls = [Region(f"{x}", Sphere((x, 0.0, 2.5), 1.2), "out") for x in (-1.0, 0.05, 1.0)]
     law, sea = law_for(walls), Sea(noise=NOISE)
@@ -238,7 +238,7 @@ def test_regions_that_contradict_each_other_leave_finite_forces_within_limits():
 
 
 @pytest.mark.medium
-def test_two_thrusters_that_are_told_stay_given_up():
+def test_two_reported_failures_stay_isolated():
     def told(t, state):
         health = np.ones(8)
         health[2] = 0.0 if t > 0.5 else 1.0

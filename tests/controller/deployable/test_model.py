@@ -26,7 +26,7 @@ POSE = [*(f"quaternion.e{i}" for i in range(4)), *(f"velocity.{a}" for a in "uvw
 @pytest.mark.parametrize(
     "name", [name if name == "odin" else pytest.param(name, marks=pytest.mark.slow) for name in MODELS]
 )
-def test_acceleration_is_that_of_the_plant(name):
+def test_model_acceleration_matches_the_plant(name):
     """One FMU step of 0.1 ms at random attitudes, rates and currents, with r_G at the origin as the law takes it."""
     rng, step = np.random.default_rng(3), 1e-4
     vehicle, model = load_vehicle(name), MODELS[name]
@@ -59,7 +59,7 @@ def test_acceleration_is_that_of_the_plant(name):
             assert (free + pushed)[3:] == pytest.approx(there[3:], abs=2e-3 * (0.1 + np.abs(there[3:]).max()))
 
 
-def test_a_lost_thruster_gives_nothing_and_the_others_give_the_wrench():
+def test_remaining_thrusters_realize_the_wrench_after_a_failure():
     for model in MODELS.values():
         thrusters = make_thrusters(model)
         for lost in range(8):
@@ -74,7 +74,7 @@ def test_a_lost_thruster_gives_nothing_and_the_others_give_the_wrench():
 
 
 @pytest.mark.slow
-def test_the_least_force_is_that_of_the_worst_direction():
+def test_least_force_is_that_of_the_worst_direction():
     """Against a search over all directions for the greatest force that the limits allow without moment: within 2 %."""
     for model in MODELS.values():
         forces = least_forces(model)
@@ -100,12 +100,12 @@ def with_thrusters(model, keep):
 
 
 @pytest.mark.medium
-def test_a_vehicle_that_cannot_push_everywhere_is_refused():
+def test_vehicle_without_force_in_every_direction_is_rejected():
     with pytest.raises(LawError, match=r"6 thrusters push 0 N in the worst direction"):
         least_forces(with_thrusters(MODELS["bluerov2_heavy"], [0, 1, 2, 3, 4, 6]))
 
 
-def test_with_no_thruster_to_spare_nothing_is_relied_on_after_a_loss():
+def test_without_redundancy_least_force_after_a_loss_is_the_nominal_one():
     six = with_thrusters(MODELS["odin"], [0, 1, 2, 4, 5, 6])
     forces = least_forces(
         six._replace(
@@ -116,7 +116,7 @@ def test_with_no_thruster_to_spare_nothing_is_relied_on_after_a_loss():
     assert forces == pytest.approx(np.full(7, 27.0))
 
 
-def test_nothing_untold_enters_the_model():
+def test_model_does_not_depend_on_weight_and_buoyancy():
     """Another weight, buoyancy and other centres make the same numbers."""
     import dataclasses
 
@@ -127,7 +127,7 @@ def test_nothing_untold_enters_the_model():
 
 
 @pytest.mark.medium
-def test_the_least_force_of_uneven_thrusters_is_that_of_the_weaker_way():
+def test_least_force_of_asymmetric_thrusters_is_that_of_the_weaker_direction():
     """Vertical thrusters that push down less than up: the worst direction is among those that go down, or up."""
     for low, high in ((-5.0, 27.0), (-27.0, 5.0)):
         uneven = MODELS["odin"]._replace(thrust_min=np.full(8, -27.0), thrust_max=np.full(8, 27.0))
@@ -138,7 +138,7 @@ def test_the_least_force_of_uneven_thrusters_is_that_of_the_weaker_way():
         assert least_forces(uneven)[-1] == pytest.approx(20.0)
 
 
-def test_lost_effectiveness_takes_force_away():
+def test_effectiveness_scales_thruster_forces():
     thrusters, dynamics = make_thrusters(MODELS["odin"]), make_dynamics(MODELS["odin"], np.ones(9))
     thrusters.effectiveness[:] = np.linspace(0.3, 1.0, 8)
     forces, out, expected = np.linspace(-20.0, 25.0, 8), np.empty(6), np.empty(6)
@@ -149,7 +149,7 @@ def test_lost_effectiveness_takes_force_away():
     assert out == pytest.approx(expected, rel=1e-12)
 
 
-def test_a_thruster_that_is_stuck_stays_in_the_matrix_with_its_force_alone():
+def test_stuck_thruster_has_equal_limits_at_its_force():
     thrusters = make_thrusters(MODELS["odin"])
     thrusters.health[3], thrusters.stuck[3] = 0.0, -7.0
     reallocate(thrusters)

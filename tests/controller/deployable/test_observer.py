@@ -96,7 +96,7 @@ def random_estimate(rng, thrusters):
     return estimate, dynamics
 
 
-def test_the_covariance_of_a_prediction_is_that_of_a_kalman_filter():
+def test_prediction_covariance_matches_a_kalman_filter():
     """F P F^T + Q; the position goes by the velocity before the period, which enters P in two steps: G F."""
     rng, thrusters = np.random.default_rng(1), make_thrusters(ODIN)
     for _ in range(20):
@@ -119,7 +119,7 @@ def test_the_covariance_of_a_prediction_is_that_of_a_kalman_filter():
         )
 
 
-def test_a_correction_is_the_joint_update_of_a_kalman_filter():
+def test_correction_matches_the_joint_kalman_update():
     """With both measurements of three axes at once, of which ours takes one number after the other."""
     rng, thrusters = np.random.default_rng(2), make_thrusters(ODIN)
     H, noise = np.eye(6, N), np.diag([GAINS.position_noise**2] * 3 + [GAINS.velocity_noise**2] * 3)
@@ -136,7 +136,7 @@ def test_a_correction_is_the_joint_update_of_a_kalman_filter():
         assert estimate.covariance == pytest.approx((np.eye(N) - K @ H) @ P, rel=1e-6, abs=1e-12)
 
 
-def test_a_moment_corrects_by_its_row():
+def test_moment_correction_matches_the_kalman_update():
     """moment = B diag(f) e - S(k) phi - m e3 x a z + what the current changes, by plain matrices; k of mid-period."""
     rng, thrusters = np.random.default_rng(3), make_thrusters(ODIN)
     for _ in range(20):
@@ -167,7 +167,7 @@ def test_a_moment_corrects_by_its_row():
         assert np.abs(seen.covariance - P).max() > 1e-2
 
 
-def test_bounds_are_kept_where_the_likeliest_state_within_them_is():
+def test_bounds_are_enforced_by_the_most_likely_state():
     """The least of (x - x0)^T P^-1 (x - x0) with one number at its bound, by SciPy."""
     rng, thrusters = np.random.default_rng(4), make_thrusters(ODIN)
     for _ in range(5):
@@ -190,7 +190,7 @@ def test_bounds_are_kept_where_the_likeliest_state_within_them_is():
 
 @pytest.mark.parametrize(("index", "bound"), [(CURRENT, 1.0), (NET_WEIGHT, 125.0), (MOMENTS, 937.5)])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_unknowns_keep_their_bounds_on_either_side(index, bound, sign):
+def test_estimates_are_bounded_on_both_sides(index, bound, sign):
     """In N and N m those of the gains, for ODIN's mass of 125 kg: 50 N times 2.5, 150 N m times its square."""
     estimate, _, _ = started()
     estimate.state[index] = 1e5 * sign
@@ -199,7 +199,7 @@ def test_unknowns_keep_their_bounds_on_either_side(index, bound, sign):
 
 
 @pytest.mark.medium
-def test_what_drives_the_vehicle_is_found_to_the_accuracy_that_is_stated():
+def test_disturbances_are_estimated_within_the_stated_accuracy():
     """Current, W - B, righting moment, lag and effectiveness, in noise, while the law flies."""
     for name, lag in (("quick", 0.0), ("slow", 0.25)):
         sea, law = Sea(current=(0.1, -0.08, 0.0), restoring=11.0, noise=(0.02, 0.01), lag=lag), law_for([])
@@ -215,7 +215,7 @@ def test_what_drives_the_vehicle_is_found_to_the_accuracy_that_is_stated():
 
 
 @pytest.mark.medium
-def test_unknowns_do_not_wind_up():
+def test_estimates_do_not_wind_up():
     """A vehicle that is held fast while the thrusters push."""
     estimate, dynamics, thrusters = started()
     thrusters.forces[:] = 27.0
@@ -228,7 +228,7 @@ def test_unknowns_do_not_wind_up():
 
 
 @pytest.mark.parametrize(("first", "noise"), [(POSITION, GAINS.position_noise), (VELOCITY, GAINS.velocity_noise)])
-def test_a_measurement_that_cannot_be_is_rejected_and_changes_nothing(first, noise):
+def test_implausible_measurement_is_rejected_without_effect(first, noise):
     estimate, dynamics, thrusters = started()
     predict(estimate, dynamics, thrusters)
     before = [np.copy(part) for part in estimate]
@@ -240,7 +240,7 @@ def test_a_measurement_that_cannot_be_is_rejected_and_changes_nothing(first, noi
     assert estimate.time_since_measurement[0] == pytest.approx(PERIOD)
 
 
-def test_numbers_that_are_not_measured_leave_the_others():
+def test_missing_components_do_not_affect_other_corrections():
     """A depth without a position corrects as the row of the depth alone does."""
     rng, thrusters = np.random.default_rng(6), make_thrusters(ODIN)
     estimate, _ = random_estimate(rng, thrusters)
@@ -252,7 +252,7 @@ def test_numbers_that_are_not_measured_leave_the_others():
     assert estimate.covariance == pytest.approx(P - np.outer(K, P[2]), rel=1e-8, abs=1e-13)
 
 
-def test_the_prediction_follows_the_vehicles_model():
+def test_prediction_follows_the_vehicle_model():
     """Turned and turning, with thrust: position and velocity after a period of steady acceleration."""
     rng, omega = np.random.default_rng(5), np.array([0.2, -0.3, 0.4])
     for model in MODELS.values():
@@ -275,7 +275,7 @@ def test_the_prediction_follows_the_vehicles_model():
         assert estimate.time_since_measurement[0] == PERIOD
 
 
-def test_measurements_count_up_to_six_standard_deviations_and_five_hundredths():
+def test_measurement_gate_is_six_standard_deviations_plus_0_05():
     for first, noise in ((POSITION, GAINS.position_noise), (VELOCITY, GAINS.velocity_noise)):
         for part, believed in ((0.98, True), (1.02, False)):
             estimate, dynamics, thrusters = started()
@@ -287,14 +287,14 @@ def test_measurements_count_up_to_six_standard_deviations_and_five_hundredths():
                 assert observer.correct(seen, first, measured, noise, GAINS) == believed
 
 
-def test_it_can_start_without_a_velocity():
+def test_observer_initializes_without_velocity():
     estimate = make_estimate(ODIN)
     initialize(estimate, np.array([1.0, 2.0, 3.0]), np.full(3, np.nan), GAINS)
     assert estimate.position.tolist() == [1.0, 2.0, 3.0] and not estimate.velocity.any()
     assert np.diag(estimate.covariance)[:6] == pytest.approx([0.02**2] * 3 + [0.3**2] * 3)
 
 
-def test_a_reset_forgets_all_but_the_effectiveness_of_thrusters():
+def test_reset_keeps_only_thruster_effectiveness():
     estimate, dynamics, thrusters = started(velocity=(0.3, 0.0, 0.0))
     for _ in range(20):
         predict(estimate, dynamics, thrusters)

@@ -80,7 +80,7 @@ def random_way(rng):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("moving", [pytest.param(False, marks=pytest.mark.slow), True])
-def test_a_way_that_costs_no_more_than_its_length_is_clear(moving):
+def test_path_with_cost_equal_to_length_is_free(moving):
     """And what is found to pass within a region, to more than the least stride, costs metres more."""
     rng, free, hit = np.random.default_rng(5), 0, 0
     for seed in range(60):
@@ -98,7 +98,7 @@ def test_a_way_that_costs_no_more_than_its_length_is_clear(moving):
     assert free > 5 and hit > 15
 
 
-def test_what_lies_beyond_the_last_look_is_not_free():
+def test_unevaluated_path_remainder_is_costly():
     """A way of which the looks do not reach the end costs at least all that it passes on from there."""
     wall = pack([Region("floor", HalfSpace((0.0, 0.0, -1.0), (0.0, 0.0, 2.7)), "in")])
     way = np.zeros((CORNERS + 1, 3))
@@ -121,14 +121,14 @@ def test_what_lies_beyond_the_last_look_is_not_free():
     ],
     ids=lambda x: type(x).__name__ if not isinstance(x, float) else str(x),
 )
-def test_the_end_lies_within_goals_of_any_shape_and_depth(goal, depth):
+def test_path_end_lies_inside_goals_of_any_shape(goal, depth):
     rng, packed, end = np.random.default_rng(6), pack([Region("goal", goal, "in")]), np.empty(3)
     for _ in range(50):
         nearest_goal_point(packed, rng.normal([4.0, 0.0, 2.5], [5.0, 3.0, 2.0]), GAINS.depth, end)
         assert clearance_at(packed, 0, end) > 0.5 * depth
 
 
-def test_the_end_of_a_ball_is_the_nearest_point():
+def test_path_end_in_a_sphere_is_its_nearest_point():
     end = np.empty(3)
     nearest_goal_point(pack([GOAL]), START, 0.3, end)
     assert end == pytest.approx([9.0 - 0.2, 0.0, 2.5], abs=1e-9)
@@ -147,7 +147,7 @@ def run(regions, steps=400, goal=GOAL, start=START, plan=None, moved=None):
 
 
 @pytest.mark.medium
-def test_it_finds_a_way_round_what_lies_across():
+def test_path_around_blocking_obstacles_is_found():
     """Of 20 fields of six balls, straight through which no way is free, within 8 s of the vehicle's waiting."""
     found = blocked = 0
     for seed in range(20):
@@ -168,7 +168,7 @@ def test_it_finds_a_way_round_what_lies_across():
 
 
 @pytest.mark.medium
-def test_a_goal_that_is_partly_covered_is_entered_where_it_is_not():
+def test_partly_covered_goal_is_entered_at_its_free_part():
     regions = pack([Region("cover", Sphere((8.4, 0.0, 2.5), 0.6), "out")])
     plan, goal = run(regions, 800)
     end = plan.path[plan.counts[0] - 1]
@@ -177,7 +177,7 @@ def test_a_goal_that_is_partly_covered_is_entered_where_it_is_not():
     assert least_clearance(plan.path, plan.counts[0], regions) > GAINS.margin
 
 
-def test_the_end_goes_with_a_goal_that_moves_even_without_a_velocity():
+def test_path_end_follows_a_moving_goal():
     """Given a velocity, and streamed to places that none tells of."""
     sailing = Region("goal", GOAL.shape, "in", (0.1, -0.2, 0.0))
 
@@ -201,14 +201,14 @@ def arrays_of(plan):
             yield part
 
 
-def test_the_same_start_makes_the_same_way_to_the_last_bit():
+def test_planning_is_deterministic():
     one, other = (run(scene(3, moving=True))[0] for _ in range(2))
     assert one.counts[0] > 1
     for a, b in zip(arrays_of(one), arrays_of(other), strict=True):
         assert np.array_equal(a, b)
 
 
-def test_random_numbers_are_those_of_xorshift64star():
+def test_random_generator_is_xorshift64star():
     state, x, mask = np.array([88172645463325252], dtype=np.uint64), 88172645463325252, 2**64 - 1
     numbers = []
     for _ in range(2000):
@@ -220,7 +220,7 @@ def test_random_numbers_are_those_of_xorshift64star():
     assert abs(np.mean(numbers) - 0.5) < 0.03 and 0.0 <= min(numbers) < max(numbers) < 1.0
 
 
-def test_looks_are_bounded(monkeypatch):
+def test_clearance_evaluations_are_bounded(monkeypatch):
     """In plain Python, a way of any length among any regions is looked at 64 times a call, and 512 times in all."""
     looked = []
 
@@ -240,7 +240,7 @@ def test_looks_are_bounded(monkeypatch):
 
 
 @pytest.mark.medium
-def test_a_search_at_rest_ends_with_a_free_way_or_after_its_periods():
+def test_search_at_rest_ends_with_a_free_path_or_its_period_limit():
     plan, periods = empty_plan(2, 1), np.array([2000, 0])
     regions, goal = pack([Region("wall", Box((4.0, 0.0, 2.5), (0.5, 4.0, 9.0)), "out")]), pack([GOAL])
     CompiledFunction(search_path)(plan, START, goal, regions, GAINS, 0.02, periods)
@@ -252,7 +252,7 @@ def test_a_search_at_rest_ends_with_a_free_way_or_after_its_periods():
 
 
 @given(st.floats(-1.0, 50.0), st.floats(0.01, 3.0), st.floats(0.1, 5.0))
-def test_the_approach_can_be_braked(distance, deceleration, slope):
+def test_approach_speed_is_within_the_deceleration(distance, deceleration, slope):
     """v dv/dd is what it asks to brake with: below the deceleration, and v grows with `slope` near 0."""
     h = 1e-6
     v = approach_speed(distance, deceleration, slope)
@@ -266,7 +266,7 @@ def test_the_approach_can_be_braked(distance, deceleration, slope):
         assert v == slope * distance
 
 
-def test_the_wanted_velocity_is_bounded_and_leads_along_the_way():
+def test_desired_velocity_is_bounded_and_follows_the_path():
     rng, plan, out = np.random.default_rng(8), empty_plan(0, 1), np.empty(3)
     for _ in range(300):
         plan.counts[0] = rng.integers(1, CORNERS + 2)
@@ -282,7 +282,7 @@ def test_the_wanted_velocity_is_bounded_and_leads_along_the_way():
     assert np.array_equal(out, drift)
 
 
-def test_the_wanted_acceleration_is_bounded():
+def test_desired_acceleration_is_bounded():
     rng, out = np.random.default_rng(9), np.empty(3)
     for scale in (1e-3, 1.0, 1e6):
         wanted, velocity = rng.normal(size=(2, 3)) * scale

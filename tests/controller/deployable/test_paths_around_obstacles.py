@@ -92,7 +92,7 @@ def random_way(rng, reach=1.0):
 
 
 @pytest.mark.medium
-def test_the_cost_is_that_of_looking_everywhere():
+def test_path_cost_matches_dense_evaluation():
     rng, packed, dear, long, soft, calls = np.random.default_rng(1), pack(REGIONS), 0, 0, 0, []
     for k in range(60):
         way, count = random_way(rng, 20.0 if k % 6 == 0 else 1.0)
@@ -109,7 +109,7 @@ def test_the_cost_is_that_of_looking_everywhere():
     assert dear > 20 and long > 1 and soft > 3 and min(calls) == 1 and max(calls) > 1
 
 
-def test_a_way_that_costs_too_much_is_not_evaluated_to_its_end():
+def test_evaluation_of_a_too_costly_path_stops_early():
     wall = pack([Region("wall", Box((2.0, 0.0, 2.5), (1.0, 9.0, 9.0)), "out")])
     way = np.zeros((CORNERS + 1, 3))
     way[0], way[1] = (4.0, 0.2, 2.5), (-900.0, 0.2, 2.5)
@@ -117,7 +117,7 @@ def test_a_way_that_costs_too_much_is_not_evaluated_to_its_end():
     assert most < cost_of(way, 2, wall, most=most)[0][0] < 300.0 < cost_of(way, 2, wall)[0][0]
 
 
-def test_soft_regions_are_avoided_where_that_is_no_long_way_round():
+def test_soft_region_cost_trades_against_the_detour():
     """A ball across the way: 2 m more for each metre within it, times its depth and half a metre for being entered."""
     disc = pack([Region("disc", Sphere((4.0, 0.2, 2.5), 1.5), "out", hard=False)])
     through, round_it = np.zeros((2, CORNERS + 1, 3))
@@ -129,7 +129,7 @@ def test_soft_regions_are_avoided_where_that_is_no_long_way_round():
     assert cost_of(round_it, 2, disc)[0] == pytest.approx([2.0 * np.hypot(4.0, 1.7), 0.0, 0.0], abs=0.3)
 
 
-def test_a_stay_within_a_soft_region_costs_as_three_metres_through_it_and_less_near_it():
+def test_path_end_in_a_soft_region_costs_three_metres_of_crossing():
     ball = pack([Region("ball", Sphere((4.0, 0.2, 2.5), 1.5), "out", hard=False, crossing_cost=7.0)])
     way = np.zeros((CORNERS + 1, 3))
     way[0] = 3.0, 0.2, 2.5
@@ -144,7 +144,7 @@ def test_a_stay_within_a_soft_region_costs_as_three_metres_through_it_and_less_n
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(("begins", "inside"), [(4.8, 0.05), (5.18, 0.02), (5.3, -0.1)])
 @pytest.mark.parametrize("cost", [0.4, 2.0, 10.0])
-def test_a_path_ends_within_a_soft_region_by_a_margin_where_the_goal_has_room(begins, inside, cost):
+def test_path_end_keeps_a_margin_inside_a_soft_keep_in_region(begins, inside, cost):
     """Ends lie up to 1.2 m from the goal's middle; north of a plane lies a region to be kept in."""
     goal, plan = pack([Region("goal", Sphere((4.0, 0.0, 2.5), 1.5), "in")]), empty_plan(1, 1)
     beyond = HalfSpace((begins, 0.0, 0.0), (-1.0, 0.0, 0.0))
@@ -155,7 +155,7 @@ def test_a_path_ends_within_a_soft_region_by_a_margin_where_the_goal_has_room(be
 
 
 @pytest.mark.medium
-def test_the_trees_leave_costly_regions_for_cheap_ones():
+def test_search_prefers_cheap_regions():
     """A wall has a door, and ends; a region lies in the door, another one beside the wall: the cheap one is passed."""
     start, goal = np.array([0.0, 0.0, 2.5]), pack([GOAL])
     scene = [
@@ -177,7 +177,7 @@ def test_the_trees_leave_costly_regions_for_cheap_ones():
     assert 5.0 < ends[20.0, 0.2] < 8.0 and -1.0 < ends[0.2, 20.0] < 1.0
 
 
-def test_the_nearest_end_is_along_the_slope_where_the_goal_is_deep_enough():
+def test_nearest_goal_point_follows_the_gradient():
     rng, end = np.random.default_rng(2), np.empty(3)
     for goal, depth in ((GOAL, 0.3), (Region("goal", Box((8.0, 0.5, 2.5), (2.0, 2.0, 2.0)), "in"), 0.3)):
         packed = pack([goal])
@@ -192,7 +192,7 @@ def test_the_nearest_end_is_along_the_slope_where_the_goal_is_deep_enough():
                 assert from_centre == pytest.approx([-0.7, *(at[1:] - [0.5, 2.5])], abs=1e-9)
 
 
-def test_a_line_is_free_if_dense_sampling_says_so():
+def test_line_check_matches_dense_sampling():
     rng, packed, said = np.random.default_rng(3), pack(REGIONS), []
     for _ in range(200):
         a, b = rng.normal([4.0, 0.0, 2.5], [1.5, 1.0, 0.7], size=(2, 3))
@@ -204,7 +204,7 @@ def test_a_line_is_free_if_dense_sampling_says_so():
     assert search.is_line_free(START, START, packed, 0.1)
 
 
-def test_the_free_length_of_a_line_ends_before_a_wall():
+def test_free_length_ends_before_a_wall():
     wall = pack([Region("wall", Box((5.0, 0.0, 2.5), (2.0, 9.0, 9.0)), "out")])
     begin, end = np.array([0.0, 0.0, 2.5]), np.array([8.0, 0.0, 2.5])
     assert 3.8 < search.free_length(begin, end, wall, 0.13) <= 4.0 - 0.13
@@ -212,7 +212,7 @@ def test_the_free_length_of_a_line_ends_before_a_wall():
     assert search.free_length(begin, np.array([3.0, 0.0, 2.5]), wall, 0.13) == 3.0
 
 
-def test_a_look_goes_no_farther_than_what_is_known_to_be_free():
+def test_line_check_steps_stay_within_known_clearance():
     """Past a small ball, 0.45 m from it at the nearest: a longer look from the start would land behind it."""
     packed = pack([Region("ball", Sphere((1.0, 0.55, 0.0), 0.1), "out")])
     begin, end = np.zeros(3), np.array([3.0, 0.0, 0.0])
@@ -225,7 +225,7 @@ def looks(state, start, end, packed, number, rng, way):
     return [search.look_for_path(state, start, end, rng.uniform(size=5), packed, GAINS, way) for _ in range(number)]
 
 
-def test_start_and_end_closer_to_a_region_than_lines_may_be_are_left():
+def test_search_starts_and_ends_closer_to_a_region_than_the_line_margin():
     balls = [Region("ball", Sphere((4.0, 0.2, 2.4), 0.7), "out"), Region("other", Sphere((-2.0, 0.9, 2.4), 0.6), "out")]
     start, end = np.array([3.26, 0.2, 2.4]), np.array([-2.0, 0.24, 2.4])  # 0.04 m and 0.06 m away
     way = np.zeros((9, 3))
@@ -351,13 +351,13 @@ def walk(seed, packed, steps):
 
 
 @pytest.mark.medium
-def test_the_search_is_that_of_the_transcription():
+def test_search_matches_the_reference_transcription():
     found = walk(4, pack(REGIONS), 240)
     assert max(found) >= 3 and found.count(0) > 20
 
 
 @pytest.mark.medium
-def test_a_found_way_is_free_all_along():
+def test_found_path_is_free():
     rng, packed, way, checked = np.random.default_rng(6), pack(REGIONS), np.zeros((9, 3)), 0
     state, end = search.empty_search(), np.array([8.0, 0.5, 2.5])
     for count in (looks(state, START, end, packed, 1, rng, way)[0] for _ in range(200)):
@@ -369,7 +369,7 @@ def test_a_found_way_is_free_all_along():
 
 
 @pytest.mark.medium
-def test_a_tree_that_is_full_starts_anew_and_a_chain_too_long_is_no_path():
+def test_full_tree_restarts_and_overlong_chain_is_no_path():
     packed, state, rng = pack([]), search.empty_search(), np.random.default_rng(7)
     way, end = np.zeros((9, 3)), np.array([8.0, 0.5, 2.5])
     sizes = []
@@ -428,7 +428,7 @@ class Change:
         return [self.anywhere(), way[-1]]
 
 
-def test_changes_are_those_of_the_transcription():
+def test_path_changes_match_the_reference_transcription():
     plan, goal, rng = empty_plan(0, 3), pack([GOAL]), np.random.default_rng(5)
     for k in range(300):
         plan.counts[0] = 1 + k % (CORNERS + 1)
@@ -442,7 +442,7 @@ def test_changes_are_those_of_the_transcription():
 
 
 @pytest.mark.medium
-def test_a_way_is_kept_up_and_replaced_by_one_that_saves_enough():
+def test_path_is_updated_and_replaced_by_a_sufficiently_cheaper_one():
     """Turn by turn: the end goes with the goal, corners are passed, the cheaper way stays."""
     wall = Region("box", Box((5.0, -0.8, 2.6), (1.0, 9.0, 9.0)), "out", (-0.03, 0.0, 0.02))
     packed, goal, plan = pack([REGIONS[0], wall, *REGIONS[2:]]), pack([GOAL]), empty_plan(5, 1)
@@ -483,7 +483,7 @@ def test_a_way_is_kept_up_and_replaced_by_one_that_saves_enough():
     assert taken > 1 and grown > 3
 
 
-def test_a_way_that_the_search_found_is_the_next_candidate():
+def test_found_path_is_the_next_candidate():
     plan, goal = empty_plan(0, 1), pack([GOAL])
     plan.counts[:], plan.path[0], plan.found[:2] = (1, 0, 2), (8.0, 0.5, 2.5), [(4.0, 1.0, 2.5), (8.0, 0.5, 2.5)]
     way_round._choose_candidate(plan, START, goal, GAINS)
@@ -492,7 +492,7 @@ def test_a_way_that_the_search_found_is_the_next_candidate():
     assert not np.array_equal(plan.candidate[:2], plan.found[:2])
 
 
-def test_passed_corners_are_dropped_one_after_the_other():
+def test_passed_corners_are_dropped_in_sequence():
     plan, corners = empty_plan(0, 1), [(1.0, 0.0, 2.5), (1.1, 0.1, 2.5), (4.0, 1.0, 2.5), (8.0, 0.5, 2.5)]
     plan.counts[0], plan.path[:4] = 4, corners
     improve_path(plan, np.array([1.05, 0.05, 2.5]), pack([GOAL]), pack([]), GAINS, 0.02)
@@ -501,7 +501,7 @@ def test_passed_corners_are_dropped_one_after_the_other():
     assert way_round._length(plan.path, 2, START) == pytest.approx(np.hypot(4.0, 0.8) + np.hypot(4.0, 0.5))
 
 
-def test_the_first_corner_of_the_longest_way_is_dropped():
+def test_first_corner_of_a_full_path_is_dropped():
     plan = empty_plan(0, 1)
     plan.counts[0], plan.path[:, 0], plan.path[:, 1:] = CORNERS + 1, np.linspace(0.0, 8.0, CORNERS + 1), (0.5, 2.5)
     before = plan.path.copy()
@@ -510,7 +510,7 @@ def test_the_first_corner_of_the_longest_way_is_dropped():
     assert np.array_equal(plan.path[:CORNERS], before[1:])
 
 
-def test_what_is_found_far_away_is_not_looked_at_again(monkeypatch):
+def test_distant_regions_are_not_reevaluated(monkeypatch):
     """In plain Python: a ball that is farther than the way is long, once; one at half of that, again after a while."""
     evaluated = []
     clearance = add_cost.__globals__["clearance_of_sphere"]

@@ -46,7 +46,7 @@ def approach(distance, a, slope):
     return np.sqrt(2.0 * a * distance + (a / slope) ** 2) - a / slope if distance > 0.0 else slope * distance
 
 
-def test_the_wanted_velocity_slows_down_for_corners_and_for_the_end():
+def test_desired_velocity_slows_at_corners_and_at_the_end():
     rng, plan, out, slowed = np.random.default_rng(1), empty_plan(0, 1), np.empty(3), 0
     for _ in range(200):
         count, at, drift = int(rng.integers(1, 5)), rng.normal(size=3), rng.normal(size=3) * 0.1
@@ -71,13 +71,13 @@ def test_the_wanted_velocity_slows_down_for_corners_and_for_the_end():
     assert slowed > 50
 
 
-def test_a_force_gives_the_acceleration():
+def test_force_of_an_acceleration_uses_the_mass_matrix():
     dynamics, out, a = askew(np.random.default_rng(2)), np.empty(6), np.array([0.3, -0.2, 0.5])
     law._force_of(dynamics, TURNED, a, out)
     assert out[:3] == pytest.approx(dynamics.mass[:3, :3] @ TURNED.T @ a, rel=1e-12)
 
 
-def test_what_a_newton_of_each_thruster_does():
+def test_thruster_influence_matrix_matches_the_inverse_mass():
     dynamics, thrusters = askew(np.random.default_rng(3)), make_thrusters(ODIN)
     body = dynamics.inverse_mass @ thrusters.matrix
     expected, ahead = np.vstack([TURNED @ body[:3], body[3:]]), TURNED @ TURNED
@@ -93,7 +93,7 @@ def test_what_a_newton_of_each_thruster_does():
     assert limits == pytest.approx(np.array([lower, upper]), rel=1e-12)
 
 
-def test_violated_soft_regions_push_out_of_them():
+def test_violated_soft_regions_repel():
     rng, position = np.random.default_rng(4), np.array([0.3, -0.1, 0.2])
     dynamics = askew(rng)
     regions = [
@@ -118,7 +118,7 @@ def test_violated_soft_regions_push_out_of_them():
 
 
 @pytest.mark.parametrize("entered", [0.0, 0.4, 1.0])
-def test_on_the_way_a_soft_region_pushes_aside_but_not_back(entered):
+def test_moving_vehicle_is_repelled_sideways_but_not_backwards(entered):
     """At rest in full; else without the part against the desired velocity, of which the goal region gives some back.
 
     Where the vehicle is as deep in it as the path ends, all of it at rest, none from 0.3 m/s on.
@@ -148,7 +148,7 @@ def test_on_the_way_a_soft_region_pushes_aside_but_not_back(entered):
 
 
 @pytest.mark.parametrize("lost", [[], [3], [3, 5], [1, 4, 6]])
-def test_what_deceleration_is_relied_on(lost):
+def test_available_braking_accounts_for_lost_thrusters(lost):
     dynamics, thrusters = askew(np.random.default_rng(5)), make_thrusters(ODIN)
     thrusters.health[lost] = 0.0
     reallocate(thrusters)
@@ -158,7 +158,7 @@ def test_what_deceleration_is_relied_on(lost):
     assert available_braking(dynamics, thrusters) == pytest.approx(expected)
 
 
-def test_the_report_says_what_it_is_of():
+def test_report_holds_the_diagnostics():
     seen, report = make_estimate(ODIN), np.full(len(law.DIAGNOSTICS), np.nan)
     seen.position[:], seen.velocity[:], seen.water_velocity[:2] = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0)
     health = np.array([1.0, 1.0, 0.0, 1.0])
@@ -182,7 +182,7 @@ def begun():
     return memory
 
 
-def test_attitude_and_rates_that_are_not_measured_are_carried_by_the_model():
+def test_missing_attitude_and_rates_are_propagated_by_the_model():
     memory = begun()
     free, seen = np.empty(6), memory.state_estimate
     loads = Loads(seen.water_velocity, seen.net_weight, seen.moments)
@@ -196,7 +196,7 @@ def test_attitude_and_rates_that_are_not_measured_are_carried_by_the_model():
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_rates_that_are_carried_stay_finite(sign):
+def test_propagated_rates_stay_bounded(sign):
     """The drag of one period at such a rate would throw it back far beyond."""
     memory = begun()
     memory.omega[:] = 1e3 * sign
@@ -210,7 +210,7 @@ def state_of(memory, **change):
     return VehicleState(seen.position.copy(), ATTITUDE.copy(), body, np.ones(8))._replace(**change)
 
 
-def test_a_measurement_is_turned_into_the_world():
+def test_measurements_are_rotated_to_the_world_frame():
     memory, theirs = begun(), begun()
     body = np.r_[TURNED.T @ [0.41, -0.31, 0.21], 0.1, 0.2, -0.3]
     state = VehicleState(np.array([1.01, 2.0, 3.0]), 1.001 * ATTITUDE, body, np.ones(8))
@@ -226,7 +226,7 @@ def test_a_measurement_is_turned_into_the_world():
     assert memory.state_estimate.position == pytest.approx(theirs.state_estimate.position, rel=1e-9)
 
 
-def test_what_repeats_itself_to_the_last_bit_while_moving_is_not_believed():
+def test_identical_measurements_while_moving_are_rejected():
     for moving in ((-0.05, 0.0, 0.0), (0.0, -0.05, 0.0), (0.0, 0.0, -0.05), (0.0, 0.0, 0.0)):
         memory = begun()
         memory.thrusters.forces[:] = 0.0
@@ -256,7 +256,7 @@ def test_what_repeats_itself_to_the_last_bit_while_moving_is_not_believed():
         ({"position": np.full(3, np.nan), "velocity_body": np.full(6, np.nan)}, set()),
     ],
 )  # fmt: skip
-def test_what_no_vehicle_can_have_is_not_believed_and_all_else_is(change, accepted):
+def test_impossible_measurements_are_rejected_and_others_accepted(change, accepted):
     fresh, memory = law_for([]).memory, begun()
     seen = memory.state_estimate
     assert input_validation.process_measurement(memory, state_of(memory, **change), GAINS) == bool(accepted)
@@ -269,7 +269,7 @@ def test_what_no_vehicle_can_have_is_not_believed_and_all_else_is(change, accept
     assert starts or input_validation.process_measurement(fresh, state_of(memory, quaternion=0.999 * ATTITUDE), GAINS)
 
 
-def test_gaps_in_what_is_measured_are_remembered_for_a_second():
+def test_longest_measurement_gap_decays_over_a_second():
     memory = begun()
     nothing = state_of(memory, position=np.full(3, np.nan), velocity_body=np.full(6, np.nan))
     for _ in range(24):
@@ -284,7 +284,7 @@ def test_gaps_in_what_is_measured_are_remembered_for_a_second():
     assert seen.longest_gap[0] == pytest.approx(0.5 * 0.98)
 
 
-def test_an_estimate_that_was_led_away_is_forgotten():
+def test_diverged_estimate_is_reset():
     memory = begun()
     memory.state_estimate.state[1], memory.fault_state.ratio[2] = 2e6, 5.0
     bad = state_of(memory, position=np.full(3, np.nan))
@@ -294,7 +294,7 @@ def test_an_estimate_that_was_led_away_is_forgotten():
     assert input_validation.process_measurement(memory, state_of(memory), GAINS)
 
 
-def test_what_is_said_for_long_is_believed_in_the_end():
+def test_persistent_measurements_are_eventually_accepted():
     memory = begun()
     elsewhere = state_of(memory, position=np.array([30.0, 2.0, 3.0]))
     for silence, begins in ((1.0, False), (GAINS.coast + 0.1, True)):
@@ -305,7 +305,7 @@ def test_what_is_said_for_long_is_believed_in_the_end():
         elsewhere.position[2] += 1e-6
 
 
-def test_weights_and_health_are_taken_for_what_they_can_be():
+def test_weights_and_health_are_sanitized():
     believed, hard = np.full((2, 4), np.nan), np.array([True, False, True, False])
     input_validation.smooth_weights(np.array([-1.0, 0.3, 2.0, np.nan]), believed, hard, 0.1)
     assert believed.tolist() == [[0.0, 0.3, 1.0, 1.0]] * 2  # the first as they are

@@ -70,7 +70,7 @@ def expected(memory, state, goal, regions, weights):
     return pushed, rows, program, np.clip(forces / thrusters.effectiveness, thrusters.lower, thrusters.upper)
 
 
-def test_a_step_is_its_stages():
+def test_step_is_the_sequence_of_its_stages():
     own, sea, weights = law_for(ALL), Sea(noise=(0.02, 0.01)), np.array([1.0, 0.3, 0.7, 0.5])
     fly(own, sea, regions=ALL, steps=4)
     sea.quaternion[:] = np.array([0.95, 0.1, -0.2, 0.15]) / np.linalg.norm([0.95, 0.1, -0.2, 0.15])
@@ -97,7 +97,7 @@ def test_a_step_is_its_stages():
     assert most >= 2
 
 
-def test_thrusters_of_uneven_effectiveness_do_not_push_against_each_other_at_a_barrier():
+def test_unequal_effectiveness_causes_no_opposing_forces_at_a_barrier():
     """What is given at a wall is the least that keeps it: no part of it without a wrench."""
     wall = Region("wall", HalfSpace((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in")
     for uneven in (0.0, 0.15):
@@ -115,7 +115,7 @@ def test_thrusters_of_uneven_effectiveness_do_not_push_against_each_other_at_a_b
         assert np.linalg.norm(idle) < 0.02 * np.linalg.norm(given)
 
 
-def test_without_measurements_it_goes_no_faster_than_it_stops_in_time_and_then_drifts():
+def test_without_measurements_speed_is_limited_to_a_timely_stop():
     """Within 0.15 s it goes on; then at most at what `acceleration` stops within `coast`; then it rests."""
     own, sea = law_for([]), Sea()
     fly(own, sea, regions=[], steps=100)
@@ -133,7 +133,7 @@ def test_without_measurements_it_goes_no_faster_than_it_stops_in_time_and_then_d
     assert law.DIAGNOSTICS[8].name == "desired_speed"
 
 
-def test_it_goes_slower_where_it_hardly_knows_its_place():
+def test_position_uncertainty_reduces_speed():
     speeds = []
     for spread in (0.01, 0.09, 0.15, 0.25):
         own = law_for([])

@@ -1,4 +1,4 @@
-"""Corrections against differences of what a sensor would tell, and against a Kalman filter of plain matrices."""
+"""Corrections against finite differences of the sensor models and a Kalman filter in plain matrices."""
 
 import copy
 
@@ -20,8 +20,8 @@ def rotation(quaternion):
     return Rotation.from_quat(np.asarray(quaternion)[[1, 2, 3, 0]])
 
 
-def told(memory, sensor):
-    """What a sensor without noise tells of the state that a memory has as its estimate."""
+def ideal_measurement(memory, sensor):
+    """Return the noise-free measurement of the state that a memory estimates."""
     R = rotation(memory.quaternion)
     if sensor == DEPTH_SENSOR:
         return np.array([memory.position[2] + memory.constants[7]])
@@ -43,7 +43,7 @@ def moved(memory, error):
 
 
 def begun(rng, age=0.0):
-    """An estimate that has moved for some time; with what it was `age` before, and what it was told since."""
+    """An estimate that has moved for some time; with the estimate `age` before, and the samples since."""
     memory = empty_memory()
     memory.position[:], memory.velocity[:] = rng.normal(size=3), rng.normal(size=3)
     tilted = Rotation.from_euler("ZYX", rng.uniform([-3.0, -0.6, -0.6], [3.0, 0.6, 0.6]))
@@ -67,7 +67,7 @@ def rows_by_differences(memory, sensor):
     for i in range(N_ERRORS):
         error = np.zeros(N_ERRORS)
         error[i] = step
-        difference = told(moved(memory, error), sensor) - told(moved(memory, -error), sensor)
+        difference = ideal_measurement(moved(memory, error), sensor) - ideal_measurement(moved(memory, -error), sensor)
         rows.append((difference + np.pi) % (2.0 * np.pi) - np.pi if sensor == COMPASS else difference)
     return np.array(rows).T / (2.0 * step)
 
@@ -82,7 +82,7 @@ def test_a_sample_corrects_as_by_plain_matrices(sensor):
         S = H @ P @ H.T + NOISE[sensor] ** 2 * np.eye(len(H))
         off = rng.multivariate_normal(np.zeros(len(H)), S) * 0.5
         measurements = empty_measurements()
-        measurements.values[PLACES[sensor]] = told(memory, sensor) + off
+        measurements.values[PLACES[sensor]] = ideal_measurement(memory, sensor) + off
         K = P @ H.T @ np.linalg.inv(S)
         expected, error = moved(memory, K @ off), np.linalg.inv(S)
         measurements.times[sensor] = memory.time[0]
@@ -96,8 +96,8 @@ def test_a_sample_corrects_as_by_plain_matrices(sensor):
 
 @pytest.mark.medium(fast=3)
 @pytest.mark.parametrize("sensor", list(PLACES))
-def test_a_late_sample_corrects_what_has_become_of_its_error(sensor):
-    """Errors 0.1 s ago, carried on: a sample of then, told now, corrects what has become of them, to second order."""
+def test_delayed_sample_corrects_the_propagated_error(sensor):
+    """Errors 0.1 s ago, propagated: a delayed sample corrects the propagated errors to second order."""
     rng, late = np.random.default_rng(10 + sensor), []
     for _ in range(6):
         memory, before, samples = begun(rng, age=0.1)
@@ -110,20 +110,20 @@ def test_a_late_sample_corrects_what_has_become_of_its_error(sensor):
         # where the errors of now are all that is uncertain, and are known to be a multiple of these
         memory.covariance[:] = np.outer(now, now) * 1e12
         measurements = empty_measurements()
-        measurements.values[PLACES[sensor]] = told(moved(before, error), sensor)
+        measurements.values[PLACES[sensor]] = ideal_measurement(moved(before, error), sensor)
         exact = SENSORS._replace(depth=0.0, velocity=0.0, heading=0.0, position=0.0)
         measurements.times[sensor] = before.time[0]
         correct_by_sensor(memory, measurements, sensor, exact)
         left = np.r_[truth.position - memory.position, truth.velocity - memory.velocity]
         # a part g of the error was taken away: its row made `expected` of it, of the samples' `off`
-        off = np.linalg.norm(told(moved(before, error), sensor) - told(before, sensor))
+        off = np.linalg.norm(ideal_measurement(moved(before, error), sensor) - ideal_measurement(before, sensor))
         g = 1.0 - left @ now[:6] / (now[:6] @ now[:6])
         assert off / g == pytest.approx(off, rel=0.05, abs=1.2e-5)
         late.append(off)
     assert np.mean(late) > 5e-5  # to which what came later adds up to 1e-4
 
 
-def test_an_outlier_is_rejected_and_a_third_in_a_row_believed():
+def test_single_outlier_is_rejected_and_third_consecutive_is_accepted():
     memory, _, _ = begun(np.random.default_rng(5))
     set_first_covariance(memory, SENSORS)
     memory.covariance[:3, :3], memory.accepted[USBL] = 1e-4 * np.eye(3), 3.0
@@ -142,7 +142,7 @@ def test_an_outlier_is_rejected_and_a_third_in_a_row_believed():
     assert memory.position[0] == pytest.approx(before[0], abs=0.05)
 
 
-def test_headings_are_compared_round_the_circle():
+def test_heading_innovation_wraps_around():
     memory, _, _ = begun(np.random.default_rng(6))
     set_first_covariance(memory, SENSORS)
     memory.quaternion[:] = Rotation.from_euler("Z", np.pi - 0.01).as_quat()[[3, 0, 1, 2]]
@@ -155,7 +155,7 @@ def test_headings_are_compared_round_the_circle():
     assert abs((yaw - (np.pi + 0.01) + np.pi) % (2 * np.pi) - np.pi) < 1e-3
 
 
-def test_a_compass_tells_nothing_of_a_vehicle_that_stands_on_its_stern():
+def test_compass_sample_is_ignored_at_vertical_pitch():
     memory, _, _ = begun(np.random.default_rng(7))
     memory.quaternion[:] = Rotation.from_euler("Y", 1.5).as_quat()[[3, 0, 1, 2]]
     before = copy.deepcopy(memory)

@@ -32,7 +32,7 @@ def skew(a):
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
-def test_it_is_the_motion_of_a_body_that_turns_and_is_pushed():
+def test_strapdown_integration_matches_scipy():
     """Of smooth rates and forces, sampled at 200 Hz for 2 s: what SciPy integrates from the same functions."""
     rng = np.random.default_rng(1)
     memory = begun(rng)
@@ -96,8 +96,8 @@ def test_the_covariance_is_propagated_as_by_plain_matrices():
 
 
 @pytest.mark.medium
-def test_errors_grow_as_the_covariance_says():
-    """A small error of the start and of each constant, carried on: what the transition of the covariance says."""
+def test_error_growth_matches_the_covariance_transition():
+    """A small initial error of each state and constant grows as the transition of the covariance."""
     rng = np.random.default_rng(3)
     for i in range(15):
         right, wrong, error = begun(np.random.default_rng(i)), begun(np.random.default_rng(i)), np.zeros(N_ERRORS)

@@ -1,4 +1,4 @@
-"""The navigation filter as a whole, on measurements of a motion that is known."""
+"""The complete navigation filter on measurements of a known motion."""
 
 import numpy as np
 import pytest
@@ -12,12 +12,12 @@ from controller.navigation.measurements import COMPASS, DEPTH_SENSOR, DVL, IMU, 
 MODEL = SensorModel()
 
 
-def told():
+def make_vehicle_state():
     return VehicleState(np.zeros(3), np.zeros(4), np.zeros(6), np.ones(8), np.zeros(12))
 
 
 def level(navigator, time, position=(1.0, 2.0, 5.0), heading=0.4, sensors=range(5)):
-    """Write what sensors of a vehicle at rest tell."""
+    """Write the measurements of a vehicle at rest."""
     values, times = navigator.measurements
     values[0], values[1:4], values[5:8], values[8:11] = position[2], 0.0, (0.0, 0.0, -9.81), 0.0
     values[11], values[12:15] = heading, position
@@ -33,15 +33,15 @@ def rest(navigator, seconds, first=0.0, sensors=range(5)):
 
 
 @pytest.mark.parametrize("missing", [DEPTH_SENSOR, IMU, COMPASS, USBL])
-def test_nothing_is_known_before_each_sensor_that_is_needed_has_told_something(missing):
-    navigator = Navigator(MODEL, told())
+def test_state_is_nan_until_every_required_sensor_has_a_sample(missing):
+    navigator = Navigator(MODEL, make_vehicle_state())
     state = rest(navigator, 0.1, sensors=[sensor for sensor in range(5) if sensor != missing])
     for part in state[:3]:
         assert np.isnan(part).all(), SENSORS[missing]
 
 
-def test_a_vehicle_at_rest_is_found():
-    state = rest(Navigator(MODEL, told()), 5.0)
+def test_state_of_a_resting_vehicle_is_estimated():
+    state = rest(Navigator(MODEL, make_vehicle_state()), 5.0)
     assert state.position == pytest.approx([1.0, 2.0, 5.0], abs=1e-3)
     assert state.velocity_body == pytest.approx(np.zeros(6), abs=1e-3)
     yaw, pitch, roll = Rotation.from_quat(state.quaternion[[1, 2, 3, 0]]).as_euler("ZYX")
@@ -52,8 +52,8 @@ def test_a_vehicle_at_rest_is_found():
 
 
 @pytest.mark.parametrize("tilt", [0.0, 1.0, 3.0])
-def test_it_starts_however_the_vehicle_lies(tilt):
-    navigator, turned = Navigator(MODEL, told()), Rotation.from_euler("ZYX", [0.4, 0.3, tilt])
+def test_alignment_works_at_any_attitude(tilt):
+    navigator, turned = Navigator(MODEL, make_vehicle_state()), Rotation.from_euler("ZYX", [0.4, 0.3, tilt])
     for time in (0.0, 0.5):
         level(navigator, time)
         navigator.measurements.values[5:8] = turned.inv().apply([0.0, 0.0, -9.81])
@@ -62,9 +62,9 @@ def test_it_starts_however_the_vehicle_lies(tilt):
     assert (ours * turned.inv()).magnitude() < 1e-9
 
 
-def test_what_is_lost_for_long_is_called_unknown_and_what_is_measured_stays():
-    """DVL and USBL tell nothing any more: velocity and position get lost, depth and attitude do not."""
-    navigator = Navigator(MODEL, told())
+def test_long_unmeasured_states_become_nan_and_measured_ones_stay():
+    """DVL and USBL are out: velocity and position become NaN, depth and attitude do not."""
+    navigator = Navigator(MODEL, make_vehicle_state())
     rest(navigator, 3.0)
     lost_velocity = lost_position = None
     for k in range(60):
@@ -81,8 +81,8 @@ def test_what_is_lost_for_long_is_called_unknown_and_what_is_measured_stays():
     assert state.position == pytest.approx([1.0, 2.0, 5.0], abs=0.05)
 
 
-def test_without_the_imu_nothing_is_known_and_afterwards_it_starts_anew():
-    navigator = Navigator(MODEL, told())
+def test_imu_outage_makes_the_state_nan_and_recovery_realigns():
+    navigator = Navigator(MODEL, make_vehicle_state())
     rest(navigator, 1.0)
     state = rest(navigator, 2.0, 1.0, sensors=[DEPTH_SENSOR, DVL, COMPASS, USBL])
     assert np.isnan(state.position).all() and np.isnan(state.quaternion).all()
@@ -90,8 +90,8 @@ def test_without_the_imu_nothing_is_known_and_afterwards_it_starts_anew():
     assert state.position == pytest.approx([1.0, 2.0, 5.0], abs=0.01)
 
 
-def test_a_first_fix_that_the_next_contradicts_is_not_believed():
-    navigator = Navigator(MODEL, told())
+def test_contradicted_first_position_fix_is_rejected():
+    navigator = Navigator(MODEL, make_vehicle_state())
     for k in range(301):
         level(navigator, 0.01 * k, sensors=[DEPTH_SENSOR, DVL, IMU, COMPASS])
         if k % 100 == 0:
@@ -101,9 +101,9 @@ def test_a_first_fix_that_the_next_contradicts_is_not_believed():
     assert navigator.state.position[1] == pytest.approx(2.0, abs=1e-3)
 
 
-def test_a_start_is_between_two_fixes_and_as_uncertain_as_they_are_apart():
+def test_initial_position_is_the_mean_of_two_fixes_with_their_spread():
     for apart, deviation in ((0.3, np.hypot(0.1, 0.15 / np.sqrt(2.0))), (1.2, np.hypot(0.6, 0.146))):
-        navigator = Navigator(MODEL, told())
+        navigator = Navigator(MODEL, make_vehicle_state())
         for time, north in ((0.0, 1.0), (1.0, 1.0 + apart)):
             level(navigator, time, position=(north, 2.0, 5.0))
             navigator.step(time)
@@ -113,9 +113,9 @@ def test_a_start_is_between_two_fixes_and_as_uncertain_as_they_are_apart():
         assert navigator.state.deviation[9:] == pytest.approx(np.full(3, rates), rel=0.01)
 
 
-def test_an_estimate_that_no_sample_agrees_with_is_given_up_and_found_anew():
+def test_inconsistent_estimate_is_reset_and_realigned():
     """Its attitude is wrong by 40 degrees, more than the covariance of a start holds: the DVL contradicts for ever."""
-    navigator = Navigator(MODEL, told())
+    navigator = Navigator(MODEL, make_vehicle_state())
     rest(navigator, 0.01)
     rest(navigator, 1.2, first=0.01)
     memory, lost = navigator.memory, []
@@ -133,12 +133,12 @@ def test_an_estimate_that_no_sample_agrees_with_is_given_up_and_found_anew():
 
 
 @pytest.mark.medium
-def test_a_filter_is_consistent_on_a_motion_of_its_own():
+def test_filter_is_consistent_on_simulated_motion():
     """Circles with a swell, by 30 sets of noise and constant errors; NEES and NIS within 99.9 % of a consistent one."""
     rng, h, runs = np.random.default_rng(11), 0.01, 30
     nees, nis = [], np.zeros((5, 2))
     for _ in range(runs):
-        state = told()
+        state = make_vehicle_state()
         navigator = Navigator(MODEL, state)
         scale = [*[MODEL.angular_velocity_bias] * 3, *[MODEL.acceleration_bias] * 3, MODEL.heading_bias,
                  MODEL.depth_bias, MODEL.velocity_scale]  # fmt: skip
@@ -165,7 +165,7 @@ def test_a_filter_is_consistent_on_a_motion_of_its_own():
                 values[1:4], times[DVL] = body + rng.normal(size=3) * MODEL.velocity, t[k]
             if k % 10 == 0:
                 values[11], times[COMPASS] = yaw[k] + constants[6] + rng.normal() * MODEL.heading, t[k]
-            if k % 100 == 30 or k == 35:  # told 0.3 s late; the first twice, to be believed
+            if k % 100 == 30 or k == 35:  # 0.3 s late; the first twice, to be accepted
                 values[12:15] = position[k - 30] + rng.normal(size=3) * MODEL.position
                 times[USBL] = t[k] - 0.3
             navigator.step(t[k])

@@ -1,4 +1,4 @@
-"""All ways to ask for a clearance say the same, of each region of a scene that has moved."""
+"""All evaluations of a clearance agree for each region of a shifted scene."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ from tests.controller.test_c_law import SHAPES
 SCENE = [Region(name, shape, ("in", "out")[i % 2]) for i, (name, (shape, _)) in enumerate(SHAPES.items())]
 
 
-def test_every_way_to_ask_says_the_same():
+def test_all_region_evaluations_agree():
     rng, packed, n = np.random.default_rng(1), pack(SCENE), len(SCENE)
     packed.shifts[:] = rng.normal(size=(n, 3))
     values, gradients, rotation_gradients, clearances = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
@@ -50,7 +50,7 @@ def test_every_way_to_ask_says_the_same():
     assert asked == 40
 
 
-def test_a_camera_askew_sees_at_the_angle_of_its_axis():
+def test_visibility_uses_the_camera_axis_angle():
     rng = np.random.default_rng(2)
     for _ in range(30):
         feature, axis, camera = rng.normal(size=(3, 3))
@@ -63,7 +63,7 @@ def test_a_camera_askew_sees_at_the_angle_of_its_axis():
     assert Visibility((1.0, 2.0, 3.0), (1.0, 0.0, 0.0), 0.4).bounds() == ((-np.inf,) * 3, (np.inf,) * 3)
 
 
-def test_a_sphere_told_by_its_kind_is_the_sphere():
+def test_shape_evaluated_by_kind_matches_the_sphere():
     rng = np.random.default_rng(3)
     for _ in range(20):
         p, centre, radius = rng.normal(size=3), rng.normal(size=3), rng.uniform(0.1, 2.0)
@@ -73,7 +73,7 @@ def test_a_sphere_told_by_its_kind_is_the_sphere():
         assert distance == pytest.approx(np.linalg.norm(p - centre) - radius, rel=1e-12)
 
 
-def test_ranges_hold_something_and_places_lie_on_either_side():
+def test_quantity_ranges_are_nonempty_and_positions_are_symmetric():
     for _, least, greatest in (LENGTH, SIZE, PART, ANGLE):
         assert least < greatest
     assert LENGTH[1:] == (-1e6, 1e6) and PART[1:] == (-1.0, 1.0) and SIZE[1] > 0.0

@@ -1,4 +1,4 @@
-"""Shapes without C code are refused by name, by all that evaluates regions in C."""
+"""Every evaluation in C rejects shapes without C code by name."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ def test_the_shapes_of_the_package_have_c_code():
         assert f"    SHAPE_{name.upper()} = {shape.kind}," in code
 
 
-def test_a_shape_without_c_code_is_refused_by_name(monkeypatch):
+def test_shape_without_c_code_is_rejected_by_name(monkeypatch):
     monkeypatch.setitem(SHAPES, "blob", Blob)
     require_in_c([Region("ball", Sphere((0.0, 0.0, 0.0), 1.0), "out")], "lanes")
     with pytest.raises(RegionError, match=r"region 'ring': shape 'blob' has no C code, expected one of .* in lanes"):
@@ -32,6 +32,6 @@ def test_a_shape_without_c_code_is_refused_by_name(monkeypatch):
     assert b"BLOB" not in c_sources()["shapes.h"]
 
 
-def test_a_shape_that_is_not_known_is_taken_for_no_other():
+def test_unknown_shape_is_rejected():
     with pytest.raises(RegionError, match="shape is of type Blob, expected one of box, "):
         require_in_c([BLOB], "lanes")

@@ -1,4 +1,4 @@
-"""Outlines of prisms: touching themselves, convex, and held by a circle, wherever they lie and however turned."""
+"""Outlines of prisms: self-intersection, convexity, and bounding circle in any pose."""
 
 import itertools
 
@@ -33,14 +33,14 @@ def images(corners):
 
 
 @pytest.mark.parametrize("name", TOUCHING)
-def test_an_outline_that_touches_itself_is_refused(name):
+def test_self_intersecting_outline_is_rejected(name):
     for corners in images(TOUCHING[name]):
         with pytest.raises(RegionError, match="corners"):
             Prism(corners, 0.0, 1.0)
 
 
 @pytest.mark.parametrize("name", SOUND)
-def test_any_other_outline_is_taken(name):
+def test_simple_outline_is_accepted(name):
     for corners in images(SOUND[name]):
         packed = np.array(Prism(corners, 0.0, 1.0).packed())
         points = packed[2:].reshape(-1, 2)

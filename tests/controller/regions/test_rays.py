@@ -1,4 +1,4 @@
-"""Rays: how far they go, against closed forms, against walking along them, and where nothing is to be met."""
+"""Ray distances against closed forms and dense sampling."""
 
 import math
 
@@ -66,7 +66,7 @@ def out(*shapes):
 
 
 @given(origins, directions, st.floats(0.1, 2.0))
-def test_sphere(origin, way, radius):
+def test_ray_to_sphere_matches_closed_form(origin, way, radius):
     (met,) = rays(out(Sphere((1.0, 2.0, 0.5), radius)), origin, way)
     to_centre = np.array([1.0, 2.0, 0.5]) - origin
     along = to_centre @ way
@@ -80,7 +80,7 @@ def test_sphere(origin, way, radius):
 
 
 @given(origins, directions, directions)
-def test_plane(origin, way, normal):
+def test_ray_to_plane_matches_closed_form(origin, way, normal):
     point = np.array([0.5, -1.0, 2.0])
     (met,) = rays(out(HalfSpace(tuple(point), tuple(normal))), origin, way)
     height, sinking = (origin - point) @ normal, -way @ normal
@@ -93,7 +93,7 @@ def test_plane(origin, way, normal):
 
 
 @given(origins, directions)
-def test_box(origin, way):
+def test_ray_to_box_matches_closed_form(origin, way):
     low, high = np.array([0.0, -0.5, 0.5]), np.array([2.0, 2.5, 1.5])
     (region,) = out(Box((1.0, 1.0, 1.0), (2.0, 3.0, 1.0)))
     (met,) = rays([region], origin, way)
@@ -111,7 +111,7 @@ def test_box(origin, way):
 
 
 @pytest.mark.parametrize("bearing", np.radians(range(0, 360, 15)))
-def test_upright_cylinder(bearing):
+def test_ray_to_cylinder_matches_closed_form(bearing):
     pile = Cylinder((4.0, 0.0, -10.0), (4.0, 0.0, 10.0), 0.65)
     (met,) = rays(out(pile), (0.0, 0.0, 3.0), (math.cos(bearing), math.sin(bearing), 0.0))
     aside, along = 4.0 * abs(math.sin(bearing)), 4.0 * math.cos(bearing)
@@ -149,14 +149,14 @@ def test_the_first_of_several_regions_ends_it(origin, way):
     assert rays(together, origin, way)[0] == pytest.approx(min(alone), abs=1e-9)
 
 
-def test_rays_at_once_are_as_one_by_one():
+def test_batched_rays_equal_single_rays():
     regions, angles = out(*CONVEX, *BENT), np.arange(0.0, 2.0 * math.pi, 0.1)
     ways = np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=1)
     origin = (4.0, 3.5, 1.5)
     assert rays(regions, origin, *ways).tolist() == [rays(regions, origin, way)[0] for way in ways]
 
 
-def test_a_shape_kept_within_is_met_from_the_inside():
+def test_ray_from_inside_a_keep_in_region_meets_its_boundary():
     tank = [Region("tank", Sphere((0.0, 0.0, 0.0), 5.0), "in")]
     met = rays(tank, (3.0, 0.0, 0.0), NORTH, -NORTH, EAST)
     assert met == pytest.approx([2.0, 8.0, 4.0], abs=1e-3)
@@ -177,32 +177,32 @@ def test_a_shape_kept_within_is_met_from_the_inside():
     ],
     ids=lambda shape: type(shape).__name__,
 )
-def test_a_level_ray_close_over_a_shape_passes_by(shape):
+def test_level_ray_above_a_shape_misses_it(shape):
     angles = np.radians(range(0, 360, 5))
     ways = np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=1)
     assert (rays(out(shape), (0.0, 0.0, 4.99), *ways) == math.inf).all()
 
 
-def test_along_a_notched_wall_it_ends_too_near_rather_than_too_far():
+def test_ray_along_a_notched_wall_is_conservative():
     wall = Prism(((-50.0, -5.0), (50.0, -5.0), (50.0, 0.0), (40.0, 0.0), (39.0, -1.0), (-50.0, 0.0)), 0.0, 9.0)
     met, closer = rays(out(wall), (42.0, 0.5, 5.0), NORTH, (0.8, -0.6, 0.0))
     assert met > 5.0 and closer == pytest.approx(0.5 / 0.6, abs=1e-3)
 
 
-def test_what_is_beyond_reach_is_not_met():
+def test_regions_beyond_range_are_not_detected():
     regions = out(Sphere((10.0, 0.0, 0.0), 1.0))
     assert rays(regions, (0.0, 0.0, 0.0), NORTH, farthest=8.9)[0] == math.inf
     assert rays(regions, (0.0, 0.0, 0.0), NORTH, farthest=9.1)[0] == pytest.approx(9.0, abs=1e-3)
 
 
-def test_a_moved_region_is_met_where_it_is():
+def test_ray_meets_a_shifted_region_at_its_position():
     packed, met = pack(out(Sphere((0.0, 0.0, 0.0), 1.0))), np.empty(2)
     packed.shifts[0] = 0.0, 6.0, 0.0
     ray_distances(packed, np.zeros(3), np.array([NORTH, EAST]), FARTHEST, met)
     assert met.tolist() == [math.inf, pytest.approx(5.0, abs=1e-3)]
 
 
-def test_regions_of_attitude_close_no_place():
+def test_attitude_regions_do_not_block_rays():
     regions = out(Orientation(TURNED, 0.8), Visibility((5.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.9))
     assert rays(regions, (0.0, 0.0, 0.0), NORTH)[0] == math.inf
     assert rays([], (0.0, 0.0, 0.0), NORTH)[0] == math.inf
@@ -211,7 +211,7 @@ def test_regions_of_attitude_close_no_place():
 # ---- lost numbers --------------------------------------------------------------------------------------------------
 
 
-def test_lost_numbers_are_told():
+def test_nan_input_gives_nan_ray_distance():
     near, met = out(Sphere((3.0, 0.0, 0.0), 1.0), *CONVEX[3:]), np.empty(1)
     assert np.isnan(rays(near, (math.nan, 0.0, 9.0), NORTH, EAST)).all()
     assert np.isnan(rays(near, (0.0, 0.0, 9.0), (math.nan, 0.0, 0.0))).all()
@@ -222,7 +222,7 @@ def test_lost_numbers_are_told():
 
 
 @pytest.mark.parametrize("bearing", np.linspace(0.0, 2.0 * np.pi, 9)[:-1])
-def test_a_notched_shape_is_met_from_afar_on_every_side(bearing):
+def test_distant_notched_shape_is_met_from_every_side(bearing):
     """Its circle passes by the rays that cannot meet it, and by no other."""
     origin = np.array([1.5 + 8.0 * np.cos(bearing), 0.9 + 8.0 * np.sin(bearing), 2.0])
     towards = np.array([0.5, 1.0, 2.0]) - origin

@@ -87,7 +87,7 @@ def test_solids_have_nearly_the_volume_of_the_formula(name):
     assert signed_volume(surface_of(shape, LIMITS)) == pytest.approx(volume, rel=1e-12 if flat else 0.05)
 
 
-def test_a_bent_pipe_has_nearly_the_volume_that_random_points_say():
+def test_bent_pipe_volume_matches_monte_carlo():
     pipe = SOLIDS["bent pipe"][0]
     low, high = np.array(pipe.bounds())
     points = np.random.default_rng(1).uniform(low, high, (40_000, 3))
@@ -98,7 +98,7 @@ def test_a_bent_pipe_has_nearly_the_volume_that_random_points_say():
 @pytest.mark.parametrize(
     "shape", [DepthBand(2.5, 1.0), HalfSpace((0.0, 1.0, 2.0), (1.0, 1.0, 0.2))], ids=lambda s: type(s).__name__
 )
-def test_planes_are_patches_as_large_as_what_is_seen(shape):
+def test_plane_surfaces_span_the_view_limits(shape):
     mesh = surface_of(shape, LIMITS)
     assert distances(shape, mesh).max() < 1e-9
     a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
@@ -124,7 +124,7 @@ def test_pipes_of_any_bends_have_their_corners_on_the_surface(points, radius):
 
 
 @given(st.lists(st.floats(0.3, 3.0), min_size=3, max_size=9))
-def test_star_shaped_polygons_are_cut_into_triangles_that_fill_them(radii):
+def test_star_shaped_polygons_are_triangulated_completely(radii):
     angles = np.linspace(0.0, math.tau, len(radii), endpoint=False)
     corners = tuple((r * math.cos(a), r * math.sin(a)) for r, a in zip(radii, angles, strict=True))
     mesh = surface_of(Prism(corners, 0.0, 2.0), LIMITS)
@@ -188,7 +188,7 @@ def test_shapes_of_attitude_have_no_surface():
 
 
 @pytest.mark.parametrize("name", [name for name, entry in ENTRIES.items() if entry.half_axes or entry.planes])
-def test_half_axes_and_planes_of_an_entry_are_on_its_surface(name):
+def test_half_axes_and_planes_of_shapes_lie_on_the_surface(name):
     entry = ENTRIES[name]
     shape = entry.example
     if entry.half_axes:

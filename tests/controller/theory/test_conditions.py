@@ -1,4 +1,4 @@
-"""The gain conditions on figures measured independently of this project, of the ODIN-like vehicle in section VII."""
+"""The gain conditions against independently computed figures of the ODIN-like vehicle in section VII."""
 
 import math
 
@@ -53,7 +53,7 @@ def test_38_holds_within_1_64_metres_of_the_goals_centre():
     assert least_of_potential_test(M, 2.0 * potential * 1.001, GAINS) < 0.0
 
 
-def test_38_holds_nowhere_or_everywhere_at_the_ends():
+def test_greatest_gradient_of_38_is_zero_or_infinite_at_extreme_gains():
     assert greatest_gradient(M, GAINS._replace(sigma_a=30.0)) == 0.0
     assert greatest_gradient(M, GAINS._replace(sigma_p=0.0)) == math.inf
 

@@ -147,18 +147,18 @@ def test_potential_is_the_integral_of_g_along_the_normal(region, position, inwar
     length = np.linalg.norm(inward)
     assert clearance[0] == pytest.approx(-length)
     expected, _ = quad(lambda t: evaluated([region], position + t * np.array(inward))[0][0] * length, 0.0, 1.0)
-    came = normalized_secondary(g, dg, clearance, np.array([0.7]), GAINS)
-    assert came == pytest.approx(0.7 * (100.0 + 0.08 * 100.0 * 90.0 / 18.8) * expected, rel=1e-9)
+    value = normalized_secondary(g, dg, clearance, np.array([0.7]), GAINS)
+    assert value == pytest.approx(0.7 * (100.0 + 0.08 * 100.0 * 90.0 / 18.8) * expected, rel=1e-9)
 
 
-def test_the_printed_sum_is_by_the_square_of_the_whole_gradient():
+def test_papers_sum_divides_by_the_squared_full_gradient():
     g, dg, _ = evaluated([Region("s", Sphere((0, 0, 0), 5.0), "out")], (1.0, 2.0, -2.0))
     assert np.sum(dg**2) == pytest.approx(36.0)
-    came = printed_secondary(g, dg, np.array([0.7]), GAINS)
-    assert came == pytest.approx(0.5 * (100.0 + 0.08 * 100.0 * 90.0 / 18.8) * 0.7 * 16.0**2 / 36.0, rel=1e-12)
+    value = printed_secondary(g, dg, np.array([0.7]), GAINS)
+    assert value == pytest.approx(0.5 * (100.0 + 0.08 * 100.0 * 90.0 / 18.8) * 0.7 * 16.0**2 / 36.0, rel=1e-12)
 
 
-def test_what_is_satisfied_or_has_no_weight_counts_nothing():
+def test_satisfied_or_zero_weight_regions_contribute_nothing():
     g, dg, clearance = evaluated([SPHERE, FLAT], (5.0, 0.0, 0.0))
     assert printed_secondary(g, dg, BETAS, GAINS) == normalized_secondary(g, dg, clearance, BETAS, GAINS) == 0.0
     g, dg, clearance = evaluated([SPHERE, FLAT], (0.3, 0.0, 0.0))
@@ -167,7 +167,7 @@ def test_what_is_satisfied_or_has_no_weight_counts_nothing():
     assert unit_gradient_secondary(g, none, GAINS) == 0.0
 
 
-def test_printed_sum_grows_without_end_towards_a_vanishing_gradient():
+def test_papers_sum_diverges_at_vanishing_gradient():
     near, nearer = (
         printed_secondary(*evaluated([SPHERE], (0.2 + x, 0.1, 0.1))[:2], BETAS[:1], GAINS) for x in (1e-2, 1e-3)
     )

@@ -12,14 +12,14 @@ EACH = pytest.mark.parametrize("name", shipped_vehicles())
 
 
 @EACH
-def test_property_1(name):
+def test_property_1_mass_matrix_is_symmetric_positive_definite(name):
     mass = load_vehicle(name).mass_matrix
     assert asymmetry(mass) < 1e-9
     assert 0.0 < least_inertia(mass) == pytest.approx(1.0 / np.linalg.norm(np.linalg.inv(mass), 2))
 
 
 @EACH
-def test_property_2(name):
+def test_property_2_coriolis_matrix_is_skew_symmetric(name):
     """C is skew-symmetric, and C nu is the rate of the momentum in turning axes (Kirchhoff)."""
     mass = load_vehicle(name).mass_matrix
     for nu in rng.normal(size=(20, 6)):

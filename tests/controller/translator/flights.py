@@ -1,4 +1,4 @@
-"""A stream of what a law is given: all shapes, noise, gaps, odd weights and failures."""
+"""A sequence of law inputs: all shapes, noise, gaps, unusual weights and failures."""
 
 import numpy as np
 

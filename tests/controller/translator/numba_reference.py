@@ -1,4 +1,4 @@
-"""The Python text of translated functions, run by Numba: somebody else's translation of the same text."""
+"""The Python text of translated functions compiled by Numba, as an independent translation."""
 
 import dis
 import functools

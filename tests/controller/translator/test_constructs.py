@@ -1,4 +1,4 @@
-"""Each construct of the subset, as C against Python; and what is refused, with its line."""
+"""Each construct of the subset, as C against Python, and rejected constructs with their line."""
 
 import inspect
 import math
@@ -185,7 +185,7 @@ def shifts(random, out):
 @pytest.mark.parametrize(
     "function", [arithmetic, choices, loops, views, tuples, order, records, special], ids=lambda f: f.__name__
 )
-def test_c_does_what_python_does(function, tmp_path):
+def test_c_results_equal_python_results_bit_for_bit(function, tmp_path):
     rng = np.random.default_rng(4)
     given = (np.zeros(3), np.zeros(2, dtype=np.int64), np.zeros(11))
     library = compiled(c_text(function, given), tmp_path)
@@ -206,7 +206,7 @@ def test_c_does_what_python_does(function, tmp_path):
 
 
 @pytest.mark.parametrize(("first", "second"), [(True, False), (True, True), (False, True)])
-def test_truth_values_take_a_word_each(first, second, tmp_path):
+def test_booleans_occupy_one_word_each(first, second, tmp_path):
     given, expected = ((Flags(first, second, np.zeros(2)),) for _ in range(2))
     Called(compiled(c_text(flagged, given), tmp_path), given)()
     flagged(*expected)
@@ -223,7 +223,7 @@ def test_random_numbers_wrap_around(tmp_path):
             assert (given[0][0], given[1][0]) == (expected[0][0], expected[1][0])
 
 
-def test_code_is_silent_under_other_compilers(tmp_path):
+def test_code_compiles_without_warnings_in_other_compilers(tmp_path):
     pytest.importorskip("ziglang", reason="the build extra is not installed")
     import sys
 
@@ -288,7 +288,7 @@ def raises(x):
     ],
     ids=lambda x: getattr(x, "__name__", ""),
 )
-def test_what_is_beyond_the_subset_is_refused_by_file_and_line(function, line, word):
+def test_unsupported_constructs_are_rejected_with_file_and_line(function, line, word):
     with pytest.raises(TranslationError, match=word) as caught:
         c_text(function, (np.zeros(4),))
     if word != "calls itself":
@@ -297,6 +297,6 @@ def test_what_is_beyond_the_subset_is_refused_by_file_and_line(function, line, w
 
 
 @pytest.mark.parametrize("value", [np.zeros(3, dtype=np.float32), np.zeros((4, 4))[:, 0], "a", [1.0], None])
-def test_arguments_that_c_has_no_words_for_are_refused(value):
+def test_arguments_without_c_type_are_rejected(value):
     with pytest.raises(TypeError, match="argument is"):
         type_of(value)

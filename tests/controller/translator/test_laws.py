@@ -78,7 +78,7 @@ def test_another_compiler_gives_the_same_bits(library, tmp_path):
 
 
 @pytest.mark.parametrize("law", sorted(LAWS))
-def test_the_code_asks_for_no_heap(law):
+def test_generated_code_allocates_no_heap_memory(law):
     flight = Flight(law)
     built = library_of(c_text(flight.function, flight.arguments))._name
     done = subprocess.run(["nm", "-D", "--undefined-only", built], capture_output=True, text=True, check=False)
@@ -90,7 +90,7 @@ def test_the_code_asks_for_no_heap(law):
 
 
 @pytest.mark.slow
-def test_sanitizers_find_nothing(library, tmp_path):
+def test_sanitizers_report_no_error(library, tmp_path):
     """The library with its checks, in a Python of its own: who loads it late needs the runtime first."""
     law, text, _ = library
     flags = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-O1")

@@ -96,7 +96,7 @@ def test_bits_are_those_of_this_machine(law, target, tmp_path):
     np.testing.assert_array_equal(found, np.concatenate(outputs))
 
 
-def test_a_law_that_does_not_fit_is_refused():
+def test_law_with_mismatched_regions_or_of_unknown_type_is_rejected():
     goal, rocks = pack([GOAL]), pack(REGIONS[:2])
     law = IsmailDunniganLaw(Gains(), [1.0, 0.0, 0.0, 0.0], PERIOD, n_regions=2)
     assert "void dock(const void *words)" in translate_law(law, goal, rocks, name="dock")
@@ -108,7 +108,7 @@ def test_a_law_that_does_not_fit_is_refused():
         translate_law(FunctionLaw(lambda *_: [0.0] * 6), goal, rocks)
 
 
-def test_what_has_no_numbers_begins_as_null():
+def test_empty_arrays_are_initialized_to_null():
     flight, program = Flight("pd"), Program()
     program.export("law", flight.function, tuple(map(type_of, flight.arguments)))
     assert "{NULL, 0}" in static_data(program, "law", flight.arguments)  # its report

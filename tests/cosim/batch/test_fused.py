@@ -1,4 +1,4 @@
-"""The fused loop flies as the readable master does, to the last bit, whatever the law."""
+"""The fused loop equals the reference master bit for bit for every law."""
 
 import numpy as np
 import pytest
@@ -56,13 +56,13 @@ def assert_same_flight(scenario):
     assert np.abs(trace[:, 20 : 20 + n]).max() > 1.0
 
 
-def test_a_short_flight_of_the_printed_law_is_the_masters_to_the_last_bit():
+def test_short_run_of_the_papers_law_equals_the_master_bit_for_bit():
     assert_same_flight(scenario_of("ismail_dunnigan", *BRISK, "limit.force=150.0", "limit.time_constant=0.1"))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", sorted(LAWS))
-def test_the_papers_run_is_the_masters_to_the_last_bit(law):
+def test_papers_run_equals_the_master_bit_for_bit(law):
     assert_same_flight(scenario_of(law))
 
 
@@ -74,15 +74,15 @@ NOISY = [
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("frozen", ["true", "false"])
-def test_noise_and_gaps_in_what_is_measured_are_the_masters(frozen):
-    # the paper's law, told nothing, asks for nothing that a plant takes: it is told the last values, or does not steer
+def test_noise_and_sensor_gaps_equal_the_master(frozen):
+    # the paper's law commands NaN without measurements: it gets the last values here, or is not used
     law = "ismail_dunnigan" if frozen == "true" else "pd"
     gap = [] if frozen == "true" else ["sensing.dead_for=0.0"]
     assert_same_flight(scenario_of(law, *BRISK, *NOISY, f"sensing.frozen={frozen}", "limit.force=150.0", *gap))
 
 
 @pytest.mark.medium
-def test_flights_by_sensors_are_the_masters():
+def test_runs_on_sensors_equal_the_master():
     """With noise, delays, lost samples and outliers of the data sheets, and two outages."""
     outages = "outages=[{sensor='dvl', time=3.0, duration=1.5}, {sensor='usbl', time=2.015, duration=9.0}]"
     sensors = ["sensing.through=sensors", "sensing.seed=4", outages, "time.step=0.005", "time.control=0.02"]
@@ -98,7 +98,7 @@ def test_flights_by_sensors_are_the_masters():
         "failures=[{thruster=3, time=2.0, effectiveness=0.3}, {thruster=6, time=4.005, stuck=true}]",
     ],
 )
-def test_thrusters_that_fail_are_the_masters(told, failures):
+def test_thruster_failures_equal_the_master(told, failures):
     given = [*BRISK, "actuation.through=thrusters", failures, f"tell_failures={told}"]
     assert_same_flight(load_scenario("paper", [*given, "law.name=pd"]))
 
@@ -109,7 +109,7 @@ SHIPPED = ("dense-field", "depth-transit", "docking", "moving-obstacle", "pipe-i
 @pytest.mark.parametrize(
     "name", [SHIPPED[3], *(pytest.param(n, marks=pytest.mark.slow) for n in SHIPPED if n != SHIPPED[3])]
 )
-def test_an_outcome_is_what_the_summary_of_a_recorded_run_says(name, tmp_path):
+def test_outcome_equals_the_summary_of_a_recorded_run(name, tmp_path):
     scenario = load_scenario(name, [CLOSED, "time.duration=20.0"])
     with Master(scenario) as master:
         recorder = Recorder(tmp_path, master.signals.columns)
@@ -136,7 +136,7 @@ def test_an_outcome_is_what_the_summary_of_a_recorded_run_says(name, tmp_path):
     assert np.isnan(outcome["stopped_at"])
 
 
-def test_a_batch_flies_each_row_as_it_would_alone_and_names_what_is_refused():
+def test_batch_rows_equal_single_rows_and_rejected_rows_are_named():
     scenario = scenario_of("ismail_dunnigan", *BRISK, "limit.force=150.0")
     variation = Variation(scenario, ["initial.position.1", "plant.parameters.mass"])
     mass = variation.number("plant.parameters.mass")
@@ -150,7 +150,7 @@ def test_a_batch_flies_each_row_as_it_would_alone_and_names_what_is_refused():
     assert flown.outcomes.dtype == OUTCOME
 
 
-def test_a_plant_that_refuses_a_step_ends_the_flight_there():
+def test_plant_step_error_stops_the_run():
     given = [
         *BRISK,
         "plant.substep=0.01",
@@ -172,11 +172,11 @@ def test_a_plant_that_refuses_a_step_ends_the_flight_there():
         ("commands.enabled=true", "commands.enabled is True"),
     ],
 )
-def test_what_the_loop_cannot_do_is_refused(change, words):
+def test_unsupported_scenarios_are_rejected(change, words):
     with pytest.raises(RunError, match=words):
         FusedFlyer(Variation(load_scenario("paper", [CLOSED, change]), []))
 
 
-def test_the_version_of_the_fmu_cannot_vary_for_one_is_loaded_for_all_rows():
+def test_fmi_version_cannot_vary_between_rows():
     with pytest.raises(RunError, match=r"plant\.fmi varies, expected 3"):
         FusedFlyer(Variation(load_scenario("paper", [CLOSED]), ["plant.fmi"]))

@@ -1,4 +1,4 @@
-"""Flights: the compiled loop does what a readable one does, and a plant that flew before flies as a new one."""
+"""The compiled loop against a reference loop in Python, and reuse of a plant."""
 
 import ctypes
 import math
@@ -129,7 +129,7 @@ def distances(scene, positions, step):
         *(pytest.param(law, marks=pytest.mark.slow) for law in sorted(LAWS) if law != "ismail_dunnigan"),
     ],
 )
-def test_compiled_loop_flies_as_the_readable_one(law, scene):
+def test_compiled_loop_equals_the_reference_loop(law, scene):
     if scene.failed_thruster:
         scene = replace(scene, failed_thruster=Failure(scene.failed_thruster.index, 3.01))
     with SceneFlyer(law, SHORT) as flyer:
@@ -144,7 +144,7 @@ def test_compiled_loop_flies_as_the_readable_one(law, scene):
     assert score.failed_step == -1 and 0.0 < score.worst_step < 1.0
 
 
-def test_a_plant_that_flew_before_flies_as_a_new_one(flyer):
+def test_reused_plant_gives_the_same_run_as_a_new_one(flyer):
     flyer.fly(HARD[2])
     again, trace = flyer.fly(HARD[0], trace=True)
     with SceneFlyer("ismail_dunnigan", SHORT) as new:
@@ -153,7 +153,7 @@ def test_a_plant_that_flew_before_flies_as_a_new_one(flyer):
     assert again._replace(worst_step=0.0) == fresh._replace(worst_step=0.0)
 
 
-def test_reached_means_inside_for_the_last_seconds_and_reach_time_is_since_when(flyer):
+def test_reached_requires_a_final_stay_and_reach_time_is_its_start(flyer):
     around = replace(PLAIN[0], goal=SphereSpec(PLAIN[0].start, 50.0))  # it starts inside and never leaves
     score, _ = flyer.fly(around)
     assert score.reach_time == 0.0 and not score.reached  # 8 s are less than 10
@@ -172,7 +172,7 @@ def test_reach_time_is_the_first_instant_of_the_stay(flyer):
     assert score.reach_time == pytest.approx((np.flatnonzero(outside)[-1] + 1) * 0.01, abs=1e-9)
 
 
-def test_the_start_is_scored_too(flyer):
+def test_initial_state_is_scored(flyer):
     x, y, z = PLAIN[0].start
     gone_at_once = Obstacle((x + 0.5, y, z), 0.4, velocity=(1000.0, 0.0, 0.0))
     scene = replace(PLAIN[0], depth_band=(-90.0, 90.0), obstacles=(gone_at_once,))
@@ -206,7 +206,7 @@ def loose(monkeypatch):
         yield flyer
 
 
-def test_a_law_that_asks_for_no_number_ends_the_flight_there_and_not_the_next(loose, monkeypatch):
+def test_nan_command_stops_one_run_and_not_the_next(loose, monkeypatch):
     failed, trace = loose.fly(PLAIN[0], trace=True)
     assert failed.failed_step == 100 and not failed.reached and failed.reach_time == math.inf
     assert trace[49, 0] == pytest.approx(0.98) and not trace[51:].any()
@@ -228,14 +228,14 @@ def test_a_law_that_asks_for_no_number_ends_the_flight_there_and_not_the_next(lo
         ({"righting_moment": 1e300}, PlantError, "r_B"),
     ],
 )
-def test_a_plant_that_cannot_be_is_refused_and_the_next_scene_flies(flyer, change, error, words):
+def test_invalid_plant_is_rejected_and_the_next_scene_runs(flyer, change, error, words):
     expected = flyer.fly(PLAIN[0])[0]
     with pytest.raises(error, match=words):
         flyer.fly(replace(PLAIN[0], **change))
     assert flyer.fly(PLAIN[0])[0]._replace(worst_step=0.0) == expected._replace(worst_step=0.0)
 
 
-def test_a_failure_after_the_end_is_none(flyer):
+def test_failure_after_the_end_has_no_effect(flyer):
     late = replace(PLAIN[0], failed_thruster=Failure(1, 1e300))
     assert flyer.fly(late)[0]._replace(worst_step=0.0) == flyer.fly(PLAIN[0])[0]._replace(worst_step=0.0)
 
@@ -244,12 +244,12 @@ def test_a_failure_after_the_end_is_none(flyer):
     ("wrong", "words"),
     [({"duration": math.nan}, "duration"), ({"control": 0.0}, "control"), ({"plant_steps": 0}, "0 plant steps")],
 )
-def test_conditions_that_cannot_be(wrong, words):
+def test_invalid_conditions_are_rejected(wrong, words):
     with pytest.raises(RunError, match=words):
         Conditions(**wrong)
 
 
-def test_an_unknown_law_is_named_with_the_known_ones():
+def test_unknown_law_error_lists_known_laws():
     with pytest.raises(RunError, match=r"law is 'ismail_duningan', expected one of .*ismail_dunnigan"):
         SceneFlyer("ismail_duningan")
 
@@ -257,7 +257,7 @@ def test_an_unknown_law_is_named_with_the_known_ones():
 @pytest.mark.medium
 @pytest.mark.filterwarnings("ignore:Exception ignored")
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs an alarm clock")
-def test_a_signal_in_mid_flight_raises_after_it(flyer):
+def test_signal_during_a_run_is_raised_after_it(flyer):
     class Alarmed(BaseException):  # as KeyboardInterrupt is, which nobody takes for an error of theirs
         pass
 
@@ -293,7 +293,7 @@ DO_STEP = ctypes.CFUNCTYPE(
 @pytest.mark.parametrize(
     ("status", "ends", "goes_on"), [(0, False, True), (1, False, True), (3, False, False), (0, True, False)]
 )
-def test_do_step_gets_its_arguments_and_its_results_are_heeded(status, ends, goes_on):
+def test_do_step_receives_arguments_and_returns_its_status(status, ends, goes_on):
     came = []
 
     @DO_STEP
@@ -311,7 +311,7 @@ def test_do_step_gets_its_arguments_and_its_results_are_heeded(status, ends, goe
     assert results[3:].view(float)[0] == 1.75
 
 
-def test_the_clock_goes_with_pythons():
+def test_clock_agrees_with_python_monotonic():
     import time
 
     clock, room = Clock().numbers, np.zeros(2, np.int64)

@@ -1,4 +1,4 @@
-"""Whole flights in lanes against the fused loop, which steps the FMU."""
+"""Complete runs in lanes against the fused loop, which steps the FMU."""
 
 import math
 import pickle
@@ -50,7 +50,7 @@ def compare(of, values, seeds):
 
 
 @pytest.mark.slow
-def test_flights_of_the_paper_are_those_of_the_fused_loop():
+def test_papers_runs_equal_the_fused_loop():
     """Each lane with other numbers, and a last batch that does not fill the lanes."""
     of = variation()
     flown = compare(of, *drawn(of, 2 * 8 + 3))
@@ -59,7 +59,7 @@ def test_flights_of_the_paper_are_those_of_the_fused_loop():
 
 
 @pytest.mark.medium
-def test_one_flight_alone_and_none():
+def test_single_and_empty_batches_are_valid():
     of = variation()
     values, seeds = drawn(of, 9)
     with LanesFlyer(of) as lanes:
@@ -86,7 +86,7 @@ REGIONS = {
 
 @pytest.mark.medium(fast=3)
 @pytest.mark.parametrize("name", REGIONS)
-def test_any_shape_flies_as_in_the_fused_loop(name):
+def test_every_shape_equals_the_fused_loop(name):
     region = f'{{name="it", criterion="obstacle", gain=80.0, {REGIONS[name]}}}'
     of = variation(
         ("initial.position.1", "law.gains.k_p1", "regions.it.gain"), f"regions=[{region}]", "time.duration=4"
@@ -108,12 +108,12 @@ def test_any_shape_flies_as_in_the_fused_loop(name):
         ("limit.force=inf", "time.step=0.002", "plant.substep=0.001"),
     ],
 )
-def test_settings_fly_as_in_the_fused_loop(overrides):
+def test_settings_equal_the_fused_loop(overrides):
     of = variation(("initial.position.1", "law.gains.k_v1", "goal.radius"), *overrides, "time.duration=5")
     compare(of, *drawn(of, 5))
 
 
-def test_a_lane_that_the_guard_stops_stands_still_while_the_others_go_on():
+def test_lane_stopped_by_the_guard_does_not_affect_others():
     step = [f"{key}=0.02" for key in ("time.step", "time.control", "time.arbiter", "plant.substep")]
     of = variation(("law.gains.k_v1", "initial.position.1"), "limit.force=inf", *step)
     values, seeds = drawn(of, 11)
@@ -124,13 +124,13 @@ def test_a_lane_that_the_guard_stops_stands_still_while_the_others_go_on():
     assert 1.0 > flown["stopped_at"][2] > flown["stopped_at"][9] > 0.0
 
 
-def test_thrusters_refuse_what_is_no_number_as_the_fmu_does():
+def test_non_finite_thrust_stops_the_lane_as_in_the_fmu():
     of = variation(("law.gains.k_p1",), "limit.force=inf", "actuation.through=thrusters", "time.duration=0.1")
     flown = compare(of, np.array([[18.8], [1e308], [20.0]]), np.arange(3)).outcomes
     np.testing.assert_array_equal(flown["stopped_at"], [math.nan, 0.0, math.nan])
 
 
-def test_a_clearance_that_is_no_number_is_told_as_such():
+def test_nan_clearance_is_reported_as_nan():
     flat = 'shape={type="ellipsoid", centre=[0.0,0,0], semi_axes=[5e-324,1.0,1.0]}'
     region = f'{{name="it", criterion="obstacle", keep="out", gain=80.0, {flat}}}'
     of = variation((), f"regions=[{region}]", "initial.position=[0,0,0.5]", "time.duration=0.1")
@@ -140,7 +140,7 @@ def test_a_clearance_that_is_no_number_is_told_as_such():
 # ---- what is refused ----
 
 
-def test_the_rows_that_are_refused_are_those_that_the_full_check_refuses():
+def test_rejected_rows_equal_those_of_full_validation():
     """Also in words; the first row is bad, and all between two good numbers is taken unasked."""
     keys = (
         "law.gains.k_p1", "regions.SR1.shape.radius", "plant.parameters.weight", "initial.velocity.0", "limit.force",
@@ -161,7 +161,7 @@ def test_the_rows_that_are_refused_are_those_that_the_full_check_refuses():
     assert np.isnan(flown.outcomes["final_x"][0]) and not flown.outcomes["violated"][0]
 
 
-def test_numbers_that_have_no_place_of_their_own_are_flown_too():
+def test_varied_elements_of_composite_values_equal_the_fused_loop():
     """Points of a prism, parts of a quaternion: each row is checked whole."""
     prism = '{name="it", criterion="shape", keep="out", gain=50.0, ' + REGIONS["prism"].partition(", ")[2] + "}"
     keys = ("regions.it.shape.corners.2.1", "initial.quaternion.3", "regions.it.gain")
@@ -172,7 +172,7 @@ def test_numbers_that_have_no_place_of_their_own_are_flown_too():
     assert set(compare(of, values, seeds).refused) == {4, 5}
 
 
-def test_a_whole_number_stays_whole_and_a_shape_written_in_whole_numbers_takes_fractions():
+def test_integer_keys_stay_integer_and_integer_shapes_accept_fractions():
     of = variation(("goal.centre.0", "sensing.seed"), "goal.centre=[128, 0.0, 5.0]", "time.duration=0.1")
     values = np.array([[129.0, 1.0], [126.0, 2.5], [127.5, 3.0], [128.0, 4.0]])
     assert set(compare(of, values, np.arange(4)).refused) == {1}
@@ -191,7 +191,7 @@ def test_a_whole_number_stays_whole_and_a_shape_written_in_whole_numbers_takes_f
         ("plant.parameters.dvl.rate=5.0", "plant.parameters.dvl.rate"),
     ],
 )
-def test_scenarios_that_lanes_cannot_fly_are_refused_by_key(override, named):
+def test_unsupported_scenarios_are_rejected_by_key(override, named):
     with pytest.raises(RunError, match=named.replace(".", r"\.")):
         LanesFlyer(variation((), *override.replace(", ", ",").split()))
 
@@ -199,12 +199,12 @@ def test_scenarios_that_lanes_cannot_fly_are_refused_by_key(override, named):
 @pytest.mark.parametrize(
     "key", ["time.duration", "plant.substep", "sensing.position_noise", "plant.parameters.imu.rate", "arbiter.points"]
 )
-def test_keys_that_lanes_cannot_vary_are_refused_by_name(key):
+def test_unsupported_varied_keys_are_rejected_by_name(key):
     with pytest.raises(RunError, match=key.replace(".", r"\.")):
         LanesFlyer(variation((key,)))
 
 
-def test_a_variation_that_was_pickled_flies_the_same():
+def test_pickled_variation_gives_the_same_run():
     of = variation()
     values, seeds = drawn(of, 3)
     with LanesFlyer(of) as here, LanesFlyer(pickle.loads(pickle.dumps(of))) as there:

@@ -122,7 +122,7 @@ def by_lanes(vehicle, starts, inputs):
 
 
 @pytest.mark.slow  # a library of its own is compiled
-def test_each_lane_is_the_fmu_to_the_last_bit(vehicle, plant):
+def test_each_lane_equals_the_fmu_bit_for_bit(vehicle, plant):
     """Surface, bottom, shear, lags, rate limits, dead bands, refused steps: each lane with its own."""
     rng = np.random.default_rng(8)
     lanes = lanes_library(vehicle, beside=CORE).lanes_count()
@@ -142,7 +142,7 @@ def test_each_lane_is_the_fmu_to_the_last_bit(vehicle, plant):
 
 
 @pytest.mark.slow
-def test_the_features_matter(plant):
+def test_tested_features_change_the_result(plant):
     """Each changes the motion, so that the comparison above compares it."""
     inputs = commands(np.random.default_rng(3))
     ends = {}

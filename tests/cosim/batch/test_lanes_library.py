@@ -1,4 +1,4 @@
-"""The library of the lanes: built once, whole, and anew where it is damaged."""
+"""The library of the lanes: cached, complete, and rebuilt if damaged."""
 
 import logging
 
@@ -20,14 +20,14 @@ def cache(tmp_path, monkeypatch):
     return tmp_path / "subreach" / "lanes"
 
 
-def test_without_a_compiler_one_line_says_so(cache, monkeypatch):
+def test_missing_compiler_gives_one_line_error(cache, monkeypatch):
     monkeypatch.setenv("CC", "no-such-compiler")
     with pytest.raises(BuildError, match="no C compiler: CC is 'no-such-compiler'"):
         lanes_library(load_vehicle("odin"))
     assert not cache.exists()
 
 
-def test_a_compiler_that_fails_leaves_nothing(cache, monkeypatch):
+def test_failed_compilation_leaves_no_file(cache, monkeypatch):
     monkeypatch.setattr(module, "_files", lambda vehicle, beside: {"many_bad.c": b"no C"})
     with pytest.raises(BuildError, match="failed"):
         lanes_library(load_vehicle("odin"))
@@ -35,7 +35,7 @@ def test_a_compiler_that_fails_leaves_nothing(cache, monkeypatch):
 
 
 @pytest.mark.slow
-def test_it_is_built_once_and_anew_where_it_is_damaged(cache, tmp_path, monkeypatch):
+def test_library_is_cached_and_rebuilt_if_damaged(cache, tmp_path, monkeypatch):
     built = []
     compile_library = module.compile_library
     monkeypatch.setattr(module, "compile_library", lambda *a: (built.append(a[4].name), compile_library(*a)))
@@ -60,7 +60,7 @@ def test_it_is_built_once_and_anew_where_it_is_damaged(cache, tmp_path, monkeypa
 
 
 @pytest.mark.slow
-def test_where_there_is_no_place_for_it_it_serves_the_process(cache, caplog):
+def test_without_cache_folder_library_is_compiled_per_process(cache, caplog):
     cache.parent.mkdir()
     cache.write_text("a file, no folder")
     with caplog.at_level(logging.WARNING):

@@ -1,4 +1,4 @@
-"""All that a user's flights run as C comes compiled with the package."""
+"""Every function that user runs execute as C is shipped precompiled."""
 
 import ctypes
 import platform
@@ -43,7 +43,7 @@ def called(monkeypatch):
 
 
 @pytest.mark.medium
-def test_what_flights_call_is_shipped_and_what_is_shipped_is_called(called, tmp_path):
+def test_shipped_functions_are_exactly_those_called(called, tmp_path):
     for name in ("docking", "harbour", "pipe-inspection", "moving-obstacle"):
         scenario = load_scenario(name, ["time.duration=0.1"])
         with Master(scenario) as master:
@@ -67,7 +67,7 @@ def test_what_flights_call_is_shipped_and_what_is_shipped_is_called(called, tmp_
     assert called == {(one, tuple(map(type_of, arguments))) for one, arguments in shipped_functions()}
 
 
-def test_their_c_is_written_a_file_each(tmp_path):
+def test_each_function_is_written_to_its_own_c_file(tmp_path):
     write_sources(tmp_path / "laws")
     names = {path.stem for path in (tmp_path / "laws").iterdir()}
     assert names == set(shipped_texts()) and {"law_step", "fused_loop_fly", "arbiter"} <= names

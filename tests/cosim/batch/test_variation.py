@@ -1,4 +1,4 @@
-"""Variations of a scenario: what makes the same one by file makes it by values, and what cannot be is named."""
+"""Variations by values equal those by file; invalid keys and values are rejected by name."""
 
 import pickle
 
@@ -20,7 +20,7 @@ def paper():
     return load_scenario("paper-limited")
 
 
-def test_values_make_the_scenario_that_the_same_settings_make_of_the_file(paper, tmp_path):
+def test_varied_values_equal_overrides_of_the_file(paper, tmp_path):
     variation = pickle.loads(pickle.dumps(Variation(paper, KEYS)))
     made = variation.scenario(VALUES, 7)
     file = tmp_path / "base.toml"
@@ -33,13 +33,13 @@ def test_values_make_the_scenario_that_the_same_settings_make_of_the_file(paper,
     assert paper.initial.position[1] == 0.0, "the base stays as it is"
 
 
-def test_a_seed_that_varies_is_left_to_its_values(paper):
+def test_varied_seed_overrides_the_row_seed(paper):
     made = Variation(paper, ["sensing.seed"]).scenario([5.0], 7)
     assert made.sensing.seed == 5 and isinstance(made.sensing.seed, int)
     assert made.plant.parameters["seed"] == 7
 
 
-def test_overrides_keep_the_last_bit(paper):
+def test_overrides_keep_full_precision(paper):
     third = 1.0 / 3.0
     (text, *_) = Variation(paper, ["limit.force"]).overrides([third], 0)
     assert float(text.partition("=")[2]) == third
@@ -59,12 +59,12 @@ def test_overrides_keep_the_last_bit(paper):
         ("", "unknown"),
     ],
 )
-def test_a_key_that_is_no_number_is_named(paper, key, words):
+def test_non_numeric_key_is_rejected_by_name(paper, key, words):
     with pytest.raises(ScenarioError, match=words):
         Variation(paper, [key])
 
 
-def test_each_key_comes_once(paper):
+def test_duplicate_keys_are_rejected(paper):
     with pytest.raises(ScenarioError, match="twice"):
         Variation(paper, ["limit.force", "limit.force"])
 
@@ -80,12 +80,12 @@ def test_each_key_comes_once(paper):
         ("initial.position.0", float("nan"), "initial.position"),
     ],
 )
-def test_a_value_that_cannot_be_is_named(paper, key, value, words):
+def test_invalid_value_is_rejected_by_name(paper, key, value, words):
     with pytest.raises(ScenarioError, match=words):
         Variation(paper, [key]).scenario([value], 0)
 
 
-def test_a_shape_written_in_whole_numbers_takes_fractions(paper):
+def test_integer_shape_parameters_accept_fractions(paper):
     whole = load_scenario("paper-limited", ["goal.radius=1", "regions.SR1.shape.centre=[2, 0, 2]"])
     made = Variation(whole, ["goal.radius", "regions.SR1.shape.centre.1"]).scenario([0.5, 0.25], 0)
     assert made.goal.radius == 0.5 and made.regions[0].region.shape.centre == (2.0, 0.25, 2.0)

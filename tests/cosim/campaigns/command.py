@@ -1,4 +1,4 @@
-"""Campaigns as commands in sessions of their own, which tests may kill."""
+"""Campaign commands in sessions of their own, which tests can kill."""
 
 import contextlib
 import os
@@ -45,7 +45,7 @@ class Command:
         )
 
     def end(self):
-        """Leave nothing running."""
+        """Stop all processes."""
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.communicate()

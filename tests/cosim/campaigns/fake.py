@@ -1,4 +1,4 @@
-"""An engine that flies nothing, in a known way: what campaigns do around engines is tested with it."""
+"""An engine with known outcomes that steps no plant, for tests of the code around engines."""
 
 import os
 import signal

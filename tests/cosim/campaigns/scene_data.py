@@ -27,7 +27,7 @@ def write(path, scenes):
 
 
 def rows(results):
-    """Return rows without what the wall clock says."""
+    """Return rows without wall-clock columns."""
     return [{k: v for k, v in row.items() if k != "worst_step_time"} for row in results.table.to_pylist()]
 
 
@@ -38,6 +38,6 @@ def results_of(path, rows):
 
 
 def batches_of(monkeypatch, n):
-    """Have every batch hold `n` rows, whatever time they take."""
+    """Make every batch hold `n` rows, independent of their duration."""
     for name, value in {"FIRST": n, "GREATEST": n, "TARGET": 1e9, "LEAST": 1e9}.items():
         monkeypatch.setattr(batch_sizing, name, value)

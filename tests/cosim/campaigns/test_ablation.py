@@ -1,4 +1,4 @@
-"""Ablations: the deployable law beside itself without parts of it."""
+"""Ablations: the deployable law compared with variants that lack one part."""
 
 import json
 import re
@@ -34,7 +34,7 @@ def scenes(tmp_path):
 
 
 @pytest.mark.medium
-def test_variants_stand_beside_the_whole_law(tmp_path, scenes):
+def test_variants_are_compared_with_the_complete_law(tmp_path, scenes):
     out = tmp_path / "out"
     done = ablate(scenes, out, ["arbiter-none", "barriers"])
     assert sorted(p.name for p in out.iterdir()) == ["ablation.json", "arbiter-none", "barriers", "whole"]
@@ -52,7 +52,7 @@ def test_variants_stand_beside_the_whole_law(tmp_path, scenes):
 
 
 @pytest.mark.medium
-def test_an_ablation_goes_on_with_what_is_left(tmp_path, scenes):
+def test_ablation_resumes_with_the_missing_variants(tmp_path, scenes):
     ablate(scenes, tmp_path / "out", ["arbiter-crisp"])
     more = ablate(scenes, tmp_path / "out", ["arbiter-crisp", "net-weight"])
     assert {name: campaign.flown for name, campaign in more.campaigns.items()} == {
@@ -60,7 +60,7 @@ def test_an_ablation_goes_on_with_what_is_left(tmp_path, scenes):
     }  # fmt: skip
 
 
-def test_every_variant_takes_out_what_it_says():
+def test_every_variant_disables_its_named_part():
     gains = {key for variant in VARIANTS.values() for key in variant.gains}
     assert gains == {
         "restoring_bound", "current_bound", "moment_bound", "effectiveness_estimation", "lag_bound",
@@ -73,13 +73,13 @@ def test_every_variant_takes_out_what_it_says():
     ("variants", "said"),
     [(["motor"], "variant 'motor' is unknown"), ([], "variants are none"), (["lag"] * 2, "each once")],
 )
-def test_what_is_no_choice_of_variants_is_refused(tmp_path, scenes, variants, said):
+def test_invalid_variants_are_rejected(tmp_path, scenes, variants, said):
     with pytest.raises(RunError, match=said):
         ablate(scenes, tmp_path / "out", variants)
     assert not (tmp_path / "out").exists()
 
 
-def test_a_folder_of_something_else_is_left_alone(tmp_path, scenes):
+def test_foreign_folder_is_rejected_and_unchanged(tmp_path, scenes):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "thesis.txt").touch()
     with pytest.raises(RunError, match=r"holds 'thesis\.txt', expected a new folder or that of an ablation"):
@@ -87,7 +87,7 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path, scenes):
 
 
 @pytest.mark.medium
-def test_the_command_says_what_came_of_it(tmp_path, scenes, capsys):
+def test_command_prints_the_ablation_result(tmp_path, scenes, capsys):
     arguments = ["ablate", str(scenes), "--out", str(tmp_path / "out"), "--variants", "lag", "--replays", "0"]
     assert main(arguments) == 0
     said = capsys.readouterr().out.splitlines()
@@ -116,7 +116,7 @@ def test_a_ratio_of_means_has_the_interval_of_its_delta_method():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["net weight", "moments", "effectiveness", "pocket"])
-def test_without_a_part_its_trials_are_failed(tmp_path, kind):
+def test_ablated_part_fails_its_trials(tmp_path, kind):
     """Without the part that a trial tries, fewer of six are completed, and all are with it."""
     tables = [t for t in map(make_trial, range(900_000, 900_200)) if t["kind"] == kind][:6]
     variant = "path-planning" if kind == "pocket" else kind.replace(" ", "-")

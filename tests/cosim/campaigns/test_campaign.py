@@ -1,4 +1,4 @@
-"""Campaigns: a row a scene, none lost and none repeated, whatever comes in between."""
+"""Campaigns: one row per scene, none lost and none repeated after interruptions."""
 
 import json
 import math
@@ -36,7 +36,7 @@ def scenes(tmp_path):
     return write(tmp_path / "scenes.jsonl", many(20))
 
 
-def test_a_row_a_scene_in_order_of_seed(tmp_path, scenes):
+def test_one_row_per_scene_ordered_by_seed(tmp_path, scenes):
     done = run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
     assert done.flown == 20
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
@@ -53,7 +53,7 @@ def test_a_row_a_scene_in_order_of_seed(tmp_path, scenes):
     assert all(f.metadata[b"description"] for f in table.schema)
 
 
-def test_rows_are_what_the_flyer_scores(tmp_path):
+def test_rows_equal_the_flyer_scores(tmp_path):
     wide = [scene | {"goal": {"centre": scene["start"], "radius": 40.0}} for scene in HARD]  # they start inside
     conditions = replace(BRIEF, settled=0.3)
     found = run_campaign(write(tmp_path / "s.jsonl", wide), "ismail_dunnigan", tmp_path / "out", conditions).results
@@ -68,14 +68,14 @@ def test_rows_are_what_the_flyer_scores(tmp_path):
 
 
 @pytest.mark.medium
-def test_another_law_is_refused_by_its_name_alone(tmp_path, scenes):
+def test_resuming_with_another_law_is_rejected(tmp_path, scenes):
     run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
     with pytest.raises(RunError, match=r"another campaign \(law is 'ismail_dunnigan', now 'deployable'\)"):
         run_campaign(scenes, "deployable", tmp_path / "out", BRIEF)
 
 
 @pytest.mark.medium
-def test_what_is_interrupted_goes_on_without_losing_or_repeating(tmp_path, scenes, monkeypatch):
+def test_resumed_campaign_neither_loses_nor_repeats_rows(tmp_path, scenes, monkeypatch):
     whole = run_campaign(scenes, "ismail_dunnigan", tmp_path / "whole", BRIEF)
     flown = []
 
@@ -104,7 +104,7 @@ def test_what_is_interrupted_goes_on_without_losing_or_repeating(tmp_path, scene
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("at", ["join", "write_atomic"])
-def test_killed_at_the_end_nothing_is_flown_again(tmp_path, scenes, monkeypatch, at):
+def test_campaign_killed_while_finishing_repeats_no_run(tmp_path, scenes, monkeypatch, at):
     with monkeypatch.context() as patch:
         where = (CampaignFolder, "remove_parts") if at == "join" else (module, "write_atomic")
         patch.setattr(*where, lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
@@ -116,7 +116,7 @@ def test_killed_at_the_end_nothing_is_flown_again(tmp_path, scenes, monkeypatch,
 
 
 @pytest.mark.medium
-def test_a_damaged_part_is_flown_again(tmp_path, scenes, monkeypatch):
+def test_damaged_part_is_recomputed(tmp_path, scenes, monkeypatch):
     whole = run_campaign(scenes, "ismail_dunnigan", tmp_path / "whole", BRIEF)
     batches_of(monkeypatch, 5)
     with monkeypatch.context() as patch:
@@ -161,7 +161,7 @@ def test_the_folder_of_another_campaign_is_refused(tmp_path, scenes, monkeypatch
     assert {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()} == before
 
 
-def test_a_folder_that_holds_something_else_is_refused(tmp_path, scenes):
+def test_foreign_folder_is_rejected(tmp_path, scenes):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "precious").write_text("x")
     with pytest.raises(RunError, match="holds no campaign"):
@@ -186,13 +186,13 @@ def test_a_folder_in_use_is_refused(tmp_path, scenes):
     assert run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF).flown == 20
 
 
-def test_a_folder_that_cannot_be_written(tmp_path, scenes):
+def test_unwritable_folder_is_rejected(tmp_path, scenes):
     (tmp_path / "file").write_text("")
     with pytest.raises(RunError, match="file"):
         run_campaign(scenes, "ismail_dunnigan", tmp_path / "file" / "out", BRIEF)
 
 
-def test_a_full_disk_is_one_line_and_what_was_done_is_kept(tmp_path, scenes, monkeypatch):
+def test_full_disk_gives_one_line_error_and_keeps_completed_rows(tmp_path, scenes, monkeypatch):
     batches_of(monkeypatch, 5)
     add = CampaignFolder.add
 
@@ -208,7 +208,7 @@ def test_a_full_disk_is_one_line_and_what_was_done_is_kept(tmp_path, scenes, mon
     assert run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF).flown == 10
 
 
-def test_what_the_plant_refuses_has_a_row_that_says_so(tmp_path):
+def test_scene_rejected_by_the_plant_has_a_marked_row(tmp_path):
     bad = [PLAIN[0], PLAIN[1] | {"weight_minus_buoyancy": 1e6}, PLAIN[2] | {"righting_moment": 1e300}, PLAIN[3]]
     done = run_campaign(write(tmp_path / "s.jsonl", bad), "ismail_dunnigan", tmp_path / "out", BRIEF)
     first, *refused, last = done.results.table.to_pylist()
@@ -230,14 +230,14 @@ def test_what_the_plant_refuses_has_a_row_that_says_so(tmp_path):
         (Score(False, math.inf, 0.5, 1.0, 1.0, 1e-6, 150), True, 1.5),
     ],
 )
-def test_what_was_not_seen_to_be_safe_is_a_violation(score, violation, stopped_at):
+def test_unproven_safety_counts_as_violation(score, violation, stopped_at):
     row = row_of(7, score, 0.01)
     assert (row.violation, row.stopped_at) == (violation, stopped_at)
     numbers = (row.min_clearance, row.reach_time, row.effort, row.thrust_variation)
     assert all(x is None or math.isfinite(x) for x in numbers)
 
 
-def test_there_is_a_reach_time_where_it_was_reached_alone():
+def test_reach_time_exists_only_if_goal_was_reached():
     late, early = (Score(reached, 115.0, 0.1, 1.0, 1.0, 1e-6, -1) for reached in (False, True))
     assert (row_of(7, late, 0.01).reach_time, row_of(7, early, 0.01).reach_time) == (None, 115.0)
 
@@ -279,7 +279,7 @@ def test_the_summary_follows_from_the_rows(tmp_path):
     json.dumps(summary, allow_nan=False)
 
 
-def test_medians_of_nothing_are_none(tmp_path, scenes):
+def test_median_of_no_values_is_none(tmp_path, scenes):
     assert run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF).summary["medians"]["reach_time"] is None
 
 
@@ -295,13 +295,13 @@ def test_medians_of_nothing_are_none(tmp_path, scenes):
         ([PLAIN[0], {"x": "y" * 1_000_001}], "line 2: has more than 1000000 bytes"),
     ],
 )
-def test_scenes_that_cannot_be_flown_are_refused_before_anything_is_written(tmp_path, lines, words):
+def test_invalid_scenes_are_rejected_before_writing(tmp_path, lines, words):
     with pytest.raises(ScenarioError, match=words):
         run_campaign(write(tmp_path / "s.jsonl", lines), "ismail_dunnigan", tmp_path / "out", BRIEF)
     assert not (tmp_path / "out").exists()
 
 
-def test_a_store_gives_back_each_scene_and_knows_blanks_for_nothing(tmp_path):
+def test_scene_store_returns_each_scene_and_ignores_whitespace(tmp_path):
     spaced = tmp_path / "spaced.jsonl"
     spaced.write_text("\n\n".join(json.dumps(scene, indent=None, separators=(" , ", " : ")) for scene in HARD))
     with SceneStore(spaced) as one, SceneStore(write(tmp_path / "s.jsonl", HARD)) as other:
@@ -310,7 +310,7 @@ def test_a_store_gives_back_each_scene_and_knows_blanks_for_nothing(tmp_path):
         assert decode_scene(line) == decode_scene(json.dumps(HARD[3]).encode())
 
 
-def test_gains_from_texts():
+def test_gains_are_parsed_from_text():
     assert gains_from("ismail_dunnigan", ["k_p1=10", " gamma = 3e0 "]) == Gains(k_p1=10.0, gamma=3.0)
     assert gains_by_law(["ismail_dunnigan"], ["ismail_dunnigan.k_q=2"]) == {"ismail_dunnigan": Gains(k_q=2.0)}
 
@@ -324,28 +324,28 @@ def test_gains_from_texts():
         ("ismail_dunnigan", ["k_p1=much"], "'much' is no number"),
     ],
 )
-def test_gains_that_cannot_be(law, settings, words):
+def test_invalid_gains_are_rejected(law, settings, words):
     with pytest.raises(RunError, match=words):
         gains_from(law, settings)
 
 
-def test_gains_of_a_law_that_is_not_compared():
+def test_gains_of_an_absent_law_are_rejected():
     with pytest.raises(RunError, match=r"expected LAW\.KEY=VALUE with one of ismail_dunnigan"):
         gains_by_law(["ismail_dunnigan"], ["k_p1=3"])
 
 
-def test_gains_that_the_law_refuses_leave_no_folder(tmp_path, scenes):
+def test_gains_rejected_by_the_law_leave_no_folder(tmp_path, scenes):
     with pytest.raises(LawError, match="gamma"):
         run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF, gains_from("ismail_dunnigan", ["gamma=0"]))
     assert not (tmp_path / "out").exists()
 
 
-def test_no_workers_are_refused(tmp_path, scenes):
+def test_zero_workers_are_rejected(tmp_path, scenes):
     with pytest.raises(RunError, match="workers is 0"):
         run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF, workers=0)
 
 
-def test_a_difference_is_said_in_words():
+def test_plan_differences_are_described_in_text():
     assert difference({"a": {"b": 1}, "c": 2}, {"a": {"b": 3}, "c": 2, "d": "x" * 50}) == (
         "a.b is 1, now 3; d is None, now 'xxxxxxxxx…"
     )
@@ -357,7 +357,7 @@ def test_a_difference_is_said_in_words():
     assert difference({"kind": "scenes", "law": "x"}, {"kind": "sweep"}) == "kind is 'scenes', now 'sweep'"
 
 
-def test_results_of_another_kind_are_refused(tmp_path):
+def test_results_of_another_kind_are_rejected(tmp_path):
     pq.write_table(pa.table({"seed": ["text"]}), tmp_path / "x.parquet")
     with pytest.raises(RunError, match=r"x\.parquet: cannot be read: column 'seed' holds string, .*expected int64$"):
         Results(tmp_path / "x.parquet", SCHEMA)

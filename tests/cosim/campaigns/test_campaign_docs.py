@@ -1,4 +1,4 @@
-"""The page on campaigns says what the code does."""
+"""The page on campaigns matches the code."""
 
 import dataclasses
 import re
@@ -62,7 +62,7 @@ def test_the_conditions_are_those_of_the_score():
     assert f"for the last {c.settled:g} s" in text
 
 
-def test_the_commands_are_understood(tmp_path, capsys):
+def test_documented_commands_parse(tmp_path, capsys):
     commands = [
         line.split() for line in PAGE[: PAGE.index("A campaign flies")].splitlines() if line.startswith("cosim ")
     ]
@@ -74,7 +74,7 @@ def test_the_commands_are_understood(tmp_path, capsys):
         assert re.search("No such file|law 'none'|scenario .* is unknown|holds no campaign", capsys.readouterr().err)
 
 
-def test_the_keys_of_the_sweep_are_there():
+def test_documented_sweep_keys_exist():
     words = next(line.split() for line in PAGE.splitlines() if line.startswith("cosim sweep"))
     keys = [vary.key for vary in vary_from(words[4 : words.index("--samples")])]
     assert len(keys) == 2

@@ -1,4 +1,4 @@
-"""Columns made by hand are those that pyarrow makes."""
+"""Columns built from buffers equal those of pyarrow."""
 
 import subprocess
 import sys
@@ -15,7 +15,7 @@ N = 37  # no multiple of the eight facts in a byte
 
 @pytest.mark.parametrize("dtype", [np.float64, np.int64, np.bool_])
 @pytest.mark.parametrize("share", [None, 0.0, 0.3, 1.0])
-def test_numbers_and_facts_against_pyarrow(dtype, share):
+def test_numeric_and_boolean_columns_match_pyarrow(dtype, share):
     rng = np.random.default_rng(3)
     values = (rng.normal(size=(N, 3)) * 3.0).astype(dtype)[:, 1]  # a column lies in steps
     absent = None if share is None else rng.random(N) < share
@@ -26,7 +26,7 @@ def test_numbers_and_facts_against_pyarrow(dtype, share):
 
 
 @pytest.mark.parametrize("texts", [[], [None, None], ["", "ab", None, "tiefe ö", "x" * 1000], ["only"]])
-def test_texts_against_pyarrow(texts):
+def test_text_columns_match_pyarrow(texts):
     column = of_texts(texts)
     column.validate(full=True)
     assert column.equals(pa.array(texts, pa.string()))
@@ -44,7 +44,7 @@ COLUMNS = [
 
 
 @pytest.mark.parametrize("column", COLUMNS, ids=str)
-def test_arrays_against_pyarrow(column):
+def test_array_columns_match_pyarrow(column):
     array, expected = to_array(column), column.to_numpy()
     assert array.dtype == expected.dtype
     np.testing.assert_array_equal(array, expected)
@@ -65,7 +65,7 @@ assert "pandas" not in sys.modules
 
 
 @pytest.mark.slow
-def test_no_sweep_brings_pandas(tmp_path):
+def test_sweep_does_not_import_pandas(tmp_path):
     pytest.importorskip("pandas")
     done = subprocess.run([sys.executable, "-c", SWEEP, tmp_path], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

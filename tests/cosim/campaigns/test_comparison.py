@@ -1,4 +1,4 @@
-"""Comparisons: each law on the same scenes, and two at a time on what one completes."""
+"""Comparisons of laws on the same scenes, and paired statistics."""
 
 import json
 import math
@@ -17,7 +17,7 @@ from tests.cosim.campaigns.scene_data import BRIEF, HARD, results_of, rows, writ
 
 
 class Idle(IsmailDunniganLaw):
-    """Does nothing, well."""
+    """A law that commands zero."""
 
     name = "idle"
 
@@ -37,7 +37,7 @@ def scenes(tmp_path):
 
 
 @pytest.mark.medium
-def test_laws_stand_side_by_side(tmp_path, scenes, idle):
+def test_laws_are_compared_on_the_same_scenes(tmp_path, scenes, idle):
     out = tmp_path / "out"
     done = compare(scenes, ["ismail_dunnigan", "idle"], out, BRIEF, {"ismail_dunnigan": Gains(k_p1=9.0)})
     assert sorted(p.name for p in out.iterdir()) == ["compare.json", "idle", "ismail_dunnigan"]
@@ -51,7 +51,7 @@ def test_laws_stand_side_by_side(tmp_path, scenes, idle):
 
 
 @pytest.mark.slow
-def test_what_is_compared_already_is_not_flown_again_and_more_laws_may_come(tmp_path, scenes, idle, monkeypatch):
+def test_compared_laws_are_not_rerun_and_laws_can_be_added(tmp_path, scenes, idle, monkeypatch):
     monkeypatch.setitem(LAWS, "idler", type("Idler", (Idle,), {"name": "idler"}))
     first = compare(scenes, ["ismail_dunnigan", "idle"], tmp_path / "out", BRIEF)
     done = compare(scenes, ["idle", "idler", "ismail_dunnigan"], tmp_path / "out", BRIEF)
@@ -67,13 +67,13 @@ def test_what_is_compared_already_is_not_flown_again_and_more_laws_may_come(tmp_
         (["ismail_dunnigan", "nil"], "'nil'"),
     ],
 )
-def test_laws_that_cannot_be_compared(tmp_path, scenes, laws, words):
+def test_invalid_law_selection_is_rejected(tmp_path, scenes, laws, words):
     with pytest.raises(RunError, match=words):
         compare(scenes, laws, tmp_path / "out", BRIEF)
     assert not (tmp_path / "out").exists()
 
 
-def test_a_folder_that_holds_something_else_is_refused(tmp_path, scenes, idle):
+def test_foreign_folder_is_rejected(tmp_path, scenes, idle):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "precious").write_text("x")
     with pytest.raises(RunError, match="holds 'precious'"):
@@ -93,7 +93,7 @@ def score(time, clearance, effort):
     return Score(math.isfinite(time), time, clearance, effort, 1.0, 1e-6, -1)
 
 
-def test_a_pair_is_compared_on_what_one_completes(results):
+def test_paired_comparison_uses_scenes_completed_by_either_law(results):
     mine = results(
         "mine", score(30.0, 0.1, 100.0), score(40.0, -0.1, 1.0), score(math.inf, 0.1, 2.0), score(50.0, 0.0, 200.0)
     )
@@ -111,7 +111,7 @@ def test_a_pair_is_compared_on_what_one_completes(results):
     }  # fmt: skip
 
 
-def test_a_difference_is_that_of_the_scenes_that_both_complete(results):
+def test_differences_use_scenes_completed_by_both_laws(results):
     mine = results("mine", *(score(time, 0.1, 10.0 * time) for time in (3.0, 5.0, 9.0, math.inf)))
     other = results("other", *(score(time, 0.1, 10.0 * time) for time in (1.0, 4.0, math.inf, 2.0)))
     found = difference("mine", mine, "other", other)
@@ -120,7 +120,7 @@ def test_a_difference_is_that_of_the_scenes_that_both_complete(results):
 
 
 @pytest.mark.parametrize("laws", [{}, [], None, {"none": {}}])
-def test_numbers_without_laws_are_no_comparison(tmp_path, laws):
+def test_comparison_without_laws_is_rejected(tmp_path, laws):
     (tmp_path / "compare.json").write_text(json.dumps({"laws": laws}))
     with pytest.raises(RunError, match="holds no comparison of laws"):
         write_comparison_page(tmp_path, 0)

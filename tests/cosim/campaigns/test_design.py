@@ -1,4 +1,4 @@
-"""Designs, held against scipy's and numpy's own."""
+"""Designs against those of SciPy and NumPy."""
 
 import itertools
 import json
@@ -62,7 +62,7 @@ def test_lists_are_drawn_from_evenly():
 
 @pytest.mark.parametrize("kind", KINDS)
 @given(st.sets(st.integers(0, 59), min_size=1), st.integers(0, 2**63 - 1))
-def test_a_row_does_not_depend_on_what_else_is_asked_for(kind, rows, seed):
+def test_row_values_do_not_depend_on_other_requested_rows(kind, rows, seed):
     vary = vary_from(
         ["a=-2:2:4", "b=1:1000:5:log", "c=1,2,3"] if kind == "grid" else ["a=-2:2", "b=1:9:log", "c=1,2,3"]
     )
@@ -73,7 +73,7 @@ def test_a_row_does_not_depend_on_what_else_is_asked_for(kind, rows, seed):
 
 
 @pytest.mark.parametrize("kind", ["random", "sobol", "lhs"])
-def test_values_stay_in_their_ranges_and_other_seeds_give_others(kind):
+def test_values_stay_in_range_and_differ_between_seeds(kind):
     one, other = (Design(TWO, kind, 1000, seed) for seed in (1, 2))
     values = one.values(all_rows(one))
     assert np.all((values >= [-2.0, 1.0]) & (values <= [2.0, 1000.0]))
@@ -81,7 +81,7 @@ def test_values_stay_in_their_ranges_and_other_seeds_give_others(kind):
 
 
 @pytest.mark.medium
-def test_every_row_has_a_seed_of_its_own_that_fmi_can_hold():
+def test_row_seeds_are_unique_31_bit_integers():
     found = Design(TWO, "random", MOST, 5)
     seeds = found.seeds(np.arange(1_000_000))
     assert len(np.unique(seeds)) == 1_000_000 and seeds.min() >= 0 and seeds.max() < 2**31
@@ -100,7 +100,7 @@ def test_every_row_has_a_seed_of_its_own_that_fmi_can_hold():
         ("k=3,-1,2", Vary("k", values=(3.0, -1.0, 2.0))),
     ],
 )
-def test_what_varies_is_read(text, expected):
+def test_varied_keys_are_parsed(text, expected):
     assert repr(vary_from([text])) == repr((expected,))
 
 
@@ -123,7 +123,7 @@ def test_what_varies_is_read(text, expected):
         (["k=1:2", "k=2:3"], "k varies twice"),
     ],
 )
-def test_what_cannot_vary_is_refused(texts, words):
+def test_invalid_varied_keys_are_rejected(texts, words):
     with pytest.raises(RunError, match=words):
         vary_from(texts)
 
@@ -144,13 +144,13 @@ def test_what_cannot_vary_is_refused(texts, words):
         ([], "random", 10, 0, "nothing varies"),
     ],
 )
-def test_designs_that_cannot_be(vary, kind, samples, seed, words):
+def test_invalid_designs_are_rejected(vary, kind, samples, seed, words):
     with pytest.raises(RunError, match=words):
         Design(vary_from(vary), kind, samples, seed)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_design_comes_back_from_the_plan(kind):
+def test_design_round_trips_through_the_plan(kind):
     grid = kind == "grid"
     vary = vary_from(["a=-2:2:4", "b=1:9:3:log", "c=1,2,3"] if grid else ["a=-2:2", "b=1:9:log", "c=1,2,3"])
     design = Design(vary, kind, None if grid else 30, 4)
@@ -160,6 +160,6 @@ def test_a_design_comes_back_from_the_plan(kind):
 
 
 @pytest.mark.parametrize("table", [{}, {"vary": 3}, {"vary": {"a": {}}, "design": "lhs", "samples": 3, "seed": 1}])
-def test_a_design_that_cannot_be_read(table):
+def test_unreadable_design_is_rejected(table):
     with pytest.raises(RunError, match="cannot be read"):
         design_of(table)

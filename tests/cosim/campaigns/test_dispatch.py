@@ -1,4 +1,4 @@
-"""Batches shared out: what dies is flown again, taken apart, and laid to the row that is to blame."""
+"""Dispatch of batches: crashed batches are retried and split until the faulty row is isolated."""
 
 from concurrent.futures import Future
 
@@ -26,7 +26,7 @@ class Work:
 
 
 class WorkerPool:
-    """Flies in order of submission; dies of some rows."""
+    """A pool that runs batches in order of submission and crashes on some rows."""
 
     def __init__(self, poison=(), width=4, certain=True):
         self.poison, self.width, self.certain = set(poison), width, certain
@@ -63,7 +63,7 @@ def flown(pool, n=200):
     return sorted(row for table in fly_all(Work(), Batches(np.arange(n)), pool) for row in table)
 
 
-def test_every_row_comes_home_once():
+def test_every_row_is_completed_once():
     pool = WorkerPool()
     assert flown(pool) == list(range(200))
     assert pool.sent[0] == [0] and pool.most == 4
@@ -72,7 +72,7 @@ def test_every_row_comes_home_once():
 
 @pytest.mark.parametrize("certain", [True, False])
 @pytest.mark.parametrize("poison", [{77}, {60, 61, 150}, {1}, {199}, {0}])
-def test_rows_that_kill_are_found_and_refused_and_no_others(poison, certain):
+def test_only_rows_that_crash_workers_are_rejected(poison, certain):
     pool = WorkerPool(poison, certain=certain)
     found = flown(pool)
     zero = {0} & poison  # refused as -0
@@ -82,7 +82,7 @@ def test_rows_that_kill_are_found_and_refused_and_no_others(poison, certain):
     assert len(pool.deaths) <= len(poison) * (FATAL + 8) * (1 if certain else 2)
 
 
-def test_what_is_not_certain_to_kill_is_flown_while_nothing_else_is():
+def test_suspect_row_runs_alone():
     pool = WorkerPool({77}, certain=False)
     alone = []
     submit = pool.submit
@@ -97,7 +97,7 @@ def test_what_is_not_certain_to_kill_is_flown_while_nothing_else_is():
     assert alone and all(alone)
 
 
-def test_a_death_by_chance_costs_nobody_a_row():
+def test_worker_crash_loses_no_row():
     class Unlucky(WorkerPool):
         def result(self, flight):
             if len(self.sent) in (5, 6) and not self.deaths:
@@ -109,7 +109,7 @@ def test_a_death_by_chance_costs_nobody_a_row():
     assert flown(Unlucky()) == list(range(200))
 
 
-def test_where_everything_dies_no_row_is_blamed():
+def test_persistent_worker_crashes_abort_without_rejecting_rows():
     with pytest.raises(RunError, match="processes died one after the other, whatever they flew"):
         flown(WorkerPool(range(200)))
     with pytest.raises(RunError, match="every process died, whatever it flew"):
@@ -119,7 +119,7 @@ def test_where_everything_dies_no_row_is_blamed():
 # ---- batches ----
 
 
-def test_batches_follow_the_time_that_a_row_takes():
+def test_batch_size_adapts_to_row_duration():
     batches = Batches(np.arange(100_000))
     sizes = []
     for _ in range(12):
@@ -130,7 +130,7 @@ def test_batches_follow_the_time_that_a_row_takes():
     assert all(after <= 4 * before for before, after in zip(sizes, sizes[1:], strict=False))
 
 
-def test_the_first_batch_of_a_further_worker_does_not_make_batches_small():
+def test_startup_time_of_a_new_worker_does_not_shrink_batches():
     batches = Batches(np.arange(100_000))
     for _ in range(12):
         rows = len(batches.take(4).rows)
@@ -140,7 +140,7 @@ def test_the_first_batch_of_a_further_worker_does_not_make_batches_small():
     assert len(batches.take(4).rows) == size
 
 
-def test_rows_that_take_long_go_one_by_one():
+def test_slow_rows_are_dispatched_singly():
     batches = Batches(np.arange(50))
     for _ in range(50):
         batch = batches.take(4)
@@ -149,7 +149,7 @@ def test_rows_that_take_long_go_one_by_one():
     assert batches.take(4) is None
 
 
-def test_towards_the_end_batches_are_shared_out_evenly_but_not_too_small():
+def test_final_batches_are_balanced_with_a_minimum_size():
     batches = Batches(np.arange(1000))
     batches.measured(1000, 1.0)  # 1 ms each
     batches.measured(1000, 1.0)
@@ -160,11 +160,11 @@ def test_towards_the_end_batches_are_shared_out_evenly_but_not_too_small():
     assert sizes == sorted(sizes, reverse=True)
 
 
-def test_halves_have_all_rows(monkeypatch):
+def test_split_batch_keeps_all_rows(monkeypatch):
     one, other = Batch(np.arange(7), 1, True).halves(2)
     assert one.rows.tolist() + other.rows.tolist() == list(range(7))
     assert one.crash_count == other.crash_count == 2 and one.alone and other.alone
 
 
-def test_the_first_batches_take_no_longer_than_a_row(monkeypatch):
+def test_first_batches_hold_one_row(monkeypatch):
     assert module.FIRST == 1 and len(Batches(np.arange(9)).take(4).rows) == 1

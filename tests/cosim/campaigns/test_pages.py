@@ -1,4 +1,4 @@
-"""The pages of campaigns, sweeps and comparisons: whole, self-contained, the same again, with the worst to be seen."""
+"""Pages of campaigns, sweeps and comparisons: complete, self-contained, reproducible, with worst replays."""
 
 import json
 import re
@@ -85,7 +85,7 @@ def flown(tmp_path_factory):
 
 
 @pytest.mark.medium
-def test_the_page_of_a_campaign_is_whole_and_says_what_the_summary_says(flown):
+def test_campaign_page_is_complete_and_matches_the_summary(flown):
     checker = check(flown / "campaign.html")
     s = json.loads((flown / "summary.json").read_text())
     worst = s["worst"][0]
@@ -111,7 +111,7 @@ def test_a_replay_shows_the_flight_of_the_row(flown):
 
 
 @pytest.mark.slow
-def test_the_page_is_the_same_again_and_flies_no_replay_again(flown, monkeypatch):
+def test_rewritten_page_is_identical_without_new_runs(flown, monkeypatch):
     before = (flown / "campaign.html").read_bytes()
     monkeypatch.setattr("cosim.campaigns.pages.replays.run_scenario", None)
     write_campaign_page(flown, 1)
@@ -120,7 +120,7 @@ def test_the_page_is_the_same_again_and_flies_no_replay_again(flown, monkeypatch
 
 
 @pytest.mark.slow
-def test_the_page_is_the_same_from_two_processes(tmp_path, monkeypatch):
+def test_page_is_identical_between_processes(tmp_path, monkeypatch):
     pages = []
     for name, workers in (("one", 1), ("two", 2)):
         (tmp_path / name).mkdir()
@@ -133,7 +133,7 @@ def test_the_page_is_the_same_from_two_processes(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_ctrl_c_while_replays_are_flown_leaves_the_page_without_them(tmp_path, monkeypatch):
+def test_ctrl_c_during_replays_leaves_a_page_without_them(tmp_path, monkeypatch):
     out = tmp_path / "out"
     run_campaign(write(tmp_path / "s.jsonl", PLAIN[:2]), "ismail_dunnigan", out, BRIEF)
     with monkeypatch.context() as patch:
@@ -146,7 +146,7 @@ def test_ctrl_c_while_replays_are_flown_leaves_the_page_without_them(tmp_path, m
 
 
 @pytest.mark.medium
-def test_a_flight_that_comes_out_otherwise_is_said_beside_its_replay(tmp_path, monkeypatch):
+def test_replay_that_differs_is_marked_on_the_page(tmp_path, monkeypatch):
     from cosim.campaigns.reruns.repeat import Repeat
 
     out = tmp_path / "out"
@@ -158,7 +158,7 @@ def test_a_flight_that_comes_out_otherwise_is_said_beside_its_replay(tmp_path, m
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("scenes", [[REFUSED], PLAIN[:1]], ids=["none that could be flown", "one"])
-def test_few_scenes_have_a_page_too(tmp_path, scenes):
+def test_page_of_few_scenes_is_complete(tmp_path, scenes):
     run_campaign(write(tmp_path / "s.jsonl", scenes), "ismail_dunnigan", tmp_path / "out", BRIEF)
     text = write_campaign_page(tmp_path / "out", 0).read_text()
     check(tmp_path / "out" / "campaign.html")
@@ -167,7 +167,7 @@ def test_few_scenes_have_a_page_too(tmp_path, scenes):
 
 
 @pytest.mark.medium
-def test_a_flight_that_the_plant_stops_can_be_seen_until_then(tmp_path):
+def test_run_stopped_by_the_plant_has_a_replay_up_to_the_stop(tmp_path):
     out = tmp_path / "out"
     done = run_campaign(
         write(tmp_path / "s.jsonl", [PLAIN[0] | {"righting_moment": -5e4}]), "ismail_dunnigan", out, BRIEF
@@ -181,7 +181,7 @@ def test_a_flight_that_the_plant_stops_can_be_seen_until_then(tmp_path):
     assert run["status"].startswith("failed")
 
 
-def test_what_is_no_complete_campaign_has_no_page(tmp_path, fakes):
+def test_incomplete_campaign_has_no_page(tmp_path, fakes):
     with pytest.raises(RunError, match="is not complete"):
         write_campaign_page(tmp_path, 0)
     run_sweep(paper(), design(3), tmp_path / "out", "fake")
@@ -193,7 +193,7 @@ def test_what_is_no_complete_campaign_has_no_page(tmp_path, fakes):
 
 
 @pytest.mark.slow
-def test_the_page_of_a_sweep(tmp_path, fakes):
+def test_sweep_page_lists_varied_keys_and_outcomes(tmp_path, fakes):
     run_sweep(paper(), design(40), tmp_path / "out", "choosy")
     checker = check(write_sweep_page(tmp_path / "out", 0))
     assert ["gain k_p1 [N/m3]", "law.gains.k_p1", "10 to 30"] in checker.rows
@@ -224,12 +224,12 @@ def test_the_page_of_a_comparison_has_all_laws_in_each_replay(tmp_path, idle):
     runs = runs_of(out / checker.asked[0])
     assert [run["name"] for run in runs] == ["ismail_dunnigan", "idle"]
     assert {p.stem for p in (out / "figures").iterdir()} == {"rates", "distributions", "scenes-ismail_dunnigan-idle"}
-    compare(tmp_path / "s.jsonl", ["ismail_dunnigan", "idle"], out, BRIEF)  # a folder with a page is no stranger
+    compare(tmp_path / "s.jsonl", ["ismail_dunnigan", "idle"], out, BRIEF)  # a folder with a page is accepted
     with pytest.raises(RunError, match=r"compare\.json: cannot be read"):
         write_comparison_page(tmp_path, 1)
 
 
-def test_how_many_replays_is_a_number(capsys):
+def test_replay_count_must_be_a_number(capsys):
     for text in ("-1", "all", "1e9"):
         with pytest.raises(SystemExit):
             main(["campaign", "s.jsonl", "--law", "ismail_dunnigan", "--out", "o", "--replays", text])
@@ -247,14 +247,14 @@ def test_text_of_a_page_is_escaped():
 @pytest.mark.parametrize(
     ("x", "text"), [(None, "–"), (-0.12345, "−0.1235"), (34064.2, "34064"), (12.0, "12"), (1.5e12, "1.5e+12")]
 )
-def test_numbers_of_tables(x, text):
+def test_table_numbers_are_formatted(x, text):
     assert number(x) == text
 
 
 @pytest.mark.parametrize("n", [1, 2, 5, 40, 1001, 1000], ids=lambda n: f"{n} numbers")
 @pytest.mark.parametrize("never", [0, 3])
-def test_the_dot_of_the_median_is_the_number_of_the_table(n, never):
-    """Of an even number of rows the median lies between two, and so does the dot; both leave out what never comes."""
+def test_median_marker_matches_the_table(n, never):
+    """Of an even number of rows the median lies between two, and so does the dot; both exclude NaN."""
     values = np.append(np.random.default_rng(n).exponential(size=n), np.full(never, np.nan))
     (drawn,) = distributions({"effort": {"": values}}, "")
     (axes,) = (axes for axes in drawn.figure.axes if axes.get_visible())
@@ -271,7 +271,7 @@ def test_the_dot_of_the_median_is_the_number_of_the_table(n, never):
     assert below <= dot.get_ydata()[0] <= shares[x >= dot.get_xdata()[0]][0], "the dot lies on the curve"
 
 
-def test_shares_count_what_never_comes():
+def test_cumulative_shares_count_unreached_rows():
     values, shares = shares_up_to(np.array([3.0, np.nan, 1.0, np.nan]))
     assert values.tolist() == [1.0, 3.0] and shares.tolist() == [0.25, 0.5]
     assert [a.size for a in shares_up_to(np.zeros(0))] == [0, 0]

@@ -1,4 +1,4 @@
-"""Rows on disk while a campaign goes on: none lost, none twice, few files."""
+"""Rows on disk during a campaign: none lost, none duplicated, few files."""
 
 import tempfile
 from pathlib import Path
@@ -33,7 +33,7 @@ def joined(found, folder):
 
 @pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("batches", [1, 2, 3, 8, 9, 26, 27, 28, 100])
-def test_parts_merge_before_they_are_many_and_keep_every_row(tmp_path, monkeypatch, batches):
+def test_parts_are_merged_and_keep_every_row(tmp_path, monkeypatch, batches):
     monkeypatch.setattr(parts, "MERGED", 3)
     found, _ = opened(tmp_path)
     rows = np.random.default_rng(batches).permutation(batches * 5).reshape(batches, 5)
@@ -47,7 +47,7 @@ def test_parts_merge_before_they_are_many_and_keep_every_row(tmp_path, monkeypat
     assert joined(again, tmp_path).equals(table(range(batches * 5)))
 
 
-def test_who_is_killed_while_parts_merge_leaves_no_row_twice(tmp_path, monkeypatch):
+def test_kill_during_merge_duplicates_no_row(tmp_path, monkeypatch):
     monkeypatch.setattr(parts, "MERGED", 3)
     found, _ = opened(tmp_path)
     for i in range(8):
@@ -67,7 +67,7 @@ def test_who_is_killed_while_parts_merge_leaves_no_row_twice(tmp_path, monkeypat
     assert joined(again, tmp_path)["row"].to_pylist() == [*range(36), 40]
 
 
-def test_a_copy_of_a_part_brings_no_row_twice(tmp_path):
+def test_copied_part_duplicates_no_row(tmp_path):
     found, _ = opened(tmp_path)
     for rows in ([0, 1], [2, 3], [4, 5]):
         found.add(table(rows))
@@ -78,18 +78,20 @@ def test_a_copy_of_a_part_brings_no_row_twice(tmp_path):
     assert joined(found, tmp_path)["row"].to_pylist() == list(range(6))
 
 
-def test_files_that_are_no_parts_are_left_alone(tmp_path):
+def test_foreign_files_are_ignored(tmp_path):
     found, _ = opened(tmp_path)
     found.add(table([0, 1]))
-    strangers = [tmp_path / "parts" / name for name in ("notes.parquet", "1-2-3.parquet", "copy of 00000000.parquet")]
-    for stranger in strangers:
-        stranger.write_text("no part")
+    foreign_files = [
+        tmp_path / "parts" / name for name in ("notes.parquet", "1-2-3.parquet", "copy of 00000000.parquet")
+    ]
+    for file in foreign_files:
+        file.write_text("no part")
     found, keys = opened(tmp_path)
     assert keys == [0, 1] and joined(found, tmp_path)["row"].to_pylist() == [0, 1]
-    assert all(stranger.exists() for stranger in strangers)
+    assert all(file.exists() for file in foreign_files)
 
 
-def test_a_merge_for_which_there_is_no_room_loses_nothing(tmp_path, monkeypatch):
+def test_failed_merge_on_full_disk_loses_no_row(tmp_path, monkeypatch):
     monkeypatch.setattr(parts, "MERGED", 3)
     found, _ = opened(tmp_path)
     for i in range(2):
@@ -110,7 +112,7 @@ def test_a_merge_for_which_there_is_no_room_loses_nothing(tmp_path, monkeypatch)
 
 @pytest.mark.medium
 @given(st.lists(st.sets(st.integers(0, 10**6), min_size=1, max_size=30), min_size=1, max_size=8), st.integers(1, 7))
-def test_files_are_joined_in_order_whatever_rows_they_hold(rows, chunk):
+def test_parts_with_any_rows_are_joined_in_order(rows, chunk):
     taken, disjoint = set(), []
     for batch in rows:
         if batch - taken:
@@ -127,7 +129,7 @@ def test_files_are_joined_in_order_whatever_rows_they_hold(rows, chunk):
     assert all(len(t) for t in found)
 
 
-def test_no_more_is_read_at_once_than_overlaps(tmp_path, monkeypatch):
+def test_only_overlapping_parts_are_read_together(tmp_path, monkeypatch):
     at_once = []
     reader = parts._Reader
 

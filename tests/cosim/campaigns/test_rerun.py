@@ -1,4 +1,4 @@
-"""A row again: by the engine that flew it, and by the readable master."""
+"""Rerun of a row by its engine and by the reference master."""
 
 import json
 import math
@@ -49,7 +49,7 @@ def folder(swept, tmp_path):
 
 
 @pytest.mark.medium
-def test_a_row_of_a_sweep_comes_again_to_the_last_bit_and_as_a_run(folder, tmp_path, capsys):
+def test_sweep_row_rerun_is_bit_identical_and_writes_a_run(folder, tmp_path, capsys):
     assert main(["rerun", str(folder), "4", "--out", str(tmp_path / "run")]) == 0
     said = capsys.readouterr().out.splitlines()
     assert said[0] == "row 4: flown again, identical to the last bit"
@@ -65,7 +65,7 @@ def test_a_row_of_a_sweep_comes_again_to_the_last_bit_and_as_a_run(folder, tmp_p
 
 
 @pytest.mark.slow
-def test_one_bit_of_difference_is_found_and_an_error(folder, tmp_path, capsys):
+def test_one_bit_difference_is_reported_as_error(folder, tmp_path, capsys):
     before = pq.read_table(folder / RESULTS)["effort"][2].as_py()
     changed(folder, "effort", 2, math.nextafter(before, math.inf))
     assert main(["rerun", str(folder), "2", "--out", str(tmp_path / "run")]) == 1
@@ -75,19 +75,19 @@ def test_one_bit_of_difference_is_found_and_an_error(folder, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_other_values_than_those_of_the_design_are_found(folder, tmp_path):
+def test_values_that_differ_from_the_design_are_reported(folder, tmp_path):
     changed(folder, "initial.position.1", 3, 0.25)
     assert list(rerun(folder, 3, tmp_path / "run").differing) == ["initial.position.1"]
 
 
 @pytest.mark.slow
-def test_other_code_is_said(folder, tmp_path, monkeypatch, capsys):
+def test_changed_code_is_reported(folder, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("cosim.campaigns.reruns.rerun.code_digest", lambda: "other")
     assert main(["rerun", str(folder), "0", "--out", str(tmp_path / "run")]) == 0
     assert "the code is not that which flew the row" in capsys.readouterr().err
 
 
-def test_a_row_that_was_refused_is_refused_again_and_makes_no_run(tmp_path, capsys):
+def test_rejected_row_is_rejected_again_without_a_run(tmp_path, capsys):
     design = Design(vary_from(["limit.time_constant=-1,0.1"]), "grid")
     run_sweep(load_scenario("paper", BRIEFLY), design, tmp_path / "out")
     rows = pq.read_table(tmp_path / "out" / RESULTS).to_pylist()
@@ -97,18 +97,18 @@ def test_a_row_that_was_refused_is_refused_again_and_makes_no_run(tmp_path, caps
 
 
 @pytest.mark.parametrize("row", ["-1", "6", "99999999999999"])
-def test_rows_that_there_are_none_of(folder, capsys, row):
+def test_nonexistent_rows_are_rejected(folder, capsys, row):
     assert main(["rerun", str(folder), row]) == 2
     assert f"has no row {row}, expected one from 0 to 5" in capsys.readouterr().err
 
 
-def test_a_row_that_kills_is_not_flown_again(folder):
+def test_row_that_crashes_workers_is_not_rerun(folder):
     changed(folder, "refused", 1, KILLED)
     with pytest.raises(RunError, match="row 1 is not flown again"):
         rerun(folder, 1)
 
 
-def test_folders_that_hold_nothing_to_repeat(folder, tmp_path):
+def test_folders_without_a_complete_campaign_are_rejected(folder, tmp_path):
     with pytest.raises(RunError, match=r"holds no campaign \(campaign\.json is missing\)"):
         rerun(tmp_path, 0)
     plan = json.loads((folder / "campaign.json").read_text())
@@ -126,7 +126,7 @@ def test_folders_that_hold_nothing_to_repeat(folder, tmp_path):
         rerun(folder, 0)
 
 
-def test_a_scenario_that_was_changed_is_not_flown(folder):
+def test_changed_scenario_is_rejected(folder):
     file = folder / "scenario.toml"
     text = file.read_text()
     assert text.count("duration = 0.3") == 1
@@ -138,7 +138,7 @@ def test_a_scenario_that_was_changed_is_not_flown(folder):
 
 
 @pytest.mark.slow
-def test_a_scene_comes_again_to_the_last_bit(tmp_path, capsys):
+def test_scene_rerun_is_bit_identical(tmp_path, capsys):
     out = tmp_path / "out"
     run_campaign(
         write(tmp_path / "s.jsonl", [*PLAIN[:2], PLAIN[2] | {"weight_minus_buoyancy": 1e6}]),
@@ -156,7 +156,7 @@ def test_a_scene_comes_again_to_the_last_bit(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_soft_regions_do_not_count_as_violated_when_a_scene_comes_again(tmp_path, capsys):
+def test_rerun_ignores_violations_of_soft_regions(tmp_path, capsys):
     scene = next(made for made in map(make_conflict, range(100)) if made["kind"].startswith("squeeze"))
     scene["scenario"]["time"]["duration"] = 1.0
     assert not any(region["hard"] for region in scene["scenario"]["regions"])

@@ -1,4 +1,4 @@
-"""Rates, bins and paired differences against numbers that are worked out otherwise."""
+"""Rates, bins and paired differences against independently computed values."""
 
 import itertools
 import math
@@ -16,7 +16,7 @@ from tests.cosim.campaigns.scene_data import results_of
 
 
 @pytest.mark.parametrize(("k", "n"), [(0, 7), (3, 7), (200, 200), (1, 1)])
-def test_the_interval_is_where_the_score_test_turns(k, n):
+def test_interval_ends_where_the_score_test_rejects(k, n):
     found = rate(np.arange(n) < k)
     z = 1.959963984540054
     for end in (found["low"], found["high"]):
@@ -61,8 +61,8 @@ def test_effects_are_the_first_order_indices_of_ishigami(n, times, within):
 
 
 @pytest.mark.parametrize("n", [100, 1000])
-def test_an_effect_that_goes_down_and_up_again_is_seen(n):
-    """Half of the variance of y is that of x², of which a rank correlation sees nothing."""
+def test_non_monotonic_effect_is_detected(n):
+    """Half of the variance of y is that of x², which a rank correlation does not detect."""
     rng = np.random.default_rng(4)
     shares, correlations, seen = [], [], []
     for _ in range(100):
@@ -76,7 +76,7 @@ def test_an_effect_that_goes_down_and_up_again_is_seen(n):
     assert np.mean(seen) > 0.97
 
 
-def test_a_fact_that_happens_in_the_middle_is_seen():
+def test_effect_on_a_boolean_outcome_is_detected():
     """A violation with the chance exp(-y²/2) peaks at y = 0."""
     rng = np.random.default_rng(5)
     y = rng.uniform(-3.0, 3.0, 300)
@@ -99,7 +99,7 @@ OUTCOMES = {
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("kind", OUTCOMES)
 @pytest.mark.parametrize("values", [None, 4], ids=["range", "four values"])
-def test_chance_alone_comes_above_the_floor_in_a_hundredth_of_all_cells(kind, values):
+def test_noise_exceeds_the_floor_at_the_stated_rate(kind, values):
     rng = np.random.default_rng(6)
     found = []
     for _ in range(500):
@@ -110,7 +110,7 @@ def test_chance_alone_comes_above_the_floor_in_a_hundredth_of_all_cells(kind, va
 
 
 @pytest.mark.medium
-def test_the_floor_is_that_of_the_analysis_of_variance():
+def test_effect_floor_matches_analysis_of_variance():
     rng = np.random.default_rng(7)
     decided = []
     for _ in range(200):
@@ -125,7 +125,7 @@ def test_the_floor_is_that_of_the_analysis_of_variance():
     assert 0.1 < np.mean(decided) < 0.9, "both are asked"
 
 
-def test_the_share_is_the_adjusted_one_of_a_line_in_each_bin():
+def test_effect_share_is_the_adjusted_r_squared_of_binwise_lines():
     rng = np.random.default_rng(8)
     x, y = rng.uniform(size=(2, 100))
     of = np.argsort(np.argsort(x)) // 20
@@ -137,14 +137,14 @@ def test_the_share_is_the_adjusted_one_of_a_line_in_each_bin():
     assert f_test.sf((1.0 - at_floor) / 9.0 / (at_floor / 90.0), 9, 90) == pytest.approx(0.01)
 
 
-def test_there_is_no_effect_of_what_is_constant_or_too_few():
+def test_constant_or_few_samples_have_no_effect():
     x = np.linspace(0.0, 1.0, 50)
     assert effect(x, np.full(50, 0.1)) is None and effect(np.ones(50), x) is None
     assert effect(x[:15], x[:15]) is None and effect(x[:0], x[:0]) is None
     assert effect(x, 1e9 + x)["share"] == pytest.approx(1.0)
 
 
-def test_the_exact_test_counts_how_coins_fall():
+def test_exact_test_matches_the_binomial_distribution():
     one, other = np.array([1, 1, 1, 1, 0, 1, 0], bool), np.array([0, 0, 0, 0, 1, 1, 0], bool)
     found = paired(one, other)
     assert (found["both"], found["only_one"], found["only_other"], found["neither"]) == (1, 4, 1, 1)
@@ -154,7 +154,7 @@ def test_the_exact_test_counts_how_coins_fall():
 
 
 @pytest.mark.medium
-def test_the_interval_of_a_median_holds_it_as_often_as_it_says():
+def test_median_interval_has_its_stated_coverage():
     rng = np.random.default_rng(2)
     found = [median_difference(rng.exponential(size=25) - math.log(2.0)) for _ in range(300)]
     held = np.mean([of["low"] <= 0.0 <= of["high"] for of in found])
@@ -163,7 +163,7 @@ def test_the_interval_of_a_median_holds_it_as_often_as_it_says():
     assert median_difference(np.array([1.0, 2.0]))["low"] is None  # too few for an interval
 
 
-def test_the_worst_come_in_the_order_that_is_told(tmp_path):
+def test_worst_rows_are_ranked_in_the_documented_order(tmp_path):
     scores = {
         1: Score(True, 30.0, 0.2, 1.0, 1.0, 0.0, -1),
         2: Score(True, 50.0, 0.2, 1.0, 1.0, 0.0, -1),

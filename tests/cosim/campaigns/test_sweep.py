@@ -1,4 +1,4 @@
-"""Sweeps around engines whose outcomes are known: a row each, whoever flies it, whatever comes in between."""
+"""Sweeps with engines of known outcomes: one row per design point for any executor and interruption."""
 
 import json
 import os
@@ -44,7 +44,7 @@ def expected(n=50):
     return found
 
 
-def test_a_row_for_each_of_the_design_in_order(tmp_path, fakes):
+def test_one_row_per_design_point_in_order(tmp_path, fakes):
     done = run_sweep(paper(), design(), tmp_path / "out", "fake")
     assert done.flown == 50 and flown(done.results) == expected()
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
@@ -56,7 +56,7 @@ def test_a_row_for_each_of_the_design_in_order(tmp_path, fakes):
     assert units["reach_time"] == "s" and units["effort"] == "N.s" and all(f.metadata[b"description"] for f in schema)
 
 
-def test_the_folder_tells_the_whole_sweep(tmp_path, fakes):
+def test_folder_records_the_complete_sweep(tmp_path, fakes):
     run_sweep(load_scenario("paper", ["limit.force=900"]), design(), tmp_path / "out", "fake")
     plan = json.loads((tmp_path / "out" / "campaign.json").read_text())
     assert plan["kind"] == "sweep" and plan["engine"] == "fake" and plan["scenario"]["limit"]["force"] == 900.0
@@ -66,7 +66,7 @@ def test_the_folder_tells_the_whole_sweep(tmp_path, fakes):
 
 
 @pytest.mark.medium
-def test_a_vehicle_file_goes_with_the_sweep_wherever_it_came_from(tmp_path, fakes, monkeypatch):
+def test_vehicle_file_is_identified_by_content_not_location(tmp_path, fakes, monkeypatch):
     from importlib import resources
 
     for place in ("one", "two"):
@@ -83,7 +83,7 @@ def test_a_vehicle_file_goes_with_the_sweep_wherever_it_came_from(tmp_path, fake
 
 
 @pytest.mark.slow
-def test_two_processes_and_executors_give_the_same_rows(tmp_path, fakes):
+def test_processes_and_executors_give_the_same_rows(tmp_path, fakes):
     run_sweep(paper(), design(), tmp_path / "two", "fake", workers=2)
     with ThreadPoolExecutor(3) as threads:
         run_sweep(paper(), design(), tmp_path / "threads", "fake", workers=3, executor=threads)
@@ -95,7 +95,7 @@ def test_two_processes_and_executors_give_the_same_rows(tmp_path, fakes):
 
 
 @pytest.mark.medium
-def test_threads_take_turns(tmp_path, fakes, monkeypatch):
+def test_engine_calls_of_threads_are_serialized(tmp_path, fakes, monkeypatch):
     inside, fly = [], Fake.fly
 
     def watched(self, values, seeds):
@@ -112,7 +112,7 @@ def test_threads_take_turns(tmp_path, fakes, monkeypatch):
         assert run_sweep(paper(), design(), tmp_path / "out", "fake", workers=4, executor=threads).flown == 50
 
 
-def test_an_executor_that_is_closed_is_one_line(tmp_path, fakes):
+def test_closed_executor_gives_one_line_error(tmp_path, fakes):
     with ThreadPoolExecutor(1) as threads:
         pass
     with pytest.raises(RunError, match=r"the executor takes no more work .* what is flown is kept"):
@@ -121,7 +121,7 @@ def test_an_executor_that_is_closed_is_one_line(tmp_path, fakes):
 
 
 @pytest.mark.medium
-def test_what_is_interrupted_goes_on_without_losing_or_repeating(tmp_path, fakes, monkeypatch):
+def test_resumed_sweep_neither_loses_nor_repeats_rows(tmp_path, fakes, monkeypatch):
     batches_of(monkeypatch, 7)
     add, left = CampaignFolder.add, [2]
 
@@ -141,7 +141,7 @@ def test_what_is_interrupted_goes_on_without_losing_or_repeating(tmp_path, fakes
     assert not (tmp_path / "out" / PARTS).exists()
 
 
-def test_a_row_that_is_refused_is_a_row_and_says_why(tmp_path, fakes, caplog):
+def test_rejected_row_is_kept_with_its_reason(tmp_path, fakes, caplog):
     done = run_sweep(paper(), design(), tmp_path / "out", "choosy")
     rows = flown(done.results)
     refused = [row for row in rows if row["refused"]]
@@ -169,21 +169,21 @@ def test_a_row_that_is_refused_is_a_row_and_says_why(tmp_path, fakes, caplog):
         ({"overrides": ["initial.position.2=3"]}, r"scenario.initial.position.2 is \d.*, now 3"),
     ],
 )
-def test_the_folder_of_another_sweep_is_refused(tmp_path, fakes, change, words):
+def test_folder_of_another_sweep_is_rejected(tmp_path, fakes, change, words):
     run_sweep(paper(), design(), tmp_path / "out", "fake")
     engine, overrides = change.pop("engine", "fake"), change.pop("overrides", [])
     with pytest.raises(RunError, match=f"holds another campaign .*{words}"):
         run_sweep(load_scenario("paper", overrides), design(**change), tmp_path / "out", engine)
 
 
-def test_a_script_that_its_own_processes_run_again_is_told_what_it_lacks(tmp_path, fakes, monkeypatch):
+def test_script_without_main_guard_is_rejected(tmp_path, fakes, monkeypatch):
     monkeypatch.setattr(current_process(), "_inheriting", True, raising=False)  # as while a spawned process starts
     with pytest.raises(RunError, match="__main__"):
         run_sweep(paper(), design(), tmp_path / "out", "fake")
     assert not (tmp_path / "out").exists()
 
 
-def test_an_engine_that_cannot_fly_it_leaves_no_folder(tmp_path, fakes):
+def test_unsupported_engine_leaves_no_folder(tmp_path, fakes):
     with pytest.raises(RunError, match="cannot fly this"):
         run_sweep(paper(), design(), tmp_path / "out", "unfit")
     with pytest.raises(ScenarioError, match=r"law\.gains\.k_p9"):
@@ -216,7 +216,7 @@ def test_the_summary_follows_from_the_rows(tmp_path, fakes):
     assert correlations[KEYS[1]]["effort"]["rho"] == pytest.approx(np.corrcoef(*ranks)[0, 1])
 
 
-def test_the_worst_rows_come_with_the_command_that_repeats_them(tmp_path, fakes):
+def test_worst_rows_carry_their_rerun_command(tmp_path, fakes):
     done = run_sweep(paper(), design(), tmp_path / "out dir", "fake")
     worst = done.summary["worst"]
     missed = [row for row in expected() if not row["reached"]]  # the fake violates only what it reaches
@@ -261,7 +261,7 @@ def test_the_summary_of_a_single_row_and_of_none_flown(tmp_path, fakes):
         ),
     ],
 )
-def test_what_the_user_must_mend_is_one_line(tmp_path, capsys, words, said):
+def test_user_errors_are_one_line(tmp_path, capsys, words, said):
     assert main(["sweep", "paper", "--out", str(tmp_path / "out"), *words]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("cosim: ") and said in line
@@ -269,7 +269,7 @@ def test_what_the_user_must_mend_is_one_line(tmp_path, capsys, words, said):
 
 
 @pytest.mark.slow
-def test_the_command_tells_what_came_of_it(tmp_path, fakes, capsys):
+def test_command_prints_the_sweep_result(tmp_path, fakes, capsys):
     out = tmp_path / "out"
     words = [*WORDS, "--engine", "fake", "--replays", "0"]
     assert main([*words, "--out", str(out)]) == 0
@@ -310,7 +310,7 @@ except RunError as error:
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files")
-def test_a_full_disk_is_one_line_and_the_folder_can_be_gone_on_from(tmp_path):
+def test_full_disk_gives_one_line_error_and_sweep_can_resume(tmp_path):
     def run(*words):
         environment = os.environ | {"PYTHONPATH": str(ROOT)}
         words = [sys.executable, "-c", _FULL, str(tmp_path / "out"), *map(str, words)]

@@ -1,4 +1,4 @@
-"""Sweeps in processes of their own and on Dask: whatever dies, no row is lost and none comes twice."""
+"""Sweeps in worker processes and on Dask: worker crashes neither lose nor duplicate rows."""
 
 import logging
 import os
@@ -32,7 +32,7 @@ def rows_of(folder):
 @needs_posix
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_sweep_that_is_killed_goes_on_by_the_same_command(command, workers):
+def test_killed_sweep_resumes_with_the_same_command(command, workers):
     words = [*SLOW, "--workers", workers]
     killed = command(*words)
     killed.wait_for_parts(4)
@@ -63,7 +63,7 @@ def test_workers_that_are_killed_are_replaced(command):
 @needs_posix
 @pytest.mark.slow
 @pytest.mark.parametrize("words", [("--workers", 1), ("--workers", 2), ("--workers", 2, "--dask")])
-def test_ctrl_c_keeps_what_is_done(command, words):
+def test_ctrl_c_keeps_completed_rows(command, words):
     interrupted = command(*SLOW, *words)
     interrupted.wait_for_parts(3)
     os.killpg(interrupted.process.pid, signal.SIGINT)  # as a terminal does
@@ -86,7 +86,7 @@ def check_poisoned(folder, n):
 
 
 @pytest.mark.slow
-def test_rows_that_kill_workers_are_refused_and_all_others_flown(tmp_path, fakes, caplog, monkeypatch):
+def test_rows_that_crash_workers_are_rejected_and_others_complete(tmp_path, fakes, caplog, monkeypatch):
     batches_of(monkeypatch, 4)  # each halving costs processes
     done = run_sweep(paper(), design(60), tmp_path / "out", "poisoned", workers=2)
     check_poisoned(tmp_path / "out", 60)
@@ -94,7 +94,7 @@ def test_rows_that_kill_workers_are_refused_and_all_others_flown(tmp_path, fakes
 
 
 @pytest.mark.slow
-def test_where_every_worker_dies_no_row_is_blamed(tmp_path, fakes):
+def test_crash_of_every_worker_rejects_no_row(tmp_path, fakes):
     with pytest.raises(RunError, match="every process died, whatever it flew"):
         run_sweep(paper(), design(1), tmp_path / "out", "deadly", workers=2)
     assert not (tmp_path / "out" / RESULTS).exists()
@@ -126,14 +126,14 @@ def test_dask_gives_the_same_rows(tmp_path, fakes, cluster, capfd):
 
 
 @pytest.mark.slow
-def test_rows_that_kill_workers_of_dask_are_refused_and_all_others_flown(tmp_path, fakes, cluster, monkeypatch):
+def test_rows_that_crash_dask_workers_are_rejected_and_others_complete(tmp_path, fakes, cluster, monkeypatch):
     batches_of(monkeypatch, 4)
     run_sweep(paper(), design(60), tmp_path / "out", "poisoned", executor=cluster)
     check_poisoned(tmp_path / "out", 60)
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_is_not_there_is_one_line(tmp_path, capsys, monkeypatch):
+def test_unreachable_scheduler_gives_one_line_error(tmp_path, capsys, monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr("cosim.campaigns.workers.cluster._SCHEDULER_TIMEOUT", 0.5)
     words = ["sweep", "docking", "--vary", "law.gains.k_p1=1:2", "--samples", "3", "--out", str(tmp_path / "out")]
@@ -146,7 +146,7 @@ def test_a_scheduler_that_is_not_there_is_one_line(tmp_path, capsys, monkeypatch
 
 
 @pytest.mark.slow
-def test_what_the_parts_of_a_library_log_is_left_out_for_as_long_as_it_is_used(caplog):
+def test_library_log_records_are_suppressed_while_in_use(caplog):
     client = logging.getLogger("library.client")
     client.setLevel(logging.WARNING)
     with _quiet("library"):

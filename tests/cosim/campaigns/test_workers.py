@@ -1,4 +1,4 @@
-"""Campaigns in processes of their own: the same rows, and whatever ends a process leaves what is done."""
+"""Campaigns in worker processes: equal rows, and completed rows survive any termination."""
 
 import os
 import signal
@@ -35,7 +35,7 @@ def test_two_workers_give_the_same_rows_as_one(tmp_path):
 
 @needs_posix
 @pytest.mark.slow
-def test_a_killed_campaign_goes_on_by_the_same_command(tmp_path, command, whole):
+def test_killed_campaign_resumes_with_the_same_command(tmp_path, command, whole):
     scenes = write(tmp_path / "s.jsonl", many(N))
     killed = command("campaign", scenes, "--law", "ismail_dunnigan", "--workers", 2)
     killed.wait_for_parts(3)
@@ -59,7 +59,7 @@ def test_a_killed_campaign_goes_on_by_the_same_command(tmp_path, command, whole)
 @needs_posix
 @pytest.mark.slow
 @pytest.mark.parametrize(("workers", "sent"), [(1, signal.SIGINT), (2, signal.SIGINT), (2, signal.SIGHUP)])
-def test_ctrl_c_or_a_closed_terminal_keeps_what_is_done(tmp_path, command, workers, sent):
+def test_ctrl_c_or_closed_terminal_keeps_completed_rows(tmp_path, command, workers, sent):
     scenes = write(tmp_path / "s.jsonl", many(2 * N))
     interrupted = command("campaign", scenes, "--law", "ismail_dunnigan", "--workers", workers)
     interrupted.wait_for_parts(2)
@@ -95,7 +95,7 @@ def test_a_worker_that_is_killed_is_replaced(tmp_path, command, whole):
         (["--law", "ismail_dunnigan", "--set", "k_p1=-1"], "law.gains.k_p1 is -1.0"),
     ],
 )
-def test_what_the_user_must_mend_is_one_line(tmp_path, capsys, words, said):
+def test_user_errors_are_one_line(tmp_path, capsys, words, said):
     scenes = write(tmp_path / "s.jsonl", HARD)
     assert main(["campaign", str(scenes), "--out", str(tmp_path / "out"), *words]) == 2
     (line,) = capsys.readouterr().err.splitlines()
@@ -103,14 +103,14 @@ def test_what_the_user_must_mend_is_one_line(tmp_path, capsys, words, said):
 
 
 @pytest.mark.parametrize("workers", ["0", "-1", "two", "1e3", "9999"])
-def test_a_number_of_workers_that_cannot_be(capsys, workers):
+def test_invalid_worker_counts_are_rejected(capsys, workers):
     with pytest.raises(SystemExit) as left:
         main(["campaign", "s.jsonl", "--law", "ismail_dunnigan", "--out", "out", "--workers", workers])
     assert left.value.code == 2 and "from 1 to 1024" in capsys.readouterr().err
 
 
 @pytest.mark.medium
-def test_scenes_come_by_standard_input_too(tmp_path, capsys, monkeypatch):
+def test_scenes_are_read_from_standard_input(tmp_path, capsys, monkeypatch):
     scenes = write(tmp_path / "s.jsonl", HARD[:1])
     out = tmp_path / "out"
     words = ["--law", "ismail_dunnigan", "--out", str(out), "--replays", "0"]
@@ -124,7 +124,7 @@ def test_scenes_come_by_standard_input_too(tmp_path, capsys, monkeypatch):
     assert "conditions.tell_failures is True, now False" in capsys.readouterr().err
 
 
-def test_compare_from_the_command_line(tmp_path, capsys):
+def test_compare_command_rejects_invalid_laws(tmp_path, capsys):
     scenes = write(tmp_path / "s.jsonl", HARD[:1])
     assert main(["compare", str(scenes), "--laws", "ismail_dunnigan", "--out", str(tmp_path / "out")]) == 2
     assert "expected two or more" in capsys.readouterr().err

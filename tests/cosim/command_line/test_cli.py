@@ -1,4 +1,4 @@
-"""The command: one clear line and exit code 2 for whatever the user must mend."""
+"""The command line: one clear line and exit code 2 for every user error."""
 
 import os
 import signal
@@ -19,7 +19,7 @@ QUICK = ["--set", "arbiter.engine=closed", "--set", "time.duration=0.02"]
     [(["--no-report"], ["summary.json"]), pytest.param([], ["report.html", "replay.html"], marks=pytest.mark.slow)],
     ids=["without a report", "with one"],
 )
-def test_run_says_what_happened_and_where_to_look(tmp_path, capsys, flags, look):
+def test_run_prints_the_verdict_and_output_paths(tmp_path, capsys, flags, look):
     out = tmp_path / "run"
     assert main(["run", "paper", "--out", str(out), *flags, *QUICK]) == 0
     said = capsys.readouterr()
@@ -36,7 +36,7 @@ def test_run_without_out_makes_a_folder_of_its_own(tmp_path, capsys, monkeypatch
     assert folder.name.startswith("paper-")
 
 
-def test_list_and_show(capsys):
+def test_list_and_show_print_scenarios(capsys):
     assert main(["list"]) == 0
     assert "paper-limited" in capsys.readouterr().out
     assert main(["show", "paper", "--set", "limit.force=5"]) == 0
@@ -44,7 +44,7 @@ def test_list_and_show(capsys):
 
 
 @pytest.mark.parametrize("arguments", [["--version"], ["--help"], ["run", "--help"]])
-def test_help_and_version(capsys, arguments):
+def test_help_and_version_exit_with_0(capsys, arguments):
     with pytest.raises(SystemExit) as left:
         main(arguments)
     assert left.value.code == 0
@@ -66,7 +66,7 @@ def test_help_and_version(capsys, arguments):
         (["show", "paper", "--set", "x=1"], "x: unknown key"),
     ],
 )
-def test_what_the_user_must_mend_is_one_line(tmp_path, capsys, monkeypatch, arguments, words):
+def test_user_errors_are_one_line(tmp_path, capsys, monkeypatch, arguments, words):
     monkeypatch.chdir(tmp_path)
     assert main(arguments) == 2
     said = capsys.readouterr().err
@@ -85,13 +85,13 @@ def test_what_the_user_must_mend_is_one_line(tmp_path, capsys, monkeypatch, argu
         ["run", "paper", "--rat"],
     ],
 )
-def test_wrong_words_exit_with_2(capsys, arguments):
+def test_invalid_arguments_exit_with_2(capsys, arguments):
     with pytest.raises(SystemExit) as left:
         main(arguments)
     assert left.value.code == 2
 
 
-def test_the_command_alone_shows_all_verbs(capsys):
+def test_command_without_verb_lists_all_verbs(capsys):
     with pytest.raises(SystemExit) as left:
         main([])
     assert left.value.code == 2
@@ -100,7 +100,7 @@ def test_the_command_alone_shows_all_verbs(capsys):
     assert "list the shipped scenarios" in said.err and "cosim run paper" in said.err
 
 
-def test_missing_compiler_is_one_line(tmp_path, capsys, monkeypatch):
+def test_missing_compiler_gives_one_line_error(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("platformdirs.user_cache_dir", lambda *_, **__: str(tmp_path / "cache"))
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
@@ -111,7 +111,7 @@ def test_missing_compiler_is_one_line(tmp_path, capsys, monkeypatch):
 
 
 @pytest.mark.slow
-def test_report_makes_the_report_again(tmp_path, capsys):
+def test_report_command_regenerates_the_report(tmp_path, capsys):
     out = tmp_path / "run"
     assert main(["run", "paper", "--out", str(out), "--no-report", *QUICK]) == 0
     assert not (out / "report.html").exists()
@@ -121,28 +121,28 @@ def test_report_makes_the_report_again(tmp_path, capsys):
     assert "holds no run" in capsys.readouterr().err
 
 
-def test_help_needs_nothing_heavy():
+def test_help_imports_no_heavy_library():
     code = "import sys, cosim.command_line.cli; print({'numpy', 'numba', 'fmpy', 'matplotlib'} & set(sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"
 
 
 @pytest.mark.slow
-def test_a_reader_that_goes_away_is_no_trouble():
+def test_closed_output_pipe_prints_no_error():
     command = f"{sys.executable} -m cosim show paper | true"
     done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
     assert done.stderr == ""
 
 
 @pytest.mark.slow
-def test_verbose_tells_of_us_alone(tmp_path):
+def test_verbose_logs_only_own_packages(tmp_path):
     command = [sys.executable, "-m", "cosim", "-v", "run", "paper", "--out", str(tmp_path / "run"), *QUICK]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert all(line.startswith(("cosim", "controller", "plant_fmu")) for line in done.stderr.splitlines())
 
 
 @pytest.mark.slow
-def test_without_a_place_to_keep_compiled_code_it_runs_all_the_same(tmp_path):
-    """Nothing writable but the run folder: compilation is not kept, the FMU goes with the process."""
+def test_run_works_without_a_writable_cache(tmp_path):
+    """Only the run folder is writable: compiled code is not cached, and the FMU is built per process."""
     arguments = ["run", "paper", "--no-report", "--out", str(tmp_path / "run"), *QUICK]
     code = f"""
 import sys
@@ -159,7 +159,7 @@ sys.exit(main({arguments!r}))
 @pytest.mark.medium
 @pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="looks into /proc")
 @pytest.mark.parametrize("delay", [0.3, *(pytest.param(delay, marks=pytest.mark.slow) for delay in (0.0, 0.8))])
-def test_ctrl_c_is_heeded_from_the_first_imports(tmp_path, delay):
+def test_ctrl_c_during_imports_exits_cleanly(tmp_path, delay):
     command = [
         sys.executable,
         "-m",
@@ -186,7 +186,7 @@ def test_ctrl_c_is_heeded_from_the_first_imports(tmp_path, delay):
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
 @pytest.mark.slow
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", None)])
-def test_ctrl_c_ends_a_real_run_readably(tmp_path, sent):
+def test_ctrl_c_leaves_a_readable_run(tmp_path, sent):
     """The process as a user has it: from the start of stepping to a report, no traceback."""
     out = tmp_path / "run"
     command = [sys.executable, "-m", "cosim", "run", "paper", "--set", "arbiter.engine=closed",

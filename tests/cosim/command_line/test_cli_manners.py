@@ -1,4 +1,4 @@
-"""What people and programs expect of a command: help, versions, JSON, quiet, completion."""
+"""Command-line conventions: help, versions, JSON, quiet, completion."""
 
 import json
 import shutil
@@ -22,7 +22,7 @@ HEAVY = {"numba", "scipy", "matplotlib", "pyarrow", "numpy", "fmpy", "msgspec", 
     ("program", "run"),
     [("cosim", main), ("plant_fmu", plant_fmu.__main__.main), ("fuzzy_arbiter", fuzzy_arbiter.__main__.main)],
 )
-def test_every_command_says_its_version(program, run, capsys, monkeypatch):
+def test_every_command_prints_its_version(program, run, capsys, monkeypatch):
     with pytest.raises(SystemExit) as left:
         run(["--version"])
     assert left.value.code == 0
@@ -60,7 +60,7 @@ def test_help_is_a_verb_too(capsys):
         (["help", "x" * 5000], "invalid choice"),
     ],
 )
-def test_words_that_are_not_understood_are_one_line(words, said, capsys):
+def test_unknown_arguments_give_one_line_error(words, said, capsys):
     with pytest.raises(SystemExit) as left:
         main(words)
     came = capsys.readouterr()
@@ -78,20 +78,20 @@ def test_list_as_json_is_the_same_list(capsys):
 
 
 @pytest.mark.medium
-def test_titles_that_are_listed_are_those_of_the_scenarios():
+def test_listed_titles_match_the_scenarios():
     assert shipped_titles() == {name: load_scenario(name).title for name in list_scenarios()}
 
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("words", [["list"], ["list", "--json"], ["help", "run"]])
-def test_what_asks_for_nothing_heavy_loads_nothing_heavy(words):
+def test_light_verbs_load_no_heavy_library(words):
     code = f"import sys, cosim.command_line.cli; cosim.command_line.cli.main({words!r}); print('loaded', *sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = done.stdout.splitlines()[-1].split()
     assert loaded[0] == "loaded" and "cosim.command_line.cli" in loaded and not HEAVY & set(loaded)
 
 
-def test_run_as_json_prints_the_summary_and_the_paths_and_nothing_else(tmp_path, capsys):
+def test_run_json_prints_only_summary_and_paths(tmp_path, capsys):
     out = tmp_path / "run"
     assert main(["run", "paper", "--json", "--out", str(out), *QUICK]) == 0
     came = json.loads(capsys.readouterr().out)
@@ -104,13 +104,13 @@ def test_run_as_json_prints_the_summary_and_the_paths_and_nothing_else(tmp_path,
 
 
 @pytest.mark.parametrize("words", [["-q", "run"], ["run", "-q"], ["run", "--quiet"]])
-def test_quiet_leaves_paths_alone(tmp_path, capsys, words):
+def test_quiet_prints_only_paths(tmp_path, capsys, words):
     out = tmp_path / "run"
     assert main([*words, "paper", "--out", str(out), *QUICK]) == 0
     assert capsys.readouterr().out == f"{out / 'summary.json'}\n"
 
 
-def test_flags_of_every_verb_mean_the_same_before_it_and_behind_it():
+def test_global_flags_work_before_and_after_the_verb():
     parse = _parser().parse_args
     for words in (["-v", "list"], ["list", "-v"]):
         assert (parse(words).verbose, parse(words).quiet) == (True, False)
@@ -165,12 +165,12 @@ def test_shells_complete_verbs_flags_scenarios_and_files(name, words, last, expe
 
 
 @pytest.mark.parametrize("name", [shell("bash"), shell("zsh"), shell("fish")])
-def test_shells_understand_the_script(name, script):
+def test_completion_scripts_are_valid_shell_code(name, script):
     done = subprocess.run([name, "-n", str(script(name))], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_every_shell_gets_every_verb(script):
+def test_completion_scripts_cover_every_verb(script):
     verbs = list(_parser().parse_args(["help"]).verbs)
     for name in ("bash", "zsh", "fish"):
         text = script(name).read_text()

@@ -74,7 +74,7 @@ class Flight:
 @pytest.mark.parametrize(
     "steer_by", ["sticks", *(pytest.param(by, marks=pytest.mark.slow) for by in ("wrench", "velocity"))]
 )
-def test_a_goal_is_reached_and_regions_are_kept_by_the_truth(tmp_path, steer_by):
+def test_goal_is_reached_and_regions_satisfied_by_the_true_state(tmp_path, steer_by):
     flight = Flight(tmp_path, 30.0, steer_by=steer_by)
     link, goal = flight.link, flight.companion.scenario.goal
     assert flight.status == "completed" and [s for _, s in flight.states][-1] == "steering"
@@ -89,7 +89,7 @@ def test_a_goal_is_reached_and_regions_are_kept_by_the_truth(tmp_path, steer_by)
 
 
 @pytest.mark.medium
-def test_without_the_frame_the_same_flight_ends_elsewhere(tmp_path):
+def test_wrong_surveyed_origin_misses_the_goal(tmp_path):
     """A surveyed origin is believed: a wrong one is what the frame step is there against."""
     flight = Flight(tmp_path, 20.0, origin=SceneOrigin(surveyed=(0.0, 0.0, 0.0)))
     true = np.array([flight.link.now(f"position.{axis}") for axis in "xyz"])
@@ -97,7 +97,7 @@ def test_without_the_frame_the_same_flight_ends_elsewhere(tmp_path):
 
 
 @pytest.mark.medium
-def test_nothing_is_steered_before_the_frame_is_known(tmp_path):
+def test_no_setpoints_are_sent_before_frame_alignment(tmp_path):
     with pytest.raises(RunError, match="where the scene's origin is"):
         Flight(tmp_path, origin=SceneOrigin())
     link = StandIn(profile="generic", silent=["GLOBAL_POSITION_INT"])
@@ -108,7 +108,7 @@ def test_nothing_is_steered_before_the_frame_is_known(tmp_path):
 
 
 @pytest.mark.medium
-def test_it_waits_for_arming_and_does_not_arm_by_itself(tmp_path):
+def test_companion_waits_for_arming_by_default(tmp_path):
     link = StandIn(profile="generic", armed=False)
     with pytest.raises(RunError, match="waiting for arming"):
         Flight(tmp_path, link=link)
@@ -118,7 +118,7 @@ def test_it_waits_for_arming_and_does_not_arm_by_itself(tmp_path):
 
 
 @pytest.mark.medium
-def test_a_dry_run_sends_no_sticks_and_no_command_but_for_messages(tmp_path):
+def test_dry_run_sends_no_setpoints_and_only_message_requests(tmp_path):
     flight = Flight(tmp_path, 3.0, dry_run=True)
     assert flight.status == "completed" and flight.states[-1][1] == "dry_run"
     assert not [m for _, m in flight.link.sent if m.get_type() in STICKS]
@@ -178,7 +178,7 @@ FAULTS = {
 
 @pytest.mark.medium
 @pytest.mark.parametrize("reason", FAULTS)
-def test_a_fault_holds_the_vehicle_within_a_second(tmp_path, reason):
+def test_fault_holds_the_vehicle_within_one_second(tmp_path, reason):
     link = StandIn(profile="generic", shift=SHIFT)
     flight = Flight(tmp_path, link=link, events=[lambda: FAULTS[reason](link)], least_battery=20.0)
     flight.held(reason)
@@ -187,7 +187,7 @@ def test_a_fault_holds_the_vehicle_within_a_second(tmp_path, reason):
 
 
 @pytest.mark.medium
-def test_a_refused_mode_holds_within_a_second_of_asking(tmp_path):
+def test_rejected_mode_holds_within_one_second(tmp_path):
     link = StandIn(profile="generic", shift=SHIFT)
     link.deaf.add(176)
     with pytest.raises(RunError, match="somebody to resume after: refused mode"):
@@ -199,14 +199,14 @@ def test_a_refused_mode_holds_within_a_second_of_asking(tmp_path):
 
 
 @pytest.mark.medium
-def test_drift_between_the_sources_holds(tmp_path):
+def test_frame_drift_holds_the_vehicle(tmp_path):
     link = StandIn(profile="generic", shift=SHIFT)
     flight = Flight(tmp_path, 8.0, link=link, events=[lambda: drift(link)])
     assert flight.status == "held: frame drift" and flight.companion.session.alignment.drift > 0.5
 
 
 @pytest.mark.medium
-def test_drift_widens_the_margins_before_it_holds(tmp_path, monkeypatch):
+def test_frame_drift_widens_margins(tmp_path, monkeypatch):
     """Of sources that come apart by 0.3 m, the margins of all regions are as much wider, and it goes on."""
     doubts, doubt = [], RegionEnvironment.doubt_positions
     monkeypatch.setattr(RegionEnvironment, "doubt_positions", lambda self, by: (doubts.append(by), doubt(self, by)))
@@ -217,7 +217,7 @@ def test_drift_widens_the_margins_before_it_holds(tmp_path, monkeypatch):
     assert doubts[0] == 0.0 and SPREADS * doubts[-1] == pytest.approx(0.3, abs=0.1)
 
 
-def test_a_reckoned_position_widens_the_margins_by_a_part_of_the_way(tmp_path, monkeypatch):
+def test_dead_reckoning_widens_margins_with_distance(tmp_path, monkeypatch):
     doubts, doubt = [], RegionEnvironment.doubt_positions
     monkeypatch.setattr(RegionEnvironment, "doubt_positions", lambda self, by: (doubts.append(by), doubt(self, by)))
     link = StandIn(profile="generic", shift=SHIFT)
@@ -230,7 +230,7 @@ def test_a_reckoned_position_widens_the_margins_by_a_part_of_the_way(tmp_path, m
     assert SPREADS * doubts[-1] == pytest.approx(0.05 * moved, rel=0.1)
 
 
-def test_sticks_that_the_autopilot_would_not_take_are_not_sent(tmp_path):
+def test_setpoints_are_not_sent_to_an_autopilot_that_ignores_them(tmp_path):
     link = StandIn(profile="ardusub", shift=SHIFT)
     told = mavlink.MAVLink_param_value_message(b"SYSID_MYGCS", 250.0, 9, 1, 0)
     link.events = [(0.5, lambda: link.hear(told, 1, 1))]
@@ -240,7 +240,7 @@ def test_sticks_that_the_autopilot_would_not_take_are_not_sent(tmp_path):
 
 
 @pytest.mark.medium
-def test_a_violated_hard_region_holds(tmp_path):
+def test_violated_hard_region_holds_the_vehicle(tmp_path):
     flight = Flight(tmp_path, 8.0, origin=SceneOrigin(surveyed=(0.0, 3.2, -1.9)))  # as if it were beside the pipe
     assert flight.status in ("held: geofence", "completed")
     inside = flight.run.table()["pipe.clearance"].to_numpy().min() < -0.1
@@ -264,7 +264,7 @@ PILOTS = {
 
 @pytest.mark.medium
 @pytest.mark.parametrize("reason", PILOTS)
-def test_a_pilot_wins_within_a_second_and_is_left_alone(tmp_path, reason):
+def test_pilot_takes_over_within_one_second(tmp_path, reason):
     link = StandIn(profile="generic", shift=SHIFT)
     flight = Flight(tmp_path, link=link, events=[lambda: PILOTS[reason](link)])
     since = flight.time_of("pilot")
@@ -275,7 +275,7 @@ def test_a_pilot_wins_within_a_second_and_is_left_alone(tmp_path, reason):
     assert (last.x, last.y, last.z, last.r) == (0, 0, 0, 0)
 
 
-def test_a_station_with_the_same_system_id_is_warned_of_once(tmp_path, caplog):
+def test_conflicting_system_id_is_reported_once(tmp_path, caplog):
     link = StandIn(profile="generic", shift=SHIFT)
     beat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
     told = [lambda: link.hear(beat), lambda: link.hear(beat), lambda: link.hear(beat, 250)]
@@ -287,7 +287,7 @@ def test_a_station_with_the_same_system_id_is_warned_of_once(tmp_path, caplog):
 
 
 @pytest.mark.medium
-def test_who_took_over_can_resume(tmp_path):
+def test_control_can_be_resumed_after_a_takeover(tmp_path):
     link = StandIn(profile="generic", shift=SHIFT)
     ours = {"system": IDENTITY[0], "component": IDENTITY[1]}
     later = [(EVENT, lambda: command(link, 193, 0.0, **ours)), (EVENT + 2.0, lambda: command(link, 193, 1.0, **ours))]
@@ -296,12 +296,12 @@ def test_who_took_over_can_resume(tmp_path):
     assert names[-1] == "steering" and "held" in names and flight.status == "completed"
 
 
-def test_each_condition_has_a_test_here():
+def test_every_condition_has_a_test():
     tested = {*FAULTS, *PILOTS, "refused mode", "frame drift", "geofence"}
     assert tested == {condition.name for condition in CONDITIONS}
 
 
-def test_the_pages_tables_are_the_codes():
+def test_documented_tables_match_the_code():
     page = (ROOT / "docs" / "howto" / "companion.md").read_text()
     for condition in CONDITIONS:
         limit = f"{condition.limit:g} {condition.unit}" if condition.unit else "any"
@@ -313,7 +313,7 @@ def test_the_pages_tables_are_the_codes():
 # ---- the run that is left ----
 
 
-def test_the_record_has_what_passed_between_companion_and_autopilot(tmp_path):
+def test_record_holds_the_exchange_with_the_autopilot(tmp_path):
     flight = Flight(tmp_path, 3.0)
     run = load_run(tmp_path / "run")
     table = run.table()
@@ -327,7 +327,7 @@ def test_the_record_has_what_passed_between_companion_and_autopilot(tmp_path):
     assert table["companion.round_trip"].to_numpy()[-1] == pytest.approx(0.067, abs=0.03)
 
 
-def test_what_a_real_vehicle_cannot_be_made_to_do_is_refused():
+def test_scenario_keys_of_simulation_only_are_rejected():
     with pytest.raises(RunError, match=r"record\.lyapunov is set"):
         scenario_to_steer(load_scenario("paper", ["record.lyapunov=true"]))
     steered = scenario_to_steer(load_scenario("pipe-inspection"))
@@ -335,7 +335,7 @@ def test_what_a_real_vehicle_cannot_be_made_to_do_is_refused():
 
 
 @pytest.mark.slow
-def test_report_and_replay_are_written_as_of_any_run(tmp_path):
+def test_report_and_replay_are_written(tmp_path):
     Flight(tmp_path, 3.0)
     summary, files = report_again(tmp_path / "run")
     assert summary["simulated_time"] == 3.0

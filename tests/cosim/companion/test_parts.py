@@ -36,7 +36,7 @@ SHIFT = 0.9, -1.6, 1.9
 # ---- clocks ----
 
 
-def test_the_quickest_answer_gives_the_offset():
+def test_clock_offset_uses_the_fastest_answer():
     sync = ClockSync()
     assert math.isnan(sync.offset)
     for sent, took, skew in ((10.0, 0.100, 0.03), (11.0, 0.004, 0.0), (12.0, 0.060, -0.02)):
@@ -47,7 +47,7 @@ def test_the_quickest_answer_gives_the_offset():
     assert sync.offset == pytest.approx(3.0, abs=1e-6)
 
 
-def test_an_autopilot_that_starts_again_has_another_offset_at_once():
+def test_autopilot_restart_resets_the_clock_offset():
     sync = ClockSync()
     for sent, boot in ((10.0, 500.0), (11.0, 501.0), (12.0, 0.5)):
         sync.take(round(boot * 1e9), sync.request(sent - 0.005), sent + 0.005)
@@ -73,7 +73,7 @@ def reported(position, geodetic=None, depth=None, heard=0.0, state=None):
     return state
 
 
-def test_the_frame_follows_from_globe_and_pressure():
+def test_frame_offset_is_derived_from_global_position_and_pressure():
     origin = (55.9097, -3.3203)
     alignment, frame, state = FrameAlignment(SceneOrigin(geodetic=origin)), LocalFrame(*origin), None
     true = np.array([3.0, -2.0, 4.0])
@@ -85,7 +85,7 @@ def test_the_frame_follows_from_globe_and_pressure():
     assert alignment.to_scene(state.position) == pytest.approx(true, abs=0.02)
 
 
-def test_positions_that_do_not_agree_give_no_frame():
+def test_inconsistent_positions_give_no_frame_offset():
     origin, rng = (55.9097, -3.3203), np.random.default_rng(1)
     alignment, frame, state = FrameAlignment(SceneOrigin(geodetic=origin)), LocalFrame(*origin), None
     for k in range(60):
@@ -119,7 +119,7 @@ VECTORED_6DOF = np.array(
 @pytest.mark.parametrize(
     "wrench", [(113, 0, 0, 0, 0, 0), (28, 28, 0, 0, 0, 0), (28, -20, 10, 0, 0, 1), (0, 0, -40, 2, 2, 0)]
 )
-def test_an_ardusub_makes_of_the_sticks_the_wrench_that_they_were_made_for(wrench):
+def test_ardusub_motor_mix_realizes_the_desired_wrench(wrench):
     """It adds the sticks in each motor, and its force goes with the square; our thrusters push the other way."""
     scale = scale_of(HEAVY, ARDUSUB, 0.5, "manual-control")
     sticks = scale.sticks(0.25 * np.array(wrench, dtype=float))
@@ -130,7 +130,7 @@ def test_an_ardusub_makes_of_the_sticks_the_wrench_that_they_were_made_for(wrenc
 
 
 @pytest.mark.parametrize("profile", ["px4", "generic"])
-def test_sticks_give_the_wrench_that_they_were_made_for(profile):
+def test_manual_control_realizes_the_desired_wrench(profile):
     """Through the vehicle's own service for sticks, whose parts of the greatest wrench the pilot's gain scales."""
     station = Station(profile, of=scenario("vehicle='bluerov2_heavy'", name="pipe-inspection"))
     station.look(1.0, **{"commands.mode": 0.0})
@@ -143,7 +143,7 @@ def test_sticks_give_the_wrench_that_they_were_made_for(profile):
 
 
 @pytest.mark.parametrize("sticks_by", ["manual-control", "rc-override"])
-def test_an_ardusub_makes_of_rate_sticks_the_rates_that_they_were_made_for(sticks_by):
+def test_rate_sticks_realize_the_desired_rates_in_ardusub(sticks_by):
     """As its Sub::get_pilot_desired_climb_rate and pwm_to_angle_dz have it, at a pilot gain of 0.5."""
     scale, gain = scale_of(HEAVY, ARDUSUB, 0.5, sticks_by), 0.5
     scaled = gain if sticks_by == "manual-control" else 1.0
@@ -158,7 +158,7 @@ def test_an_ardusub_makes_of_rate_sticks_the_rates_that_they_were_made_for(stick
     assert scale.climb_stick(0.0) == scale.yaw_rate_stick(0.0) == scale.yaw_rate_stick(math.nan) == 0.0
 
 
-def test_overridden_channels_are_in_ardusubs_order_and_are_given_back_by_zero():
+def test_rc_override_follows_the_ardusub_order_and_zero_releases():
     message = decoded(channels_override(mavlink, 1, np.array([1.0, -1.0, 0.5, 0.25, -0.25, 0.1])))
     pulses = [getattr(message, f"chan{i}_raw") for i in range(1, 9)]
     assert pulses == [1400, 1600, 1300, 1540, 1900, 1100, 0xFFFF, 0xFFFF]  # pitch roll up yaw ahead right
@@ -167,7 +167,7 @@ def test_overridden_channels_are_in_ardusubs_order_and_are_given_back_by_zero():
 
 
 @pytest.mark.parametrize("wrench", [(20, 0, 0, 0, 0, 0), (28, -20, 10, 0, 0, 1)])
-def test_overridden_channels_give_the_wrench_that_they_were_made_for(wrench):
+def test_rc_override_realizes_the_desired_wrench(wrench):
     """As sticks do, but for the pilot's gain, which does not scale them."""
     sticks = scale_of(HEAVY, ARDUSUB, 0.5, "rc-override").sticks(np.array(wrench, dtype=float))
     motors = VECTORED_6DOF @ sticks
@@ -185,14 +185,14 @@ def test_overridden_channels_give_the_wrench_that_they_were_made_for(wrench):
         ("generic", "attitude", "rc-override", "no sticks are sent"),
     ],
 )
-def test_what_an_autopilot_does_not_take_is_refused_by_name(profile, steer_by, sticks_by, word):
+def test_unsupported_setpoints_are_rejected_by_name(profile, steer_by, sticks_by, word):
     with pytest.raises(RunError, match=word):
         require_taken(profile, steer_by, sticks_by)
     with pytest.raises(RunError, match=word):
         Companion(scenario(name="pipe-inspection"), None, CompanionOptions(profile, steer_by, sticks_by))
 
 
-def test_an_attitude_leads_by_what_the_moment_turns():
+def test_attitude_setpoint_leads_by_the_desired_moment():
     """A second-order loop that is asked for it accelerates as the moment does."""
     lead, state = TurnLead(HEAVY), reported((0.0, 0.0, 0.0))
     inertia = np.diag(HEAVY.inertia) + np.diag(HEAVY.added_mass)[3:]
@@ -206,7 +206,7 @@ def test_an_attitude_leads_by_what_the_moment_turns():
     assert lead.attitude(np.full(6, math.nan), reported((0.0, 0.0, 0.0))) == pytest.approx([1.0, 0.0, 0.0, 0.0])
 
 
-def test_a_thrust_along_each_axis_is_the_published_extension_of_an_attitude_target():
+def test_three_axis_thrust_uses_the_published_attitude_target_extension():
     """MAVLink's common.xml: three floats behind type_mask, which leave the checksum as it is."""
     message = attitude_target(mavlink, 1, np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.25, -0.5, 0.125]))
     frame = message.pack(mavlink.MAVLink(None, 255, 191))
@@ -218,7 +218,7 @@ def test_a_thrust_along_each_axis_is_the_published_extension_of_an_attitude_targ
     assert decoded(without).type_mask == 0b1000111 and thrust_body_of(decoded(without)) == (0.0, 0.0, 0.0)
 
 
-def test_a_velocity_leads_by_the_acceleration_that_the_wrench_gives():
+def test_velocity_setpoint_leads_by_the_desired_acceleration():
     def asked_for(force, speed):
         state = reported((0.0, 0.0, 0.0))
         state.velocity[:] = speed, 0.0, 0.0
@@ -235,7 +235,7 @@ def test_a_velocity_leads_by_the_acceleration_that_the_wrench_gives():
 
 
 @pytest.mark.parametrize(("gain", "lag", "push"), [(1.0, 3.0, 0.0), (0.41, 1.55, -0.05), (0.65, 0.8, 0.06)])
-def test_a_velocity_loop_of_another_gain_and_lag_does_what_the_wrench_asks_for(gain, lag, push):
+def test_velocity_lead_compensates_unknown_gain_and_lag(gain, lag, push):
     """A speed is kept through a loop that is not the assumed one, with a current; without the observer it is not."""
     lead, state, period, wanted = VelocityLead(HEAVY, 2.0, 0.5), reported((0.0, 0.0, 0.0)), 0.02, 0.25
     for _ in range(1500):
@@ -247,7 +247,7 @@ def test_a_velocity_loop_of_another_gain_and_lag_does_what_the_wrench_asks_for(g
     assert state.velocity[0] == pytest.approx(wanted, abs=0.005)
 
 
-def test_a_way_without_a_fix_is_reckoned():
+def test_distance_without_a_fix_is_accumulated():
     """Of 3 m north and 4 m down the horizontal part, and only while the estimate says that it is relative."""
     relative, absolute = 8, 24  # flags of EKF_STATUS_REPORT and ESTIMATOR_STATUS
     alignment, state = FrameAlignment(SceneOrigin(surveyed=SHIFT)), ReportedState((255, 191))
@@ -270,7 +270,7 @@ def seen(**values):
 
 
 @pytest.mark.parametrize("condition", CONDITIONS, ids=lambda condition: condition.name)
-def test_each_condition_ends_steering_beyond_its_limit_alone(condition):
+def test_steering_ends_only_beyond_a_condition_limit(condition):
     supervisor = Supervisor()
     assert supervisor.update(seen()) == "steering"
     at_limit = Observation(0.0, True, True, True, True, {condition.name: condition.limit})
@@ -282,7 +282,7 @@ def test_each_condition_ends_steering_beyond_its_limit_alone(condition):
     assert supervisor.update(seen()) == "steering" and supervisor.reason == ""
 
 
-def test_the_way_to_steering_goes_step_by_step():
+def test_supervisor_states_advance_in_order():
     supervisor, nothing = Supervisor(), Observation(0.0, False, False, False, False, {})
     known = {"has_state": True}
     expected = [
@@ -304,13 +304,13 @@ def test_the_way_to_steering_goes_step_by_step():
         (254, 1, 300, 500, True),
     ],
 )
-def test_deflected_sticks_of_somebody_else_are_a_pilots(system, component, x, z, counts):
+def test_deflected_foreign_sticks_count_as_a_pilot(system, component, x, z, counts):
     state = reported((0.0, 0.0, 0.0))
     state.take(system, component, mavlink.MAVLink_manual_control_message(1, x, 0, z, 0, 0), 5.0)
     assert (state.pilot_at == 5.0) == counts
 
 
-def test_overridden_channels_are_a_pilots_too():
+def test_rc_override_counts_as_a_pilot():
     state = reported((0.0, 0.0, 0.0))
     pulses = [0, 0xFFFF, 1500, 1500, 1700, 0, 0, 0]
     state.take(255, 190, mavlink.MAVLink_rc_channels_override_message(1, 1, *pulses), 6.0)
@@ -329,7 +329,7 @@ def decoded(message):
     return found
 
 
-def test_failsafe_parameters_are_asked_for_until_they_come_or_for_three_seconds():
+def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
     failsafes = Failsafes("ardusub")
     assert not failsafes.is_read(0.0)
     asked = [len(failsafes.wanted(0.25 * k)) for k in range(9)]
@@ -345,7 +345,7 @@ def test_failsafe_parameters_are_asked_for_until_they_come_or_for_three_seconds(
     assert silent.startswith("not answered by the autopilot: FS_PILOT_INPUT,")
 
 
-def test_nothing_that_follows_is_warned_about_and_a_deaf_autopilot_is_known():
+def test_missing_failsafe_and_ignored_station_are_reported():
     failsafes = Failsafes("ardusub")
     for name in ("FS_PILOT_INPUT", "FS_GCS_ENABLE"):
         failsafes.take(decoded(value_of(name, 0.0)))
@@ -355,14 +355,14 @@ def test_nothing_that_follows_is_warned_about_and_a_deaf_autopilot_is_known():
     assert failsafes.deaf_to(250) == "" and "SYSID_MYGCS is 250" in failsafes.deaf_to(255)
 
 
-def test_whole_numbers_of_a_px4_come_as_bits():
+def test_px4_integer_parameters_are_decoded_from_bits():
     failsafes = Failsafes("px4")
     (bits,) = struct.unpack("<f", struct.pack("<i", 3))
     failsafes.take(decoded(value_of("NAV_RCL_ACT", bits, kind=6)))
     assert failsafes.values == {"NAV_RCL_ACT": 3.0}
 
 
-def test_the_clock_of_a_simulated_autopilot_goes_as_fast_as_it_is_said_to():
+def test_simulated_autopilot_clock_runs_at_the_given_speedup():
     with NetworkLink(parse_endpoint("udpout:127.0.0.1:14598"), speedup=5.0) as link:
         before, wall = link.clock(), time.monotonic()
         link.receive(0.1)  # a fiftieth of a second of the wall's

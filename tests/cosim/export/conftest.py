@@ -1,4 +1,4 @@
-"""Runs of little cost: real ones for a second, and one that was killed and has gaps."""
+"""Inexpensive runs: real ones of a second, and a killed one with gaps."""
 
 import shutil
 

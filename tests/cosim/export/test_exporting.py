@@ -1,4 +1,4 @@
-"""What of a run is exported, into which files, and what is refused."""
+"""Export of a run: selection of signals and steps, files, and rejected requests."""
 
 import builtins
 import importlib
@@ -19,7 +19,7 @@ from cosim.export.formats import FORMATS
 from cosim.results.record import load_record
 
 
-def test_every_step_and_signal_is_taken_unless_told_otherwise(run):
+def test_export_defaults_to_all_steps_and_signals(run):
     excerpt, record = excerpt_of(run), load_record(run)
     assert excerpt.columns == record.columns
     assert excerpt.count == len(record) == len(record["time"])
@@ -28,7 +28,7 @@ def test_every_step_and_signal_is_taken_unless_told_otherwise(run):
 
 
 @pytest.mark.parametrize("every", [1, 7, 101, 1000])
-def test_one_step_of_so_many_is_that(run, every):
+def test_every_nth_step_is_exported(run, every):
     record = load_record(run)
     excerpt = excerpt_of(run, every=every)
     assert np.array_equal(np.concatenate([block["time"] for block in excerpt.blocks()]), record["time"][::every])
@@ -36,26 +36,26 @@ def test_one_step_of_so_many_is_that(run, every):
 
 
 @pytest.mark.parametrize(("rate", "rows"), [(10.0, 11), (30.0, 31), (100.0, 101), (1e6, 101)])
-def test_a_rate_gives_so_many_steps_a_second_and_never_more_than_there_are(run, rate, rows):
+def test_export_rate_is_capped_by_the_recorded_rate(run, rate, rows):
     time = excerpt_of(run, rate=rate).signal("time")
     assert len(time) == rows
     assert time[0] == 0.0
     assert np.abs(np.diff(time) - 1.0 / min(rate, 100.0)).max() < 0.0101
 
 
-def test_patterns_pick_signals_and_the_time_is_always_there(run):
+def test_patterns_select_signals_and_time_is_always_included(run):
     names = [column.name for column in excerpt_of(run, ["*.clearance", "thrust[[]1]", "thrust[2]"]).columns]
     assert names[0] == "time"
     assert {"goal.clearance", "thrust[1]", "thrust[2]"} < set(names)
     assert all(name == "time" or name.endswith(".clearance") or name.startswith("thrust[") for name in names)
 
 
-def test_a_pattern_that_fits_nothing_is_named_with_names_near_it(run):
+def test_unmatched_pattern_error_suggests_similar_names(run):
     with pytest.raises(ExportError, match=r"--signals postion\.x: fits no signal .* position\.x"):
         excerpt_of(run, ["postion.x"])
 
 
-def test_the_command_names_the_file_after_the_run(run, tmp_path, monkeypatch, capsys):
+def test_default_file_name_is_the_run_name(run, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["export", str(run), "--to", "csv", "--every", "10", "--signals", "position.*"]) == 0
     assert capsys.readouterr().out.split() == ["docking.csv", "docking.units.csv"]
@@ -81,7 +81,7 @@ def test_a_folder_is_never_replaced(run, tmp_path):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pipes have names on POSIX alone")
-def test_what_is_no_file_is_never_replaced(run, tmp_path):
+def test_non_regular_file_is_never_replaced(run, tmp_path):
     out = tmp_path / "out.npz"
     os.mkfifo(out)
     with pytest.raises(ExportError, match="exists"):
@@ -89,7 +89,7 @@ def test_what_is_no_file_is_never_replaced(run, tmp_path):
     assert out.is_fifo()
 
 
-def test_a_writer_that_fails_leaves_what_was_there(run, tmp_path, monkeypatch):
+def test_failed_writer_leaves_the_old_file(run, tmp_path, monkeypatch):
     out = tmp_path / "out.csv"
     out.write_text("mine")
 
@@ -104,13 +104,13 @@ def test_a_writer_that_fails_leaves_what_was_there(run, tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["out.csv"]
 
 
-def test_an_unknown_format_is_refused_with_those_that_there_are(run, capsys):
+def test_unknown_format_error_lists_formats(run, capsys):
     assert main(["export", str(run), "--to", "xlsx"]) == 2
     assert capsys.readouterr().err == f"cosim: --to xlsx: expected one of {', '.join(FORMATS)}\n"
 
 
 @pytest.mark.parametrize(("to", "lacking", "brings"), [("mcap", "mcap", "mcap"), ("rrd", "rerun", "rerun-sdk")])
-def test_what_is_not_installed_is_named(run, tmp_path, monkeypatch, to, lacking, brings):
+def test_missing_library_is_named(run, tmp_path, monkeypatch, to, lacking, brings):
     plain = builtins.__import__
 
     def without(name, *rest, **keywords):
@@ -126,24 +126,24 @@ def test_what_is_not_installed_is_named(run, tmp_path, monkeypatch, to, lacking,
 
 
 @pytest.mark.parametrize("choice", [{"signals": ["time"]}, {"every": 2}, {"rate": 5.0}])
-def test_a_tlog_takes_no_choice_of_signals_or_steps(run, tmp_path, choice):
+def test_tlog_export_rejects_signal_and_step_selection(run, tmp_path, choice):
     with pytest.raises(ExportError, match="expected no --signals, --every or --rate"):
         export_run(run, "tlog", tmp_path / "out.tlog", **choice)
 
 
 @pytest.mark.parametrize("flags", [["--every", "0"], ["--rate", "nan"], ["--every", "2", "--rate", "5"]])
-def test_numbers_that_cannot_be_are_refused(run, flags, capsys):
+def test_invalid_numbers_are_rejected(run, flags, capsys):
     with pytest.raises(SystemExit):
         main(["export", str(run), "--to", "csv", *flags])
     assert "argument --" in capsys.readouterr().err
 
 
-def test_a_folder_without_a_run_is_refused(tmp_path, capsys):
+def test_folder_without_a_run_is_rejected(tmp_path, capsys):
     assert main(["export", str(tmp_path), "--to", "csv"]) == 2
     assert "holds no run" in capsys.readouterr().err
 
 
-def test_a_tlog_is_the_vehicle_as_pymavlink_sees_it(run, tmp_path):
+def test_tlog_export_is_readable_by_pymavlink(run, tmp_path):
     (path,) = export_run(run, "tlog", tmp_path / "out.tlog")
     record, log = load_record(run), mavutil.mavlink_connection(str(path))
     depths = {}
@@ -166,7 +166,7 @@ def test_blocks_of_a_long_record_stay_small(run, monkeypatch):
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full disk to try")
 @pytest.mark.parametrize("to", ["csv", "npz", "mat", "mcap", "rrd"])
-def test_a_full_disk_is_told_and_leaves_nothing(run, tmp_path, monkeypatch, to):
+def test_full_disk_is_reported_and_leaves_no_file(run, tmp_path, monkeypatch, to):
     if to == "rrd":
         pytest.importorskip("rerun")
     entry = FORMATS[to]
@@ -181,14 +181,14 @@ def test_a_full_disk_is_told_and_leaves_nothing(run, tmp_path, monkeypatch, to):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_tlog_that_lacks_something_is_none(run, tmp_path, monkeypatch):
+def test_incomplete_tlog_is_discarded(run, tmp_path, monkeypatch):
     monkeypatch.setattr("cosim.mavlink.channels.tlog.Tlog.send", lambda channel, _: channel.trouble.update(lost=1))
     with pytest.raises(ExportError, match="not all was written"):
         export_run(run, "tlog", tmp_path / "out.tlog")
     assert not list(tmp_path.iterdir())
 
 
-def test_a_run_is_never_replaced_by_what_is_made_of_it(run, tmp_path):
+def test_export_never_overwrites_the_run(run, tmp_path):
     before = (run / "record.parquet").read_bytes()
     (tmp_path / "link").symlink_to(run)
     for folder in (run, tmp_path / "link"):

@@ -1,4 +1,4 @@
-"""MCAP, read back by its own library: signals to the last bit, and a scene that stands upright."""
+"""MCAP read back by its own library: bit-identical signals and the orientation of the scene."""
 
 import re
 
@@ -57,8 +57,8 @@ def read_killed(killed, tmp_path_factory):
     return Read(path)
 
 
-def said(read):
-    """Return where each signal of the record is, as the channels say: group and field by name."""
+def channels_of_signals(read):
+    """Return the group and the field of each signal by name, from the channel metadata."""
     return {
         re.match(r"(.+?) \[[^]]*]: ", text)[1]: (channel.topic.removeprefix("/signals/"), field)
         for channel in read.summary.channels.values()
@@ -70,7 +70,7 @@ def said(read):
 @pytest.mark.parametrize("which", ["run", "killed"])
 def test_every_signal_is_there_to_the_last_bit(which, request):
     read = request.getfixturevalue("read" if which == "run" else "read_killed")
-    record, where = load_record(request.getfixturevalue(which)), said(read)
+    record, where = load_record(request.getfixturevalue(which)), channels_of_signals(read)
     assert where.keys() == record.units.keys()
     for name, (group, field) in where.items():
         got, expected = read.signal(group, field), record[name]
@@ -79,7 +79,7 @@ def test_every_signal_is_there_to_the_last_bit(which, request):
         assert np.array_equal(got[known].view(np.uint64), expected[known].view(np.uint64)), name
 
 
-def test_units_stand_in_the_channels(read, run):
+def test_channel_metadata_holds_units(read, run):
     (position,) = (c for c in read.summary.channels.values() if c.topic == "/signals/position")
     assert position.metadata["x"].startswith("position.x [m]: ")
 
@@ -93,13 +93,13 @@ def test_times_are_simulated_nanoseconds_in_order(read, run):
 
 
 def test_signals_have_no_field_that_plotjuggler_takes_for_a_time_stamp(read):
-    """It reads a field of this name as a number of its own clock, whatever it is."""
+    """PlotJuggler reads a field of this name as a time stamp."""
     for channel in read.summary.channels.values():
         if channel.topic.startswith("/signals/"):
             assert "timestamp" not in channel.metadata
 
 
-def test_the_scene_is_in_messages_that_foxglove_knows(read):
+def test_scene_uses_foxglove_message_schemas(read):
     schemas = read.summary.schemas
     topics = {c.topic: schemas[c.schema_id].name for c in read.summary.channels.values()}
     assert {topic: name for topic, name in topics.items() if not topic.startswith("/signals/")} == WELL_KNOWN
@@ -114,7 +114,7 @@ def vector(message):
     return np.array([message.x, message.y, message.z])
 
 
-def test_the_world_is_shown_with_down_downwards_and_north_ahead(read):
+def test_map_frame_converts_ned_to_z_up(read):
     ((at, static),) = read.messages["/tf_static"]
     (upright,) = static.transforms
     assert (at, upright.parent_frame_id, upright.child_frame_id) == (0, "map", "ned")
@@ -139,7 +139,7 @@ def test_frames_lead_from_the_world_to_the_vehicle(read, run):
         assert vector(pose.pose.position).tolist() == vector(place.translation).tolist()
 
 
-def test_the_vehicle_stays_where_it_was_while_its_pose_is_unknown(read_killed, killed):
+def test_vehicle_keeps_its_last_pose_while_pose_is_unknown(read_killed, killed):
     record = load_record(killed)
     unknown = {round(t * 1e9) for t in record["time"][np.isnan(record["position.x"])]}
     assert len(unknown) == 20
@@ -165,7 +165,7 @@ def test_the_active_region_is_the_one_that_the_log_names(read):
     assert active in first.message
 
 
-def test_shapes_are_what_foxglove_draws_as_such(read):
+def test_shapes_use_foxglove_primitives(read):
     _, scene = read.messages["/scene"][0]
     drawn = {entity.id: entity for entity in scene.entities}
     assert vector(drawn["goal"].spheres[0].size).tolist() == [0.6, 0.6, 0.6]
@@ -189,7 +189,7 @@ def test_regions_that_move_have_frames_of_their_own(moving_run, tmp_path):
     assert {e.id: e.frame_id for e in scene.entities}["crossing buoy"] == "region crossing buoy"
 
 
-def test_what_a_command_changes_is_drawn_from_then_on(run, tmp_path, monkeypatch):
+def test_commanded_change_is_drawn_from_its_time(run, tmp_path, monkeypatch):
     change = {"time": 0.5, "region": 0, "shape": {"kind": "sphere", "centre": (7.0, 0.0, 4.0), "radius": 0.9}}
     monkeypatch.setattr("cosim.export.scene.changes_of", lambda *_: [change])
     (path,) = export_run(run, "mcap", tmp_path / "out.mcap")
@@ -203,7 +203,7 @@ def test_scenario_and_summary_are_attached(read, run):
     assert '"status": "completed"' in read.attached["summary.json"]
 
 
-def test_chosen_signals_leave_the_scene_whole(run, tmp_path):
+def test_signal_selection_keeps_the_scene_complete(run, tmp_path):
     (path,) = export_run(run, "mcap", tmp_path / "out.mcap", signals=["*.clearance"], every=10)
     read = Read(path)
     assert [t for t in read.messages if t.startswith("/signals/")] == ["/signals/step", "/signals/clearance"]
@@ -217,7 +217,7 @@ def test_chosen_signals_leave_the_scene_whole(run, tmp_path):
 
 @pytest.fixture(scope="module")
 def steered(tmp_path_factory):
-    """The folder of a run to which an obstacle comes, and grows, and whose target becomes another."""
+    """Return the folder of a run with an added, growing obstacle and a changed target."""
     commands = {
         20: AddObstacle(7, (5.0, 0.0, 2.0), 0.4),
         40: SetTarget((4.0, -1.0, 2.0), 0.6),
@@ -254,7 +254,7 @@ def test_spheres_as_they_are_drawn_give_the_recorded_clearances(steered, tmp_pat
     assert ("goal", 1.2) in sizes
 
 
-def test_an_obstacle_that_waits_far_away_does_not_widen_the_scene(steered, tmp_path):
+def test_parked_obstacle_does_not_widen_the_scene(steered, tmp_path):
     (path,) = export_run(steered, "mcap", tmp_path / "out.mcap")
     _, scene = Read(path).messages["/scene"][0]
     planes = [vector(p) for e in scene.entities for drawn in e.triangles for p in drawn.points]

@@ -30,7 +30,7 @@ class Read:
         return [(time, value) for time, value in self.columns[at] if value is not None]
 
     def path_of(self, name):
-        """Return the entity of a signal of the record, which says its name."""
+        """Return the entity path of a recorded signal, which contains its name."""
         for path, component in self.columns:
             if component == "names" and self[path, "names"][0][1][0].startswith(f"{name} ["):
                 return path
@@ -73,19 +73,19 @@ def test_the_world_is_north_east_down(read):
     assert (x, y, z) == (forward, right, down)
 
 
-def test_regions_are_drawn_as_what_they_are(read):
+def test_regions_use_rerun_primitives_of_their_shape(read):
     assert read["/world/regions/goal/Ellipsoids3D", "half_sizes"][0][1] == [pytest.approx([0.3] * 3)]
     assert read[r"/world/regions/port\ wall/Boxes3D", "half_sizes"][0][1] == [pytest.approx([1.35, 0.35, 1.2])]
     assert ("/world/place/heading/Mesh3D", "triangle_indices") in read.columns
 
 
-def test_what_happened_stands_in_words(read):
+def test_events_are_logged_as_text(read):
     said = [value[0] for _, value in read["/events", "text"]]
     assert said[-1] == "End of the run"
     assert any(text.startswith("Gives way to") for text in said)
 
 
-def test_what_a_command_changes_is_drawn_from_then_on(run, tmp_path, monkeypatch):
+def test_commanded_change_is_drawn_from_its_time(run, tmp_path, monkeypatch):
     changes = [
         {"time": 0.5, "region": 0, "shape": {"kind": "sphere", "centre": (7.0, 0.0, 4.0), "radius": 0.9}},
         {"time": 0.8, "region": 0, "shape": {"kind": "box", "centre": (7.0, 0.0, 4.0), "size": (1.0, 1.0, 1.0)}},

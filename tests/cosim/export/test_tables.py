@@ -91,13 +91,13 @@ def test_more_than_a_mat_file_holds_is_refused(run, tmp_path, monkeypatch):
 
 @pytest.mark.medium
 @given(st.lists(st.text(min_size=1), unique=True))
-def test_legal_names_are_names_of_matlab_and_protobuf_and_differ(names):
+def test_sanitized_names_are_unique_identifiers(names):
     made = legal(names)
     assert len(set(made)) == len(names)
     assert all(re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,62}", name, re.ASCII) for name in made)
 
 
-def test_legal_names_are_like_the_names():
+def test_sanitized_names_resemble_the_originals():
     assert legal(["position.x", "thrust[1]", "port wall.clearance", "position_x", "1"]) == [
         "position_x", "thrust_1", "port_wall_clearance", "position_x_2", "n1",
     ]  # fmt: skip

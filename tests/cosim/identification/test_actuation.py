@@ -26,7 +26,7 @@ def log_of(vehicle, seed=0, rows=60, period=0.05):
 
 
 @pytest.mark.medium
-def test_the_wrench_is_that_of_the_plant(vehicle):
+def test_wrench_matches_the_plant(vehicle):
     """The FMU gives the wrench at moments; its mean over a step follows from Simpson's rule on its substeps."""
     bent = dataclasses.replace(
         vehicle, thrust_time_constant=np.full(8, 0.12), thrust_curve=np.full(8, 0.5), thrust_dead_band=np.full(8, 0.05)
@@ -52,7 +52,7 @@ def test_the_wrench_is_that_of_the_plant(vehicle):
 
 
 @pytest.mark.parametrize("lag", [0.03, 0.1, 0.4])
-def test_derivatives_are_those_of_the_wrench(vehicle, lag):
+def test_wrench_derivatives_match_central_differences(vehicle, lag):
     forces, scales, h = CommandedForces(log_of(vehicle), vehicle, STEP), np.linspace(0.9, 1.1, 8), 1e-6
     found = forces.actuation(lag, scales)
     both = [forces.actuation(lag + by, scales).wrench for by in (h, -h)]
@@ -63,7 +63,7 @@ def test_derivatives_are_those_of_the_wrench(vehicle, lag):
         assert found.by_scale[i] == pytest.approx((both[0] - both[1]) / (2.0 * h), abs=1e-6)
 
 
-def test_a_lag_keeps_the_impulse(vehicle):
+def test_lag_conserves_the_impulse(vehicle):
     """All that is commanded arrives, but for what is still on its way: the gap at the end, times the lag."""
     log, lag = log_of(vehicle), 0.1
     forces = CommandedForces(log, vehicle, STEP)
@@ -74,7 +74,7 @@ def test_a_lag_keeps_the_impulse(vehicle):
     assert missing == pytest.approx(lag * (reached - steady[:, 0]), abs=1e-2 * np.abs(steady).max() * lag)
 
 
-def test_a_rate_limit_is_refused(vehicle):
+def test_rate_limit_is_rejected(vehicle):
     slow = dataclasses.replace(vehicle, thrust_rate_limit=np.full(8, 10.0))
     with pytest.raises(IdentificationError, match="rate_limit"):
         CommandedForces(log_of(vehicle), slow, STEP)

@@ -28,19 +28,19 @@ def tried(axes=(True,) * 6, seed=0):
     return list(candidates(np.array(axes), np.random.default_rng(seed), 1))
 
 
-def test_sticks_are_within_their_way_and_have_no_mean():
+def test_sticks_are_within_range_with_zero_mean():
     for segment in tried():
         assert segment.sticks.shape == (round(SECONDS / PERIOD), 6)
         assert np.abs(segment.sticks).max() <= 1.0
         assert segment.sticks.mean(axis=0) == pytest.approx(np.zeros(6), abs=1e-12)
 
 
-def test_axes_that_no_thruster_moves_are_left_alone():
+def test_unactuated_axes_are_not_excited():
     axes = (True, False, True, False, False, True)
     assert all(not segment.sticks[:, [1, 3, 4]].any() for segment in tried(axes))
 
 
-def test_a_schedule_returns_between_segments_and_holds_commands_that_can_be():
+def test_schedule_returns_between_segments_with_valid_commands():
     segments = [s for s in tried() if s.mode == "stabilize"][:2]
     commands = schedule(segments)
     for _, command in commands:
@@ -57,7 +57,7 @@ def rehearsed(segment, duration=BEGIN + SECONDS):
 
 
 @pytest.mark.slow  # compiles the prediction
-def test_surge_tells_its_damping_and_rest_does_not(vehicle):
+def test_surge_segment_informs_its_damping_and_rest_does_not(vehicle):
     steps = next(s for s in tried() if s.mode == "depth_hold" and s.title.startswith("surge: steps"))
     parameters = free_parameters(vehicle, FREE)
     rest = Segment("rest", "depth_hold", 0.0 * steps.sticks)
@@ -67,7 +67,7 @@ def test_surge_tells_its_damping_and_rest_does_not(vehicle):
     assert (np.diag(moved)[:2] * scale**2 > 1e3 * np.diag(still)[:2] * scale**2).all()
 
 
-def test_the_choice_takes_what_is_not_known_yet(vehicle):
+def test_segment_choice_complements_known_information(vehicle):
     """Two of three candidates are alike: the third is taken second."""
     parameters = free_parameters(vehicle, FREE)[:2]
     scale = np.array([p.deviation for p in parameters])
@@ -83,20 +83,20 @@ def test_the_choice_takes_what_is_not_known_yet(vehicle):
         (["--depth", "1"], "--depth 1: the box of 4 m leaves the water"),
     ],
 )
-def test_limits_that_cannot_be_are_named(arguments, said, tmp_path, capsys):
+def test_invalid_limits_are_rejected_by_name(arguments, said, tmp_path, capsys):
     assert main(["excite", "--vehicle", "bluerov2_heavy", "--out", str(tmp_path / "pool"), *arguments]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "pool").exists()
 
 
-def test_a_folder_that_holds_something_is_kept(tmp_path, capsys):
+def test_nonempty_folder_is_rejected(tmp_path, capsys):
     (tmp_path / "mine").write_text("")
     assert main(["excite", "--vehicle", "bluerov2_heavy", "--out", str(tmp_path)]) == 2
     assert "is not empty" in capsys.readouterr().err
 
 
 @pytest.mark.slow
-def test_excite_run_identify(tmp_path, monkeypatch, capsys):
+def test_identification_recovers_the_plant_from_an_excitation_run(tmp_path, monkeypatch, capsys):
     """The run of another plant than the one that the sticks were chosen for becomes the numbers of that plant."""
     monkeypatch.setattr(designing, "candidates", lambda axes, rng, draws: tried()[10:60:4])
     pool, run, mine = tmp_path / "pool", tmp_path / "run", tmp_path / "mine.toml"

@@ -68,7 +68,7 @@ def found(log, vehicle):
 
 
 @pytest.mark.medium
-def test_the_numbers_are_found_again(found):
+def test_fit_recovers_the_true_parameters(found):
     truth = np.array([TRUTH[p.plant] if p.plant else BIAS[p.index] for p in found.parameters])
     off = (found.values - truth) / found.intervals.deviations
     assert np.abs(off).max() < 4.0
@@ -78,7 +78,7 @@ def test_the_numbers_are_found_again(found):
 
 
 @pytest.mark.medium
-def test_the_nominal_intervals_are_those_of_the_information(found):
+def test_nominal_intervals_follow_from_the_information_matrix(found):
     """Computed anew from the rows, prior included."""
     rows = [r.jacobian for r in found.residuals] + [np.diag([1.0 / p.deviation for p in found.parameters])]
     covariance = np.linalg.pinv(np.concatenate(rows)) @ np.linalg.pinv(np.concatenate(rows)).T
@@ -87,7 +87,7 @@ def test_the_nominal_intervals_are_those_of_the_information(found):
 
 
 @pytest.mark.slow
-def test_the_gradient_is_that_of_the_cost(log, vehicle, found):
+def test_gradient_matches_the_cost(log, vehicle, found):
     """The start of each window is eliminated; cost and gradient are still those of all."""
     from cosim.identification.fit import Problem
     from cosim.identification.residuals import Residuals
@@ -104,21 +104,21 @@ def test_the_gradient_is_that_of_the_cost(log, vehicle, found):
         assert gradient[j] == pytest.approx((ahead - back) / (2.0 * bit[j]), rel=0.02)
 
 
-def test_it_predicts_better_than_to_hold_the_velocity(log, vehicle, found):
+def test_fitted_model_predicts_better_than_constant_velocity(log, vehicle, found):
     for p in validate([log], vehicle, found.parameters, found.values, found.step):
         if p.topic == "velocity":
             assert p.identified[0] < p.start_vehicle[0] and p.identified[0] < 0.5 * p.held[0]
 
 
 @pytest.mark.slow
-def test_what_no_run_tells_rests_on_its_prior(log, vehicle):
+def test_uninformed_parameter_keeps_its_prior(log, vehicle):
     parameters = free_parameters(vehicle, ("thrusters.time_constant", "hydrodynamics.quadratic_damping.1"))
     found = fit([log], vehicle, parameters)
     assert [found.parameters[i].name for i in found.resting()] == ["thrusters.time_constant"]
 
 
 @pytest.mark.slow
-def test_a_late_topic_is_found_late(log, vehicle):
+def test_topic_delay_is_estimated(log, vehicle):
     """All samples of velocity are 0.1 s late by their stamps."""
     late = tuple(dataclasses.replace(t, times=t.times + 0.1) if t.name == "velocity" else t for t in log.topics)
     delayed = dataclasses.replace(log, topics=late)
@@ -131,7 +131,7 @@ def test_a_late_topic_is_found_late(log, vehicle):
 
 
 @pytest.mark.slow
-def test_a_disturbance_is_said_and_widens_the_intervals(log, vehicle):
+def test_disturbance_is_reported_and_widens_the_intervals(log, vehicle):
     """A velocity that wanders by 2 cm/s within seconds: the noise alone does not explain it."""
     wander = 0.02 * np.sin(2 * np.pi * log.topic("velocity").times[:, None] / [5.0, 7.0, 9.0])
     moved = tuple(dataclasses.replace(t, values=t.values + wander) if t.name == "velocity" else t for t in log.topics)
@@ -142,7 +142,7 @@ def test_a_disturbance_is_said_and_widens_the_intervals(log, vehicle):
     assert (done.intervals.deviations[:3] > 1.5 * done.intervals.nominal[:3]).any()
 
 
-def test_free_numbers_are_found_by_their_keys(vehicle):
+def test_free_parameters_are_selected_by_key(vehicle):
     names = [p.name for p in free_parameters(vehicle, ("hydrodynamics.added_mass.diagonal",))]
     assert names == [f"hydrodynamics.added_mass.{i}.{i}" for i in range(1, 7)]
     assert len(free_parameters(vehicle, DEFAULT_FREE)) == 21 + 12 + 4 + 1
@@ -152,7 +152,7 @@ def test_free_numbers_are_found_by_their_keys(vehicle):
             free_parameters(vehicle, (key,))
 
 
-def test_a_vehicle_takes_the_numbers(vehicle):
+def test_fitted_values_are_applied_to_the_vehicle(vehicle):
     keys = ("hydrodynamics.added_mass.2.6", "thrusters.matrix.3", "thrusters.time_constant", "hydrostatics.buoyancy")
     changed = with_values(vehicle, free_parameters(vehicle, keys), np.array([0.5, 1.1, 0.2, 130.0]))
     assert changed.added_mass[1, 5] == changed.added_mass[5, 1] == 0.5
@@ -176,7 +176,7 @@ def test_windows_that_tumble_or_have_gaps_are_rejected(log, vehicle):
             free_parameters(vehicle, FREE))  # fmt: skip
 
 
-def test_commands_change_on_the_grid(log):
+def test_integration_grid_matches_the_command_period(log):
     assert integration_step([log]) == pytest.approx(PERIOD / 2)
 
 
@@ -189,7 +189,7 @@ def test_noise_is_estimated_from_fourth_differences():
 
 
 @pytest.mark.parametrize(("correlation", "refused"), [(0.89, False), (-0.89, False), (0.91, True), (-0.91, True)])
-def test_a_delay_and_a_lag_that_runs_do_not_separate_are_refused_by_name(vehicle, log, correlation, refused):
+def test_inseparable_delay_and_lag_are_rejected_by_name(vehicle, log, correlation, refused):
     keys = ("thrusters.time_constant",)
     parameters = [*free_parameters(vehicle, keys), *nuisances(("delay",), [log])]
     lag = next(i for i, p in enumerate(parameters) if p.kind == "lag")

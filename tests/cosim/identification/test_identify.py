@@ -37,7 +37,7 @@ def run(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_a_run_becomes_a_vehicle_that_builds(run, tmp_path, capsys):
+def test_identified_vehicle_file_builds(run, tmp_path, capsys):
     out = tmp_path / "mine.toml"
     free = ["hydrodynamics.quadratic_damping.1", "hydrostatics.buoyancy", "hydrodynamics.added_mass.4.4"]
     arguments = ["--vehicle", "bluerov2_heavy", "--nuisance", "current", "--out", str(out)]
@@ -57,12 +57,12 @@ def test_a_run_becomes_a_vehicle_that_builds(run, tmp_path, capsys):
         plant.step(0.1)
 
 
-def test_a_name_that_no_vehicle_can_have_is_refused_before_the_work(run, tmp_path, capsys):
+def test_invalid_vehicle_name_is_rejected_before_the_fit(run, tmp_path, capsys):
     assert main(["identify", str(run), "--vehicle", "odin", "--out", str(tmp_path / "1.toml")]) == 2
     assert "no vehicle's file" in capsys.readouterr().err
 
 
-def test_an_unknown_nuisance_is_named(run, tmp_path, capsys):
+def test_unknown_nuisance_is_rejected_by_name(run, tmp_path, capsys):
     arguments = ["--vehicle", "bluerov2_heavy", "--nuisance", "wind", "--out", str(tmp_path / "a.toml")]
     assert main(["identify", str(run), *arguments]) == 2
     assert "--nuisance wind: is unknown" in capsys.readouterr().err

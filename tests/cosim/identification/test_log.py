@@ -45,7 +45,7 @@ def write(folder: Path, columns: dict[str, np.ndarray]) -> Path:
     return folder
 
 
-def test_held_samples_and_gaps_are_no_samples(tmp_path):
+def test_held_values_and_gaps_are_excluded_from_samples(tmp_path):
     log = load_log(write(tmp_path, signals()), VEHICLE)
     dvl = log.topic("velocity")
     assert len(dvl.times) == ROWS // 10 - 1
@@ -65,25 +65,25 @@ def test_held_samples_and_gaps_are_no_samples(tmp_path):
         (("measured.velocity.u", "velocity.u"), "no velocity or position"),
     ],
 )
-def test_what_is_missing_is_named(tmp_path, without, message):
+def test_missing_columns_are_named(tmp_path, without, message):
     columns = {name: x for name, x in signals().items() if name not in without}
     with pytest.raises(IdentificationError, match=message):
         load_log(write(tmp_path, columns), VEHICLE)
 
 
-def test_thrusters_that_rest_are_named(tmp_path):
+def test_resting_thrusters_are_rejected(tmp_path):
     columns = {name: 0.0 * x if name.startswith("thrust[") else x for name, x in signals().items()}
     with pytest.raises(IdentificationError, match="the thrusters rest"):
         load_log(write(tmp_path, columns), VEHICLE)
 
 
-def test_another_vehicle_is_named(tmp_path):
+def test_log_of_another_vehicle_is_rejected(tmp_path):
     columns = signals() | {"thrust[9]": signals()["time"]}
     with pytest.raises(IdentificationError, match="more thrusters than the 8"):
         load_log(write(tmp_path, columns), VEHICLE)
 
 
-def test_positions_stand_in_for_velocities(tmp_path):
+def test_positions_replace_missing_velocities(tmp_path):
     columns = {name: x for name, x in signals().items() if "velocity.u" not in name}
     columns |= {f"position.{axis}": np.sin(columns["time"]) for axis in "xy"}
     log = load_log(write(tmp_path, columns), VEHICLE)
@@ -97,7 +97,7 @@ def test_positions_stand_in_for_velocities(tmp_path):
         ("limit = { force = 50.0 }", "has a limit or a lag"),
     ],
 )
-def test_commands_that_the_scenario_bends_are_refused(tmp_path, scenario, message):
+def test_scenario_settings_that_alter_commands_are_rejected(tmp_path, scenario, message):
     folder = write(tmp_path, signals() | {"wrench.X": signals()["thrust[1]"]})
     (folder / "scenario.toml").write_text(scenario)
     with pytest.raises(IdentificationError, match=message):

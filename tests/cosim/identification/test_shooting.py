@@ -32,7 +32,7 @@ def start_and_wrench(seed=1):
     return start, np.stack([wrench, np.zeros_like(wrench)], axis=1)
 
 
-def test_the_prediction_is_the_motion_of_the_fmu(vehicle, shooter):
+def test_prediction_matches_the_fmu(vehicle, shooter):
     start, wrench = start_and_wrench()
     times = np.arange(1, STEPS + 1) * STEP
     names = [f"position.{axis}" for axis in "xyz"] + [f"quaternion.e{i}" for i in range(4)]
@@ -52,7 +52,7 @@ def test_the_prediction_is_the_motion_of_the_fmu(vehicle, shooter):
     assert np.abs(fine - expected).max() < 1e-10  # rounding
 
 
-def test_samples_between_steps_lie_on_the_motion(shooter):
+def test_samples_between_steps_are_interpolated(shooter):
     start, wrench = start_and_wrench()
     times = np.sort(np.random.default_rng(3).uniform(0.0, STEP * STEPS, 40))
     found = shooter.predict(BODY, start, wrench, STEP, times)
@@ -87,7 +87,7 @@ def name_of(along, j):
     return along.parameters[j] or ""
 
 
-def test_sensitivities_are_those_of_the_prediction(shooter):
+def test_sensitivities_match_central_differences(shooter):
     """Central differences of two widths, extrapolated: their error is of order four."""
     rng = np.random.default_rng(2)
     start, wrench = start_and_wrench()
@@ -111,13 +111,13 @@ def test_sensitivities_are_those_of_the_prediction(shooter):
         assert np.abs(found[:, j] - expected).max() <= 1e-6 * max(scale, 1e-3), along.parameters[j]
 
 
-def test_a_body_that_cannot_be_is_refused(shooter):
+def test_invalid_body_parameters_are_rejected(shooter):
     start, wrench = start_and_wrench()
     with pytest.raises(IdentificationError, match="not positive definite"):
         shooter.predict({"added_mass[1,1]": -50.0}, start, wrench, STEP, np.array([1.0]))
 
 
-def test_a_motion_beyond_numbers_is_refused(shooter):
+def test_diverging_motion_is_rejected(shooter):
     start, wrench = start_and_wrench()
     with pytest.raises(IdentificationError, match="no numbers"):
         shooter.predict({}, start, 1e9 * wrench, STEP, np.array([1.0]))

@@ -1,4 +1,4 @@
-"""JSON with numbers that are none: what Python writes by itself, no other reader takes."""
+"""JSON with NaN and infinity replaced by null, which every reader accepts."""
 
 import json
 import math
@@ -13,7 +13,7 @@ def refuse(constant):
 
 
 @pytest.mark.parametrize("nothing", [math.nan, math.inf, -math.inf])
-def test_what_is_no_number_is_null_however_deep(nothing):
+def test_nan_and_infinity_become_null_at_any_depth(nothing):
     value = {"a": nothing, "b": [1.5, (nothing, {"c": nothing})], "d": "NaN", "e": True}
     text = json_text(value)
     assert json.loads(text, parse_constant=refuse) == {
@@ -25,6 +25,6 @@ def test_what_is_no_number_is_null_however_deep(nothing):
     assert text.endswith("}\n")
 
 
-def test_numbers_keep_every_bit():
+def test_floats_round_trip_exactly():
     numbers = [0.1 + 0.2, 5e-324, -0.0, 2**60]
     assert [*map(repr, json.loads(json_text(numbers)))] == [*map(repr, nan_to_none(numbers))] == [*map(repr, numbers)]

@@ -1,4 +1,4 @@
-"""Runs that are shown while they go on, and viewers."""
+"""Runs with a live view, and viewers."""
 
 import contextlib
 import json
@@ -19,7 +19,7 @@ WAIT = 120.0  # s, that nothing should take, however busy the machine
 
 
 class Viewer:
-    """A viewer that is no browser; it keeps what it is told."""
+    """A viewer without a browser that keeps the messages it receives."""
 
     def __init__(self, url):
         self._connecting = connect(url.replace("http", "ws") + "ws", max_size=None, open_timeout=60.0)
@@ -35,29 +35,29 @@ class Viewer:
     def command(self, **command):
         self.socket.send(json.dumps(command))
 
-    def hear(self):
-        """Take one message; return its kind."""
+    def receive(self):
+        """Receive one message and return its kind."""
         message = self.socket.recv(timeout=WAIT)
         if isinstance(message, bytes):
             self.rows += list(np.frombuffer(message, "<f8").reshape(-1, len(self.headers[-1]["signals"])))
             return "rows"
-        told = json.loads(message)
-        if told["type"] == "header":
-            self.headers.append(told["run"])
+        message = json.loads(message)
+        if message["type"] == "header":
+            self.headers.append(message["run"])
             self.rows = []
-        self.texts.append(told)
-        return told["type"]
+        self.texts.append(message)
+        return message["type"]
 
     def until(self, kind):
-        while self.hear() != kind:
+        while self.receive() != kind:
             pass
         return self.texts[-1] if self.texts else None
 
-    def told(self, kind):
+    def messages_of(self, kind):
         return [text for text in self.texts if text["type"] == kind]
 
-    def said(self, kind):
-        return [text["text"] for text in self.told("said") if text["kind"] == kind]
+    def texts_of(self, kind):
+        return [text["text"] for text in self.messages_of("said") if text["kind"] == kind]
 
     def column(self, name):
         names = [signal["name"] for signal in self.headers[-1]["signals"]]

@@ -1,4 +1,4 @@
-"""Where a live view is served, and who may come there."""
+"""Addresses of the live view, and its accepted hosts and origins."""
 
 import socket
 
@@ -18,12 +18,12 @@ def test_an_address_is_a_port_or_a_host_with_one():
 @pytest.mark.parametrize(
     "text", ["harbour", "127.0.0.1", "127.0.0.1:", ":70000", "70000", "-1", "no.such.host.invalid:1"]
 )
-def test_what_is_no_address_is_told(text):
+def test_invalid_address_is_rejected(text):
     with pytest.raises(TelemetryError, match=r"--live .*expected HOST:PORT or PORT"):
         parse_live(text)
 
 
-def test_other_machines_come_only_with_leave():
+def test_remote_binding_requires_allow_remote():
     with pytest.raises(TelemetryError, match="--allow-remote"):
         parse_live("0.0.0.0:9000")
 
@@ -40,7 +40,7 @@ HERE = LiveAddress("127.0.0.1", "127.0.0.1", 8765)
         ("127.0.0.1:9999", "http://127.0.0.1:9999"),  # through a tunnel
     ],
 )
-def test_pages_of_ours_and_programs_may_come(host, origin):
+def test_own_pages_and_programs_are_accepted(host, origin):
     assert foreign_origin(HERE, host, origin) is None
 
 
@@ -58,18 +58,18 @@ def test_pages_of_ours_and_programs_may_come(host, origin):
         ("[", None),
     ],
 )
-def test_pages_of_other_sites_may_not(host, origin):
+def test_foreign_origins_are_rejected(host, origin):
     assert foreign_origin(HERE, host, origin)
 
 
-def test_a_page_for_other_machines_is_reached_by_number_or_known_names_alone():
+def test_remote_host_header_must_be_an_address_or_own_name():
     there = LiveAddress("0.0.0.0", "0.0.0.0", 8765, loopback=False)
     assert foreign_origin(there, "192.0.2.7:8765", "http://192.0.2.7:8765") is None
     assert foreign_origin(there, f"{socket.gethostname()}:8765", None) is None
     assert foreign_origin(there, "evil.example:8765", None)
 
 
-def test_a_taken_port_is_an_error_only_where_it_was_asked_for():
+def test_occupied_port_is_an_error_only_if_requested():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(TelemetryError, match=f"127.0.0.1:{port} cannot be opened"):

@@ -1,4 +1,4 @@
-"""The live page in a real browser: the vehicle moves, and what is dragged arrives in the run."""
+"""The live page in a real browser: displayed motion, and commands by dragging."""
 
 import io
 import json
@@ -105,7 +105,7 @@ def test_the_target_is_dragged_with_the_mouse(browser, live, tmp_path):
     assert (target == after).all(axis=1).any()
 
 
-def test_a_region_to_be_kept_within_is_dragged_by_its_name(browser, live):
+def test_keep_in_region_is_dragged_by_its_label(browser, live):
     running = live("harbour", "time.duration=12", "regions.ship.keep=in", commands=True, rate=1.0)
     until(lambda: running.view._run >= 0)
     browser.get(running.url)
@@ -127,7 +127,7 @@ def test_a_region_to_be_kept_within_is_dragged_by_its_name(browser, live):
     until(lambda: browser.execute_script(moved) not in (None, 0))
 
 
-def test_the_page_tells_of_what_is_there_and_of_what_moves(browser, live):
+def test_page_lists_regions_and_moving_regions(browser, live):
     running = live("moving-obstacle", "time.duration=4", commands=True, await_arm=False, rate=1.0)
     until(lambda: running.view._run >= 0)
     browser.get(running.url)
@@ -147,7 +147,7 @@ def test_the_page_tells_of_what_is_there_and_of_what_moves(browser, live):
     }  # fmt: skip
 
 
-def test_what_is_left_of_the_panel_of_commands_does_not_lie_upon_its_heading(browser, live):
+def test_scrolled_command_panel_does_not_cover_its_heading(browser, live):
     running = live("harbour", commands=True, await_arm=False)
     until(lambda: running.view._run >= 0)
     browser.get(running.url)

@@ -1,4 +1,4 @@
-"""What late viewers get of a run."""
+"""The history of rows that late viewers receive."""
 
 import numpy as np
 from hypothesis import given
@@ -26,7 +26,7 @@ def filled(count, most):
 
 
 @given(st.integers(0, 3000), st.integers(2, 40), st.integers(1, 300), st.floats(0, 1))
-def test_old_rows_are_thinned_evenly_and_new_ones_never(count, most, at_once, part):
+def test_old_rows_are_thinned_evenly_and_new_rows_are_kept(count, most, at_once, part):
     history = filled(count, most)
     rows = all_since(history, 0, at_once)
     new = max(0, count - _NEW)

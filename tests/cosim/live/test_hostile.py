@@ -1,4 +1,4 @@
-"""Pages of other sites, floods and garbage: none of it commands anything, or hurts the run."""
+"""Foreign origins, floods and malformed requests neither command nor disturb the run."""
 
 import contextlib
 import socket
@@ -17,14 +17,14 @@ from cosim.scenario.scenario import load_scenario
 from tests.cosim.live.conftest import ARM, WAIT, same
 
 
-def ask(url, **headers):
+def request(url, **headers):
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     return opener.open(urllib.request.Request(url, headers=headers), timeout=WAIT)
 
 
 def refused(url, status, **headers):
     with pytest.raises(urllib.error.HTTPError) as caught:
-        ask(url, **headers)
+        request(url, **headers)
     caught.value.close()
     assert caught.value.code == status
 
@@ -37,9 +37,9 @@ def closed_with(client):
         return error.rcvd.code
 
 
-def test_the_page_is_served_alone_and_to_our_own_pages(live):
+def test_only_the_page_is_served_and_only_to_own_origin(live):
     running = live(commands=True)
-    with ask(running.url) as page:
+    with request(running.url) as page:
         text = page.read().decode()
         assert page.headers["Content-Type"] == "text/html; charset=utf-8"
         assert "frame-ancestors 'none'" in page.headers["Content-Security-Policy"]
@@ -57,7 +57,7 @@ def test_the_page_is_served_alone_and_to_our_own_pages(live):
 
 
 @pytest.mark.medium
-def test_nothing_that_comes_hurts_the_run(live, tmp_path, caplog):
+def test_malformed_requests_do_not_affect_the_run(live, tmp_path, caplog):
     running = live(commands=True)
     host, port = running.url.removeprefix("http://").strip("/").split(":")
     place = (host, int(port))
@@ -68,9 +68,9 @@ def test_nothing_that_comes_hurts_the_run(live, tmp_path, caplog):
         b"POST /ws HTTP/1.1\r\nHost: a\r\n\r\n",
         b"\r\n" * 999,
     ):
-        with socket.create_connection(place, timeout=WAIT) as stranger, contextlib.suppress(OSError):
-            stranger.sendall(garbage)
-            stranger.recv(100)
+        with socket.create_connection(place, timeout=WAIT) as foreign, contextlib.suppress(OSError):
+            foreign.sendall(garbage)
+            foreign.recv(100)
     with connect(url) as client:  # more than a message may have
         with contextlib.suppress(ConnectionClosed):
             client.send("x" * (LONGEST + 1))
@@ -96,8 +96,8 @@ def test_nothing_that_comes_hurts_the_run(live, tmp_path, caplog):
             viewer.socket.send(bad)
         for _ in range(11):
             viewer.until("said")
-        assert len(viewer.said("refused")) == 11
-        assert all(said.isprintable() and len(said) < 300 for said in viewer.said("refused"))
+        assert len(viewer.texts_of("refused")) == 11
+        assert all(said.isprintable() and len(said) < 300 for said in viewer.texts_of("refused"))
     with connect(url) as client:  # D4: a text that is no UTF-8, by which WebSocket has a connection fail
         client.socket.sendall(b'\x81\x8f\0\0\0\0{"command":"\xff"}')
         assert closed_with(client) == 1007
@@ -117,7 +117,7 @@ def test_nothing_that_comes_hurts_the_run(live, tmp_path, caplog):
 
 
 @pytest.mark.slow
-def test_a_flood_is_slowed_down_and_shut_out(live):
+def test_flooding_viewer_is_throttled_and_disconnected(live):
     running = live(commands=True)
     with connect(running.url.replace("http", "ws") + "ws") as flood:
         with contextlib.suppress(ConnectionClosed):
@@ -130,7 +130,7 @@ def test_a_flood_is_slowed_down_and_shut_out(live):
     assert running.end().summary["commands"] < 500
 
 
-def test_more_viewers_than_there_is_room_for_are_sent_away(live):
+def test_excess_viewers_are_rejected(live):
     running = live(commands=True)
     with contextlib.ExitStack() as stack:
         viewers = [stack.enter_context(running.viewer()) for _ in range(16)]
@@ -143,7 +143,7 @@ def test_more_viewers_than_there_is_room_for_are_sent_away(live):
         viewers[0].until("end")
 
 
-def test_connections_beyond_the_most_are_cut_off_so_that_the_run_keeps_files_to_write(live):
+def test_excess_connections_are_closed_to_preserve_file_descriptors(live):
     running = live(commands=True)
     host, port = running.url.removeprefix("http://").strip("/").split(":")
     with contextlib.ExitStack() as stack:

@@ -1,4 +1,4 @@
-"""What viewers order is followed, logged, told to all, and repeated; or refused with the reason."""
+"""Commands of viewers: applied, logged, broadcast, and replayed; or rejected with a reason."""
 
 import json
 
@@ -16,14 +16,14 @@ def commanded(viewer, *commands):
     viewer.until("header")
     for command in commands:
         viewer.command(**command)
-    viewer.command(command="set_heading", heading="north")  # is refused, which tells that all before were taken
-    while not viewer.said("refused") or "heading" not in viewer.said("refused")[-1]:
-        viewer.hear()
-    return viewer.said("refused")[:-1]
+    viewer.command(command="set_heading", heading="north")  # its rejection shows that all before were processed
+    while not viewer.texts_of("refused") or "heading" not in viewer.texts_of("refused")[-1]:
+        viewer.receive()
+    return viewer.texts_of("refused")[:-1]
 
 
 @pytest.mark.medium
-def test_commands_are_followed_told_to_all_and_repeat_to_the_last_bit(live, tmp_path):
+def test_commands_are_applied_broadcast_and_reproducible(live, tmp_path):
     running = live("harbour", commands=True)
     with running.viewer() as viewer, running.viewer() as other:
         refused = commanded(
@@ -43,10 +43,11 @@ def test_commands_are_followed_told_to_all_and_repeat_to_the_last_bit(live, tmp_
     assert record.stack([f"ship.shift.{a}" for a in "xyz"])[-1].tolist() == [1.0, 2.0, 0.5]
     log = [json.loads(line)["command"]["command"] for line in (done.folder / "commands.jsonl").read_text().splitlines()]
     assert log == ["set_target", "shift_region", "add_obstacle", "change_setting", "arm"]
-    assert "ship moved by (1, 2, 0.5) m" in other.said("command")
-    assert other.said("command") == viewer.said("command")
+    assert "ship moved by (1, 2, 0.5) m" in other.texts_of("command")
+    assert other.texts_of("command") == viewer.texts_of("command")
     names = [region["name"] for region in other.headers[0]["regions"]]
-    changes = [change for text in other.told("changes") for change in text["changes"]] or other.headers[0]["changes"]
+    received = [change for text in other.messages_of("changes") for change in text["changes"]]
+    changes = received or other.headers[0]["changes"]
     shapes = {names[change["region"]]: change["shape"] for change in changes}
     assert shapes["pile 1"]["radius"] == 0.9 and shapes["seen 1"]["radius"] == 0.3
     drawing = {"centre": [12.0, 2.0, 3.0], "half_axes": (0.4 * np.eye(3)).tolist()}
@@ -58,7 +59,7 @@ def test_commands_are_followed_told_to_all_and_repeat_to_the_last_bit(live, tmp_
     assert same(record, load_record(again.folder))
 
 
-def test_what_cannot_be_is_refused_with_the_reason(live):
+def test_invalid_commands_are_rejected_with_a_reason(live):
     running = live("harbour", commands=True)
     wrong = {
         "expected one of ship": {"command": "shift_region", "region": "shop", "by": [1, 0, 0]},
@@ -82,18 +83,18 @@ def test_what_cannot_be_is_refused_with_the_reason(live):
 
 
 @pytest.mark.medium
-def test_without_commands_every_order_is_refused(live):
+def test_without_commands_flag_every_command_is_rejected(live):
     running = live(rate=4.0)
     with running.viewer() as viewer:
         assert viewer.until("header")["run"]["commands"] is False
         viewer.command(**ARM)
         viewer.until("end")
-    assert viewer.said("refused") == ["commands are off: start with --commands"]
+    assert viewer.texts_of("refused") == ["commands are off: start with --commands"]
     assert not (running.end().folder / "commands.jsonl").exists()
 
 
 @pytest.mark.slow
-def test_a_run_that_repeats_commands_takes_no_others(live, tmp_path):
+def test_replayed_run_accepts_no_other_commands(live, tmp_path):
     (tmp_path / "commands.jsonl").write_text(
         '{"step":20,"command":{"command":"shift_region","region":"ship","by":[0.0,3.0,0.0]}}\n'
     )
@@ -102,14 +103,14 @@ def test_a_run_that_repeats_commands_takes_no_others(live, tmp_path):
         viewer.until("header")
         viewer.command(command="set_mode", mode="hold")
         viewer.until("end")
-    assert viewer.said("refused") == ["this run repeats the commands of a log and takes no others"]
-    assert "ship moved by (0, 3, 0) m" in viewer.said("command")
+    assert viewer.texts_of("refused") == ["this run repeats the commands of a log and takes no others"]
+    assert "ship moved by (0, 3, 0) m" in viewer.texts_of("command")
     time, shift = viewer.column("time"), viewer.column("ship.shift.y")
     assert np.array_equal(shift, np.where(time < 0.2, 0.0, 3.0))
 
 
 @pytest.mark.slow
-def test_a_ground_station_and_a_viewer_order_the_same_run(live):
+def test_ground_station_and_viewer_command_the_same_run(live):
     from tests.cosim.run.test_run_on_a_link import Station, command, on
 
     with Station(command(400, 1.0), command(192, -1.0, 1.0, 0.0, 0.7)) as station:
@@ -120,4 +121,4 @@ def test_a_ground_station_and_a_viewer_order_the_same_run(live):
             viewer.until("end")
     log = (running.end().folder / "commands.jsonl").read_text()
     assert '"arm"' in log and '"shift_region"' in log
-    assert "Armed" in viewer.said("command") and "ship moved by (0, 1, 0) m" in viewer.said("command")
+    assert "Armed" in viewer.texts_of("command") and "ship moved by (0, 1, 0) m" in viewer.texts_of("command")

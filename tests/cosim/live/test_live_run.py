@@ -1,4 +1,4 @@
-"""A run that is shown while it goes on: viewers see the record, and the record does not know of them."""
+"""A run with a live view: viewers receive the record, and do not change it."""
 
 import logging
 import socket
@@ -30,7 +30,7 @@ def test_viewers_see_rows_of_the_record_to_the_last_bit(live):
 
 
 @pytest.mark.medium
-def test_the_record_is_the_same_whoever_watches(live, tmp_path):
+def test_viewers_do_not_change_the_record(live, tmp_path):
     alone = run_scenario(load_scenario("harbour", ["time.duration=2"]), tmp_path / "alone", report=False)
     running = live(rate=4.0)
     with running.viewer() as one, running.viewer() as other:
@@ -41,11 +41,11 @@ def test_the_record_is_the_same_whoever_watches(live, tmp_path):
 
 
 @pytest.mark.slow
-def test_who_comes_late_gets_what_was(live):
+def test_late_viewer_receives_the_history(live):
     running = live(rate=2.0)
     with running.viewer() as early:
         while not early.rows or early.column("time")[-1] < 0.5:
-            early.hear()
+            early.receive()
         with running.viewer() as late:
             late.until("rows")
             assert late.column("time")[0] == 0.0
@@ -55,7 +55,7 @@ def test_who_comes_late_gets_what_was(live):
 
 
 @pytest.mark.slow
-def test_a_viewer_that_takes_nothing_holds_nobody_up(live, tmp_path):
+def test_stalled_viewer_does_not_block_others(live, tmp_path):
     running = live(rate=2.0)
     host, port = running.url.removeprefix("http://").strip("/").split(":")
     with socket.create_connection((host, int(port))) as lazy:
@@ -71,11 +71,11 @@ def test_a_viewer_that_takes_nothing_holds_nobody_up(live, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_reset_begins_another_run_for_the_viewers(live):
+def test_reset_starts_a_new_run_for_the_viewers(live):
     running = live(commands=True, await_arm=False, rate=2.0)
     with running.viewer() as viewer:
         while not viewer.rows or viewer.column("time")[-1] < 0.2:
-            viewer.hear()
+            viewer.receive()
         viewer.command(command="reset")
         assert viewer.until("end")["status"] == "reset"
         viewer.until("header")
@@ -83,12 +83,12 @@ def test_a_reset_begins_another_run_for_the_viewers(live):
         assert viewer.column("time")[0] == 0.0
         viewer.command(command="set_mode", mode="hold")
         assert viewer.until("end")["status"] == "completed"
-    assert "Holds its place" in viewer.said("command")
+    assert "Holds its place" in viewer.texts_of("command")
     assert running.end().folder.name == "live-2"
 
 
 @pytest.mark.slow
-def test_what_breaks_in_the_view_is_logged_and_the_run_goes_on(live, monkeypatch, caplog):
+def test_view_error_is_logged_and_the_run_continues(live, monkeypatch, caplog):
     def broken(*_):
         raise ZeroDivisionError("made up")
 
@@ -98,7 +98,7 @@ def test_what_breaks_in_the_view_is_logged_and_the_run_goes_on(live, monkeypatch
     assert "the run goes on" in caplog.text and "made up" in caplog.text
 
 
-def test_what_the_helm_refuses_later_is_told_too(live, caplog):
+def test_late_command_rejection_reaches_the_viewer(live, caplog):
     running = live("harbour", "commands.obstacles=1", commands=True)
     with running.viewer() as viewer, caplog.at_level(logging.WARNING):
         viewer.until("header")
@@ -106,4 +106,4 @@ def test_what_the_helm_refuses_later_is_told_too(live, caplog):
             viewer.command(command="add_obstacle", number=number, position=[1.0, 50.0, 3.0], radius=0.5)
         viewer.command(**ARM)
         viewer.until("end")
-    assert any("no room for obstacle 2" in text for text in viewer.said("warning"))
+    assert any("no room for obstacle 2" in text for text in viewer.texts_of("warning"))

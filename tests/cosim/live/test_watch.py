@@ -1,4 +1,4 @@
-"""A run in the terminal."""
+"""``cosim watch``: a run displayed in the terminal."""
 
 import io
 import re
@@ -35,7 +35,7 @@ def drawn(look, width, height, **options):
 
 
 @pytest.mark.medium
-def test_without_a_terminal_one_picture_tells_how_it_ended(paper, capsys):
+def test_without_a_terminal_one_frame_shows_the_result(paper, capsys):
     assert main(["watch", str(paper.folder)]) == 0
     out = capsys.readouterr().out
     assert "\x1b" not in out
@@ -57,7 +57,7 @@ def test_every_picture_of_a_run_fits_its_terminal(paper, size):
         assert len(lines) <= size[1] and max(map(len, lines)) <= size[0]
 
 
-def test_what_is_violated_is_told_by_sign_and_word_without_colour(paper):
+def test_violations_are_readable_without_color(paper):
     record = load_record(paper.folder)
     k = int(np.argmin(record["SR1.clearance"]))
     frames = list(looks(str(paper.folder), rate=None))
@@ -69,7 +69,7 @@ def test_what_is_violated_is_told_by_sign_and_word_without_colour(paper):
     assert "Gives way to" in text
 
 
-def test_a_terminal_of_plain_letters_gets_plain_bars(paper):
+def test_ascii_terminal_gets_ascii_bars(paper):
     *_, last = looks(str(paper.folder), rate=None)
     file = io.TextIOWrapper(io.BytesIO(), encoding="ascii", errors="replace")
     console = Console(file=file, width=80)
@@ -79,14 +79,14 @@ def test_a_terminal_of_plain_letters_gets_plain_bars(paper):
     assert "#" in file.buffer.getvalue().decode() and "?????" not in file.buffer.getvalue().decode()
 
 
-def test_colours_go_where_they_are_not_wanted(paper, monkeypatch):
+def test_colors_are_omitted_if_unwanted(paper, monkeypatch):
     *_, last = looks(str(paper.folder), rate=None)
     assert "\x1b[3" in drawn(last, 80, 24, force_terminal=True, color_system="standard")
     monkeypatch.setenv("NO_COLOR", "1")
     assert "\x1b[3" not in drawn(last, 80, 24, force_terminal=True)
 
 
-def test_names_cannot_steer_the_terminal(paper):
+def test_names_cannot_inject_terminal_codes(paper):
     *_, last = looks(str(paper.folder), rate=None)
     header = last.header | {"title": "a\x1b[2Jb\x07"}
     assert "\x1b" not in drawn(Look(header, last.row, "\x1b]0;x\x07"), 80, 24)
@@ -126,25 +126,25 @@ def test_a_live_run_is_watched_to_its_end(live):
         viewer.command(**ARM)
         viewer.until("end")
         assert ended(watching)
-    assert seen[-1].ended == ("completed", viewer.told("end")[0]["verdict"])
+    assert seen[-1].ended == ("completed", viewer.messages_of("end")[0]["verdict"])
     assert seen[-1]["time"] == 2.0 and len(seen) > 2
 
 
 @pytest.mark.parametrize("what", ["ws://127.0.0.1:1", "1", "ftp://127.0.0.1:21", "ws://[", "ws://127.0.0.1"])
-def test_where_nothing_is_one_line_says_so(what, capsys):
+def test_missing_run_gives_one_line_error(what, capsys):
     assert main(["watch", what]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and "cosim: " in error
 
 
-def test_no_run_is_told():
+def test_missing_run_or_server_is_reported():
     with pytest.raises(Exception, match="holds no run"):
         next(looks("no/such/folder"))
     with pytest.raises(TelemetryError, match="cannot be watched"):
         next(looks("1"))
 
 
-def test_a_run_that_was_killed_before_its_first_rows_keeps_nobody_waiting(paper, tmp_path, monkeypatch):
+def test_run_killed_before_its_first_rows_does_not_block_watch(paper, tmp_path, monkeypatch):
     monkeypatch.setattr("cosim.live.watching.sources._FRESH", 0.0)
     (tmp_path / PARTS).mkdir()
     shutil.copy(paper.folder / SCENARIO, tmp_path)
@@ -154,7 +154,7 @@ def test_a_run_that_was_killed_before_its_first_rows_keeps_nobody_waiting(paper,
 
 
 @pytest.mark.parametrize("garbage", ["no parquet", "another table"])
-def test_parts_that_are_no_record_are_named_in_one_line(paper, tmp_path, garbage):
+def test_invalid_parts_give_one_line_error(paper, tmp_path, garbage):
     (tmp_path / PARTS).mkdir()
     shutil.copy(paper.folder / SCENARIO, tmp_path)
     part = tmp_path / PARTS / "000000.parquet"

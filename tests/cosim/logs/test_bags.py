@@ -123,7 +123,7 @@ def columns(tmp_path):
     return tmp_path / "map.toml"
 
 
-def test_a_bag_comes_out_as_the_dive_was(bag, columns, dive, tmp_path):
+def test_imported_bag_matches_the_dive(bag, columns, dive, tmp_path):
     run = cosim.import_log(bag, "bluerov2_heavy", tmp_path / "run", columns=columns, report=False)
     for names, expected in (
         ([f"position.{a}" for a in "xyz"], dive.position),
@@ -137,7 +137,7 @@ def test_a_bag_comes_out_as_the_dive_was(bag, columns, dive, tmp_path):
     assert facts.start == pytest.approx(START, abs=1e-3)
 
 
-def test_a_bag_without_its_end_is_read_as_far_as_it_goes(bag, columns, tmp_path):
+def test_truncated_bag_is_read_to_its_end(bag, columns, tmp_path):
     data = bag.read_bytes()
     (tmp_path / "cut.mcap").write_bytes(data[: len(data) // 2])
     run = cosim.import_log(tmp_path / "cut.mcap", "bluerov2_heavy", tmp_path / "run", columns=columns, report=False)
@@ -156,7 +156,7 @@ def test_a_bag_without_its_end_is_read_as_far_as_it_goes(bag, columns, tmp_path)
         ("data[7]", "data[8]", r"/thrusters has no field 'data\[8\]'"),
     ],
 )
-def test_what_a_bag_lacks_is_named(bag, columns, tmp_path, old, new, what):
+def test_missing_bag_topics_are_named(bag, columns, tmp_path, old, new, what):
     columns.write_text(MAP.replace(old, new, 1))
     with pytest.raises(ImportLogError, match=what):
         cosim.import_log(bag, "bluerov2_heavy", tmp_path / "run", columns=columns)
@@ -192,7 +192,7 @@ def write_ulog(path, dive):
                 file.write(message("D", data))
 
 
-def test_a_log_of_px4_comes_out_as_the_dive_was(dive, tmp_path):
+def test_imported_px4_log_matches_the_dive(dive, tmp_path):
     path = tmp_path / "dive.ulg"
     write_ulog(path, dive)
     theirs = {data.name: data.data for data in pyulog.ULog(str(path)).data_list}
@@ -209,7 +209,7 @@ def test_a_log_of_px4_comes_out_as_the_dive_was(dive, tmp_path):
     assert "something_else" in load_log_facts(run.folder).unread
 
 
-def test_a_log_of_px4_that_breaks_off_is_read_as_far_as_it_goes(dive, tmp_path):
+def test_truncated_px4_log_is_read_to_its_end(dive, tmp_path):
     path = tmp_path / "dive.ulg"
     write_ulog(path, dive)
     data = path.read_bytes()
@@ -219,7 +219,7 @@ def test_a_log_of_px4_that_breaks_off_is_read_as_far_as_it_goes(dive, tmp_path):
 
 
 @pytest.mark.parametrize("suffix", [".mcap", ".ulg"])
-def test_what_is_not_installed_is_said(tmp_path, columns, monkeypatch, suffix):
+def test_missing_library_is_reported(tmp_path, columns, monkeypatch, suffix):
     import sys
 
     for name in ("mcap_ros2", "mcap_ros2.decoder", "pyulog", "pyulog.core"):

@@ -6,7 +6,7 @@ import pytest
 from cosim.logs.clocks import Clock, VehicleClock
 
 
-def test_drift_and_delays_are_undone():
+def test_clock_drift_and_delays_are_corrected():
     rng = np.random.default_rng(1)
     true = np.sort(rng.uniform(0.0, 1800.0, 20_000))
     stamps = 37.0 + true * (1.0 - 4e-5)  # the vehicle's clock is slow
@@ -19,7 +19,7 @@ def test_drift_and_delays_are_undone():
     assert "+40 ppm" in clock.words()
 
 
-def test_a_restart_of_the_vehicle_gets_a_line_of_its_own():
+def test_vehicle_restart_starts_a_new_clock_fit():
     clock = VehicleClock()
     first, second = np.arange(100.0, 160.0), np.arange(5.0, 60.0)
     stamps = np.concatenate([first, second])
@@ -30,14 +30,14 @@ def test_a_restart_of_the_vehicle_gets_a_line_of_its_own():
     assert clock.restarts == [1205.0]
 
 
-def test_without_a_stamp_the_time_of_writing_counts():
+def test_messages_without_stamp_use_the_log_time():
     clock = VehicleClock()
     clock.put(1.0, 11.0)
     assert clock.times(np.array([np.nan, 2.0]), np.array([50.0, 50.0])).tolist() == [50.0, 12.0]
 
 
 @pytest.mark.parametrize("by", [-5000.0, -2.0, 86400.0, 1.7e9])
-def test_jumps_become_pauses_of_a_second_in_one_and_in_many(by):
+def test_clock_jumps_become_one_second_pauses_in_any_blocks(by):
     said = np.arange(0.0, 20.0, 0.1)
     said[120:] += by
     one, many = Clock(), Clock()
@@ -50,14 +50,14 @@ def test_jumps_become_pauses_of_a_second_in_one_and_in_many(by):
     assert [by_ for _, by_ in one.jumps] == pytest.approx([by + 0.1]) == [by_ for _, by_ in many.jumps]
 
 
-def test_pauses_and_messages_out_of_order_are_no_jumps():
+def test_pauses_and_unordered_messages_are_no_jumps():
     said = np.array([0.0, 1.0, 0.4, 2.0, 3000.0, 3000.1])
     clock = Clock()
     assert clock.times(said).tolist() == said.tolist()
     assert clock.jumps == []
 
 
-def test_two_jumps_within_a_block():
+def test_two_jumps_within_a_block_are_found():
     said = np.concatenate([np.arange(0.0, 5.0, 0.5), np.arange(100000.0, 100005.0, 0.5), np.arange(3.0, 8.0, 0.5)])
     one, many = Clock(), Clock()
     np.testing.assert_allclose(many.times(said), [one.time(t) for t in said.tolist()])

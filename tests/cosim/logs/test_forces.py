@@ -24,12 +24,12 @@ def topic(quantity, size=16):
         (1900, 18, 6.02), (1900, 20, 6.72), (1500, 16, 0.0), (1700, 16, 1.82), (1300, 16, -1.44),
     ],
 )  # fmt: skip
-def test_the_t200_gives_what_its_maker_measured(pulse, voltage, kilograms):
+def test_t200_force_matches_manufacturer_data(pulse, voltage, kilograms):
     force = force_of_pulse(np.array([float(pulse)]), np.array([float(voltage)]))[0]
     assert force == pytest.approx(kilograms * 9.80665, abs=1e-9)
 
 
-def test_the_t200_gives_more_at_more_voltage_and_nothing_about_neutral():
+def test_t200_force_grows_with_voltage_and_is_zero_at_neutral():
     pulses = np.arange(1100.0, 1901.0, 5.0)
     low, high = (force_of_pulse(pulses, np.full_like(pulses, volts)) for volts in (12.0, 15.3))
     assert (np.diff(high) >= 0.0).all()
@@ -38,7 +38,7 @@ def test_the_t200_gives_more_at_more_voltage_and_nothing_about_neutral():
     assert np.isnan(force_of_pulse(np.array([np.nan, 1600.0]), np.array([15.0, np.nan]))).all()
 
 
-def test_pulses_give_the_forces_that_a_simulated_autopilot_gives_by_them():
+def test_pulse_forces_match_the_simulated_autopilot():
     commands = commands_of(topic("pulses"), HEAVY, None, "", {})
     pulses = np.array([[1500.0, 1520.0, 1600.0, 1400.0, 1900.0, 1100.0, 1750.0, 1250.0, *[0.0] * 8]])
     table = HEAVY.autopilot
@@ -47,7 +47,7 @@ def test_pulses_give_the_forces_that_a_simulated_autopilot_gives_by_them():
     assert commands.through == "thrusters"
 
 
-def test_a_reversed_motor_pushes_the_other_way_also_by_the_curve_of_the_t200():
+def test_reversed_motor_negates_the_force():
     pulses = np.full((1, 16), 1600.0)
     for curve in (None, "t200"):
         plain, turned = (
@@ -58,7 +58,7 @@ def test_a_reversed_motor_pushes_the_other_way_also_by_the_curve_of_the_t200():
         np.testing.assert_allclose(turned, plain * np.where(np.arange(8) == 2, -1.0, 1.0))
 
 
-def test_the_autopilot_says_which_output_drives_which_motor():
+def test_motor_outputs_follow_autopilot_parameters():
     swapped = {f"SERVO{n}_FUNCTION": 33.0 + motor for n, motor in enumerate([1, 0, 2, 3, 4, 5, 6, 7], 1)}
     assert channels_of(HEAVY.autopilot, HEAVY, swapped) == (2, 1, 3, 4, 5, 6, 7, 8)
     six = {f"SERVO{n}_FUNCTION": 32.0 + n for n in range(1, 7)}
@@ -66,7 +66,7 @@ def test_the_autopilot_says_which_output_drives_which_motor():
         channels_of(HEAVY.autopilot, HEAVY, six)
 
 
-def test_efforts_and_forces_go_by_the_thrusters_limits():
+def test_efforts_and_forces_use_the_thruster_limits():
     values = np.array([[1.0, -1.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.25]])
     effort = commands_of(topic("effort", 8), HEAVY, None, "", {}).forces(values, np.zeros(1))
     np.testing.assert_allclose(effort, 40.0 * values)
@@ -92,7 +92,7 @@ def test_sticks_and_wrenches_act_on_the_body():
         ("bluerov2_heavy", "t200", "--curve t200 needs the voltage, expected --voltage"),
     ],
 )
-def test_what_pulses_need_is_named(vehicle, curve, what):
+def test_missing_requirements_of_pulses_are_named(vehicle, curve, what):
     with pytest.raises(ImportLogError, match=what):
         commands_of(topic("pulses"), load_vehicle(vehicle), curve, "", {})
     with pytest.raises(ImportLogError, match="has 4 outputs, expected 8"):
@@ -100,7 +100,7 @@ def test_what_pulses_need_is_named(vehicle, curve, what):
 
 
 @pytest.mark.parametrize("curve", ["linear", "quadratic", "t200"])
-def test_a_gap_of_pulses_is_a_gap_of_forces_and_an_output_that_is_off_gives_none(curve):
+def test_pulse_gaps_give_nan_forces_and_disabled_outputs_zero(curve):
     commands = commands_of(topic("pulses"), HEAVY, curve, "15 V", {})
     pulses = np.array([[np.nan] * 16, [0.0] * 16, [1700.0] * 16])
     forces = commands.forces(pulses, np.full(3, 15.0))

@@ -40,7 +40,7 @@ def test_euler_angles_are_products_of_elementary_rotations(order, angles):
 
 
 @given(roll=st.floats(-3.1, 3.1), pitch=st.floats(-1.5, 1.5), yaw=st.floats(-3.1, 3.1))
-def test_roll_pitch_yaw_are_those_of_pymavlink(roll, pitch, yaw):
+def test_roll_pitch_yaw_match_pymavlink(roll, pitch, yaw):
     m = Matrix3()
     m.from_euler(roll, pitch, yaw)
     expected = [[getattr(row, axis) for axis in "xyz"] for row in (m.a, m.b, m.c)]
@@ -49,7 +49,7 @@ def test_roll_pitch_yaw_are_those_of_pymavlink(roll, pitch, yaw):
     np.testing.assert_allclose(euler_zyx(q[None])[0], (roll, pitch, yaw), atol=1e-7)
 
 
-def test_a_vehicle_that_looks_north_in_enu_looks_north_in_ned():
+def test_heading_north_in_enu_is_heading_north_in_ned():
     """In ENU and FLU, yaw counts from east to north: north is a yaw of 90 degrees; in NED and FRD it is none."""
     north = quaternions_of_angles(np.array([[np.pi / 2.0, 0.0, 0.0]]), "ZYX")
     q = turn_quaternions(north, "ENU", "FLU")
@@ -62,7 +62,7 @@ def test_a_vehicle_that_looks_north_in_enu_looks_north_in_ned():
 @pytest.mark.parametrize("world", WORLDS)
 @pytest.mark.parametrize("body", BODIES)
 @given(angles=ANGLES)
-def test_a_vector_is_the_same_by_each_way_round(world, body, angles):
+def test_vector_rotation_commutes_with_frame_conversion(world, body, angles):
     q = quaternions_of_angles(np.array([angles]), "ZYX")
     vector = np.array([0.3, -0.7, 1.1])  # in that body frame
     expected = WORLDS[world] @ rotation_matrix(q[0]) @ vector
@@ -71,13 +71,13 @@ def test_a_vector_is_the_same_by_each_way_round(world, body, angles):
 
 
 @given(angles=ANGLES)
-def test_vectors_of_the_world_are_turned_into_the_body(angles):
+def test_world_vectors_are_rotated_to_the_body(angles):
     q = quaternions_of_angles(np.array([angles]), "ZYX")
     vector = np.array([[0.3, -0.7, 1.1]])
     np.testing.assert_allclose(rotate_to_body(q, vector)[0], rotation_matrix(q[0]).T @ vector[0], atol=1e-12)
 
 
 @pytest.mark.parametrize("matrix", [*WORLDS.values(), *BODIES.values()])
-def test_frames_are_turned_and_not_mirrored(matrix):
+def test_frame_conversions_are_proper_rotations(matrix):
     np.testing.assert_allclose(matrix @ matrix.T, np.eye(3))
     assert np.linalg.det(matrix) == pytest.approx(1.0)

@@ -53,7 +53,7 @@ def facts_by_quantity(run):
 
 
 @pytest.mark.medium
-def test_every_sample_of_a_tlog_is_there(tlog):
+def test_every_tlog_sample_is_imported(tlog):
     read = messages_of(TLOG, "ATTITUDE", "LOCAL_POSITION_NED", "SERVO_OUTPUT_RAW", "SCALED_PRESSURE2")
     topics = facts_by_quantity(tlog)
     for quantity, kind, rate in (
@@ -65,7 +65,7 @@ def test_every_sample_of_a_tlog_is_there(tlog):
 
 
 @pytest.mark.medium
-def test_attitudes_and_positions_are_where_the_vehicles_clock_has_them(tlog):
+def test_attitudes_and_positions_follow_the_vehicle_clock(tlog):
     """At the stamps of the vehicle, the rows are what it said; a constant offset of its clock is all that is free."""
     read = messages_of(TLOG, "ATTITUDE", "LOCAL_POSITION_NED")
     record, facts = tlog.record, load_log_facts(tlog.folder)
@@ -88,7 +88,7 @@ def test_attitudes_and_positions_are_where_the_vehicles_clock_has_them(tlog):
             assert np.isfinite(record[name]).mean() > 0.99
 
 
-def test_depth_is_by_pressure_as_the_autopilot_turns_it(tlog):
+def test_depth_is_derived_from_pressure_as_in_the_autopilot(tlog):
     parameters = {m.param_id: m.param_value for m in messages_of(TLOG, "PARAM_VALUE")["PARAM_VALUE"]}
     pressures = [100.0 * m.press_abs for m in messages_of(TLOG, "SCALED_PRESSURE2")["SCALED_PRESSURE2"]]
     deep = (np.array(pressures) - parameters["BARO2_GND_PRESS"]) / (9800.0 * parameters["BARO_SPEC_GRAV"])
@@ -97,7 +97,7 @@ def test_depth_is_by_pressure_as_the_autopilot_turns_it(tlog):
     assert np.isclose(found[:, None], deep[None], atol=1e-9).any(axis=1).all()
 
 
-def test_sensors_say_when_they_sampled(tlog):
+def test_sensor_sampling_times_are_recorded(tlog):
     record = tlog.record
     stamps = record["measured.time.depth_sensor"]
     known = np.isfinite(stamps)
@@ -106,13 +106,13 @@ def test_sensors_say_when_they_sampled(tlog):
     assert len(np.unique(stamps[known])) >= 520  # of 635, of which some come twice within a row
 
 
-def test_what_was_not_read_is_named(tlog):
+def test_unread_messages_are_listed(tlog):
     unread = load_log_facts(tlog.folder).unread
     assert unread["AHRS2"] == 5245 and unread["GPS_INPUT"] == 1011
     assert unread["MANUAL_CONTROL (sticks)"] > 1400  # servo outputs are there, so they are not needed
 
 
-def test_a_tlog_has_the_columns_of_any_run(tlog):
+def test_imported_tlog_has_the_columns_of_a_run(tlog):
     assert tlog.summary["status"] == "imported" and not tlog.summary["has_goal"]
     again = cosim.load_run(tlog.folder)
     assert json_text(again.summary) == json_text(tlog.summary)
@@ -124,7 +124,7 @@ def test_a_tlog_has_the_columns_of_any_run(tlog):
     assert 60.0 < np.abs(wrench[known, :3]).max() < 70.0
 
 
-def test_a_dataflash_log_is_what_pymavlink_reads(dataflash):
+def test_dataflash_import_matches_pymavlink(dataflash):
     """Every message is on the one clock of the autopilot, so rows are exact."""
     read = messages_of(DATAFLASH, "XKF1", "XKQ", "RATE", "RCOU", "BARO", "BAT")
     topics, facts, record = facts_by_quantity(dataflash), load_log_facts(dataflash.folder), dataflash.record
@@ -143,7 +143,7 @@ def test_a_dataflash_log_is_what_pymavlink_reads(dataflash):
 
 
 @pytest.mark.medium
-def test_a_vehicle_of_another_frame_is_refused_and_leaves_nothing(tmp_path):
+def test_vehicle_of_another_frame_is_rejected_without_files(tmp_path):
     with pytest.raises(ImportLogError, match=r"small\.BIN: the autopilot's frame is vectored, expected vectored_6dof"):
         cosim.import_log(DATAFLASH, "bluerov2_heavy", tmp_path / "run")
     with pytest.raises(ImportLogError, match=r"vehicle 'odin' has no table \[autopilot\]"):
@@ -157,14 +157,14 @@ def heartbeat(kind, autopilot=3):
 
 
 @pytest.mark.parametrize(("kind", "words"), [(2, "quadrotor"), (1, "fixed wing"), (10, "ground rover")])
-def test_logs_of_what_flies_or_drives_are_refused(tmp_path, kind, words):
+def test_logs_of_non_underwater_vehicles_are_rejected(tmp_path, kind, words):
     path = tmp_path / "it.tlog"
     path.write_bytes(struct.pack(">Q", 1_700_000_000_000_000) + heartbeat(kind))
     with pytest.raises(ImportLogError, match=f"is of a {words}, expected the log of an underwater vehicle"):
         cosim.import_log(path, "bluerov2_heavy", tmp_path / "run")
 
 
-def test_sticks_are_the_commands_where_no_servo_output_is_logged(tmp_path):
+def test_sticks_replace_missing_servo_outputs(tmp_path):
     sender = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
     pilot = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
     with (tmp_path / "it.tlog").open("wb") as file:
@@ -186,7 +186,7 @@ def test_sticks_are_the_commands_where_no_servo_output_is_logged(tmp_path):
 
 @pytest.mark.medium(fast=2)
 @pytest.mark.parametrize(("path", "cut"), [(TLOG, 0.3), (DATAFLASH, 0.61803), (DATAFLASH, 0.9)])
-def test_a_log_that_breaks_off_is_read_as_far_as_it_goes(tmp_path, path, cut, six_thrusters):
+def test_truncated_log_is_read_to_its_end(tmp_path, path, cut, six_thrusters):
     data = path.read_bytes()
     (tmp_path / path.name).write_bytes(data[: int(cut * len(data))])
     vehicle = "bluerov2_heavy" if path is TLOG else six_thrusters
@@ -196,7 +196,7 @@ def test_a_log_that_breaks_off_is_read_as_far_as_it_goes(tmp_path, path, cut, si
 
 
 @pytest.mark.medium
-def test_junk_within_a_log_costs_no_more_than_what_it_hides(tmp_path):
+def test_junk_in_a_log_loses_only_overwritten_frames(tmp_path):
     data = bytearray(TLOG.read_bytes())
     rng = np.random.default_rng(3)
     for start in (100_000, 700_000, 1_200_000):
@@ -218,7 +218,7 @@ def test_junk_within_a_log_costs_no_more_than_what_it_hides(tmp_path):
         ("it.ulg", b"ULog but not really", "cannot be read as a ULog file"),
     ],
 )
-def test_what_is_no_log_is_refused_in_one_line(tmp_path, name, content, what):
+def test_invalid_log_gives_one_line_error(tmp_path, name, content, what):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(CosimError) as caught:
         cosim.import_log(tmp_path / name, "bluerov2_heavy", tmp_path / "run")
@@ -227,14 +227,14 @@ def test_what_is_no_log_is_refused_in_one_line(tmp_path, name, content, what):
     assert not (tmp_path / "run").exists()
 
 
-def test_a_log_of_another_autopilot_firmware_is_refused(tmp_path, six_thrusters):
+def test_log_of_another_firmware_is_rejected(tmp_path, six_thrusters):
     data = DATAFLASH.read_bytes().replace(b"ArduSub V4.1.0", b"ArduCopter V4 ")
     (tmp_path / "it.bin").write_bytes(data)
     with pytest.raises(ImportLogError, match="is of a vehicle of ArduCopter"):
         cosim.import_log(tmp_path / "it.bin", six_thrusters, tmp_path / "run")
 
 
-def test_dataflash_formats_are_those_of_pymavlink():
+def test_dataflash_parser_matches_pymavlink():
     """Every message that the readers take comes to the same numbers."""
     from cosim.logs.formats.dataflash import _messages
 
@@ -253,7 +253,7 @@ def test_dataflash_formats_are_those_of_pymavlink():
 
 
 @pytest.mark.medium
-def test_report_replay_and_export_work_on_it(tlog, tmp_path):
+def test_report_replay_and_export_work_on_an_imported_log(tlog, tmp_path):
     folder = tmp_path / "small"
     shutil.copytree(tlog.folder, folder)
     from cosim.run.run_folder import report_again
@@ -270,7 +270,7 @@ def test_report_replay_and_export_work_on_it(tlog, tmp_path):
 
 
 @pytest.mark.medium
-def test_a_scenario_judges_a_log(tmp_path):
+def test_scenario_regions_are_evaluated_on_a_log(tmp_path):
     run = cosim.import_log(TLOG, "bluerov2_heavy", tmp_path / "run", scenario="depth-transit", report=False)
     record = run.record
     assert run.summary["has_goal"] and not run.summary["reached"]
@@ -282,13 +282,13 @@ def test_a_scenario_judges_a_log(tmp_path):
     np.testing.assert_allclose(record["band.clearance"][known], expected[known], atol=1e-9)
 
 
-def test_an_imported_run_cannot_be_run(tlog):
+def test_imported_run_cannot_be_rerun(tlog):
     with pytest.raises(CosimError, match=r"log is 'small\.tlog', expected none: a run that was imported cannot be run"):
         cosim.load_scenario(tlog.folder / "scenario.toml")
 
 
 @pytest.mark.slow
-def test_a_run_that_goes_out_as_telemetry_comes_back_as_it_was(tmp_path):
+def test_run_round_trips_through_telemetry(tmp_path):
     """Through our own MAVLink and back: what was flown, at the rates of the link."""
     over = {"time.duration": 10.0, "vehicle": "bluerov2_heavy", "actuation.through": "thrusters"}
     flown = cosim.run_scenario(cosim.load_scenario("depth-transit").replace(over), tmp_path / "flown", report=False)

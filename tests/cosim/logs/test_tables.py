@@ -76,7 +76,7 @@ def write(tmp_path):
 
 
 @pytest.mark.parametrize(("suffix", "sep"), [(".csv", ","), (".csv", ";"), (".parquet", ",")])
-def test_a_dive_in_other_units_and_frames_comes_out_as_it_was(write, suffix, sep):
+def test_imported_table_in_other_units_and_frames_matches_the_dive(write, suffix, sep):
     dive = Dive(np.arange(0.0, 60.0, 0.05))
     run = write(frame_of(dive), suffix=suffix, sep=sep)
     record = run.record
@@ -98,7 +98,7 @@ def test_a_dive_in_other_units_and_frames_comes_out_as_it_was(write, suffix, sep
 @pytest.mark.medium(fast=5)
 @pytest.mark.parametrize("order", ["ZYX", "zyx", "XZY", "YXZ", "ZXZ"])
 @pytest.mark.parametrize("inverse", [False, True])
-def test_euler_angles_in_whichever_order(write, order, inverse):
+def test_euler_angles_of_any_order_are_imported(write, order, inverse):
     from scipy.spatial.transform import Rotation
 
     dive = Dive(np.arange(0.0, 20.0, 0.1))
@@ -120,7 +120,7 @@ inverse = {str(inverse).lower()}
     np.testing.assert_allclose(np.abs((found * dive.quaternion).sum(axis=1)), 1.0, atol=1e-9)
 
 
-def test_quaternions_with_the_scalar_last_and_velocity_over_ground(write):
+def test_scalar_last_quaternions_and_ground_velocity_are_imported(write):
     dive = Dive(np.arange(0.0, 30.0, 0.1))
     w, x, y, z = dive.quaternion.T
     frame = pd.DataFrame({"t": dive.times, "x": x, "y": y, "z": z, "w": w})
@@ -139,7 +139,7 @@ columns = ["vn", "ve", "vd"]
     np.testing.assert_allclose(record.stack([f"velocity.{a}" for a in "uvw"]), expected, atol=1e-9)
 
 
-def test_times_of_iso_8601_and_topics_with_times_of_their_own(write):
+def test_iso_8601_times_and_per_topic_times_are_imported(write):
     dive = Dive(np.arange(0.0, 20.0, 0.1))
     start = datetime.datetime(2025, 3, 1, 12, 0, 0, tzinfo=datetime.UTC)
     stamps = [(start + datetime.timedelta(seconds=float(t))).isoformat() for t in dive.times]
@@ -178,7 +178,7 @@ def test_gaps_and_missing_cells_are_marked(write):
 
 
 @pytest.mark.parametrize("by", [-30.0, 1e6])
-def test_a_jump_of_the_clock_is_a_marked_second(write, by):
+def test_clock_jump_becomes_a_marked_gap(write, by):
     dive = Dive(np.arange(0.0, 40.0, 0.05))
     frame = frame_of(dive)
     frame.loc[dive.times > 20.01, "t"] += 1e3 * by
@@ -207,7 +207,7 @@ def test_a_jump_of_the_clock_is_a_marked_second(write, by):
         ('["wx", "wy", "wz"]\nunit = "deg/s"', '["f1", "battery", "wz"]', r"rates reaches 1.58e\+04 rad/s"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_in_a_map_is_named(write, tmp_path, old, new, what):
+def test_invalid_column_map_is_rejected_by_name(write, tmp_path, old, new, what):
     assert old in MAP
     with pytest.raises(ImportLogError, match=what) as caught:
         write(frame_of(Dive(np.arange(0.0, 5.0, 0.1))), MAP.replace(old, new, 1))
@@ -215,7 +215,7 @@ def test_what_is_wrong_in_a_map_is_named(write, tmp_path, old, new, what):
     assert not (tmp_path / "run").exists()
 
 
-def test_a_map_goes_with_tables_alone(tmp_path):
+def test_column_map_is_accepted_only_with_tables(tmp_path):
     (tmp_path / "it.csv").write_text("t,x\n0,1\n")
     with pytest.raises(ImportLogError, match="needs a column map, expected --map FILE"):
         cosim.import_log(tmp_path / "it.csv", "bluerov2_heavy", tmp_path / "run")
@@ -224,7 +224,7 @@ def test_a_map_goes_with_tables_alone(tmp_path):
         cosim.import_log(tmp_path / "it.tlog", "bluerov2_heavy", tmp_path / "run", columns=tmp_path / "map.toml")
 
 
-def test_a_log_without_motion_says_what_is_needed(write):
+def test_log_without_motion_is_rejected_with_requirements(write):
     frame = pd.DataFrame({"t": np.arange(9.0), "battery": 15.0})
     text = 'time = { column = "t" }\n[voltage]\ncolumns = ["battery"]\n'
     with pytest.raises(
@@ -233,14 +233,14 @@ def test_a_log_without_motion_says_what_is_needed(write):
         write(frame, text)
 
 
-def test_a_log_without_commands_says_so(write):
+def test_log_without_commands_is_remarked(write):
     dive = Dive(np.arange(0.0, 5.0, 0.1))
     run = write(frame_of(dive), MAP[: MAP.index("[thrust]")])
     assert any("no commands of thrusters" in remark for remark in load_log_facts(run.folder).remarks)
     assert cosim.load_run(run.folder).summary["max_force"] != 0.0
 
 
-def test_a_scenario_sees_a_dive_enter_its_goal(write, tmp_path):
+def test_scenario_goal_is_evaluated_on_an_imported_dive(write, tmp_path):
     """Regions judge a log as they judge a run."""
     (tmp_path / "judge.toml").write_text("""vehicle = "bluerov2_heavy"
 title = "A ball"
@@ -262,7 +262,7 @@ radius = 0.3
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_memory_stays_as_it_is_however_long_the_log_is(tmp_path):
+def test_import_memory_does_not_grow_with_the_log(tmp_path):
     """A log that is eight times as long has 300 MB more of numbers, and takes no such memory."""
     (tmp_path / "map.toml").write_text(MAP)
     code = """

@@ -19,7 +19,7 @@ def cleaned(contents, tmp_path, quantity, times, values):
     return topic, rows
 
 
-def test_held_values_are_taken_once(contents, tmp_path):
+def test_held_values_count_once(contents, tmp_path):
     """A sensor of 10 Hz in a table of 100 Hz."""
     times = np.arange(0.0, 30.0, 0.01)
     values = np.sin(np.floor(times * 10.0 + 1e-6) / 10.0)
@@ -29,7 +29,7 @@ def test_held_values_are_taken_once(contents, tmp_path):
     np.testing.assert_allclose(rows[:, 1], np.sin(rows[:, 0]), atol=1e-9)
 
 
-def test_a_value_that_rests_is_still_sampled(contents, tmp_path):
+def test_constant_value_causes_no_gap(contents, tmp_path):
     """A held sensor that sees nothing new for five seconds has no gap there."""
     k = np.arange(3000)
     values = np.where((k // 10 > 100) & (k // 10 < 150), 1.0, np.sin(0.1 * (k // 10)))
@@ -38,7 +38,7 @@ def test_a_value_that_rests_is_still_sampled(contents, tmp_path):
 
 
 @pytest.mark.parametrize("quantity", ["depth", "pulses"])
-def test_values_that_change_each_time_and_commands_are_all_kept(contents, tmp_path, quantity):
+def test_changing_values_and_commands_are_all_kept(contents, tmp_path, quantity):
     rng = np.random.default_rng(0)
     values = rng.normal(size=500) if quantity == "depth" else np.repeat(rng.uniform(1100, 1900, 50), 10)
     topic, rows = cleaned(contents, tmp_path, quantity, np.arange(500) * 0.1, values)
@@ -46,7 +46,7 @@ def test_values_that_change_each_time_and_commands_are_all_kept(contents, tmp_pa
     np.testing.assert_array_equal(rows[:, 1], values)
 
 
-def test_bursts_are_spread_over_the_time_before_them(contents, tmp_path):
+def test_bursts_are_spread_over_the_preceding_time(contents, tmp_path):
     """Samples of 50 Hz that a link lets through ten at once."""
     true = np.arange(0.02, 40.0, 0.02)
     came = np.ceil(true / 0.2 - 1e-9) * 0.2 + 1e-4 * (np.arange(len(true)) % 10)
@@ -57,7 +57,7 @@ def test_bursts_are_spread_over_the_time_before_them(contents, tmp_path):
     assert topic.rate == pytest.approx(50.0, rel=0.02)
 
 
-def test_gaps_are_counted_and_no_row_lies_in_one(contents, tmp_path):
+def test_gaps_are_counted_and_contain_no_row(contents, tmp_path):
     times = np.arange(0.0, 60.0, 0.1)
     times = times[~((times > 10.05) & (times < 12.95)) & ~((times > 40.05) & (times < 41.0))]
     topic, _ = cleaned(contents, tmp_path, "position", times, np.column_stack([times, times, times]))
@@ -74,7 +74,7 @@ def test_gaps_are_counted_and_no_row_lies_in_one(contents, tmp_path):
         np.testing.assert_allclose(values[known], grid[known], atol=0.31 if read == "held" else 1e-9)
 
 
-def test_what_comes_out_of_order_is_left_out_and_counted(contents, tmp_path):
+def test_unordered_samples_are_dropped_and_counted(contents, tmp_path):
     times = np.arange(0.0, 10.0, 0.1)
     times[50] = times[47]
     topic, rows = cleaned(contents, tmp_path, "heading", times, 0.1 * times)
@@ -82,7 +82,7 @@ def test_what_comes_out_of_order_is_left_out_and_counted(contents, tmp_path):
     assert (np.diff(rows[:, 0]) > 0.0).all()
 
 
-def test_what_is_no_number_is_left_out_and_counted(contents, tmp_path):
+def test_non_finite_samples_are_dropped_and_counted(contents, tmp_path):
     values = np.arange(30.0)
     values[3] = np.nan
     values[7] = np.inf
@@ -94,12 +94,12 @@ def test_what_is_no_number_is_left_out_and_counted(contents, tmp_path):
 @pytest.mark.parametrize(
     ("quantity", "value"), [("rates", 80.0), ("depth", 2e4), ("pulses", 1.5e6), ("sticks", 1000.0)]
 )
-def test_a_size_that_cannot_be_is_a_wrong_unit(contents, tmp_path, quantity, value):
+def test_implausible_magnitude_is_reported_as_a_wrong_unit(contents, tmp_path, quantity, value):
     with pytest.raises(ImportLogError, match=rf"it: {quantity} reaches .* expected at most .* check its unit"):
         cleaned(contents, tmp_path, quantity, np.arange(9.0), np.full((9, 3), value))
 
 
-def test_attitudes_go_the_shorter_way_and_stay_unit(contents, tmp_path):
+def test_attitudes_are_interpolated_along_the_shorter_arc(contents, tmp_path):
     angle = np.arange(0.0, 20.0, 0.5)
     q = np.column_stack([np.cos(angle / 2), 0 * angle, 0 * angle, np.sin(angle / 2)])
     q[::2] *= -1.0  # the same attitudes
@@ -112,7 +112,7 @@ def test_attitudes_go_the_shorter_way_and_stay_unit(contents, tmp_path):
     assert np.abs(np.abs((found[:, [0, 3]] * expected).sum(axis=1)) - 1.0).max() < 1e-4
 
 
-def test_a_quick_phase_is_no_burst(contents, tmp_path):
+def test_fast_phase_is_not_a_burst(contents, tmp_path):
     """A link that is quick for a while, and slow for the rest."""
     times = np.concatenate([np.arange(0.0, 5.0, 0.02), np.arange(5.0, 100.0, 0.5)])
     topic, rows = cleaned(contents, tmp_path, "depth", times, np.sin(times))

@@ -1,4 +1,4 @@
-"""Threads of links end with the test that starts them, also where it fails."""
+"""Stop the link threads of each test, even if the test fails."""
 
 import importlib.util
 

@@ -1,4 +1,4 @@
-"""A ground station without a network: what it sends and gets goes through the wire format both ways."""
+"""A ground station without a network; its messages pass through the wire format both ways."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class Station:
             self.autopilot.tick(self.now)
 
     def send(self, message: Any, system: int = 255, component: int = 190, wire: Wire | None = None) -> list[Any]:
-        """Send a message, and return what came of it."""
+        """Send a message, and return the replies."""
         coder = mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
         (decoded,) = mavlink.MAVLink(None).parse_buffer(message.pack(coder))
         wire = wire or self.wire

@@ -1,4 +1,4 @@
-"""A vehicle that does little, and frames and links for it."""
+"""A stub vehicle, with frames and links for it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ KEY = bytes(range(32))
 
 
 class StubVehicle:
-    """Sends one message a snapshot, notes what comes, and echoes heartbeats with an acknowledgement."""
+    """Send one message per snapshot, record received messages, and acknowledge heartbeats."""
 
     def __init__(self):
         self.links, self.rows, self.received, self.ticks, self.closed = [], [], [], 0, False
@@ -99,7 +99,7 @@ def tended(link, message):
 
 
 def until(condition, seconds=60.0):
-    """Wait for a condition; return whether it came true."""
+    """Wait for a condition; return whether it became true."""
     deadline = time.monotonic() + seconds
     while not condition():
         if time.monotonic() > deadline:

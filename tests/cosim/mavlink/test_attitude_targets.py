@@ -31,7 +31,7 @@ def commands_of(made):
 
 
 @pytest.mark.parametrize(("thrust", "rate"), [(0.5, 0.0), (1.0, -0.3), (0.25, 0.15), (0.0, 0.3)])
-def test_thrust_is_a_rate_of_climb_to_an_ardusub_in_guided(thrust, rate):
+def test_thrust_is_a_climb_rate_in_ardusub_guided(thrust, rate):
     made = station("ardusub", REACH)
     for _ in range(5):  # it is streamed
         made.send(target(thrust=thrust))
@@ -39,14 +39,14 @@ def test_thrust_is_a_rate_of_climb_to_an_ardusub_in_guided(thrust, rate):
     assert attitude == TURNED and force == (0.0, 0.0, 0.0) and rate_down == pytest.approx(rate)
 
 
-def test_without_thrust_sticks_push_an_ardusub_in_alt_hold():
+def test_attitude_target_without_thrust_leaves_force_to_sticks_in_alt_hold():
     made = station("ardusub", DEPTH_HOLD)
     made.send(attitude_target(mavlink, 1, np.array(TURNED), None))
     assert commands_of(made) == [(TURNED, None, None)]
 
 
 @pytest.mark.parametrize("profile", ["px4", "generic"])
-def test_a_thrust_along_each_axis_pushes_a_px4_in_offboard(profile):
+def test_three_axis_thrust_acts_in_px4_offboard(profile):
     made = station(profile, REACH)
     made.send(attitude_target(mavlink, 1, np.array(TURNED), np.array([0.25, -0.5, 0.0])))
     made.send(target(thrust=0.125))  # which an underwater vehicle's PX4 takes for one ahead
@@ -61,7 +61,7 @@ def test_a_thrust_along_each_axis_pushes_a_px4_in_offboard(profile):
         ("ardusub", DEPTH_HOLD, 5.0, SetAttitude(None)),
     ],
 )
-def test_an_attitude_that_is_not_sent_any_more_ends(profile, mode, after, ends):
+def test_stale_attitude_target_expires(profile, mode, after, ends):
     made = station(profile, mode)
     made.send(target(RATES | (NO_THRUST if mode == DEPTH_HOLD else 0)))
     made.commanded()
@@ -84,14 +84,14 @@ def test_an_attitude_that_is_not_sent_any_more_ends(profile, mode, after, ends):
         ("ardusub", target(RATES | THRUST_BODY), "a rate of climb is"),
     ],
 )
-def test_what_cannot_be_followed_is_refused_by_name(profile, message, words):
+def test_invalid_attitude_targets_are_rejected_by_name(profile, message, words):
     made = station(profile, REACH)
     made.send(message)
     assert made.commanded() == [] and words in "".join(made.wire.texts)
 
 
 @pytest.mark.parametrize(("profile", "mask"), [("ardusub", RATES), ("ardusub", RATES | NO_THRUST), ("px4", RATES)])
-def test_set_points_before_their_mode_are_the_usual_way_and_worth_a_word_after_three_seconds(profile, mask):
+def test_setpoints_before_their_mode_are_announced_after_three_seconds(profile, mask):
     made = station(profile, {"commands.mode": 1.0})
     for _ in range(50):
         made.send(target(mask))

@@ -1,4 +1,4 @@
-"""The vehicle as a whole: whatever comes, and whatever the numbers are."""
+"""The complete vehicle under any message and any row values."""
 
 import math
 import struct
@@ -105,7 +105,7 @@ def stations():
 
 @settings(max_examples=examples(100), deadline=None)
 @given(st.lists(messages(), min_size=1, max_size=4))
-def test_no_message_raises(stations, sent):
+def test_no_message_raises_an_exception(stations, sent):
     for station in stations:
         for message in sent:
             try:
@@ -133,7 +133,7 @@ def test_a_command_is_acknowledged_once(stations, message):
 
 @settings(max_examples=examples(20), deadline=None)
 @given(st.binary(min_size=8 * len(COLUMNS), max_size=8 * len(COLUMNS)), st.integers(0, 5), st.floats())
-def test_no_number_of_a_row_raises(stations, bits, spoiled, often):
+def test_no_row_value_raises_an_exception(stations, bits, spoiled, often):
     whole, some = np.frombuffer(bits).copy(), row(time=1.0)
     whole[spoiled::4] = often
     some[spoiled::6] = whole[spoiled::6]
@@ -145,7 +145,7 @@ def test_no_number_of_a_row_raises(stations, bits, spoiled, often):
         station.wire.clear()
 
 
-def test_everything_promised_is_streamed_at_its_rate():
+def test_documented_messages_are_streamed_at_their_rates():
     promised = {
         "HEARTBEAT": 1.0, "SYS_STATUS": 2.0, "SYSTEM_TIME": 1.0, "ATTITUDE": 10.0, "ATTITUDE_QUATERNION": 10.0,
         "LOCAL_POSITION_NED": 10.0, "GLOBAL_POSITION_INT": 5.0, "VFR_HUD": 5.0, "NAV_CONTROLLER_OUTPUT": 2.0,
@@ -165,7 +165,7 @@ def test_everything_promised_is_streamed_at_its_rate():
     assert times == list(range(100, 20_001, 100))
 
 
-def test_a_heartbeat_goes_out_every_second_by_the_wall_clock_too():
+def test_heartbeat_is_sent_every_wall_clock_second():
     station = Station()
     station.look(0.0)
     station.autopilot.tick(station.now)
@@ -176,7 +176,7 @@ def test_a_heartbeat_goes_out_every_second_by_the_wall_clock_too():
     assert 8 <= station.wire.counts()["HEARTBEAT"] <= 12
 
 
-def test_streams_go_on_by_the_wall_clock_while_nothing_moves():
+def test_streams_continue_by_wall_clock_while_simulation_is_paused():
     station = Station()
     station.look(0.0)
     station.wait(4.0)
@@ -184,7 +184,7 @@ def test_streams_go_on_by_the_wall_clock_while_nothing_moves():
     assert {m.time_boot_ms for m in station.wire.of("ATTITUDE")} == {0}
 
 
-def test_before_the_first_snapshot_nothing_is_known_and_nothing_streamed():
+def test_only_heartbeats_are_sent_before_the_first_snapshot():
     station = Station()
     station.wait(4.0)
     assert set(station.wire.counts()) == {"HEARTBEAT"}
@@ -194,7 +194,7 @@ def test_before_the_first_snapshot_nothing_is_known_and_nothing_streamed():
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_heartbeats_keep_pace_with_what_else_is_said(profile):
+def test_heartbeats_are_not_starved_by_other_messages(profile):
     # Mission Planner gives up when 200 packets go by without one
     station = Station(profile)
     for k in range(500):
@@ -206,7 +206,7 @@ def test_heartbeats_keep_pace_with_what_else_is_said(profile):
 @pytest.mark.parametrize(
     ("profile", "autopilot", "number"), [("ardusub", 3, 4), ("px4", 12, 6 << 16), ("generic", 0, 6 << 16)]
 )
-def test_identity(profile, autopilot, number):
+def test_heartbeat_identifies_the_emulated_autopilot(profile, autopilot, number):
     station = Station(profile)
     station.look()
     station.command(512, 0)
@@ -216,7 +216,7 @@ def test_identity(profile, autopilot, number):
     assert (beat.get_srcSystem(), beat.get_srcComponent()) == (1, 1)
 
 
-def test_a_disarmed_vehicle_stands_by():
+def test_disarmed_vehicle_reports_standby():
     station = Station()
     station.look(**{"commands.armed": 0.0})
     station.command(512, 0)
@@ -224,7 +224,7 @@ def test_a_disarmed_vehicle_stands_by():
     assert not beat.base_mode & 128 and beat.system_status == mavlink.MAV_STATE_STANDBY
 
 
-def test_its_last_word_is_a_heartbeat_in_standby():
+def test_last_message_is_a_standby_heartbeat():
     station = Station()
     station.look()
     station.autopilot.close(station.now)
@@ -232,7 +232,7 @@ def test_its_last_word_is_a_heartbeat_in_standby():
     assert station.wire.texts[-1] == "The run has ended"
 
 
-def test_what_is_meant_for_others_is_not_heard():
+def test_messages_for_other_systems_are_ignored():
     station = Station()
     station.look()
     long = mavlink.MAVLink_command_long_message
@@ -243,7 +243,7 @@ def test_what_is_meant_for_others_is_not_heard():
     assert len(station.send(long(0, 0, 400, 0, 1, 0, 0, 0, 0, 0, 0))) == 1
 
 
-def test_only_allowed_systems_are_heard():
+def test_only_allowed_systems_are_accepted():
     station = Station(allowed_systems=frozenset({250}))
     station.look()
     arm = mavlink.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
@@ -252,7 +252,7 @@ def test_only_allowed_systems_are_heard():
 
 @settings(max_examples=examples(150), deadline=None)
 @given(st.one_of(messages(), commands()))
-def test_read_only_commands_nothing(message):
+def test_read_only_vehicle_applies_no_command(message):
     try:
         message.pack(mavlink.MAVLink(None))
     except (struct.error, OverflowError, TypeError):
@@ -275,7 +275,7 @@ def test_each_link_has_its_own_streams():
     assert station.wire.counts()["ATTITUDE"] == 0 and other.counts()["ATTITUDE"] == 10
 
 
-def test_a_run_that_begins_again_is_told():
+def test_run_restart_is_announced():
     station = Station()
     station.look(5.0)
     station.look(0.0)
@@ -288,7 +288,7 @@ def test_a_run_that_begins_again_is_told():
 
 
 @pytest.mark.parametrize("last", [5.0, 0.0])
-def test_nothing_is_heeded_between_one_run_and_the_next(last):
+def test_commands_between_runs_are_rejected(last):
     """What is accepted is followed by the run that the station sees, not by the one after it."""
     station, accepted, rejected = Station(), 0, 1
     station.look(last)

@@ -1,4 +1,4 @@
-"""What carries frames: each kind against a peer of the standard library or pymavlink."""
+"""Channels: each kind against a peer of the standard library or pymavlink."""
 
 import errno
 import os
@@ -33,7 +33,7 @@ def udp_socket():
     return made
 
 
-def heard(link):
+def received(link):
     return [message for _, message in link.receive(time.perf_counter() + 60.0)]
 
 
@@ -45,24 +45,24 @@ def closed_port():
 # ---- UDP ----
 
 
-def test_udpout_speaks_with_one_peer_alone():
-    with udp_socket() as peer, udp_socket() as stranger:
+def test_udpout_accepts_only_its_configured_peer():
+    with udp_socket() as peer, udp_socket() as foreign:
         link = link_of(UdpOut(*peer.getsockname()))
         tended(link, heartbeat())
         data, address = peer.recvfrom(1000)
         assert Station().parse(data)[0].get_type() == "HEARTBEAT"
-        stranger.sendto(Station().pack(attitude(1)), address)
+        foreign.sendto(Station().pack(attitude(1)), address)
         peer.sendto(Station().pack(attitude(2)), address)
-        assert [m.time_boot_ms for m in heard(link)] == [2]
+        assert [m.time_boot_ms for m in received(link)] == [2]
         link.channel.close()
 
 
-def test_nobody_listening_is_survived_and_who_comes_later_hears_the_next_frame():
+def test_udpout_survives_absent_peer_and_late_peer_receives_frames():
     port = closed_port()
     link = link_of(UdpOut(HERE, port))
     for _ in range(50):
         assert tended(link, heartbeat())
-        assert not heard(link)
+        assert not received(link)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as late:
         late.bind((HERE, port))
         late.settimeout(60.0)
@@ -72,7 +72,7 @@ def test_nobody_listening_is_survived_and_who_comes_later_hears_the_next_frame()
     assert not link.troubles()
 
 
-def test_udpin_sends_to_each_who_spoke_a_heeded_frame():
+def test_udpin_sends_to_peers_with_accepted_frames():
     link = link_of(UdpIn(HERE, 0))
     with udp_socket() as good, udp_socket() as other, udp_socket() as bad:
         to = (HERE, link.channel.port)
@@ -81,7 +81,7 @@ def test_udpin_sends_to_each_who_spoke_a_heeded_frame():
         other.sendto(Station(254).pack(heartbeat()), to)
         bad.sendto(b"\xfd\xff\x00", to)
         bad.sendto(Station(1, 1).pack(heartbeat()), to)  # as if it were we
-        assert until(lambda: not heard(link) and len(link.channel.peers) == 2)
+        assert until(lambda: not received(link) and len(link.channel.peers) == 2)
         tended(link, attitude(1))
         assert good.recv(1000) == other.recv(1000)
         bad.setblocking(False)
@@ -90,14 +90,14 @@ def test_udpin_sends_to_each_who_spoke_a_heeded_frame():
     link.channel.close()
 
 
-def test_each_peer_is_answered_in_the_version_that_it_speaks():
+def test_udp_peers_are_answered_in_their_mavlink_version():
     """By MAVLink's specification an old one has neither extensions nor ids above 255; what pymavlink 1.0 decodes."""
     link, old_side, new_side = link_of(UdpIn(HERE, 0)), Station(), Station(254)
     with udp_socket() as old, udp_socket() as new:
         to = (HERE, link.channel.port)
         old.sendto(old_side.pack(heartbeat(), v1=True), to)
         new.sendto(new_side.pack(heartbeat()), to)
-        assert until(lambda: not heard(link) and len(link.channel.peers) == 2)
+        assert until(lambda: not received(link) and len(link.channel.peers) == 2)
         rates = mavlink.MAVLink_scaled_imu2_message(5, 1, 2, 3, 4, 5, 6, 7, 8, 9, temperature=1234)
         for message in (attitude(1), mavlink.MAVLink_current_mode_message(0, 4, 4), rates):
             link.send(message)
@@ -110,29 +110,29 @@ def test_each_peer_is_answered_in_the_version_that_it_speaks():
         packet = new.recv(1000)
         assert packet[0] == 0xFD and [m.get_seq() for m in Station().parse(packet)] == [0, 1, 2]
         old.sendto(old_side.pack(heartbeat()), to)  # it can speak the newer one after all
-        heard(link)
+        received(link)
         tended(link, heartbeat())
         assert old.recv(1000)[0] == 0xFD
     link.channel.close()
 
 
-def test_who_speaks_mavlink_1_over_tcp_is_answered_in_it():
+def test_tcp_client_is_answered_in_its_mavlink_version():
     link = link_of(TcpIn(HERE, 0))
     (side,) = connected(link.channel)
     side.settimeout(60.0)
     side.sendall(Station().pack(heartbeat(), v1=True))
-    assert until(lambda: heard(link))
+    assert until(lambda: received(link))
     tended(link, attitude(3))
     assert v10.MAVLink(None).parse_buffer(side.recv(1000))[0].time_boot_ms == 3
     side.close()
     link.channel.close()
 
 
-def test_peers_are_bounded_and_forgotten_when_silent():
+def test_peer_count_is_bounded_and_silent_peers_expire():
     link, sockets = link_of(UdpIn(HERE, 0)), [udp_socket() for _ in range(udp.PEERS + 2)]
     for one in sockets:
         one.sendto(Station().pack(heartbeat()), (HERE, link.channel.port))
-    assert len(heard(link)) == len(sockets)  # all are heeded, though not all can be answered
+    assert len(received(link)) == len(sockets)  # all are accepted, though not all can be answered
     assert len(link.channel.peers) == udp.PEERS
     assert link.troubles() == ["2 frames of peers beyond 8"]
     now = time.monotonic()
@@ -145,7 +145,7 @@ def test_peers_are_bounded_and_forgotten_when_silent():
     link.channel.close()
 
 
-def test_ports_that_are_taken_are_refused_in_one_line():
+def test_occupied_ports_give_one_line_error():
     udp_in, tcp_in = UdpIn(HERE, 0), TcpIn(HERE, 0)
     with pytest.raises(TelemetryError, match=f"udpin:127.0.0.1:{udp_in.port}: Address already in use"):
         UdpIn(HERE, udp_in.port)
@@ -185,7 +185,7 @@ def drained(client):
     return data
 
 
-def test_a_server_has_many_clients_and_hears_each():
+def test_server_receives_from_all_clients():
     link = link_of(TcpIn(HERE, 0))
     a, b = connected(link.channel, 2)
     tended(link, attitude(1))
@@ -193,26 +193,26 @@ def test_a_server_has_many_clients_and_hears_each():
     pieces = Station().pack(attitude(5)), Station(254).pack(attitude(6))
     a.sendall(pieces[0][:20])
     b.sendall(pieces[1][:11])  # streams do not mix
-    assert not heard(link)
+    assert not received(link)
     a.sendall(pieces[0][20:])
     b.sendall(pieces[1][11:])
-    assert sorted(m.time_boot_ms for m in heard(link) + heard(link)) == [5, 6]
+    assert sorted(m.time_boot_ms for m in received(link) + received(link)) == [5, 6]
     for client in (a, b):
         client.close()
     link.channel.close()
 
 
-def test_a_client_that_goes_is_let_go():
+def test_disconnected_client_is_removed():
     link = link_of(TcpIn(HERE, 0))
     for _ in range(3):
         (client,) = connected(link.channel)
         client.close()
-        assert until(lambda: not (heard(link) or link.channel.tend(time.monotonic()) or link.channel.clients))
+        assert until(lambda: not (received(link) or link.channel.tend(time.monotonic()) or link.channel.clients))
     assert link.send(heartbeat())
     link.channel.close()
 
 
-def test_a_client_that_resets_while_it_is_sent_to_is_let_go():
+def test_client_reset_during_send_is_removed():
     link = link_of(TcpIn(HERE, 0))
     (client,) = connected(link.channel)
     client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\x01\x00\x00\x00\x00\x00\x00\x00")
@@ -225,7 +225,7 @@ def test_a_client_that_resets_while_it_is_sent_to_is_let_go():
     link.channel.close()
 
 
-def test_clients_are_bounded_and_one_too_many_is_turned_away():
+def test_excess_clients_are_rejected():
     link = link_of(TcpIn(HERE, 0))
     clients = connected(link.channel, tcp.CLIENTS)
     with socket.create_connection((HERE, link.channel.port), 2.0) as extra:
@@ -234,7 +234,7 @@ def test_clients_are_bounded_and_one_too_many_is_turned_away():
     assert link.troubles() == ["1 clients beyond 8 turned away"]
     clients[0].close()
     assert until(
-        lambda: heard(link) or link.channel.tend(time.monotonic()) or len(link.channel.clients) == tcp.CLIENTS - 1
+        lambda: received(link) or link.channel.tend(time.monotonic()) or len(link.channel.clients) == tcp.CLIENTS - 1
     )
     for client in clients:
         client.close()
@@ -242,7 +242,7 @@ def test_clients_are_bounded_and_one_too_many_is_turned_away():
 
 
 @pytest.mark.slow
-def test_a_slow_reader_loses_whole_frames_and_no_other_client_any():
+def test_slow_reader_loses_whole_frames_and_other_clients_none():
     """Field notes, 3.1.5: 200 000 unread ODOMETRY left 2 torn frames and no word of the rest."""
     link = link_of(TcpIn(HERE, 0))
     slow, quick = connected(link.channel, 2)
@@ -269,7 +269,7 @@ def test_a_slow_reader_loses_whole_frames_and_no_other_client_any():
         client.close()
 
 
-def test_a_client_that_takes_nothing_is_closed_after_a_while():
+def test_stalled_client_is_closed_after_a_timeout():
     link = link_of(TcpIn(HERE, 0))
     (client,) = connected(link.channel)
     while link.send(odometry()):
@@ -283,7 +283,7 @@ def test_a_client_that_takes_nothing_is_closed_after_a_while():
     link.channel.close()
 
 
-def test_patience_ends_after_a_while_without_any_progress():
+def test_send_timeout_restarts_with_progress():
     out = Outgoing(Taker([None, None, None, 2, None, None, None]))
     out.put(b"frame")
     assert out.flush(10.0)
@@ -309,7 +309,7 @@ class Taker:
         return len(data[:size])
 
 
-def test_what_is_taken_in_pieces_arrives_whole():
+def test_partially_sent_frames_arrive_complete():
     taker = Taker([3, None, 5, None, 1, 1000])
     out = Outgoing(taker, limit=100)
     frames = [bytes([i]) * 30 for i in range(6)]
@@ -320,7 +320,7 @@ def test_what_is_taken_in_pieces_arrives_whole():
     assert taker.taken == b"".join(kept)
 
 
-def test_a_client_waits_for_a_server_that_does_not_listen_yet(monkeypatch):
+def test_tcp_client_waits_for_its_server(monkeypatch):
     monkeypatch.setattr(tcp, "_AGAIN", 0.0)
     with socket.create_server((HERE, 0)) as probe:
         port = probe.getsockname()[1]
@@ -336,7 +336,7 @@ def test_a_client_waits_for_a_server_that_does_not_listen_yet(monkeypatch):
     link.channel.close()
 
 
-def test_a_client_of_a_server_comes_back_after_the_server_did(monkeypatch):
+def test_tcp_client_reconnects_after_server_restart(monkeypatch):
     monkeypatch.setattr(tcp, "_AGAIN", 0.0)
     server = socket.create_server((HERE, 0))
     port = server.getsockname()[1]
@@ -346,12 +346,12 @@ def test_a_client_of_a_server_comes_back_after_the_server_did(monkeypatch):
     tended(link, attitude(1))
     assert frames_of(side.recv(1000))[0].time_boot_ms == 1
     side.sendall(Station().pack(heartbeat()))
-    assert until(lambda: heard(link))
+    assert until(lambda: received(link))
     server.close()
     side.close()
 
     def lost():
-        heard(link)
+        received(link)
         link.channel.tend(time.monotonic())
         return link.channel._stream is None
 
@@ -376,7 +376,7 @@ pty = pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo-terminals
 
 
 def come_to(terminal, count, station=None):
-    """Return so many messages that come to the other end of a line: a pseudo-terminal takes its time."""
+    """Return the given number of messages from the other end of a line, which may be slow."""
     os.set_blocking(terminal, False)
     station, found = station or Station(), []
 
@@ -392,7 +392,7 @@ def come_to(terminal, count, station=None):
 
 
 @pty
-def test_a_serial_line_carries_frames_both_ways_and_every_byte():
+def test_serial_line_is_bidirectional_and_8_bit_clean():
     ours, theirs = os.openpty()
     link = link_of(Serial(os.ttyname(theirs), 57600))
     for message in (odometry(0x0D0A1113), attitude(0x03040D1A)):  # bytes that terminals like to eat
@@ -401,10 +401,10 @@ def test_a_serial_line_carries_frames_both_ways_and_every_byte():
     every = mavlink.MAVLink_encapsulated_data_message(1, list(range(253)))
     frame = Station().pack(every)
     os.write(ours, b"junk" + frame[:100])
-    assert not heard(link)
+    assert not received(link)
     os.write(ours, frame[100:] + Station().pack(heartbeat()))
     found = []
-    assert until(lambda: found.extend(heard(link)) or len(found) == 2)
+    assert until(lambda: found.extend(received(link)) or len(found) == 2)
     assert [m.get_type() for m in found] == ["ENCAPSULATED_DATA", "HEARTBEAT"]
     link.channel.close()
     os.close(ours)
@@ -412,7 +412,7 @@ def test_a_serial_line_carries_frames_both_ways_and_every_byte():
 
 
 @pty
-def test_a_line_that_takes_nothing_drops_whole_frames():
+def test_blocked_serial_line_drops_whole_frames():
     ours, theirs = os.openpty()
     link = link_of(Serial(os.ttyname(theirs), 57600))
     sent = [link.send(attitude(i)) for i in range(2000)]
@@ -433,7 +433,7 @@ def test_a_line_that_takes_nothing_drops_whole_frames():
 
 
 @pty
-def test_a_device_that_disappears_is_opened_when_it_is_back(tmp_path, caplog):
+def test_serial_device_is_reopened_after_disconnection(tmp_path, caplog):
     path = tmp_path / "ttyUSB0"
     ours, theirs = os.openpty()
     path.symlink_to(os.ttyname(theirs))
@@ -442,7 +442,7 @@ def test_a_device_that_disappears_is_opened_when_it_is_back(tmp_path, caplog):
     os.close(ours)
     path.unlink()
     now = time.monotonic()
-    assert until(lambda: heard(link) or link.channel.tend(now) or link.channel._stream is None)
+    assert until(lambda: received(link) or link.channel.tend(now) or link.channel._stream is None)
     assert not link.send(heartbeat())
     link.channel.tend(now + 2.0)
     assert link.channel._stream is None
@@ -458,7 +458,7 @@ def test_a_device_that_disappears_is_opened_when_it_is_back(tmp_path, caplog):
 
 
 @pty
-def test_lines_that_cannot_be_are_refused(tmp_path):
+def test_invalid_serial_devices_are_rejected(tmp_path):
     with pytest.raises(TelemetryError, match="serial:/dev/none: No such file"):
         Serial("/dev/none", 57600)
     with pytest.raises(TelemetryError, match=r"baud is 57601, expected one that the system knows, such as .*57600"):
@@ -480,7 +480,7 @@ def logged(path):
     return found
 
 
-def test_a_log_reads_back_with_the_times_of_the_simulation(tmp_path):
+def test_tlog_timestamps_follow_simulation_time(tmp_path):
     path = tmp_path / "dive.tlog"
     before = time.time()
     link = link_of(Tlog(str(path)))
@@ -499,7 +499,7 @@ def test_a_log_reads_back_with_the_times_of_the_simulation(tmp_path):
     assert not link.troubles()
 
 
-def test_a_log_of_a_run_that_gets_ahead_of_the_clock_has_no_times_in_the_future(tmp_path):
+def test_tlog_of_a_fast_run_has_no_future_timestamps(tmp_path):
     path = tmp_path / "fast.tlog"
     link = link_of(Tlog(str(path)))
     link.channel.begin_earlier(600.0)
@@ -511,7 +511,7 @@ def test_a_log_of_a_run_that_gets_ahead_of_the_clock_has_no_times_in_the_future(
 
 
 @pytest.mark.parametrize(("rate", "seconds"), [(None, 12.0), (10.0, 12.0), (1.0, 0.0), (0.5, 0.0)])
-def test_a_run_gets_ahead_where_it_is_faster_than_the_clock(rate, seconds):
+def test_lead_over_wall_clock_depends_on_duration_and_rate(rate, seconds):
     assert ahead(load_scenario("paper", ["time.duration=12"]), rate) == seconds
 
 
@@ -523,7 +523,7 @@ def test_a_log_is_never_overwritten(tmp_path):
     assert path.read_bytes() == b"precious"
 
 
-def test_a_log_that_nothing_was_sent_to_leaves_no_file(tmp_path):
+def test_unused_tlog_leaves_no_file(tmp_path):
     path = tmp_path / "dive.tlog"
     Tlog(str(path)).close()
     assert not path.exists()
@@ -546,7 +546,7 @@ class FullDisk:
         self.file.close()
 
 
-def test_a_full_disk_is_told_once_and_tears_no_frame(tmp_path, caplog):
+def test_full_disk_is_reported_once_and_truncates_no_frame(tmp_path, caplog):
     path = tmp_path / "dive.tlog"
     channel = Tlog(str(path))
     channel._file = disk = FullDisk(channel._file)

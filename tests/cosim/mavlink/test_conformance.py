@@ -1,4 +1,4 @@
-"""The client's side of the checks, against a scripted other side: what is lost on the way is asked for again."""
+"""The client side of the conformance checks against a scripted vehicle that loses messages."""
 
 import json
 import math
@@ -106,7 +106,7 @@ def test_missing_sequence_numbers_are_counted():
     assert client.lost == 5 and client.total == 5
 
 
-def test_an_answer_that_came_with_others_is_not_passed_over():
+def test_answer_among_other_messages_is_found():
     def answer(message):
         if message.get_type() == "COMMAND_LONG":
             ack = mavlink.MAVLink_command_ack_message(message.command, 0)
@@ -120,7 +120,7 @@ def test_an_answer_that_came_with_others_is_not_passed_over():
     assert all(math.isnan(client.link.sent[-1].to_dict()[f"param{i}"]) for i in range(1, 8))
 
 
-def test_parameters_that_are_lost_are_asked_for_again():
+def test_lost_parameters_are_requested_again():
     lost = {2, 5}
 
     def answer(message):
@@ -134,11 +134,11 @@ def test_parameters_that_are_lost_are_asked_for_again():
     assert sorted(values) == list(range(8)) and count == 8 and retries == 1
 
 
-def test_a_vehicle_without_parameters_is_given_up():
+def test_vehicle_without_parameters_times_out():
     assert fetch_parameters(client_of(lambda message: None)) == ({}, None, 5)
 
 
-def test_a_mission_item_that_is_lost_is_asked_for_again():
+def test_lost_mission_item_is_requested_again():
     asked = []
 
     def answer(message):
@@ -190,13 +190,13 @@ class FileServer:
 
 
 @pytest.mark.parametrize("lost", [(), (1,), (0, 2)])
-def test_a_file_comes_whole_though_packets_of_its_bursts_are_lost(lost):
+def test_ftp_download_survives_lost_burst_packets(lost):
     data = bytes(range(256)) * 5
     found = ftp.download(client_of(FileServer(data, lost)), "@PARAM/param.pck")
     assert found.data == data and found.retries == 0
 
 
-def test_a_file_that_ends_before_its_announced_size_ends_there():
+def test_ftp_file_shorter_than_announced_is_read_completely():
     """As ArduPilot's of parameters, of which it announces twelve bytes each: the end is what it refuses to read."""
 
     class Estimating(FileServer):
@@ -229,7 +229,7 @@ def ardupilot(custom=b"d3adbeef"):
     return client
 
 
-def test_an_ardusub_may_fail_what_it_is_known_to_and_nothing_else():
+def test_only_known_differences_of_ardusub_are_tolerated():
     baseline = baseline_of(Subject(ardupilot(), (), 1.0, False))
     assert set(baseline.differences) <= {check.name for check in CHECKS}
     known = baseline.judge("parameter-unknown", failed("nothing", "an answer"))
@@ -242,18 +242,18 @@ def test_an_ardusub_may_fail_what_it_is_known_to_and_nothing_else():
     assert json.loads(as_json("x", [result]))["passed"] is True
 
 
-def test_our_own_vehicle_and_other_autopilots_may_fail_nothing():
+def test_own_vehicle_and_other_autopilots_have_no_tolerated_differences():
     ours = baseline_of(Subject(ardupilot(b"subreach"), (), 1.0, False))
     px4 = baseline_of(Subject(client_of(lambda message: None), (), 1.0, False))
     assert not ours.differences and not px4.differences
 
 
-def test_a_file_that_is_not_there_is_told_of():
+def test_missing_ftp_file_is_reported():
     assert ftp.download(client_of(FileServer(b"x")), "other") == (None, "FileNotFound", 0)
     assert ftp.download(client_of(lambda message: None), "other") == (None, "no answer", 3)
 
 
-def test_connecting_counts_what_had_to_be_repeated_and_names_what_never_came():
+def test_connection_counts_retries_and_names_missing_steps():
     ignored = []
 
     def answer(message):
@@ -279,13 +279,13 @@ def test_connecting_counts_what_had_to_be_repeated_and_names_what_never_came():
     assert qgc_connect(Client(Scripted(answer, beat=False))).steps == ()
 
 
-def test_the_speed_of_the_clock_is_that_of_the_boot_times():
+def test_clock_speed_is_derived_from_boot_times():
     heard = tuple(Heard(0.5 * i, 1, 1, 0, "ATTITUDE", SimpleNamespace(time_boot_ms=4000 * i)) for i in range(5))
     assert speed_of(heard) == pytest.approx(8.0)
     assert speed_of(heard[:1]) == 1.0 == speed_of(())
 
 
-def test_results_are_told_in_a_line_and_as_json():
+def test_results_are_printed_as_text_and_json():
     check = Check("some-check", ("QGC", "MAVSDK"), lambda subject: passed(""))
     results = [
         Result(check, passed("fine"), 0.1),
@@ -303,6 +303,6 @@ def test_results_are_told_in_a_line_and_as_json():
     assert judged(True, "a", "b") == passed("a") and judged(False, "a", "b") == failed("a", "b")
 
 
-def test_a_profile_goes_without_an_endpoint(capsys):
+def test_profile_and_endpoint_are_mutually_exclusive(capsys):
     assert main(["mavlink-check", "udpin:127.0.0.1:14999", "--profile", "px4"]) == 2
     assert "--profile" in capsys.readouterr().err

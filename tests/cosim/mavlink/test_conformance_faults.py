@@ -1,4 +1,4 @@
-"""The checks of a vehicle: ours passes all of them, and each of them fails on a vehicle that has its fault."""
+"""The conformance checks: this vehicle passes all, and each check fails on a vehicle with its fault."""
 
 import itertools
 import json
@@ -30,7 +30,7 @@ QUICKER = {
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_our_vehicle_passes_every_check(profile, capsys):
+def test_conforming_vehicle_passes_every_check(profile, capsys):
     for _ in range(ATTEMPTS):
         code = main(["mavlink-check", "--profile", profile, "--json"])
         found = json.loads(capsys.readouterr().out)
@@ -146,7 +146,7 @@ def faulty():
             yield link, fault
 
 
-def test_every_check_of_a_single_message_has_its_fault():
+def test_every_single_message_check_has_an_injected_fault():
     of_all = {"sequence-numbers", "mavlink-2"}
     assert {check.name for check in CHECKS} - of_all == set(FAULTS)
 

@@ -1,4 +1,4 @@
-"""Where links lead: what is understood, and what is refused in which words."""
+"""Endpoint texts: accepted forms and rejection messages."""
 
 import pytest
 from hypothesis import given
@@ -22,7 +22,7 @@ from cosim.mavlink.wire.endpoint import Endpoint, parse_endpoint
         ("tcpin://localhost:5760", "tcpin", "127.0.0.1", 5760),
     ],
 )
-def test_networks(text, kind, host, port):
+def test_network_endpoints_are_parsed(text, kind, host, port):
     assert parse_endpoint(text) == Endpoint(kind, text, host=host, port=port)
 
 
@@ -35,11 +35,11 @@ def test_networks(text, kind, host, port):
         ("serial:COM7:57600", "COM7", 57600),
     ],
 )
-def test_serial_lines_need_no_leave(text, path, baud):
+def test_serial_endpoints_need_no_allow_remote(text, path, baud):
     assert parse_endpoint(text) == Endpoint("serial", text, path=path, baud=baud)
 
 
-def test_a_log_is_a_new_file(tmp_path):
+def test_log_endpoint_requires_a_new_file(tmp_path):
     path = tmp_path / "dive.tlog"
     assert parse_endpoint(str(path)) == Endpoint("tlog", str(path), path=str(path))
     path.touch()
@@ -51,7 +51,7 @@ def test_a_log_is_a_new_file(tmp_path):
         parse_endpoint("x" * 300 + ".tlog")
 
 
-def test_beyond_this_machine_only_with_leave():
+def test_remote_endpoints_require_allow_remote():
     for text in ("udpout:192.0.2.1:14550", "udpin://0.0.0.0:14550", "tcpin:0.0.0.0:5760", "tcp:192.0.2.1:5760"):
         with pytest.raises(TelemetryError, match="beyond this machine; --allow-remote"):
             parse_endpoint(text)
@@ -82,7 +82,7 @@ def test_beyond_this_machine_only_with_leave():
         ("serial::57600", "expected serial:DEVICE"),
     ],
 )
-def test_what_cannot_be_is_refused(text, words):
+def test_invalid_endpoints_are_rejected(text, words):
     with pytest.raises(TelemetryError, match=words) as caught:
         parse_endpoint(text)
     assert repr(text)[:30] in str(caught.value)  # of a long one the middle is left out
@@ -90,7 +90,7 @@ def test_what_cannot_be_is_refused(text, words):
 
 
 @given(st.text(max_size=40).map("udpout:".__add__) | st.text(max_size=40) | st.from_regex(r"[a-z]{3,7}:(//)?\d+:\w*"))
-def test_whatever_is_written_is_understood_or_refused(text):
+def test_any_text_is_parsed_or_rejected(text):
     try:
         found = parse_endpoint(text)
     except TelemetryError:

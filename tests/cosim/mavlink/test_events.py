@@ -1,4 +1,4 @@
-"""Texts about what happens, and the watch over the station."""
+"""Status texts of events, and the ground-station failsafe."""
 
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
@@ -21,7 +21,7 @@ def clearances(goal=-3.0, first=2.0, band=2.0):
     return {"goal.clearance": (goal, first, 2.0, band, 1e5, 1e5)}
 
 
-def test_regions_entered_and_left(station):
+def test_region_entry_and_exit_are_announced_with_hysteresis(station):
     station.look(1.0, **clearances(first=-0.005))  # not far enough in
     assert station.wire.texts == []
     station.look(1.1, **clearances(first=-0.02))
@@ -32,7 +32,7 @@ def test_regions_entered_and_left(station):
     assert [m.severity for m in station.wire.of("STATUSTEXT")] == [4, 6]
 
 
-def test_at_an_edge_it_is_not_said_again_and_again(station):
+def test_chatter_at_a_boundary_is_rate_limited(station):
     for k in range(200):
         station.now += 0.01
         station.autopilot.tick(station.now)
@@ -40,13 +40,13 @@ def test_at_an_edge_it_is_not_said_again_and_again(station):
     assert len(station.wire.texts) <= 4
 
 
-def test_the_target_reached_and_left(station):
+def test_target_reached_and_left_are_announced(station):
     station.look(1.0, **clearances(goal=0.1))
     station.look(2.0, **clearances(goal=-0.1))
     assert station.wire.texts == ["Target reached", "Target left"]
 
 
-def test_saturation(station):
+def test_saturation_is_announced(station):
     station.look(1.0, allocation_saturated=1.0)
     station.look(1.5)
     station.look(1.6, **{"thrust_saturated[3]": 1.0})
@@ -55,14 +55,14 @@ def test_saturation(station):
     assert station.wire.texts == ["Thrust saturated", "Thrust no longer saturated"]
 
 
-def test_armed_disarmed_and_the_bottom(station):
+def test_arming_and_bottom_contact_are_announced(station):
     station.look(1.0, **{"commands.armed": 0.0})
     station.look(1.1)
     station.look(1.2, bottom_contact=1.0)
     assert station.wire.texts == ["Disarmed", "Armed", "Bottom touched"]
 
 
-def test_a_long_text_comes_in_parts(station):
+def test_long_text_is_split_into_chunks(station):
     context = station.autopilot._context
     for length in (50, 51, 100, 101, 150, 500):
         station.wire.clear()
@@ -80,7 +80,7 @@ def test_a_long_text_comes_in_parts(station):
             assert parts[0].id == 0
 
 
-def test_who_says_too_much_is_not_heard(station):
+def test_status_text_rate_is_limited(station):
     for i in range(100):
         station.autopilot._context.say(f"line {i}")
     assert len(station.wire.texts) == 12
@@ -104,7 +104,7 @@ def commanding(action, **options):
     ("action", "commands"),
     [("warn", []), ("hold", [SetMode("hold")]), ("surface", [SetMode("surface")]), ("disarm", [Arm(False)])],
 )
-def test_a_station_that_falls_silent(action, commands):
+def test_silent_station_triggers_the_loss_action(action, commands):
     station = commanding(action)
     station.wait(4.9)
     assert station.commanded() == [] and not any("lost" in text for text in station.wire.texts)
@@ -124,13 +124,13 @@ def test_a_station_that_falls_silent(action, commands):
 
 
 @pytest.mark.medium
-def test_none_is_none():
+def test_loss_action_none_does_nothing():
     station = commanding("none")
     station.wait(100.0, 0.5)
     assert not any("lost" in text for text in station.wire.texts) and station.commanded() == []
 
 
-def test_only_who_commands_is_missed():
+def test_only_loss_of_a_commanding_station_triggers_the_action():
     station = Station("ardusub", loss_action="disarm")
     station.look(0.0)
     station.send(BEAT, system=250)  # never commands
@@ -148,7 +148,7 @@ def test_only_who_commands_is_missed():
 
 
 @pytest.mark.medium
-def test_simulated_time_does_not_count():
+def test_loss_timeout_uses_wall_clock_time():
     station = commanding("disarm")
     for k in range(200):
         station.look(5.0 * k)
@@ -156,7 +156,7 @@ def test_simulated_time_does_not_count():
     assert station.commanded() == []
 
 
-def test_time_and_action_are_parameters():
+def test_failsafe_timeout_and_action_are_parameters():
     station = commanding("warn")
     for name, value in ((b"FS_GCS_TIMEOUT", 20.0), (b"FS_GCS_ENABLE", 2.0)):
         station.send(mavlink.MAVLink_param_set_message(1, 1, name, value, 9))
@@ -177,7 +177,7 @@ def test_an_action_that_finds_the_queue_full_is_tried_again():
     assert station.commanded() == [Arm(False)]
 
 
-def test_clocks(station):
+def test_time_messages_are_answered(station):
     station.look(2.5)
     station.wire.clear()
     (reply,) = station.send(mavlink.MAVLink_timesync_message(0, 987))

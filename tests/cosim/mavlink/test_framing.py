@@ -1,4 +1,4 @@
-"""Frames: found in datagrams and streams, whatever stands between them; every check against pymavlink's own codec."""
+"""Frames in datagrams and streams with garbage in between, checked against pymavlink's codec."""
 
 import random
 import struct
@@ -56,7 +56,7 @@ def refusals(counts):
 
 
 @pytest.mark.parametrize("v1", [False, True])
-def test_each_message_of_the_dialect_passes_when_meant_for_us_and_only_then(v1):
+def test_every_message_passes_only_if_addressed_to_the_vehicle(v1):
     station = Station()
     for number, kind in mavlink.mavlink_map.items():
         if v1 and number > 255:
@@ -75,7 +75,7 @@ def test_each_message_of_the_dialect_passes_when_meant_for_us_and_only_then(v1):
         assert theirs.counts.foreign == meant
 
 
-def test_what_is_for_everybody_is_for_us_and_so_is_each_component():
+def test_broadcast_and_any_component_targets_are_accepted():
     gate, station = open_gate(), Station()
     assert names(gate.datagram(station.pack(request_list(0)))) == ["PARAM_REQUEST_LIST"]  # zeros are cut off
     assert names(gate.datagram(station.pack(mavlink.MAVLink_param_request_list_message(1, 77))))
@@ -84,7 +84,7 @@ def test_what_is_for_everybody_is_for_us_and_so_is_each_component():
     assert refusals(gate.counts) == {"foreign": 1}
 
 
-def test_our_own_frames_and_those_of_systems_that_are_not_allowed_are_refused():
+def test_own_frames_and_disallowed_systems_are_rejected():
     gate = open_gate(allowed=frozenset({1, 255}))
     assert not list(gate.datagram(Station(1, 1).pack(heartbeat())))
     assert not list(gate.datagram(Station(245, 190).pack(heartbeat())))
@@ -93,13 +93,13 @@ def test_our_own_frames_and_those_of_systems_that_are_not_allowed_are_refused():
     assert refusals(gate.counts) == {"own": 1, "system": 1}
 
 
-def test_the_key_is_never_changed_from_outside():
+def test_setup_signing_message_is_ignored():
     gate = open_gate()
     assert not list(gate.datagram(Station().pack(mavlink.MAVLink_setup_signing_message(1, 1, [1] * 32, 5))))
     assert refusals(gate.counts) == {"setup_signing": 1}
 
 
-def test_an_unknown_message_is_dropped_and_its_neighbours_are_not():
+def test_unknown_message_is_dropped_without_its_neighbors():
     station = Station()
     unknown = bytearray(station.pack(attitude(1)))
     unknown[7:10] = (0xABCDEF).to_bytes(3, "little")
@@ -114,7 +114,7 @@ def test_an_unknown_message_is_dropped_and_its_neighbours_are_not():
 
 
 @pytest.mark.parametrize("bad", [b"\xfd\xff\x00", b"\xfe", b"\xfd" * 300, b"\xfe" * 300, b"junk", b"", None])
-def test_a_bad_datagram_costs_none_of_the_next_fifty(bad):
+def test_malformed_datagram_loses_no_following_frame(bad):
     station = Station()
     bad = station.pack(odometry())[:100] if bad is None else bad
     frames = [station.pack(attitude(i)) for i in range(50)]
@@ -128,7 +128,7 @@ def test_a_bad_datagram_costs_none_of_the_next_fifty(bad):
 
 
 @pytest.mark.medium
-def test_a_frame_with_a_wrong_bit_is_refused_and_the_stream_goes_on():
+def test_corrupted_frame_is_rejected_and_the_stream_continues():
     station = Station()
     good = station.pack(odometry())
     for i in range(len(good) * 8):
@@ -142,8 +142,8 @@ def test_a_frame_with_a_wrong_bit_is_refused_and_the_stream_goes_on():
         assert names(reader.read(bytes(bad) + after)) == ["ATTITUDE"] * 8
 
 
-def test_a_decoder_that_refuses_a_payload_is_no_trouble():
-    """Flags that nobody knows must not be passed over."""
+def test_decoder_error_counts_as_malformed():
+    """Unknown incompatibility flags must not be ignored."""
     frame = bytearray(Station().pack(heartbeat()))
     frame[2] = 2
     crc = mavlink.x25crc(bytes(frame[1:-2]) + bytes([mavlink.MAVLink_heartbeat_message.crc_extra])).crc
@@ -153,7 +153,7 @@ def test_a_decoder_that_refuses_a_payload_is_no_trouble():
     assert refusals(gate.counts) == {"malformed": 1}
 
 
-def test_a_payload_longer_than_ours_is_of_a_newer_sender_and_read_as_far_as_we_know():
+def test_longer_payload_of_a_newer_dialect_is_truncated():
     payload = struct.pack("<IBBBBB", 7, 12, 0, 0, 4, 3) + b"new"
     head = bytes([0xFD, len(payload), 0, 0, 0, 255, 190, 0, 0, 0]) + payload
     crc = mavlink.x25crc(head[1:] + bytes([mavlink.MAVLink_heartbeat_message.crc_extra])).crc
@@ -161,7 +161,7 @@ def test_a_payload_longer_than_ours_is_of_a_newer_sender_and_read_as_far_as_we_k
     assert message.custom_mode == 7 and message.mavlink_version == 3
 
 
-def test_a_stream_keeps_no_more_than_one_frame():
+def test_stream_buffer_holds_at_most_one_frame():
     rng = random.Random(1)
     reader = StreamReader(open_gate())
     for data in (b"\xfd" * 5000, b"\xfe\xff" * 5000, rng.randbytes(20000), bytes(20000)):
@@ -170,7 +170,7 @@ def test_a_stream_keeps_no_more_than_one_frame():
             assert len(reader._rest) <= 280
 
 
-def test_a_stream_yields_what_pymavlink_finds_in_it():
+def test_stream_reader_matches_pymavlink():
     station, rng = Station(), random.Random(0)
     sent = [station.pack(any_message(kind)) for kind in mavlink.mavlink_map.values() if kind.msgname != "SETUP_SIGNING"]
     data = b"".join(sent)
@@ -192,7 +192,7 @@ pieces = st.lists(st.binary(max_size=300) | frames | frames.map(lambda f: f[:-3]
 
 
 @given(pieces, st.integers(1, 600))
-def test_nothing_raises_and_no_frame_comes_of_nothing(parts, chunk):
+def test_arbitrary_bytes_raise_nothing_and_invent_no_frame(parts, chunk):
     data = b"".join(parts)
     gate = open_gate()
     list(gate.datagram(data))
@@ -203,7 +203,7 @@ def test_nothing_raises_and_no_frame_comes_of_nothing(parts, chunk):
 
 
 @given(st.sampled_from(sorted(kinds())), st.binary(max_size=255), st.booleans(), st.integers(0, 255))
-def test_nothing_raises_whatever_payload_has_a_right_checksum(number, payload, v1, flags):
+def test_valid_checksum_with_any_payload_raises_nothing(number, payload, v1, flags):
     if v1 and number < 256:
         head = bytes([0xFE, len(payload), 0, 255, 190, number])
     else:
@@ -227,7 +227,7 @@ def test_offsets_of_targets_are_those_of_the_packed_message():
         assert payload[at] == 99, kind.msgname
 
 
-def test_what_mavlink_1_has_of_a_message_is_what_its_own_dialect_says():
+def test_mavlink_1_payload_sizes_match_its_dialect():
     both = [number for number in v10.mavlink_map if number in kinds()]
     assert len(both) > 150
     for number in both:

@@ -24,7 +24,7 @@ class Client:
     def __init__(self, station):
         self.station, self.seq = station, 0
 
-    def ask(self, opcode, data=b"", session=0, size=None, offset=0, **who):
+    def request(self, opcode, data=b"", session=0, size=None, offset=0, **who):
         self.seq += 2
         packet = FTP_OP(
             self.seq, session, opcode, len(data) if size is None else size, 0, 0, offset, bytearray(data)
@@ -43,17 +43,17 @@ class Client:
         return FTP_OP(*fields[:6], fields[7], raw[12 : 12 + fields[3]])
 
     def whole(self, path=FILE):
-        (opened,) = self.ask(OPEN, path)
+        (opened,) = self.request(OPEN, path)
         (length,) = struct.unpack("<I", opened.payload)
         content = b""
         while len(content) < length:
-            burst = self.ask(BURST, session=opened.session, size=239, offset=len(content))
+            burst = self.request(BURST, session=opened.session, size=239, offset=len(content))
             assert [b.burst_complete for b in burst] == [0] * (len(burst) - 1) + [1]
             assert [b.seq for b in burst] == [self.seq + i for i in range(1, len(burst) + 1)]
             for part in burst:
                 assert part.offset == len(content)
                 content += part.payload
-        assert self.ask(BURST, session=opened.session, size=239, offset=length)[0].payload[0] == EOF
+        assert self.request(BURST, session=opened.session, size=239, offset=length)[0].payload[0] == EOF
         return content
 
 
@@ -64,7 +64,7 @@ def client():
     return Client(station)
 
 
-def test_the_file_is_the_list(client):
+def test_parameter_file_equals_the_parameter_list(client):
     decoded = mavftp.MAVFTP.ftp_param_decode(client.whole())
     client.station.send(LIST)
     client.station.wait(0.1)
@@ -74,70 +74,70 @@ def test_the_file_is_the_list(client):
     ]
 
 
-def test_parts_of_the_file(client):
+def test_parameter_file_can_be_read_in_part(client):
     decoded = mavftp.MAVFTP.ftp_param_decode(client.whole(FILE + b"?start=3&count=4&withdefaults=1"))
     whole = mavftp.MAVFTP.ftp_param_decode(client.whole())
     assert [p[:2] for p in decoded.params] == [p[:2] for p in whole.params][3:7]
 
 
-def test_single_reads_and_their_end(client):
+def test_single_reads_return_data_until_end_of_file(client):
     content = client.whole()
-    (opened,) = client.ask(OPEN, FILE)
-    (part,) = client.ask(READ, session=opened.session, size=80, offset=40)
+    (opened,) = client.request(OPEN, FILE)
+    (part,) = client.request(READ, session=opened.session, size=80, offset=40)
     assert (part.opcode, part.payload) == (ACK, content[40:120])
-    (end,) = client.ask(READ, session=opened.session, size=80, offset=len(content))
+    (end,) = client.request(READ, session=opened.session, size=80, offset=len(content))
     assert (end.opcode, end.payload) == (NAK, bytes([EOF]))
-    (too_long,) = client.ask(READ, session=opened.session, size=240)
+    (too_long,) = client.request(READ, session=opened.session, size=240)
     assert (too_long.opcode, too_long.payload[0]) == (NAK, INVALID_SIZE)
 
 
-def test_crc(client):
-    (reply,) = client.ask(CRC, FILE)
+def test_file_crc_is_correct(client):
+    (reply,) = client.request(CRC, FILE)
     assert struct.unpack("<I", reply.payload)[0] == crc_by_bits(client.whole())
 
 
-def test_folders(client):
-    assert client.ask(LISTING, b"/")[0].payload == b"D@PARAM\0"
-    assert client.ask(LISTING, b"@PARAM")[0].payload == f"Fparam.pck\t{len(client.whole())}\0".encode()
-    assert client.ask(LISTING, b"@PARAM", offset=1)[0].payload[0] == EOF
+def test_folders_are_listed(client):
+    assert client.request(LISTING, b"/")[0].payload == b"D@PARAM\0"
+    assert client.request(LISTING, b"@PARAM")[0].payload == f"Fparam.pck\t{len(client.whole())}\0".encode()
+    assert client.request(LISTING, b"@PARAM", offset=1)[0].payload[0] == EOF
 
 
 @pytest.mark.parametrize(
     "path",
     [b"", b"/etc/passwd", b"../../etc/passwd", b"@PARAM/../etc/passwd", b"@SYS/threads.txt", b"@PARAM", b"\xff" * 239],
 )
-def test_there_is_nothing_else(client, path):
-    (reply,) = client.ask(OPEN, path)
+def test_other_paths_are_not_found(client, path):
+    (reply,) = client.request(OPEN, path)
     assert (reply.opcode, reply.payload[0]) == (NAK, NOT_FOUND)
 
 
 @pytest.mark.parametrize(
     ("opcode", "error"), [(CREATE, PROTECTED), (WRITE, PROTECTED), (8, PROTECTED), (13, PROTECTED), (99, UNKNOWN)]
 )
-def test_nothing_can_be_written(client, opcode, error):
-    (reply,) = client.ask(opcode, FILE)
+def test_write_operations_are_rejected(client, opcode, error):
+    (reply,) = client.request(opcode, FILE)
     assert (reply.opcode, reply.payload[0], reply.req_opcode) == (NAK, error, opcode)
 
 
-def test_sessions_end(client):
-    (opened,) = client.ask(OPEN, FILE)
-    assert client.ask(READ, session=opened.session + 1, size=10)[0].payload[0] == INVALID_SESSION
+def test_terminated_session_is_invalid(client):
+    (opened,) = client.request(OPEN, FILE)
+    assert client.request(READ, session=opened.session + 1, size=10)[0].payload[0] == INVALID_SESSION
     for end in (TERMINATE, RESET):
-        (opened,) = client.ask(OPEN, FILE)
-        assert client.ask(end, session=opened.session)[0].opcode == ACK
-        assert client.ask(READ, session=opened.session, size=10)[0].payload[0] == INVALID_SESSION
+        (opened,) = client.request(OPEN, FILE)
+        assert client.request(end, session=opened.session)[0].opcode == ACK
+        assert client.request(READ, session=opened.session, size=10)[0].payload[0] == INVALID_SESSION
 
 
 def test_a_file_that_is_open_does_not_change(client):
     before = client.whole()
-    (opened,) = client.ask(OPEN, FILE)
+    (opened,) = client.request(OPEN, FILE)
     client.station.send(mavlink.MAVLink_param_set_message(1, 1, b"GOAL_RADIUS", 0.9, 9))
-    (part,) = client.ask(READ, session=opened.session, size=200)
+    (part,) = client.request(READ, session=opened.session, size=200)
     assert part.payload == before[:200]
     assert client.whole() != before
 
 
-def test_what_was_lost_is_sent_again(client):
+def test_repeated_request_gets_the_same_reply(client):
     packet = FTP_OP(5, 0, OPEN, len(FILE), 0, 0, 0, bytearray(FILE)).pack()
     assert [bytes(r.payload) for r in client.send(packet)] == [bytes(r.payload) for r in client.send(packet)]
 
@@ -146,16 +146,17 @@ def test_what_was_lost_is_sent_again(client):
 def test_replies_echo_the_session_that_the_station_chose(client, session):
     """MAVProxy counts its sessions, and drops a reply of another one."""
     for opcode, data in ((LISTING, b"/"), (OPEN, FILE), (READ, b""), (BURST, b""), (TERMINATE, b""), (OPEN, b"no")):
-        assert {reply.session for reply in client.ask(opcode, data, session=session, size=len(data) or 40)} == {session}
+        replies = client.request(opcode, data, session=session, size=len(data) or 40)
+        assert {reply.session for reply in replies} == {session}
 
 
 def test_stations_do_not_share_a_session(client):
     for system in range(240, 248):  # all choose the same number
-        assert client.ask(OPEN, FILE + b"?start=%d" % (system - 240), system=system)[0].session == 0
-    heads = [client.ask(READ, size=40, system=system)[0].payload for system in range(240, 248)]
+        assert client.request(OPEN, FILE + b"?start=%d" % (system - 240), system=system)[0].session == 0
+    heads = [client.request(READ, size=40, system=system)[0].payload for system in range(240, 248)]
     assert len(set(heads)) == 8
     for system in range(2, 200):  # many more: the oldest go
-        assert client.ask(OPEN, FILE, system=system)[0].opcode == ACK
+        assert client.request(OPEN, FILE, system=system)[0].opcode == ACK
 
 
 @settings(max_examples=examples(200), deadline=None)

@@ -1,4 +1,4 @@
-"""Whatever is sent: no error, no memory, no time of the stepper, and good frames in between are heeded."""
+"""Hostile input causes no error, leak or delay, and valid frames in between are accepted."""
 
 import socket
 import time
@@ -20,7 +20,7 @@ HERE = "127.0.0.1"
 
 
 class Script:
-    """A channel on which certain datagrams come."""
+    """A channel that receives given datagrams."""
 
     datagrams = True
 
@@ -58,19 +58,19 @@ def attack(count, verifier=None, station=None):
     return gate.counts
 
 
-def test_good_datagrams_between_bad_ones_are_all_heeded():
+def test_all_valid_datagrams_among_hostile_ones_are_accepted():
     counts = attack(20_000)
     assert min(counts.malformed, counts.checksum, counts.accepted) > 1000 and counts.unknown > 10
     assert counts.unsigned == counts.forged == 0
 
 
-def test_with_a_key_the_good_ones_alone_are_heeded():
+def test_with_a_key_only_signed_datagrams_are_accepted():
     counts = attack(5000, Verifier(KEY, SigningClock()), Station(key=KEY))
     assert counts.accepted == 50 and counts.unsigned > 900
 
 
-def test_in_a_stream_good_frames_between_bad_ones_are_all_heeded():
-    """Also those behind half a frame, which may be taken for its other half until the checksum tells."""
+def test_all_valid_frames_in_a_hostile_stream_are_accepted():
+    """Also frames after half a frame, which may be taken for its other half until the checksum fails."""
     station = Station()
     data = b"".join(interspersed(5000, 20, station)) + bytes(300)
     reader = StreamReader(open_gate())
@@ -79,7 +79,7 @@ def test_in_a_stream_good_frames_between_bad_ones_are_all_heeded():
 
 
 @pytest.mark.slow
-def test_two_hundred_thousand_hostile_datagrams_leave_nothing_behind():
+def test_hostile_datagrams_leak_no_memory():
     gate = open_gate()
 
     def receive(count):
@@ -99,7 +99,7 @@ def test_two_hundred_thousand_hostile_datagrams_leave_nothing_behind():
 
 
 class Clock:
-    """A clock that goes on by as much at each look, and by what an answer takes."""
+    """A clock that advances by a fixed time at each reading, and by the duration of an answer."""
 
     LOOK, ANSWER = 1e-5, 7e-5  # s
 
@@ -127,7 +127,7 @@ class Answering(StubVehicle):
         self.answered += 1
 
 
-def test_a_flood_takes_a_bounded_slice_of_each_turn(monkeypatch):
+def test_flood_consumes_a_bounded_share_of_each_cycle(monkeypatch):
     """However much is waiting, a turn ends; the thread then rests for a multiple of what it took."""
     clock = Clock()
     monkeypatch.setattr("cosim.mavlink.thread.time", clock)

@@ -1,4 +1,4 @@
-"""Listening: what is known of vehicles, how it is shown, and that nothing from outside can outgrow or steer it."""
+"""``cosim listen``: known vehicles, their display, bounded memory, and terminal safety."""
 
 import os
 import pty
@@ -34,7 +34,7 @@ def heartbeat(autopilot=12, base_mode=0x81, custom_mode=6 << 16, kind=12):
     return mavlink.MAVLink_heartbeat_message(kind, autopilot, base_mode, custom_mode, 4, 3)
 
 
-def heard(message, at=0.0, system=1, component=1):
+def received(message, at=0.0, system=1, component=1):
     return Heard(at, system, component, 0, message.get_type(), message)
 
 
@@ -63,14 +63,14 @@ class Vehicle:
         self.socket.close()
 
 
-def test_the_picture_shows_vehicle_position_texts_and_rows(link):
+def test_display_shows_vehicle_position_texts_and_messages(link):
     watch = Watch()
     for i in range(11):
-        watch.take(heard(mavlink.MAVLink_attitude_message(100 * i, 0.1, -0.2, 0.3, 0, 0, 0), 0.1 * i))
-    watch.take(heard(heartbeat(), 1.0))
-    watch.take(heard(mavlink.MAVLink_local_position_ned_message(0, 1.5, -2.25, 3.0, 0, 0, 0), 1.0))
-    watch.take(heard(mavlink.MAVLink_global_position_int_message(0, 0, 0, 0, -3000, 0, 0, 0, 0), 1.0))
-    watch.take(heard(mavlink.MAVLink_statustext_message(4, b"region SR1 entered"), 1.0))
+        watch.take(received(mavlink.MAVLink_attitude_message(100 * i, 0.1, -0.2, 0.3, 0, 0, 0), 0.1 * i))
+    watch.take(received(heartbeat(), 1.0))
+    watch.take(received(mavlink.MAVLink_local_position_ned_message(0, 1.5, -2.25, 3.0, 0, 0, 0), 1.0))
+    watch.take(received(mavlink.MAVLink_global_position_int_message(0, 0, 0, 0, -3000, 0, 0, 0, 0), 1.0))
+    watch.take(received(mavlink.MAVLink_statustext_message(4, b"region SR1 entered"), 1.0))
     text = "\n".join(picture(link, watch, 1.0))
     assert "vehicle 1:1 PX4 SUBMARINE, mode OFFBOARD, ARMED, ACTIVE" in text
     assert "north 1.50 east -2.25 down 3.00 m, roll 5.7 pitch -11.5 yaw 17.2 deg, depth 3.00 m" in text
@@ -78,10 +78,10 @@ def test_the_picture_shows_vehicle_position_texts_and_rows(link):
     assert re.search(r"ATTITUDE +1:1 +10\.0 +11  roll pitch yaw|ATTITUDE +1:1 +10\.0 +11  5\.7 -11\.5 17\.2 deg", text)
 
 
-def test_rates_follow_what_comes_and_fall_when_it_stops():
+def test_message_rates_track_arrivals_and_decay():
     watch = Watch()
     for i in range(400):
-        watch.take(heard(mavlink.MAVLink_system_time_message(0, 0), 0.05 * i))
+        watch.take(received(mavlink.MAVLink_system_time_message(0, 0), 0.05 * i))
         watch.sample(0.05 * i)
     (row,) = watch.rows.values()
     assert row.rate(20.0) == pytest.approx(20.0, rel=0.05)
@@ -90,25 +90,25 @@ def test_rates_follow_what_comes_and_fall_when_it_stops():
     assert row.rate(45.0) == 0.0
 
 
-def test_a_silent_vehicle_is_said_to_be_silent(link):
+def test_silent_vehicle_is_marked_silent(link):
     watch = Watch()
-    watch.take(heard(heartbeat(), 1.0))
+    watch.take(received(heartbeat(), 1.0))
     assert "SILENT" not in picture(link, watch, 3.0)[1]
     assert "SILENT for 9 s" in picture(link, watch, 10.0)[1]
 
 
 def test_ground_stations_are_no_vehicle(link):
     watch = Watch()
-    watch.take(heard(heartbeat(autopilot=8, kind=6), 1.0, system=255))
+    watch.take(received(heartbeat(autopilot=8, kind=6), 1.0, system=255))
     assert watch.vehicle is None
     assert "no vehicle was heard" in picture(link, watch, 1.0)
 
 
-def test_a_flood_of_names_and_texts_does_not_grow_without_bound(link):
+def test_memory_is_bounded_under_a_flood_of_names_and_texts(link):
     watch = Watch()
     for i in range(20 * ROWS):
-        watch.take(heard(mavlink.MAVLink_named_value_float_message(0, f"n{i}".encode(), 1.0), 1e-4 * i))
-        watch.take(heard(mavlink.MAVLink_statustext_message(6, b"x"), 1e-4 * i, system=1 + i % 200))
+        watch.take(received(mavlink.MAVLink_named_value_float_message(0, f"n{i}".encode(), 1.0), 1e-4 * i))
+        watch.take(received(mavlink.MAVLink_statustext_message(6, b"x"), 1e-4 * i, system=1 + i % 200))
         watch.sample(1e-4 * i)
     assert len(watch.rows) == ROWS and len(watch.texts) == TEXTS
     assert watch.total == 40 * ROWS and watch.beyond > 0
@@ -126,42 +126,42 @@ def test_a_flood_of_names_and_texts_does_not_grow_without_bound(link):
         mavlink.MAVLink_available_modes_message(1, 1, 0, 6 << 16, 0, ESCAPE.encode()),
     ],
 )
-def test_nothing_that_comes_can_steer_the_terminal(link, message):
+def test_received_text_cannot_inject_terminal_codes(link, message):
     decoded = mavlink.MAVLink(None).decode(bytearray(message.pack(mavlink.MAVLink(None, 1, 1))))
     watch = Watch()
-    watch.take(heard(heartbeat()))
-    watch.take(heard(decoded))
+    watch.take(received(heartbeat()))
+    watch.take(received(decoded))
     assert all(line.isprintable() for line in picture(link, watch, 1.0, width=200))
 
 
-def test_every_message_of_the_dialect_can_be_shown(link):
+def test_every_message_of_the_dialect_is_displayed(link):
     watch, codec = Watch(), mavlink.MAVLink(None)
     for number, kind in mavlink.mavlink_map.items():
         head = bytes([0xFD, 1, 0, 0, 0, 1, 1, *number.to_bytes(3, "little")])
         crc = mavlink.x25crc(head[1:] + b"\1" + bytes([kind.crc_extra])).crc
-        watch.take(heard(codec.decode(bytearray(head + b"\1" + crc.to_bytes(2, "little")))))
+        watch.take(received(codec.decode(bytearray(head + b"\1" + crc.to_bytes(2, "little")))))
     shown = {line.split()[0] for line in picture(link, watch, 1.0) if "1:1" in line}
     assert len(watch.rows) == min(ROWS, len(mavlink.mavlink_map)) and len(shown) >= ROWS - 5
 
 
-def test_what_is_not_known_is_shown_as_such():
+def test_unknown_values_are_shown_as_dashes():
     status = mavlink.MAVLink_sys_status_message(0, 0, 0, 500, 65535, -1, -1, *[0] * 6)
     assert values(status) == "load 50.0 %  voltage_battery - V  current_battery - A  battery_remaining - %"
 
 
-def test_what_rounds_to_nothing_has_no_sign(link):
+def test_values_rounded_to_zero_have_no_sign(link):
     watch = Watch()
     attitude = mavlink.MAVLink_attitude_message(0, -1e-5, 0.0, -1e-5, -1e-5, -0.0, 0.0)
     place = mavlink.MAVLink_local_position_ned_message(0, -1e-3, -0.0, -1e-3, 0.0, 0.0, -1e-9)
     world = mavlink.MAVLink_global_position_int_message(0, 0, 0, 0, 1, 0, 0, 0, 0)
     for message in (heartbeat(), attitude, place, world):
-        watch.take(heard(message))
+        watch.take(received(message))
     shown = "\n".join(picture(link, watch, 1.0))
     assert "roll 0.0 pitch 0.0 yaw 0.0 deg" in shown and "depth 0.00 m" in shown
     assert not re.search(r"-0\.0+\b", shown)
 
 
-def test_values_that_are_no_numbers_are_shown():
+def test_nan_and_infinity_are_displayed():
     assert "nan" in values(mavlink.MAVLink_attitude_message(0, float("nan"), 0, 0, 0, 0, 0))
     assert "inf" in values(mavlink.MAVLink_named_value_float_message(0, b"x", float("inf")))
 
@@ -182,7 +182,7 @@ def test_modes_have_their_names(autopilot, number, told, name):
     assert mode_name(heartbeat(autopilot, custom_mode=number), told) == name
 
 
-def test_broken_frames_cost_nothing_and_old_ones_are_heard(link):
+def test_broken_frames_are_ignored_and_mavlink_1_is_received(link):
     port = int(link.name.rpartition(":")[2])
     with Vehicle(port) as vehicle:
         vehicle.socket.sendto(b"\xfd\xff\x00" + bytes(30), vehicle.address)
@@ -196,7 +196,7 @@ def test_broken_frames_cost_nothing_and_old_ones_are_heard(link):
     assert link.old == 1 and link.counts.malformed == 2
 
 
-def test_with_a_key_only_what_is_signed_with_it_is_heard():
+def test_with_a_key_only_signed_frames_are_received():
     endpoint = parse_endpoint(f"udpin:127.0.0.1:{free_port()}")
     speaker = parse_endpoint(f"udpout:127.0.0.1:{endpoint.port}")
     with GroundLink(endpoint, key=bytes(32)) as link:
@@ -209,7 +209,7 @@ def test_with_a_key_only_what_is_signed_with_it_is_heard():
     assert "1 frames forged" in picture(link, Watch(), 0.0)[0]
 
 
-def test_following_ends_after_so_many_messages_or_seconds(link):
+def test_follow_ends_after_the_given_messages_or_seconds(link):
     port = int(link.name.rpartition(":")[2])
     with Vehicle(port) as vehicle:
         for _ in range(9):
@@ -221,7 +221,7 @@ def test_following_ends_after_so_many_messages_or_seconds(link):
 
 
 @pytest.mark.slow
-def test_the_command_prints_a_picture():
+def test_listen_command_prints_the_display():
     port = free_port()
     with (
         Vehicle(port) as vehicle,
@@ -237,7 +237,7 @@ def test_the_command_prints_a_picture():
     assert "3 messages" in text and "PX4 SUBMARINE" in text and "\x1b" not in text
 
 
-def test_hearing_nothing_is_a_failure(capsys):
+def test_receiving_no_vehicle_exits_with_1(capsys):
     assert main(["listen", f"udpin:127.0.0.1:{free_port()}", "--seconds", "0.2"]) == 1
     assert "no vehicle was heard" in capsys.readouterr().out
 
@@ -250,14 +250,14 @@ def test_hearing_nothing_is_a_failure(capsys):
         (["new.tlog"], "not a file"),
     ],
 )
-def test_what_is_no_endpoint_is_said_in_a_line(arguments, text, capsys):
+def test_invalid_endpoint_gives_one_line_error(arguments, text, capsys):
     assert main(["listen", *arguments]) == 2
     error = capsys.readouterr().err
     assert text in error and error.count("\n") == 1
 
 
 @pytest.mark.slow
-def test_on_a_terminal_it_is_drawn_in_place_and_ctrl_c_gives_the_cursor_back():
+def test_terminal_display_redraws_in_place_and_ctrl_c_restores_the_cursor():
     port = free_port()
     leader, follower = pty.openpty()
     with Vehicle(port) as vehicle, subprocess.Popen(

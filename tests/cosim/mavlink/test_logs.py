@@ -1,18 +1,18 @@
-"""Who asks for log files is answered at once: there are none."""
+"""Requests for log files are answered at once with an empty list."""
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from tests.cosim.mavlink.station import Station
 
 
-def test_the_list_of_logs_is_empty_and_comes_at_once():
-    """MAVSDK waits 7.5 s where no answer comes."""
+def test_log_list_is_empty_and_answered_immediately():
+    """MAVSDK waits 7.5 s without an answer."""
     station = Station()
     (entry,) = station.send(mavlink.MAVLink_log_request_list_message(1, 1, 0, 0xFFFF))
     assert (entry.get_type(), entry.num_logs, entry.last_log_num, entry.size) == ("LOG_ENTRY", 0, 0, 0)
 
 
-def test_a_log_that_is_not_there_has_no_data():
+def test_missing_log_has_no_data():
     station = Station()
     data = station.send(mavlink.MAVLink_log_request_data_message(1, 1, 7, 90, 1000))[0]
     assert (data.get_type(), data.id, data.ofs, data.count) == ("LOG_DATA", 7, 90, 0)

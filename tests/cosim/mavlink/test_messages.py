@@ -1,4 +1,4 @@
-"""What the messages say of a snapshot."""
+"""The content of telemetry messages for a given snapshot."""
 
 import math
 from importlib import metadata
@@ -39,50 +39,50 @@ def station():
     return station
 
 
-def ask(station, message_id):
+def request(station, message_id):
     station.wire.clear()
     station.command(512, message_id)
     return [m for m in station.wire.got if m.get_type() != "COMMAND_ACK"]
 
 
-def test_pose(station):
-    (attitude,) = ask(station, 30)
+def test_pose_messages_match_the_snapshot(station):
+    (attitude,) = request(station, 30)
     assert (attitude.time_boot_ms, attitude.yaw, attitude.yawspeed) == (12_500, 2.0, pytest.approx(0.03))
-    (quaternion,) = ask(station, 31)
+    (quaternion,) = request(station, 31)
     assert (quaternion.q1, quaternion.q4) == (pytest.approx(math.cos(1.0)), pytest.approx(math.sin(1.0)))
-    (local,) = ask(station, 32)
+    (local,) = request(station, 32)
     north, east, down = rotation_matrix(TURN) @ np.array([0.5, -0.2, 0.1])
     assert (local.x, local.y, local.z) == (1.0, 2.0, 5.0)
     assert (local.vx, local.vy, local.vz) == pytest.approx((north, east, down), rel=1e-6)
-    (globe,) = ask(station, 33)
+    (globe,) = request(station, 33)
     assert (globe.relative_alt, globe.alt, globe.hdg) == (-5000, -5000, round(math.degrees(2.0) * 100))
     assert (globe.vx, globe.vy, globe.vz) == (round(north * 100), round(east * 100), round(down * 100))
-    (hud,) = ask(station, 74)
+    (hud,) = request(station, 74)
     assert (hud.alt, hud.climb, hud.heading, hud.throttle) == (-5.0, pytest.approx(-down), 115, 100)
-    (odometry,) = ask(station, 331)
+    (odometry,) = request(station, 331)
     assert (odometry.frame_id, odometry.child_frame_id, odometry.estimator_type) == (1, 12, 8)
     assert math.isnan(odometry.pose_covariance[0]) and odometry.vx == 0.5
 
 
-def test_depth_as_pressure(station):
-    (outside,), (inside,) = ask(station, 137), ask(station, 29)
+def test_depth_is_reported_as_pressure(station):
+    (outside,), (inside,) = request(station, 137), request(station, 29)
     assert outside.press_abs == pytest.approx(1013.25 + 1000.0 * 9.80665 * 5.0 / 100.0)
     assert inside.press_abs == pytest.approx(1013.25)
 
 
-def test_thrusters(station):
-    (actuators,) = ask(station, 375)
+def test_actuator_outputs_are_normalized_forces(station):
+    (actuators,) = request(station, 375)
     assert actuators.actuator[:4] == [0.5, -1.0, 0.0, 1.0] and actuators.active == 0xFF
 
 
 def servos(of, profile="ardusub", **row):
     station = Station(profile, of=of)
     station.look(1.0, **row)
-    (message,) = ask(station, 36)
+    (message,) = request(station, 36)
     return [getattr(message, f"servo{i}_raw") for i in range(1, 10)]
 
 
-def test_pulses_are_those_of_the_vehicles_own_table():
+def test_servo_pulses_follow_the_vehicle_table():
     """A real ArduSub that drives a BlueROV2 Heavy forward gives 1300, 1300, 1700, 1700 (measured)."""
     forward = {"thrust[1]": (10.0, 10.0, -10.0, -10.0)}
     heavy = scenario("vehicle='bluerov2_heavy'", "actuation.through='thrusters'")
@@ -97,7 +97,7 @@ def test_pulses_and_forces_are_each_others_inverse():
     assert pulse_of_effort(table, 1)(math.nan) == 1500
 
 
-def test_a_vehicle_without_a_table_has_straight_pulses_in_order():
+def test_vehicle_without_a_table_has_linear_pulses_in_order():
     forces = (13.5, -27.0, 0.0, 54.0)
     assert servos(scenario(), **{"thrust[1]": forces})[:4] == [1700, 1100, 1500, 1900]
 
@@ -105,37 +105,37 @@ def test_a_vehicle_without_a_table_has_straight_pulses_in_order():
 def test_time_of_servos_wraps():
     station = Station()
     station.look(5000.0)
-    (servo,) = ask(station, 36)
+    (servo,) = request(station, 36)
     assert servo.time_usec == 5_000_000_000 % 2**32
     station.look(5e6)
-    (attitude,) = ask(station, 30)
+    (attitude,) = request(station, 30)
     assert attitude.time_boot_ms == 5_000_000_000 % 2**32
 
 
-def test_all_sensors_that_mavsdk_asks_for_are_healthy(station):
-    (status,) = ask(station, 1)
+def test_sensors_checked_by_mavsdk_are_healthy(station):
+    (status,) = request(station, 1)
     for bit in (1, 2, 4, 32, mavlink.MAV_SYS_STATUS_PREARM_CHECK):
         assert status.onboard_control_sensors_present & status.onboard_control_sensors_enabled & bit
         assert status.onboard_control_sensors_health & bit
     assert status.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_GEOFENCE
 
 
-def test_the_target(station):
-    (target,) = ask(station, 85)
+def test_target_messages_match_the_goal(station):
+    (target,) = request(station, 85)
     assert (target.coordinate_frame, target.x, target.y, target.z) == (1, 8.0, 0.0, 5.0)
-    (nav,) = ask(station, 62)
+    (nav,) = request(station, 62)
     assert nav.wp_dist == round(math.hypot(7.0, 2.0)) and nav.target_bearing == round(math.degrees(math.atan2(-2, 7)))
 
 
-def test_weights_and_estimates_by_name(station):
-    values = {m.name: m.value for m in ask(station, 251)}
+def test_weights_and_estimates_are_sent_as_named_values(station):
+    values = {m.name: m.value for m in request(station, 251)}
     assert values["w_obstacle"] == pytest.approx(0.7) and values["phi4"] == 4.0 and values["goal_clear"] == -3.0
     assert values["qp_slack"] == 0.25 and values["clearance"] == 2.0 and values["thrust"] == 1.0
     assert all(len(name) <= 10 for name in values)
 
 
-def test_arrays(station):
-    arrays = {m.array_id: m for m in ask(station, 350)}
+def test_debug_arrays_hold_weights_clearances_and_thrusts(station):
+    arrays = {m.array_id: m for m in request(station, 350)}
     assert {i: m.name for i, m in arrays.items()} == {
         1: "weights",
         2: "values",
@@ -147,7 +147,7 @@ def test_arrays(station):
     assert arrays[3].data[:4] == [-3.0, 2.0, 2.0, 2.0] and arrays[4].data[:2] == [13.5, -27.0]
 
 
-def test_obstacles_as_the_vehicle_sees_them():
+def test_obstacle_distances_are_relative_to_the_vehicle():
     station = Station()
     # SR1 of the scenario: a sphere of 0.5 m about (2, 0, 1.8); a seen one about (5, 2, 5) of 1 m
     there = np.array([5.0, 2.0, 5.0]) - [0.0, 0.0, -1e5]
@@ -156,7 +156,7 @@ def test_obstacles_as_the_vehicle_sees_them():
         "quaternion.e0": tuple(TURN), "attitude.roll": EULER, "seen 1.shift.x": tuple(there),
         "goal.clearance": (-3.0, distance, 2.0, 2.0, 3.0, 1e5),
     })  # fmt: skip
-    found = {m.obstacle_id: (m.x, m.y, m.z) for m in ask(station, 11037)}
+    found = {m.obstacle_id: (m.x, m.y, m.z) for m in request(station, 11037)}
     assert set(found) == {1, 4}
     here, back = np.array([1.0, 2.0, 5.0]), rotation_matrix(TURN).T
     towards = np.array([2.0, 0.0, 1.8]) - here
@@ -164,20 +164,20 @@ def test_obstacles_as_the_vehicle_sees_them():
     assert found[4] == pytest.approx(back @ np.array([3.0, 0.0, 0.0]), abs=1e-5)
 
 
-def test_the_bottom_where_there_is_one(station):
+def test_rangefinder_is_reported_only_above_a_bottom(station):
     for message_id in (132, 173, 11038):
-        assert ask(station, message_id) == []
+        assert request(station, message_id) == []
     station.look(13.0, **{"altitude": 2.5, "measured.altitude": 2.5})
-    assert ask(station, 132)[0].current_distance == 250 and ask(station, 132)[0].orientation == 25
-    assert ask(station, 173)[0].distance == 2.5 and ask(station, 11038)[0].distance == 2.5
+    assert request(station, 132)[0].current_distance == 250 and request(station, 132)[0].orientation == 25
+    assert request(station, 173)[0].distance == 2.5 and request(station, 11038)[0].distance == 2.5
 
 
-def test_what_is_armed_is_under_way_even_on_the_bottom(station):
-    assert ask(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
+def test_armed_vehicle_is_in_air_even_on_the_bottom(station):
+    assert request(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
     station.look(13.0, bottom_contact=1.0)
-    assert ask(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
+    assert request(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
     station.look(14.0, **{"commands.armed": 0.0})
-    assert ask(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND
+    assert request(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND
 
 
 @pytest.mark.parametrize(
@@ -188,33 +188,33 @@ def test_what_is_armed_is_under_way_even_on_the_bottom(station):
         ("generic", OWN[0] << 24 | OWN[1] << 16 | OWN[2] << 8 | 255, b"subreach"),
     ],
 )
-def test_the_version_is_that_of_whom_the_profile_stands_for(profile, flight, custom):
-    (version,) = ask(Station(profile), 148)
+def test_version_matches_the_emulated_autopilot(profile, flight, custom):
+    (version,) = request(Station(profile), 148)
     assert version.flight_sw_version == flight  # ends in 255 if official, which QGroundControl compares with the newest
     assert version.middleware_sw_version == OWN[0] << 24 | OWN[1] << 16 | OWN[2] << 8 | 255
     assert bytes(version.flight_custom_version) == custom
 
 
-def test_before_the_first_step_the_vehicle_is_where_the_scenario_has_it():
+def test_initial_position_is_reported_before_the_first_step():
     station = Station(of=scenario("initial.position=[1.0, 2.0, 3.0]"))
-    (local,) = ask(station, 32)
+    (local,) = request(station, 32)
     assert (local.x, local.y, local.z) == (1.0, 2.0, 3.0)
 
 
-def test_origin_and_home():
+def test_global_origin_and_home_can_be_set():
     station = Station()
     station.look()
     replies = station.send(mavlink.MAVLink_set_gps_global_origin_message(1, 470_000_000, 80_000_000, 12_000))
     assert replies[0].get_type() == "GPS_GLOBAL_ORIGIN"
     assert (replies[0].latitude, replies[0].longitude, replies[0].altitude) == (470_000_000, 80_000_000, 12_000)
-    (globe,) = ask(station, 33)
+    (globe,) = request(station, 33)
     assert globe.lat == pytest.approx(470_000_000, abs=200) and (globe.alt, globe.relative_alt) == (7000, -5000)
     assert station.command(179, 1.0) == mavlink.MAV_RESULT_ACCEPTED  # here
-    (home,) = ask(station, 242)
+    (home,) = request(station, 242)
     assert (home.latitude, home.longitude, home.altitude, home.z) == (globe.lat, globe.lon, 12_000, 0.0)
     assert station.command(179, 0.0) == mavlink.MAV_RESULT_DENIED  # nowhere
     station.send(mavlink.MAVLink_set_gps_global_origin_message(1, 2**31 - 1, 0, 0))
-    assert ask(station, 49)[0].latitude == 470_000_000
+    assert request(station, 49)[0].latitude == 470_000_000
 
 
 def ecef(latitude, longitude, altitude):
@@ -230,7 +230,7 @@ def ecef(latitude, longitude, altitude):
 
 @pytest.mark.parametrize("latitude", [-80.0, -33.0, 0.0, 55.9097, 70.0])
 @pytest.mark.parametrize("offset", [(100.0, 0.0, 0.0), (0.0, 100.0, 5.0), (-70.0, 70.0, 30.0)])
-def test_the_local_frame_against_the_ellipsoid(latitude, offset):
+def test_local_frame_matches_the_ellipsoid(latitude, offset):
     frame = LocalFrame(latitude, 179.9999)
     north, east, down = offset
     here, there = ecef(latitude, 179.9999, 0.0), ecef(*frame.to_global(offset))
@@ -252,7 +252,7 @@ def test_the_local_frame_stays_finite_at_the_pole():
 # ---- fields ----
 
 
-def test_fields_hold_what_comes():
+def test_out_of_range_values_are_clamped_to_the_field():
     make = Encoder(mavlink)
     coder = mavlink.MAVLink(None)
     message = make("GLOBAL_POSITION_INT", -1, math.inf, -math.inf, 1e300, math.nan, 1e9, -1e9, 0.6, math.nan)
@@ -265,7 +265,7 @@ def test_fields_hold_what_comes():
     make("ACTUATOR_OUTPUT_STATUS", 0, 0, [1.0]).pack(coder)
 
 
-def test_numbers_of_the_link():
+def test_link_numbers_are_rounded_clamped_and_wrapped():
     assert [whole(x) for x in (1.4, math.nan, math.inf, -2.0, 3)] == [1, None, None, -2, 3]
     assert float32(math.inf) == float32(1e300) == pytest.approx(3.4028234e38) and float32(-0.5) == -0.5
     assert wrapped(2**32 * 1000 + 5000) == 5 and wrapped(2**32 + 7, 1) == 7
@@ -278,7 +278,7 @@ def test_euler_angles_are_those_of_the_plant():
         assert euler_of(whole_turn.tolist()) == pytest.approx((roll, pitch, yaw), abs=1e-9)
 
 
-def test_weights_of_criteria_of_ones_own_have_names_that_differ():
+def test_weight_names_of_custom_criteria_are_unique():
     assert weight_names(("obstacle", "shape", "depth")) == ["w_obstacle", "w_shape", "w_depth"]
     assert weight_names(("visibility", "visibilitx", "v")) == ["w_visibili", "w_visibil2", "w_v"]
 

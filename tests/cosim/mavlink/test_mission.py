@@ -50,7 +50,7 @@ def upload(station, *items, **who):
     return ack.type
 
 
-def test_what_is_written_is_read_back(station):
+def test_mission_round_trips(station):
     items = [
         {"numbers": (5.0, 1.5, 7.0, 0.25), "place": (12_345, -54_321, 2.5)},
         {
@@ -75,7 +75,7 @@ def test_what_is_written_is_read_back(station):
         assert old.get_type() == "MISSION_ITEM" and old.x * scale == pytest.approx(back.x, rel=1e-6, abs=100)
 
 
-def test_what_the_items_mean(station):
+def test_mission_items_map_to_regions_and_stays(station):
     upload(
         station,
         {"numbers": (5.0, 1.5, 0.0, NAN)},
@@ -105,7 +105,7 @@ def test_what_the_items_mean(station):
     )
 
 
-def test_what_is_done_at_once(station):
+def test_immediate_mission_items_are_decoded(station):
     jump = 2.0 + first(station)
     mission = {"frame": 2, "place": (0, 0, 0.0)}  # MAV_FRAME_MISSION
     assert not upload(
@@ -136,13 +136,13 @@ def test_what_is_done_at_once(station):
     assert (back.command, back.frame, back.param1, back.x) == (JUMP, 2, jump, 0.0)
 
 
-def test_a_law_without_a_speed_takes_no_item_for_one():
+def test_speed_item_is_rejected_for_a_law_without_speed():
     station = Station("px4", of=scenario(name="paper"))
     station.look()
     assert upload(station, {"command": SPEED, "numbers": (1, 0.5, -1, 0)}) == mavlink.MAV_MISSION_UNSUPPORTED
 
 
-def test_an_item_is_refused_as_it_comes_and_named(station):
+def test_invalid_item_is_rejected_on_receipt_by_name(station):
     items = [{}, {"command": 201}, {}, {}]  # QGroundControl names the item that it sent last
     station.send(mavlink.MAVLink_mission_count_message(1, 1, 4 + first(station), 0))
     for seq in range(1 + first(station)):
@@ -154,13 +154,13 @@ def test_an_item_is_refused_as_it_comes_and_named(station):
     assert station.send(item(2 + first(station)))[-1].type == mavlink.MAV_MISSION_ERROR  # it is over
 
 
-def test_a_speed_of_a_mission_is_a_parameter_from_then_on(station):
+def test_mission_speed_updates_the_parameter(station):
     upload(station, {}, {"command": SPEED, "numbers": (1, 0.25, -1, 0)}, {})
     for item in (0.0, 2.0):  # the step of item 1 was not seen
         station.look(1.0 + item, **{"commands.mode": 3.0, "commands.item": item})
     (value,) = station.send(mavlink.MAVLink_param_request_read_message(1, 1, b"LAW_SPEED", -1))
     assert value.param_value == 0.25
-    assert [m.seq for m in station.wire.of("MISSION_ITEM_REACHED")] == [first(station)]  # nor is it told of
+    assert [m.seq for m in station.wire.of("MISSION_ITEM_REACHED")] == [first(station)]  # nor is it reported
     station.commanded()
     station.send(mavlink.MAVLink_param_set_message(1, 1, b"LAW_SPEED", 1.0, 9))
     assert station.commanded() == [ChangeSetting("law.gains.speed", 1.0)]
@@ -189,7 +189,7 @@ def test_a_speed_of_a_mission_is_a_parameter_from_then_on(station):
         ({"command": JUMP, "numbers": (1, NAN, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM2),
     ],
 )
-def test_what_cannot_be_flown_is_refused_whole(station, fields, result):
+def test_invalid_mission_is_rejected_and_the_old_one_kept(station, fields, result):
     upload(station, {})
     station.commanded()
     assert upload(station, {}, fields) == result
@@ -198,7 +198,7 @@ def test_what_cannot_be_flown_is_refused_whole(station, fields, result):
     assert count.count == 1 + first(station)  # the mission before is still there
 
 
-def test_the_old_form_of_items_is_taken_too():
+def test_deprecated_float_mission_items_are_accepted():
     station = Station("generic")
     station.look()
     station.send(mavlink.MAVLink_mission_count_message(1, 1, 1, 0))
@@ -216,7 +216,7 @@ def test_home_is_the_first_item_for_ardupilot():
     assert (home.command, home.x, home.y, home.z) == (WAYPOINT, LATITUDE, LONGITUDE, 0.0)
 
 
-def test_fences_and_rally_points_are_none(station):
+def test_fences_and_rally_points_are_empty(station):
     for kind in (1, 2):
         (count,) = station.send(mavlink.MAVLink_mission_request_list_message(1, 1, kind))
         assert (count.count, count.mission_type) == (0, kind)
@@ -229,7 +229,7 @@ def test_fences_and_rally_points_are_none(station):
     assert station.commanded() == []
 
 
-def test_an_item_that_does_not_come_is_asked_for_again_and_given_up(station):
+def test_missing_item_is_requested_again_until_timeout(station):
     station.send(mavlink.MAVLink_mission_count_message(1, 1, 3, 0))
     station.wire.clear()
     station.wait(4.5, 0.5)
@@ -243,7 +243,7 @@ def test_an_item_that_does_not_come_is_asked_for_again_and_given_up(station):
     assert upload(station, {}) == mavlink.MAV_MISSION_ACCEPTED
 
 
-def test_an_upload_can_be_broken_off(station):
+def test_upload_can_be_canceled(station):
     station.send(mavlink.MAVLink_mission_count_message(1, 1, 3, 0))
     station.send(mavlink.MAVLink_mission_ack_message(1, 1, mavlink.MAV_MISSION_OPERATION_CANCELLED, 0))
     station.wire.clear()
@@ -251,18 +251,18 @@ def test_an_upload_can_be_broken_off(station):
     assert station.wire.of("MISSION_REQUEST_INT") == []
 
 
-def test_two_do_not_upload_at_once(station):
+def test_concurrent_uploads_are_rejected(station):
     station.send(mavlink.MAVLink_mission_count_message(1, 1, 3, 0))
     (ack,) = station.send(mavlink.MAVLink_mission_count_message(1, 1, 1, 0), system=250)
     assert (ack.type, ack.target_system) == (mavlink.MAV_MISSION_DENIED, 250)
 
 
-def test_too_long_a_mission(station):
+def test_too_long_mission_is_rejected(station):
     (ack,) = station.send(mavlink.MAVLink_mission_count_message(1, 1, 501, 0))
     assert ack.type == mavlink.MAV_MISSION_NO_SPACE
 
 
-def test_clear(station):
+def test_mission_can_be_cleared(station):
     upload(station, {})
     (ack,) = station.send(mavlink.MAVLink_mission_clear_all_message(1, 1, 255))
     assert ack.type == mavlink.MAV_MISSION_ACCEPTED
@@ -271,7 +271,7 @@ def test_clear(station):
     assert count.count == 0
 
 
-def test_start_and_set_current(station):
+def test_mission_start_and_set_current_are_applied(station):
     upload(station, {}, {}, {})
     station.commanded()
     assert station.command(300, 0.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
@@ -282,11 +282,11 @@ def test_start_and_set_current(station):
     assert station.command(224, NAN) == mavlink.MAV_RESULT_DENIED
 
 
-def test_start_without_a_mission(station):
+def test_start_without_a_mission_is_rejected(station):
     assert station.command(300, 0.0) == mavlink.MAV_RESULT_FAILED
 
 
-def test_progress_is_told(station):
+def test_mission_progress_is_reported(station):
     upload(station, {}, {})
     seq = first(station)
 
@@ -309,7 +309,7 @@ def test_progress_is_told(station):
     assert current().mission_state == mavlink.MISSION_STATE_PAUSED
 
 
-def test_read_only():
+def test_read_only_rejects_missions():
     station = Station(commands=False)
     (ack,) = [
         r for r in station.send(mavlink.MAVLink_mission_count_message(1, 1, 1, 0)) if r.get_type() == "MISSION_ACK"

@@ -18,7 +18,7 @@ def station(request):
     return station
 
 
-def test_arming(station):
+def test_arm_and_disarm_commands_are_applied(station):
     assert station.command(400, 1.0) == ACCEPTED
     assert station.command(400, 0.0, 21196.0) == ACCEPTED
     assert station.command(400, NAN) == DENIED
@@ -44,7 +44,7 @@ def test_arming(station):
         ]),
     ],
 )  # fmt: skip
-def test_each_profile_has_its_numbers(profile, numbers, mode):
+def test_mode_numbers_follow_the_profile(profile, numbers, mode):
     station = Station(profile)
     station.look()
     upload(station)
@@ -56,7 +56,7 @@ def test_each_profile_has_its_numbers(profile, numbers, mode):
 @pytest.mark.medium(fast=11)
 @pytest.mark.parametrize("profile", ["px4", "generic"])
 @pytest.mark.parametrize("number", [0, 3, 4, 9, 16, 19, 20, 21])
-def test_a_number_of_ardusub_means_nothing_else(profile, number):
+def test_ardusub_mode_numbers_are_unknown_to_other_profiles(profile, number):
     station = Station(profile)
     station.look()
     assert station.command(SET_MODE, 1, number, 0) == FAILED
@@ -65,7 +65,7 @@ def test_a_number_of_ardusub_means_nothing_else(profile, number):
 
 
 @pytest.mark.parametrize("number", [1, 6, 7, 20, 21, 77])
-def test_a_mode_that_is_not_there_is_refused(number):
+def test_unknown_mode_is_rejected(number):
     station = Station("ardusub")
     station.look()
     assert station.command(SET_MODE, 1, number) == FAILED
@@ -78,7 +78,7 @@ def test_a_mode_needs_the_bit_of_custom_modes(station):
     assert station.commanded() == []
 
 
-def test_set_mode_message():
+def test_set_mode_message_is_applied():
     for name, number in (("ardusub", 9), ("px4", 4 << 16 | 6 << 24), ("generic", 4 << 16 | 6 << 24)):
         station = Station(name)
         station.look()
@@ -87,7 +87,7 @@ def test_set_mode_message():
         assert station.commanded() == [SetMode("surface")]
 
 
-def test_standard_modes(station):
+def test_standard_modes_are_applied(station):
     upload(station)
     station.commanded()
     for number, mode in ((1, "hold"), (6, "mission"), (5, "surface"), (4, "depth_hold")):
@@ -98,7 +98,7 @@ def test_standard_modes(station):
     assert station.commanded() == []
 
 
-def test_available_modes_say_what_can_be_set(station):
+def test_available_modes_list_settable_modes(station):
     assert station.command(512, 435, 0) == ACCEPTED
     modes = station.wire.of("AVAILABLE_MODES")
     assert [(m.number_modes, m.mode_index) for m in modes] == [(7, i) for i in range(1, 8)]
@@ -118,7 +118,7 @@ def test_available_modes_say_what_can_be_set(station):
 
 
 @pytest.mark.parametrize("armed", [0.0, 1.0])
-def test_base_mode_is_a_real_ardusubs(armed):
+def test_base_mode_equals_that_of_ardusub(armed):
     """ArduSub's base_mode(): stabilised and manual input in all modes, guided where it finds its own way."""
     station = Station("ardusub")
     for number, guided in ((0, 0), (2, 0), (3, 8), (4, 8), (9, 0), (16, 8), (19, 0)):
@@ -147,7 +147,7 @@ def test_a_mission_is_needed_for_its_mode(station):
     assert "Refused: there is no mission" in station.wire.texts
 
 
-def test_pause_and_go_on(station):
+def test_pause_and_continue_are_applied(station):
     assert station.command(193, 0.0) == ACCEPTED
     assert station.command(193, 1.0) == ACCEPTED
     assert station.command(252, 0.0, 2.0) == ACCEPTED
@@ -157,14 +157,14 @@ def test_pause_and_go_on(station):
     assert station.command(252, 0.0, 3.0) == UNSUPPORTED
 
 
-def test_landing_is_surfacing_and_home_is_at_the_surface(station):
+def test_land_surfaces_and_home_is_at_the_surface(station):
     assert station.command(21) == ACCEPTED
     assert station.command(20) == ACCEPTED
     assert station.commanded() == [SetMode("surface"), SetTarget((0.0, 0.0, 0.5), 0.3)]
 
 
 @pytest.mark.parametrize("profile", ["px4", "generic"])
-def test_px4s_mode_of_return_is_a_command_to_surface_at_home(profile):
+def test_px4_return_mode_surfaces_at_home(profile):
     station = Station(profile)
     station.look()
     assert station.command(176, 129, 4, 5) == ACCEPTED
@@ -182,7 +182,7 @@ def test_a_restart_is_refused_while_armed(station):
     assert station.commanded() == [Reset(), Reset()]
 
 
-def test_before_there_is_a_snapshot_what_was_ordered_shows():
+def test_commanded_mode_is_reported_before_the_first_snapshot():
     station = Station(of=scenario("commands.await_arm=true"))
     station.command(262, 1)
     station.command(512, 0)
@@ -190,12 +190,12 @@ def test_before_there_is_a_snapshot_what_was_ordered_shows():
     assert (beat.custom_mode, beat.base_mode & 128) == (16, 0)
 
 
-def test_too_many_commands_are_turned_away(station):
+def test_full_command_queue_rejects_commands(station):
     results = [station.command(400, 1.0) for _ in range(300)]
     assert results == [ACCEPTED] * 256 + [REJECTED] * 44
 
 
-def test_read_only_refuses():
+def test_read_only_rejects_modes():
     station = Station(commands=False)
     station.look()
     assert [station.command(n, 1.0) for n in (400, 20, 21, 246, 179, 300)] == [DENIED] * 6

@@ -1,4 +1,4 @@
-"""What stations are told of obstacles: a level scan, and the nearest points."""
+"""Obstacle messages: a horizontal scan and the nearest points."""
 
 import math
 
@@ -17,7 +17,7 @@ HERE = np.array([1.0, 2.0, 5.0])  # of the station's vehicle [m, NED]
 
 
 def station(centre=(1.0, 8.0, 5.0), radius=1.0, **options):
-    """Return one whose only obstacle is a sphere, 6 m east of the vehicle unless said otherwise."""
+    """Return a station whose only obstacle is a sphere, by default 6 m east of the vehicle."""
     where = f"regions.SR1.shape.centre={list(map(float, centre))}"
     return Station(of=scenario(where, f"regions.SR1.shape.radius={radius}"), **options)
 
@@ -35,12 +35,12 @@ def attitude(roll=0.0, pitch=0.0, yaw=0.0):
 
 
 def seen(offset, radius):
-    """Return what a row has of an obstacle that came while running, so far from the vehicle [m, NED]."""
+    """Return the row values of a dynamic obstacle at an offset from the vehicle [m, NED]."""
     shift = tuple(HERE + offset - PARKED_POSITION)
     return {"seen 1.shift.x": shift, "seen 1.clearance": math.hypot(*offset) - radius}
 
 
-def asked(station, number=330):
+def request(station, number=330):
     station.wire.clear()
     assert station.command(512, number) == mavlink.MAV_RESULT_ACCEPTED
     return station.wire.of(mavlink.mavlink_map[number].msgname)
@@ -48,7 +48,7 @@ def asked(station, number=330):
 
 def scan(station, time=1.0, **row):
     station.look(time, **row)
-    (message,) = asked(station)
+    (message,) = request(station)
     return list(message.distances)
 
 
@@ -59,10 +59,10 @@ def met(distances):
 # ---- the message ---------------------------------------------------------------------------------------------------
 
 
-def test_its_fields_are_as_stations_read_them():
+def test_obstacle_distance_fields_follow_the_specification():
     stood = station()
     stood.look(12.5)
-    (message,) = asked(stood)
+    (message,) = request(stood)
     assert (message.time_usec, message.increment, message.increment_f, message.angle_offset) == (
         12_500_000,
         5,
@@ -76,7 +76,7 @@ def test_its_fields_are_as_stations_read_them():
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_it_is_streamed_once_a_second(profile):
+def test_obstacle_distance_is_streamed_at_1_hz(profile):
     stood = station(profile=profile)
     stood.look(0.0)
     stood.wire.clear()
@@ -89,7 +89,7 @@ def test_it_is_streamed_once_a_second(profile):
 
 
 @pytest.mark.parametrize(("yaw", "sector"), [(90, AHEAD), (0, RIGHT), (-90, BEHIND), (180, LEFT), (75, 3), (-135, 45)])
-def test_what_is_east_is_in_the_sector_of_its_bearing(yaw, sector):
+def test_obstacle_is_in_the_sector_of_its_bearing(yaw, sector):
     distances = scan(station(), **attitude(yaw=yaw))
     assert distances[sector] == min(distances) == 500
     assert abs(distances[sector - 1] - distances[(sector + 1) % 72]) <= 1  # it lies evenly about the sector's middle
@@ -101,7 +101,7 @@ def test_sectors_go_clockwise():
     assert set(met(distances)) <= set(range(7, 12))
 
 
-def test_each_sector_has_the_nearest_that_is_in_it():
+def test_each_sector_holds_its_nearest_obstacle():
     distances = scan(station(centre=at(6.0, 0.0, 0.0), radius=2.0))
     for i, distance in enumerate(distances):
         near, far = (math.radians(max(abs((i + 36) % 72 - 36) * 5.0 + s, 0.0)) for s in (-2.5, 2.5))
@@ -117,31 +117,31 @@ def test_each_sector_has_the_nearest_that_is_in_it():
 
 @pytest.mark.medium(fast=13)
 @pytest.mark.parametrize("bearing", np.radians(np.arange(0.0, 360.0, 7.3)))
-def test_nothing_wider_than_it_tells_slips_through(bearing):
+def test_obstacle_of_documented_size_is_always_detected(bearing):
     away = 19.6 * np.array([math.cos(bearing), math.sin(bearing), 0.0])
     assert met(scan(station(centre=HERE + away, radius=0.3)))
 
 
-def test_the_scan_stays_level():
+def test_scan_plane_stays_horizontal():
     level = scan(station(), **attitude(yaw=40.0))
     assert scan(station(), **attitude(roll=30.0, pitch=-50.0, yaw=40.0)) == level
 
 
-def test_what_is_above_or_below_is_not_in_it():
+def test_obstacles_above_or_below_are_excluded():
     assert met(scan(station(centre=at(0.0, 6.0, 1.05)))) == {}
     assert met(scan(station(centre=at(0.0, 6.0, -0.8))))[RIGHT] == 540
 
 
-def test_nothing_is_one_more_than_the_greatest():
+def test_empty_sector_holds_maximum_plus_one():
     assert scan(station(centre=at(0.0, 21.5, 0.0))) == [NOTHING] * 72
     assert min(scan(station(centre=at(0.0, 20.5, 0.0)))) == 1950
 
 
-def test_inside_an_obstacle_all_is_at_hand():
+def test_inside_an_obstacle_all_distances_are_minimal():
     assert scan(station(centre=at(0.0, 0.3, 0.0))) == [0] * 72
 
 
-def test_only_what_is_to_be_kept_out_of_as_an_obstacle_counts():
+def test_only_keep_out_obstacle_regions_are_scanned():
     base = ["regions.SR1.shape.centre=[90.0, 0.0, 5.0]"]
     near = "regions.{}.shape={{type='sphere', centre=[4.0, 2.0, 5.0], radius=1.0}}"
     other = Station(of=scenario(*base, near.format("SR2")))  # of the criterion shape
@@ -170,7 +170,7 @@ def test_a_moving_region_is_where_it_is_now():
     assert scan(stood, 4.0)[RIGHT] == 500
 
 
-def test_a_seen_obstacle_is_as_wide_as_its_clearance_says():
+def test_dynamic_obstacle_width_follows_its_clearance():
     stood = station(centre=(90.0, 0.0, 0.0))
     assert met(scan(stood)) == {}
     for radius in (0.5, 1.5):
@@ -181,11 +181,11 @@ def test_a_seen_obstacle_is_as_wide_as_its_clearance_says():
     assert met(scan(stood)) == {}  # forgotten
 
 
-def test_before_the_first_snapshot_no_obstacle_has_come():
+def test_before_the_first_snapshot_only_scenario_obstacles_are_reported():
     stood = station(centre=(0.0, 6.0, 1.0))  # the scenario begins at depth 1
     stood.wait(3.0)  # streams go by the wall clock
     assert stood.wire.of("OBSTACLE_DISTANCE_3D") == []
-    (message,) = asked(stood)
+    (message,) = request(stood)
     assert message.distances[RIGHT] == 500 and message.distances[LEFT] == NOTHING
 
 
@@ -200,7 +200,7 @@ def test_a_changed_setting_changes_the_scan():
 
 
 @pytest.mark.parametrize("lost", [{"position.x": (math.nan, 2.0, 5.0)}, {"attitude.yaw": math.nan}])
-def test_lost_numbers_are_unknown(lost):
+def test_nan_values_are_reported_as_unknown(lost):
     assert scan(station(), **lost) == [UNKNOWN] * 72
 
 
@@ -211,9 +211,9 @@ def test_the_nearest_points_are_those_of_the_scan():
     stood = station()
     both = {**attitude(yaw=90.0), **seen((-4.0, 0.0, 0.0), 0.5), "SR1.clearance": 5.0}
     stood.look(1.0, **both)
-    first, second = asked(stood, 11037)
+    first, second = request(stood, 11037)
     assert (first.obstacle_id, second.obstacle_id) == (4, 1)
     assert (first.x, first.y, first.z) == pytest.approx((0.0, 3.5, 0.0), abs=1e-6)
     assert (second.x, second.y, second.z) == pytest.approx((5.0, 0.0, 0.0), abs=1e-6)
-    (message,) = asked(stood)
+    (message,) = request(stood)
     assert message.distances[AHEAD] == 500 and message.distances[RIGHT] == 350

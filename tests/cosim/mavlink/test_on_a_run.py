@@ -1,4 +1,4 @@
-"""The vehicle on the link and the run behind it, step by step."""
+"""The vehicle on the link with a simulated run, step by step."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def flight():
         yield Flight(master)
 
 
-def test_disarm_and_arm(flight):
+def test_disarming_stops_thrusters_and_arming_resumes(flight):
     flight.fly(0.5)
     flight.command(400, 0.0)
     flight.fly(0.5)
@@ -55,7 +55,7 @@ def test_disarm_and_arm(flight):
 
 
 @pytest.mark.medium
-def test_a_velocity_is_flown_and_ends(flight):
+def test_velocity_setpoint_is_tracked_and_expires(flight):
     """MAVSDK's set_velocity_ned, streamed at 10 Hz."""
     flight.fly(0.1)
     x = flight.master.signals.view("position.x", 3)
@@ -71,7 +71,7 @@ def test_a_velocity_is_flown_and_ends(flight):
     assert np.abs(x - rest).max() < 0.05
 
 
-def test_a_set_point_is_reached(flight):
+def test_position_setpoint_is_reached(flight):
     flight.fly(0.1)
     flight.send(local(place=(1.5, 0.5, 1.0)))
     flight.fly(0.1)
@@ -83,7 +83,7 @@ def test_a_set_point_is_reached(flight):
     assert np.linalg.norm([position.x - 1.5, position.y - 0.5, position.z - 1.0]) < 0.51
 
 
-def test_parameters_take_effect(flight):
+def test_parameter_changes_take_effect_in_the_run(flight):
     flight.fly(0.1)
     for name, value in ((b"LAW_SPEED", 0.7), (b"SR1_RADIUS", 0.4), (b"THR_MAX_1", 20.0), (b"GOAL_RADIUS", 0.8)):
         flight.send(mavlink.MAVLink_param_set_message(1, 1, name, value, 9))
@@ -94,7 +94,7 @@ def test_parameters_take_effect(flight):
     assert [(s.key, s.value) for s in settings] == [(s.key, s.value) for s in flight.autopilot._context.settings]
 
 
-def test_an_obstacle_counts(flight):
+def test_sent_obstacle_gets_a_clearance(flight):
     flight.fly(0.1)
     flight.send(obstacle(place=(4.0, 0.0, 3.0)))
     flight.fly(0.1)
@@ -103,7 +103,7 @@ def test_an_obstacle_counts(flight):
     assert view.clearances[4] == pytest.approx(np.linalg.norm(here - [4.0, 0.0, 3.0]) - 0.5)
 
 
-def test_by_hand(flight):
+def test_manual_control_moves_the_vehicle(flight):
     flight.command(176, 1, 19)
     flight.send(sticks(x=1000))
     flight.fly(0.2)
@@ -114,7 +114,7 @@ def test_by_hand(flight):
 
 
 @pytest.mark.medium
-def test_a_mission_of_regions(flight):
+def test_uploaded_mission_is_completed(flight):
     flight.fly(0.1)
     places = [(0.6, 0.0, 1.0), (1.2, 0.4, 1.2)]
     flight.send(mavlink.MAVLink_mission_count_message(1, 1, 3, 0))
@@ -129,7 +129,7 @@ def test_a_mission_of_regions(flight):
     assert flight.last("HEARTBEAT").custom_mode == 3
 
 
-def test_who_listens_changes_nothing():
+def test_telemetry_does_not_change_the_run():
     rows = []
     for listening in (False, True):
         with Master(load_scenario("paper-deployable", ["time.duration=2.0"])) as master:
@@ -148,7 +148,7 @@ def test_who_listens_changes_nothing():
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("value", [0.0, 1e-30, 1e9, -1e9])
-def test_no_parameter_ends_the_run(flight, value):
+def test_no_parameter_change_aborts_the_run(flight, value):
     flight.send(mavlink.MAVLink_param_request_list_message(1, 1))
     flight.wait(0.1)
     values = {message.param_id: message.param_value for message in flight.wire.of("PARAM_VALUE")}

@@ -1,4 +1,4 @@
-"""Parameters: read, set, refused, and as a file."""
+"""Parameters: read, set, rejected, and as a file."""
 
 import struct
 from decimal import Decimal
@@ -47,7 +47,7 @@ def test_every_setting_has_a_name_of_its_own(name):
     assert all(0 < len(n) <= 16 and n == n.upper() for n in names.values())
 
 
-def test_a_list_waits_for_room_on_its_link(station):
+def test_parameter_list_waits_for_free_link_capacity(station):
     """What a slow line has no room for would be lost, and asked for again one by one."""
     station.wire.room = False
     station.send(LIST)
@@ -59,7 +59,7 @@ def test_a_list_waits_for_room_on_its_link(station):
     assert [v.param_index for v in values] == list(range(values[0].param_count))
 
 
-def test_names_can_be_read():
+def test_parameter_names_are_readable():
     keys = {
         "law.gains.k_p1": "LAW_K_P1", "regions.SR1.gain": "SR1_GAIN", "regions.SR1.shape.radius": "SR1_RADIUS",
         "goal.radius": "GOAL_RADIUS", "arbiter.ramp": "ARB_RAMP", "limit.force": "LIM_FORCE",
@@ -70,13 +70,13 @@ def test_names_can_be_read():
 
 @settings(max_examples=examples(50))
 @given(st.lists(st.text(max_size=25), unique=True, max_size=12))
-def test_names_are_different_whatever_the_keys(keys):
+def test_parameter_names_are_unique_for_any_keys(keys):
     names = parameter_names(keys)
     assert len(set(names.values())) == len(keys) and all(0 < len(n) <= 16 for n in names.values())
     assert names == parameter_names(keys)
 
 
-def test_the_list_is_whole(station):
+def test_parameter_list_is_complete(station):
     station.send(LIST)
     station.wait(0.1)
     values = station.wire.of("PARAM_VALUE")
@@ -103,7 +103,7 @@ PX4 = [
 
 
 @pytest.mark.parametrize(("profile", "names"), [("ardusub", SUB), ("px4", PX4)])
-def test_what_qgroundcontrol_looks_for_is_there_and_needs_no_setup(profile, names):
+def test_qgroundcontrol_finds_its_parameters_without_setup(profile, names):
     station = Station(profile, loss_action="surface")
     values = {name: read(station, name)[0].param_value for name in names}
     if profile == "ardusub":  # APMSensorsComponent::setupComplete
@@ -128,7 +128,7 @@ def test_the_frame_is_that_of_the_vehicle():
 
 @pytest.mark.medium(fast=6)
 @pytest.mark.parametrize("name", list_scenarios())
-def test_no_setting_is_hidden_by_a_name_that_stations_look_for(name):
+def test_parameter_names_do_not_collide_with_station_parameters(name):
     keys = [setting.key for setting in LiveSettings(scenario(name=name))]
     taken = set(parameter_names(keys).values())
     for profile in ("ardusub", "px4"):
@@ -143,7 +143,7 @@ def test_a_flood_of_requests_makes_one_list(station):
     assert len(station.wire.of("PARAM_VALUE")) <= 100
 
 
-def test_who_asks_in_the_middle_gets_all(station):
+def test_request_during_a_listing_restarts_it(station):
     station.send(LIST)
     count = station.wire.of("PARAM_VALUE")[0].param_count
     station.wire.clear()
@@ -152,27 +152,27 @@ def test_who_asks_in_the_middle_gets_all(station):
     assert {v.param_index for v in station.wire.of("PARAM_VALUE")} == set(range(count))
 
 
-def test_read_by_name_and_by_index(station):
+def test_parameter_is_readable_by_name_and_by_index(station):
     (value,) = read(station, "GOAL_RADIUS")
     (same,) = read(station, "", value.param_index)
     assert (value.param_id, value.param_value) == (same.param_id, same.param_value) == ("GOAL_RADIUS", 0.5)
 
 
 @pytest.mark.parametrize(("name", "index"), [("NO_SUCH", -1), ("", 9999), ("GOAL_RADIUS", 32767), ("", -1)])
-def test_what_is_not_there_is_said_to_be_so(station, name, index):
+def test_missing_parameter_gives_param_error(station, name, index):
     (error,) = read(station, name, index)
     assert (error.get_type(), error.error) == ("PARAM_ERROR", mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
     assert (error.target_system, error.target_component) == (255, 190)
 
 
-def test_setting_one(station):
+def test_parameter_can_be_set(station):
     (value,) = put(station, "GOAL_RADIUS", 0.7)
     assert value.param_value == pytest.approx(0.7, rel=1e-7)
     assert station.commanded() == [ChangeSetting("goal.radius", 0.7)]  # with the digits that were meant
     assert read(station, "GOAL_RADIUS")[0].param_value == value.param_value
 
 
-def test_the_same_value_makes_no_order(station):
+def test_unchanged_value_submits_no_command(station):
     station.send(LIST)
     station.wait(0.1)
     for value in station.wire.of("PARAM_VALUE"):
@@ -195,7 +195,7 @@ def test_the_same_value_makes_no_order(station):
         ("SYSID_THISMAV", 2.0, mavlink.MAV_PARAM_ERROR_READ_ONLY),
     ],
 )
-def test_what_cannot_be_is_refused_and_the_old_value_told(station, name, value, error):
+def test_invalid_value_is_rejected_and_the_old_value_returned(station, name, value, error):
     before = read(station, name)[0]
     replies = [reply for reply in put(station, name, value) if reply.get_type() != "STATUSTEXT"]
     assert (replies[0].get_type(), replies[0].error) == ("PARAM_ERROR", error)
@@ -204,12 +204,12 @@ def test_what_cannot_be_is_refused_and_the_old_value_told(station, name, value, 
     assert station.commanded() == []
 
 
-def test_the_refusal_says_what_is_expected(station):
+def test_rejection_text_names_the_expected_range(station):
     put(station, "ARB_RAMP", 1e9)
     assert "expected 0 to 1000" in "".join(station.wire.texts)
 
 
-def test_read_only():
+def test_read_only_rejects_parameter_changes():
     station = Station(commands=False)
     error, old = (reply for reply in put(station, "GOAL_RADIUS", 0.7) if reply.get_type() != "STATUSTEXT")
     assert error.error == mavlink.MAV_PARAM_ERROR_PERMISSION_DENIED and old.param_value == 0.5
@@ -222,14 +222,14 @@ def test_an_integer_is_cast_for_ardupilot_alone():
         assert station.commanded() == ([ChangeSetting("goal.radius", 2.0)] if taken else [])
 
 
-def test_a_full_queue_leaves_the_value(station):
+def test_full_queue_leaves_the_value_unchanged(station):
     for i in range(300):
         put(station, "GOAL_RADIUS", 1.0 + i)
     assert len(station.commanded()) == 256
     assert read(station, "GOAL_RADIUS")[0].param_value == 256.0
 
 
-def test_speed_is_a_parameter(station):
+def test_speed_command_sets_the_speed_parameter(station):
     assert station.command(178, 1.0, 0.6) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command(178, 1.0, -1.0) == mavlink.MAV_RESULT_ACCEPTED  # as it is
     assert station.command(178, 1.0, NAN) == mavlink.MAV_RESULT_DENIED
@@ -237,7 +237,7 @@ def test_speed_is_a_parameter(station):
     assert read(station, "LAW_SPEED")[0].param_value == pytest.approx(0.6)
 
 
-def test_speed_is_unknown_to_laws_without_it():
+def test_speed_command_is_unsupported_for_laws_without_speed():
     station = Station(of=scenario(name="paper"))
     assert station.command(178, 1.0, 0.6) == mavlink.MAV_RESULT_UNSUPPORTED
 
@@ -253,12 +253,12 @@ def crc_by_bits(data):
 
 
 @given(st.binary(max_size=60))
-def test_crc(data):
+def test_crc32_matches_bitwise_reference(data):
     assert bare_crc32(data) == crc_by_bits(data)
     assert bare_crc32(data[3:], bare_crc32(data[:3])) == crc_by_bits(data)
 
 
-def test_px4_stations_know_a_list_by_its_hash():
+def test_px4_parameter_hash_identifies_the_list():
     station = Station("px4")
     first = station.send(LIST)[0]
     assert (first.param_id, first.param_index, first.param_type) == (
@@ -283,7 +283,7 @@ def test_px4_stations_know_a_list_by_its_hash():
 
 @settings(max_examples=examples(200))
 @given(st.floats(width=32, allow_nan=False, allow_infinity=False))
-def test_shortest_is_the_same_float32(value):
+def test_shortest_decimal_round_trips_as_float32(value):
     short = shortest(value)
     assert struct.pack("<f", short) == struct.pack("<f", value)
     assert significant(short) <= significant(value)

@@ -1,4 +1,4 @@
-"""A recorded run on MAVLink links: what comes is what was recorded, none of it is left out, and nothing is heeded."""
+"""A recorded run streamed over MAVLink: complete, equal to the record, and read-only."""
 
 import shutil
 import socket
@@ -47,7 +47,7 @@ def logged(recorded, tmp_path_factory):
 
 
 @pytest.mark.medium
-def test_as_fast_as_it_goes_nothing_is_left_out(logged):
+def test_unlimited_rate_drops_no_message(logged):
     done, messages = logged
     assert done.simulated == pytest.approx(4.0) and done.troubles == []
     stamps = [m.time_boot_ms for _, m in messages if m.get_type() == "ATTITUDE"]
@@ -56,7 +56,7 @@ def test_as_fast_as_it_goes_nothing_is_left_out(logged):
     assert sequence == [i % 256 for i in range(len(sequence))]
 
 
-def test_what_comes_is_what_was_recorded(logged, recorded):
+def test_streamed_values_equal_the_record(logged, recorded):
     record = load_record(recorded)
     time, position = record["time"], record.stack(["position.x", "position.y", "position.z"])
     came = [m for _, m in logged[1] if m.get_type() == "LOCAL_POSITION_NED"]
@@ -66,14 +66,14 @@ def test_what_comes_is_what_was_recorded(logged, recorded):
         np.testing.assert_allclose([message.x, message.y, message.z], position[k], rtol=1e-6)
 
 
-def test_the_log_replays_as_it_would_have_been_lived(logged):
+def test_log_timestamps_advance_in_real_time(logged):
     attitudes = [(stamp, m.time_boot_ms) for stamp, m in logged[1] if m.get_type() == "ATTITUDE"]
     wall = (attitudes[-1][0] - attitudes[0][0]) * 1e-6
     assert wall == pytest.approx(4.0, abs=0.02)
 
 
 @pytest.mark.slow
-def test_a_run_that_was_commanded_is_streamed_too(shipped_run, tmp_path):
+def test_commanded_run_is_streamed(shipped_run, tmp_path):
     log = tmp_path / "run.tlog"
     folder = shipped_run("paper-limited", *COMMANDED).folder
     done = replay(folder, [parse_endpoint(str(log))], MavlinkOptions(profile="px4"), rate=None)
@@ -83,7 +83,7 @@ def test_a_run_that_was_commanded_is_streamed_too(shipped_run, tmp_path):
     assert beats[0].base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 
 
-def test_a_killed_run_is_streamed_as_far_as_it_goes(recorded, tmp_path):
+def test_killed_run_is_streamed_to_its_last_row(recorded, tmp_path):
     killed = tmp_path / "killed"
     (killed / "record.parts").mkdir(parents=True)
     shutil.copy(recorded / "scenario.toml", killed)
@@ -93,7 +93,7 @@ def test_a_killed_run_is_streamed_as_far_as_it_goes(recorded, tmp_path):
 
 
 @pytest.mark.slow
-def test_over_udp_at_the_rate_asked_for_it_answers_and_obeys_nothing(recorded, tmp_path):
+def test_streaming_over_udp_answers_requests_and_rejects_commands(recorded, tmp_path):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
         s.bind(("127.0.0.1", 0))
         port = s.getsockname()[1]
@@ -111,14 +111,14 @@ def test_over_udp_at_the_rate_asked_for_it_answers_and_obeys_nothing(recorded, t
     assert done[0].wall >= 4.0
 
 
-def test_the_command_writes_a_log_and_says_so(recorded, tmp_path, capsys):
+def test_stream_command_writes_a_log_and_reports_it(recorded, tmp_path, capsys):
     log = tmp_path / "run.tlog"
     assert main(["stream", str(recorded), "--mavlink", str(log), "--rate", "max"]) == 0
     assert "4.0 s streamed" in capsys.readouterr().out
     assert log.stat().st_size > 10_000
 
 
-def test_what_is_no_run_is_said_in_a_line(recorded, tmp_path, capsys):
+def test_missing_run_gives_one_line_error(recorded, tmp_path, capsys):
     assert main(["stream", str(tmp_path), "--mavlink", str(tmp_path / "a.tlog")]) == 2
     assert "holds no run (scenario.toml is missing)" in capsys.readouterr().err
     shutil.copy(recorded / "scenario.toml", tmp_path)
@@ -127,7 +127,7 @@ def test_what_is_no_run_is_said_in_a_line(recorded, tmp_path, capsys):
     assert not list(tmp_path.glob("*.tlog"))
 
 
-def test_a_record_of_something_else_is_refused(recorded, tmp_path):
+def test_foreign_record_is_rejected(recorded, tmp_path):
     shutil.copy(recorded / "scenario.toml", tmp_path)
     pq.write_table(pa.table({"time": [0.0, 0.1]}), tmp_path / "record.parquet")
     with pytest.raises(RunError, match=r"no columns 'position\.x'"):

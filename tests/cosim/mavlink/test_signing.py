@@ -1,4 +1,4 @@
-"""Signatures: ours are taken by pymavlink, its are taken by us, and neither takes what is forged or repeated."""
+"""Signatures: compatible with pymavlink both ways; forged and replayed frames are rejected."""
 
 import hashlib
 import os
@@ -52,7 +52,7 @@ def signed_link(clock, link=3):
     return Link("test", Captured(), open_gate(), SOURCE, signer=Signer(KEY, clock, link))
 
 
-def test_pymavlink_takes_what_we_sign_and_nothing_after_a_change():
+def test_pymavlink_accepts_own_signatures_and_rejects_altered_frames():
     link, station = signed_link(SigningClock()), Station(key=KEY)
     for i in range(20):
         assert link.send(attitude(i))
@@ -83,7 +83,7 @@ def test_timestamps_rise_on_all_links_and_over_a_restart(monkeypatch):
     assert int.from_bytes(a.channel.frames[-1][-12:-6], "little") > stamps[-1]
 
 
-def test_what_pymavlink_signs_is_taken_once():
+def test_frame_signed_by_pymavlink_is_accepted_once():
     gate, _ = gate_and_clock()
     station = Station(key=KEY)
     frames = [station.pack(attitude(i)) for i in range(10)]
@@ -107,7 +107,7 @@ def test_forged_unsigned_and_version_1_frames_are_refused_and_counted():
     assert accepts(gate, bytes(good))
 
 
-def test_a_forged_frame_does_not_silence_the_one_it_pretends_to_be():
+def test_forged_timestamp_does_not_block_the_real_sender():
     """A timestamp of the far future counts only with a good signature."""
     gate, clock = gate_and_clock()
     station = Station(key=KEY)
@@ -117,7 +117,7 @@ def test_a_forged_frame_does_not_silence_the_one_it_pretends_to_be():
     assert clock.now < now() + MINUTE
 
 
-def test_a_new_stream_may_be_a_minute_behind_and_an_old_one_goes_its_own_pace():
+def test_new_stream_may_lag_at_most_one_minute():
     gate, _ = gate_and_clock()
     assert accepts(gate, Station(key=KEY, link=1, stamp=now() - MINUTE + 100_000).pack(heartbeat()))
     late = Station(key=KEY, link=2, stamp=now() - MINUTE - 100_000)
@@ -125,7 +125,7 @@ def test_a_new_stream_may_be_a_minute_behind_and_an_old_one_goes_its_own_pace():
     assert refused(gate) == {"old": 1}
 
 
-def test_a_sender_whose_clock_is_ahead_takes_our_frames():
+def test_sender_with_fast_clock_accepts_own_frames():
     clock = SigningClock()
     gate, link = open_gate(Verifier(KEY, clock)), signed_link(clock)
     station = Station(key=KEY, stamp=now() + MINUTE - 200_000)
@@ -138,7 +138,7 @@ def test_a_sender_whose_clock_is_ahead_takes_our_frames():
     assert [m.get_type() for m in station.parse(link.channel.frames[-1])] == ["HEARTBEAT"]
 
 
-def test_a_clock_an_hour_ahead_is_refused_and_locks_nobody_out():
+def test_clock_one_hour_ahead_is_rejected_without_lockout():
     gate, clock = gate_and_clock()
     for k in range(5):  # nor does one that creeps ahead, a minute at a time
         accepts(gate, Station(key=KEY, link=k, stamp=now() + (k + 1) * MINUTE - 100_000).pack(heartbeat()))
@@ -148,7 +148,7 @@ def test_a_clock_an_hour_ahead_is_refused_and_locks_nobody_out():
     assert accepts(gate, Station(key=KEY, link=10, stamp=now()).pack(heartbeat()))
 
 
-def test_a_frame_heard_on_one_link_is_a_repeat_on_another():
+def test_frame_received_on_two_links_counts_as_replay():
     verifier = Verifier(KEY, SigningClock())
     frame = Station(key=KEY).pack(heartbeat())
     assert accepts(open_gate(verifier), frame)
@@ -197,12 +197,12 @@ RAW = bytes(range(128, 160))
         (bytes(32), bytes(32)),
     ],
 )
-def test_key_files(tmp_path, content, key):
+def test_key_files_are_read(tmp_path, content, key):
     assert read_key(key_file(tmp_path, content)) == key
 
 
 @pytest.mark.parametrize("content", [b"", b" \n", b"\xff" * 31, b"\xff" * 33, b"two\nlines"])
-def test_files_without_a_key_are_refused(tmp_path, content):
+def test_files_without_a_key_are_rejected(tmp_path, content):
     with pytest.raises(TelemetryError, match="expected 32 bytes, 64 hexadecimal digits or a passphrase"):
         read_key(key_file(tmp_path, content))
 
@@ -213,7 +213,7 @@ def test_a_key_file_that_is_too_long_is_refused_rather_than_cut(tmp_path):
         read_key(key_file(tmp_path, b"a" * 4097))
 
 
-def test_keys_that_others_can_read_are_refused(tmp_path):
+def test_world_readable_key_files_are_rejected(tmp_path):
     with pytest.raises(TelemetryError, match=r"none: the key cannot be read: No such file"):
         read_key(tmp_path / "none")
     if os.name == "posix":
@@ -221,7 +221,7 @@ def test_keys_that_others_can_read_are_refused(tmp_path):
             read_key(key_file(tmp_path, KEY, 0o644))
 
 
-def test_signed_by_hand_once_published():
+def test_signature_matches_published_example():
     """The golden frame: key of 42s, made from the specification with hashlib and a bitwise checksum alone."""
     head = bytes([9, 1, 0, 0, 255, 190, 0, 0, 0, 7, 0, 0, 0, 6, 8, 0, 0, 3])  # HEARTBEAT of a ground station
     crc = 0xFFFF
@@ -237,7 +237,7 @@ def test_signed_by_hand_once_published():
     assert (message.custom_mode, message.type, message.autopilot) == (7, 6, 8)
 
 
-def test_a_signed_link_over_a_socket_is_silent_to_whoever_has_no_key():
+def test_signed_udp_link_sends_to_an_absent_peer():
     assert mavlink.MAVLink_heartbeat_message.crc_extra == 50
     link = Link("test", UdpOut("127.0.0.1", 9), open_gate(), SOURCE, signer=Signer(KEY, SigningClock(), 0))
     assert link.send(heartbeat())

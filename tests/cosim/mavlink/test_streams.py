@@ -35,13 +35,13 @@ def run(station, seconds, step=0.01, **values):
     ("interval", "count"),
     [(20_000, 500), (15_000, 667), (33_333, 300), (1_000_000, 10), (1, 1000), (9_999, 1000), (-1, 0)],
 )
-def test_an_interval_is_kept_exactly(station, interval, count):
+def test_requested_interval_is_kept_exactly(station, interval, count):
     assert station.command(SET, ATTITUDE, interval) == ACCEPTED
     assert run(station, 10.0)["ATTITUDE"] == pytest.approx(count, abs=1 if count else 0)
 
 
 @pytest.mark.medium
-def test_nothing_drifts_when_steps_do_not_fit(station):
+def test_interval_does_not_drift_with_unaligned_steps(station):
     station.command(SET, ATTITUDE, 25_000)
     run(station, 60.0, step=0.007)
     times = [m.time_boot_ms for m in station.wire.of("ATTITUDE")]
@@ -49,18 +49,18 @@ def test_nothing_drifts_when_steps_do_not_fit(station):
     assert all(0 <= time % 25 <= 7 for time in times)  # always the first snapshot once it is due
 
 
-def test_steps_that_were_lost_are_not_made_up_for(station):
+def test_missed_steps_send_no_burst(station):
     station.look(100.0)
     assert station.wire.counts()["ATTITUDE"] == 1
 
 
-def test_back_to_the_default(station):
+def test_interval_returns_to_default(station):
     station.command(SET, ATTITUDE, 500_000)
     assert station.command(SET, ATTITUDE, 0) == ACCEPTED
     assert run(station, 5.0)["ATTITUDE"] == 50
 
 
-def test_the_interval_is_told(station):
+def test_message_interval_is_reported(station):
     station.command(SET, ATTITUDE, 50_000)
     for command in ((GET, ATTITUDE), (ONCE, 244, ATTITUDE)):
         assert station.command(*command) == ACCEPTED
@@ -75,12 +75,12 @@ def test_the_interval_is_told(station):
 @pytest.mark.parametrize(
     "numbers", [(9999, 100_000), (NAN, 100_000), (ATTITUDE, NAN), (math.inf, 1), (-1, 1), (397, 1)]
 )
-def test_an_interval_for_nothing(station, numbers):
+def test_interval_of_an_unknown_message_is_rejected(station, numbers):
     assert station.command(SET, *numbers) in (DENIED, FAILED)
 
 
 @pytest.mark.medium
-def test_a_link_carries_so_much_and_no_more(station):
+def test_stream_load_per_link_is_bounded(station):
     results = [station.command(SET, message_id, 1) for message_id in MESSAGES]
     assert DENIED in results and results[0] == ACCEPTED
     assert station.autopilot._streams[station.wire].load <= GREATEST_LOAD
@@ -90,7 +90,7 @@ def test_a_link_carries_so_much_and_no_more(station):
 
 @pytest.mark.medium(fast=9)
 @pytest.mark.parametrize("message_id", MESSAGES)
-def test_everything_in_the_table_can_be_asked_for(station, message_id):
+def test_every_listed_message_can_be_requested(station, message_id):
     station.look(1.0, altitude=3.0, measured__altitude=3.0, **{"goal.clearance": (-3.0, 2.0, 2.0, 2.0, 3.0, 3.0)})
     station.wire.clear()
     assert station.command(ONCE, message_id) == ACCEPTED
@@ -99,7 +99,7 @@ def test_everything_in_the_table_can_be_asked_for(station, message_id):
 
 
 @pytest.mark.parametrize("message_id", [140, 300, 395, 396, 397, 410, 9999, -5, NAN])
-def test_what_is_not_there_fails_at_once(station, message_id):
+def test_request_of_an_unknown_message_fails(station, message_id):
     assert station.command(ONCE, message_id) == FAILED
 
 
@@ -107,7 +107,7 @@ def group(number, rate, start=1):
     return mavlink.MAVLink_request_data_stream_message(1, 1, number, rate, start)
 
 
-def test_groups(station):
+def test_stream_groups_set_their_messages(station):
     station.send(group(10, 25))
     counts = run(station, 4.0)
     assert counts["ATTITUDE"] == counts["AHRS2"] == 100 and counts["ATTITUDE_QUATERNION"] == 40
@@ -116,7 +116,7 @@ def test_groups(station):
     assert counts["ATTITUDE"] == 0 and counts["ATTITUDE_QUATERNION"] == 40
 
 
-def test_all_groups_at_once_as_mavproxy_asks(station):
+def test_stream_all_request_of_mavproxy_sets_every_group(station):
     station.send(group(0, 4))
     counts = run(station, 10.0)
     for name in ("ATTITUDE", "VFR_HUD", "GLOBAL_POSITION_INT", "SYS_STATUS", "SERVO_OUTPUT_RAW", "SCALED_IMU2"):
@@ -126,14 +126,14 @@ def test_all_groups_at_once_as_mavproxy_asks(station):
     assert run(station, 2.0)["ATTITUDE"] == 0
 
 
-def test_seventeen_types_at_fifty_hertz_go_through(station):
+def test_seventeen_messages_at_50_hertz_are_accepted(station):
     ids = (1, 2, 24, 29, 30, 31, 32, 33, 36, 62, 74, 85, 137, 147, 242, 245, 178)
     assert [station.command(SET, i, 20_000) for i in ids] == [ACCEPTED] * 17
     counts = run(station, 2.0)
     assert all(counts[mavlink.mavlink_map[i].msgname] == 100 for i in ids)
 
 
-def test_version_and_banner(station):
+def test_version_and_banner_are_sent_on_request(station):
     assert station.command(520, 1.0) == ACCEPTED and station.command(42428) == ACCEPTED
     (version,) = station.wire.of("AUTOPILOT_VERSION")
     assert version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT

@@ -1,4 +1,4 @@
-"""Set-points, sticks and obstacles."""
+"""Setpoints, manual control and obstacles."""
 
 import math
 
@@ -38,7 +38,7 @@ def local(frame=1, mask=POSITION, place=(3.0, 4.0, 5.0), speed=(0.0, 0.0, 0.0), 
     return mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, frame, mask, *place, *speed, 0, 0, 0, yaw, 0)
 
 
-def test_a_set_point_moves_the_target_once(station):
+def test_setpoint_moves_the_target_once(station):
     for _ in range(20):
         station.send(local())
     station.send(local(place=(3.5, 4.0, 5.0)))
@@ -48,14 +48,14 @@ def test_a_set_point_moves_the_target_once(station):
 @pytest.mark.parametrize(
     ("frame", "position"), [(1, (3, 4, 5)), (7, (4, 6, 10)), (8, (-3, 5, 10)), (9, (-3, 5, 10)), (12, (-3, 5, 10))]
 )
-def test_frames(station, frame, position):
+def test_setpoint_frames_are_converted(station, frame, position):
     station.look(2.0, **EAST)  # at 1, 2, 5
     station.send(local(frame))
     (command,) = station.commanded()
     assert command.position == pytest.approx(position)
 
 
-def test_with_velocity_and_yaw(station):
+def test_setpoint_velocity_and_yaw_are_applied(station):
     station.send(local(mask=WITH_VELOCITY, speed=(0.1, 0.2, 0.0)))
     station.send(local(mask=POSITION & ~1024, yaw=1.0, place=(1.0, 1.0, 1.0)))
     aim, other, face = station.commanded()
@@ -64,7 +64,7 @@ def test_with_velocity_and_yaw(station):
     )
 
 
-def test_depth_alone(station):
+def test_depth_only_setpoint_keeps_horizontal_target(station):
     station.send(local(mask=POSITION | 0b011, place=(NAN, NAN, 2.0)))
     assert station.commanded() == [SetTarget((8.0, 0.0, 2.0))]
 
@@ -74,14 +74,14 @@ def test_depth_alone(station):
     local(place=(NAN, 0, 0)), local(place=(math.inf, 0, 0)), local(place=(1e6, 0, 0)), local(mask=0b111000111000),
     local(mask=WITH_VELOCITY, speed=(NAN, 0, 0)), local(mask=WITH_VELOCITY, speed=(1e4, 0, 0)),
 ])  # fmt: skip
-def test_what_is_no_place_is_refused_with_a_word(station, message):
+def test_invalid_setpoint_is_rejected_with_one_text(station, message):
     for _ in range(5):
         station.send(message)
     assert station.commanded() == []
     assert len([t for t in station.wire.texts if t.startswith("Refused")]) == 1
 
 
-def test_set_points_count_while_the_region_is_to_be_reached(station):
+def test_setpoints_are_applied_only_in_reach_mode(station):
     station.look(2.0, **{"commands.mode": 1.0})
     station.send(local())
     assert station.commanded() == []
@@ -94,7 +94,7 @@ def velocity(going, frame=1, mask=0b110111000111, **more):
     return local(frame, mask, (0.0, 0.0, 0.0), going, **more)
 
 
-def test_a_velocity_without_a_position_travels_from_here_until_it_ends(station):
+def test_velocity_setpoint_moves_the_target_from_the_current_position_until_timeout(station):
     """MAVSDK's set_velocity_ned, sent again at 20 Hz, and then no more."""
     for _ in range(20):
         station.send(velocity((0.2, 0.0, -0.1)))
@@ -125,14 +125,14 @@ def test_a_velocity_in_the_bodys_frame_is_turned_by_yaw(station):
         (local(mask=0b110000111111), "accelerations are not followed"),
     ],
 )
-def test_rates_and_accelerations_are_refused_aloud(station, message, words):
+def test_rates_and_accelerations_are_rejected_with_text(station, message, words):
     message.afx, message.yaw_rate = 0.1, 0.2
     station.send(message)
     assert station.commanded() == []
     assert words in "".join(station.wire.texts)
 
 
-def test_a_set_point_before_its_mode_is_no_warning_and_counts_with_it(station):
+def test_setpoint_streamed_before_its_mode_is_applied_on_mode_change(station):
     """PX4's pattern: stream set-points, then switch to offboard."""
     station.look(2.0, **{"commands.mode": 1.0})
     station.wire.clear()
@@ -144,7 +144,7 @@ def test_a_set_point_before_its_mode_is_no_warning_and_counts_with_it(station):
     assert station.commanded() == [SetTarget((3.0, 4.0, 5.0))]
 
 
-def test_set_points_that_wait_too_long_are_spoken_of(station):
+def test_ignored_setpoints_are_announced(station):
     station.look(2.0, **{"commands.mode": 1.0})
     station.wire.clear()
     for _ in range(35):
@@ -166,7 +166,7 @@ def texts(station):
     return whole
 
 
-def test_each_reason_of_a_refusal_is_said_in_the_end(station):
+def test_every_rejection_reason_is_eventually_reported(station):
     for k in range(6):
         station.send(local(frame=20 + k % 3))
     assert len(station.wire.texts) == 2  # one text in two parts
@@ -176,7 +176,7 @@ def test_each_reason_of_a_refusal_is_said_in_the_end(station):
     assert any("(2 times)" in text for text in said if "frame 21;" in text)
 
 
-def test_a_flood_of_texts_waits_and_is_not_lost(station):
+def test_excess_status_texts_are_queued(station):
     for k in range(30):
         station.autopilot._context.say(f"text {k}")
     assert len(station.wire.texts) == 12
@@ -184,7 +184,7 @@ def test_a_flood_of_texts_waits_and_is_not_lost(station):
     assert station.wire.texts == [f"text {k}" for k in range(30)]
 
 
-def test_targets_above_water_or_outside_their_region_are_followed_with_a_warning():
+def test_targets_above_water_or_outside_a_region_are_accepted_with_a_warning():
     kept_in = scenario(name="harbour")
     station = Station("ardusub", of=kept_in)
     station.look()
@@ -201,7 +201,7 @@ def test_targets_above_water_or_outside_their_region_are_followed_with_a_warning
 
 
 @pytest.mark.parametrize("speed", [-0.5, 99.0, 0.0, NAN, math.inf, 1.2])
-def test_speeds_that_cannot_be_are_refused_aloud(speed):
+def test_invalid_speeds_are_rejected_with_text(speed):
     station = Station("ardusub", of=scenario("vehicle='bluerov2_heavy'", name="pipe-inspection"))
     station.look()
     assert station.command(178, 0.0, speed) == mavlink.MAV_RESULT_DENIED
@@ -209,14 +209,14 @@ def test_speeds_that_cannot_be_are_refused_aloud(speed):
     assert station.commanded() == []
 
 
-def test_speeds_of_the_protocol(station):
+def test_speed_command_values_follow_the_protocol(station):
     assert terminal_speed(load_vehicle("bluerov2_heavy")) == pytest.approx(0.85, abs=0.01)  # 13.7 v + 141 v² = 113 N
     for asked, key in ((-1.0, None), (0.2, 0.2), (-2.0, station.autopilot._context.scenario.law.gains.speed)):
         assert station.command(178, 0.0, asked) == mavlink.MAV_RESULT_ACCEPTED
         assert [c.value for c in station.commanded()] == ([] if key is None else [key])
 
 
-def test_the_same_set_point_counts_again_after_another_mode(station):
+def test_repeated_setpoint_is_applied_again_after_a_mode_change(station):
     station.send(local())
     station.look(2.0, **{"commands.mode": 1.0})
     station.look(3.0)
@@ -236,19 +236,19 @@ def where(position):
 
 
 @pytest.mark.parametrize("frame", [0, 3, 5, 6])
-def test_set_points_on_the_globe(station, frame):
+def test_global_setpoints_are_converted_to_local(station, frame):
     station.send(globe(frame, where((30.0, -20.0, 4.0))))
     (command,) = station.commanded()
     assert command.position == pytest.approx((30.0, -20.0, 4.0), abs=0.02)
 
 
-def test_other_frames_on_the_globe(station):
+def test_unsupported_global_frames_are_ignored(station):
     for frame in (1, 11):
         station.send(globe(frame, where((30.0, -20.0, 4.0))))
     assert station.commanded() == []
 
 
-def test_reposition(station):
+def test_reposition_moves_the_target(station):
     x, y, z = where((30.0, -20.0, 4.0))
     assert station.command_int(REPOSITION, 0, (-1.0, 1.0, 0.0, 0.5), x, y, z) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command(REPOSITION, -1.0, 1.0, 0.0, NAN, x / 1e7, y / 1e7, z) == mavlink.MAV_RESULT_ACCEPTED
@@ -261,14 +261,14 @@ def test_reposition(station):
     assert station.command_int(REPOSITION, 0, (-1, 1, 0, NAN), 0, 0, 0.0) == mavlink.MAV_RESULT_DENIED
 
 
-def test_reposition_without_a_place_holds_this_one(station):
+def test_reposition_without_a_position_holds_the_current_one(station):
     assert station.command(REPOSITION, -1.0, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED  # QGroundControl's pause for PX4
     assert station.command(REPOSITION, -1.0, 1.0, 0.0, 0.5) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command(REPOSITION, -1.0, 1.0, 0.0, NAN, NAN, NAN, -2.0) == mavlink.MAV_RESULT_ACCEPTED
     assert station.commanded() == [SetMode("hold"), SetMode("hold"), SetHeading(0.5), SetTarget((1.0, 2.0, 2.0))]
 
 
-def test_another_depth_as_qgroundcontrol_asks_ardupilot_for_it(station):
+def test_qgroundcontrol_altitude_change_moves_the_depth(station):
     deeper = local(frame=7, mask=0xFFF8, place=(0.0, 0.0, 1.5))  # APMFirmwarePlugin::guidedModeChangeAltitude
     station.send(deeper)
     station.wait(0.5)
@@ -284,7 +284,7 @@ def guided(current, frame=3, place=(55.9098, -3.3202, -4.0), command=16):
     return mavlink.MAVLink_mission_item_message(1, 1, 0, frame, command, current, 1, 0, 0, 0, 0, *place)
 
 
-def test_go_to_location_as_qgroundcontrol_asks_ardupilot_for_it(station):
+def test_qgroundcontrol_goto_location_moves_the_target(station):
     (ack,) = station.send(guided(2))
     assert (ack.get_type(), ack.type) == ("MISSION_ACK", mavlink.MAV_MISSION_ACCEPTED)
     (command,) = station.commanded()
@@ -294,7 +294,7 @@ def test_go_to_location_as_qgroundcontrol_asks_ardupilot_for_it(station):
     assert station.commanded() == [SetTarget((8.0, 0.0, 4.0))]  # the target's depth alone
 
 
-def test_a_place_to_go_to_that_cannot_be_is_refused(station):
+def test_invalid_goto_location_is_rejected(station):
     assert station.send(guided(2, frame=10))[-1].type == mavlink.MAV_MISSION_UNSUPPORTED_FRAME
     assert station.send(guided(2, command=17))[-1].type == mavlink.MAV_MISSION_UNSUPPORTED
     assert station.send(guided(2, place=(0.0, 0.0, 0.0)))[-1].type == mavlink.MAV_MISSION_DENIED
@@ -304,7 +304,7 @@ def test_a_place_to_go_to_that_cannot_be_is_refused(station):
     assert station.commanded()[0].position[2] == 5.0  # as deep as it is
 
 
-def test_turning(station):
+def test_condition_yaw_sets_the_heading(station):
     station.look(2.0, **EAST)
     assert station.command(YAW, 30.0, 0.0, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command(YAW, 30.0, 0.0, -1.0, 1.0) == mavlink.MAV_RESULT_ACCEPTED
@@ -313,7 +313,7 @@ def test_turning(station):
     assert absolute.heading == pytest.approx(math.radians(30)) and relative.heading == pytest.approx(math.radians(60))
 
 
-def test_the_first_that_comes_steers_until_it_is_silent(station):
+def test_first_commanding_station_keeps_control_until_silent(station):
     station.send(local())
     station.send(local(place=(9.0, 9.0, 9.0)), system=250)
     assert station.command(REPOSITION, -1, 1, system=250) == mavlink.MAV_RESULT_DENIED
@@ -342,7 +342,7 @@ def sticks(x=0, y=0, z=500, r=0, s=0, t=0, extensions=0):
         ("ardusub", sticks(x=0x7FFF, y=-0x8000, z=0x7FFF, r=100), (0, -1.0, 0, 0, 0, 0.1)),
     ],
 )
-def test_sticks(profile, message, wrench):
+def test_manual_control_is_applied_in_manual_mode(profile, message, wrench):
     station = Station(profile)
     station.look(**{"commands.mode": 0.0})
     station.send(message)
@@ -351,12 +351,12 @@ def test_sticks(profile, message, wrench):
     assert commands == ([ManualControl(wrench)] if any(wrench) else [])
 
 
-def test_sticks_count_in_manual_alone(station):
+def test_manual_control_is_ignored_outside_manual_mode(station):
     station.send(sticks(x=1000))
     assert station.commanded() == []
 
 
-def test_sticks_that_nobody_holds_are_let_go(station):
+def test_stale_manual_control_is_zeroed(station):
     station.look(2.0, **{"commands.mode": 0.0})
     station.send(sticks(x=1000))
     station.wait(2.9)
@@ -368,7 +368,7 @@ def test_sticks_that_nobody_holds_are_let_go(station):
     assert station.commanded() == []
 
 
-def test_sticks_count_anew_once_armed(station):
+def test_manual_control_is_applied_again_after_arming(station):
     station.look(2.0, **{"commands.mode": 0.0, "commands.armed": 0.0})
     station.send(sticks(x=1000))
     station.look(2.1, **{"commands.mode": 0.0})
@@ -384,7 +384,7 @@ def obstacle(number=1, frame=1, place=(4.0, 5.0, 6.0)):
 
 
 @pytest.mark.parametrize(("frame", "position"), [(1, (4, 5, 6)), (12, (1 - 5, 2 + 4, 5 + 6)), (20, (4, 5, 6))])
-def test_an_obstacle_that_is_seen_is_kept_out_of(station, frame, position):
+def test_reported_obstacle_becomes_a_region(station, frame, position):
     station.look(2.0, **EAST)
     station.send(obstacle(frame=frame))
     station.send(obstacle(frame=frame, place=(4.0, 5.02, 6.0)))  # hardly moved
@@ -392,7 +392,7 @@ def test_an_obstacle_that_is_seen_is_kept_out_of(station, frame, position):
     assert (command.number, command.radius) == (1, 0.5) and command.position == pytest.approx(position)
 
 
-def test_the_body_frame_leans_with_the_body(station):
+def test_body_frame_offsets_follow_the_full_attitude(station):
     quaternion = from_axis_angle(np.array([0.0, 1.0, 0.0]), math.pi / 2)  # nose up: ahead is up
     station.look(2.0, **{"quaternion.e0": tuple(quaternion)})
     station.send(obstacle(frame=12, place=(2.0, 0.0, 0.0)))
@@ -405,7 +405,7 @@ def test_an_obstacle_that_moves_is_moved(station):
     assert station.commanded() == [AddObstacle(1, (4.0, 5.0, 6.0), 0.5), AddObstacle(1, (4.0, 5.5, 6.0), 0.5)]
 
 
-def test_only_so_many_and_the_one_not_seen_for_long_goes(station):
+def test_obstacle_count_is_bounded_and_stale_obstacles_expire(station):
     for number in (1, 2, 3):
         station.send(obstacle(number))
     assert [command.number for command in station.commanded()] == [1, 2]
@@ -417,7 +417,7 @@ def test_only_so_many_and_the_one_not_seen_for_long_goes(station):
     assert station.commanded() == [RemoveObstacle(2), AddObstacle(3, (4.0, 5.0, 6.0), 0.5)]
 
 
-def test_obstacles_in_other_frames_or_nowhere(station):
+def test_obstacles_in_unknown_frames_or_without_position_are_ignored(station):
     station.send(obstacle(frame=8))
     station.send(obstacle(place=(NAN, 0.0, 0.0)))
     assert station.commanded() == []
@@ -428,7 +428,7 @@ def override(*pulses):
 
 
 @pytest.mark.parametrize("mode", [0.0, 5.0, 6.0])
-def test_overridden_channels_are_sticks_in_ardusubs_order(station, mode):
+def test_rc_override_maps_to_axes_in_ardusub_order(station, mode):
     station.look(2.0, **{"commands.mode": mode})
     station.send(override(1500, 1500, 1700, 1500, 1900, 1300))  # pitch roll up yaw forward right
     (command,) = station.commanded()
@@ -442,6 +442,6 @@ def test_overridden_channels_are_sticks_in_ardusubs_order(station, mode):
     assert station.commanded()[-1] == ManualControl((0.0,) * 6)
 
 
-def test_overridden_channels_count_in_no_other_mode(station):
+def test_rc_override_is_ignored_outside_manual_modes(station):
     station.send(override(1500, 1500, 1700, 1500, 1900, 1300))
     assert station.commanded() == []

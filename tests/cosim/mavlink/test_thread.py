@@ -1,4 +1,4 @@
-"""The thread of all links: what it owes the stepper, the vehicle and each peer."""
+"""The thread of all links: isolation of the stepper, the vehicle and each peer."""
 
 import socket
 import threading
@@ -33,7 +33,7 @@ from tests.cosim.mavlink.stubs import (
 HERE = "127.0.0.1"
 
 
-class Ear:
+class GroundSocket:
     """A ground station's socket."""
 
     def __init__(self, station=None):
@@ -44,7 +44,7 @@ class Ear:
         self.port = self.socket.getsockname()[1]
         self.station, self.messages = station or Station(), []
 
-    def hear(self):
+    def receive(self):
         while True:
             try:
                 data, self.address = self.socket.recvfrom(2048)
@@ -52,11 +52,11 @@ class Ear:
                 return self.messages
             self.messages += self.station.parse(data)
 
-    def say(self, message):
+    def send(self, message):
         self.socket.sendto(self.station.pack(message), self.address)
 
     def count(self, name):
-        return sum(m.get_type() == name for m in self.hear())
+        return sum(m.get_type() == name for m in self.receive())
 
     def __enter__(self):
         return self
@@ -69,10 +69,10 @@ def row(t):
     return np.array([t, 1.0, 2.0])
 
 
-def test_snapshots_come_in_order_every_10_ms_of_the_simulation_and_are_copies():
-    with Ear() as ear:
+def test_snapshots_are_ordered_copies_every_10_ms():
+    with GroundSocket() as ground:
         vehicle = StubVehicle()
-        links = LinkThread(vehicle, [udp_link(ear.port)], step=1e-3)
+        links = LinkThread(vehicle, [udp_link(ground.port)], step=1e-3)
         links.start()
         shared = row(0.0)
         for k in range(1001):
@@ -80,13 +80,13 @@ def test_snapshots_come_in_order_every_10_ms_of_the_simulation_and_are_copies():
             links.observe(k, shared)
         links.close()
         assert [r[0] for r in vehicle.rows] == pytest.approx(np.arange(101) * 0.01)
-        assert [m.time_boot_ms for m in ear.hear()[:-1]] == [int(t * 1000) for t in np.arange(1001)[::10] * 1e-3]
-        assert ear.messages[-1].get_type() == "HEARTBEAT" and vehicle.closed
-        sequence = [m.get_seq() for m in ear.messages]
+        assert [m.time_boot_ms for m in ground.receive()[:-1]] == [int(t * 1000) for t in np.arange(1001)[::10] * 1e-3]
+        assert ground.messages[-1].get_type() == "HEARTBEAT" and vehicle.closed
+        sequence = [m.get_seq() for m in ground.messages]
         assert all((b - a) % 256 == 1 for a, b in zip(sequence, sequence[1:], strict=False))
 
 
-def test_each_row_of_a_coarse_run_is_shown():
+def test_every_row_of_a_coarse_run_is_observed():
     vehicle = StubVehicle()
     links = LinkThread(vehicle, [], step=0.05)
     for k in range(5):
@@ -96,29 +96,29 @@ def test_each_row_of_a_coarse_run_is_shown():
     assert len(vehicle.rows) == 5
 
 
-def test_an_answer_comes_while_nothing_is_observed_and_ticks_go_on():
-    with Ear() as ear:
+def test_requests_are_answered_while_the_simulation_is_paused():
+    with GroundSocket() as ground:
         vehicle = StubVehicle()
-        links = LinkThread(vehicle, [udp_link(ear.port)], step=1e-3)
+        links = LinkThread(vehicle, [udp_link(ground.port)], step=1e-3)
         links.start()
         links.observe(0, row(0.0))
-        assert until(ear.hear)
-        ear.say(heartbeat())
-        assert until(lambda: ear.count("COMMAND_ACK") == 1)
+        assert until(ground.receive)
+        ground.send(heartbeat())
+        assert until(lambda: ground.count("COMMAND_ACK") == 1)
         assert until(lambda: vehicle.ticks > 20)
         links.close()
     assert [m.get_type() for m in vehicle.received] == ["HEARTBEAT"]
 
 
 def test_many_links_at_once_each_with_a_sequence_of_its_own():
-    with Ear() as ear, Ear() as other:
+    with GroundSocket() as ground, GroundSocket() as other:
         server, udp_in = TcpIn(HERE, 0), UdpIn(HERE, 0)
         links = LinkThread(
-            StubVehicle(), [udp_link(ear.port), link_of(udp_in), link_of(server), udp_link(other.port)], step=0.01
+            StubVehicle(), [udp_link(ground.port), link_of(udp_in), link_of(server), udp_link(other.port)], step=0.01
         )
         links.start()
         other.address = (HERE, udp_in.port)
-        other.say(heartbeat())
+        other.send(heartbeat())
         with socket.create_connection((HERE, server.port), 60.0) as client:
             assert until(lambda: server.clients and udp_in.peers)
             for k in range(300):
@@ -129,19 +129,19 @@ def test_many_links_at_once_each_with_a_sequence_of_its_own():
                 data += chunk
         tcp_messages = Station().parse(data)
         assert [m.get_seq() for m in tcp_messages] == [i % 256 for i in range(301)]
-        assert [m.get_seq() for m in ear.hear()] == [i % 256 for i in range(301)]
+        assert [m.get_seq() for m in ground.receive()] == [i % 256 for i in range(301)]
         assert other.count("ATTITUDE") == 600 and other.count("COMMAND_ACK") == 1
 
 
-def test_a_log_beside_a_link_has_what_went_out_and_what_was_heeded(tmp_path):
+def test_log_holds_sent_and_accepted_frames(tmp_path):
     path = tmp_path / "dive.tlog"
-    with Ear() as ear:
+    with GroundSocket() as ground:
         vehicle = StubVehicle()
-        links = LinkThread(vehicle, [udp_link(ear.port), link_of(Tlog(str(path)))], step=0.01)
+        links = LinkThread(vehicle, [udp_link(ground.port), link_of(Tlog(str(path)))], step=0.01)
         links.start()
         links.observe(0, row(0.0))
-        assert until(ear.hear)
-        ear.say(heartbeat())
+        assert until(ground.receive)
+        ground.send(heartbeat())
         assert until(lambda: vehicle.received)
         for k in range(1, 1001):  # ten seconds in no time
             links.observe(k, row(k * 0.01))
@@ -175,16 +175,16 @@ class Clumsy(StubVehicle):
         raise ValueError("attach")
 
 
-def test_an_error_of_the_vehicle_is_told_once_a_kind_and_costs_no_more(caplog):
-    with Ear() as ear:
+def test_vehicle_errors_are_logged_once_per_kind_and_isolated(caplog):
+    with GroundSocket() as ground:
         vehicle = Clumsy()
-        links = LinkThread(vehicle, [udp_link(ear.port)], step=0.01)
+        links = LinkThread(vehicle, [udp_link(ground.port)], step=0.01)
         links.start()
         for k in range(50):
             links.observe(k, row(k * 0.01))
-        assert until(lambda: len(vehicle.rows) == 50 and ear.count("ATTITUDE") == 50)
+        assert until(lambda: len(vehicle.rows) == 50 and ground.count("ATTITUDE") == 50)
         for _ in range(5):
-            ear.say(heartbeat())
+            ground.send(heartbeat())
         assert until(lambda: len(vehicle.received) == 5)
         links.close()
     tracebacks = [record.message for record in caplog.records if record.exc_info]
@@ -202,11 +202,11 @@ def test_an_error_of_the_vehicle_is_told_once_a_kind_and_costs_no_more(caplog):
     )
 
 
-def test_what_cannot_be_encoded_is_counted_and_the_sequence_has_no_gap(caplog):
+def test_unencodable_messages_are_counted_without_sequence_gap(caplog):
     text = mavlink.MAVLink_statustext_message(6, b"")
     text._text_raw = "letters where bytes belong"
-    with Ear() as ear:
-        link = udp_link(ear.port)
+    with GroundSocket() as ground:
+        link = udp_link(ground.port)
         for bad in (
             attitude(-1),  # struct.error
             attitude(1.5),
@@ -219,7 +219,7 @@ def test_what_cannot_be_encoded_is_counted_and_the_sequence_has_no_gap(caplog):
             assert not link.send(bad)
             assert link.send(attitude(1))
         link.channel.close()
-        assert [m.get_seq() for m in ear.hear()] == list(range(7))
+        assert [m.get_seq() for m in ground.receive()] == list(range(7))
     assert link.unencodable == 7
     assert link.troubles() == ["7 messages that could not be encoded"]
     assert len(caplog.records) == 3  # one a kind of message
@@ -228,8 +228,8 @@ def test_what_cannot_be_encoded_is_counted_and_the_sequence_has_no_gap(caplog):
 def test_a_budget_thins_streams_before_answers(monkeypatch):
     clock = [100.0]
     monkeypatch.setattr(link_module.time, "monotonic", lambda: clock[0])
-    with Ear() as ear:
-        link = udp_link(ear.port, budget=10_000.0)
+    with GroundSocket() as ground:
+        link = udp_link(ground.port, budget=10_000.0)
         sent = [link.send(odometry(1)) for _ in range(100)]  # 24.5 kB at once
         assert 10 < sent.count(True) < 5000 / 245 and link.dropped == sent.count(False)
         assert all(link.send(mavlink.MAVLink_command_ack_message(1, 0)) for _ in range(20))
@@ -239,11 +239,11 @@ def test_a_budget_thins_streams_before_answers(monkeypatch):
         assert link.has_room() and link.send(odometry(1))
         link.channel.close()
         assert link.troubles() == [f"{link.dropped} messages over the budget"]
-        sequence = [m.get_seq() for m in ear.hear()]
+        sequence = [m.get_seq() for m in ground.receive()]
     assert sequence == list(range(len(sequence)))
 
 
-def test_a_stalled_thread_drops_the_oldest_and_says_how_many(caplog):
+def test_stalled_thread_drops_oldest_snapshots_and_reports_the_count(caplog):
     vehicle = StubVehicle()
     links = LinkThread(vehicle, [], step=0.01)
     for k in range(thread.SNAPSHOTS + 904):
@@ -255,7 +255,7 @@ def test_a_stalled_thread_drops_the_oldest_and_says_how_many(caplog):
     assert "904 snapshots dropped" in caplog.text
 
 
-def test_closing_is_bounded_by_time_and_counts_what_was_left(monkeypatch, caplog):
+def test_closing_is_time_bounded_and_counts_dropped_snapshots(monkeypatch, caplog):
     monkeypatch.setattr(thread, "_DRAINING", 0.05)
     vehicle = StubVehicle()
     vehicle.observe = lambda row: time.sleep(0.02)
@@ -270,7 +270,7 @@ def test_closing_is_bounded_by_time_and_counts_what_was_left(monkeypatch, caplog
     assert "mavlink" not in [t.name for t in threading.enumerate()]
 
 
-def test_links_that_were_never_started_are_closed_too(tmp_path):
+def test_unstarted_links_are_closed(tmp_path):
     channel = UdpIn(HERE, 0)
     LinkThread(StubVehicle(), [link_of(channel)], step=0.01).close()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
@@ -278,19 +278,19 @@ def test_links_that_were_never_started_are_closed_too(tmp_path):
 
 
 def test_endpoints_become_links_of_one_signed_vehicle(tmp_path):
-    with Ear(Station(key=KEY)) as ear:
-        texts = [f"udpout:127.0.0.1:{ear.port}", str(tmp_path / "dive.tlog")]
+    with GroundSocket(Station(key=KEY)) as ground:
+        texts = [f"udpout:127.0.0.1:{ground.port}", str(tmp_path / "dive.tlog")]
         links = open_links([parse_endpoint(text) for text in texts], MavlinkOptions(key=KEY, system_id=9))
         assert [link.name for link in links] == texts
         vehicle = StubVehicle()
         running = LinkThread(vehicle, links, step=0.01)
         running.start()
         running.observe(0, row(0.0))
-        assert until(lambda: ear.count("ATTITUDE"))
-        assert ear.messages[0].get_srcSystem() == 9
-        assert ear.station.codec.signing.goodsig_count > 0
-        ear.say(heartbeat())
-        ear.socket.sendto(Station().pack(heartbeat()), ear.address)
+        assert until(lambda: ground.count("ATTITUDE"))
+        assert ground.messages[0].get_srcSystem() == 9
+        assert ground.station.codec.signing.goodsig_count > 0
+        ground.send(heartbeat())
+        ground.socket.sendto(Station().pack(heartbeat()), ground.address)
         assert until(lambda: links[0].counts.unsigned and vehicle.received)
         running.close()
     assert links[0].troubles() == ["1 frames unsigned"]

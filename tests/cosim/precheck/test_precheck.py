@@ -1,4 +1,4 @@
-"""`cosim check_scenario`: every shipped scenario, the paper's figures, and advice that mends what it is given for."""
+"""`cosim check`: shipped scenarios, the paper's figures, and the effect of its advice."""
 
 import json
 import math
@@ -48,7 +48,7 @@ EACH_SCENARIO = [name if name == "paper" else pytest.param(name, marks=pytest.ma
 
 @pytest.mark.medium
 @pytest.mark.parametrize("name", EACH_SCENARIO)
-def test_every_shipped_scenario_can_be_checked(name):
+def test_every_shipped_scenario_is_checkable(name):
     result = check_scenario(load_scenario(name, [CLOSED]))
     assert {finding.topic for finding in result.findings} == {"vehicle", "law", "regions", "thrust"}
     for finding in result.findings:
@@ -58,21 +58,21 @@ def test_every_shipped_scenario_can_be_checked(name):
 
 
 @pytest.mark.medium
-def test_properties_of_the_papers_vehicle(paper):
+def test_properties_1_to_3_and_12_are_evaluated_for_the_papers_vehicle(paper):
     assert [paper[name].status for name in ("Property 1", "Property 2", "Property 3", "(12)")] == [
         "holds", "holds", "note", "holds",
     ]  # fmt: skip
     assert paper["Property 3"].numbers["least_at_rest"] == 0.0
 
 
-def test_vehicle_of_the_plant_is_looked_at(paper):
+def test_check_uses_the_plant_parameters(paper):
     heavy = of_law("plant.parameters.mass=300", "plant.parameters.linear_damping[1]=1")
     assert heavy["(38) 1, 2"].numbers["position_need"] > 1.5 * paper["(38) 1, 2"].numbers["position_need"]
     drag = [f"plant.parameters.linear_damping[{i}]=2" for i in (1, 2, 3)]
     assert of_law(*drag)["Property 3"].status == "holds"
 
 
-def test_conditions_of_the_paper(paper):
+def test_gain_conditions_38_and_45_are_evaluated_for_the_paper(paper):
     first = paper["(38) 1, 2"]
     assert first.status == "fails"
     assert first.numbers["position_have"] == pytest.approx(0.04, abs=0.001)
@@ -89,7 +89,7 @@ def test_conditions_of_the_paper(paper):
     assert paper["(45) 2, 3"].status == "holds"
 
 
-def test_asked_force_of_the_paper(paper):
+def test_commanded_force_at_the_papers_start(paper):
     finding = paper["asked at t = 0"]
     assert finding.status == "fails"
     assert finding.numbers["asked"] == pytest.approx(26.82e3, rel=1e-3)
@@ -100,13 +100,13 @@ def test_asked_force_of_the_paper(paper):
 @pytest.mark.parametrize(
     ("finding", "key"), [("(38) 1, 2", "sigma_p"), ("(45) 1", "sigma_p"), ("asked at t = 0", "k_p1")]
 )
-def test_advice_mends(paper, finding, key):
+def test_following_the_advice_satisfies_the_conditions(paper, finding, key):
     value = float(re.search(rf"law\.gains\.{key} to (?:about )?([0-9.e-]+[0-9])", paper[finding].advice)[1])
     assert of_law(f"law.gains.{key}={0.98 * value}")[finding].status == "holds"
     assert of_law(f"law.gains.{key}={1.05 * value}")[finding].status == "fails"
 
 
-def test_advice_on_attitude():
+def test_attitude_gain_advice_satisfies_the_condition():
     heavy = of_law("law.gains.sigma_a=50")
     assert heavy["(38) 1, 2"].numbers["greatest_gradient"] == 0.0
     value = float(re.search(r"sigma_a to ([0-9.]+[0-9])", heavy["(38) 1, 2"].advice)[1])
@@ -119,7 +119,7 @@ def test_start_near_the_goal_holds():
 
 
 @pytest.mark.medium
-def test_goals_that_are_no_sphere():
+def test_non_spherical_goals_are_checked():
     box = "goal={type='box',centre=[8,0,5],size=[1,1,1]}"
     found = of_law(box)
     assert found["(38) 1, 2"].status == "holds"  # |df/dp| = 1
@@ -136,7 +136,7 @@ def test_start_inside_a_hard_region_fails_and_the_advice_leads_out():
 
 
 @pytest.mark.medium
-def test_covered_goal_fails_and_names_who_covers_it():
+def test_covered_goal_fails_and_names_the_covering_region():
     found = of_regions("regions.SR2.shape.centre=[8,0,5.1]", "regions.SR2.shape.radius=0.8")
     assert found["goal and regions"].status == "fails"
     assert "SR2 alone" in found["goal and regions"].advice
@@ -161,13 +161,13 @@ def test_contradictory_regions_fail():
     assert found["regions together"].numbers["depth"] == pytest.approx(-0.7, abs=1e-3)
 
 
-def test_overlaps_of_regions_to_be_kept_out_of(paper):
+def test_overlaps_of_keep_out_regions_are_measured(paper):
     # centres 0.4 m apart, radii 0.5 m
     assert paper["overlaps"].numbers["SR1, SR2"] == pytest.approx(0.3, abs=1e-3)
     assert "overlaps" not in of_regions("regions.SR2.shape.centre=[2,0,9]", "regions.SR1.shape.centre=[2,9,9]")
 
 
-def test_current_that_is_too_strong():
+def test_excessive_current_fails_with_the_admissible_speed():
     found = of_thrust("plant.current=[2.0,0.0,0.0]")["holding still"]
     assert found.status == "fails"
     # 76.4 N against 48 N s2/m2
@@ -175,19 +175,19 @@ def test_current_that_is_too_strong():
     assert speed == pytest.approx(math.sqrt(4 * 27.0 / math.sqrt(2.0) / 48.0), abs=0.06)
 
 
-def test_a_vehicle_that_is_too_heavy_is_not_blamed_on_the_current():
+def test_excess_weight_is_not_attributed_to_the_current():
     found = of_thrust("plant.current=[0.5,0.0,0.0]", "plant.parameters.weight=1400")["holding still"]
     assert found.status == "fails" and "Trim" in found.advice
 
 
 @pytest.mark.medium
-def test_thruster_that_cannot_be_missed_is_a_note():
+def test_indispensable_thruster_is_a_note():
     found = of_thrust("plant.parameters.weight=1320")["one thruster lost"]
     assert found.status == "note" and "5, 6, 7, 8" in found.text
 
 
 @pytest.mark.medium
-def test_other_laws_are_not_held_to_the_printed_laws_theory():
+def test_theory_conditions_apply_only_to_the_papers_law():
     changes = ("law.name=deployable", "law.gains={}", "actuation.through=thrusters")
     result = check_scenario(load_scenario("paper", [CLOSED, *changes]))
     assert result.holds
@@ -195,7 +195,7 @@ def test_other_laws_are_not_held_to_the_printed_laws_theory():
     assert law.status == "note" and "not of this one (deployable)" in law.text
 
 
-def test_regions_of_attitude_close_no_place_but_can_be_violated_at_the_start():
+def test_attitude_regions_block_no_path_but_can_be_violated_at_the_start():
     view = (
         "{name='view',criterion='shape',keep='in',gain=1,"
         "shape={type='visibility',feature=[-9,0,1],camera_axis=[1,0,0],half_angle=0.5}}"
@@ -207,18 +207,18 @@ def test_regions_of_attitude_close_no_place_but_can_be_violated_at_the_start():
     assert "goal and regions" not in found and found["way"].status == "holds"
 
 
-def test_moving_regions_are_taken_as_they_are_first():
+def test_moving_regions_are_checked_at_time_zero():
     found = of_regions("regions.SR1.velocity=[0.1,0,0]")
     assert "at time 0" in found["goal and regions"].text
 
 
-def test_no_regions():
+def test_scenario_without_regions_has_a_free_path():
     found = of_regions("regions=[]", "intersection=[]")
     assert "goal and regions" not in found and found["way"].status == "holds"
 
 
 @pytest.mark.medium
-def test_command_says_what_to_change_and_fails(capsys):
+def test_failed_check_prints_advice_and_exits_with_1(capsys):
     assert main(["check", "paper", "--set", CLOSED]) == 1
     said = capsys.readouterr().out
     assert "Verdict: 3 of 15 fail" in said
@@ -226,14 +226,14 @@ def test_command_says_what_to_change_and_fails(capsys):
 
 
 @pytest.mark.medium
-def test_command_succeeds_where_nothing_fails(capsys):
+def test_passed_check_exits_with_0(capsys):
     arguments = [word for change in (CLOSED, *MENDED) for word in ("--set", change)]
     assert main(["check", "paper", *arguments]) == 0
     assert "nothing stands against" in capsys.readouterr().out
 
 
 @pytest.mark.slow
-def test_command_as_json(capsys):
+def test_check_command_prints_json(capsys):
     assert main(["check", "paper", "--set", CLOSED, "--set", "law.gains.sigma_p=0", "--json"]) == 1
     result = json.loads(capsys.readouterr().out)
     assert result["holds"] is False and result["law"] == "ismail_dunnigan"
@@ -242,6 +242,6 @@ def test_command_as_json(capsys):
     assert result == json.loads(check_json(check_scenario(load_scenario("paper", [CLOSED, "law.gains.sigma_p=0"]))))
 
 
-def test_unknown_scenario_is_one_line(capsys):
+def test_unknown_scenario_gives_one_line_error(capsys):
     assert main(["check", "papre"]) == 2
     assert "did you mean 'paper'" in capsys.readouterr().err

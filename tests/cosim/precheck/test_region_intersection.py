@@ -1,4 +1,4 @@
-"""Common points of regions: known places, and certificates that brute force cannot contradict."""
+"""Common points of regions: known points, and certificates checked by brute force."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def searched(*regions):
     return search(regions, *box_about(regions, [ORIGIN], 3.0))
 
 
-def test_two_balls_meet_midway():
+def test_deepest_common_point_of_two_spheres_is_midway():
     overlap = searched(ball("a", 0.0, 1.0), ball("b", 1.5, 1.0))
     assert overlap.found and not overlap.excluded
     assert overlap.point == pytest.approx((0.75, 0.0, 0.0), abs=1e-3)
@@ -43,7 +43,7 @@ def test_a_covered_goal_is_known():
 
 
 @pytest.mark.slow
-def test_the_band_and_all_else_are_found_by_brute_force_too():
+def test_intersection_matches_brute_force():
     rng = np.random.default_rng(4)
     for _ in range(4):
         regions = [
@@ -60,6 +60,6 @@ def test_the_band_and_all_else_are_found_by_brute_force_too():
         assert overlap.depth == pytest.approx(common_depth(np.array([overlap.point]), regions)[0], abs=1e-9)
 
 
-def test_box_within_is_cut_to_what_has_an_end():
+def test_search_box_is_clipped_to_finite_region_bounds():
     low, high = box_within(Region("band", DepthBand(2.0, 0.5), "in"), np.full(3, -9.0), np.full(3, 9.0))
     assert low.tolist() == [-9.0, -9.0, 1.5] and high.tolist() == [9.0, 9.0, 2.5]

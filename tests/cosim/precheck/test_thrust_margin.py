@@ -1,4 +1,4 @@
-"""Thrust in each direction, against what can be read off the ODIN-like vehicle's thrusters."""
+"""Thrust in each direction, against values derived by hand from the ODIN-like vehicle."""
 
 import math
 
@@ -28,17 +28,17 @@ def test_directions_are_26_unit_vectors_with_names_of_their_own():
     # four horizontal thrusters at 45 degrees, four vertical ones, of 27 N each
     [("north", 4 * 27.0 / math.sqrt(2.0)), ("south-west", 54.0), ("down", 108.0), ("up", 108.0)],
 )
-def test_greatest_force(direction, expected):
+def test_greatest_force_matches_the_thruster_geometry(direction, expected):
     assert greatest_force(ODIN, np.array(DIRECTIONS[direction]), NOTHING, ALL) == pytest.approx(expected)
 
 
-def test_a_lost_vertical_thruster_takes_its_opposite_with_it():
+def test_losing_a_vertical_thruster_halves_the_vertical_force():
     alive = ALL.copy()
     alive[4] = False
     assert greatest_force(ODIN, np.array(DIRECTIONS["down"]), NOTHING, alive) == pytest.approx(54.0)
 
 
-def test_what_cannot_be_held_is_none():
+def test_unsustainable_load_gives_none():
     assert greatest_force(ODIN, np.array(DIRECTIONS["down"]), np.r_[0.0, 0.0, 108.1, 0.0, 0.0, 0.0], ALL) is None
     left = greatest_force(ODIN, np.array(DIRECTIONS["down"]), np.r_[0.0, 0.0, 100.0, 0.0, 0.0, 0.0], ALL)
     assert left == pytest.approx(8.0)
@@ -50,7 +50,7 @@ def margin(current, weight=ODIN.weight, quaternion=LEVEL, vehicle=ODIN):
 
 
 @pytest.mark.medium
-def test_still_water():
+def test_margin_in_still_water_is_the_full_force():
     m = margin(STILL)
     assert m.drag == 0.0 and m.excess_weight == pytest.approx(-2.0)
     assert m.thrust.force == pytest.approx(54.0) == m.left.force  # 2 N of 108 N leave the horizontal as it is
@@ -59,7 +59,7 @@ def test_still_water():
 
 
 @pytest.mark.medium
-def test_current_takes_its_drag():
+def test_current_reduces_the_margin_by_its_drag():
     """48 N s2/m2 at 0.4 m/s from the south: 7.68 N, of which 1/sqrt(2) along the weak diagonal."""
     m = margin([0.4, 0.0, 0.0])
     assert m.drag == pytest.approx(7.68)
@@ -76,12 +76,12 @@ def test_weight_narrows_the_vertical():
     assert m.left_without[4] is None
 
 
-def test_too_much_cannot_be_held():
+def test_excessive_current_has_no_margin():
     assert margin([2.0, 0.0, 0.0]).left is None
 
 
 @pytest.mark.medium
-def test_munks_moment_is_held_too():
+def test_munk_moment_is_included():
     """A long body in an oblique stream wants to turn across it."""
     rov = load_vehicle("bluerov2_heavy")
     m = margin([0.3, 0.3, 0.0], weight=rov.weight, vehicle=rov)

@@ -1,4 +1,4 @@
-"""Whether there is a way: what the search finds is one, and what nothing can pass is not passed."""
+"""Path search: found paths are free, and blocked scenes have none."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ GOAL = ball("goal", 6.0, 0.5)
     ],
     ids=["open", "rock", "soft", "wall", "wide wall", "shut in", "tube", "plugged tube", "start at a surface"],
 )
-def test_a_way_is_found_where_there_is_one(regions, found):
+def test_path_is_found_if_one_exists(regions, found):
     way = find_way(regions, GOAL, ORIGIN, GAINS, 60.0)
     assert way.found is found
     if not found:
@@ -57,5 +57,5 @@ def test_the_length_is_that_of_the_path():
     assert way.clearance == np.inf and way.searched < 1.0
 
 
-def test_a_search_lasts_as_long_as_the_flight():
+def test_search_time_is_bounded_by_the_run_duration():
     assert find_way([WALL], GOAL, ORIGIN, GAINS, 3.0).searched == pytest.approx(3.0)

@@ -28,7 +28,7 @@ NO_ROOT = pytest.mark.skipif(hasattr(os, "geteuid") and os.geteuid() == 0, reaso
         ("gaps", "completed", 6001, "End of the run"),
     ],
 )
-def test_a_run_that_is_not_whole_has_a_page_that_says_so(kind, status, rows, last, docking, copy_of, spoil):
+def test_incomplete_run_has_a_page_with_a_notice(kind, status, rows, last, docking, copy_of, spoil):
     run = load_run(spoil(copy_of(docking), kind))
     assert run.summary["status"] == status and len(run.record["time"]) == rows
     _, [(header, columns)] = read_page(write_replay(run).read_text())
@@ -38,7 +38,7 @@ def test_a_run_that_is_not_whole_has_a_page_that_says_so(kind, status, rows, las
     assert header["gaps"] == (dict.fromkeys(GAPS, 120) if kind == "gaps" else {})
 
 
-def test_gaps_stay_gaps_and_extremes_are_of_what_is_there(docking, copy_of, spoil):
+def test_gaps_are_kept_and_extremes_exclude_them(docking, copy_of, spoil):
     run = load_run(spoil(copy_of(docking), "gaps"))
     _, [(header, columns)] = read_page(write_replay(run).read_text())
     gap = [2.995 < t < 4.195 for t in columns["time"]]
@@ -48,7 +48,7 @@ def test_gaps_stay_gaps_and_extremes_are_of_what_is_there(docking, copy_of, spoi
     assert header["summary"]["min_clearance"]["heading"] == np.nanmin(run.record["heading.clearance"])
 
 
-def test_the_summary_of_a_record_with_gaps_is_json(docking, copy_of, spoil):
+def test_summary_of_a_record_with_gaps_is_valid_json(docking, copy_of, spoil):
     folder = spoil(copy_of(docking), "gaps")
     table = pq.read_table(folder / "record.parquet")
     at = table.schema.get_field_index("roof.clearance")
@@ -111,7 +111,7 @@ def _bad_scenario(folder):
         (_bad_scenario, "scenario.toml: "),
     ],
 )
-def test_what_is_no_run_is_one_clear_line_and_leaves_the_page_alone(spoilt, text, docking, copy_of, capsys):
+def test_invalid_run_gives_one_line_error_and_keeps_the_page(spoilt, text, docking, copy_of, capsys):
     folder = copy_of(docking)
     spoilt(folder)
     before = sorted(folder.rglob("*"))
@@ -124,7 +124,7 @@ def test_what_is_no_run_is_one_clear_line_and_leaves_the_page_alone(spoilt, text
 
 
 @pytest.mark.medium
-def test_a_run_has_its_page_unless_no_report_is_wanted(tmp_path, capsys):
+def test_run_writes_its_page_unless_no_report(tmp_path, capsys):
     quick = ["--set", "arbiter.engine=closed", "--set", "time.duration=0.05"]
     assert main(["run", "docking", "--out", str(tmp_path / "with"), *quick]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == str(tmp_path / "with" / "replay.html")
@@ -134,7 +134,7 @@ def test_a_run_has_its_page_unless_no_report_is_wanted(tmp_path, capsys):
     assert "replay" not in capsys.readouterr().out
 
 
-def test_replay_writes_one_run_s_page_into_its_folder(docking, copy_of, capsys):
+def test_replay_writes_the_page_into_the_run_folder(docking, copy_of, capsys):
     folder = copy_of(docking)
     (folder / "replay.html").unlink(missing_ok=True)
     for _ in range(2):
@@ -145,7 +145,7 @@ def test_replay_writes_one_run_s_page_into_its_folder(docking, copy_of, capsys):
     assert not list(folder.glob(".*"))
 
 
-def test_several_runs_come_here_under_names_that_tell_them_apart(docking, copy_of, tmp_path, monkeypatch, capsys):
+def test_several_runs_get_distinct_names(docking, copy_of, tmp_path, monkeypatch, capsys):
     here, there, other = copy_of(docking, "a/run"), copy_of(docking, "b/run"), copy_of(docking, "c")
     monkeypatch.chdir(tmp_path)
     assert main(["replay", str(here), str(there), str(other), "--title", "Three <dockings>"]) == 0
@@ -156,14 +156,14 @@ def test_several_runs_come_here_under_names_that_tell_them_apart(docking, copy_o
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pipes have names on POSIX alone")
-def test_a_pipe_is_neither_read_nor_written_over(docking, tmp_path, capsys):
+def test_named_pipe_is_not_overwritten(docking, tmp_path, capsys):
     os.mkfifo(tmp_path / "x.html")
     assert main(["replay", str(docking.folder), "--out", str(tmp_path / "x.html")]) == 2
     assert "exists and is no replay" in capsys.readouterr().err
     assert (tmp_path / "x.html").is_fifo()
 
 
-def test_another_file_is_not_written_over(docking, tmp_path, capsys):
+def test_foreign_file_is_not_overwritten(docking, tmp_path, capsys):
     file = tmp_path / "thesis.html"
     file.write_text("years of work")
     assert main(["replay", str(docking.folder), "--out", str(file)]) == 2
@@ -178,7 +178,7 @@ def test_another_file_is_not_written_over(docking, tmp_path, capsys):
 
 
 @NO_ROOT
-def test_a_place_that_cannot_be_written_is_one_line(docking, tmp_path):
+def test_unwritable_folder_gives_one_line_error(docking, tmp_path):
     from cosim.replay.pages import replay
 
     tmp_path.chmod(0o500)

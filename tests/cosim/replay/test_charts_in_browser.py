@@ -41,7 +41,7 @@ def same(a, b):
 
 
 @pytest.mark.parametrize("name", ["docking", "paper"])
-def test_every_curve_is_that_of_the_record_to_the_last_bit(name, browser, shown, request):
+def test_chart_curves_equal_the_record_bit_for_bit(name, browser, shown, request):
     page = shown(request.getfixturevalue(name))
     browser.open(page.file)
     charts = browser.js(_SERIES)
@@ -60,7 +60,7 @@ def test_every_curve_is_that_of_the_record_to_the_last_bit(name, browser, shown,
     assert names >= thrusters or not any(any(page.columns[name]) for name in thrusters)
 
 
-def test_a_chart_has_ink_of_its_own_and_moves_its_cursor(browser, shown, docking):
+def test_charts_are_painted_and_move_their_cursor(browser, shown, docking):
     browser.open(shown(docking).file)
     visible = "window.subreach.charts.filter((c) => !c.element.hidden)"
     browser.js(f"{visible}.forEach((c) => {{ c.stale = true; c.paint(); }})")
@@ -77,7 +77,7 @@ def test_a_chart_has_ink_of_its_own_and_moves_its_cursor(browser, shown, docking
     assert places[1] > places[0] + 50.0
 
 
-def test_a_click_in_a_chart_seeks(browser, shown, docking):
+def test_click_in_a_chart_seeks(browser, shown, docking):
     from selenium.webdriver.common.action_chains import ActionChains
 
     browser.open(shown(docking).file)
@@ -88,7 +88,7 @@ def test_a_click_in_a_chart_seeks(browser, shown, docking):
     assert browser.drawn["time"] == browser.t
 
 
-def test_the_fired_rules_stand_in_words_at_the_cursor(browser, shown, paper):
+def test_fired_rules_are_shown_at_the_cursor(browser, shown, paper):
     browser.open(shown(paper).file)
     record = paper.record
     step = int(np.argmax(record["weight.obstacle"]))

@@ -47,7 +47,7 @@ def told(run, kind, log=()):
 
 
 @pytest.mark.medium
-def test_the_paper_s_run_is_told_in_order(paper):
+def test_events_of_the_papers_run_are_ordered(paper):
     events = events_of(paper, ())
     assert [event.time for event in events] == sorted(event.time for event in events)
     assert len(events) < 40
@@ -62,7 +62,7 @@ def test_the_paper_s_run_is_told_in_order(paper):
     assert (events[-1].time, events[-1].kind, events[-1].text) == (time[-1], "end", "End of the run")
 
 
-def test_a_goal_is_entered_and_left_across_gaps(paper):
+def test_goal_entry_and_exit_are_detected_across_gaps(paper):
     inside = [1.0, -1.0, np.nan, 1.0, np.nan, 1.0, -1.0, np.nan]
     run = made(paper, np.arange(8) * 0.5, goal__clearance=inside)
     assert told(run, "goal") == [
@@ -73,13 +73,13 @@ def test_a_goal_is_entered_and_left_across_gaps(paper):
     ]
 
 
-def test_a_violation_that_lasts_says_so(paper):
+def test_violation_lasting_to_the_end_is_marked(paper):
     run = made(paper, [0.0, 1.0, 2.0, 3.0], SR3__clearance=[1.0, -0.25, -0.5, -0.125])
     assert told(run, "violation") == [(1.0, "Violates SR3 (soft) to the end, by up to 0.500 m")]
 
 
 @pytest.mark.slow
-def test_chatter_is_told_in_few_words(paper):
+def test_chatter_is_summarized(paper):
     n = 20_000
     odd = np.arange(n) % 2
     signals = {f"{name}__clearance": odd - 0.5 for name in ("SR1", "SR2", "SR3", "goal")}
@@ -95,7 +95,7 @@ def test_chatter_is_told_in_few_words(paper):
     assert told(run, "active") == [(run.record["time"][-1], "Gives way to SR1 (obstacle)")]
 
 
-def test_a_brief_look_back_is_no_change_but_a_brief_visit_on_the_way_is(paper):
+def test_brief_return_is_no_event_but_brief_transition_is(paper):
     time = np.arange(0.0, 4.0, 0.05)
     who = np.zeros(len(time), int)
     who[20:40], who[25], who[40], who[41:] = 1, 0, 2, 3  # SR1, for a step the goal, SR1, for a step SR2, SR3
@@ -109,7 +109,7 @@ def test_a_brief_look_back_is_no_change_but_a_brief_visit_on_the_way_is(paper):
     ]
 
 
-def test_a_failure_is_told_if_the_run_came_so_far(paper):
+def test_failures_are_listed_if_the_run_reached_them(paper):
     from cosim.scenario.tables import Failure
 
     failed = Failure(3, 1.5), Failure(1, 2.5), Failure(2, 1.6, effectiveness=0.4), Failure(4, 1.7, stuck=True)
@@ -130,7 +130,7 @@ def test_a_failure_is_told_if_the_run_came_so_far(paper):
         ("failed: t = 1", "The run failed: t = 1"),
     ],
 )
-def test_the_end_says_how(paper, status, text):
+def test_end_event_states_the_status(paper, status, text):
     assert told(made(paper, [0.0, 1.0], status=status), "end") == [(1.0, text)]
 
 
@@ -152,11 +152,11 @@ def test_the_end_says_how(paper, status, text):
         (Reset(), "Reset"),
     ],
 )
-def test_each_order_has_its_words(command, words):
+def test_every_command_has_a_description(command, words):
     assert command_words(command) == words
 
 
-def test_commands_of_a_moment_are_told_together():
+def test_simultaneous_commands_are_one_event():
     log = [
         (0, Arm(True)),
         (0, SetMode("hold")),
@@ -172,7 +172,7 @@ def test_commands_of_a_moment_are_told_together():
     assert command_events(many, 0.01, 3) == [(0.0, "Commanded: key.0 is 1; key.1 is 1; key.2 is 1; 6 more commands")]
 
 
-def test_commands_of_rows_that_a_kill_took_are_not_told_and_the_end_is_last(paper):
+def test_commands_after_the_last_row_are_omitted(paper):
     run = made(paper, [0.0, 0.001, 0.002], status="killed")
     log = [(1, Arm(True)), (3, Reset()), (900, Arm(False))]
     assert told(run, "command", log) == [(0.001, "Commanded: Armed"), (0.002, "Commanded: Reset")]

@@ -38,7 +38,7 @@ return faces.filter((face) => face.corners.every((p) => Math.abs(off(p) - 1) < 1
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("name", ["docking", "paper"])
-def test_the_way_fills_the_picture(name, size, browser, shown, request):
+def test_path_fills_the_view(name, size, browser, shown, request):
     run = request.getfixturevalue(name)
     browser.open(shown(run).file, size)
     way = run.record.stack([f"position.{axis}" for axis in "xyz"])[::50]
@@ -47,7 +47,7 @@ def test_the_way_fills_the_picture(name, size, browser, shown, request):
     assert np.hypot(*np.ptp(seen, axis=0)) > 0.35 * np.hypot(width, height)
 
 
-def test_names_keep_off_the_vehicle(browser, shown, docking, paper):
+def test_labels_do_not_cover_the_vehicle(browser, shown, docking, paper):
     for run in (docking, paper):
         browser.open(shown(run).file, (1280, 720))
         for part in np.linspace(0.0, 1.0, 9):
@@ -56,14 +56,14 @@ def test_names_keep_off_the_vehicle(browser, shown, docking, paper):
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (1280, 900), (1920, 1080)])
-def test_no_chart_is_cut_by_the_edge_of_its_board(size, browser, shown, docking):
+def test_charts_are_not_clipped(size, browser, shown, docking):
     browser.open(shown(docking).file, size)
     charts = browser.js(CUT)
     assert len(charts) >= 2
     assert [chart["key"] for chart in charts if chart["cut"] or chart["plot"] < 60.0] == []
 
 
-def test_time_is_broken_before_a_settled_tail(browser, shown, docking):
+def test_time_axis_is_broken_before_a_settled_tail(browser, shown, docking):
     browser.open(shown(docking).file, (1280, 720))
     rest, end = browser.js("return [subreach.player.rest, subreach.player.end]")
     assert docking.summary["settle_time"] < rest < 0.7 * end
@@ -80,13 +80,13 @@ def test_time_is_broken_before_a_settled_tail(browser, shown, docking):
     assert middle == pytest.approx(0.5 * (left + right))
 
 
-def test_of_a_run_that_moves_to_its_end_time_is_whole(browser, shown, shipped_run):
+def test_time_axis_of_a_moving_run_is_unbroken(browser, shown, shipped_run):
     run = load_run(shipped_run("docking", "time.duration=6", "arbiter.engine=closed").folder)
     browser.open(shown(run).file)
     assert not browser.js("return subreach.charts[0].frame.axis.broken || subreach.page.timeline.axis.broken")
 
 
-def test_at_rest_in_the_goal_the_panel_says_so(browser, shown, docking):
+def test_panel_reports_rest_in_the_goal(browser, shown, docking):
     browser.open(shown(docking).file)
     browser.scrub(docking.record["time"][-1])
     text = browser.js("return document.querySelector('#panel .now').innerText")
@@ -95,7 +95,7 @@ def test_at_rest_in_the_goal_the_panel_says_so(browser, shown, docking):
     assert browser.drawn["runs"][0]["active"] == 0
 
 
-def test_escape_closes_the_choice_of_charts(browser, shown, docking):
+def test_escape_closes_the_chart_menu(browser, shown, docking):
     browser.open(shown(docking).file)
     browser.js("document.querySelector('#charts-menu summary').click()")
     browser.js("document.querySelector('#charts-choice input').focus()")
@@ -108,14 +108,14 @@ def test_escape_closes_the_choice_of_charts(browser, shown, docking):
     assert not browser.js(f"{menu} return menu.open")
 
 
-def test_a_hull_is_a_ball_where_the_vehicle_s_file_says_so(browser, shown, docking, paper):
+def test_spherical_hull_is_drawn_as_a_sphere(browser, shown, docking, paper):
     browser.open(shown(paper).file)  # flies ODIN
     assert browser.js(BALL) > 0.4
     browser.open(shown(docking).file)
     assert browser.js(BALL) == 0.0
 
 
-def test_regions_of_one_criterion_have_curves_of_different_colours(browser, shown, docking):
+def test_region_curves_of_one_criterion_have_distinct_colors(browser, shown, docking):
     for scheme in ("light", "dark"):
         browser.open(shown(docking).file, scheme=scheme)
         lines = "[...subreach.charts[0].legend.querySelectorAll('line')]"

@@ -56,7 +56,7 @@ def streamed(monkeypatch):
 
 @pytest.mark.medium
 @pytest.mark.parametrize("name", RUNS)
-def test_what_is_told_of_a_run_does_not_depend_on_how_it_is_read(name, run_of, streamed):
+def test_streamed_run_gives_the_same_report_and_trace(name, run_of, streamed):
     run = run_of(name)
     long = streamed(run)
     assert json_text(long.summary) == json_text(run.summary)
@@ -66,7 +66,7 @@ def test_what_is_told_of_a_run_does_not_depend_on_how_it_is_read(name, run_of, s
     assert not long.record._kept  # nothing was read as a whole
 
 
-def test_gaps_are_told_as_they_are(docking, copy_of, spoil, streamed):
+def test_streamed_run_with_gaps_gives_the_same_report_and_trace(docking, copy_of, spoil, streamed):
     run = load_run(spoil(copy_of(docking), "gaps"))
     long = streamed(run)
     assert contents_of(long) == contents_of(run) and contents_of(run).remarks
@@ -75,7 +75,7 @@ def test_gaps_are_told_as_they_are(docking, copy_of, spoil, streamed):
 
 @pytest.mark.medium(fast=2)
 @pytest.mark.parametrize(("every", "rate"), [(1, None), (7, None), (1, 30.0)])
-def test_an_excerpt_is_the_same(every, rate, docking, streamed):
+def test_streamed_excerpt_is_identical(every, rate, docking, streamed):
     held, long = (excerpt_of(run.folder, every=every, rate=rate) for run in (docking, docking))
     long = dataclasses.replace(long, run=streamed(docking))
     for name in ("time", "position.x"):
@@ -86,7 +86,7 @@ def test_an_excerpt_is_the_same(every, rate, docking, streamed):
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("name", RUNS)
-def test_figures_of_a_long_run_draw_few_rows_and_miss_no_extreme(name, run_of, streamed, monkeypatch):
+def test_figures_of_a_long_run_are_thinned_and_keep_extremes(name, run_of, streamed, monkeypatch):
     monkeypatch.setattr("cosim.report.figures.sampled_rows._MOST", 2000)
     monkeypatch.setattr("cosim.report.figures.sampled_rows._EVEN", 50)
     run = run_of(name)
@@ -132,7 +132,7 @@ def cut(data, array):
 
 
 @given(st.lists(st.sampled_from([1.0, -1.0, -2.0, np.nan]), max_size=40), st.data())
-def test_spans_are_the_same_in_any_blocks(signal, data):
+def test_spans_do_not_depend_on_blocks(signal, data):
     signal = np.array(signal)
     time = np.arange(len(signal)) * 0.5
     found, ended = Spans(), []
@@ -148,7 +148,7 @@ def test_spans_are_the_same_in_any_blocks(signal, data):
 
 
 @given(st.lists(st.integers(1, 4), max_size=60), st.integers(1, 5), st.data())
-def test_the_widest_gaps_stay_however_the_blocks_fall(lengths, most, data):
+def test_widest_gaps_do_not_depend_on_blocks(lengths, most, data):
     flags = np.array([i % 2 == 0 for i, length in enumerate(lengths) for _ in range(length)], bool)
     time = np.arange(len(flags)) * 1.0
     few = _Few(most)
@@ -167,7 +167,7 @@ def test_the_widest_gaps_stay_however_the_blocks_fall(lengths, most, data):
 
 
 @given(st.lists(st.sampled_from([0.0, 1.0, 2.0, np.nan, np.inf, -np.inf]), min_size=1, max_size=40), st.data())
-def test_extremes_are_those_of_each_part_in_any_blocks(signal, data):
+def test_extremes_do_not_depend_on_blocks(signal, data):
     signal = np.array(signal)
     edges = even_edges(len(signal), data.draw(st.integers(1, len(signal))))
     found = extreme_rows([[piece] for piece in cut(data, signal)], 1, edges)
@@ -179,7 +179,7 @@ def test_extremes_are_those_of_each_part_in_any_blocks(signal, data):
 
 
 @given(st.integers(0, 3), st.data())
-def test_a_sum_does_not_depend_on_the_blocks(times, data):
+def test_sum_does_not_depend_on_blocks(times, data):
     rng = np.random.default_rng(data.draw(st.integers(0, 99)))
     numbers = rng.lognormal(sigma=5.0, size=times * 2**18 + data.draw(st.integers(0, 999)))
     totals = []

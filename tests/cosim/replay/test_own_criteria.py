@@ -36,7 +36,7 @@ def ruled(tmp_path_factory):
     return load_run(run_scenario(scenario, folder / "run", report=False).folder)
 
 
-def test_the_header_has_criteria_and_regions_in_their_colours(four):
+def test_header_lists_criteria_and_regions_with_colors(four):
     header = header_of(four.scenario, four.record.columns)
     assert [(one["name"], one["colour"]) for one in header["criteria"]] == CRITERIA
     colours = dict(CRITERIA)
@@ -48,7 +48,7 @@ def test_the_header_has_criteria_and_regions_in_their_colours(four):
     assert "visibility pressing → α4 high" in header["rules"][-1]["words"]
 
 
-def test_events_and_the_report_say_who_led_and_why(four):
+def test_events_and_report_name_the_active_criterion(four):
     turns = [(event.time, event.text) for event in events_of(four, ()) if event.kind == "active"]
     assert [text for _, text in turns] == [
         "Gives way to view (visibility)", "Gives way to pillar (obstacle)", "Goes for the goal again",
@@ -65,7 +65,7 @@ def test_events_and_the_report_say_who_led_and_why(four):
     assert float(obstacle[2]) == pytest.approx(led.sum() * 0.01, abs=0.2)  # turns that are back at once do not count
 
 
-def test_the_terminal_names_them_all(four):
+def test_terminal_view_lists_all_criteria(four):
     *_, last = looks(str(four.folder), rate=None)
     console = Console(file=io.StringIO(), width=80, height=40)
     console.print(picture(last, 80, 40))
@@ -77,13 +77,13 @@ def test_the_terminal_names_them_all(four):
         )
 
 
-def test_solids_of_exports_have_their_colours(four):
+def test_exported_solids_use_criterion_colors(four):
     everything = tuple(range(len(four.record.columns)))
     colours = [solid.colour for solid in Scene(Excerpt(four, everything, 1, None)).solids]
     assert colours[-1] == (0xCC, 0x79, 0xA7)
 
 
-def test_rules_of_a_file_fire_as_the_arbiter_explains(ruled):
+def test_rules_of_an_arbiter_file_match_its_explanation(ruled):
     viewing = Viewing(ruled.scenario, ruled.record.columns)
     names = [column.name for column in viewing.columns]
     rows = viewing.extended(ruled.record.stack([ruled.record.columns[i].name for i in viewing.picked]))

@@ -23,7 +23,7 @@ def page(docking):
     return replay_page([trace_of(docking).as_json()], docking.scenario.title)
 
 
-def test_the_numbers_of_a_page_are_those_of_the_record_to_the_last_bit(docking, page):
+def test_page_numbers_equal_the_record_bit_for_bit(docking, page):
     _, [(header, columns)] = read_page(page)
     rows = {t: k for k, t in enumerate(docking.record["time"].tolist())}
     steps = [rows[t] for t in columns["time"]]
@@ -33,14 +33,14 @@ def test_the_numbers_of_a_page_are_those_of_the_record_to_the_last_bit(docking, 
 
 
 @pytest.mark.parametrize("name", ["docking", pytest.param("dense-field", marks=pytest.mark.slow), "paper"])
-def test_a_minute_is_small(name, shipped_run):
+def test_page_of_one_minute_is_small(name, shipped_run):
     run = load_run(shipped_run(name, CLOSED).folder)
     text = replay_page([trace_of(run).as_json()], "A minute")
     assert run.record["time"][-1] == 60.0
     assert len(text.encode()) < A_MINUTE
 
 
-def test_a_page_asks_for_nothing_from_elsewhere(page):
+def test_page_loads_no_external_resource(page):
     reader, _ = read_page(page)
     for tag, name, value in reader.attributes:
         if name in ("src", "href", "xlink:href", "action", "data", "poster", "srcset", "content"):
@@ -52,7 +52,7 @@ def test_a_page_asks_for_nothing_from_elsewhere(page):
     assert not {"iframe", "object", "embed", "base"} & set(reader.elements)
 
 
-def test_names_are_text_whatever_they_say(docking):
+def test_names_are_escaped(docking):
     trace = trace_of(docking).as_json()
     # a scenario's file may not have such a name, but whoever makes one in Python may
     named = json.loads(json.dumps(trace).replace("port wall", json.dumps(HOSTILE)[1:-1]))
@@ -65,7 +65,7 @@ def test_names_are_text_whatever_they_say(docking):
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
-def test_the_page_s_own_script_unpacks_the_same_numbers(page, tmp_path):
+def test_page_script_decodes_the_same_numbers(page, tmp_path):
     """As a browser would, in an engine without one: every number of every column, and the pose between rows."""
     _, [(header, columns)] = read_page(page)
     script = page[page.index("class Run {") : page.index("async function loadRuns")]
@@ -90,7 +90,7 @@ def test_the_page_s_own_script_unpacks_the_same_numbers(page, tmp_path):
     assert after == [axis[-1] for axis in place] and before == [axis[0] for axis in place]
 
 
-def test_a_page_appears_whole_or_not_at_all(docking, tmp_path, monkeypatch):
+def test_page_is_written_atomically(docking, tmp_path, monkeypatch):
     file = tmp_path / "replay.html"
     write_page(file, [], "live")
     assert is_page(file) and [p.name for p in tmp_path.iterdir()] == ["replay.html"]

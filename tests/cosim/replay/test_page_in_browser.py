@@ -26,7 +26,7 @@ def wait_until(browser, script):
     WebDriverWait(browser.driver, 120).until(lambda _: browser.js(f"return {script}"))
 
 
-def test_the_keyboard_alone_plays_seeks_zooms_and_changes_the_theme(browser, shown, docking):
+def test_keyboard_controls_play_seek_zoom_and_theme(browser, shown, docking):
     from selenium.webdriver.common.keys import Keys
 
     page = shown(docking)
@@ -64,7 +64,7 @@ def test_the_keyboard_alone_plays_seeks_zooms_and_changes_the_theme(browser, sho
     assert browser.js("return document.querySelector('dialog[open]') === null")
 
 
-def test_tab_reaches_every_control_and_shows_where_it_is(browser, shown, docking):
+def test_tab_reaches_every_control_with_visible_focus(browser, shown, docking):
     from selenium.webdriver.common.keys import Keys
 
     browser.open(shown(docking).file)
@@ -87,7 +87,7 @@ def test_tab_reaches_every_control_and_shows_where_it_is(browser, shown, docking
 
 
 @pytest.mark.parametrize("size", [(390, 844), (844, 390), (320, 640)])
-def test_nothing_is_wider_than_a_phone(browser, shown, docking, size):
+def test_page_fits_a_phone(browser, shown, docking, size):
     browser.open(shown(docking).file, size)
     assert browser.js("return innerWidth") == size[0]
     assert browser.js("return document.documentElement.scrollWidth") <= size[0]
@@ -102,7 +102,7 @@ def test_nothing_is_wider_than_a_phone(browser, shown, docking, size):
         browser.shoot("docking-phone")
 
 
-def test_light_and_dark_follow_the_reader_s_wish(browser, shown, docking):
+def test_theme_follows_the_browser_preference(browser, shown, docking):
     found = {}
     for scheme in ("light", "dark"):
         browser.open(shown(docking).file, scheme=scheme)
@@ -115,7 +115,7 @@ def test_light_and_dark_follow_the_reader_s_wish(browser, shown, docking):
     assert found["light"] > 600 and found["dark"] < 200
 
 
-def test_two_runs_overlay_and_stand_side_by_side(browser, both, docking, paper):
+def test_two_runs_are_overlaid_and_shown_side_by_side(browser, both, docking, paper):
     browser.open(both)
     names = [run["name"] for run in browser.js("return window.subreach.runs.map((r) => ({ name: r.header.name }))")]
     assert names == [docking.folder.name, paper.folder.name]
@@ -138,7 +138,7 @@ def test_two_runs_overlay_and_stand_side_by_side(browser, both, docking, paper):
     assert browser.logs()[1] == []
 
 
-def test_names_are_text_in_every_place(browser, docking, tmp_path):
+def test_names_are_escaped_everywhere(browser, docking, tmp_path):
     trace = json.dumps(trace_of(docking).as_json()).replace("port wall", json.dumps(HOSTILE)[1:-1])
     browser.open(write_page(tmp_path / "replay.html", [json.loads(trace) | {"title": HOSTILE}], HOSTILE))
     browser.scrub(5.0)
@@ -149,7 +149,7 @@ def test_names_are_text_in_every_place(browser, docking, tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["killed", "gaps", "one row", "interrupted"])
-def test_a_run_that_is_not_whole_says_so(kind, browser, docking, copy_of, spoil, tmp_path):
+def test_incomplete_run_shows_a_notice(kind, browser, docking, copy_of, spoil, tmp_path):
     run = load_run(spoil(copy_of(docking), kind))
     browser.open(write_page(tmp_path / "replay.html", [trace_of(run).as_json()], "spoilt"))
     browser.scrub(run.record["time"][-1])
@@ -159,13 +159,13 @@ def test_a_run_that_is_not_whole_says_so(kind, browser, docking, copy_of, spoil,
     assert browser.logs()[1] == []
 
 
-def test_a_page_without_a_run_says_so(browser, tmp_path):
+def test_page_without_a_run_shows_a_notice(browser, tmp_path):
     browser.open(write_page(tmp_path / "replay.html", [], "nothing"))
     assert "holds no run" in browser.js("return document.body.innerText")
     assert browser.logs()[1] == []
 
 
-def test_the_panel_tells_distances_in_words_without_signs(browser, shown, docking):
+def test_panel_shows_distances_without_signs(browser, shown, docking):
     page = shown(docking)
     browser.open(page.file)
     rows = """return Object.fromEntries([...document.querySelectorAll("#panel .distances li")].map(
@@ -181,7 +181,7 @@ def test_the_panel_tells_distances_in_words_without_signs(browser, shown, dockin
         assert told["roof"].endswith(" m clear")
 
 
-def test_of_many_regions_none_but_the_six_nearest_have_names(browser, shown, shipped_run):
+def test_only_the_six_nearest_regions_are_labeled(browser, shown, shipped_run):
     page = shown(load_run(shipped_run("dense-field", "time.duration=1", "arbiter.engine=closed").folder))
     browser.open(page.file)
     browser.js("subreach.player.seek(subreach.player.duration)")

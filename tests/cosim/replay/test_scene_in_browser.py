@@ -16,7 +16,7 @@ def pose(record, step):
     return [record[name][step] for name in AXES], [record[name][step] for name in QUATERNION]
 
 
-def test_a_page_opens_from_disk_and_asks_for_nothing(browser, shown, docking):
+def test_page_opens_from_disk_without_requests(browser, shown, docking):
     browser.open(shown(docking).file)
     browser.press("?")
     browser.js("document.querySelector('dialog[open]').close()")
@@ -29,7 +29,7 @@ def test_a_page_opens_from_disk_and_asks_for_nothing(browser, shown, docking):
     assert browser.js("return performance.getEntriesByType('resource').map((r) => r.name)") == []
 
 
-def test_the_page_says_what_was_asked_and_what_happened(browser, shown, docking):
+def test_page_shows_title_and_verdict(browser, shown, docking):
     browser.open(shown(docking).file)
     text = browser.js("return document.body.innerText")
     assert docking.scenario.title in text
@@ -48,7 +48,7 @@ def test_scrubbing_moves_the_vehicle_to_the_recorded_pose(browser, shown, dockin
         assert browser.drawn["runs"][0]["quaternion"] == attitude
 
 
-def test_between_rows_the_vehicle_is_between_their_poses(browser, shown, docking):
+def test_pose_is_interpolated_between_rows(browser, shown, docking):
     page, record = shown(docking), docking.record
     browser.open(page.file)
     for row, part in ((40, 0.25), (300, 0.5), (700, 0.9)):
@@ -71,7 +71,7 @@ def ten_instants(page):
 
 
 @pytest.mark.parametrize("name", ["paper", "docking"])
-def test_the_active_region_s_colour_is_that_of_the_record_at_ten_instants(name, browser, shown, request):
+def test_active_region_color_matches_the_record(name, browser, shown, request):
     page = shown(request.getfixturevalue(name))
     record = page.run.record
     browser.open(page.file)
@@ -96,7 +96,7 @@ def test_the_active_region_s_colour_is_that_of_the_record_at_ten_instants(name, 
     assert len(seen) >= {"paper": 4, "docking": 2}[name]
 
 
-def test_the_picture_changes_with_the_time_and_with_who_is_active(browser, shown, paper):
+def test_view_changes_with_time(browser, shown, paper):
     browser.open(shown(paper).file)
 
     def picture():
@@ -110,7 +110,7 @@ def test_the_picture_changes_with_the_time_and_with_who_is_active(browser, shown
     assert picture() == before
 
 
-def test_three_instants_are_kept_as_pictures(browser, shown, docking):
+def test_screenshots_of_three_instants_differ(browser, shown, docking):
     browser.open(shown(docking).file)
     files = set()
     for part, name in ((0.0, "start"), (0.08, "on-the-way"), (1.0, "end")):
@@ -119,7 +119,7 @@ def test_three_instants_are_kept_as_pictures(browser, shown, docking):
     assert len(files) == 3
 
 
-def test_a_drag_turns_the_scene_and_the_wheel_comes_nearer(browser, shown, docking):
+def test_drag_rotates_and_wheel_zooms_the_scene(browser, shown, docking):
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.actions.wheel_input import ScrollOrigin
     from selenium.webdriver.common.by import By

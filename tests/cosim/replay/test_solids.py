@@ -87,18 +87,18 @@ def outside(shape, points):
     return clearances_at(np.atleast_2d(points), Region("it", shape, "out"))
 
 
-def test_the_page_draws_every_shape_of_attitude_and_knows_no_other():
+def test_page_draws_exactly_the_attitude_shapes():
     of_attitude = {name for name, entry in ENTRIES.items() if entry.of_attitude}
     assert set(run("return Object.keys(SIGHTS);")) == set(OF_ATTITUDE) == of_attitude
     scripts = "".join(path.read_text(encoding="utf-8") for path in ASSETS.glob("*.js"))
     assert {name for name in ENTRIES if f'"{name}"' in scripts} == {"depth_band"}  # which is dragged up and down alone
 
 
-def test_the_page_has_the_colour_of_the_goal_as_all_others():
+def test_page_uses_the_common_goal_color():
     assert run("return GOAL_COLOUR;") == GOAL_COLOUR
 
 
-def test_a_mesh_is_drawn_as_it_comes():
+def test_meshes_are_drawn_unchanged():
     box = BOUNDED["box"]
     solid = run("const s = surfaceOf(shape); return { ...s, points: [...s.points] };", shape=shape_of(box))
     np.testing.assert_allclose(outside(box, np.reshape(solid["points"], (-1, 3))), 0.0, atol=1e-6)
@@ -107,14 +107,14 @@ def test_a_mesh_is_drawn_as_it_comes():
 
 @pytest.mark.medium(fast=8)
 @pytest.mark.parametrize("name", BOUNDED)
-def test_the_points_of_a_surface_are_on_it(surfaces, name):
+def test_surface_points_lie_on_the_shape(surfaces, name):
     points = np.reshape(surfaces[name]["points"], (-1, 3))
     assert len(points) >= 8
     np.testing.assert_allclose(outside(BOUNDED[name], points), 0.0, atol=1e-6)  # where coordinates are rounded
 
 
 @pytest.mark.parametrize("name", [name for name, shape in BOUNDED.items() if not isinstance(shape, Sphere | Ellipsoid)])
-def test_a_surface_is_closed_and_its_normals_point_out_of_it(surfaces, name):
+def test_surfaces_are_closed_with_outward_normals(surfaces, name):
     surface = surfaces[name]
     points, normals = np.reshape(surface["points"], (-1, 3)), np.reshape(surface["normals"], (-1, 3))
     assert all(edge[2] != edge[3] for edge in surface["edges"])
@@ -132,7 +132,7 @@ def test_a_surface_is_closed_and_its_normals_point_out_of_it(surfaces, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BOUNDED)
-def test_a_point_is_hidden_where_the_line_from_the_eye_meets_the_shape(name):
+def test_hidden_points_match_ray_casting(name):
     rng = np.random.default_rng(2)
     shape = BOUNDED[name]
     low, high = (np.array(corner) - 1.0 + 2.0 * i for i, corner in enumerate(shape.bounds()))
@@ -164,7 +164,7 @@ def test_a_point_is_hidden_where_the_line_from_the_eye_meets_the_shape(name):
     [DepthBand(3.0, 1.0), HalfSpace((1.0, 2.0, 3.0), (0.3, -1.0, 0.4)), HalfSpace((0.0, 0.0, 4.0), (0.0, 0.0, 1.0))],
 )
 @pytest.mark.parametrize("keep", ["in", "out"])
-def test_a_sheet_is_in_its_plane_and_in_the_bounds_and_its_hatching_on_the_forbidden_side(shape, keep):
+def test_plane_sheets_lie_in_bounds_with_hatching_on_the_forbidden_side(shape, keep):
     low, high = [-3.0, -4.0, 0.0], [5.0, 4.0, 6.0]
     sheets = run(
         "return sheetsOf(shape, keep, [0, 0, 0], [low, high]);", shape=shape_of(shape), keep=keep, low=low, high=high
@@ -179,7 +179,7 @@ def test_a_sheet_is_in_its_plane_and_in_the_bounds_and_its_hatching_on_the_forbi
 
 
 @pytest.mark.parametrize("tolerance", [0.3, 1.8])
-def test_the_rim_of_a_sector_of_headings_is_where_the_attitude_is_at_its_tolerance(tolerance):
+def test_heading_sector_rim_lies_at_the_attitude_tolerance(tolerance):
     shape = Orientation((0.9, 0.1, 0.2, -0.4), tolerance)
     sight = run(
         "return SIGHTS.orientation(shape, { position, quaternion }, [0, 0, 0], 0.3);",
@@ -196,7 +196,7 @@ def test_the_rim_of_a_sector_of_headings_is_where_the_attitude_is_at_its_toleran
 
 
 @pytest.mark.parametrize("half_angle", [0.5, 2.0])
-def test_a_feature_on_the_rim_of_a_view_is_at_the_edge_of_the_picture(half_angle):
+def test_view_cone_rim_lies_at_zero_clearance(half_angle):
     shape = Visibility((6.0, 3.0, 4.0), (1.0, 0.3, 0.2), half_angle, (0.2, -0.1, 0.1))
     sight = run(
         "return SIGHTS.visibility(shape, { position, quaternion }, [0, 0, 0], 0.3);",
@@ -210,7 +210,7 @@ def test_a_feature_on_the_rim_of_a_view_is_at_the_edge_of_the_picture(half_angle
         assert clearance == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_pixel_s_ray_goes_through_the_point_that_is_seen_there():
+def test_pixel_ray_passes_through_its_projected_point():
     rng = np.random.default_rng(3)
     points = rng.uniform(-5.0, 5.0, (100, 3))
     seen = run(
@@ -236,7 +236,7 @@ def test_a_pixel_s_ray_goes_through_the_point_that_is_seen_there():
         np.testing.assert_allclose(view["all"], view["at"], rtol=1e-9)
 
 
-def test_down_is_downwards_north_is_up_from_above_and_to_the_right_from_the_side():
+def test_camera_views_orient_ned_axes():
     views = run(
         """
         const camera = new Camera();
@@ -269,7 +269,7 @@ def test_down_is_downwards_north_is_up_from_above_and_to_the_right_from_the_side
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("name", ["sphere", "ellipsoid"])
-def test_lines_of_sight_along_the_outline_of_a_ball_touch_it(name):
+def test_sphere_outline_rays_are_tangent(name):
     outline = run(
         """
         const camera = new Camera();

@@ -26,7 +26,7 @@ def _tuples(value):
     return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 
-def test_the_page_s_shapes_give_every_recorded_clearance_again(steered):
+def test_page_shapes_reproduce_recorded_clearances(steered):
     header, record = trace_of(steered).header, steered.record
     time = record["time"]
     positions = record.stack([f"position.{axis}" for axis in "xyz"])
@@ -48,7 +48,7 @@ def test_the_page_s_shapes_give_every_recorded_clearance_again(steered):
     assert checked > 401 * len(header["regions"]) - 800  # all rows of all, but obstacles that had not come
 
 
-def test_changes_are_few_and_at_their_steps(steered):
+def test_changes_are_listed_at_their_steps(steered):
     changes = trace_of(steered).header["changes"]
     names = [region["name"] for region in trace_of(steered).header["regions"]]
     told = [(round(c["time"] * 100), names[c["region"]]) for c in changes]
@@ -59,24 +59,24 @@ def test_changes_are_few_and_at_their_steps(steered):
     ]  # fmt: skip
 
 
-def test_gains_are_those_of_the_commands(steered):
+def test_region_gains_follow_the_commands(steered):
     header = trace_of(steered).header
     ship = [region["name"] for region in header["regions"]].index("ship")
     assert header["regions"][ship]["gain"] == 100.0
     assert [c["gain"] for c in header["changes"] if c["region"] == ship] == [100.0, 55.0, 55.0]
 
 
-def test_commands_are_told(steered):
+def test_commands_are_listed_as_events(steered):
     texts = [event["text"] for event in trace_of(steered).header["events"] if event["kind"] == "command"]
     assert texts[1] == "Commanded: Target at (4, -1, 2) m, radius 0.6 m"
     assert any("Mission of 4 items; Follows the mission" in text for text in texts)
 
 
-def test_a_run_that_was_not_steered_has_no_changes(docking):
+def test_uncommanded_run_has_no_changes(docking):
     assert trace_of(docking).header["changes"] == []
 
 
-def test_a_log_that_is_none_is_one_line(steered, copy_of):
+def test_invalid_log_gives_one_line_error(steered, copy_of):
     folder = copy_of(steered)
     (folder / "commands.jsonl").write_text('{"step": 1}\n{"step": 2}\n')
     with pytest.raises(RunError, match=r"commands\.jsonl, line 1: .*command"):
@@ -84,7 +84,7 @@ def test_a_log_that_is_none_is_one_line(steered, copy_of):
 
 
 @pytest.mark.parametrize(("first", "end"), [(50, 70), (50, 401)])
-def test_obstacles_that_came_while_the_pose_was_unknown_have_their_size_once_it_is_known(steered, copy_of, first, end):
+def test_obstacles_added_during_an_unknown_pose_get_their_size_later(steered, copy_of, first, end):
     folder = copy_of(steered)
     table = pq.read_table(folder / RECORD)
     for name in ("position.x", "seen 2.clearance"):

@@ -18,7 +18,7 @@ from fuzzy_arbiter import Arbiter
 from tests.cosim.replay.decoding import active_of
 
 
-def test_rows_are_those_of_the_record_to_the_last_bit(docking):
+def test_trace_rows_equal_the_record_bit_for_bit(docking):
     trace = trace_of(docking)
     names = [signal["name"] for signal in trace.header["signals"]]
     recorded = [name for name in names if name in docking.record.units]
@@ -41,7 +41,7 @@ def test_first_last_and_extreme_rows_are_kept(docking):
 
 
 @given(st.integers(1, 3000), st.integers(1, 400), st.data())
-def test_sampling_keeps_to_its_budget_and_loses_no_spike(n, columns, data):
+def test_sampling_keeps_its_budget_and_all_spikes(n, columns, data):
     time = np.arange(n) * 1.0
     telling = np.zeros((n, 2))
     spike = data.draw(st.integers(0, n - 1))
@@ -55,7 +55,7 @@ def test_sampling_keeps_to_its_budget_and_loses_no_spike(n, columns, data):
     assert len(steps) <= 400_000 / (8 * columns) + 150_000 * n / 60 / (8 * columns) + 402
 
 
-def test_who_is_active_agrees_with_a_reading_row_by_row(docking):
+def test_active_region_matches_row_by_row_evaluation(docking):
     trace = trace_of(docking)
     names = [signal["name"] for signal in trace.header["signals"]]
     columns = {name: column.tolist() for name, column in zip(names, trace.rows.T, strict=True)}
@@ -64,7 +64,7 @@ def test_who_is_active_agrees_with_a_reading_row_by_row(docking):
     assert 1.0 in columns["active"] and {2.0, 3.0} & set(columns["active"])  # the heading, and a wall
 
 
-def test_nothing_is_active_where_nothing_asks_or_is_known():
+def test_no_region_is_active_without_membership_or_pose():
     nan, zero = np.nan, np.zeros((1, 3))
     one, moving = np.array([[1.0, 0.0, 0.0]]), np.array([False])
     assert active_regions([0], zero, zero, np.array([[-1.0]]), moving).tolist() == [0.0]
@@ -87,7 +87,7 @@ def test_nothing_is_active_where_nothing_asks_or_is_known():
         (0.5, 0.2, 0.1, 0.0, 1.0),
     ],
 )
-def test_at_rest_in_the_goal_a_region_leads_where_it_weighs_half_or_is_violated(weight, clearance, goal, speed, active):
+def test_at_rest_a_region_is_active_at_half_weight_or_violation(weight, clearance, goal, speed, active):
     resting = rests(np.array([goal]), np.array([[0.0, speed, 0.0]]))
     asked, weights = np.array([[0.3, 0.0, 0.0]]), np.array([[weight, 0.0, 0.0]])
     assert active_regions([0], asked, weights, np.array([[clearance]]), resting).tolist() == [active]
@@ -116,7 +116,7 @@ def test_a_row_without_memberships_has_no_strengths(docking):
     assert np.isnan(extended[0, -8:]).all() and np.isfinite(extended[1]).all()
 
 
-def test_one_row_is_seen_alone_as_among_others(docking):
+def test_rows_are_extended_independently(docking):
     trace = trace_of(docking)
     viewing = Viewing(docking.scenario, docking.record.columns)
     n = len(viewing.picked)
@@ -146,19 +146,19 @@ def test_runs_of_all_kinds_have_a_trace(name, overrides, shipped_run):
     assert trace.header["events"][-1]["text"] == "End of the run"
 
 
-def test_what_is_no_number_becomes_none():
+def test_nan_and_infinity_become_none():
     mixed = {"a": (1.0, float("nan")), "b": [float("-inf"), {"c": True}], "d": "nan", "e": None, "f": 7}
     assert nan_to_none(mixed) == {"a": [1.0, None], "b": [None, {"c": True}], "d": "nan", "e": None, "f": 7}
 
 
 @pytest.mark.medium
-def test_a_trace_is_of_the_run_as_it_came(docking):
+def test_trace_uses_the_scenario_as_flown(docking):
     slower = dataclasses.replace(docking.scenario, table=docking.scenario.table | {"title": "elsewhere"})
     assert trace_of(dataclasses.replace(docking, scenario=slower)).header["title"] == "elsewhere"
 
 
 @pytest.mark.medium
-def test_the_paper_is_seen_at_its_own_instants(paper):
+def test_papers_overlap_instants_are_in_the_trace(paper):
     """The overlap of the paper's regions lasts 48 ms of 60 s: it is in the page to the step."""
     trace = trace_of(paper)
     first, last = paper.summary["intersection_windows"][0]

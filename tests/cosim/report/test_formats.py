@@ -1,4 +1,4 @@
-"""Reports as pages and as pictures; and what a bad run leaves."""
+"""Reports as pages and as pictures, and reports of incomplete runs."""
 
 import shutil
 import struct
@@ -27,7 +27,7 @@ def folder(shipped_run, tmp_path_factory):
     return made
 
 
-def test_the_pictures_are_those_of_the_page(folder):
+def test_png_and_svg_figures_coincide(folder):
     svgs, pngs = ({p.stem for p in (folder / "figures").glob(f"*.{kind}")} for kind in ("svg", "png"))
     assert svgs == pngs and len(svgs) == 10
     for name in pngs:
@@ -42,7 +42,7 @@ def size_of(png):
 
 
 @pytest.mark.parametrize("formats", ["html", "png,html"])
-def test_every_path_that_was_written_is_printed(shipped_run, tmp_path, capsys, formats):
+def test_every_written_path_is_printed(shipped_run, tmp_path, capsys, formats):
     folder = tmp_path / "run"
     shutil.copytree(shipped_run("paper", *SHORT).folder, folder)
     (folder / "summary.json").unlink()
@@ -53,7 +53,7 @@ def test_every_path_that_was_written_is_printed(shipped_run, tmp_path, capsys, f
     assert printed[:2] == [str(folder / "report.html"), str(folder / "replay.html")]
 
 
-def test_one_bad_folder_does_not_keep_the_others_from_their_report(shipped_run, tmp_path, capsys):
+def test_invalid_folder_does_not_prevent_other_reports(shipped_run, tmp_path, capsys):
     good, bad = tmp_path / "good", tmp_path / "bad"
     shutil.copytree(shipped_run("paper", *SHORT).folder, good)
     bad.mkdir()
@@ -64,14 +64,14 @@ def test_one_bad_folder_does_not_keep_the_others_from_their_report(shipped_run, 
     assert (good / "report.html").exists() and not list(bad.iterdir())
 
 
-def test_a_format_that_is_none_is_one_line(tmp_path, capsys):
+def test_unknown_format_gives_one_line_error(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main(["report", str(tmp_path), "--format", "html,docx"])
     assert "'docx': expected html, png" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("formats", [["html"], ["png"]])
-def test_a_full_disk_leaves_what_was_there(shipped_run, tmp_path, monkeypatch, formats):
+def test_full_disk_leaves_old_files_unchanged(shipped_run, tmp_path, monkeypatch, formats):
     folder = tmp_path / "run"
     shutil.copytree(shipped_run("paper", *SHORT, report=True).folder, folder)
     before = {p: p.read_bytes() for p in folder.rglob("*") if p.is_file() and p.name != "summary.json"}
@@ -86,7 +86,7 @@ def test_a_full_disk_leaves_what_was_there(shipped_run, tmp_path, monkeypatch, f
 
 
 def changed(folder, shipped, change):
-    """Copy a run with another record, as a kill leaves it: without a summary."""
+    """Copy a run with another record and without a summary, as after a kill."""
     shutil.copytree(shipped, folder)
     table = pq.read_table(folder / RECORD)
     pq.write_table(change(table), folder / RECORD)
@@ -115,14 +115,14 @@ def without_numbers(first):
     ],
     ids=["NaN from a row on", "NaN throughout", "one row"],
 )
-def test_a_record_that_is_broken_or_short_gives_a_page_that_says_so(shipped_run, tmp_path, change, said):
+def test_incomplete_record_gives_a_page_with_a_notice(shipped_run, tmp_path, change, said):
     folder = changed(tmp_path / "run", shipped_run("paper", *SHORT).folder, change)
     assert main(["report", str(folder)]) == 0
     assert said in (folder / "report.html").read_text()
     assert not list(folder.glob(".*"))
 
 
-def test_an_empty_record_is_one_line(shipped_run, tmp_path, capsys):
+def test_empty_record_gives_one_line_error(shipped_run, tmp_path, capsys):
     folder = changed(tmp_path / "run", shipped_run("paper", *SHORT).folder, lambda table: table.slice(0, 0))
     assert main(["report", str(folder), "--format", "png"]) == 2
     assert capsys.readouterr().err == f"cosim: {folder}: the record of the run is empty\n"

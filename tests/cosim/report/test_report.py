@@ -1,4 +1,4 @@
-"""The report: complete, self-contained, and saying no more than the numbers."""
+"""The report: complete, self-contained, and consistent with the numbers."""
 
 import re
 import tomllib
@@ -92,7 +92,7 @@ def test_every_figure_is_there_as_a_vector_file_numbered_and_with_a_caption(ship
         ET.parse(run.folder / "figures" / f"{name}.svg")
 
 
-def test_whatever_the_page_points_to_is_there(shipped_run):
+def test_every_link_target_of_the_page_exists(shipped_run):
     run = shipped_run("paper", *SHORT, report=True)
     checker = Checker()
     checker.feed(page_of(run))
@@ -102,7 +102,7 @@ def test_whatever_the_page_points_to_is_there(shipped_run):
 
 
 @pytest.mark.slow
-def test_no_overlap_no_figure_of_it(tmp_path):
+def test_overlap_figure_exists_only_with_an_overlap(tmp_path):
     scenario = load_scenario("paper", ["arbiter.engine=closed", "time.duration=0.05"])
     run = run_scenario(scenario, tmp_path / "run")
     assert sorted(p.stem for p in run.folder.glob("figures/*.svg")) == FIGURES
@@ -126,7 +126,7 @@ def test_claims_carry_this_runs_numbers(shipped_run):
 
 
 @pytest.mark.slow
-def test_claims_know_of_thrusters(tmp_path):
+def test_claims_mention_thruster_limits(tmp_path):
     overrides = ["arbiter.engine=closed", "time.duration=20", "actuation.through=thrusters"]
     scenario = load_scenario("paper", overrides)
     summary = run_scenario(scenario, tmp_path / "run", report=False).summary
@@ -137,7 +137,7 @@ def test_claims_know_of_thrusters(tmp_path):
     assert "Winds up" in adapting.why
 
 
-def test_claims_blame_no_sphere_that_was_not_entered(tmp_path):
+def test_claims_mention_only_entered_spheres(tmp_path):
     scenario = load_scenario("paper", ["arbiter.engine=closed", "time.duration=1", "initial.position=[0,3,1]"])
     summary = run_scenario(scenario, tmp_path / "run", report=False).summary
     avoiding = paper_claims(scenario, summary)[2]
@@ -146,7 +146,7 @@ def test_claims_blame_no_sphere_that_was_not_entered(tmp_path):
 
 
 @pytest.mark.slow
-def test_other_scenarios_are_not_held_against_the_paper(tmp_path):
+def test_claims_are_only_for_scenarios_of_the_paper(tmp_path):
     scenario = load_scenario("paper", ["arbiter.engine=closed", "time.duration=0.01", 'compare=""'])
     assert "Beside the paper" not in page_of(run_scenario(scenario, tmp_path / "run"))
 
@@ -160,7 +160,7 @@ def test_names_from_files_are_escaped(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_goal_far_aside_still_fits_the_page(tmp_path):
+def test_figure_fits_a_distant_goal(tmp_path):
     overrides = ["arbiter.engine=closed", "time.duration=0.05", "goal.centre=[0,20,5]"]
     run = run_scenario(load_scenario("paper", overrides), tmp_path / "run")
     root = ET.parse(run.folder / "figures" / "path-plane.svg").getroot()
@@ -213,7 +213,7 @@ def test_thinned_curves_keep_their_gaps():
     assert not gap[(few < 0.299) | (few > 0.401)].any()
 
 
-def test_numbers_are_the_summarys_in_words_with_units(shipped_run):
+def test_summary_numbers_are_labeled_with_units(shipped_run):
     run = shipped_run("paper", *SHORT, report=True)
     checker = Checker()
     checker.feed(page_of(run))
@@ -224,7 +224,7 @@ def test_numbers_are_the_summarys_in_words_with_units(shipped_run):
     assert "cosim run scenario.toml --out again" in words
 
 
-def test_the_table_of_regions_says_when_and_how_long(shipped_run):
+def test_region_table_gives_violation_time_and_duration(shipped_run):
     run = load_run(shipped_run("paper", *SHORT, report=True).folder)
     rows = {row[0]: row for row in contents_of(run).regions.rows}
     signal, time = run.record["SR1.clearance"], run.record["time"]

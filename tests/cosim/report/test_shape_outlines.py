@@ -1,4 +1,4 @@
-"""Outlines of shapes in figures, against lines of sight through the shapes themselves."""
+"""Outlines of shapes in figures, against ray casting."""
 
 import numpy as np
 import pytest
@@ -47,7 +47,7 @@ def within(areas, points):
 @pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("view", [SIDE, ABOVE, ASLANT], ids=["side", "above", "aslant"])
 @pytest.mark.parametrize("name", SHAPES)
-def test_an_area_is_what_lines_of_sight_meet(name, view):
+def test_projected_area_matches_ray_casting(name, view):
     shape = SHAPES[name]
     lines = lines_of_shape(shape, LOW, HIGH, view)
     places = np.random.default_rng(5).uniform(-4.0, 4.0, (300, 2))
@@ -65,7 +65,7 @@ def test_an_area_is_what_lines_of_sight_meet(name, view):
 
 
 @pytest.mark.parametrize("name", ["star", "bent pipe", "cylinder", "box", "cone"])
-def test_an_outline_is_drawn_where_it_is_seen_alone(name):
+def test_outline_separates_covered_from_free_area(name):
     lines = lines_of_shape(SHAPES[name], LOW, HIGH, ASLANT)
     size = 8e-3
     for outline in lines.outline:

@@ -1,4 +1,4 @@
-"""Regions in pictures: where those that move were, and those that are at no place left out."""
+"""Regions in figures: moving regions, and regions without a position."""
 
 import re
 
@@ -31,12 +31,12 @@ def inspection(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def drifting(tmp_path_factory):
-    """Two buoys that come nearer and then go."""
+    """Two buoys that approach and recede."""
     keys = ["regions.0.velocity=[-4.0,1.3,0]", "regions.1.velocity=[0.0,1.0,0.0]"]
     return story_of(tmp_path_factory.mktemp("runs") / "b", "moving-obstacle", *keys)
 
 
-def test_regions_of_attitude_are_at_no_place_but_features_are(inspection):
+def test_attitude_regions_are_not_drawn_but_features_are(inspection):
     assert [(place.region.name, place.faint) for place in places_of(inspection)] == [
         ("goal", True), ("goal", True), ("goal", False), ("pipe", False), ("sea bed", False),
     ]  # fmt: skip
@@ -45,7 +45,7 @@ def test_regions_of_attitude_are_at_no_place_but_features_are(inspection):
     assert feature == pytest.approx([3.0, 3.5, 4.6])
 
 
-def test_what_moved_is_drawn_where_it_began_where_it_ended_and_where_it_mattered(drifting):
+def test_moving_regions_are_drawn_at_start_end_and_closest_approach(drifting):
     first, last, nearest = [place for place in places_of(drifting) if place.region.name == "crossing buoy"]
     assert list(first.shift) == [0.0, 0.0, 0.0]
     assert last.shift == pytest.approx([-8.0, 2.6, 0.0])
@@ -91,7 +91,7 @@ def test_every_axis_of_every_figure_has_a_name_and_a_unit(request, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["inspection", "drifting"])
-def test_nothing_is_cut_off_and_no_names_overlap(request, name):
+def test_labels_are_not_clipped_and_do_not_overlap(request, name):
     for drawing in drawings(request.getfixturevalue(name)):
         figure = drawing.figure
         renderer = FigureCanvasAgg(figure).get_renderer()
@@ -131,7 +131,7 @@ def test_a_view_from_above_has_east_to_the_right_of_north(drifting):
     assert down[1, 1] < down[0, 1]
 
 
-def test_the_view_in_space_keeps_right_right():
+def test_three_dimensional_view_is_right_handed():
     right, up = Box(np.zeros(3), np.ones(3)).view
     towards = np.cross(right, up)  # the viewer
     assert np.linalg.det(np.array([right, up, towards])) == pytest.approx(1.0)

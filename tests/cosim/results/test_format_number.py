@@ -1,4 +1,4 @@
-"""What was kept in the form of another version is refused in one line."""
+"""Files of another format version are rejected in one line."""
 
 import json
 import shutil
@@ -16,7 +16,7 @@ VERBS = [["report", "{run}"], ["export", "{run}", "--to", "npz"], ["replay", "{r
 @pytest.mark.medium(fast=4)
 @pytest.mark.parametrize("verb", VERBS, ids=lambda words: words[0])
 @pytest.mark.parametrize(("said", "named"), [(None, "1"), ({"format": "3"}, "3"), ({"format": "x\x1b"}, "x")])
-def test_a_record_of_another_form_is_refused(shipped_run, tmp_path, monkeypatch, capsys, verb, said, named):
+def test_record_of_another_format_version_is_rejected(shipped_run, tmp_path, monkeypatch, capsys, verb, said, named):
     monkeypatch.chdir(tmp_path)
     run = shipped_run("paper", "arbiter.engine=closed", "time.duration=0.05").folder
     shutil.copytree(run, tmp_path / "run")
@@ -33,7 +33,7 @@ def test_a_record_of_another_form_is_refused(shipped_run, tmp_path, monkeypatch,
 
 
 @pytest.mark.parametrize(("said", "named"), [({}, "1"), ({"format": 7}, "7"), ({"format": [2]}, r"\[2\]")])
-def test_a_campaign_of_another_form_is_refused(tmp_path, said, named):
+def test_campaign_of_another_format_version_is_rejected(tmp_path, said, named):
     (tmp_path / "campaign.json").write_text(json.dumps({"kind": "scenes"} | said))
     with pytest.raises(RunError, match=rf"campaign\.json: format is {named}, expected 2"):
         read_plan(tmp_path)

@@ -1,4 +1,4 @@
-"""The shipped scenarios against numbers measured independently of this project, one region active at a time."""
+"""The shipped scenarios against independently computed figures, one active region at a time."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ BOTH = pytest.mark.parametrize("engine", ["closed", pytest.param("skfuzzy", mark
 
 
 @BOTH
-def test_paper_without_a_limit(shipped_run, engine):
+def test_unlimited_paper_run_matches_reference_figures(shipped_run, engine):
     summary = shipped_run("paper", f"arbiter.engine={engine}").summary
     assert summary["max_force"] == pytest.approx(26.82e3, rel=0.01)
     assert summary["max_force_asked"] == summary["max_force"]
@@ -36,7 +36,7 @@ def test_shipped_paper_runs_scikit_fuzzy(shipped_run):
 
 
 @pytest.mark.parametrize("duration", [5, pytest.param(60, marks=pytest.mark.slow)])
-def test_both_engines_drive_the_same_path(shipped_run, duration):
+def test_both_arbiter_engines_give_the_same_path(shipped_run, duration):
     """Their weights differ by at most the square of the grid's step over 2; the path hardly notices."""
     closed, skfuzzy = (
         load_record(shipped_run("paper", f"arbiter.engine={e}", f"time.duration={duration}").folder)
@@ -49,7 +49,7 @@ def test_both_engines_drive_the_same_path(shipped_run, duration):
 
 
 @pytest.mark.slow
-def test_paper_limited_to_108_newtons(shipped_run):
+def test_paper_run_limited_to_108_newtons_matches_reference_figures(shipped_run):
     run = shipped_run("paper-limited", "arbiter.engine=closed")
     summary = run.summary
     assert summary["max_force"] == pytest.approx(108.0, rel=1e-9)
@@ -73,7 +73,7 @@ def test_paper_limited_to_108_newtons(shipped_run):
     [pytest.param(76.4, (3.24, 3.92), 1.4, marks=pytest.mark.slow), (100.0, (2.82, 3.42), 1.6)],
     ids=["76.4 N", "100 N"],
 )
-def test_other_limits(shipped_run, limit, window, speed):
+def test_other_force_limits_match_reference_figures(shipped_run, limit, window, speed):
     summary = shipped_run("paper-limited", "arbiter.engine=closed", "time.duration=20", f"limit.force={limit}").summary
     assert summary["intersection_windows"][0] == pytest.approx(window, abs=0.01)
     assert summary["max_speed"] == pytest.approx(speed, abs=0.06)

@@ -1,4 +1,4 @@
-"""What is recorded is there once, to the last bit, however the writing of it ends."""
+"""The record holds each row once, bit for bit, for any interruption of its writing."""
 
 import contextlib
 import itertools
@@ -41,7 +41,7 @@ def test_a_record_keeps_every_bit(tmp_path):
 
 @pytest.mark.parametrize("when", ["before", "after"])
 @pytest.mark.parametrize("where", ["pq.write_table", "pq.ParquetWriter.write_table", "Path.replace"])
-def test_an_interruption_while_a_part_is_written_loses_and_doubles_nothing(tmp_path, monkeypatch, where, when):
+def test_interrupt_during_any_write_call_neither_loses_nor_duplicates_rows(tmp_path, monkeypatch, where, when):
     recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
     name, _, method = where.rpartition(".")
     owner = {"pq": pq, "pq.ParquetWriter": pq.ParquetWriter, "Path": Path}[name]
@@ -66,7 +66,7 @@ def test_an_interruption_while_a_part_is_written_loses_and_doubles_nothing(tmp_p
     assert [p.name for p in tmp_path.iterdir()] == ["record.parquet"]
 
 
-def test_a_slow_run_is_written_by_the_clock(tmp_path, monkeypatch):
+def test_slow_run_is_written_at_time_intervals(tmp_path, monkeypatch):
     now = iter(np.arange(0.0, 1e3, 0.3))
     monkeypatch.setattr("cosim.results.recorder.time.monotonic", lambda: next(now))
     recorder = Recorder(tmp_path, COLUMNS)
@@ -76,7 +76,7 @@ def test_a_slow_run_is_written_by_the_clock(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("most", [199, 200])
-def test_a_large_record_keeps_few_signals_in_memory_and_a_small_one_all(tmp_path, monkeypatch, most):
+def test_signal_cache_is_bounded_for_large_records(tmp_path, monkeypatch, most):
     monkeypatch.setattr("cosim.results.record._SMALL", most)
     columns = [Column(f"c{i}", "", "x") for i in range(100)]
     recorder = Recorder(tmp_path, columns)
@@ -90,7 +90,7 @@ def test_a_large_record_keeps_few_signals_in_memory_and_a_small_one_all(tmp_path
         record["nothing"]
 
 
-def test_an_interrupted_write_loses_and_repeats_nothing(tmp_path, monkeypatch):
+def test_interrupted_part_write_neither_loses_nor_duplicates_rows(tmp_path, monkeypatch):
     """Ctrl-C within the writing of a part, as Python delivers it: when the call returns."""
     recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
     real, calls = pq.write_table, []
@@ -161,7 +161,7 @@ def test_a_part_holds_64_mib_at_the_most(tmp_path, monkeypatch):
     assert pq.ParquetFile(part).metadata.num_rows == 4000
 
 
-def test_a_record_that_cannot_be_finished_leaves_all_in_parts(tmp_path, monkeypatch):
+def test_failed_finalization_leaves_all_rows_in_parts(tmp_path, monkeypatch):
     recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
     for k in range(35):
         recorder.observe(k, np.array([k, 2.0 * k]))
@@ -181,7 +181,7 @@ def test_a_record_that_cannot_be_finished_leaves_all_in_parts(tmp_path, monkeypa
 
 @pytest.mark.parametrize("first", [1, 2, 3])
 @pytest.mark.parametrize("then", range(6))
-def test_a_close_that_is_interrupted_leaves_all_and_may_be_called_again(tmp_path, monkeypatch, first, then):
+def test_interrupted_close_keeps_all_rows_and_can_be_repeated(tmp_path, monkeypatch, first, then):
     recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
     for k in range(35):
         recorder.observe(k, np.array([k, 2.0 * k]))
@@ -210,7 +210,7 @@ def test_a_close_that_is_interrupted_leaves_all_and_may_be_called_again(tmp_path
     assert [p.name for p in tmp_path.iterdir()] == [RECORD]
 
 
-def test_where_the_whole_finds_no_room_parts_hold_what_there_is_room_for(tmp_path, monkeypatch):
+def test_full_disk_keeps_the_rows_that_fit_in_parts(tmp_path, monkeypatch):
     resource = pytest.importorskip("resource")
     monkeypatch.setattr("cosim.results.recorder.time.monotonic", lambda: 0.0)
     rng = np.random.default_rng(3)
@@ -229,7 +229,7 @@ def test_where_the_whole_finds_no_room_parts_hold_what_there_is_room_for(tmp_pat
 
 
 @pytest.mark.medium
-def test_a_slow_run_takes_no_more_memory_as_it_goes_on(tmp_path, monkeypatch):
+def test_memory_of_a_slow_run_does_not_grow(tmp_path, monkeypatch):
     now = itertools.count(0.0, 0.3)
     monkeypatch.setattr("cosim.results.recorder.time.monotonic", lambda: next(now))
     recorder = Recorder(tmp_path, [Column(f"c{i}", "", "x") for i in range(100)])  # room for a group takes 8 MB
@@ -246,7 +246,7 @@ def test_a_slow_run_takes_no_more_memory_as_it_goes_on(tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there are no timers")
-def test_a_storm_of_signals_loses_and_doubles_nothing(tmp_path):
+def test_signal_storm_neither_loses_nor_duplicates_rows(tmp_path):
     recorder, storm = Recorder(tmp_path, COLUMNS, rows_per_part=300), np.random.default_rng(7)
     caught = 0
 
@@ -297,7 +297,7 @@ def test_a_record_holds_each_row_once_however_its_writing_is_interrupted(tmp_pat
     assert pq.read_table(tmp_path / RECORD)["time"].to_pylist() == list(range(recorder.rows))
 
 
-def test_a_record_is_whole_after_a_disk_that_was_full_for_a_while(tmp_path, monkeypatch):
+def test_record_is_complete_after_a_temporarily_full_disk(tmp_path, monkeypatch):
     recorder = Recorder(tmp_path, [Column("time", "s", "")], rows_per_part=3)
     write, writes = pq.ParquetWriter.write_table, 0
 

@@ -1,4 +1,4 @@
-"""A bar on a terminal, and a line where something is compiled first."""
+"""The progress bar on a terminal, and the notice of a compilation."""
 
 import io
 import logging
@@ -11,12 +11,12 @@ from cosim.run.progress import WORDS, ProgressBar, announce_compilation
 
 
 @pytest.fixture(autouse=True)
-def untold_compiling():
-    """Let compilation be announced, which other tests silence."""
+def compilation_notice():
+    """Leave the notice of a compilation on, which other tests silence."""
 
 
 def compiles():
-    """Say what a library says before it is compiled."""
+    """Log the record that a library emits before it is compiled."""
     logging.getLogger("controller.compiling.first_use").info("compiling")
 
 
@@ -27,31 +27,31 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_it_is_said_once_and_only_if_it_happens():
-    told = []
-    with announce_compilation(told.append):
-        assert told == []
+def test_compilation_is_announced_once_if_it_happens():
+    notices = []
+    with announce_compilation(notices.append):
+        assert notices == []
         compiles()
         compiles()
-    assert told == [WORDS]
+    assert notices == [WORDS]
     compiles()
-    assert told == [WORDS]
+    assert notices == [WORDS]
 
 
-def test_a_function_that_is_compiled_says_so_and_one_that_is_kept_does_not(monkeypatch, tmp_path):
+def test_cached_function_announces_no_compilation(monkeypatch, tmp_path):
     from controller.compiling import library
 
     monkeypatch.setattr("platformdirs.user_cache_dir", lambda name: str(tmp_path / name))
     text = "void entry(const void *words);\nvoid entry(const void *words) { (void)words; }\n"
-    told = []
+    notices = []
     for expected in ([WORDS], [WORDS, WORDS][:1]):
         library.library_of.cache_clear()
-        with announce_compilation(told.append):
+        with announce_compilation(notices.append):
             library.library_of(text)
-        assert told == expected
+        assert notices == expected
 
 
-def test_the_line_stands_beside_the_bar(monkeypatch):
+def test_compilation_notice_does_not_break_the_progress_bar(monkeypatch):
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
     with announce_compilation(lambda words: terminal.write(f"{words}\n")):
@@ -63,14 +63,14 @@ def test_the_line_stands_beside_the_bar(monkeypatch):
     assert lines == [WORDS, "paper 10/10", ""]
 
 
-def test_nothing_moves_where_there_is_no_terminal(capsys):
+def test_no_progress_bar_without_a_terminal(capsys):
     with ProgressBar(True, "{n}", total=3) as bar:
         bar.update(2)
     assert capsys.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize(("flags", "said"), [([], f"cosim: {WORDS}\n"), (["-q"], "")])
-def test_every_verb_says_it_unless_it_is_quiet(flags, said, capsys, monkeypatch):
+def test_every_verb_announces_compilation_unless_quiet(flags, said, capsys, monkeypatch):
     monkeypatch.setitem(cli._VERBS, "show", lambda options: compiles() or 0)
     assert cli.main([*flags, "show", "paper"]) == 0
     assert capsys.readouterr() == ("", said)

@@ -1,4 +1,4 @@
-"""Run folders: whole, readable, and complete even after an interruption."""
+"""Run folders: complete and readable, even after an interruption."""
 
 import json
 
@@ -22,7 +22,7 @@ REQUIRED = {
 }  # fmt: skip
 
 
-def test_folder_holds_what_is_promised(shipped_run):
+def test_folder_holds_documented_files(shipped_run):
     folder = shipped_run("paper", *SHORT, report=True).folder
     names = sorted(p.name for p in folder.iterdir())
     assert names == ["figures", "record.parquet", "replay.html", "report.html", "scenario.toml", "summary.json"]
@@ -65,7 +65,7 @@ def test_settled_means_inside_for_the_last_ten_seconds(shipped_run):
     assert early["reached"] and early["settle_time"] == pytest.approx(13.87, abs=0.1) and not early["settled"]
 
 
-def test_spans():
+def test_spans_of_a_boolean_signal_are_found():
     time = np.arange(6) * 0.5
     assert spans(np.array([0, 1, 1, 0, 0, 1], bool), time) == [(0.5, 1.5), (2.5, 2.5)]
     assert spans(np.array([1, 1, 1, 1, 1, 1], bool), time) == [(0.0, 2.5)]
@@ -79,13 +79,13 @@ def test_a_folder_in_use_is_refused(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["precious"]
 
 
-def test_a_place_that_cannot_be_written_is_refused(tmp_path):
+def test_unwritable_folder_is_rejected(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(RunError, match="file"):
         run_scenario(load_scenario("paper", SHORT), tmp_path / "file" / "run")
 
 
-def test_a_scenario_that_the_fmu_refuses_leaves_no_folder(tmp_path):
+def test_scenario_rejected_by_the_fmu_leaves_no_folder(tmp_path):
     out = tmp_path / "run"
     for override in ("plant.parameters.mass=-5", "law.gains.k_p1=1e9"):  # before the first step, and in it
         with pytest.raises(PlantError):
@@ -94,7 +94,7 @@ def test_a_scenario_that_the_fmu_refuses_leaves_no_folder(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_failure_midway_leaves_what_was_recorded(tmp_path):
+def test_plant_error_keeps_recorded_rows(tmp_path):
     out = tmp_path / "run"
     scenario = load_scenario("paper", [*SHORT, "law.gains.k_v1=5e5"])  # which no 1 kHz loop can hold: k_v1 h > 2 m
     with pytest.raises(PlantError):
@@ -141,7 +141,7 @@ def test_a_killed_run_can_be_reported(tmp_path):
     assert not list(killed.glob(".*"))
 
 
-def test_what_is_no_run_cannot_be_reported(tmp_path):
+def test_missing_run_cannot_be_reported(tmp_path):
     with pytest.raises(RunError, match="no run"):
         report_again(tmp_path)
 
@@ -161,7 +161,7 @@ def test_a_discarded_run_leaves_the_users_folder(tmp_path):
     assert list(mine.iterdir()) == []
 
 
-def test_whatever_goes_wrong_in_a_step_leaves_a_readable_record(tmp_path, monkeypatch):
+def test_error_before_the_first_row_leaves_no_folder(tmp_path, monkeypatch):
     def broken(self):
         raise ZeroDivisionError
 
@@ -172,12 +172,12 @@ def test_whatever_goes_wrong_in_a_step_leaves_a_readable_record(tmp_path, monkey
     assert not (tmp_path / "none").exists()
 
 
-def test_regions_of_any_name_saturate_nothing(tmp_path):
+def test_region_names_do_not_affect_saturation(tmp_path):
     scenario = load_scenario("paper", [*SHORT, "regions.SR3.name=not_saturated"])
     assert run_scenario(scenario, tmp_path / "run", report=False).summary["saturated_time"] == 0.0
 
 
-def test_an_interrupt_before_the_first_step_leaves_nothing(tmp_path, monkeypatch):
+def test_interrupt_before_the_first_step_leaves_no_folder(tmp_path, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
@@ -187,7 +187,7 @@ def test_an_interrupt_before_the_first_step_leaves_nothing(tmp_path, monkeypatch
     assert not (tmp_path / "run").exists()
 
 
-def test_no_record_is_a_clear_error(tmp_path):
+def test_missing_or_damaged_record_is_rejected(tmp_path):
     with pytest.raises(RunError, match="no record"):
         load_record(tmp_path)
     (tmp_path / "record.parquet").write_bytes(b"PAR1 and then nothing")
@@ -196,7 +196,7 @@ def test_no_record_is_a_clear_error(tmp_path):
 
 
 @pytest.mark.slow
-def test_own_vehicle_travels_with_the_run(tmp_path):
+def test_custom_vehicle_file_is_copied_into_the_run(tmp_path):
     from importlib import resources
 
     text = (

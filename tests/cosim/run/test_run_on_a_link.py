@@ -1,4 +1,4 @@
-"""A run that is a MAVLink vehicle: its record does not know who listens, and repeats from what was commanded."""
+"""A run as a MAVLink vehicle: telemetry does not change the record, and commands replay it."""
 
 import socket
 import threading
@@ -21,7 +21,7 @@ SHORT = ["time.duration=3"]
 
 
 class Station:
-    """A ground station that says one thing after the other once it hears the vehicle."""
+    """A ground station that sends its messages in sequence once it receives the vehicle."""
 
     def __init__(self, *says):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -90,7 +90,7 @@ def patient_links(monkeypatch):
 
 
 @pytest.mark.medium
-def test_the_record_is_the_same_to_the_last_bit_whoever_listens(tmp_path):
+def test_telemetry_does_not_change_the_record(tmp_path):
     scenario = load_scenario("harbour", SHORT)
     alone = run_scenario(scenario, tmp_path / "alone", report=False)
     with Station(command(400, 0.0), command(512, 148.0)) as station:
@@ -110,7 +110,7 @@ def test_the_record_is_the_same_to_the_last_bit_whoever_listens(tmp_path):
 
 
 @pytest.mark.slow
-def test_what_came_over_the_link_repeats_to_the_last_bit(tmp_path):
+def test_commands_received_over_mavlink_replay_bit_for_bit(tmp_path):
     scenario = load_scenario("harbour", ["time.duration=2", "commands.enabled=true", "commands.await_arm=true"])
     target = mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0b110111111000, 2, -1, 2, *[0] * 8)
     says = [command(400, 1.0), target, command(192, -1.0, 1.0, 0.0, 0.7), command(176, 1.0, 4.0, 3.0)]
@@ -131,7 +131,7 @@ def test_what_came_over_the_link_repeats_to_the_last_bit(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_restart_is_another_run_on_the_same_link(tmp_path):
+def test_restart_starts_a_new_run_on_the_same_link(tmp_path):
     scenario = load_scenario("harbour", ["time.duration=1.5", "commands.enabled=true"])
     says = [command(512, 1.0)] * 4  # some tenths of a second
     with Station(*says, command(246, 1.0, 0.0, 0.0, 0.0, 0.0, 20190226.0)) as station:
@@ -152,7 +152,7 @@ def test_a_restart_is_another_run_on_the_same_link(tmp_path):
     assert same(first, load_record(again.folder))
 
 
-def test_commands_need_a_scenario_that_heeds_them(tmp_path):
+def test_commands_log_requires_commands_enabled(tmp_path):
     (tmp_path / "commands.jsonl").touch()
     with pytest.raises(RunError, match=r"expected a scenario with commands\.enabled"):
         run_scenario(load_scenario("paper", SHORT), tmp_path / "run", commands_log=tmp_path / "commands.jsonl")
@@ -168,7 +168,7 @@ def test_a_link_that_cannot_be_opened_leaves_no_folder(tmp_path):
     assert not (tmp_path / "run").exists()
 
 
-def test_a_run_that_cannot_begin_leaves_no_log(tmp_path):
+def test_failed_start_leaves_no_log(tmp_path):
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "notes").touch()
     log = tmp_path / "run.tlog"

@@ -45,7 +45,7 @@ PRINTS = {  # of each program, what prints something
 
 @pytest.mark.parametrize("words", [["list"], ["--help"], ["run", "paper"], ["show", "nowhere"]])
 @pytest.mark.parametrize("program", MAINS)
-def test_D7_a_closed_standard_output_is_one_line_and_nothing_is_done(program, words, tmp_path, capsys, monkeypatch):
+def test_D7_closed_standard_output_gives_one_line_error_and_no_work(program, words, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "stdout", None)
     assert MAINS[program](words) == 2
@@ -55,7 +55,7 @@ def test_D7_a_closed_standard_output_is_one_line_and_nothing_is_done(program, wo
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("program", MAINS)
-def test_D7_a_process_without_standard_output(program):
+def test_D7_process_without_standard_output_exits_with_2(program):
     command = f"{sys.executable} -m {program} {' '.join(PRINTS[program])} >&-"
     done = subprocess.run(command, shell=True, stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 2
@@ -66,13 +66,13 @@ def test_D7_a_process_without_standard_output(program):
     ("program", "words"),
     [("cosim", ["show", "x"]), ("plant_fmu", ["docs", "--vehicle", "x"]), ("fuzzy_arbiter", ["show", "x"])],
 )
-def test_D7_without_standard_error_complaints_do_not_go_into_the_output(program, words, capsys, monkeypatch):
+def test_D7_without_standard_error_messages_do_not_enter_the_output(program, words, capsys, monkeypatch):
     monkeypatch.setattr(sys, "stderr", None)
     assert MAINS[program](words) == 2
     assert capsys.readouterr().out == ""
 
 
-def test_D7_without_standard_input_scenes_are_none(tmp_path, capsys, monkeypatch):
+def test_D7_closed_standard_input_is_rejected(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(sys, "stdin", None)
     assert main(["campaign", "-", "--law", "ismail_dunnigan", "--out", str(tmp_path / "out")]) == 2
     assert capsys.readouterr() == ("", "cosim: standard input: is closed\n")
@@ -82,7 +82,7 @@ def test_D7_without_standard_input_scenes_are_none(tmp_path, capsys, monkeypatch
 @pytest.mark.medium(fast=1)
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
 @pytest.mark.parametrize("program", MAINS)
-def test_D7_a_full_standard_output_is_one_line(program):
+def test_D7_full_standard_output_gives_one_line_error(program):
     with open("/dev/full", "wb") as full:
         command, buffered = [sys.executable, "-m", program, *PRINTS[program]], os.environ | {"PYTHONUNBUFFERED": ""}
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, env=buffered, text=True, check=False)
@@ -117,7 +117,7 @@ SETTINGS = {
      ["sitl", "--port", "9113", "--timeout", "1", "--out", "out"]],
     ids=lambda words: words[0],
 )  # fmt: skip
-def test_D8_a_deep_or_long_setting_is_one_line(words, setting, tmp_path, capsys, monkeypatch):
+def test_D8_deep_or_long_setting_gives_one_line_error(words, setting, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main([*words, "--set", setting]) == 2
     said = capsys.readouterr()
@@ -140,7 +140,7 @@ def test_D8_a_deep_or_long_setting_is_one_line(words, setting, tmp_path, capsys,
     ],
     ids=lambda words: " ".join(words)[:40],
 )
-def test_D8_what_else_is_set_from_a_text(words, tmp_path, capsys, monkeypatch):
+def test_D8_other_text_settings_give_one_line_errors(words, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main([*words, "--out", "out"]) == 2
     said = capsys.readouterr()
@@ -166,7 +166,7 @@ def without_nohup():
 
 @pytest.mark.usefixtures("without_nohup")
 @pytest.mark.parametrize("sent", [signal.SIGHUP, signal.SIGTERM, signal.SIGINT])
-def test_D10_every_verb_ends_by_a_signal_as_by_ctrl_c(sent, capsys, monkeypatch):
+def test_D10_every_verb_handles_termination_signals_like_ctrl_c(sent, capsys, monkeypatch):
     before = [signal.getsignal(number) for number in (signal.SIGHUP, signal.SIGTERM, signal.SIGINT)]
     monkeypatch.setitem(cli._VERBS, "show", lambda options: receive(sent))
     assert main(["show", "paper"]) == 130
@@ -175,7 +175,7 @@ def test_D10_every_verb_ends_by_a_signal_as_by_ctrl_c(sent, capsys, monkeypatch)
 
 
 @pytest.mark.usefixtures("without_nohup")
-def test_D10_a_terminal_that_closes_twice_does_not_disturb_the_end():
+def test_D10_repeated_hangup_does_not_disturb_shutdown():
     with kills_interrupt():
         with pytest.raises(KeyboardInterrupt):
             receive(signal.SIGHUP)
@@ -199,7 +199,7 @@ def test_D10_under_nohup_a_closed_terminal_stays_ignored():
 
 @pytest.mark.slow
 def test_D10_a_run_whose_terminal_is_closed_is_readable(tmp_path):
-    """The process as a user has it: it leads the session of a terminal, whose other end goes."""
+    """The process leads the session of a terminal whose other end is closed."""
     import fcntl
 
     out = tmp_path / "run"
@@ -313,7 +313,7 @@ NEED = {
 }
 
 
-def test_D12_every_verb_is_tried():
+def test_D12_every_verb_has_a_case():
     assert set(VERBS) == set(cli._VERBS)
 
 
@@ -321,7 +321,7 @@ def test_D12_every_verb_is_tried():
 @pytest.mark.parametrize(
     "verb", [pytest.param(verb, marks=pytest.mark.slow) if verb in SLOW | WAITING else verb for verb in VERBS]
 )
-def test_D12_a_reader_that_goes_away_ends_every_verb_alike(verb, flown, place, unread, capsys):
+def test_D12_closed_output_pipe_exits_with_141_for_every_verb(verb, flown, place, unread, capsys):
     if verb in NEED:
         pytest.importorskip(NEED[verb])
     if verb == "rerun":
@@ -365,7 +365,7 @@ OTHERS = [
 
 @pytest.mark.medium(fast=3)
 @pytest.mark.parametrize(("program", "words"), OTHERS, ids=lambda value: value if isinstance(value, str) else value[0])
-def test_D12_a_reader_that_goes_away_ends_the_other_commands_alike(
+def test_D12_closed_output_pipe_exits_with_141_for_other_commands(
     program, words, tmp_path, unread, capsys, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
@@ -384,7 +384,7 @@ def test_D12_a_reader_that_goes_away_ends_the_other_commands_alike(
     ids=lambda value: value if isinstance(value, str) else " ".join(value),
 )
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_D12_a_process_whose_reader_goes_away_ends_silently_with_141(program, words, unbuffered):
+def test_D12_process_with_closed_output_pipe_exits_silently_with_141(program, words, unbuffered):
     reading, writing = os.pipe()
     os.close(reading)
     command = [sys.executable, "-m", program, *words]
@@ -394,7 +394,7 @@ def test_D12_a_process_whose_reader_goes_away_ends_silently_with_141(program, wo
     assert (done.returncode, done.stderr) == (141, b"")
 
 
-def test_D12_another_pipe_that_breaks_is_told(capsys, monkeypatch):
+def test_D12_other_broken_pipes_are_reported(capsys, monkeypatch):
     def broken(options):
         raise BrokenPipeError(32, "Broken pipe")
 
@@ -421,7 +421,7 @@ def make_trap(kind, path):
 @pytest.mark.medium(fast=17)
 @pytest.mark.parametrize("kind", ["pipe", "folder", "socket", "/dev/null", "/dev/zero"])
 @pytest.mark.parametrize("role", ["scenario", "base", "vehicle", "vehicle of a plant", "definition"])
-def test_D13_what_is_no_file_is_one_line_and_no_hang(role, kind, tmp_path, capsys, monkeypatch):
+def test_D13_non_regular_file_gives_one_line_error_without_hanging(role, kind, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(os.path.realpath(tmp_path))  # short enough for the name of a socket
     make_trap(kind, tmp_path / "trap.toml")
     before = set(tmp_path.iterdir())

@@ -1,4 +1,4 @@
-"""Titles say what was changed since they were written, wherever they are shown."""
+"""Titles list the changes made since they were written."""
 
 import dataclasses
 import re
@@ -37,7 +37,7 @@ def saved(path, text):
 
 
 @pytest.mark.parametrize("name", list_scenarios())
-def test_what_is_shipped_is_as_its_title_says(name):
+def test_shipped_scenarios_have_unchanged_titles(name):
     scenario = load_scenario(name)
     assert scenario.title == scenario.table["title"] and scenario.table["changed"] == ()
 
@@ -82,11 +82,11 @@ def test_the_numbers_of_shipped_titles_are_those_of_their_scenarios():
         ),
     ],
 )
-def test_what_is_set_is_told_beside_the_title(overrides, added):
+def test_overrides_are_listed_in_the_title(overrides, added):
     assert load_scenario("paper-limited", overrides).title == LIMITED + added
 
 
-def test_a_title_that_is_set_along_is_taken_at_its_word(tmp_path):
+def test_overridden_title_lists_no_changes(tmp_path):
     both = ["limit.force=500", 'title="Limited to 500 N"']
     assert load_scenario("paper-limited", both).title == "Limited to 500 N"
     changed = saved(tmp_path / "changed.toml", load_scenario("paper-limited", ["limit.force=500"]).toml())
@@ -95,7 +95,7 @@ def test_a_title_that_is_set_along_is_taken_at_its_word(tmp_path):
     assert load_scenario(own).title == "My own"
 
 
-def test_a_base_lends_its_title_with_what_is_laid_over_it(tmp_path):
+def test_inherited_title_lists_overridden_keys(tmp_path):
     one = saved(tmp_path / "one.toml", 'base = "paper-limited"\nlimit = { force = 500.0 }\n')
     two = saved(tmp_path / "two.toml", 'base = "one.toml"\n[arbiter]\nramp = 0.5\n')
     assert load_scenario(one).title == FORCE
@@ -105,13 +105,13 @@ def test_a_base_lends_its_title_with_what_is_laid_over_it(tmp_path):
     assert load_scenario(two, ["limit.force=108"]).title == f"{LIMITED} (changed: arbiter.ramp = 0.5 m)"
 
 
-def test_what_is_no_scenario_without_its_base_or_its_settings_says_what_makes_it_one(tmp_path):
+def test_title_lists_settings_that_complete_a_partial_scenario(tmp_path):
     half = saved(tmp_path / "half.toml", 'title = "Half"\nvehicle = "odin"\ntime = { duration = 2.0 }\n')
     rest = ["initial.position=[0,0,1]", 'goal={type="sphere",centre=[3,0,2],radius=0.5}']
     assert load_scenario(half, rest).title == "Half (changed: initial, goal)"
 
 
-def test_a_file_written_from_a_changed_scenario_says_the_same_and_more(tmp_path):
+def test_written_scenario_keeps_and_extends_its_listed_changes(tmp_path):
     changed = load_scenario("paper-limited", ["limit.force=500"])
     file = saved(tmp_path / "mine.toml", changed.toml())
     assert load_scenario(file).title == FORCE and load_scenario(file).toml() == changed.toml()
@@ -121,7 +121,7 @@ def test_a_file_written_from_a_changed_scenario_says_the_same_and_more(tmp_path)
     assert load_scenario(gone, overrides).title == f"{LIMITED} (changed: regions.SR3.gain, regions = none)"
 
 
-def test_a_title_that_is_shown_stays_printable(tmp_path):
+def test_unprintable_changes_are_rejected(tmp_path):
     from cosim.errors import ScenarioError
 
     file = saved(
@@ -132,7 +132,7 @@ def test_a_title_that_is_shown_stays_printable(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_pages_of_a_run_say_so_when_it_is_flown_and_when_it_is_reported_again(tmp_path):
+def test_report_pages_show_the_changed_title(tmp_path):
     scenario = load_scenario("paper-limited", ["limit.force=500", "time.duration=0.05", "arbiter.engine=closed"])
     folder = run_scenario(scenario, tmp_path / "run").folder
     assert "limit.force = 500 N" in scenario.title
@@ -148,7 +148,7 @@ def test_the_pages_of_a_run_say_so_when_it_is_flown_and_when_it_is_reported_agai
     assert load_scenario(folder / "scenario.toml").title == scenario.title
 
 
-def test_rows_of_a_sweep_say_what_varies(tmp_path, fakes):
+def test_sweep_row_titles_list_varied_keys(tmp_path, fakes):
     base = load_scenario("paper-limited", ["arbiter.ramp=0.5"])
     made = Variation(base, ["limit.force", "law.gains.k_p1"]).scenario([1 / 3, 18.8], 7)
     assert made.title == f"{LIMITED} (changed: arbiter.ramp = 0.5 m, limit.force = 0.333333 N)"
@@ -157,7 +157,7 @@ def test_rows_of_a_sweep_say_what_varies(tmp_path, fakes):
     assert repeated.title.startswith(f"{LIMITED} (changed: arbiter.ramp = 0.5 m, limit.force = ")
 
 
-def test_the_title_says_who_flew_if_no_law_of_ours():
+def test_title_names_an_external_law():
     def rest(*_):
         return np.zeros(6)
 
@@ -170,12 +170,12 @@ def test_the_title_says_who_flew_if_no_law_of_ours():
     assert heavy.endswith("(flown by ardupilot; changed: vehicle = bluerov2_heavy_wu, time.duration = 60 s)")
 
 
-def test_several_runs_on_a_page_have_each_title_once():
+def test_page_of_several_runs_shows_each_title_once():
     assert joint_title({"a": "One", "b": "One"}) == "One: a, b"
     assert joint_title({"a": "One", "b": "Two", "c": "One"}) == "One: a, c; Two: b"
 
 
-def test_a_title_follows_the_law_that_a_summary_names():
+def test_title_names_the_law_of_the_summary():
     scenario = load_scenario("paper")
     autopilot = dataclasses.replace(scenario, law=dataclasses.replace(scenario.law, name="px4"))
     assert autopilot.title == f"{scenario.title} (flown by px4)"

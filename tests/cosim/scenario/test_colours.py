@@ -1,4 +1,4 @@
-"""Regions are told apart by their colours, and belong to their criteria by them."""
+"""Region colors are distinguishable and derived from their criteria."""
 
 from itertools import combinations
 
@@ -19,7 +19,7 @@ def lab(colour):
 
 
 @pytest.mark.parametrize("name", ["docking", "harbour", "inspection-visibility", "pipe-inspection", "paper"])
-def test_regions_of_a_scene_are_told_apart(name):
+def test_region_colors_are_distinguishable(name):
     scenario = load_scenario(name)
     colours = colours_of_regions(scenario)
     assert len(colours) == len(scenario.regions) + 1
@@ -27,7 +27,7 @@ def test_regions_of_a_scene_are_told_apart(name):
         assert np.linalg.norm(lab(a) - lab(b)) > 20.0, (a, b)
 
 
-def test_the_first_region_of_a_criterion_has_its_colour_and_the_seventh_again():
+def test_region_colors_repeat_after_six():
     scenario = load_scenario("dense-field")
     own = {criterion.name: criterion.colour for criterion in scenario.criteria}
     obstacles = [i for i, secondary in enumerate(scenario.regions, start=1) if secondary.criterion == "obstacle"]

@@ -1,4 +1,4 @@
-"""Criteria and rules of a scenario: what stands in its file, what is filled in, and what is refused."""
+"""Criteria and rules of a scenario: file content, defaults, and rejected values."""
 
 import tomllib
 
@@ -73,14 +73,14 @@ def test_without_criteria_they_are_the_papers():
     assert not load_scenario("docking", ["criteria.shape.membership.ramp=0.2"]).has_paper_criteria
 
 
-def test_four_criteria_are_weighed_as_section_vi_weighs_three():
+def test_four_criteria_are_weighted_by_the_rules_of_section_vi():
     system = load_scenario(FOUR).rules.system
     arbiter = Arbiter([Criterion(name) for name in "abcd"])
     for sample in ([1, 1, 1, 1], [0, 0, 0, 1], [0.2, 0.5, 0.1, 0.9], [0, 0.7, 1, 0.4]):
         assert Arbiter(system=system)(sample) == arbiter(sample)
 
 
-def test_order_is_the_priority_and_the_order_of_columns():
+def test_criteria_order_sets_priority_and_column_order():
     assert load_scenario(FOUR).criterion_names == ("obstacle", "shape", "depth", "visibility")
     first = load_scenario(FOUR, ["criteria.visibility.order=0"])
     assert first.criterion_names == ("visibility", "obstacle", "shape", "depth")
@@ -88,7 +88,7 @@ def test_order_is_the_priority_and_the_order_of_columns():
     assert [first.criterion_names[i] for i in first.criterion_places] == ["obstacle", "shape", "depth", "visibility"]
 
 
-def test_colours_that_are_left_out_differ():
+def test_default_criterion_colors_are_distinct():
     names = ["obstacle", "a", "b", "depth"]
     criteria = ", ".join(f'{{name = "{name}"}}' for name in names)
     scenario = load_scenario("sitl", [f"criteria=[{criteria}]"])
@@ -131,13 +131,13 @@ def test_keys_of_the_default_can_be_set():
         ("arbiter.file=nowhere.fcl", "arbiter.file: nowhere.fcl: No such file"),
     ],
 )  # fmt: skip
-def test_a_fault_is_one_line_that_names_the_key(change, words):
+def test_invalid_criteria_give_one_line_error_with_the_key(change, words):
     with pytest.raises(ScenarioError) as caught:
         load_scenario(FOUR, [change])
     assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_obstacles_that_come_in_need_their_criterion():
+def test_dynamic_obstacles_require_the_obstacle_criterion():
     criteria = 'criteria=[{name="depth"}]'
     with pytest.raises(
         ScenarioError, match=r"commands.obstacles is above 0, expected 0 without a criterion 'obstacle'"
@@ -146,7 +146,7 @@ def test_obstacles_that_come_in_need_their_criterion():
     load_scenario("sitl", [criteria, "regions=[]", "commands.enabled=true", "commands.obstacles=0"])
 
 
-def test_a_file_of_rules_goes_with_the_scenario(own, tmp_path):
+def test_arbiter_file_is_saved_with_the_scenario(own, tmp_path):
     scenario = load_scenario(own)
     assert scenario.rules.system.outside == "clip"
     assert [output.name for output in scenario.rules.system.outputs] == ["obstacle", "depth"]
@@ -162,7 +162,7 @@ def test_a_file_of_rules_goes_with_the_scenario(own, tmp_path):
     assert again.rules == scenario.rules and again.toml() == text
 
 
-def test_another_file_drops_the_inputs_of_the_one_before(own):
+def test_clearing_the_arbiter_file_drops_its_inputs(own):
     assert load_scenario(own, ['arbiter.file=""']).rules.system == prioritised(
         [Criterion("obstacle", "exist", "not_exist"), Criterion("depth", "not_maintain", "maintain")]
     )
@@ -214,7 +214,7 @@ def test_every_format_is_read(own, suffix):
         ('criteria=[{name="obstacle"},{name="depth"},{name="shape"}]', "mine.toml has no output 'shape'"),
     ],
 )
-def test_faults_of_inputs_and_outputs_are_named(own, change, words):
+def test_invalid_inputs_and_outputs_are_rejected_by_name(own, change, words):
     with pytest.raises(ScenarioError) as caught:
         load_scenario(own, [change])
     assert words in str(caught.value) and "\n" not in str(caught.value)
@@ -230,7 +230,7 @@ def test_faults_of_inputs_and_outputs_are_named(own, change, words):
         ('  "if distance is far and soon is later then obstacle is low",\n', "", "output 'obstacle' has no default"),
     ],
 )  # fmt: skip
-def test_faults_of_the_file_are_named(own, old, new, words):
+def test_invalid_arbiter_files_are_rejected_by_name(own, old, new, words):
     text = RULES.replace(old, new)
     if "deep" in new:
         text = text.replace('name = "depth"', 'name = "deep"')
@@ -242,7 +242,7 @@ def test_faults_of_the_file_are_named(own, old, new, words):
     assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_a_file_that_is_no_text_is_refused(own):
+def test_binary_or_oversized_arbiter_file_is_rejected(own):
     (own.parent / "mine.toml").write_bytes(b"\xff\xfe")
     with pytest.raises(ScenarioError, match="is no UTF-8"):
         load_scenario(own)

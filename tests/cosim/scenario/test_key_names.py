@@ -1,4 +1,4 @@
-"""Keys of scenarios in words: each number has some, with the unit that the documents give it."""
+"""Labels of scenario keys with the units of the documents."""
 
 import re
 from pathlib import Path
@@ -46,11 +46,11 @@ def label(key, name="paper-limited", overrides=()):
         ("regions", "regions"),
     ],
 )
-def test_a_key_in_words(key, words):
+def test_keys_have_readable_labels(key, words):
     assert label(key) == words
 
 
-def test_keys_of_other_shapes_in_words():
+def test_keys_of_other_shapes_have_readable_labels():
     assert label("regions.heading.shape.tolerance", "docking") == "tolerance of heading [rad]"
     assert label("regions.port wall.shape.size.1", "docking") == "size y of port wall [m]"
     assert label("failures.0.time", "dense-field") == "time of failure 0 [s]"
@@ -59,7 +59,7 @@ def test_keys_of_other_shapes_in_words():
 
 
 @pytest.mark.parametrize("name", list_scenarios())
-def test_every_key_of_a_scenario_has_words(name):
+def test_every_scenario_key_has_a_label(name):
     scenario = load_scenario(name)
     for key in keys_of(scenario.table):
         words = key_name(key, scenario.table, scenario.vehicle).words
@@ -87,7 +87,7 @@ def test_units_are_those_of_the_document():
     assert asked > 20
 
 
-def test_outcomes_have_words_with_the_units_of_their_columns():
+def test_outcome_labels_match_column_units():
     for name, (_, unit, _) in FIELDS.items():
         told = LABELS[name].partition(" [")[2].removesuffix("]")
         assert told == unit.replace(".", " ")

@@ -1,4 +1,4 @@
-"""A law of one's own in the place of a scenario's: flown, named in the run folder, refused where it cannot be."""
+"""Custom laws: run, named in the run folder, and rejected where unsupported."""
 
 import json
 import tomllib
@@ -39,7 +39,7 @@ def named(monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_run_by_a_law_of_ones_own_is_whole_and_says_whose_it_is(scenario, named, tmp_path):
+def test_run_with_custom_law_is_complete_and_names_it(scenario, named, tmp_path):
     run = run_scenario(scenario, tmp_path / "run", law=named)
     record = load_record(run.folder)
     assert (record["command.X"] == 20.0).all() and (record["estimate.phi1"] == 0.0).all()
@@ -53,7 +53,7 @@ def test_a_run_by_a_law_of_ones_own_is_whole_and_says_whose_it_is(scenario, name
     assert NAME in (run.folder / "replay.html").read_text()
 
 
-def test_the_same_law_as_a_function_flies_the_same_to_the_bit(tmp_path):
+def test_function_law_gives_the_same_run_bit_for_bit(tmp_path):
     scenario = load_scenario("paper", [*SHORT, "time.control=0.01", "time.duration=0.5"])
     law = law_of(scenario)
     run = run_scenario(scenario, tmp_path / "own", report=False, law=law)
@@ -63,14 +63,14 @@ def test_the_same_law_as_a_function_flies_the_same_to_the_bit(tmp_path):
     assert all(np.array_equal(one[name], other[name], equal_nan=True) for name in other.units)
 
 
-def test_a_killed_run_says_whose_law_it_was(scenario, named, tmp_path):
+def test_killed_run_names_its_custom_law(scenario, named, tmp_path):
     run = run_scenario(scenario, tmp_path / "run", report=False, law=named)
     (run.folder / "summary.json").unlink()
     assert load_run(run.folder).summary["law"] == NAME
 
 
 @pytest.mark.medium
-def test_the_file_of_such_a_run_is_read_but_not_run(scenario, named, tmp_path):
+def test_scenario_file_with_custom_law_is_loadable_but_not_runnable(scenario, named, tmp_path):
     run = run_scenario(scenario, tmp_path / "run", report=False, law=named)
     again = load_scenario(run.folder / "scenario.toml")
     assert again.law.name == NAME and again.law.own
@@ -83,13 +83,13 @@ def test_the_file_of_such_a_run_is_read_but_not_run(scenario, named, tmp_path):
 
 
 @pytest.mark.parametrize("engine", ["fused", "lanes"])
-def test_a_sweep_refuses_it(scenario, named, engine, tmp_path):
+def test_sweep_rejects_custom_law(scenario, named, engine, tmp_path):
     design = Design(vary_from(["initial.position.1=-1:1"]), samples=2)
     with pytest.raises(RunError, match=r"law\.name is "):
         run_sweep(with_custom_law(named, scenario), design, tmp_path / "sweep", engine)
 
 
-def test_what_it_breaks_off_with_is_left_readable(scenario, tmp_path):
+def test_invalid_output_of_a_custom_law_leaves_a_readable_run(scenario, tmp_path):
     def late(state, goal, regions, weights):
         return np.zeros(6) if state.position[0] == 0.0 and not calls.append(1) and len(calls) < 5 else np.zeros(3)
 
@@ -100,7 +100,7 @@ def test_what_it_breaks_off_with_is_left_readable(scenario, tmp_path):
     assert summary["status"].startswith("failed: law ") and summary["simulated_time"] == pytest.approx(0.07)
 
 
-def test_what_it_raises_itself_comes_through_and_leaves_the_record(scenario, tmp_path):
+def test_exception_of_a_custom_law_propagates_and_keeps_the_record(scenario, tmp_path):
     def faulty(state, goal, regions, weights):
         calls.append(1)
         return np.zeros(6) if len(calls) < 5 else 1 / 0
@@ -113,7 +113,7 @@ def test_what_it_raises_itself_comes_through_and_leaves_the_record(scenario, tmp
 
 
 @pytest.mark.parametrize("law", [ahead, FunctionLaw, 3])
-def test_what_is_no_law_is_refused(law, scenario, tmp_path):
+def test_invalid_law_is_rejected(law, scenario, tmp_path):
     with pytest.raises(LawError, match=r"law is .*:.*, expected a FunctionLaw"):
         run_scenario(scenario, tmp_path / "run", law=law)
     assert not (tmp_path / "run").exists()
@@ -123,7 +123,7 @@ def test_what_is_no_law_is_refused(law, scenario, tmp_path):
     ("key", "words"),
     [("commands.enabled=true", "commands.enabled is true"), ("record.lyapunov=true", "record.lyapunov is true")],
 )
-def test_what_goes_with_shipped_laws_alone_is_refused(key, words, named, tmp_path):
+def test_options_of_shipped_laws_are_rejected_with_custom_law(key, words, named, tmp_path):
     scenario = load_scenario("paper", [*SHORT, key])
     for attempt in (lambda: run_scenario(scenario, tmp_path / "run", law=named), lambda: Master(scenario, named)):
         with pytest.raises(ScenarioError, match=words):
@@ -131,7 +131,7 @@ def test_what_goes_with_shipped_laws_alone_is_refused(key, words, named, tmp_pat
     assert not (tmp_path / "run").exists()
 
 
-def test_forces_of_thrusters_want_thrusters(scenario, tmp_path):
+def test_thruster_output_requires_thruster_actuation(scenario, tmp_path):
     law = FunctionLaw(lambda *_: [1.0] * 8, output="thrusters")
     with pytest.raises(ScenarioError, match=r"actuation.through is 'wrench', expected 'thrusters': law .*<lambda>"):
         run_scenario(scenario, tmp_path / "run", law=law)
@@ -140,6 +140,6 @@ def test_forces_of_thrusters_want_thrusters(scenario, tmp_path):
     assert (load_record(tmp_path / "run")["thrust[8]"] == 1.0).all()
 
 
-def test_gains_of_a_law_of_ones_own_are_refused():
+def test_gains_of_a_custom_law_are_rejected():
     with pytest.raises(ScenarioError, match=r"law\.gains has 'k_p1', expected nothing with a law of one's own"):
         load_scenario("paper", ["law.name=mine.py:steer", "law.gains.k_p1=1.0"])

@@ -1,4 +1,4 @@
-"""Rules to compare an arbiter with, and what a path through a region costs by the arbiter."""
+"""Rule variants for comparison with an arbiter, and path costs through its regions."""
 
 import itertools
 
@@ -47,11 +47,11 @@ def test_without_an_arbiter_all_weights_are_1():
 
 
 @pytest.mark.parametrize("variant", ["ordered", "reversed", "crisp", "none"])
-def test_variants_have_the_closed_form(variant):
+def test_rule_variants_use_the_closed_form_engine(variant):
     assert Arbiter(system=rules_by_order(variant, FOUR, 101)).engine == "closed"
 
 
-def test_a_file_has_its_own_rules(tmp_path):
+def test_rule_variant_is_rejected_with_an_arbiter_file(tmp_path):
     Arbiter(system=prioritised()).save(tmp_path / "mine.json")
     table = "".join(f'arbiter.inputs.{name}="membership.{name}"\n' for name in ("obstacle", "shape", "depth"))
     changes = [f'arbiter.file="{tmp_path / "mine.json"}"', *table.splitlines()]
@@ -65,15 +65,15 @@ def costs(variant):
     return {r.criterion: r.region.crossing_cost for r in scenario.regions if not r.region.hard}
 
 
-def test_a_path_costs_most_through_what_the_arbiter_gives_up_last():
+def test_path_cost_is_highest_in_regions_of_top_priority():
     """Three criteria have soft regions. In its two pairs the first always wins, the second once, the third never."""
     assert costs("ordered") == pytest.approx({"shape": 10.0, "depth": 2.0, "visibility": 0.4}, rel=1e-9)
     assert costs("reversed") == pytest.approx({"shape": 0.4, "depth": 2.0, "visibility": 10.0}, rel=1e-9)
     assert costs("none") == pytest.approx(dict.fromkeys(("shape", "depth", "visibility"), 2.0), rel=1e-9)
 
 
-def test_rules_of_a_file_are_asked_by_their_own_signals(tmp_path):
-    """Of a file by clearances: on the surface presses in full, as far as the universe goes not at all."""
+def test_arbiter_file_costs_use_its_own_input_signals(tmp_path):
+    """A file over clearances: full membership on the surface, zero at the end of the universe."""
     text = """FUNCTION_BLOCK mine
 VAR_INPUT risers : REAL; below : REAL; END_VAR
 VAR_OUTPUT obstacle : REAL; shape : REAL; depth : REAL; visibility : REAL; END_VAR
@@ -113,5 +113,5 @@ END_FUNCTION_BLOCK
     assert found["depth"] == found["visibility"]
 
 
-def test_hard_regions_alone_cost_what_they_did():
+def test_crossing_cost_without_soft_regions_is_the_default():
     assert {r.region.crossing_cost for r in load_scenario("dense-field").regions} == {2.0}

@@ -1,4 +1,4 @@
-"""Scenario files: every key checked, every fault named."""
+"""Scenario files: every key validated, every error named."""
 
 import dataclasses
 import tomllib
@@ -52,7 +52,7 @@ def test_written_scenario_reads_back_the_same(tmp_path, name):
             assert getattr(again, f.name) == getattr(first, f.name), f.name
 
 
-def test_base_lays_one_scenario_over_another(tmp_path):
+def test_base_scenario_is_overridden_by_the_file(tmp_path):
     path = saved(tmp_path, 'base = "paper"\nlimit = { force = 5.0 }\n')
     scenario = load_scenario(path)
     assert scenario.limit.force == 5.0
@@ -65,12 +65,12 @@ def test_base_may_be_a_file_beside(tmp_path):
     assert load_scenario(saved(tmp_path, 'base = "other.toml"\ntitle = "Mine"\n')).title == "Mine"
 
 
-def test_base_of_itself_is_refused(tmp_path):
+def test_circular_base_is_rejected(tmp_path):
     with pytest.raises(ScenarioError, match="base"):
         load_scenario(saved(tmp_path, 'base = "mine.toml"\n'))
 
 
-def test_base_lies_elsewhere_with_its_vehicle(tmp_path):
+def test_vehicle_path_is_relative_to_the_base_file(tmp_path):
     from importlib import resources
 
     (tmp_path / "common").mkdir()
@@ -85,14 +85,14 @@ def test_base_lies_elsewhere_with_its_vehicle(tmp_path):
     assert load_scenario(saved(tmp_path / "mine", 'base = "../common/b.toml"\n', "a.toml")).vehicle.mass == 125.0
 
 
-def test_overlap_is_of_regions_to_be_kept_out_of():
+def test_overlap_includes_only_keep_out_regions():
     scenario = load_scenario("paper", ["regions.SR1.keep=in", "intersection=[]"])
     assert scenario.intersection == (1, 2)
     with pytest.raises(ScenarioError, match="SR1"):
         load_scenario("paper", ["regions.SR1.keep=in"])
 
 
-def test_own_vehicle_file_is_found_beside_the_scenario(tmp_path):
+def test_vehicle_file_is_relative_to_the_scenario(tmp_path):
     from importlib import resources
 
     (tmp_path / "boat.toml").write_text((resources.files("plant_fmu") / "vehicles" / "odin.toml").read_text())
@@ -195,7 +195,7 @@ def test_overrides_reach_every_depth(tmp_path):
         ("title.x=3", ["title"]),
     ],
 )
-def test_faults_are_named_in_one_line(override, words):
+def test_invalid_keys_give_one_line_errors(override, words):
     with pytest.raises(ScenarioError) as caught:
         load_scenario("paper", [override])
     said = str(caught.value)
@@ -217,7 +217,7 @@ def test_faults_are_named_in_one_line(override, words):
         ),
     ],
 )
-def test_faults_about_sensors_are_named(overrides, words):
+def test_invalid_sensor_keys_are_rejected_by_name(overrides, words):
     with pytest.raises(ScenarioError, match=words):
         load_scenario("paper", ["sensing.through=sensors", *overrides])
 
@@ -240,7 +240,7 @@ def test_faults_about_sensors_are_named(overrides, words):
         ("actuation.through=wrench", "'wrench', expected 'thrusters'"),
     ],
 )
-def test_faults_about_thrusters_and_their_law_are_named(override, words):
+def test_invalid_thruster_and_law_keys_are_rejected_by_name(override, words):
     with pytest.raises(ScenarioError, match=words):
         load_scenario("dense-field", [override])
 
@@ -256,7 +256,7 @@ def test_gains_go_with_the_name_of_their_law(tmp_path):
     assert load_scenario(saved(tmp_path, text)).law.gains == type(other.law.gains)()
 
 
-def test_what_moves_is_named():
+def test_moving_regions_are_listed():
     scenario = load_scenario("paper", ["goal.velocity=[0.1,0,0]", "regions.SR2.streamed=true"])
     assert scenario.moving == ("goal", "SR2")
     assert scenario.goal_region.velocity == (0.1, 0.0, 0.0)
@@ -276,11 +276,11 @@ def test_what_moves_is_named():
         (["sensing.velocity_noise=0.1"], False),
     ],
 )
-def test_sensing_is_exact_unless_something_is_wrong_with_it(keys, exact):
+def test_sensing_is_exact_without_sensor_faults(keys, exact):
     assert load_scenario("paper", keys).sensing.exact == exact
 
 
-def test_a_limit_of_the_wrench_says_nothing_of_thrusters():
+def test_wrench_limit_is_rejected_with_thruster_actuation():
     with pytest.raises(ScenarioError, match="limit"):
         load_scenario("paper-limited", ["actuation.through=thrusters"])
 
@@ -305,7 +305,7 @@ def test_broken_files_are_refused(tmp_path, content):
         load_scenario(path)
 
 
-def test_a_table_that_is_given_in_part_is_filled_in_too():
+def test_partial_tables_get_defaults():
     table = load_scenario("paper", ["sensing.position_noise=0.02"]).table
     assert table["sensing"].keys() == load_scenario("paper").table["sensing"].keys()
     assert table["sensing"]["position_noise"] == 0.02 and table["sensing"]["seed"] == 0

@@ -1,4 +1,4 @@
-"""Shipped scenarios with the deployable law: the goal reached for good, every hard region kept."""
+"""Shipped scenarios with the deployable law: goal reached and every hard region satisfied."""
 
 import pytest
 
@@ -21,12 +21,12 @@ DEPLOYABLE = [
 LONG = ("dense-field", "harbour", "paper-deployable")
 
 
-def test_these_are_all_that_are_shipped_with_that_law():
+def test_all_shipped_scenarios_of_the_law_are_tested():
     assert [name for name in list_scenarios() if load_scenario(name).law.name == "deployable"] == DEPLOYABLE
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in DEPLOYABLE])
-def test_goal_is_reached_and_every_hard_region_kept(tmp_path, name):
+def test_goal_is_reached_and_every_hard_region_satisfied(tmp_path, name):
     """As shipped, but for the report: every plant step counts."""
     scenario = load_scenario(name)
     summary = run_scenario(scenario, tmp_path / "run", report=False).summary
@@ -41,7 +41,7 @@ def test_goal_is_reached_and_every_hard_region_kept(tmp_path, name):
     assert summary["max_force"] <= sum(limits)
 
 
-def test_the_view_asks_for_something(tmp_path):
+def test_view_region_is_active_in_the_shipped_scenario(tmp_path):
     """Were every angle allowed, the coupling would get out of the picture: keeping it is no matter of course."""
     shipped = load_scenario("pipe-inspection").regions[0].region.shape.half_angle
     free = load_scenario("pipe-inspection", ["regions.view.shape.half_angle=3.0", "time.duration=15.0"])
@@ -49,7 +49,7 @@ def test_the_view_asks_for_something(tmp_path):
     assert 3.0 - least > shipped + 0.1
 
 
-def test_the_failed_thruster_is_found_untold(tmp_path):
+def test_unreported_thruster_failure_is_detected(tmp_path):
     """It is found when it is used: at 9 s it pushes, at 10 s it is idle for a while."""
     scenario = load_scenario("dense-field", ["time.duration=12.0", "failures.0.time=9.0"])
     record = load_record(run_scenario(scenario, tmp_path / "run", report=False).folder)
@@ -58,7 +58,7 @@ def test_the_failed_thruster_is_found_untold(tmp_path):
     assert set(given_up[record["time"] > 10.5]) == {2.0}
 
 
-def test_the_paper_scene_is_the_papers():
+def test_paper_scene_matches_the_paper():
     """Start, goal, regions and gains of the regions are the same; only law, periods and actuation differ."""
     paper, deployable = load_scenario("paper"), load_scenario("paper-deployable")
     for key in ("goal", "regions", "initial", "vehicle"):

@@ -1,4 +1,4 @@
-"""``cosim show``: a template, which repeats the scenario."""
+"""``cosim show``: a commented template that round-trips."""
 
 import dataclasses
 import re
@@ -31,7 +31,7 @@ def shown(capsys):
 
 @pytest.mark.medium(fast=3)
 @pytest.mark.parametrize("name", list_scenarios())
-def test_what_is_shown_is_the_same_scenario(name, shown, tmp_path):
+def test_shown_scenario_round_trips(name, shown, tmp_path):
     (tmp_path / "mine.toml").write_text(shown(name))
     first, again = load_scenario(name), load_scenario(tmp_path / "mine.toml")
     for field in dataclasses.fields(first):
@@ -45,7 +45,7 @@ def test_what_is_shown_is_the_same_scenario(name, shown, tmp_path):
 CORNERS = [[float(i), 0.123456789 * i * i] for i in range(12)]
 
 
-def test_flags_vehicles_and_long_shapes_are_in_it(shown, tmp_path, monkeypatch):
+def test_shown_text_includes_flags_vehicles_and_long_shapes(shown, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.toml").write_text(shown("paper"))
     (tmp_path / "boat.toml").write_text((load_vehicle_file("odin")).read_text())
@@ -68,7 +68,7 @@ def load_vehicle_file(name):
 
 
 @pytest.mark.parametrize("name", list_scenarios())
-def test_a_vector_takes_one_line_and_a_key_of_one_region_says_what_it_means(name, shown):
+def test_shown_vectors_take_one_line_and_keys_are_explained(name, shown):
     text = shown(name)
     assert not re.search(r"^\s*[-\d.]+,?$", text, re.M)
     tables = re.split(r"\n(?=\[\[)", text)
@@ -81,7 +81,7 @@ def test_a_vector_takes_one_line_and_a_key_of_one_region_says_what_it_means(name
     assert re.search(r"^duration = [\d.]+ +# s, ", text, re.M) and re.search(r"^radius = [\d.]+ +# m$", text, re.M)
 
 
-def test_units_of_what_depends_on_law_vehicle_and_shape(shown):
+def test_units_depend_on_law_vehicle_and_shape(shown):
     assert re.search(r"^k_p1 = 18.8 +# N/m3, on the primary region", shown("paper"), re.M)
     text = shown("docking")
     assert re.search(r"^speed = 1.2 +# m/s, greatest over ground", text, re.M)
@@ -109,7 +109,7 @@ def test_every_gain_of_every_law_is_explained():
         ("mine.py:steer", "speed", ""),
     ],
 )  # fmt: skip
-def test_the_unit_of_a_gain_heads_its_comment(law, gain, unit):
+def test_gain_units_are_read_from_the_gain_comments(law, gain, unit):
     assert unit_of_gain(law, gain) == unit
 
 
@@ -138,6 +138,6 @@ VALUE = st.recursive(
 
 @pytest.mark.medium
 @given(st.dictionaries(TEXT, VALUE, max_size=5))
-def test_any_table_reads_back_as_it_was(table):
+def test_tables_round_trip(table):
     for said in ({}, {"time.step": "s, a comment", **dict.fromkeys(table, "one\tmore")}):
         assert tomllib.loads(scenario_text(table, said)) == table

@@ -1,4 +1,4 @@
-"""The vehicle with the plant's parameters laid over."""
+"""The vehicle with the plant's parameter overrides applied."""
 
 import numpy as np
 
@@ -10,14 +10,14 @@ def changed(*overrides):
     return load_scenario("paper", [f"plant.parameters.{text}" for text in overrides])
 
 
-def test_nothing_laid_over_is_the_vehicle_itself():
+def test_without_overrides_the_true_vehicle_is_nominal():
     scenario = load_scenario("paper")
     true = true_vehicle(scenario)
     for name, value in vars(scenario.vehicle).items():
         assert np.array_equal(getattr(true, name), value), name
 
 
-def test_numbers_vectors_and_matrices_are_laid_over():
+def test_scalar_vector_and_matrix_overrides_are_applied():
     scenario = changed("mass=130", "r_G.z=0.1", "inertia.xy=0.5", "weight=1300")
     true = true_vehicle(scenario)
     assert true.mass == 130.0 and true.r_G[2] == 0.1 and true.weight == 1300.0
@@ -25,7 +25,7 @@ def test_numbers_vectors_and_matrices_are_laid_over():
     assert scenario.vehicle.inertia[0, 1] == 0.0
 
 
-def test_elements_are_counted_from_one_and_failed_thrusters_have_no_force():
+def test_element_indices_start_at_one_and_failed_thrusters_have_no_force():
     scenario = changed(
         "added_mass[1,5]=-3", "quadratic_damping[3]=99", "thrust_effectiveness[2]=0", "thrust_effectiveness[3]=0.5"
     )
@@ -39,5 +39,5 @@ def test_elements_are_counted_from_one_and_failed_thrusters_have_no_force():
     assert np.array_equal(model.phi, scenario.true_restoring_parameters)
 
 
-def test_what_is_no_number_of_the_vehicle_is_left_alone():
+def test_non_vehicle_parameters_are_ignored():
     assert true_vehicle(changed("bottom_depth=20", "dvl.rate=5")).mass == 125.0

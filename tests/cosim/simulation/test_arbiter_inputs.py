@@ -1,4 +1,4 @@
-"""What the arbiter gets: speeds and times against motion itself, given signals against NumPy's interpolation."""
+"""Arbiter inputs: speeds and times against motion, given signals against NumPy's interpolation."""
 
 import numpy as np
 import pytest
@@ -55,7 +55,7 @@ def inputs_of(signals, state, now=0.0):
     return found
 
 
-def test_it_decides_by_what_the_law_expects_or_else_by_what_is_measured():
+def test_arbiter_uses_law_estimate_or_measurement():
     measured, decides = state_of([1.0, 2.0, 3.0], [0.1, 0.2, 0.3], [0.4, 0.5, 0.6, 0.7, 0.8, 0.9]), empty_state()
     lost = measured._replace(position=np.full(3, np.nan))
     expected, nothing = np.array([1.1, 2.1, 3.1, 0.3, 0.2, 0.1]), np.full(6, np.nan)
@@ -76,7 +76,7 @@ triples = st.tuples(small, small, small)
 
 @given(st.tuples(st.floats(-1.0, 6.0), st.floats(-3.0, 3.0), st.floats(0.5, 4.0)), triples, triples, triples)
 @settings(deadline=None)
-def test_a_closing_speed_is_how_fast_the_clearance_shrinks_in_motion(position, turn, linear, rates):
+def test_closing_speed_is_the_rate_of_clearance_decrease(position, turn, linear, rates):
     """Central differences over a motion that SciPy integrates: position along R v, attitude by the body rates."""
     state = state_of(position, np.array(turn) * 0.3, (*linear, *rates))
     found = inputs_of([InputSignal("a", "closing_speed", 1), InputSignal("b", "closing_speed", 0)], state)
@@ -94,7 +94,7 @@ def test_a_closing_speed_is_how_fast_the_clearance_shrinks_in_motion(position, t
     np.testing.assert_allclose(found.closing_speeds[smooth], expected[smooth], atol=1e-3)
 
 
-def test_the_time_to_contact_is_that_of_a_steady_approach():
+def test_time_to_contact_assumes_constant_velocity():
     """A rock at 2.5 m that comes at 0.2 m/s, a vehicle that goes at 0.3 m/s: met after 5 s; not met when it flees."""
     state = state_of((0.0, 1.0, 2.0), (0.0, 0.0, 0.0), (0.3, 0.1, 0.0, 0.0, 0.0, 0.0))
     signals = [
@@ -114,7 +114,7 @@ def test_the_time_to_contact_is_that_of_a_steady_approach():
 @given(
     st.lists(st.floats(0.0, 50.0), min_size=1, max_size=6, unique=True).map(sorted), st.data(), st.floats(-5.0, 60.0)
 )
-def test_a_given_signal_is_straight_between_its_points(times, data, now):
+def test_given_signal_is_linearly_interpolated(times, data, now):
     if len(times) > 1 and min(np.diff(times)) < 1e-6:
         return
     values = data.draw(st.lists(st.floats(-5.0, 5.0), min_size=len(times), max_size=len(times)))

@@ -1,4 +1,4 @@
-"""The deployable law on the plant: what it does when measurements, thrusters or regions are not as they should be."""
+"""The deployable law on the plant with faulty measurements, thrusters or regions."""
 
 import numpy as np
 import pytest
@@ -68,7 +68,7 @@ def within_limits(flight):
     return np.isfinite(flight.forces).all() and np.abs(flight.forces).max() <= 27.0
 
 
-def test_it_goes_round_a_rock():
+def test_obstacle_is_avoided_and_goal_reached():
     flight = fly([ROCK])
     assert reached(flight) and within_limits(flight)
     assert flight.clearance(ROCK).min() > 0.0
@@ -76,7 +76,7 @@ def test_it_goes_round_a_rock():
 
 @pytest.mark.medium
 @pytest.mark.parametrize(("weight", "share"), [(0.0, 1e-3), (1.0, 1e-6)])
-def test_a_barrier_that_works_gives_way_by_a_small_share_of_what_it_asks_for(weight, share):
+def test_active_barrier_has_a_small_bounded_slack(weight, share):
     """A rock alone on the way: the slack is never 0 then, but far below what docs/deployable.md counts as kept."""
     flight = fly([ROCK], weights=[weight])
     yielding, held = flight.report("constraint_slack"), flight.report("barriers") > 0
@@ -86,14 +86,14 @@ def test_a_barrier_that_works_gives_way_by_a_small_share_of_what_it_asks_for(wei
 
 
 @pytest.mark.medium
-def test_no_regions_at_all_is_a_scene_too():
+def test_empty_scene_reaches_the_goal():
     assert reached(fly([]))
 
 
 @pytest.mark.medium
 @pytest.mark.parametrize("length", [1.0, 5.0])
-def test_a_measurement_of_nan_is_bridged_then_waited_for(length):
-    """Within `coast` it goes on by its model and stops the vehicle; after it, the thrusters rest until it is back."""
+def test_nan_measurements_are_bridged_then_the_vehicle_waits(length):
+    """Within `coast` the law propagates its model and stops the vehicle; then thrusts are zero until recovery."""
     flight = fly([ROCK], duration=40.0, spoil=lambda t, s: NOWHERE if 2.0 < t < 2.0 + length else s)
     assert within_limits(flight) and reached(flight)
     assert flight.clearance(ROCK).min() > 0.0
@@ -105,7 +105,7 @@ def test_a_measurement_of_nan_is_bridged_then_waited_for(length):
 
 @pytest.mark.medium
 @pytest.mark.parametrize("lost", ["velocity", "position"])
-def test_what_is_left_of_the_measurements_is_enough(lost):
+def test_position_or_velocity_alone_suffices(lost):
     """From 2 s to the end: a position without a velocity, or a velocity without a position."""
 
     def spoil(now, state):
@@ -123,8 +123,8 @@ def test_what_is_left_of_the_measurements_is_enough(lost):
 
 @pytest.mark.medium
 @pytest.mark.parametrize("held", [False, True])
-def test_navigation_at_one_hertz_is_slower_but_keeps_clear(held):
-    """Between two measurements there is nothing, or the last one again."""
+def test_navigation_at_1_hz_is_slower_but_avoids_obstacles(held):
+    """Between two measurements there is NaN, or the last value repeated."""
     last = {}
 
     def spoil(now, state):
@@ -146,7 +146,7 @@ def test_navigation_at_one_hertz_is_slower_but_keeps_clear(held):
 
 
 @pytest.mark.medium
-def test_a_frozen_sensor_is_a_dead_one():
+def test_frozen_sensor_counts_as_failed():
     held = {}
 
     def freeze(now, state):
@@ -161,7 +161,7 @@ def test_a_frozen_sensor_is_a_dead_one():
     assert flight.report("time_since_measurement").max() == pytest.approx(1.0, abs=0.05)
 
 
-def test_a_vehicle_that_is_held_still_to_the_bit_is_believed_in_the_end():
+def test_persistent_identical_measurements_are_eventually_accepted():
     """Such as one on a hook, while by the model the current carries it away."""
     held = {}
 
@@ -177,20 +177,20 @@ def test_a_vehicle_that_is_held_still_to_the_bit_is_believed_in_the_end():
     assert (silence[flight.time > 13.0] == 0.0).any()
 
 
-def test_without_any_measurement_the_thrusters_rest():
+def test_without_measurements_thrusts_are_zero():
     flight = fly([ROCK], duration=5.0, spoil=lambda t, s: NOWHERE)
     assert not flight.forces.any()
 
 
 @pytest.mark.medium
-def test_infinite_and_unnormalized_measurements_are_none():
+def test_infinite_and_unnormalized_measurements_are_ignored():
     bad = VehicleState(np.array([np.inf, 0.0, 0.0]), np.array([5.0, 0.0, 0.0, 0.0]), np.full(6, np.inf), np.ones(8))
     flight = fly([ROCK], spoil=lambda t, s: bad if 2.0 < t < 3.0 else s)
     assert reached(flight) and within_limits(flight) and flight.clearance(ROCK).min() > 0.0
 
 
 @pytest.mark.medium
-def test_a_single_outlier_is_not_believed():
+def test_single_outlier_is_rejected():
     off = np.array([2.0, -1.0, 1.0])
     calm = fly([ROCK])
     flight = fly([ROCK], spoil=lambda t, s: s._replace(position=s.position + off) if abs(t - 4.0) < 0.001 else s)
@@ -199,8 +199,8 @@ def test_a_single_outlier_is_not_believed():
 
 @pytest.mark.medium
 @pytest.mark.parametrize(("weights", "kept"), [((1.0, 0.0), 0), ((0.0, 1.0), 1)])
-def test_of_two_regions_that_exclude_each_other_the_weightier_is_kept(weights, kept):
-    """North of 1 m and south of 0 m at once: the arbiter's weight says which of them yields."""
+def test_of_two_conflicting_regions_the_higher_weight_is_satisfied(weights, kept):
+    """North of 1 m and south of 0 m at once: the arbiter's weight determines which of them yields."""
     south = Region("south", HalfSpace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in")
     north = Region("north", HalfSpace((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)), "in")
     flight = fly([south, north], weights=weights)
@@ -211,7 +211,7 @@ def test_of_two_regions_that_exclude_each_other_the_weightier_is_kept(weights, k
 
 
 @pytest.mark.medium
-def test_with_equal_weights_both_yield_alike():
+def test_equal_weights_share_the_violation():
     south = Region("south", HalfSpace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in")
     north = Region("north", HalfSpace((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)), "in")
     flight = fly([south, north])
@@ -219,7 +219,7 @@ def test_with_equal_weights_both_yield_alike():
 
 
 @pytest.mark.medium
-def test_from_within_an_obstacle_it_leaves_at_once():
+def test_vehicle_leaves_an_obstacle_it_starts_in():
     inside = Region("inside", Sphere((0.0, 0.2, 2.0), 0.8), "out")
     flight = fly([inside])
     clearance = flight.clearance(inside)
@@ -228,7 +228,7 @@ def test_from_within_an_obstacle_it_leaves_at_once():
 
 
 @pytest.mark.medium
-def test_a_goal_that_is_covered_is_waited_for():
+def test_vehicle_waits_for_a_covered_goal():
     cover = Region("cover", Sphere((6.0, 0.0, 2.0), 0.9), "out")
     flight = fly([cover])
     assert flight.clearance(cover).min() > 0.0
@@ -236,21 +236,21 @@ def test_a_goal_that_is_covered_is_waited_for():
 
 
 @pytest.mark.medium
-def test_it_makes_way_for_what_comes_and_returns():
+def test_vehicle_evades_a_moving_obstacle_and_returns():
     comer = Region("comer", Sphere((9.0, 0.0, 2.0), 0.6), "out", velocity=(-0.15, 0.0, 0.0))
     flight = fly([comer], duration=60.0)
     assert flight.clearance(comer).min() > 0.0 and reached(flight)
 
 
 @pytest.mark.medium
-def test_it_follows_a_goal_that_moves():
+def test_moving_goal_is_tracked():
     goal = Region("goal", Sphere((4.0, 0.0, 2.0), 0.5), "in", velocity=(0.1, 0.15, 0.0))
     flight = fly([], goal=goal, duration=40.0)
     assert flight.clearance(goal)[-500:].min() > 0.0
 
 
 @pytest.mark.slow
-def test_a_box_with_one_opening_is_left_through_it():
+def test_vehicle_escapes_a_pocket_through_its_opening():
     """The way straight ahead is a pocket, open behind: a potential alone would stay in it."""
     walls = [
         Region("front", Box((2.0, 0.0, 2.0), (0.2, 3.0, 3.0)), "out"),
@@ -265,7 +265,7 @@ def test_a_box_with_one_opening_is_left_through_it():
 
 
 @pytest.mark.medium
-def test_restoring_force_and_current_are_found():
+def test_restoring_force_and_current_are_estimated():
     flight = fly([], duration=40.0, plant={"buoyancy": 1226.25 - 12.0, "current.x": -0.2, "current.y": 0.15})
     assert reached(flight)
     assert flight.law.estimate[0] == pytest.approx(12.0, abs=0.5)
@@ -282,7 +282,7 @@ def angle_to(flight, feature):
 
 
 @pytest.mark.slow
-def test_the_feature_stays_in_view_on_the_way():
+def test_feature_stays_in_view_along_the_path():
     feature = (4.0, 3.0, 2.0)
     view = Region("view", Visibility(feature, (1.0, 0.0, 0.0), 0.7), "in")
     flight = fly([view], duration=40.0)
@@ -293,7 +293,7 @@ def test_the_feature_stays_in_view_on_the_way():
 
 
 @pytest.mark.medium
-def test_a_soft_view_is_lost_in_passing_alone():
+def test_soft_view_is_violated_only_briefly():
     feature = (4.0, 3.0, 2.0)
     view = Region("view", Visibility(feature, (1.0, 0.0, 0.0), 0.7), "in", hard=False)
     flight = fly([view], duration=40.0)
@@ -302,7 +302,7 @@ def test_a_soft_view_is_lost_in_passing_alone():
 
 
 @pytest.mark.medium
-def test_a_feature_behind_is_turned_to():
+def test_vehicle_turns_to_a_feature_behind():
     view = Region("view", Visibility((-4.0, 0.5, 2.0), (1.0, 0.0, 0.0), 0.5), "in")
     flight = fly([view], duration=40.0)
     assert angle_to(flight, (-4.0, 0.5, 2.0))[-1] < 0.5 and reached(flight)
@@ -318,7 +318,7 @@ def test_an_orientation_region_turns_the_vehicle():
 
 @pytest.mark.medium
 @pytest.mark.parametrize("lost", [2, 6])
-def test_a_lost_thruster_that_is_told_is_not_used(lost):
+def test_reported_failed_thruster_is_not_used(lost):
     def tell(now, state):
         health = np.ones(8)
         health[lost] = 0.0 if 3.0 <= now < 15.0 else 1.0
@@ -334,6 +334,6 @@ def test_a_lost_thruster_that_is_told_is_not_used(lost):
     ("change", "words"),
     [({"speed": 0.0}, "speed"), ({"braking_share": 1.5}, "braking_share"), ({"margin": np.nan}, "margin")],
 )
-def test_gains_that_cannot_be_are_named(change, words):
+def test_invalid_gains_are_rejected_by_name(change, words):
     with pytest.raises(LawError, match=f"law.gains.{words}"):
         LAWS["deployable"].for_vehicle(vehicle_model(ODIN), DeployableGains(**change), LEVEL, PERIOD, 0)

@@ -1,4 +1,4 @@
-"""The deployable law against what nobody should give it, and against places that are hard to get through."""
+"""The deployable law with invalid inputs, and in geometrically difficult scenes."""
 
 from typing import NamedTuple
 
@@ -102,7 +102,7 @@ spoilt = st.builds(Spoilt, st.integers(0, 4), st.integers(0, 99), st.sampled_fro
     goal=st.tuples(st.sampled_from(PLACES), st.booleans()),
     steps=st.lists(st.lists(spoilt, max_size=3), min_size=1, max_size=12),
 )
-def test_whatever_comes_forces_are_finite_and_within_limits_and_it_recovers(shapes, goal, steps):
+def test_forces_stay_bounded_under_any_input_and_recover(shapes, goal, steps):
     regions = [Region(str(i), s, "in" if within else "out", hard=hard) for i, (s, within, hard) in enumerate(shapes)]
     law, packed, forces = law_for(len(regions)), pack(regions), np.zeros(8)
     packed_goal = pack([Region("goal", goal[0], "in" if goal[1] else "out")])
@@ -115,7 +115,7 @@ def test_whatever_comes_forces_are_finite_and_within_limits_and_it_recovers(shap
         assert_sound(law, forces)
 
 
-def test_it_believes_again_after_a_first_measurement_that_was_false():
+def test_estimate_recovers_from_a_false_first_measurement():
     """Led away by a false start, the estimate would be no number for ever: it begins anew instead."""
     law, goal, forces = law_for(0, 0.1), pack([Region("goal", Sphere((3.0, 0.0, 2.0), 0.5), "in")]), np.zeros(8)
     far = VehicleState(np.full(3, 9e5), LEVEL, np.array([90.0, -90.0, 90.0, 30.0, 30.0, -30.0]), np.ones(8))
@@ -129,7 +129,7 @@ def test_it_believes_again_after_a_first_measurement_that_was_false():
     assert forces.any()
 
 
-def test_hundreds_of_regions_are_a_step_like_any_other():
+def test_hundreds_of_regions_give_bounded_forces():
     rng = np.random.default_rng(3)
     regions = [
         Region(str(i), Sphere(tuple(HERE + rng.normal(size=3) * 2.0), 0.4), "out", velocity=tuple(rng.normal(size=3)))
@@ -143,7 +143,7 @@ def test_hundreds_of_regions_are_a_step_like_any_other():
         assert_sound(law, forces)
 
 
-def test_a_lone_false_rate_teaches_no_moment():
+def test_single_false_rate_does_not_change_the_moment_estimate():
     law, goal, forces = law_for(0), pack([Region("goal", Sphere((0.0, 0.0, 2.0), 0.5), "in")]), np.zeros(8)
     for k in range(50):
         rates = np.array([0.0, 0.0, 0.0, 60.0, -60.0, 60.0]) if k == 30 else np.zeros(6)
@@ -168,7 +168,7 @@ CAGES = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CAGES)
-def test_it_stops_before_the_end_of_what_it_shall_stay_within(name):
+def test_vehicle_stops_inside_a_keep_in_region(name):
     """The goal lies beyond; on the way there the nearest face is one alongside, not the one ahead."""
     shape, start, goal = CAGES[name]
     cage = Region("cage", shape, "in")
@@ -182,7 +182,7 @@ def wall(x, y, z, size):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [0.6, 0.3])
-def test_a_door_that_is_the_only_way_is_found_and_passed(width):
+def test_vehicle_passes_through_the_only_opening(width):
     beside, above = 3.0 + width / 2, (0.2, width + 0.01, 6.0)
     walls = [wall(4.0, side * beside, 2.0, (0.2, 6.0, 8.0)) for side in (-1, 1)]
     walls += [wall(4.0, 0.0, 2.0 + side * beside, above) for side in (-1, 1)]
@@ -202,7 +202,7 @@ def test_a_door_that_is_the_only_way_is_found_and_passed(width):
         (Box((0, 0, 0), (80, 2, 2)), (0, 0.9, 0), (0, -1, 0), (1, 0, 0), np.inf, None),
     ],
 )
-def test_the_face_ahead_is_found(shape, at, nearest, velocity, distance, face):
+def test_face_ahead_is_located(shape, at, nearest, velocity, distance, face):
     found, packed = np.empty(3), pack([Region("cage", shape, "in")])
     plane = face_ahead(packed, 0, np.array(at, float), np.array(nearest, float), np.array(velocity, float), 6.0, found)
     assert plane == pytest.approx(distance, abs=1e-12)
@@ -210,8 +210,8 @@ def test_the_face_ahead_is_found(shape, at, nearest, velocity, distance, face):
         assert found == pytest.approx(np.array(face, float), abs=1e-12)
 
 
-def test_a_slope_turns_by_the_motion_against_the_region():
-    """Side by side with a ball that moves along, nothing turns; against finite differences where it does."""
+def test_gradient_rate_follows_relative_motion():
+    """The rate is zero beside a ball of equal velocity, and matches finite differences otherwise."""
     for own in ((0.0, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, -0.1, 0.05)):
         packed = pack([Region("ball", Sphere((2.0, 0.0, 2.0), 0.5), "out", velocity=own)])
         velocity, sight, n, later = (
@@ -230,7 +230,7 @@ def test_a_slope_turns_by_the_motion_against_the_region():
         assert gradient_rate(Sphere.kind, -1.0, n, later, relative) == pytest.approx(truth, abs=0.003)
 
 
-def test_no_turn_is_seen_where_another_face_becomes_the_nearest():
+def test_gradient_rate_is_zero_at_a_face_switch():
     """In the middle between two walls the slope leaps to the opposite, which is no acceleration."""
     one, other = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
     for kind in (Box.kind, DepthBand.kind, Cylinder.kind, Sphere.kind):
@@ -246,8 +246,8 @@ def test_no_turn_is_seen_where_another_face_becomes_the_nearest():
     ],
     ids=["a feature right behind", "an attitude half a turn away"],
 )
-def test_half_a_turn_away_it_turns_one_way_round(region):
-    """There the slope is zero: nothing would say which way to turn."""
+def test_vehicle_turns_from_an_attitude_half_a_turn_away(region):
+    """The gradient is zero there, and gives no direction to turn."""
     flight = fly([region], Region("goal", Sphere((0.0, 0.0, 2.0), 0.5), "in"), duration=20.0)
     north = 1.0 - 2.0 * (flight.quaternion[:, 2] ** 2 + flight.quaternion[:, 3] ** 2)  # of the body's x axis
     assert north[0] > 0.99 and north[-1] < -np.cos(0.4)
@@ -255,7 +255,7 @@ def test_half_a_turn_away_it_turns_one_way_round(region):
 
 
 @pytest.mark.slow
-def test_smoothing_halves_what_noise_makes_of_the_thrust():
+def test_smoothing_halves_noise_induced_thrust_variation():
     rng = np.random.default_rng(8)
     noise = rng.normal(size=(1000, 2, 3)) * np.array([[0.02], [0.01]])
 

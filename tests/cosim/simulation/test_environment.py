@@ -1,4 +1,4 @@
-"""Regions that move: by their velocity, or from outside."""
+"""Regions that move by their velocity or by external updates."""
 
 import numpy as np
 import pytest
@@ -46,7 +46,7 @@ def test_a_region_at_rest_has_no_shift():
 
 
 class Leader:
-    """Moves a region along a circle, by what it is told of the time."""
+    """Move a region along a circle by the given time."""
 
     def __init__(self, master, name):
         self.master, self.name = master, name
@@ -65,14 +65,14 @@ class Leader:
 
 
 @pytest.mark.parametrize("name", ["goal", "SR2"])
-def test_a_streamed_region_is_where_it_is_said_to_be(name):
+def test_streamed_region_is_at_its_streamed_position(name):
     key = "goal.streamed=true" if name == "goal" else "regions.SR2.streamed=true"
     kept = run(key, observer=lambda master: Leader(master, name))
     assert shift(kept, name) == pytest.approx(np.array([Leader.place(t) for t in kept["time"]]), abs=1e-12)
 
 
-def test_between_words_from_outside_it_goes_on():
-    """Before the run, with a velocity: from then on that is its motion; the law is told of it."""
+def test_streamed_region_extrapolates_its_velocity():
+    """Before the run, with a velocity: from then on that is its motion, which the law receives."""
     told = []
     kept = run(
         "regions.SR2.streamed=true",
@@ -92,13 +92,13 @@ def test_between_words_from_outside_it_goes_on():
         ("SR2", [0, 0, 0], [0, np.nan, 0], "three finite numbers"),
     ],
 )
-def test_faults_are_named(name, to, velocity, words):
+def test_invalid_region_moves_are_rejected_by_name(name, to, velocity, words):
     streamed = ["goal.streamed=true", "regions.SR2.streamed=true", "regions.SR1.velocity=[1,0,0]"]
     with Master(load_scenario("paper", [*SHORT, *streamed])) as master, pytest.raises(RunError, match=words):
         master.move_region(name, to, velocity)
 
 
-def test_doubt_about_positions_adds_to_that_of_each_place():
+def test_position_uncertainty_adds_in_quadrature():
     environment = RegionEnvironment(load_scenario("pipe-inspection"))
     environment._deviations[1] = 0.3
     environment.doubt_positions(0.4)

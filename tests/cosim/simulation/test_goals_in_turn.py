@@ -1,4 +1,4 @@
-"""A goal that goes on to other places: when it does, what counts as reached, and the fused loop to the last bit."""
+"""Successive goals: when they advance, when they count as reached, and the fused loop bit for bit."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def run(tmp_path_factory):
 
 
 @pytest.mark.medium
-def test_the_goal_goes_on_when_the_vehicle_has_stayed_in_it(run):
+def test_goal_advances_after_the_stay_time(run):
     record = load_record(run.folder)
     place = np.rint(record["goal.place"]).astype(int)
     position = np.column_stack([record[f"position.{axis}"] for axis in "xyz"])
@@ -38,14 +38,14 @@ def test_the_goal_goes_on_when_the_vehicle_has_stayed_in_it(run):
     assert place[-1] == 2
 
 
-def test_the_last_place_alone_counts_as_reached(run):
+def test_only_the_last_goal_counts_as_reached(run):
     record = load_record(run.folder)
     within = (record["goal.place"] == 2.0) & (record["goal.clearance"] >= 0.0)
     assert run.summary["reached"] and run.summary["reach_time"] == record["time"][np.argmax(within)]
     assert run.summary["closest_to_goal"] == -record["goal.clearance"][record["goal.place"] == 2.0].max()
 
 
-def test_the_fused_loop_flies_it_as_the_master_does(run):
+def test_fused_loop_equals_the_master(run):
     for duration in (40.0, 6.0):  # 6 s end at the second place
         scenario = load_scenario("paper", [*TOUR, f"time.duration={duration}", "arbiter.engine=closed"])
         with FusedFlyer(Variation(scenario, [])) as flyer:
@@ -62,7 +62,7 @@ def test_the_fused_loop_flies_it_as_the_master_does(run):
 
 @pytest.mark.medium
 @pytest.mark.parametrize("net_weight", [-50.0, 0.0, 50.0])
-def test_a_soft_region_keeps_no_light_vehicle_out_of_a_goal_that_lies_in_it(net_weight):
+def test_soft_region_does_not_block_a_goal_inside_it(net_weight):
     """The top of the goal is 0.6 m deep in a soft region, whose push there is more than what brings the vehicle on."""
     shape = "{type='half_space', point=[0.0, 0.0, 3.3], normal=[0.0, 0.0, 1.0]}"
     changes = [
@@ -87,6 +87,6 @@ def test_a_soft_region_keeps_no_light_vehicle_out_of_a_goal_that_lies_in_it(net_
         ("commands.enabled=true", "commands.enabled is true"),
     ],
 )
-def test_what_cannot_be_beside_it_is_refused_by_name(change, words):
+def test_incompatible_keys_are_rejected_by_name(change, words):
     with pytest.raises(ScenarioError, match=words.replace(".", r"\.")):
         load_scenario("paper", [*TOUR, change])

@@ -1,4 +1,4 @@
-"""Regions that are hard to keep and ways that are hard to find: those of a list, and families drawn at random."""
+"""Difficult regions and paths: regression scenes, and randomly drawn families."""
 
 import functools
 from pathlib import Path
@@ -184,7 +184,7 @@ FAMILIES = {"pocket": pocket, "bent pipe": bent_pipe, "rocks": rocks} | {
 
 @pytest.fixture
 def flown(tmp_path):
-    """Return what flies a scenario's text, or its file, and gives the outcome."""
+    """Return a function that runs a scenario's text or file and returns the outcome."""
 
     def fly(scenario):
         file = scenario
@@ -203,7 +203,7 @@ def flown(tmp_path):
     ("name", "reached"),
     [("ellipsoid", False), ("bluerov2-box-corner", False), ("wall", True), ("transit60-slab4", True)],
 )
-def test_what_once_broke_the_law_is_kept(flown, name, reached):
+def test_regression_scenes_keep_hard_regions(flown, name, reached):
     outcome = flown(DATA / f"{name}.toml")
     assert outcome["min_clearance"] > 0.0 and bool(outcome["settled"]) == reached
 
@@ -212,7 +212,7 @@ def test_what_once_broke_the_law_is_kept(flown, name, reached):
 @pytest.mark.parametrize("vehicle", VEHICLES)
 @pytest.mark.parametrize("kind", ["ellipsoid", "sphere", "box", "cylinder", "cone"])
 @pytest.mark.parametrize("seeds", [range(1), pytest.param(range(1, 60), marks=pytest.mark.slow)], ids=["few", "many"])
-def test_a_room_is_kept_wherever_its_goal_lies(flown, kind, vehicle, seeds):
+def test_keep_in_region_is_satisfied_for_any_goal(flown, kind, vehicle, seeds):
     left = [seed for seed in seeds if not flown(kept_in(kind, vehicle, seed))["min_clearance"] > 0.0]
     assert left == []
 
@@ -221,7 +221,7 @@ def test_a_room_is_kept_wherever_its_goal_lies(flown, kind, vehicle, seeds):
 @pytest.mark.parametrize("vehicle", VEHICLES)
 @pytest.mark.parametrize("kind", FAMILIES)
 @pytest.mark.parametrize("seeds", [range(1), pytest.param(range(1, 40), marks=pytest.mark.slow)], ids=["few", "many"])
-def test_a_way_round_is_found(flown, kind, vehicle, seeds):
+def test_path_around_obstacles_is_found(flown, kind, vehicle, seeds):
     for seed in seeds:
         outcome = flown(FAMILIES[kind](vehicle, seed))
         assert outcome["settled"] and outcome["min_clearance"] > 0.0, seed

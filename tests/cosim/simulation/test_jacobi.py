@@ -1,4 +1,4 @@
-"""The order of a step: Jacobi's is that of masters that exchange all values at once."""
+"""The order of a step: Jacobi is that of masters that exchange all values at once."""
 
 from pathlib import Path
 
@@ -34,7 +34,7 @@ def rows_of(scenario):
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("scenario", [("paper", SHORT), (ALL_SHAPES, [])], ids=["paper", "all shapes"])
-def test_jacobi_is_three_parts_that_exchange_at_the_end_of_each_step(scenario):
+def test_jacobi_exchanges_values_at_the_end_of_each_step(scenario):
     name, settings = scenario
     loaded = load_scenario(name, [*settings, "master.order=jacobi"])
     rows, signals = rows_of(loaded)
@@ -44,7 +44,7 @@ def test_jacobi_is_three_parts_that_exchange_at_the_end_of_each_step(scenario):
     assert rows[:, at : at + 3].max() > 0.5
 
 
-def test_the_commands_come_together_as_the_step_gets_shorter():
+def test_jacobi_and_gauss_seidel_converge_with_the_step():
     def apart(step):
         given = [*SHORT[:2], *(f"time.{key}={step}" for key in ("step", "control", "arbiter")), SHORT[-1]]
         ends = []

@@ -1,4 +1,4 @@
-"""V and its rate in the record of a run, and what summary and report say of them."""
+"""V and its rate in the record, the summary and the report of a run."""
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def test_v_of_the_paper_falls_below_zero_without_a_limit():
 
 
 def test_first_value_is_that_of_the_start():
-    """13 f^2 of (32), and Gamma on the restoring parameters: nothing moves yet, the attitude is the desired one."""
+    """13 f^2 of (32), and Gamma on the restoring parameters: the vehicle is at rest in the desired attitude."""
     kept = run("time.duration=0.01", *ALONE)
     phi = load_scenario("paper").true_restoring_parameters
     f = 8.0**2 + 4.0**2 - 0.5**2
@@ -78,7 +78,7 @@ def test_rate_is_that_of_v_up_to_the_sampling():
 
 
 @pytest.mark.medium
-def test_rate_is_not_that_of_v_where_the_theory_does_not_reach():
+def test_rate_differs_from_v_outside_the_theory():
     """A limit on the force; weights that change (d alpha/dt neglected); gradients that are not 1 (as printed)."""
     strong = ("regions.SR1.gain=1e5", "regions.SR2.gain=1e5", "time.duration=0.3")
     assert defect(run("time.duration=1.0", *ALONE, "limit.force=108"), "normalized", 1e-3) > 0.3
@@ -89,13 +89,13 @@ def test_rate_is_not_that_of_v_where_the_theory_does_not_reach():
     assert defect(changing, "printed", 1e-3) > 0.05
 
 
-def test_nothing_is_recorded_unless_asked_for():
+def test_lyapunov_columns_exist_only_if_requested():
     with Master(load_scenario("paper", ["arbiter.engine=closed"])) as master:
         assert not [c.name for c in master.signals.columns if c.name.startswith("lyapunov")]
 
 
 @pytest.mark.medium
-def test_recording_changes_nothing_else(shipped_run):
+def test_recording_lyapunov_changes_no_other_column(shipped_run):
     short = ("arbiter.engine=closed", "time.duration=1")
     without, with_v = (load_record(shipped_run("paper", *short, *more).folder) for more in ((), QUICK[1:]))
     assert set(with_v.units) - set(without.units) == {f"lyapunov.{name}" for name in (*FORMS, "rate")}
@@ -103,7 +103,7 @@ def test_recording_changes_nothing_else(shipped_run):
         assert np.array_equal(without[name], with_v[name]), name
 
 
-def test_summary_counts_rises():
+def test_summary_counts_increases_of_v():
     signals = {"time": np.arange(6) * 0.5, "lyapunov.rate": np.zeros(6)}
     signals |= {
         "lyapunov.printed": np.array([5.0, 4.0, 4.0, 4.5, 4.6, 1.0]),
@@ -124,7 +124,7 @@ def test_summary_counts_rises():
 
 
 @pytest.mark.slow
-def test_report_draws_v(tmp_path):
+def test_report_plots_the_lyapunov_function(tmp_path):
     scenario = load_scenario("paper", [*QUICK, "time.duration=0.4"])
     done = run_scenario(scenario, tmp_path / "run")
     assert done.summary["lyapunov"]["primary"]["first_negative"] == pytest.approx(0.03, abs=0.002)
@@ -154,7 +154,7 @@ LOOKING = (
     ],
     ids=["another law", "a region of attitude"],
 )
-def test_v_is_refused_where_it_is_not_defined(overrides, words):
+def test_undefined_lyapunov_function_is_rejected(overrides, words):
     with pytest.raises(ScenarioError, match=words):
         load_scenario("paper", [*QUICK, *overrides])
 

@@ -1,4 +1,4 @@
-"""The stepping: order, periods, actuation, and what observers see."""
+"""Stepping: order, periods, actuation, and observers."""
 
 import time
 
@@ -68,7 +68,7 @@ def test_estimate_moves_once_a_control_period():
 
 
 @pytest.mark.parametrize("limits", ["direction", "per-thruster"])
-def test_thrusters_carry_the_wrench(limits):
+def test_thruster_forces_realize_the_wrench(limits):
     kept = run("paper", "actuation.through=thrusters", f"actuation.limits={limits}")
     thrusts = np.array([kept[f"thrust[{i + 1}]"] for i in range(8)])[:, :-1]
     assert np.abs(thrusts).max() == pytest.approx(27.0)
@@ -79,13 +79,13 @@ def test_thrusters_carry_the_wrench(limits):
     assert np.allclose(x, z, rtol=1e-9) == (limits == "direction")
 
 
-def test_membership_of_a_criterion_is_that_of_its_most_pressing_region():
+def test_criterion_membership_is_that_of_its_most_critical_region():
     kept = run("paper", "regions.SR2.criterion=obstacle")
     clearance = np.minimum(kept["SR1.clearance"], kept["SR2.clearance"])
     assert kept["membership.obstacle"] == pytest.approx(np.clip(1.0 - clearance / 0.2, 0.0, 1.0), abs=1e-12)
 
 
-def test_no_regions_is_a_scene_too():
+def test_empty_scene_is_valid():
     kept = run("paper", "regions=[]", "intersection=[]")
     assert not kept["weight.obstacle"].any()
 
@@ -105,12 +105,12 @@ def test_current_and_parameters_reach_the_plant():
         ("initial.position=[1e9,0,0]", "position.x"),
     ],
 )
-def test_what_the_fmu_refuses_is_told(override, words):
+def test_fmu_rejection_is_reported(override, words):
     with pytest.raises(Exception, match=words):
         Master(load_scenario("paper", [override]))
 
 
-def test_a_failing_step_says_when():
+def test_step_error_names_its_time():
     with (
         Master(load_scenario("paper", [*SHORT, "law.gains.k_p1=1e9"])) as master,
         pytest.raises(PlantError, match=r"t = 0 s: wrench"),
@@ -119,7 +119,7 @@ def test_a_failing_step_says_when():
 
 
 @pytest.mark.slow
-def test_many_masters_leave_nothing_behind(tmp_path, monkeypatch):
+def test_closed_masters_leave_no_temporary_files(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     for _ in range(20):
         with Master(load_scenario("paper", [*SHORT, "time.duration=0.005"])) as master:
@@ -128,7 +128,7 @@ def test_many_masters_leave_nothing_behind(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_stall_is_not_made_up_for_in_a_rush():
+def test_paced_run_does_not_catch_up_after_a_stall():
     walls = []
 
     class Stalling:

@@ -1,4 +1,4 @@
-"""Memberships of criteria against the same in NumPy, and against the terms themselves."""
+"""Memberships of criteria against NumPy and against their terms."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def memberships_of(clearances, criteria, width, setups=PAPER, times=(), shape=BA
 
 
 @given(arrays(np.float64, 5, elements=lengths), arrays(np.int64, 5, elements=st.integers(0, 2)), st.floats(1e-3, 1.0))
-def test_a_criterion_asks_as_its_most_pressing_region_does(clearances, criteria, width):
+def test_criterion_membership_is_that_of_its_most_critical_region(clearances, criteria, width):
     found = memberships_of(clearances, [NAMES[i] for i in criteria], width)
     for criterion, membership in enumerate(found):
         mine = clearances[(criteria == criterion) & ~np.isnan(clearances)]
@@ -43,11 +43,11 @@ def test_a_criterion_asks_as_its_most_pressing_region_does(clearances, criteria,
         assert membership == pytest.approx(expected, abs=1e-15)
 
 
-def test_a_crisp_membership_is_one_up_to_the_surface():
+def test_crisp_membership_is_one_inside_the_region():
     assert memberships_of([0.0, 1e-300, -1.0], NAMES, 0.0).tolist() == [1.0, 0.0, 1.0]
 
 
-def test_without_regions_nothing_asks():
+def test_without_regions_memberships_are_zero():
     assert not memberships_of([], [], 0.2).any()
 
 
@@ -55,7 +55,7 @@ POINTS = st.lists(st.floats(-3.0, 3.0), min_size=2, max_size=6, unique=True).map
 
 
 @given(POINTS, st.data())
-def test_a_term_over_clearance_or_time_is_the_term_itself(places, data):
+def test_membership_term_equals_its_curve(places, data):
     degrees = data.draw(st.lists(st.floats(0.0, 1.0), min_size=len(places), max_size=len(places)))
     if len(set(degrees)) == 1 or min(np.diff(places)) < 1e-9:
         return
@@ -73,7 +73,7 @@ def test_a_term_over_clearance_or_time_is_the_term_itself(places, data):
     assert found == pytest.approx(np.interp(samples, places, degrees), abs=1e-12)
 
 
-def test_the_strongest_reason_counts_each_of_regions_in_its_unit():
+def test_criterion_membership_is_the_maximum_over_its_terms():
     membership = {
         "clearance": {"falling": [0.0, 1.0]},
         "angle": {"falling": [0.0, 0.1]},
@@ -87,7 +87,7 @@ def test_the_strongest_reason_counts_each_of_regions_in_its_unit():
     assert memberships_of([0.05], ["view"], 0.2, setups, [np.inf], shape=level).tolist() == [0.5]
 
 
-def test_criteria_without_a_reason_follow_the_ramp_of_the_arbiter_and_others_do_not():
+def test_criteria_without_membership_use_the_arbiter_ramp():
     _, setups = check_criteria((CriterionEntry("a"), CriterionEntry("b", membership={"ramp": 0.4})))
     assert memberships_of([0.1, 0.1], ["a", "b"], 0.2, setups).tolist() == [0.5, 0.75]
     assert pack_memberships(regions(["a", "b"]), setups, 0.2).follows.tolist() == [True, False]
@@ -123,7 +123,7 @@ def curved(term):
     return setups
 
 
-def test_every_curve_is_tried():
+def test_every_curve_has_a_case():
     assert set(CURVES) == set(KINDS) - {"singleton"}  # which jumps
 
 
@@ -132,7 +132,7 @@ def test_every_curve_is_tried():
     "term", [*({kind: numbers} for kind, numbers in CURVES.items()), {"gaussian": [0.2, 0.5], "height": 0.7}], ids=str
 )
 @pytest.mark.parametrize("compiled", [False, True])
-def test_a_curve_over_clearance_is_the_curve_itself(term, compiled):
+def test_membership_curve_equals_its_definition(term, compiled):
     """By the translated C, too; powers by NumPy's or C's own routine are off by a unit of the last place or two."""
     kind, numbers = next(iter(term.items()))
     curve = Curve(kind, tuple(map(float, numbers)), term.get("height", 1.0))
@@ -148,7 +148,7 @@ def test_a_curve_over_clearance_is_the_curve_itself(term, compiled):
 
 @pytest.mark.parametrize("text", FORMULAS)
 @pytest.mark.parametrize("compiled", [False, True])
-def test_a_formula_over_clearance_is_the_formula_itself(text, compiled):
+def test_membership_formula_equals_its_expression(text, compiled):
     packed = pack_memberships(regions(["near"]), curved({"formula": text}), 0.2)
     compute = CompiledFunction(compute_memberships) if compiled else compute_memberships
     found, x = np.zeros(1), np.zeros(1)
@@ -161,7 +161,7 @@ def test_a_formula_over_clearance_is_the_formula_itself(text, compiled):
 @pytest.mark.parametrize(
     ("a", "b"), [(0.0, -1.0), (-2.0, 0.5), (-2.0, 3.0), (1e200, 2.0), (-1e200, 3.0), (1e-200, -2.0), (np.inf, -1.0)]
 )
-def test_where_python_raises_powers_and_quotients_are_those_of_numpy(a, b):
+def test_division_and_power_errors_follow_numpy(a, b):
     with np.errstate(all="ignore"):
         np.testing.assert_equal(_power(a, b), float(np.power(np.float64(a), b)))
         np.testing.assert_equal(_quotient(a, 0.0), float(np.divide(a, 0.0)))
@@ -184,12 +184,12 @@ def test_where_python_raises_powers_and_quotients_are_those_of_numpy(a, b):
         ),
     ],
 )
-def test_what_is_no_curve_is_refused(term, fault):
+def test_invalid_curves_are_rejected(term, fault):
     with pytest.raises(ScenarioError, match=f"^criteria.near.membership.{fault}"):
         curved(term)
 
 
-def test_reasons_are_said_in_words():
+def test_membership_terms_have_text_descriptions():
     says = {
         "gaussian of mean 0.2, deviation 0.5, height 0.7, in m": {"gaussian": [0.2, 0.5], "height": 0.7},
         "exp(-abs(x)), with x in m": {"formula": "exp(-abs(x))"},

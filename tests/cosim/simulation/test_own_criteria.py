@@ -1,4 +1,4 @@
-"""Runs with criteria and rules of one's own: against independent computation, and in the fused loop to the last bit."""
+"""Runs with custom criteria and rules, against independent computation and the fused loop bit for bit."""
 
 import functools
 
@@ -104,7 +104,7 @@ def assert_same_to_the_last_bit(scenario):
     return run
 
 
-def test_noise_reaches_the_weights_only_as_far_as_it_moves_the_laws_estimate():
+def test_weights_use_the_laws_estimate_under_noise():
     scenario, degrees = load_scenario(FOUR, [*NOISY, "initial.position=[2.0, 1.4, 5.45]", "time.duration=3.0"]), []
     with Master(scenario) as master:
         depth = master.signals.index("membership.depth")
@@ -120,11 +120,11 @@ def test_noise_reaches_the_weights_only_as_far_as_it_moves_the_laws_estimate():
     assert by_estimate - of_truth < 0.25 * (by_measurement - of_truth)
 
 
-def test_the_fused_loop_flies_four_criteria_as_the_master_does():
+def test_fused_loop_with_four_criteria_equals_the_master():
     assert_same_to_the_last_bit(load_scenario(FOUR, ["time.duration=14.0", *NOISY]))
 
 
-def test_the_fused_loop_flies_curves_as_the_master_does():
+def test_fused_loop_with_curves_equals_the_master():
     changes = [
         "criteria.obstacle.membership={ramp=0.3,approach_time={sigmoid=[2.0,-3.0]}}",
         "criteria.shape.membership={clearance={gaussian=[0.0,0.3]}}",
@@ -141,24 +141,24 @@ def test_the_fused_loop_flies_curves_as_the_master_does():
     assert np.ptp(run["membership.obstacle"]) > 0.5
 
 
-def test_the_fused_loop_flies_rules_of_a_file_as_the_master_does(own):
+def test_fused_loop_with_an_arbiter_file_equals_the_master(own):
     changes = ["initial.position=[6.5, 0.0, 4.2]", "time.duration=6.0", "arbiter.inputs.charge=[[1, 1], [4, 0.1]]"]
     assert_same_to_the_last_bit(load_scenario(own, changes))
 
 
-def test_the_fused_loop_sweeps_centroids_as_the_master_does(swept):
+def test_fused_loop_with_exact_centroids_equals_the_master(swept):
     changes = ["initial.position=[6.5, 0.0, 4.2]", "time.duration=6.0"]
     assert_same_to_the_last_bit(load_scenario(swept, changes))
 
 
-def test_the_fused_loop_through_sensors_is_the_same(own):
+def test_fused_loop_with_sensors_equals_the_master(own):
     changes = ["initial.position=[6.5, 0.0, 4.2]", "time.duration=20.0", "sensing.through=sensors"]
     assert_same_to_the_last_bit(
         load_scenario(own, [*changes, *(f"sensing.{key}=0.0" for key in ("position_noise", "velocity_noise"))])
     )
 
 
-def test_the_record_has_what_the_rules_got(own, tmp_path):
+def test_record_holds_the_arbiter_inputs(own, tmp_path):
     scenario = load_scenario(
         own,
         [
@@ -180,7 +180,7 @@ def test_the_record_has_what_the_rules_got(own, tmp_path):
     assert (again.folder / "record.parquet").read_bytes() == (tmp_path / "run" / "record.parquet").read_bytes()
 
 
-def test_lanes_refuse_what_they_have_not(own):
+def test_lanes_reject_custom_criteria_and_arbiter_files(own):
     for scenario, words in (
         (load_scenario(FOUR, ["law.name=ismail_dunnigan"]), "criteria is"),
         (load_scenario(own, ["law.name=ismail_dunnigan"]), "arbiter.file is 'mine.toml'"),
@@ -189,20 +189,20 @@ def test_lanes_refuse_what_they_have_not(own):
             LanesFlyer(Variation(scenario, ()))
 
 
-def test_a_sampling_engine_is_refused_by_the_fused_loop(own):
+def test_fused_loop_rejects_sampling_engines(own):
     with pytest.raises(RunError, match=r"arbiter.engine is 'grid', expected 'closed'"):
         FusedFlyer(Variation(load_scenario(own, ["arbiter.engine=grid"]), ()))
 
 
-def test_visibility_changes_what_the_vehicle_does():
-    """With it the joint comes into view within six seconds, without its pull not at all."""
+def test_visibility_criterion_changes_the_motion():
+    """With the criterion the joint enters the view within six seconds, without its gain never."""
     seen = flown("time.duration=14.0")
     assert (seen["view.clearance"][600:] > 0.0).all()
     assert (Rows(load_scenario(FOUR, ["time.duration=14.0", "regions.view.gain=0"]))["view.clearance"] < -0.4).all()
 
 
 @pytest.mark.slow
-def test_its_place_among_the_criteria_changes_what_the_vehicle_does():
+def test_visibility_priority_changes_the_motion():
     """First instead of last, it holds the view where the risers press, and enters them deeper."""
     last, first = flown(), flown("criteria.visibility.order=0")
     assert (last["view.clearance"] > 0.0).mean() > 0.55

@@ -1,4 +1,4 @@
-"""What law and arbiter are told, and what they are not."""
+"""Information that reaches law and arbiter, and information that is withheld."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -85,7 +85,7 @@ def same(one, other):
 
 @pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("untold", [*([key] for key in UNTOLD), UNTOLD], ids=[*UNTOLD, "all"])
-def test_what_the_law_is_not_told_leaves_its_arguments_alone(spy, untold):
+def test_undisclosed_conditions_do_not_change_law_inputs(spy, untold):
     """Construction and first step have the same arguments bit for bit; the last step, in another place, has not."""
     (plain, _), (changed, _) = spy(*NOISY), spy(*NOISY, *untold)
     assert len(plain.built) == len(changed.built) == 3
@@ -96,7 +96,7 @@ def test_what_the_law_is_not_told_leaves_its_arguments_alone(spy, untold):
 
 @pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("told", ["regions.SR1.shape.radius=0.6", "goal.velocity=[0.1,0,0]", "sensing.seed=8"])
-def test_the_first_step_sees_what_it_is_told(spy, told):
+def test_disclosed_conditions_change_law_inputs(spy, told):
     """Keep the test above from passing by blindness."""
     assert not same(spy(*NOISY)[0].steps[0], spy(*NOISY, told)[0].steps[0])
 
@@ -105,15 +105,15 @@ def test_the_law_is_built_for_the_vehicle(spy):
     assert not same(spy()[0].built[-1], spy("vehicle=bluerov2_heavy")[0].built[-1])
 
 
-def test_a_failed_thruster_gives_nothing_from_its_time_on():
+def test_failed_thruster_gives_zero_after_its_failure_time():
     kept = run("failures=[{thruster=3,time=1.0}]")
     given, asked = kept["thruster_force[3]"][:-1], kept["thrust[3]"][:-1]
     assert np.abs(given[:100]).min() > 0.0
     assert not given[100:].any()
-    assert np.abs(asked[100:]).max() > 1.0  # and nobody has told the law
+    assert np.abs(asked[100:]).max() > 1.0  # and the failure is not reported to the law
 
 
-def test_a_failure_that_is_told_reaches_law_and_allocation(spy):
+def test_reported_failure_reaches_law_and_allocation(spy):
     given, kept = spy("failures=[{thruster=3,time=1.0}]", "tell_failures=true", "law.gains.k_p1=0.01")
     health = [arguments[3] for arguments in given.steps]
     assert all(h.all() for h in health[:100])
@@ -148,7 +148,7 @@ def test_noise_is_white_of_the_stated_size_and_held_for_a_control_period():
     )
 
 
-def test_the_seed_alone_decides_the_noise():
+def test_noise_depends_only_on_the_seed():
     def noise(*keys):
         kept = run(*NOISY, *keys)
         return stack(kept, *SENSED) - stack(kept, *TRUE)
@@ -157,8 +157,8 @@ def test_the_seed_alone_decides_the_noise():
     assert np.abs(noise() - noise("sensing.seed=8")).max() > 0.01
 
 
-def test_arbiter_goes_by_what_is_told_and_the_record_by_the_truth():
-    """Far noise: the told position is metres off, so that the memberships are those of no true place."""
+def test_arbiter_uses_measurements_and_record_holds_true_clearances():
+    """Large noise: the measured position is metres off, so that memberships differ from the true ones."""
     kept = run("sensing.position_noise=3.0", "law.gains.k_p1=0.001", "arbiter.ramp=1.0")
     p, told = stack(kept, *TRUE[:3]), stack(kept, *SENSED[:3])
     centre = np.array([2.0, 0.0, 1.8])
@@ -169,7 +169,7 @@ def test_arbiter_goes_by_what_is_told_and_the_record_by_the_truth():
 
 
 class Still(IsmailDunniganLaw):
-    """Asks for nothing, whatever it is told."""
+    """Command zero for any input."""
 
     def step(self, state, goal, regions, weights, forces):
         self.told.append((state.position.copy(), state.velocity_body.copy()))
@@ -183,7 +183,7 @@ def still(monkeypatch):
     return Still.told
 
 
-def test_a_dead_sensor_says_nothing_and_holds_the_weights(still):
+def test_sensor_outage_gives_nan_and_holds_the_weights(still):
     kept = run(*DEAD, "initial.velocity=[1.0,0,0,0,0,0]", "regions.SR3.shape.tolerance=0.1", "arbiter.ramp=2.0")
     lost = np.isnan(stack(kept, *SENSED))
     time = kept["time"]
@@ -208,7 +208,7 @@ def test_a_frozen_sensor_repeats_its_last_values(still):
     assert np.abs(sensed[80] - sensed[79])[0] > 0.05
 
 
-def test_a_sensor_frozen_from_the_start_has_the_first_values(still):
+def test_sensor_frozen_from_the_start_holds_initial_values(still):
     kept = run(
         "sensing.dead_from=0.0", "sensing.dead_for=0.3", "sensing.frozen=true", "initial.velocity=[1.0,0,0,0,0,0]"
     )

@@ -1,4 +1,4 @@
-"""Thrusters that fail in a run: what they are commanded, and what they give."""
+"""Thruster failures in a run: commanded and actual forces."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def flown(failures, *more):
 
 
 @pytest.mark.medium
-def test_a_thruster_that_loses_part_of_its_force_gives_the_rest():
+def test_partial_failure_scales_the_thruster_force():
     asked, given = flown("[{thruster=3, time=1.0, effectiveness=0.3}]")
     left = np.array([1.0, 1.0, 0.3, 1.0, 1.0, 1.0, 1.0, 1.0])
     ratio = given[1100:] / asked[1100:]  # a step apart, which changes little
@@ -36,7 +36,7 @@ def test_a_thruster_that_loses_part_of_its_force_gives_the_rest():
 
 @pytest.mark.medium
 @pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
-def test_a_thruster_that_is_stuck_keeps_the_force_it_was_given_last(order):
+def test_stuck_thruster_keeps_its_last_force(order):
     asked, given = flown("[{thruster=5, time=1.0, stuck=true}]", f"master.order={order}")
     assert np.ptp(given[1003:, 4]) == 0.0 and np.ptp(asked[1003:, 4]) > 1.0  # while it is asked for another
     assert given[1003, 4] == pytest.approx(asked[1000, 4], abs=0.05)

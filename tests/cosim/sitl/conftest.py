@@ -1,4 +1,4 @@
-"""A server in a thread, for stand-ins to talk to."""
+"""A server in a thread, for stand-in autopilots to connect to."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""A stand-in for ArduPilot, of no code of ours: frames as it packs them, answers read as naively as it reads them."""
+"""An independent stand-in for ArduPilot that packs frames and parses answers as ArduPilot does."""
 
 import re
 import socket
@@ -24,13 +24,13 @@ KEYS = (
 
 
 def newest_line(data):
-    """The text between the last two ends of lines; nothing before the first one counts."""
+    """Return the text between the last two line ends."""
     last = data.rindex(b"\n")
     return data[data.rindex(b"\n", 0, last) + 1 : last].decode("ascii")
 
 
 def parse(line):
-    """Search each bare word, wherever it comes first, and read on two characters behind it; check nothing else."""
+    """Search the first occurrence of each bare key, and read on two characters behind it, without checks."""
     found = {}
     for section, key, n, required in KEYS:
         at = line.find(section)
@@ -79,7 +79,7 @@ class StandIn:
         self.socket.sendto(data, self.address)
 
     def exchange(self, pwm=(), count=None):
-        """Send a frame and return the answer's bytes; the count goes up only by itself where none is given."""
+        """Send a frame and return the answer's bytes; the count increases unless one is given."""
         self.send(frame(self.count if count is None else count, pwm, self.rate, self.channels))
         answer = self.socket.recv(65000)
         if count is None:
@@ -87,7 +87,7 @@ class StandIn:
         return answer
 
     def fly(self, pwm=()):
-        """One frame; what the answer says."""
+        """Exchange one frame; return the parsed answer."""
         return parse(newest_line(self.exchange(pwm)))
 
 

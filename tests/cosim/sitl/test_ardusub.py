@@ -1,4 +1,4 @@
-"""A real ArduSub, where there is one on the path: it arms, dives in MANUAL, and holds its depth in ALT_HOLD."""
+"""A real ArduSub, if one is on the path: it arms, dives in MANUAL, and holds its depth in ALT_HOLD."""
 
 import contextlib
 import os
@@ -14,7 +14,7 @@ from cosim.results.record import load_record
 
 ARDUSUB = shutil.which("ardusub")
 MANUAL, ALT_HOLD = 19, 2
-DEPTH = 4.0  # m, at which it is told to hold
+DEPTH = 4.0  # m, the commanded depth
 WALL = 240.0  # s, after which the test gives up
 
 # what ArduSub is given beside its own defaults: eight thrusters as vectored_6dof, sticks that rest in the middle, a

@@ -1,4 +1,4 @@
-"""The link beside the lockstep: the autopilot's estimate in the record, and the DVL that it is told of."""
+"""The MAVLink connection beside the lockstep: the recorded estimate, and the DVL messages."""
 
 import contextlib
 
@@ -26,8 +26,8 @@ def motion(time, velocity, gyro=STILL):
     return Motion(time, gyro, STILL, STILL, velocity, STILL, (1.0, 0.0, 0.0, 0.0), None, velocity)
 
 
-def told(options, seconds=10.0, rate=400):
-    """What a DVL tells of a vehicle that goes ahead at 0.5 m/s and turns to starboard at 0.1 rad/s."""
+def dvl_messages(options, seconds=10.0, rate=400):
+    """Return the DVL messages of a vehicle with a surge of 0.5 m/s and a yaw rate of 0.1 rad/s."""
     dvl = Dvl(options)
     found = []
     for k in range(round(seconds * rate) + 1):
@@ -36,8 +36,8 @@ def told(options, seconds=10.0, rate=400):
     return found
 
 
-def test_the_ways_of_a_dvl_add_up():
-    found = told(DvlOptions(rate=8.0, latency=0.0))
+def test_dvl_displacements_sum_to_the_motion():
+    found = dvl_messages(DvlOptions(rate=8.0, latency=0.0))
     assert len(found) == 80
     assert {interval for _, _, interval, _, _ in found} == {125_000}
     assert np.sum([moved for *_, moved in found], axis=0) == pytest.approx((5.0, 0.0, 0.0))
@@ -45,15 +45,15 @@ def test_the_ways_of_a_dvl_add_up():
 
 
 @pytest.mark.medium
-def test_a_dvl_is_late_and_loses_what_it_is_said_to():
-    late = told(DvlOptions(rate=8.0, latency=0.25))
+def test_dvl_has_its_configured_latency_and_dropout():
+    late = dvl_messages(DvlOptions(rate=8.0, latency=0.25))
     assert [time - stamp / 1e6 for time, stamp, *_ in late] == pytest.approx([0.25] * len(late), abs=1e-6)
-    lossy = told(DvlOptions(rate=8.0, latency=0.0, dropout=0.3), seconds=100.0)
+    lossy = dvl_messages(DvlOptions(rate=8.0, latency=0.0, dropout=0.3), seconds=100.0)
     assert 480 <= len(lossy) <= 640  # of 800
-    assert [one[1] for one in lossy] == [one[1] for one in told(DvlOptions(8.0, 0.0, 0.3), seconds=100.0)]
+    assert [one[1] for one in lossy] == [one[1] for one in dvl_messages(DvlOptions(8.0, 0.0, 0.3), seconds=100.0)]
 
 
-def test_the_estimate_is_in_the_record_and_arming_lets_go(tmp_path):
+def test_estimate_is_recorded_and_arming_releases_the_vehicle(tmp_path):
     m, port = dialect(), free_port()
     link = AutopilotLink(parse_endpoint(f"udpin:127.0.0.1:{port}"), DvlOptions(rate=100.0, latency=0.0))
     options = FlightOptions(

@@ -1,4 +1,4 @@
-"""``cosim sitl`` as a user has it."""
+"""``cosim sitl`` on the command line."""
 
 import os
 import re
@@ -26,7 +26,7 @@ from tests.cosim.sitl.stand_in import NEUTRAL, StandIn
         (["--set", "law.nmae=pd"], "law.nmae: unknown key; did you mean 'name'?"),
     ],
 )  # fmt: skip
-def test_what_must_be_mended_is_one_line(arguments, words, capsys):
+def test_user_errors_are_one_line(arguments, words, capsys):
     assert main(["sitl", *arguments]) == 2
     said = capsys.readouterr().err
     assert words in said and said.count("\n") == 1
@@ -36,7 +36,7 @@ def test_what_must_be_mended_is_one_line(arguments, words, capsys):
     "arguments",
     [["--port", "0"], ["--port", "65536"], ["--timeout", "0"], ["--timeout", "nan"], ["--record-rate", "-1"]],
 )
-def test_numbers_that_cannot_be(arguments, capsys):
+def test_invalid_numbers_are_rejected(arguments, capsys):
     with pytest.raises(SystemExit):
         main(["sitl", *arguments])
     assert "expected a" in capsys.readouterr().err
@@ -51,7 +51,7 @@ def free_port():
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGINT, getattr(signal, "SIGHUP", None)])
-def test_a_signal_ends_it_with_a_readable_run(tmp_path, sent):
+def test_signal_leaves_a_readable_run(tmp_path, sent):
     out = tmp_path / "run"
     command = [sys.executable, "-m", "cosim", "sitl", "--vehicle", "bluerov2_heavy", "--no-report"]
     command += ["--port", str(free_port()), "--out", str(out)]
@@ -70,7 +70,7 @@ def test_a_signal_ends_it_with_a_readable_run(tmp_path, sent):
 
 
 @pytest.mark.slow
-def test_a_report_made_again_still_says_who_flew(serve):
+def test_regenerated_report_names_the_autopilot(serve):
     served = serve("time.duration=0.05")
     with StandIn(served.address) as pilot:
         for _ in range(60):

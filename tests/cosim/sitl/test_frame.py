@@ -1,4 +1,4 @@
-"""From pulses to forces: frame, signs, curve, and what gives no force."""
+"""From pulses to forces: frame, signs, curve, and dead band."""
 
 import math
 from importlib import resources
@@ -37,8 +37,8 @@ def forces(law, outputs):
 
 @pytest.mark.parametrize("name", BLUEROVS)
 @pytest.mark.parametrize("motor", range(8))
-def test_each_motor_does_what_ardusub_takes_it_to_do(name, motor):
-    """As the sign of each factor says; roll and pitch of the horizontal motors are left out by ArduSub."""
+def test_motor_effects_match_ardusub_factors(name, motor):
+    """By the sign of each factor; ArduSub ignores roll and pitch of the horizontal motors."""
     vehicle = load_vehicle(name)
     pulses = [1500] * 16
     pulses[motor] = 1900
@@ -58,7 +58,7 @@ def test_each_motor_does_what_ardusub_takes_it_to_do(name, motor):
         (0, 0.0), (1, 0.0), (799, 0.0), (2201, 0.0), (65535, 0.0),  # no pulse
     ],
 )  # fmt: skip
-def test_the_curve(pulse, part):
+def test_thrust_curve_is_applied(pulse, part):
     """u|u| of 40 N with u = (pulse - 1500)/400, and a sign of -1."""
     given = forces(law_of_pwm(load_vehicle("bluerov2_heavy")), [pulse] * 16)
     assert given == pytest.approx([-40.0 * part] * 8, abs=1e-12)
@@ -71,7 +71,7 @@ def own(tmp_path, table):
     return path
 
 
-def test_channels_signs_and_curve_of_ones_own(tmp_path):
+def test_custom_channels_signs_and_curve_are_applied(tmp_path):
     table = '[autopilot]\nframe = "mine"\nchannels = [9, 0, 3, 32, 5, 6, 7, 8]\nsigns = [1, 1, -1, 1, 1, 1, 1, 1]\n'
     vehicle = load_vehicle(own(tmp_path, table + 'curve = "linear"\npwm_dead_band = 0\n'))
     law = law_of_pwm(vehicle)
@@ -97,7 +97,7 @@ def test_channels_signs_and_curve_of_ones_own(tmp_path):
         ("pwm_dead_band = -1", "autopilot.pwm_dead_band is -1 us"),
     ],
 )
-def test_a_table_that_cannot_be(tmp_path, line, words):
+def test_invalid_autopilot_table_is_rejected(tmp_path, line, words):
     with pytest.raises(VehicleError, match=words):
         load_vehicle(own(tmp_path, f'[autopilot]\nframe = "mine"\n{line}\n'))
 
@@ -110,17 +110,17 @@ def test_a_table_that_cannot_be(tmp_path, line, words):
         ('[autopilot]\nframe = "a"\nsign = 1\n', "autopilot.sign: unknown key; did you mean 'signs'"),
     ],
 )
-def test_keys_are_checked(tmp_path, table, words):
+def test_invalid_autopilot_keys_are_rejected(tmp_path, table, words):
     with pytest.raises(TableError, match=words):
         load_vehicle(own(tmp_path, table))
 
 
-def test_a_vehicle_without_the_table_says_so():
+def test_vehicle_without_autopilot_table_is_rejected():
     with pytest.raises(RunError, match=r"vehicle 'odin' has no table \[autopilot\]"):
         law_of_pwm(load_vehicle("odin"))
 
 
-def test_controls_ask_for_the_limits_straight():
+def test_controls_map_linearly_to_force_limits():
     law = law_of_controls(load_vehicle("rexrov"))
     vehicle = load_vehicle("rexrov")
     n = vehicle.n_thrusters

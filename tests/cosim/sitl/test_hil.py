@@ -47,7 +47,7 @@ def packed(number, *values, sequence=0):
     return b"\xfd" + frame + checksum(frame + bytes([extra])).to_bytes(2, "little")
 
 
-def test_the_checksum_is_the_one_of_the_catalogue():
+def test_checksum_matches_its_published_check_value():
     assert checksum(b"123456789") == 0x6F91
 
 
@@ -85,7 +85,7 @@ class Px4:
         return number, struct.unpack(layout, frame[10:-2].ljust(size, b"\0")[:size])
 
     def sensors(self):
-        """What HIL_SENSOR says next; what came before is in `seen`."""
+        """Return the next HIL_SENSOR; earlier messages are in `seen`."""
         while True:
             number, fields = self.message()
             self.seen[number] = fields
@@ -119,7 +119,7 @@ def down(u):
 
 
 @pytest.mark.slow
-def test_it_is_held_until_controls_come_and_then_each_is_a_step(serve_px4):
+def test_vehicle_is_held_until_first_controls_then_steps_once_per_message(serve_px4):
     served = serve_px4("time.duration=0.4")
     with Px4(served.address) as px4:
         held = [px4.sensors() for _ in range(3)]
@@ -148,7 +148,7 @@ def fly(px4, controls, frames):
     return fields
 
 
-def test_what_is_not_armed_gives_no_force(serve_px4):
+def test_disarmed_controls_give_no_force(serve_px4):
     served = serve_px4("time.duration=0.1")
     with Px4(served.address) as px4:
         for _ in range(25):
@@ -159,7 +159,7 @@ def test_what_is_not_armed_gives_no_force(serve_px4):
 
 
 @pytest.mark.slow
-def test_a_pilot_holds_depth_by_the_barometer(serve_px4):
+def test_depth_is_held_by_barometer_feedback(serve_px4):
     """PX4 finds the depth from an air pressure; the loop is closed over the pressure on the wire."""
     served = serve_px4("time.duration=20.0")
     memory = [0.0, 0.0]
@@ -187,7 +187,7 @@ def test_a_pilot_holds_depth_by_the_barometer(serve_px4):
     assert px4.seen[0][2] == 8  # a heartbeat of no autopilot
 
 
-def test_one_that_leaves_and_comes_again_begins_a_new_run(serve_px4):
+def test_reconnecting_autopilot_starts_a_new_run(serve_px4):
     served = serve_px4("time.duration=0.4")
     with Px4(served.address) as px4:
         fly(px4, down(0.3), 20)
@@ -204,7 +204,7 @@ def test_one_that_leaves_and_comes_again_begins_a_new_run(serve_px4):
 
 
 @pytest.mark.slow
-def test_garbage_between_the_frames_does_nothing(serve_px4):
+def test_garbage_between_frames_is_ignored(serve_px4):
     found = []
     for rubbish in (b"", b"\x00not mavlink\xff", packed(93, 1, 1, *[1.0] * 16, ARMED)[:-1] + b"\0"):
         served = serve_px4("time.duration=0.1")
@@ -221,7 +221,7 @@ def test_garbage_between_the_frames_does_nothing(serve_px4):
 
 
 @pytest.mark.medium
-def test_silence_ends_it(serve_px4):
+def test_silence_ends_the_run(serve_px4):
     served = serve_px4(timeout=0.3)
     with Px4(served.address) as px4:
         fly(px4, down(0.1), 5)
@@ -232,13 +232,13 @@ def test_silence_ends_it(serve_px4):
 
 
 @given(st.floats(-500.0, 100.0))
-def test_the_pressure_gives_the_altitude_back(altitude):
-    """By the exponent of the standard atmosphere as others round it."""
+def test_pressure_round_trips_to_altitude(altitude):
+    """With the rounded exponent of the standard atmosphere in common use."""
     back = (1.0 - (air_pressure(altitude) / 1013.25) ** 0.190263) * 44330.8
     assert back == pytest.approx(altitude, abs=0.05 + 1e-4 * abs(altitude))
 
 
-def test_field_and_speeds_are_told_in_their_frames_and_cut_where_they_do_not_fit():
+def test_magnetic_field_and_speeds_are_in_their_frames_and_saturated():
     """Facing east the field's north is to the left."""
     zero, east = (0.0,) * 3, (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
     motion = Motion(0.0, zero, (0.0, 0.0, -9.8), zero, (1e4, 0.0, -1e4), zero, east, 3.0, zero)

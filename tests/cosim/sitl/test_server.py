@@ -1,4 +1,4 @@
-"""Lockstep with a stand-in for ArduPilot: frames exact, repeated, lost, foreign; restarts; and what is left of them."""
+"""Lockstep with a stand-in for ArduPilot: exact, repeated, lost and foreign frames; restarts; and records."""
 
 import random
 import struct
@@ -43,7 +43,7 @@ def pulses(k):
         ((2**32 - 1, 0), ["first", "restart"]),
     ],
 )
-def test_what_a_count_means(counts, frames):
+def test_frame_counts_are_classified(counts, frames):
     lockstep = Lockstep()
     assert [lockstep.judge(count) for count in counts] == frames
 
@@ -66,8 +66,8 @@ def test_each_frame_is_a_step_of_the_plant(serve):
     assert set(record["thrust[5]"]) == {-10.0}
 
 
-def test_at_rest_the_imu_feels_gravity_alone_and_the_bottom_is_below(serve):
-    """Neither weight nor buoyancy, both off by as much: nothing but gravity is left to be felt."""
+def test_imu_at_rest_measures_gravity_and_rangefinder_the_bottom(serve):
+    """Weight and buoyancy are off by the same amount: the IMU measures gravity alone."""
     served = serve("time.duration=0.01", "plant.parameters.weight=131.588", "initial.position=[1,2,3]")
     with StandIn(served.address) as pilot:
         said = [pilot.fly(NEUTRAL) for _ in range(12)]
@@ -79,7 +79,7 @@ def test_at_rest_the_imu_feels_gravity_alone_and_the_bottom_is_below(serve):
     assert said[0]["rng_1"] == pytest.approx(27.0)
 
 
-def test_it_is_held_where_it_starts_until_a_thruster_is_driven(serve):
+def test_vehicle_is_held_until_a_thruster_is_driven(serve):
     """Rolled over and 1 N light it would move; time and the record's time begin apart."""
     half = 0.5**0.5
     served = serve("time.duration=0.1", f"initial.quaternion=[{half},{half},0,0]", "initial.position=[1,2,0]")
@@ -110,7 +110,7 @@ def test_an_idle_autopilot_is_lowered_from_the_surface_and_starts_where_the_scen
     assert (outcome.counts.waited, outcome.counts.steps) == (72, 24)
 
 
-def test_a_lowered_vehicle_feels_what_its_depths_say():
+def test_lowering_motion_is_consistent_with_its_depths():
     """Speed and acceleration against differences of the depth; rolled on its side, the IMU has them along y."""
     lowering, h = motion.Lowering(4.0), 1e-4
     for at in np.linspace(4.2, 9.8, 9):
@@ -127,8 +127,8 @@ def test_a_lowered_vehicle_feels_what_its_depths_say():
     assert (carried.position_ned, carried.velocity_ned, carried.altitude) == ((1.0, 2.0, 3.0), (0.0, 0.0, 0.5), 7.0)
 
 
-def test_velocity_is_told_north_east_down(serve):
-    """Facing east, and rolled by nothing: forward is east, right is south."""
+def test_velocity_is_reported_in_ned(serve):
+    """Heading east without roll: forward is east, right is south."""
     half = 0.5**0.5
     served = serve(
         "time.duration=0.01", f"initial.quaternion=[{half},0,0,{half}]", "initial.velocity=[1.0,0.5,0.25,0,0,0]"
@@ -140,7 +140,7 @@ def test_velocity_is_told_north_east_down(serve):
     assert said[0]["attitude"][2] == pytest.approx(np.pi / 2, abs=1e-3)
 
 
-def test_no_bottom_no_rangefinder(serve, tmp_path):
+def test_without_a_bottom_there_is_no_rangefinder(serve, tmp_path):
     path = tmp_path / "deep.toml"
     path.write_text(
         'vehicle = "bluerov2_heavy"\ntime = { duration = 0.01 }\ninitial = { position = [0.0, 0.0, 2.0] }\n'
@@ -154,7 +154,7 @@ def test_no_bottom_no_rangefinder(serve, tmp_path):
         assert "rng_1" not in parse(newest_line(pilot.socket.recv(65000)))
 
 
-def test_the_run_is_that_of_a_master_whose_law_is_the_autopilot(serve):
+def test_run_equals_a_master_with_the_autopilot_as_law(serve):
     """No step but the master's own: current, failing thruster and arbiter included."""
     overrides = (
         "time.duration=0.5", "plant.current=[0.2,-0.1,0.0]", "failures=[{thruster=5,time=0.2}]",
@@ -191,7 +191,7 @@ def test_a_resent_frame_gets_the_same_answer_and_makes_no_step(serve):
     assert (outcome.counts.steps, outcome.counts.resent) == (120, 3)
 
 
-def test_lost_frames_are_counted_and_one_step_is_made(serve, caplog):
+def test_lost_frames_are_counted_and_advance_one_step(serve, caplog):
     served = serve("time.duration=0.1")
     with StandIn(served.address) as pilot:
         pilot.fly(NEUTRAL)
@@ -207,7 +207,7 @@ def test_lost_frames_are_counted_and_one_step_is_made(serve, caplog):
     assert [r.message for r in caplog.records] == ["4 frames of the autopilot have not come: one step is made for all"]
 
 
-def test_a_restart_begins_a_new_run_with_the_plant_as_at_first(serve):
+def test_restart_starts_a_new_run_from_the_initial_state(serve):
     served = serve("time.duration=0.1")
     with StandIn(served.address) as pilot:
         before = [pilot.exchange(heave(0.8)) for _ in range(50)]
@@ -220,7 +220,7 @@ def test_a_restart_begins_a_new_run_with_the_plant_as_at_first(serve):
     assert (len(load_record(one.folder)["time"]), len(load_record(two.folder)["time"])) == (50, 121)
 
 
-def test_thirty_two_channels(serve, tmp_path):
+def test_thirty_two_channels_are_accepted(serve, tmp_path):
     path = tmp_path / "mine.toml"
     text = (resources.files("plant_fmu") / "vehicles" / "bluerov2_heavy.toml").read_text()
     path.write_text(text.replace("signs = -1", "signs = -1\nchannels = [25, 26, 27, 28, 29, 30, 31, 32]"))
@@ -234,7 +234,7 @@ def test_thirty_two_channels(serve, tmp_path):
     assert set(load_record(run.folder)["law.pwm32"]) == {1700.0}
 
 
-def test_garbage_is_counted_and_does_nothing(serve):
+def test_garbage_is_counted_and_ignored(serve):
     good = []
     for hostile in (False, True):
         served = serve("time.duration=0.1")
@@ -251,7 +251,7 @@ def test_garbage_is_counted_and_does_nothing(serve):
     assert np.array_equal(*good)
 
 
-def test_a_second_sender_is_refused_while_the_first_is_there(serve):
+def test_second_sender_is_rejected_while_the_first_is_active(serve):
     served = serve("time.duration=0.1")
     with StandIn(served.address) as pilot, StandIn(served.address) as other:
         for k in range(120):
@@ -267,8 +267,8 @@ def test_a_second_sender_is_refused_while_the_first_is_there(serve):
 
 
 @pytest.mark.medium
-def test_an_autopilot_from_another_port_takes_over_from_a_silent_one(serve, monkeypatch):
-    """With the next count it goes on, as one behind a relay does; with any other it is a new one."""
+def test_autopilot_on_another_port_replaces_a_silent_one(serve, monkeypatch):
+    """With the next count the run continues, as behind a relay; any other count starts a new run."""
     monkeypatch.setattr("cosim.sitl.server._PRESENT", 0.05)
     served = serve("time.duration=0.1")
     for first, steps in ((0, 10), (10, 10), (15, 120)):
@@ -281,7 +281,7 @@ def test_an_autopilot_from_another_port_takes_over_from_a_silent_one(serve, monk
     assert (one.summary["status"], one.summary["steps"], two.summary["status"]) == (RESTARTED, 19, "completed")
 
 
-def test_a_rate_that_changes_on_the_way_changes_no_step(serve):
+def test_rate_change_during_a_run_keeps_the_step(serve):
     served = serve("time.duration=0.1")
     with StandIn(served.address) as pilot:
         for k in range(120):
@@ -302,7 +302,7 @@ def test_the_step_is_that_of_the_first_frame(serve, rate):
 
 
 @pytest.mark.medium
-def test_the_record_is_the_same_to_the_bit_however_the_clock_on_the_wall_goes(serve):
+def test_record_does_not_depend_on_wall_clock_timing(serve):
     found = []
     for hurry in (True, False):
         served = serve(
@@ -319,7 +319,7 @@ def test_the_record_is_the_same_to_the_bit_however_the_clock_on_the_wall_goes(se
 
 
 @pytest.mark.medium
-def test_the_record_is_thinned_out_and_the_summary_knows(serve):
+def test_record_is_decimated_and_summary_uses_all_steps(serve):
     found = []
     for rate in (100.0, 1200.0):
         served = serve("time.duration=0.5", record_rate=rate)
@@ -345,7 +345,7 @@ def test_silence_ends_the_run_after_the_timeout(serve):
     assert (run.summary["status"], run.summary["steps"]) == ("ended: silence for 0.3 s", 4)
 
 
-def test_no_autopilot_no_run(serve):
+def test_without_an_autopilot_there_is_no_run(serve):
     served = serve(timeout=0.2)
     with pytest.raises(RunError, match=r"no autopilot came: ended: silence for 0.2 s"):
         served.outcome()
@@ -363,7 +363,7 @@ def test_a_plant_that_fails_leaves_its_record(serve):
     assert len(load_record(served.server._flights._ended[0][0].folder)["time"]) == 5
 
 
-def test_a_taken_port_is_told(serve, tmp_path):
+def test_occupied_port_is_reported(serve, tmp_path):
     served = serve(timeout=0.1)
     flights = Flights(FlightOptions(), "ardupilot", law_of_pwm)
     with pytest.raises(RunError, match=rf"UDP 127.0.0.1:{served.address[1]}: Address already in use"):
@@ -380,20 +380,20 @@ def test_a_taken_port_is_told(serve, tmp_path):
         (("record.lyapunov=true",), None, "record.lyapunov"),
     ],
 )
-def test_what_cannot_be_flown_is_told_before_anybody_waits(overrides, vehicle, words):
+def test_invalid_scenario_is_rejected_before_waiting(overrides, vehicle, words):
     with pytest.raises(Exception, match=words):
         Flights(FlightOptions("sitl", overrides, vehicle), "ardupilot", law_of_pwm)
 
 
-def test_a_folder_in_use_is_told_before_anybody_waits(tmp_path):
+def test_nonempty_folder_is_rejected_before_waiting(tmp_path):
     (tmp_path / "here").touch()
     with pytest.raises(RunError, match="exists and is not empty"):
         Flights(FlightOptions(out=tmp_path), "ardupilot", law_of_pwm)
 
 
 @pytest.mark.slow
-def test_a_pilot_holds_depth_within_5_cm(serve):
-    """Down to 4 m by pulses of a PID on the depth that is told, and there to stay: the vehicle is 1 N too heavy."""
+def test_depth_is_held_within_5_cm(serve):
+    """Down to 4 m by pulses of a PID on the reported depth, and held there: the vehicle is 1 N too heavy."""
     served = serve("time.duration=40.0", record_rate=100.0)
     integral, depth, sinking = 0.0, 0.3, 0.0
     with StandIn(served.address, rate=400) as pilot:

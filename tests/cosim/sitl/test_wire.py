@@ -1,4 +1,4 @@
-"""The bytes on the wire, against bytes by hand and a reader as naive as ArduPilot's."""
+"""The wire format, against manually assembled bytes and a parser as simple as ArduPilot's."""
 
 import json
 import math
@@ -26,14 +26,14 @@ AT_REST = Motion(
 )
 
 
-def test_sixteen_channels_by_hand():
+def test_sixteen_channel_packet_is_decoded():
     data = bytes.fromhex("1a48 b004 39300000" + "dc05" * 15 + "6c07")
     packet = decode(data)
     assert (packet.frame_rate, packet.frame_count) == (1200, 12345)
     assert packet.pwm == (1500,) * 15 + (1900,)
 
 
-def test_thirty_two_channels_by_hand():
+def test_thirty_two_channel_packet_is_decoded():
     data = bytes.fromhex("8173 9001 ffffffff" + "0000" * 31 + "4c04")
     packet = decode(data)
     assert (packet.frame_rate, packet.frame_count) == (400, 2**32 - 1)
@@ -53,17 +53,17 @@ def test_thirty_two_channels_by_hand():
         struct.pack("<HHI16H", 18458, 1200, 0, *[1500] * 16)[:-1],
     ],
 )
-def test_what_is_no_servo_packet(data):
+def test_invalid_servo_packets_are_rejected(data):
     assert decode(data) is None
 
 
 @given(st.binary(max_size=80))
-def test_no_bytes_upset_the_reader(data):
+def test_arbitrary_bytes_raise_nothing(data):
     packet = decode(data)
     assert packet is None or len(packet.pwm) in (16, 32)
 
 
-def test_the_line_is_compact_and_ends_on_both_sides():
+def test_json_line_is_compact_and_delimited_by_newlines():
     data = encode(AT_REST)
     assert data == (
         b'\n{"timestamp":0.25,"imu":{"gyro":[0.0,0.0,0.0],"accel_body":[0.0,0.0,-9.81]},"position":[1.0,2.0,3.0],'
@@ -79,7 +79,7 @@ def test_the_naive_reader_refuses_blanks_behind_colons():
         parse(line)
 
 
-def test_the_naive_reader_takes_the_first_word_that_it_finds():
+def test_naive_reader_matches_the_first_key_substring():
     with pytest.raises(ValueError, match="/position"):
         parse('{"position_of_home":0,' + newest_line(encode(AT_REST))[1:])
 
@@ -118,7 +118,7 @@ def test_every_number_is_read_back_to_the_last_bit(motion):
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("field", ["gyro", "specific_force", "position_ned", "velocity_ned", "altitude"])
-def test_what_is_not_finite_is_never_sent(field, bad):
+def test_non_finite_state_is_never_sent(field, bad):
     value = bad if field == "altitude" else (0.0, bad, 0.0)
     with pytest.raises(RunError, match=r"t = 0.25 s: the vehicle's state is not finite"):
         encode(AT_REST._replace(**{field: value}))

@@ -1,4 +1,4 @@
-"""Masters of SSP that we did not write, each run in a process of its own: ``python -m tests.cosim.ssp.masters``."""
+"""Independent SSP masters, each run in a process of its own: ``python -m tests.cosim.ssp.masters``."""
 
 import importlib.util
 import subprocess

@@ -1,4 +1,4 @@
-"""Controller and arbiter as FMUs of their own, against the Python law, regions and arbiter."""
+"""Controller and arbiter as separate FMUs, against the Python law, regions and arbiter."""
 
 import ctypes
 import logging
@@ -85,7 +85,7 @@ def test_controller_is_the_python_law_over_random_inputs(controller, scenario):
     assert abs(read(controller, "estimate.")).min() > 0.01
 
 
-def test_controller_starts_from_the_initial_state_while_all_is_zero(controller, scenario):
+def test_controller_uses_the_initial_state_while_inputs_are_zero(controller, scenario):
     controller.initialise()
     initial = scenario.initial
     start = np.array([*initial.position, *initial.quaternion, *initial.velocity])
@@ -131,13 +131,13 @@ def test_numbers_of_the_scenario_are_parameters(controller):
         ({"initial.quaternion.e0": 0.0}, "initial.quaternion is not of length 1"),
     ],
 )
-def test_numbers_that_are_no_shape_are_refused(controller, values, said):
+def test_invalid_shape_parameters_are_rejected(controller, values, said):
     controller.set(values)
     with pytest.raises(PlantError, match=re.escape(said)):
         controller.initialise()
 
 
-def test_ranges_are_kept(controller):
+def test_parameter_ranges_are_enforced(controller):
     for name, value in (("regions.ball.shape.radius", 0.0), ("law.gains.gamma", 0.0), ("law.gains.k_p2", -1.0)):
         with pytest.raises(PlantError, match=re.escape(f"{name} = {value:g} refused")):
             controller.set({name: value})
@@ -170,7 +170,7 @@ def test_steps_that_do_not_divide_the_period_are_warned_about(controller, steps,
     assert [r.message.removeprefix("FMU: ") for r in caplog.records if "late" in r.message] == said
 
 
-def test_so_are_those_of_the_arbiter(arbiter, caplog):
+def test_steps_that_do_not_divide_the_arbiter_period_are_warned_about(arbiter, caplog):
     arbiter.initialise()
     with caplog.at_level(logging.DEBUG, "plant_fmu"):
         for _ in range(9):
@@ -203,7 +203,7 @@ def test_arbiter_is_the_python_one_over_random_inputs(arbiter):
         np.testing.assert_allclose(arbiter.outputs.values, closed(memberships.tolist()), rtol=0.0, atol=1e-15)
 
 
-def test_a_restored_controller_goes_on_as_before(scenario, fmi):
+def test_restored_controller_continues_identically(scenario, fmi):
     """Memory and counts are part of the FMU's state, and pass through bytes."""
     from plant_fmu import Plant
 
@@ -227,7 +227,7 @@ def test_a_restored_controller_goes_on_as_before(scenario, fmi):
 
 
 @pytest.mark.medium
-def test_fmpy_gives_the_same_as_our_own_stepping(scenario):
+def test_fmpy_matches_own_stepping(scenario):
     """By name and one by one, as any importer does."""
     path = cached_fmu(controller_component(scenario), 2)
     description, folder = fmpy.read_model_description(str(path)), fmpy.extract(str(path))
@@ -253,7 +253,7 @@ def test_fmpy_gives_the_same_as_our_own_stepping(scenario):
     unit.freeInstance()
 
 
-def test_there_is_no_model_exchange(scenario):
+def test_components_offer_co_simulation_only(scenario):
     path = cached_fmu(controller_component(scenario), 3)
     description = fmpy.read_model_description(str(path))
     assert description.modelExchange is None and description.coSimulation is not None
@@ -280,7 +280,7 @@ def test_sources_are_complete_and_hold_no_python(scenario, fmi, make, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("make", [controller_component, arbiter_component])
-def test_every_importer_takes_them(scenario, fmi, make):
+def test_every_importer_accepts_the_components(scenario, fmi, make):
     verdicts = check_fmu(cached_fmu(make(scenario), fmi))
     for verdict in verdicts:
         assert verdict.result.status != "failed", (verdict.result.importer, verdict.result.note)

@@ -1,4 +1,4 @@
-"""FMUs of others on a coupled plant, in masters of others: a vehicle on a tether in a current, from the examples."""
+"""External FMUs on a coupled plant in independent masters: the example of a tethered vehicle in a current."""
 
 import runpy
 from pathlib import Path
@@ -47,7 +47,7 @@ def tether(motion):
 
 
 def in_turn(steps, step):
-    """Return the motion where each works on what the others gave after the last step (Jacobi's order)."""
+    """Return the motion with the outputs exchanged after each step (Jacobi's order)."""
     vehicle = of_vehicle(load_vehicle("odin"), {"weight": WEIGHT}, coupled=True)
     rows, force, water, rate, before = [], np.zeros(3), 0j, 0j, 0.0
     with Plant(cached_fmu(vehicle, 2)) as plant:
@@ -99,7 +99,7 @@ def test_masters_connect_a_current_and_a_tether(master, packed, tmp_path):
 
 
 @pytest.mark.slow
-def test_shorter_steps_come_to_the_solution_of_the_equations(packed, tmp_path):
+def test_coupling_error_converges_linearly_with_the_step(packed, tmp_path):
     """Half the step, half the error: what is held within a step lags by that much."""
     exact = continuous(20.0)
     errors = []
@@ -112,7 +112,7 @@ def test_shorter_steps_come_to_the_solution_of_the_equations(packed, tmp_path):
 
 
 @pytest.mark.slow
-def test_at_rest_the_stretch_is_that_of_net_weight_and_drag(packed, tmp_path):
+def test_static_tether_stretch_matches_net_weight_and_drag(packed, tmp_path):
     """By hand, with the drag of each body axis; and the moments of tether and weight cancel."""
     end = in_master("fmpy", packed(STEP), 12500, STEP, tmp_path / "rows.npy")[-1]
     assert np.abs(end[7:]).max() < 1e-3

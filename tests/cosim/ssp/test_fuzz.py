@@ -17,7 +17,7 @@ HERE = Path(__file__).parent
 
 @pytest.mark.slow
 @pytest.mark.parametrize("make", [controller_component, arbiter_component])
-def test_no_order_of_calls_does_harm(make, tmp_path):
+def test_any_call_order_is_memory_safe(make, tmp_path):
     """No fault of memory or arithmetic, and no number out that is none; every function succeeds now and then."""
     for name, data in neutral_members(make(load_scenario(HERE / "all-shapes.toml")), 3).items():
         if name.startswith("sources/"):
@@ -39,7 +39,7 @@ def test_no_order_of_calls_does_harm(make, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("make", [controller_component, arbiter_component])
-def test_null_does_no_harm(make, fmi, tmp_path):
+def test_null_pointers_are_rejected(make, fmi, tmp_path):
     """Every function with each of its pointers NULL in turn is an error, never a crash."""
     rows = sweep_sources(tmp_path, fmi, make(load_scenario(HERE / "all-shapes.toml")))
     assert len(rows) > 500

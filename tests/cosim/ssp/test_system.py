@@ -1,4 +1,4 @@
-"""A scenario as a system of FMUs: the same flight in masters that we did not write as in Jacobi's order here."""
+"""A scenario as a system of FMUs: the same run in independent masters as in Jacobi order here."""
 
 import io
 import re
@@ -42,7 +42,7 @@ def packed(tmp_path_factory):
 
 @pytest.mark.slow
 def test_a_master_with_another_step_is_warned(packed, capfd):
-    """In FMPy, which prints what FMUs say; the scenario has a step of 10 ms, the law a period of 30 ms."""
+    """In FMPy, which prints the log of FMUs; the scenario has a step of 10 ms, the law a period of 30 ms."""
     run_in_fmpy(packed, 20, 0.02)
     warnings = [line for line in capfd.readouterr().out.splitlines() if "late" in line]
     assert len(warnings) == 1
@@ -74,7 +74,7 @@ def compared(ours, theirs):
 
 
 @pytest.mark.medium
-def test_fmpy_flies_it_as_we_do(packed):
+def test_fmpy_simulation_equals_own_run(packed):
     """With every shape, regions and goal on the move, a current, a lag, and three periods."""
     scenario = load_scenario(ALL_SHAPES)
     ours = jacobi(ALL_SHAPES)
@@ -83,7 +83,7 @@ def test_fmpy_flies_it_as_we_do(packed):
 
 
 @pytest.mark.slow
-def test_the_page_on_it_does_what_it_says(tmp_path, monkeypatch, capsys):
+def test_documentation_example_runs(tmp_path, monkeypatch, capsys):
     text = (ROOT / "docs" / "ssp.md").read_text()
     command, code = re.search(r"```sh\ncosim (.*?)```", text, re.S)[1], re.search(r"```python\n(.*?)```", text, re.S)[1]
     monkeypatch.chdir(tmp_path)
@@ -98,7 +98,7 @@ def test_the_page_on_it_does_what_it_says(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3])
 @pytest.mark.parametrize("name", ["paper", "paper-limited"])
 @pytest.mark.parametrize("master", ["fmpy", "ecos", "libcosim"])
-def test_masters_fly_the_paper_as_we_do(master, name, fmi, tmp_path):
+def test_masters_reproduce_the_papers_run(master, name, fmi, tmp_path):
     """30 s at 10 ms; in the first step FMPy's connectors are 0, those of the others hold the plant's first outputs."""
     if fmi == 3 and master != "ecos":
         pytest.skip("takes FMI 2.0 alone in a system")
@@ -111,7 +111,7 @@ def test_masters_fly_the_paper_as_we_do(master, name, fmi, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize(("master", "fmi"), [("fmpy", 2), ("ecos", 2), ("ecos", 3), ("libcosim", 2), ("oms", 2)])
 @pytest.mark.parametrize("name", ["docking", "pipe-inspection", "inspection-visibility", "harbour"])
-def test_masters_fly_shipped_scenarios_as_we_do(name, master, fmi, tmp_path):
+def test_masters_reproduce_shipped_scenarios(name, master, fmi, tmp_path):
     """The deployable law on thrusters, noise, regions on the move, four criteria: the first 20 s."""
     settings = ["time.duration=20.0"]
     scenario = load_scenario(name, settings)
@@ -133,7 +133,7 @@ def test_masters_fly_shipped_scenarios_as_we_do(name, master, fmi, tmp_path):
         ("docking", ["goal.then=[[6.5, -3.0, 3.0]]", "goal.stay=0.2", "goal.centre=[6.8, -3.0, 3.0]"]),
     ],
 )
-def test_every_law_flies_as_in_python(name, settings, tmp_path):
+def test_every_law_equals_its_python_run(name, settings, tmp_path):
     settings = ["time.duration=2.0", *settings]
     scenario = load_scenario(name, settings)
     path = package_system(scenario, tmp_path / "s.ssp")
@@ -165,7 +165,7 @@ def test_noise_is_that_of_numpy(tmp_path):
 # ---- the file ----
 
 
-def test_it_keeps_to_the_schema_and_names_what_its_fmus_have(packed, tmp_path):
+def test_system_description_is_valid_and_matches_its_fmus(packed, tmp_path):
     with zipfile.ZipFile(packed) as archive:
         archive.extractall(tmp_path)
     schema = Path(fmpy.ssp.__file__).parent / "schema" / "SystemStructureDescription.xsd"
@@ -186,7 +186,7 @@ def test_it_keeps_to_the_schema_and_names_what_its_fmus_have(packed, tmp_path):
     assert len(ends) == len(inputs) == 13 + 6 + 3 + 3  # each once
 
 
-def test_units_of_both_ends_are_one(packed):
+def test_connected_variables_have_equal_units(packed):
     with zipfile.ZipFile(packed) as archive:
         root = etree.fromstring(archive.read("SystemStructure.ssd"))
     ns = {"ssd": root.nsmap["ssd"], "ssc": root.nsmap["ssc"]}
@@ -202,7 +202,7 @@ def test_units_of_both_ends_are_one(packed):
     assert {unit for unit in units.values() if unit} == defined
 
 
-def test_the_plant_starts_as_the_scenario_says(packed, tmp_path):
+def test_plant_start_values_match_the_scenario(packed, tmp_path):
     with zipfile.ZipFile(packed) as archive:
         archive.extract("resources/plant.fmu", tmp_path)
     with CoSimulationInstance(tmp_path / "resources" / "plant.fmu") as plant:
@@ -212,7 +212,7 @@ def test_the_plant_starts_as_the_scenario_says(packed, tmp_path):
         assert plant["wrench_force_limit"] == 200.0 and plant["seed"] == 7 and plant["free_surface"] is True
 
 
-def test_the_same_bytes_each_time_and_no_python_inside(packed, tmp_path):
+def test_package_is_reproducible_and_holds_no_python(packed, tmp_path):
     again = package_system(load_scenario(ALL_SHAPES), tmp_path / "again.ssp")
     assert again.read_bytes() == packed.read_bytes()
     with zipfile.ZipFile(packed) as archive:
@@ -223,7 +223,7 @@ def test_the_same_bytes_each_time_and_no_python_inside(packed, tmp_path):
     assert not [name for name in names if ".py" in name]
 
 
-def test_the_scenario_within_makes_the_same_file(packed, tmp_path):
+def test_packaged_scenario_reproduces_the_package(packed, tmp_path):
     with zipfile.ZipFile(packed) as archive:
         inner = tmp_path / "all-shapes.toml"
         inner.write_bytes(archive.read("documentation/scenario.toml"))
@@ -231,7 +231,7 @@ def test_the_scenario_within_makes_the_same_file(packed, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_vehicle_of_ones_own_goes_with_it(packed, tmp_path):
+def test_custom_vehicle_is_packaged(packed, tmp_path):
     shipped = resources.files("plant_fmu") / "vehicles" / "odin.toml"
     (tmp_path / "mine.toml").write_text(shipped.read_text().replace('name = "odin"', 'name = "mine"'))
     scenario = load_scenario(ALL_SHAPES, [f"vehicle='{tmp_path / 'mine.toml'}'"])
@@ -254,14 +254,14 @@ def test_a_vehicle_of_ones_own_goes_with_it(packed, tmp_path):
         ("paper", [CLOSED, "regions.SR2.streamed=true"], "regions.SR2.streamed is true, expected false"),
     ],
 )
-def test_what_a_system_has_not_is_refused_by_its_key(name, changes, said, tmp_path):
+def test_unsupported_scenario_is_rejected_by_key(name, changes, said, tmp_path):
     with pytest.raises(RunError) as caught:
         package_system(load_scenario(name, changes), tmp_path / "s.ssp")
     assert str(caught.value).startswith(said)
     assert not list(tmp_path.iterdir())
 
 
-def test_a_step_that_does_not_divide_a_period_is_not_packaged(tmp_path, capsys):
+def test_step_that_does_not_divide_a_period_is_rejected(tmp_path, capsys):
     out = tmp_path / "s.ssp"
     assert main(["package", str(ALL_SHAPES), "--set", "time.step=0.02", "--out", str(out)]) == 2
     said = capsys.readouterr().err
@@ -272,14 +272,14 @@ def test_a_step_that_does_not_divide_a_period_is_not_packaged(tmp_path, capsys):
 # ---- the command ----
 
 
-def test_the_command_writes_it(tmp_path, capsys, monkeypatch):
+def test_package_command_writes_the_system(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["package", str(ALL_SHAPES), "--to", "ssp"]) == 0
     assert capsys.readouterr().out == "all-shapes.ssp\n"
     assert zipfile.is_zipfile("all-shapes.ssp")
 
 
-def test_the_command_says_what_stands_against_it(tmp_path, capsys):
+def test_package_command_reports_errors_in_one_line(tmp_path, capsys):
     out = tmp_path / "nowhere" / "s.ssp"
     assert main(["package", str(ALL_SHAPES), "--out", str(out)]) == 2
     assert "nowhere" in capsys.readouterr().err
@@ -304,7 +304,7 @@ def test_a_system_has_as_many_criteria_as_the_scenario(tmp_path):
 
 
 @pytest.mark.slow
-def test_memberships_and_rules_of_ones_own_are_packaged(tmp_path):
+def test_custom_memberships_and_rules_are_packaged(tmp_path):
     """With inputs that are no memberships: a clearance, a speed, the time and such."""
     (tmp_path / "mine.toml").write_text(RULES)
     (tmp_path / "scenario.toml").write_text(SCENARIO)

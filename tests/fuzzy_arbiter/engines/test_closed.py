@@ -1,4 +1,4 @@
-"""The closed form against the exact centroid, and the proof that there is one."""
+"""The closed form against the exact centroid, and the proof of its existence."""
 
 import math
 from fractions import Fraction
@@ -39,7 +39,7 @@ def criteria(n):
     return [Criterion(f"c{i}") for i in range(n)]
 
 
-def test_it_is_the_exact_centroid_on_100_000_inputs():
+def test_closed_form_equals_exact_centroid_on_100_000_inputs():
     """The joined triangles integrated over their knots in extended precision, without the closed form."""
     inputs = np.random.default_rng(5).random((100_000, 3))
     x = inputs.astype(np.longdouble)
@@ -63,7 +63,7 @@ def test_it_is_the_exact_centroid_on_100_000_inputs():
 @pytest.mark.medium
 @settings(max_examples=examples(60), deadline=None)
 @given(st.lists(st.fractions(0, 1, max_denominator=64), min_size=1, max_size=5))
-def test_it_is_the_centroid_by_definition_in_rational_numbers(memberships):
+def test_closed_form_equals_rational_centroid(memberships):
     system = prioritised(criteria(len(memberships)))
     inputs = [float(m) for m in memberships]
     exact = [float(w) for w in reference.weights(system, inputs)]
@@ -117,7 +117,7 @@ def test_a_centroid_beyond_both_ends_is_clipped():
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("height", [1e-2, 1e-4, 1e-6])
-def test_terms_of_very_different_areas(height):
+def test_terms_of_very_different_areas_are_exact(height):
     """Where the area is a millionth of what it was, and C(h) a million times as steep."""
     plateau, low_triangle = Shape(((0, 1),)), Shape(((0.6, 0), (0.7, height), (0.8, 0)))
     narrow = triangle(0.7 - height, 0.7, 0.7 + height)
@@ -133,7 +133,7 @@ def test_terms_of_very_different_areas(height):
 
 
 @pytest.mark.parametrize("height", [2e-6, 3e-6, 5e-6, 7e-6, 1.1e-5, 1.3e-5])
-def test_no_number_is_taken_for_one_of_the_next_piece(height):
+def test_piecewise_evaluation_is_exact_next_to_breakpoints(height):
     """Just below h = 1 the wide foot of low begins to be clipped: C(h) bends by a slope of about 1/height."""
     low = Shape(((0, 1), (0.01, 1), (0.01, height), (1, height)))
     high = Shape(((0.7, 0), (0.7, 3 * height), (0.9, 3 * height), (0.9, 0)))
@@ -145,7 +145,7 @@ def test_no_number_is_taken_for_one_of_the_next_piece(height):
             assert engine.weights([h])[0] == pytest.approx(exact, abs=16 * EPS)
 
 
-def test_the_number_of_pieces():
+def test_number_of_cubic_pieces_is_minimal():
     """One cubic for the full triangles, also for trapezoids that meet there; three for the asymmetric pair."""
 
     def count(low, high):
@@ -158,7 +158,7 @@ def test_the_number_of_pieces():
 
 
 @pytest.mark.parametrize("n", range(1, 13))
-def test_the_forms_that_are_alike_give_the_same_weights(n):
+def test_equivalent_rule_forms_give_the_same_weights(n):
     inputs = np.random.default_rng(n).random((50, n))
     expected = Arbiter(criteria(n), engine="exact").batch(inputs)
     for form in ("hierarchical", "minimal", "conjunctive"):
@@ -171,11 +171,11 @@ def test_the_forms_that_are_alike_give_the_same_weights(n):
     (1, "hierarchical", 2), (3, "hierarchical", 8), (10, "hierarchical", 29),
     (3, "minimal", 6), (3, "conjunctive", 9), (3, "complete", 24), (5, "complete", 160),
 ])  # fmt: skip
-def test_the_number_of_rules(n, form, count):
+def test_number_of_rules_follows_the_form(n, form, count):
     assert len(prioritised(criteria(n), form).rules) == count
 
 
-def test_the_complete_table_agrees_on_crisp_inputs_and_only_there():
+def test_complete_form_equals_others_only_on_crisp_inputs():
     """Its rules also ask whether the criteria of lower priority are on or off, which a graded one is to neither."""
     complete, usual = Arbiter(form="complete"), Arbiter()
     for i in range(8):
@@ -206,7 +206,7 @@ def test_any_clauses_of_complementary_cuts_have_a_closed_form():
     assert np.abs(arbiter.batch(x) - [arbiter(row) for row in x.tolist()]).max() <= EPS
 
 
-def test_criteria_with_memberships_of_their_own():
+def test_criteria_with_custom_memberships_have_a_closed_form():
     hot = Criterion("temperature", on="hot", off="fine", membership=rising(24.0, 30.0))
     near = Criterion("wall", on="near", off="far", membership=falling(0.0, 0.5))
     arbiter = Arbiter([near, hot], outside="clip")
@@ -225,7 +225,7 @@ def test_criteria_with_memberships_of_their_own():
         (["if a is on then y is high", "if a is on then y is low"], "the cut of 'low' is not 1 minus that of 'high'"),
     ],
 )
-def test_what_has_no_closed_form_is_said(rules, words):
+def test_missing_closed_form_is_explained(rules, words):
     system = System(DEGREES, (Output("y", (0, 1), (Term("low", falling(0, 1)), Term("high", rising(0, 1)))),), rules)
     with pytest.raises(EngineError, match=words):
         Arbiter(system=system, engine="closed")
@@ -234,7 +234,7 @@ def test_what_has_no_closed_form_is_said(rules, words):
     assert words in automatic.engine_reason
 
 
-def test_terms_that_are_no_complements_are_not_taken_for_them():
+def test_non_complementary_terms_have_no_closed_form():
     gap = Variable("a", (0, 1), (Term("off", falling(0, 0.4)), Term("on", rising(0.6, 1))))
     output = Output("y", (0, 1), (Term("low", falling(0, 1)), Term("high", rising(0, 1))))
     assert Arbiter(
@@ -246,7 +246,7 @@ def test_terms_that_are_no_complements_are_not_taken_for_them():
 
 @settings(max_examples=examples(80), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(systems(norms=False), st.data())
-def test_where_it_says_there_is_a_closed_form_it_is_right(system, data):
+def test_closed_form_matches_exact_centroid_for_any_system(system, data):
     arbiter = Arbiter(system=system)
     inputs = [data.draw(st.floats(0.0, 1.0)) for _ in system.inputs]
     if arbiter.engine == "closed":
@@ -262,7 +262,7 @@ def test_at_most_one_weight_is_above_one_half(memberships):
 
 @settings(max_examples=examples(100), deadline=None)
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12), st.data())
-def test_more_of_a_criterion_is_never_less_weight_for_it_nor_more_for_those_below(memberships, data):
+def test_weights_are_monotonic_in_the_memberships(memberships, data):
     k = data.draw(st.integers(0, len(memberships) - 1))
     more = data.draw(st.floats(memberships[k], 1.0))
     arbiter = Arbiter(criteria(len(memberships)))
@@ -274,7 +274,7 @@ def test_more_of_a_criterion_is_never_less_weight_for_it_nor_more_for_those_belo
 
 @settings(max_examples=examples(100), deadline=None)
 @given(st.lists(st.floats(0.0, 1.0), min_size=3, max_size=12), st.randoms())
-def test_the_lowest_weight_does_not_care_for_the_order_of_those_above(memberships, random):
+def test_lowest_weight_is_symmetric_in_higher_criteria(memberships, random):
     *above, last = memberships
     shuffled = random.sample(above, len(above))
     arbiter = Arbiter(criteria(len(memberships)))
@@ -282,7 +282,7 @@ def test_the_lowest_weight_does_not_care_for_the_order_of_those_above(membership
 
 
 @given(st.integers(1, 12), st.data())
-def test_crisp_inputs_give_the_floor_to_the_first_that_asks(n, data):
+def test_crisp_inputs_give_full_weight_to_the_first_active_criterion(n, data):
     asks = data.draw(st.lists(st.booleans(), min_size=n, max_size=n))
     first = asks.index(True) if True in asks else None
     assert Arbiter(criteria(n))(list(map(float, asks))) == tuple(float(k == first) for k in range(n))
@@ -297,7 +297,7 @@ def test_weights_rise_smoothly():
     assert max(slopes[0], slopes[-1]) < 0.01
 
 
-def test_a_shape_with_a_plateau_below_one():
+def test_shape_with_a_plateau_below_one_is_exact():
     low, high = Shape(((0, 0.5), (0.5, 0.5), (1, 0))), Shape(((0, 0), (0.5, 0.25), (1, 1)))
     output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
     arbiter = Arbiter(criteria(2), weight=output)
@@ -307,7 +307,7 @@ def test_a_shape_with_a_plateau_below_one():
 
 
 @pytest.mark.slow
-def test_a_proof_that_would_be_too_long_is_given_up_soon():
+def test_closed_form_search_is_bounded():
     """Two disjunctions of 400 clauses each, joined by *and*: 160,000 clauses, none of which is in another."""
     names = [f"v{i}" for i in range(60)]
     variables = tuple(Variable(name, (0, 1), (Term("off", falling(0, 1)), Term("on", rising(0, 1)))) for name in names)
@@ -338,7 +338,7 @@ ONLY_ON = OFF_ON[1:]
     ],
     ids=["negated", "beyond the degrees", "in another order"],
 )
-def test_degrees_that_are_not_the_inputs_as_they_come(names, terms, universe, rules):
+def test_closed_form_covers_nonlinear_input_terms(names, terms, universe, rules):
     outputs = tuple(Output(y, (0, 1), (Term("low", falling(0, 1)), Term("high", rising(0, 1)))) for y in "yz")
     conclusions = ("y is high", "y is low", "z is high", "z is low")
     variables = tuple(Variable(name, universe, terms) for name in names)
@@ -352,7 +352,7 @@ def test_degrees_that_are_not_the_inputs_as_they_come(names, terms, universe, ru
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_terms_of_which_only_one_is_the_other_s_complement_to_the_last_bit(order):
+def test_inexact_complements_have_no_closed_form(order):
     """Beside 1e-20 the other has 1."""
     terms = (Term("on", Shape(((0, 1e-20), (1, 1)))), Term("off", falling(0, 1)))[::order]
     output = Output("y", (0, 1), (Term("low", falling(0, 1)), Term("high", rising(0, 1))))
@@ -361,7 +361,7 @@ def test_terms_of_which_only_one_is_the_other_s_complement_to_the_last_bit(order
     assert "'low' is not 1 minus that of 'high'" in arbiter.engine_reason
 
 
-def test_rules_that_add_nothing_hinder_no_closed_form():
+def test_redundant_rules_do_not_prevent_a_closed_form():
     output = Output("y", (0, 1), OFF_ON)
     variables = tuple(Variable(name, (0, 1), OFF_ON) for name in "ab")
     rules = ("if a is on then y is on", "if b is on and a is on then y is on", "if a is off then y is off")

@@ -33,7 +33,7 @@ EPS = np.finfo(float).eps
 @pytest.mark.medium
 @settings(max_examples=examples(150), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(systems(), st.data())
-def test_it_is_the_exact_centroid_of_any_system(system, data):
+def test_centroid_is_exact_for_any_system(system, data):
     inputs = [data.draw(st.floats(0.0, 1.0)) for _ in system.inputs]
     exact = reference.centroids(system, inputs)
     arbiter = Arbiter(system=system, engine="exact")
@@ -42,7 +42,7 @@ def test_it_is_the_exact_centroid_of_any_system(system, data):
     assert np.array_equal(arbiter.batch([inputs])[0], arbiter(inputs), equal_nan=True)
 
 
-def test_the_tipping_answer():
+def test_tipping_example_is_exact():
     """Of scikit-fuzzy's example, whose exact centroid is 12118694/610275."""
     poor, middling, good = triangle(0, 0, 5), triangle(0, 5, 10), triangle(5, 10, 10)
     words = (Term("poor", poor), Term("average", middling), Term("good", good))
@@ -62,7 +62,7 @@ def test_the_tipping_answer():
 
 
 @pytest.mark.parametrize("implication", ["min", "prod"])
-def test_degrees_next_to_nothing_do_not_underflow(implication):
+def test_tiny_degrees_do_not_underflow(implication):
     """As both cuts vanish alike, the centroid goes to the middle of the joined supports."""
     output = Output("y", (0, 1), (Term("low", falling(0, 1)), Term("high", rising(0, 1))))
     rules = ("if x is on then y is low", "if x is on then y is high")
@@ -76,8 +76,8 @@ def test_degrees_next_to_nothing_do_not_underflow(implication):
 
 @settings(max_examples=examples(150), deadline=None)
 @given(st.lists(shapes(), min_size=1, max_size=4), st.data(), st.booleans())
-def test_cuts_of_any_size(terms, data, scaled):
-    """The sweep and its batch at cuts that are next to nothing, alone or beside others."""
+def test_cuts_of_any_size_are_exact(terms, data, scaled):
+    """The sweep and its batch at tiny cuts, alone or beside others."""
     sizes = st.one_of(st.just(0.0), st.floats(0.0, 1.0), st.floats(-300.0, 0.0).map(lambda x: 10.0**x))
     cuts = [data.draw(sizes) for _ in terms]
     cuts[0] = cuts[0] or 1e-17
@@ -91,7 +91,7 @@ def test_cuts_of_any_size(terms, data, scaled):
 
 
 @pytest.mark.parametrize("cut", [1e-6, 1e-9, 1e-12, 1e-17, 1e-60, 1e-200, 5e-324])
-def test_a_term_alone_has_its_middle_however_low_it_is_cut(cut):
+def test_single_symmetric_term_has_its_center_at_any_cut(cut):
     output = Output("y", (0, 1), (Term("mid", triangle(0, 0.5, 1)),))
     inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
     arbiter = Arbiter(system=System(inputs, (output,), ("if x is on then y is mid",), normalization="none"))
@@ -99,7 +99,7 @@ def test_a_term_alone_has_its_middle_however_low_it_is_cut(cut):
     assert arbiter.batch([[cut]])[0].tolist() == list(arbiter([cut]))
 
 
-def test_lines_whose_slopes_differ_by_less_than_rounding():
+def test_nearly_parallel_lines_are_exact():
     almost = Shape(((0, 1), (1, 1e-20)))
     output = Output("y", (0, 1), (Term("a", falling(0, 1)), Term("b", almost), Term("c", rising(0, 1))))
     inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
@@ -110,7 +110,7 @@ def test_lines_whose_slopes_differ_by_less_than_rounding():
         assert arbiter.batch([[1.0]])[0].tolist() == list(arbiter([1.0]))
 
 
-def test_an_output_of_one_centroid_cannot_be_scaled():
+def test_output_with_one_centroid_cannot_be_normalized():
     output = Output("y", (0, 1), (Term("any", triangle(0, 0.5, 1)),))
     system = System((Variable("x", (0, 1), (Term("on", rising(0, 1)),)),), (output,), ("if x is on then y is any",))
     system = replace(system, normalization="range")
@@ -118,7 +118,7 @@ def test_an_output_of_one_centroid_cannot_be_scaled():
         Arbiter(system=system)
 
 
-def test_a_default_stands_where_no_rule_fires():
+def test_default_is_used_if_no_rule_fires():
     output = Output("y", (0, 10), (Term("a", falling(0, 5)), Term("b", rising(5, 10))), default=7.0)
     inputs = (Variable("x", (0, 1), (Term("on", rising(0.5, 1)),)),)
     rules = ("if x is on then y is b",)
@@ -130,7 +130,7 @@ def test_a_default_stands_where_no_rule_fires():
 
 
 @pytest.mark.parametrize(("default", "weight"), [(0.5, 0.0), (9.5, 1.0)])
-def test_a_default_beyond_the_terms_is_a_weight_even_so(default, weight):
+def test_default_outside_the_terms_gives_a_weight_in_range(default, weight):
     output = Output("y", (0, 10), (Term("a", falling(0, 5)), Term("b", rising(5, 10))), default=default)
     inputs = (Variable("x", (0, 1), (Term("on", rising(0.5, 1)),)),)
     arbiter = Arbiter(system=System(inputs, (output,), ("if x is on then y is b",), normalization="range"))
@@ -138,14 +138,14 @@ def test_a_default_beyond_the_terms_is_a_weight_even_so(default, weight):
     assert arbiter.batch([[0.25], [1.0]])[:, 0].tolist() == [weight, 1.0]
 
 
-def test_of_many_rows_those_without_a_firing_rule_are_nan():
+def test_batch_rows_without_a_firing_rule_are_nan():
     output = Output("y", (0, 1), (Term("a", falling(0, 1)), Term("b", rising(0, 1))))
     inputs = (Variable("x", (0, 1), (Term("on", rising(0.5, 1)),)),)
     arbiter = Arbiter(system=System(inputs, (output,), ("if x is on then y is b",)))
     assert np.isnan(arbiter.batch([[1.0], [0.75], [0.25], [0.1]])[:, 0]).tolist() == [False, False, True, True]
 
 
-def test_shapes_that_jump():
+def test_discontinuous_shapes_are_integrated_exactly():
     """A box clipped at 1/2 is a box: its centroid is the middle."""
     output = Output("y", (0, 10), (Term("box", Shape(((2, 0), (2, 1), (5, 1), (5, 0)))), Term("b", rising(9, 10))))
     inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)

@@ -1,4 +1,4 @@
-"""The grid engine gives what scikit-fuzzy gives, whatever the number of points."""
+"""The grid engine equals scikit-fuzzy at any number of points."""
 
 import itertools
 import pickle
@@ -107,7 +107,7 @@ def random_engines(rng, points):
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("points", [3, 10, 11, 101, 1001])
-def test_any_output_at_any_cuts_is_as_scikit_fuzzy_has_it(points):
+def test_centroid_equals_scikit_fuzzy(points):
     rng = np.random.default_rng(points)
     for _ in range(40 if points < 1001 else 8):
         grid, scikit, cuts = random_engines(rng, points)
@@ -121,7 +121,7 @@ def test_any_output_at_any_cuts_is_as_scikit_fuzzy_has_it(points):
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("points", [3, 10, 37])
-def test_any_output_at_any_cuts_is_to_rounding_what_scikit_fuzzy_means(points):
+def test_centroid_matches_the_scikit_fuzzy_formula_to_rounding(points):
     rng = np.random.default_rng(points)
     for _ in range(25):
         grid, _, cuts = random_engines(rng, points)
@@ -134,7 +134,7 @@ def test_any_output_at_any_cuts_is_to_rounding_what_scikit_fuzzy_means(points):
 @pytest.mark.parametrize(
     "system", [prioritised(), mixed(), mixed("prod", "probor", 37), mixed("min", "probor", 100), TIPPING, gap(5.5)]
 )
-def test_any_system_is_as_scikit_fuzzy_has_it(system):
+def test_any_system_equals_scikit_fuzzy(system):
     grid, scikit = GridEngine(system), ScikitEngine(system)
     low, high = np.array([v.universe for v in system.inputs]).T
     rows = low + (high - low) * np.random.default_rng(5).random((40, len(low)))
@@ -171,7 +171,7 @@ def test_section_vi_is_off_the_exact_centroid_by_a_sixth_of_the_squared_step_at_
 
 
 @pytest.mark.parametrize("points", [11, 101, 1001])
-def test_scikit_fuzzy_itself_keeps_the_bound(points):
+def test_scikit_fuzzy_satisfies_the_error_bound(points):
     step = 1 / (points - 1)
     engine = ScikitEngine(prioritised(points=points))
     for h in np.random.default_rng(points).random(40):
@@ -180,7 +180,7 @@ def test_scikit_fuzzy_itself_keeps_the_bound(points):
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 4097])
-def test_a_sample_of_a_batch_is_to_the_last_bit_what_it_is_alone(n):
+def test_batch_rows_equal_single_samples_bit_for_bit(n):
     engine = GridEngine(one_output(TIP, 40))
     cuts = np.random.default_rng(n).random((3, n))
     found = engine.centroid_of_many(0, cuts).tolist()
@@ -188,7 +188,7 @@ def test_a_sample_of_a_batch_is_to_the_last_bit_what_it_is_alone(n):
     assert found[-3:] == [engine.centroid(0, column) for column in cuts.T.tolist()[-3:]]
 
 
-def test_a_term_that_hardly_rises():
+def test_nearly_flat_term_is_evaluated():
     flat = Output("y", (0, 1), (Term("a", Shape(((0, 0), (1, 1e-310)))), Term("b", triangle(0, 0.5, 1))))
     engine = GridEngine(one_output(flat, 11))
     cuts = np.array([[1.0, 0.3], [0.7, 0.2]])
@@ -215,7 +215,7 @@ def test_the_cost_does_not_grow_with_the_points():
     assert len(sizes[100_001]) <= 12
 
 
-def test_areas_below_the_least_are_divided_by_it_as_scikit_fuzzy_does():
+def test_tiny_areas_are_floored_as_in_scikit_fuzzy():
     system = one_output(WEIGHT, 11)
     cuts = [0.0, 1e-17]
     theirs = ScikitEngine(system).centroid(0, cuts)
@@ -232,7 +232,7 @@ def test_a_jump_of_an_input_is_exact_and_of_an_output_a_slope_over_one_cell():
     assert engine.centroids([0.5])[0] == pytest.approx((0.05 * (0.4 + 0.2 / 3) + 0.5 * 0.75) / 0.55)
 
 
-def test_what_scikit_fuzzy_cannot_run_is_refused_by_name():
+def test_systems_unsupported_by_scikit_fuzzy_are_rejected_by_name():
     with pytest.raises(EngineError, match="'grid': implication is 'prod'"):
         GridEngine(System(TIPPING.inputs, TIPPING.outputs, TIPPING.rules, implication="prod"))
     with pytest.raises(EngineError, match="'thin' is 0 at all 11 points"):

@@ -58,7 +58,7 @@ def sampled(output, cuts, implications, points=500_000):
 @pytest.mark.medium(fast=4)
 @pytest.mark.parametrize("implication", ["min", "prod", "einstein_product", "hamacher_product"])
 @pytest.mark.parametrize("aggregation", ["max", "probor", "sum", "einstein_sum", "hamacher_sum", "bounded_sum"])
-def test_a_centroid_is_what_sampling_tends_to(implication, aggregation):
+def test_centroid_is_the_limit_of_dense_sampling(implication, aggregation):
     output = Output("y", (0, 10), TERMS, aggregation=aggregation)
     engine = ExactEngine(system(output, implication))
     cuts = [0.9, 0.35, 0.6, 0.75]
@@ -68,7 +68,7 @@ def test_a_centroid_is_what_sampling_tends_to(implication, aggregation):
     assert "within 1e-09" in engine.methods["y"]
 
 
-def test_a_centroid_is_that_of_scipy_between_known_bends():
+def test_centroid_matches_scipy_quadrature():
     """Of a Gaussian, clipped where it is known to meet its cut, and a logistic curve by its antiderivative."""
     output = Output("y", (0, 10), (Term("a", curve("gaussian", 4.0, 1.5)),))
     reach = 1.5 * math.sqrt(-2 * math.log(0.6))
@@ -124,7 +124,7 @@ def area_of(shape, cut):
 
 @settings(max_examples=examples(40), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(shapes(), min_size=1, max_size=3), st.data())
-def test_on_straight_terms_it_gives_what_the_sweep_gives(drawn, data):
+def test_piecewise_linear_terms_match_the_exact_sweep(drawn, data):
     """Which is rational, see test_exact."""
     output = Output("y", (0.0, 1.0), tuple(Term(f"t{j}", shape) for j, shape in enumerate(drawn)))
     cuts = [data.draw(st.integers(1, 16)) / 16 for _ in drawn]
@@ -138,7 +138,7 @@ def test_on_straight_terms_it_gives_what_the_sweep_gives(drawn, data):
 @pytest.mark.parametrize("aggregation", ["max", "probor", "sum", "drastic_sum", "nilpotent_maximum", "normalized_sum"])
 @pytest.mark.parametrize("implication", ["min", "prod", "bounded_difference", "drastic_product", "nilpotent_minimum"])
 @pytest.mark.parametrize("defuzzifier", ["centroid", "bisector", "mom", "som", "lom"])
-def test_every_defuzzifier_is_what_sampling_tends_to(defuzzifier, implication, aggregation):
+def test_every_defuzzifier_is_the_limit_of_dense_sampling(defuzzifier, implication, aggregation):
     output = Output("y", (0, 10), TERMS, None, defuzzifier, aggregation)
     cuts = [0.9, 0.35, 0.6, 0.75]
     x, y = sampled(output, cuts, [implication] * 4, 40_000)
@@ -158,7 +158,7 @@ def test_every_defuzzifier_is_what_sampling_tends_to(defuzzifier, implication, a
 @pytest.mark.parametrize(
     ("defuzzifier", "value"), [("bisector", 5 - math.sqrt(0.5)), ("mom", 4.0), ("som", 4.0), ("lom", 4.0)]
 )
-def test_a_triangle_alone_has_what_geometry_says(defuzzifier, value):
+def test_defuzzified_triangle_matches_geometry(defuzzifier, value):
     # a right triangle of the legs 6 and 1, standing at 4, has half its area beyond 4 + 6 (1 - sqrt(1/2))
     value = 4 + 6 * (1 - math.sqrt(0.5)) if defuzzifier == "bisector" else value
     output = Output("y", (0, 10), (Term("t", triangle(4.0, 4.0, 10.0)),), None, defuzzifier)
@@ -177,14 +177,14 @@ def test_between_two_equal_halves_the_bisector_is_in_the_middle_of_the_gap():
     assert ExactEngine(system(output)).centroids([0.7, 0.7])[0] == pytest.approx(5.0, abs=1e-9)
 
 
-def test_singletons_count_where_nothing_else_fires():
+def test_singletons_count_only_if_no_area_fires():
     terms = (Term("a", curve("singleton", 2.0)), Term("b", curve("singleton", 8.0)), Term("c", triangle(3, 4, 5)))
     engine = ExactEngine(system(Output("y", (0, 10), terms)))
     assert engine.centroids([0.25, 0.75, 0.0])[0] == pytest.approx(6.5)
     assert engine.centroids([1.0, 1.0, 0.5])[0] == pytest.approx(4.0)
 
 
-def test_rules_of_two_blocks_bound_by_their_own_implication():
+def test_rule_blocks_use_their_own_implication():
     output = Output("y", (0, 10), TERMS[:2])
     blocks = [Operators(implication="prod"), Operators(implication="min")]
     x, y = sampled(output, [0.5, 0.5], ["prod", "min"])
@@ -202,14 +202,14 @@ def test_one_term_concluded_twice_counts_twice_in_a_sum():
     assert ExactEngine(most).centroids([0.5, 0.5])[0] == pytest.approx(5.0)
 
 
-def test_batches_give_what_samples_give():
+def test_batches_equal_single_samples():
     made = system(Output("y", (0, 10), TERMS))
     rows = np.random.default_rng(0).random((20, 4))
     engine = ExactEngine(made)
     assert engine.centroids_of_many(rows)[:, 0].tolist() == [engine.centroids(row)[0] for row in rows.tolist()]
 
 
-def test_what_has_no_area_has_no_value():
+def test_zero_area_gives_nan():
     output = Output("y", (0, 10), (Term("a", falling(0, 10)),))
     made = system(output, "bounded_difference")
     assert ExactEngine(made).centroids([1.0])[0] == pytest.approx(10 / 3)
@@ -218,13 +218,13 @@ def test_what_has_no_area_has_no_value():
     assert math.isnan(ExactEngine(low).centroids([0.25])[0])
 
 
-def test_what_is_too_rough_is_refused():
+def test_unintegrable_terms_are_rejected():
     output = Output("y", (0, 1), (Term("a", Formula("0.5 + 0.5 * sin(1e6 * x * x)")),))
     with pytest.raises(EngineError, match="output 'y': its joined terms are too rough to be integrated to 1e-09"):
         ExactEngine(system(output)).centroids([0.6])
 
 
-def test_the_arbiter_says_how_each_output_is_evaluated():
+def test_arbiter_names_the_evaluation_method_of_each_output():
     made = system(Output("y", (0, 10), TERMS))
     assert Arbiter(system=made).engine_reason.endswith("'y': adaptive quadrature, within 1e-09 of the universe's width")
     straight = system(Output("y", (0, 10), TERMS[3:]))
@@ -233,7 +233,7 @@ def test_the_arbiter_says_how_each_output_is_evaluated():
 
 
 @pytest.mark.parametrize("cut", [1.0, 1e-3, 1e-20])
-def test_where_rules_hardly_fire_the_greatest_places_are_still_the_peaks(cut):
+def test_maximum_defuzzifiers_work_at_tiny_firing_strengths(cut):
     terms = (Term("a", triangle(0, 1, 2)), Term("b", triangle(1, 2, 3)))
     made = system(Output("y", (0, 10), terms, None, "mom"), "prod")
     assert ExactEngine(made).centroids([cut, cut])[0] == pytest.approx(1.5, abs=1e-9)

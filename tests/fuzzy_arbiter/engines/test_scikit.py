@@ -1,4 +1,4 @@
-"""The engine that is scikit-fuzzy gives what scikit-fuzzy gives, and has none of its traps."""
+"""The scikit-fuzzy engine equals scikit-fuzzy and avoids its known defects."""
 
 import gc
 import multiprocessing
@@ -149,7 +149,7 @@ def sizes():
     ],
     ids=lambda system: f"{system.name}, {len(system.rules)} rules, {system.conjunction}, {system.disjunction}",
 )
-def test_all_of_it_is_what_stock_scikit_fuzzy_gives_to_the_last_bit(system):
+def test_engine_equals_stock_scikit_fuzzy_bit_for_bit(system):
     engine, built = ScikitEngine(system), stock(system)
     rng = np.random.default_rng(1)
     low, high = np.array([v.universe for v in system.inputs]).T
@@ -162,7 +162,7 @@ def test_all_of_it_is_what_stock_scikit_fuzzy_gives_to_the_last_bit(system):
 
 
 @pytest.mark.slow
-def test_many_evaluations_forget_no_input():
+def test_repeated_evaluations_keep_all_inputs():
     """scikit-fuzzy forgets all inputs when it clears its cache, after 1000 runs."""
     engine = ScikitEngine(prioritised(points=3))
     first = engine.centroids([0.1, 0.25, 0.75])
@@ -186,7 +186,7 @@ def gap(default=None):
     return System((x,), (y,), (Rule(x["a"], y["a"]), Rule(x["b"], y["b"])), normalization="none")
 
 
-def test_an_output_for_which_no_rule_fires_is_never_an_earlier_value():
+def test_output_without_a_firing_rule_is_never_stale():
     engine = ScikitEngine(gap())
     for _ in range(2):
         assert engine.centroids([1.0])[0] == pytest.approx(5.2)
@@ -195,7 +195,7 @@ def test_an_output_for_which_no_rule_fires_is_never_an_earlier_value():
     assert ScikitEngine(gap(default=5.5)).centroids_of_many(np.array([[5.0], [1.0]]))[:, 0] == pytest.approx([5.5, 5.2])
 
 
-def test_a_batch_is_its_rows_and_may_be_empty():
+def test_batch_equals_its_rows_and_may_be_empty():
     engine = ScikitEngine(mixed())
     rows = np.random.default_rng(3).random((20, 2)) * 10
     assert engine.centroids_of_many(rows).tolist() == [engine.centroids(row) for row in rows.tolist()]
@@ -235,7 +235,7 @@ def test_a_batch_is_its_rows_and_may_be_empty():
         ),
     ],
 )
-def test_what_scikit_fuzzy_cannot_run_is_refused_by_name(system, words):
+def test_systems_unsupported_by_scikit_fuzzy_are_rejected_by_name(system, words):
     with pytest.raises(EngineError, match=words):
         ScikitEngine(system)
 
@@ -267,7 +267,7 @@ def test_threads_do_not_disturb_each_other():
 
 
 @pytest.mark.slow
-def test_nothing_of_an_engine_or_of_a_thread_stays():
+def test_engines_and_threads_leak_no_memory():
     """scikit-fuzzy keeps each system that was ever run, 51 KB of it, in dictionaries of its classes."""
     system = prioritised(points=11)
 
@@ -294,7 +294,7 @@ def test_nothing_of_an_engine_or_of_a_thread_stays():
     assert growth < 51_000
 
 
-def test_nothing_of_a_run_stays():
+def test_evaluations_leak_no_state():
     engine = ScikitEngine(prioritised(points=3))
     engine.weights([0.1, 0.2, 0.3])
     before = sizes()
@@ -306,7 +306,7 @@ def test_nothing_of_a_run_stays():
         assert all(len(kept._sim_data) == 1 for key, kept in state.data.items() if key in mine)
 
 
-def test_results_that_are_remembered_are_few(monkeypatch):
+def test_result_cache_is_bounded(monkeypatch):
     monkeypatch.setattr("fuzzy_arbiter.engines.scikit._REMEMBERED", 5)
     engine = ScikitEngine(prioritised(points=3))
     for x in np.linspace(0, 1, 23):
@@ -332,7 +332,7 @@ def test_an_engine_can_be_sent_to_another_process_and_forked():
 
 
 @pytest.mark.slow
-def test_no_warning_of_scikit_fuzzy_reaches_a_run():
+def test_scikit_fuzzy_warnings_are_suppressed():
     code = (
         "from fuzzy_arbiter import prioritised; from fuzzy_arbiter.engines.scikit import ScikitEngine;"
         "print(ScikitEngine(prioritised()).weights([1, 0, 0]))"

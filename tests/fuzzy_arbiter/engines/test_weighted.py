@@ -1,4 +1,4 @@
-"""Values: Sugeno's and Tsukamoto's outputs, against sums worked out here; defaults, locks, chains, hedges."""
+"""Weighted outputs of Sugeno and Tsukamoto, against sums computed here; defaults, locks, chains, hedges."""
 
 import math
 from dataclasses import replace
@@ -45,7 +45,7 @@ def test_values_are_weighted_by_the_strengths_of_their_rules(defuzzifier, aggreg
     assert "'y': weighted values, to rounding" in arbiter.engine_reason
 
 
-def test_a_formula_speaks_of_inputs_and_of_outputs_before():
+def test_formula_may_use_inputs_and_earlier_outputs():
     first = Output("u", (0, 10), (Term("t", Formula("x * x")),), None, "average", "sum")
     second = Output("v", (0, 10), (Term("t", Formula("abs(u - z)")),), None, "average", "sum")
     made = System((X, Z), (first, second), ("if x is any then u is t and v is t",), normalization="none")
@@ -57,7 +57,7 @@ def test_a_formula_speaks_of_inputs_and_of_outputs_before():
         System((X, Z), (second, first), ("if x is any then u is t and v is t",), normalization="none")
 
 
-def test_tsukamoto_takes_the_place_that_has_the_strength():
+def test_tsukamoto_inverts_the_term_at_the_rule_strength():
     made = output(rising(0.0, 50.0), curve("sigmoid", 20.0, -2.0), falling(-10.0, 10.0))
     arbiter = Arbiter(
         system=system(made, "if x is low then y is t0", "if x is high then y is t1 ", "if x is high then y is t2")
@@ -75,7 +75,7 @@ def test_tsukamoto_takes_the_place_that_has_the_strength():
         output(Constant(1.0), defuzzifier="centroid")
 
 
-def test_where_there_is_no_value_there_is_the_default_or_none():
+def test_undefined_value_gives_the_default_or_nan():
     made = output(Formula("1 / (x - 5)"))
     arbiter = Arbiter(system=system(made, "if x is high then y is t0"))
     assert arbiter([9.0, 0.0]) == (0.25,)
@@ -85,7 +85,7 @@ def test_where_there_is_no_value_there_is_the_default_or_none():
     assert settled.batch([[5.0, 0.0], [9.0, 0.0], [0.0, 0.0]])[:, 0].tolist() == [-1.0, 0.25, -1.0]
 
 
-def test_a_locked_value_stays_in_its_range_or_at_the_one_before():
+def test_locked_output_is_clipped_or_holds_its_previous_value():
     held = replace(output(Constant(150.0)), lock_range=True)
     assert Arbiter(system=system(held, "if x is high then y is t0"))([9.0, 0.0]) == (100.0,)
     kept = replace(output(Linear((1.0, 0.0))), lock_previous=True, default=-1.0)
@@ -97,7 +97,7 @@ def test_a_locked_value_stays_in_its_range_or_at_the_one_before():
     assert np.isnan(free.batch(rows)[:, 0]).tolist() == [True, False, False, False, False]
 
 
-def test_a_condition_may_ask_for_an_output_of_the_rules_before():
+def test_conditions_may_use_earlier_outputs():
     power = Output("power", (0, 1), (Term("less", falling(0, 1)), Term("more", rising(0, 1))))
     made = System(
         (X,),
@@ -129,7 +129,7 @@ def test_a_condition_may_ask_for_an_output_of_the_rules_before():
         (Not(Anything("x")), 0.0),
     ],
 )
-def test_hedges_bend_strengths(condition, degree):
+def test_hedges_modify_strengths(condition, degree):
     made = output(Constant(1.0), defuzzifier="sum", default=0.0)
     arbiter = Arbiter(system=system(made, Rule(condition, (Is("y", "t0"),))))
     assert arbiter([4.0, 0.0]) == pytest.approx((degree,), abs=1e-15)
@@ -137,7 +137,7 @@ def test_hedges_bend_strengths(condition, degree):
     assert Arbiter(system=system(made, str(arbiter.system.rules[0]))).system == arbiter.system
 
 
-def test_an_input_without_terms_is_one_that_values_speak_of():
+def test_input_without_terms_is_allowed_only_in_formulas():
     bare = Variable("w", (0, 1), ())
     made = output(Linear((0.0, 0.0, 1.0)))
     whole = System((X, Z, bare), (made,), ("if x is any then y is t0",), normalization="none")
@@ -154,7 +154,7 @@ def test_values_of_inputs_leave_no_range_to_normalize():
     assert Arbiter(system=replace(two, normalization="range"))([2.5, 0.0]) == pytest.approx((0.25,))
 
 
-def test_engines_and_checks_that_know_only_plain_systems_say_so():
+def test_engines_and_verification_reject_weighted_systems():
     made = system(output(Constant(2.0)), "if x is low then y is t0")
     for engine in ("closed", "grid", "skfuzzy"):
         with pytest.raises(EngineError, match=f"engine '{engine}': output 'y' has the defuzzifier average"):

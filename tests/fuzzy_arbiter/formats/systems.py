@@ -173,7 +173,7 @@ def conditions(draw, inputs, plain):
 
 @st.composite
 def systems(draw, plain=False):
-    """Any system; plain ones are those that every format can say."""
+    """Any system; every format supports plain ones."""
     names = st.sampled_from(WORDS if plain or draw(st.integers(0, 3)) else NAMES)
     found = draw(st.lists(names, min_size=2, max_size=4, unique_by=str.lower))
     cut = draw(st.integers(1, len(found) - 1))

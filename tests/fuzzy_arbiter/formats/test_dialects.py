@@ -1,4 +1,4 @@
-"""What jFuzzyLogic, fuzzylite, MATLAB and Octave write beyond the standard, in their manner."""
+"""The dialects of jFuzzyLogic, fuzzylite, MATLAB and Octave beyond the standard."""
 
 import math
 
@@ -30,7 +30,7 @@ END_FUNCTION_BLOCK
 """
 
 
-def test_jfuzzylogics_functions_and_what_it_takes_where_nothing_is_said():
+def test_jfuzzylogic_functions_and_defaults_are_read():
     system = reads(JFUZZYLOGIC, "fcl")
     of = {term.name: term.shape for term in system.inputs[0].terms}
     assert of["a"](2.5) == pytest.approx((math.cos(math.pi / 2) + 1) / 2)
@@ -95,7 +95,7 @@ END_FUNCTION_BLOCK
 """
 
 
-def test_fuzzylites_dialect_of_fcl():
+def test_fuzzylite_dialect_of_fcl_is_read():
     system = reads(FUZZYLITE, "fcl")
     y, u = system.outputs
     assert system.name == "my - fan"
@@ -155,7 +155,7 @@ def fis(rule="1 1, 1 (1) : 1", head="", type="sugeno", method="wtaver", function
     return reads(head + FIS.format(rule=rule, type=type, method=method, function=function), "fis")
 
 
-def test_matlabs_functions():
+def test_matlab_functions_are_read():
     system = fis()
     a, b, c, d, e, f = (term.shape for term in system.inputs[0].terms)
     assert system.inputs[0].universe == (-math.pi, math.pi / 2)
@@ -206,7 +206,7 @@ def test_hedges_are_fractions(rule, head, said):
         ({"function": "trimf',[0 1 2]"}, "'mf1' is no value, nor does it only rise or only fall"),
     ],
 )
-def test_what_fis_cannot_mean_is_refused(options, fault):
+def test_invalid_fis_options_are_rejected(options, fault):
     with pytest.raises((FormatError, DefinitionError), match=fault):
         fis(**options)
 
@@ -219,7 +219,7 @@ def test_what_fis_cannot_mean_is_refused(options, fault):
         ("gaussmf',[0.2 1]", 0.8, 1.0 - math.exp(-0.5)),
     ],
 )
-def test_what_is_concluded_not_to_be_is_a_complement(function, at, degree):
+def test_negated_conclusion_becomes_a_complement_term(function, at, degree):
     system = fis("1 1, -2 (1) : 1", type="mamdani", method="centroid", function=function)
     output = system.outputs[0]
     assert (str(system.rules[0]), output.term_names) == (
@@ -228,12 +228,12 @@ def test_what_is_concluded_not_to_be_is_a_complement(function, at, degree):
     assert output.terms[2].shape(at) == pytest.approx(degree)
 
 
-def test_a_complement_of_a_curve_in_pieces_is_refused():
+def test_complement_of_a_piecewise_curve_is_rejected():
     with pytest.raises(DefinitionError, match=r"line 32: .*the complement of this function is not known"):
         fis("1 1, -1 (1) : 1", type="mamdani", method="centroid", function="smf',[0 1]")
 
 
-def test_octave_joins_strengths_by_its_aggregation_and_matlab_adds_them():
+def test_octave_aggregates_strengths_and_matlab_sums_them():
     text = FIS.replace("[System]", "[System]\nAggMethod='max'")
     both = text.format(rule="1 1, 1 (1) : 1", type="sugeno", method="wtaver", function="constant',[1]")
     assert reads(both, "fis").outputs[0].aggregation == "sum"
@@ -262,13 +262,13 @@ def test_fuzzylite_5_adds_keys_to_outputs(keys, expected):
         reads(text.replace("[Input2]", "[Input2]\nEnabled=0"), "fis")
 
 
-def test_hybrid_files_have_sets_and_values():
+def test_hybrid_systems_are_read():
     assert fis(type="hybrid", method="centroid", function="constant',[0.5]").outputs[0].defuzzifier == "average"
     assert fis(type="hybrid", method="bisector", function="trimf',[0 0.5 1]").outputs[0].defuzzifier == "bisector"
     assert fis(type="tsukamoto", function="rampmf',[0 1]").outputs[0].weighted
 
 
-def test_fuzzylite_5_has_other_words():
+def test_fuzzylite_5_keywords_are_read():
     text = """Engine: old
 InputVariable: x
   range: 0.000 1.000

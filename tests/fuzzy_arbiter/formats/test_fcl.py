@@ -1,4 +1,4 @@
-"""The Fuzzy Control Language: what others write, and what is refused."""
+"""The Fuzzy Control Language: foreign files, and rejected content."""
 
 from dataclasses import replace
 
@@ -50,7 +50,7 @@ END_FUNCTION_BLOCK
 """
 
 
-def test_a_block_of_others_is_read():
+def test_foreign_function_block_is_read():
     system = reads(OTHERS, "fcl")
     assert system.name == "tipper"
     assert [v.universe for v in (*system.inputs, *system.outputs)] == [(0, 9), (0, 9), (0, 30)]
@@ -71,7 +71,7 @@ def test_several_rule_blocks_of_like_operators_are_one():
         reads(text.replace("OR : MAX; ACCU : MAX", "OR : MAX; ACCU : BSUM"), "fcl")
 
 
-def test_rules_of_a_block_of_other_operators_keep_them():
+def test_rules_keep_the_operators_of_their_block():
     parts = OTHERS.split("    RULE 2")
     text = f"{parts[0]}END_RULEBLOCK RULEBLOCK No2 OR : ASUM; ACT : PROD; ACCU : MAX;    RULE 2{parts[1]}"
     system = reads(text, "fcl")
@@ -80,13 +80,13 @@ def test_rules_of_a_block_of_other_operators_keep_them():
     assert reads(writes(system, "fcl"), "fcl") == system
 
 
-def test_accumulation_may_be_said_of_each_output():
+def test_accumulation_may_be_set_per_output():
     moved = OTHERS.replace("ACCU : MAX;", "").replace("METHOD : COG;", "METHOD : COG; ACCU : MAX;")
     assert moved != OTHERS
     assert reads(moved, "fcl") == reads(OTHERS, "fcl")
 
 
-def test_a_range_may_be_said_without_the_sign_of_assignment():
+def test_range_may_omit_the_assignment_operator():
     text = writes(TIPPING, "fcl")
     assert reads(text.replace("RANGE := (", "RANGE ("), "fcl") == TIPPING
 
@@ -100,12 +100,12 @@ def test_a_range_may_be_said_without_the_sign_of_assignment():
         ("", ("min", "max", "min")),
     ],
 )
-def test_an_operator_that_is_not_said_is_the_one_of_its_pair(operators, norms):
+def test_missing_operator_is_the_dual_of_the_given_one(operators, norms):
     system = reads(OTHERS.replace("AND : MIN;\n    ACT : MIN;", operators), "fcl")
     assert (system.conjunction, system.disjunction, system.implication) == norms
 
 
-def test_a_range_of_an_input_stands_at_its_declaration_only_where_its_points_do_not_make_it():
+def test_input_range_is_written_only_if_not_implied_by_its_points():
     assert "RANGE" not in writes(prioritised(), "fcl").split("END_VAR")[0]
     wide = replace(TIPPING.inputs[0], universe=(-1.5, 10))
     text = writes(replace(TIPPING, inputs=(wide, TIPPING.inputs[1])), "fcl")
@@ -169,7 +169,7 @@ def test_numbers_are_those_of_the_standard():
         ("TRIAN 0 5 10;", "TRIAN 40 45 50; RANGE := (0 .. 30);", r"line 19: .*term 'cheap' has no area"),
     ],
 )  # fmt: skip
-def test_what_is_not_known_is_refused_with_its_line(old, new, fault):
+def test_unknown_constructs_are_rejected_with_their_line(old, new, fault):
     assert old in OTHERS
     if fault is None:
         assert reads(OTHERS.replace(old, new), "fcl") == reads(OTHERS, "fcl")
@@ -198,18 +198,18 @@ def test_what_is_not_known_is_refused_with_its_line(old, new, fault):
           "rules": ("if quality is poor then tip is low",)}, "the defuzzifier 'sum' of output 'tip': expected 'av"),
     ],
 )  # fmt: skip
-def test_what_it_cannot_say_is_named(change, fault):
+def test_unsupported_features_are_rejected_by_name(change, fault):
     with pytest.raises(UnsupportedError, match=f"^fcl cannot say {fault}"):
         writes(replace(TIPPING, **change), "fcl")
 
 
-def test_names_that_differ_in_case_alone_are_one_to_the_standard():
+def test_names_that_differ_only_in_case_are_rejected():
     twin = Variable("QUALITY", (0, 1), TIPPING.inputs[0].terms)
     with pytest.raises(UnsupportedError, match="the names 'quality' and 'QUALITY': they differ in case alone"):
         writes(replace(TIPPING, inputs=(*TIPPING.inputs, twin)), "fcl")
 
 
-def test_jumps_are_points_of_one_place():
+def test_jumps_are_written_as_points_at_one_position():
     box = Variable(
         "quality", (0, 10), (replace(TIPPING.inputs[0].terms[0], shape=Shape(((2, 0), (2, 1), (4, 1), (4, 0)))),)
     )
@@ -252,13 +252,13 @@ def test_one_of_several_blocks_is_chosen_by_name(tmp_path):
     assert Arbiter.load(path, block="second of two")([1.0]) == pytest.approx((3.0,))
 
 
-def test_strengths_are_joined_by_value_as_jfuzzylogic_joins_them():
+def test_strengths_are_joined_by_value_as_in_jfuzzylogic():
     assert Arbiter(system=reads(BLOCKS, "fcl"))([1.0]) == pytest.approx(((1.0 + 3.0) / 2.0,))  # not (1 + 1 + 3) / 3
     ours = BLOCKS.replace("TERM on := (0, 0) (1, 1)", "TERM on := Ramp 0.0 1.0")  # a word of fuzzylite, which adds them
     assert Arbiter(system=reads(ours, "fcl"))([1.0]) == pytest.approx(((1.0 + 1.0 + 3.0) / 3.0,))
 
 
-def test_terms_of_one_name_are_refused_for_libraries_differ_in_which_they_mean():
+def test_duplicate_term_names_are_rejected():
     for head in ("", "(* generated with fuzzylite *)"):
         with pytest.raises(DefinitionError, match="two terms are named 'low', expected each name once"):
             reads(head + BLOCKS.replace("small", "low"), "fcl")

@@ -1,4 +1,4 @@
-"""Files: told by their suffix, read with their name in every fault, written whole or not at all."""
+"""Files: format by suffix, errors that name the file, atomic writes."""
 
 import os
 from dataclasses import replace
@@ -12,14 +12,14 @@ from tests.fuzzy_arbiter.formats.systems import TIPPING
 
 
 @pytest.mark.parametrize("format", FORMATS)
-def test_the_suffix_tells_the_format_in_any_case(format, tmp_path):
+def test_file_suffix_selects_the_format_case_insensitively(format, tmp_path):
     for suffix in (format, format.upper()):
         path = tmp_path / f"a.b.{suffix}"
         save(TIPPING, path)
         assert load(path) == load(str(path)) == TIPPING
 
 
-def test_an_older_file_is_replaced_and_no_scratch_is_left(tmp_path):
+def test_existing_file_is_replaced_without_temporary_files(tmp_path):
     path = tmp_path / "a.json"
     save(TIPPING, path)
     save(prioritised(), path)
@@ -28,7 +28,7 @@ def test_an_older_file_is_replaced_and_no_scratch_is_left(tmp_path):
     assert path.stat().st_mode & 0o777 == 0o644
 
 
-def test_what_cannot_be_said_leaves_the_older_file(tmp_path):
+def test_unsupported_system_leaves_the_existing_file(tmp_path):
     path = tmp_path / "a.fis"
     save(TIPPING, path)
     with pytest.raises(UnsupportedError):
@@ -36,7 +36,7 @@ def test_what_cannot_be_said_leaves_the_older_file(tmp_path):
     assert load(path) == TIPPING
 
 
-def test_a_disk_that_fails_leaves_the_older_file(tmp_path, monkeypatch):
+def test_write_error_leaves_the_existing_file(tmp_path, monkeypatch):
     path = tmp_path / "a.toml"
     save(TIPPING, path)
 
@@ -51,14 +51,14 @@ def test_a_disk_that_fails_leaves_the_older_file(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["a.xml", "a", ".json", "a.json.txt"])
-def test_other_suffixes_are_refused(name, tmp_path):
+def test_unknown_suffixes_are_rejected(name, tmp_path):
     for call in (lambda path: save(TIPPING, path), load):
         with pytest.raises(FormatError, match="expected one of json, toml, fcl, fis, fll"):
             call(tmp_path / name)
     assert not os.listdir(tmp_path)
 
 
-def test_places_where_nothing_can_be_read_or_written(tmp_path):
+def test_unreadable_and_unwritable_paths_are_rejected(tmp_path):
     (tmp_path / "folder.json").mkdir()
     for path, fault in (
         ("none/a.json", "No such file"),
@@ -69,20 +69,20 @@ def test_places_where_nothing_can_be_read_or_written(tmp_path):
                 call(tmp_path / path)
 
 
-def test_a_name_with_a_null_in_it(tmp_path):
+def test_path_with_a_null_byte_is_rejected(tmp_path):
     for call in (lambda path: save(TIPPING, path), load):
         with pytest.raises(FormatError, match="null"):
             call(tmp_path / "a\0b.json")
 
 
-def test_text_that_is_not_utf8(tmp_path):
+def test_non_utf8_text_is_rejected(tmp_path):
     path = tmp_path / "a.fis"
     path.write_bytes(b"[System]\n% caf\xe9")
     with pytest.raises(FormatError, match=r"a\.fis: byte 14 is no UTF-8"):
         load(path)
 
 
-def test_faults_name_the_file(tmp_path):
+def test_errors_name_the_file(tmp_path):
     path = tmp_path / "a.fll"
     save(TIPPING, path)
     text = path.read_text()

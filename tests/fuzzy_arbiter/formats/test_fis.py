@@ -1,4 +1,4 @@
-"""MATLAB's text: what MATLAB and Octave write, and what is refused."""
+"""The MATLAB format FIS: files of MATLAB and Octave, and rejected content."""
 
 from dataclasses import replace
 
@@ -55,7 +55,7 @@ MF2='generous':'trimf',[20 25 30]
 """
 
 
-def test_a_file_of_others_is_read():
+def test_foreign_file_is_read():
     system = reads(OTHERS, "fis")
     assert system.name == "Tip for two"
     service, food = system.inputs
@@ -77,18 +77,18 @@ def test_a_file_of_others_is_read():
         ("Version=2.0\n", ""),
     ],
 )
-def test_other_ways_to_say_the_same(old, new):
+def test_equivalent_spellings_are_read(old, new):
     assert old in OTHERS
     assert reads(OTHERS.replace(old, new), "fis") == reads(OTHERS, "fis")
 
 
-def test_operators_that_are_left_empty_are_min_and_max():
+def test_empty_operators_default_to_min_and_max():
     text = OTHERS.replace("'algebraic_product'", "''").replace("'probor'", "''")
     system = reads(text, "fis")
     assert (system.conjunction, system.disjunction) == ("min", "max")
 
 
-def test_halves_of_triangles_get_their_other_foot_beyond_the_range():
+def test_half_triangles_are_extended_beyond_the_range():
     text = writes(prioritised(), "fis")
     assert "MF1='low':'trimf',[-1 0 1]\nMF2='high':'trimf',[0 1 2]" in text
 
@@ -102,7 +102,7 @@ def test_halves_of_triangles_get_their_other_foot_beyond_the_range():
         *(Shape(((3, 1),)), Shape(((3, 0),)), falling(0, 5e-324), rising(10 - 1e-15, 10)),
     ],
 )
-def test_all_shapes_of_0_and_1_come_back(shape):
+def test_shapes_with_degrees_0_and_1_round_trip(shape):
     term = Term("t", shape)
     system = replace(TIPPING, inputs=(Variable("v", (0, 10), (term,)),), rules=("if v is t then tip is low",))
     assert reads(writes(system, "fis"), "fis") == system
@@ -158,13 +158,13 @@ def test_all_shapes_of_0_and_1_come_back(shape):
         ("[System]", "[system]", r"line 3: '\[system\]', expected a section such as \[System\]"),
     ],
 )
-def test_what_is_not_known_is_refused_with_its_line(old, new, fault):
+def test_unknown_constructs_are_rejected_with_their_line(old, new, fault):
     assert old in OTHERS
     with pytest.raises((FormatError, DefinitionError), match=fault):
         reads(OTHERS.replace(old, new, 1), "fis")
 
 
-def test_terms_of_one_name_are_told_apart_for_rules_speak_of_their_places():
+def test_duplicate_term_names_are_made_unique():
     named = reads(OTHERS, "fis").inputs[0].term_names
     again = reads(OTHERS.replace("'good'", f"'{named[0]}'", 1), "fis")
     assert again.inputs[0].term_names == (named[0], f"{named[0]}_2", *named[2:])
@@ -196,12 +196,12 @@ def bent():
         ),
     ],
 )
-def test_what_it_cannot_say_is_named(change, fault):
+def test_unsupported_features_are_rejected_by_name(change, fault):
     with pytest.raises(UnsupportedError, match=f"^fis cannot say {fault}"):
         writes(replace(TIPPING, **change), "fis")
 
 
-def test_conclusions_stand_in_the_order_of_the_outputs():
+def test_conclusions_must_follow_the_output_order():
     system = prioritised(form="minimal")
     rule = Rule(system.rules[0].condition, (system.outputs[1]["low"], system.outputs[0]["high"]))
     with pytest.raises(
@@ -210,7 +210,7 @@ def test_conclusions_stand_in_the_order_of_the_outputs():
         writes(replace(system, rules=(rule,)), "fis")
 
 
-def test_ramps_of_tsukamotos_method_are_fuzzylites():
+def test_tsukamoto_ramps_follow_fuzzylite():
     terms = {"up": rising(0.0, 0.25), "down": falling(0.4, 0.6), "s": curve("s_shape", 0.0, 1.0)}
     x, y = Variable("x", (0, 1), {"on": rising(0, 1)}), Output("y", (0, 1), terms, None, "average", "sum")
     system = System((x,), (y,), tuple(f"if x is on then y is {name}" for name in terms))

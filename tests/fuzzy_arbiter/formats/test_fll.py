@@ -1,4 +1,4 @@
-"""The FuzzyLite Language: what fuzzylite writes, and what is refused."""
+"""The FuzzyLite Language: files of fuzzylite, and rejected content."""
 
 from dataclasses import replace
 
@@ -47,7 +47,7 @@ RuleBlock: more
 """
 
 
-def test_an_engine_of_others_is_read():
+def test_foreign_engine_is_read():
     system = reads(OTHERS, "fll")
     assert (system.name, system.outside, system.points) == ("tip for two", "clip", 1000)
     assert (system.conjunction, system.disjunction, system.implication) == ("prod", "max", "prod")
@@ -66,7 +66,7 @@ def test_an_engine_of_others_is_read():
     ]
 
 
-def test_points_and_clipping_are_said_in_its_own_words():
+def test_points_and_clipping_use_fll_keywords():
     system = prioritised(outside="clip", points=64)
     text = writes(system, "fll")
     assert text.count("lock-range: true") == 3
@@ -137,20 +137,20 @@ def test_terms_are_triangles_trapezoids_and_ramps_where_they_can_be():
         ("  enabled: true", "  enabled", "line 5: 'enabled', expected a key, a colon and its value"),
     ],
 )  # fmt: skip
-def test_what_is_not_known_is_refused_with_its_line(old, new, fault):
+def test_unknown_constructs_are_rejected_with_their_line(old, new, fault):
     assert old in OTHERS
     with pytest.raises((FormatError, DefinitionError), match=fault):
         reads(OTHERS.replace(old, new, 1), "fll")
 
 
-def test_one_resolution_and_one_locking_serve_all():
+def test_outputs_share_one_resolution_and_locking():
     text = writes(prioritised(), "fll")
     assert reads(text.replace("Centroid 101", "Centroid 100", 1), "fll").points == 101  # the most of any
     with pytest.raises(FormatError, match="'shape' has another lock-range than 'obstacle'"):
         reads(text.replace("lock-range: false", "lock-range: true", 1), "fll")
 
 
-def test_rules_of_a_block_of_other_operators_keep_them():
+def test_rules_keep_the_operators_of_their_block():
     head, tail = OTHERS.split("RuleBlock: more")
     system = reads(
         head + "RuleBlock: more" + tail.replace("implication: AlgebraicProduct", "implication: Minimum"), "fll"
@@ -159,7 +159,7 @@ def test_rules_of_a_block_of_other_operators_keep_them():
     assert reads(writes(system, "fll"), "fll") == system
 
 
-def test_one_engine_makes_a_file():
+def test_file_with_two_engines_is_rejected():
     text = writes(prioritised(), "fll")
     with pytest.raises(FormatError, match="expected one Engine in a FLL file, 2 came"):
         reads(f"{text}Engine: twin\n", "fll")
@@ -177,11 +177,11 @@ def test_one_engine_makes_a_file():
          "the condition of R1 .*: expected only terms negated"),
     ],
 )  # fmt: skip
-def test_what_it_cannot_say_is_named(change, fault):
+def test_unsupported_features_are_rejected_by_name(change, fault):
     with pytest.raises(UnsupportedError, match=f"^fll cannot say {fault}"):
         writes(replace(TIPPING, **change), "fll")
 
 
-def test_names_of_engines_may_be_any_other_text():
+def test_engine_names_may_be_any_text():
     system = replace(TIPPING, name="a: b, 'c'")
     assert reads(writes(system, "fll"), "fll") == system

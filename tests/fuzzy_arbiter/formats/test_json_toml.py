@@ -1,4 +1,4 @@
-"""Our own schema: the long form, the short form of criteria, and faults that name the key."""
+"""The native schema: the long form, the short form of criteria, and errors that name the key."""
 
 import json
 import tomllib
@@ -44,7 +44,7 @@ full = {rising = [0.5, 1]}
 """
 
 
-def test_terms_may_be_said_in_words():
+def test_terms_may_use_named_shapes():
     assert reads(LONG, "toml") == System(
         (
             Variable(
@@ -93,7 +93,7 @@ def test_criteria_are_the_short_form():
     assert reads('{"criteria": [{"name": "a"}]}', "json") == prioritised([Criterion("a")])
 
 
-def test_points_of_a_term_stand_on_one_line_and_the_text_is_plain_json_and_toml():
+def test_term_points_are_on_one_line_of_standard_json_and_toml():
     line = "[[0.0, 1.0], [5.0, 0.0]]"
     for format, parse, said in (("json", json.loads, f'"poor": {line},'), ("toml", tomllib.loads, f"poor = {line}")):
         text = writes(TIPPING, format)
@@ -103,7 +103,7 @@ def test_points_of_a_term_stand_on_one_line_and_the_text_is_plain_json_and_toml(
 
 
 @pytest.mark.parametrize("format", ["json", "toml"])
-def test_any_name_and_shape_can_be_said(format):
+def test_any_name_and_shape_round_trips(format):
     names = ("not exist", "it's", "a\\b", "is", "é日𝛼", "1.5", "[x]", "#", "if a is b then c is d")
     terms = tuple(Term(name, Shape(((0, 0.25), (1, 0.5), (1, 0), (3, 0.125 + i / 64)))) for i, name in enumerate(names))
     system = System(
@@ -169,7 +169,7 @@ def changed(path, value):
         (["criteria"], [], "^inputs: unknown key, expected one of name, criteria|^rules: unknown key, expected one of"),
     ],
 )
-def test_faults_name_the_key(path, value, fault):
+def test_errors_name_the_key(path, value, fault):
     with pytest.raises((FormatError, DefinitionError), match=fault):
         reads(changed(path, value), "json")
 
@@ -189,7 +189,7 @@ def test_faults_name_the_key(path, value, fault):
         ('{"criteria": [{"name": "a"}], "rules": []}', "^rules: unknown key, expected one of name, criteria"),
     ],
 )
-def test_faults_of_the_short_form_name_the_key(text, fault):
+def test_errors_of_the_short_form_name_the_key(text, fault):
     with pytest.raises((FormatError, DefinitionError), match=fault):
         reads(text, "json")
 
@@ -207,7 +207,7 @@ def test_faults_of_the_short_form_name_the_key(text, fault):
         ("{}", "^inputs: key is missing"),
     ],
 )
-def test_text_that_is_no_json(text, fault):
+def test_invalid_json_is_rejected(text, fault):
     with pytest.raises(FormatError, match=fault):
         reads(text, "json")
 
@@ -228,7 +228,7 @@ def test_text_that_is_no_json(text, fault):
         ),
     ],
 )
-def test_text_that_is_no_toml(text, fault):
+def test_invalid_toml_is_rejected(text, fault):
     with pytest.raises((FormatError, DefinitionError), match=fault):
         reads(text, "toml")
 

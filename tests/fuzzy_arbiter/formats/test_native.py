@@ -1,4 +1,4 @@
-"""Range normalization, said in the universe."""
+"""Range normalization expressed by the universe."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -27,7 +27,7 @@ def weight(pair, universe=(0.0, 1.0), default=None):
     return Output("w", universe, (Term("low", PAIRS[pair][0]), Term("high", PAIRS[pair][1])), default)
 
 
-def test_triangles_reach_one_width_further_on_both_sides():
+def test_triangles_extend_one_width_beyond_both_ends():
     output = fold_normalization(prioritised()).outputs[0]
     assert output.universe == (-1.0, 2.0)
     assert [term.shape for term in output.terms] == [falling(-1, 2), rising(-1, 2)]
@@ -52,7 +52,7 @@ def test_a_default_is_mapped_and_held_within_the_range():
         assert output.default == pytest.approx(mapped, abs=EPS)
 
 
-def test_what_has_no_normalization_stays():
+def test_system_without_normalization_is_unchanged():
     system = prioritised(normalization="none")
     assert fold_normalization(system) is system
 
@@ -76,7 +76,7 @@ def test_terms_too_close_for_floating_point_are_refused():
 
 
 @pytest.mark.parametrize("format", FORMATS)
-def test_every_format_can_say_it(format):
+def test_folded_normalization_round_trips_in_every_format(format):
     system = fold_normalization(prioritised(form="minimal"))
     assert reads(writes(system, format), format) == system
     assert reads(writes(system, format), format) == replace(system, normalization="none")

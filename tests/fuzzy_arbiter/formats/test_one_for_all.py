@@ -1,4 +1,4 @@
-"""One tip for a waiter in every format, as people and other tools write it."""
+"""The tipping example in every format, as users and other tools write it."""
 
 import pytest
 
@@ -158,13 +158,13 @@ TEXTS = {"fis": FIS, "fcl": FCL, "fll": FLL, "toml": TOML, "json": JSON}
 
 
 @pytest.mark.parametrize("format", TEXTS)
-def test_all_say_the_same(format):
+def test_all_formats_read_to_the_same_system(format):
     text = TEXTS[format]
     for form in (text, "\ufeff" + text.replace("\n", "\r\n"), text.replace("\n", "\r"), text.replace("\n", "  \n")):
         assert reads(form, format) == reads(FIS, "fis")
 
 
-def test_its_centroids_are_the_exact_ones():
+def test_centroids_are_exact():
     system = reads(FIS, "fis")
     for inputs in ([0, 0], [3, 8.0], [5.5, 2.2], [9.9, 9.9]):
         exact = reference.centroids(system, inputs)

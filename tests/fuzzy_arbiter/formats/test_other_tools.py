@@ -1,4 +1,4 @@
-"""Files that we write mean to other tools what they mean to us."""
+"""Written files have the same meaning in other tools."""
 
 import json
 from dataclasses import replace
@@ -27,14 +27,14 @@ def centroids(system, samples):
     return np.array([ExactEngine(replace(system, normalization="none")).centroids(sample) for sample in samples])
 
 
-def test_the_tip_of_the_manuals():
+def test_tipping_example_matches_the_manuals():
     """Moment over area, each the sum of a few parts above zero: a rounding or two for every part."""
     rounding = 16 * np.finfo(float).eps
     assert centroids(TIPPING, [[6.5, 9.8]])[0, 0] == pytest.approx(float(Fraction(12118694, 610275)), rel=rounding)
 
 
 @pytest.mark.parametrize("format", FORMATS)
-def test_committed_files_are_what_is_written_and_read(format):
+def test_committed_files_round_trip(format):
     path = DATA / f"tipping.{format}"
     assert load(path) == TIPPING
     assert path.read_text() == writes(TIPPING, format)
@@ -93,7 +93,7 @@ WILD = replace(
     ids=["plain", "scaled", "wild", "product", "prioritised", "natively"],
 )
 @pytest.mark.parametrize("tool", TOOLS)
-def test_other_tools_give_our_centroids(tool, system, tmp_path, request):
+def test_other_tools_give_the_same_centroids(tool, system, tmp_path, request):
     found, evaluate = TOOLS[tool]
     if not found():
         pytest.skip(NEEDED[tool])

@@ -1,4 +1,4 @@
-"""What is written reads as the same system, or is refused by name; no text ends in a traceback."""
+"""Written systems round-trip or are rejected by name; no text ends in a traceback."""
 
 from dataclasses import replace
 
@@ -19,13 +19,13 @@ relaxed = settings(max_examples=examples(40), suppress_health_check=[HealthCheck
 
 @pytest.mark.parametrize("format", FORMATS)
 @pytest.mark.parametrize("form", FORMS)
-def test_prioritised_systems_come_back(format, form):
+def test_prioritised_systems_round_trip(format, form):
     for system in (prioritised(form=form), prioritised(form=form, normalization="sum", outside="clip", points=77)):
         assert reads(writes(system, format), format) == system
 
 
 @pytest.mark.parametrize("format", FORMATS)
-def test_richer_systems_come_back_and_give_the_same(format):
+def test_richer_systems_round_trip_with_equal_results(format):
     system = RICHER[format]
     again = reads(writes(system, format), format)
     assert again == system
@@ -37,7 +37,7 @@ def test_richer_systems_come_back_and_give_the_same(format):
 @pytest.mark.parametrize("format", FORMATS)
 @relaxed
 @given(systems(plain=True))
-def test_plain_systems_come_back_in_every_format(format, system):
+def test_plain_systems_round_trip_in_every_format(format, system):
     assert reads(writes(system, format), format) == system
 
 
@@ -45,7 +45,7 @@ def test_plain_systems_come_back_in_every_format(format, system):
 @pytest.mark.parametrize("format", FORMATS)
 @relaxed
 @given(systems())
-def test_any_system_comes_back_or_is_refused_by_name(format, system):
+def test_any_system_round_trips_or_is_rejected_by_name(format, system):
     fault = _fault(lambda: writes(system, format), UnsupportedError)
     if fault is None:
         assert reads(writes(system, format), format) == system
@@ -76,7 +76,7 @@ SIGNS = st.sampled_from("()[]{}\"'%#*:=;,.0123 -eE\nabct_\\/\u00e9\u2028\0")
 @pytest.mark.parametrize("format", FORMATS)
 @settings(max_examples=examples(100))
 @given(data=st.data())
-def test_no_damaged_text_ends_in_a_traceback(format, data):
+def test_damaged_text_raises_only_typed_errors(format, data):
     text = texts[format]
     for _ in range(data.draw(st.integers(1, 3))):
         kind = data.draw(st.sampled_from(("cut", "insert", "replace", "drop", "repeat", "swap")))
@@ -100,7 +100,7 @@ def test_no_damaged_text_ends_in_a_traceback(format, data):
 @pytest.mark.parametrize("format", FORMATS)
 @given(text=st.text(max_size=60))
 @settings(max_examples=examples(60))
-def test_no_other_text_ends_in_a_traceback(format, text):
+def test_arbitrary_text_raises_only_typed_errors(format, text):
     _require_one_line(text, format)
 
 
@@ -126,14 +126,14 @@ MONSTERS = (
 @pytest.mark.medium(fast=41)
 @pytest.mark.parametrize("format", FORMATS)
 @pytest.mark.parametrize("text", MONSTERS)
-def test_monsters_are_refused_in_few_words(format, text):
+def test_oversized_texts_give_short_errors(format, text):
     with pytest.raises(ArbiterError) as error:
         reads(text, format)
     assert len(str(error.value)) < 500
 
 
 @pytest.mark.parametrize("format", ["json", "toml", "fcl", "fll"])
-def test_the_deepest_rule_comes_back(format):
+def test_deepest_allowed_rule_round_trips(format):
     condition = Is("quality", "poor")
     for _ in range(50):
         condition = Not(condition) if format == "fll" else ~(condition & Is("service", "poor"))
@@ -144,7 +144,7 @@ def test_the_deepest_rule_comes_back(format):
 
 
 @pytest.mark.parametrize("format", FORMATS)
-def test_ends_of_lines_and_a_byte_order_mark_do_not_matter(format):
+def test_line_endings_and_byte_order_mark_are_ignored(format):
     system = prioritised(points=33)
     assert reads("\ufeff" + writes(system, format).replace("\n", "\r\n"), format) == system
 
@@ -159,7 +159,7 @@ def test_numbers_are_not_rounded(format):
 
 
 @pytest.mark.parametrize("format", ["fcl", "fis", "fll"])
-def test_settings_stand_in_one_comment_that_is_read_back(format):
+def test_settings_round_trip_in_one_comment(format):
     text = writes(prioritised(), format)
     assert "fuzzy_arbiter: normalization = range" in text.splitlines()[0]
     assert "(c - 0.3333333333333333) / 0.3333333333333333, held within [0, 1], for alpha_1" in text
@@ -187,14 +187,14 @@ def test_settings_stand_in_one_comment_that_is_read_back(format):
         ("fuzzy_arbiter normalization = range", "line 1: .* is almost such a comment, expected 'fuzzy_arbiter:'"),
     ],
 )
-def test_settings_that_there_are_not_are_refused(format, said, fault):
+def test_unknown_settings_are_rejected(format, said, fault):
     text = writes(prioritised(), format).replace("fuzzy_arbiter: normalization = range", said)
     with pytest.raises(FormatError, match=fault):
         reads(text, format)
 
 
 @pytest.mark.parametrize("format", ["fcl", "fis", "fll"])
-def test_settings_come_once(format):
+def test_duplicate_settings_are_rejected(format):
     text = writes(prioritised(), format)
     with pytest.raises(FormatError, match=r"line 2: .* is the second such comment after line 1, expected one"):
         reads(f"{text.splitlines()[0]}\n{text}", format)

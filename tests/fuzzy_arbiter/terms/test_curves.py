@@ -1,4 +1,4 @@
-"""Curves against the formulas of their manuals, worked out here."""
+"""Curves against the formulas of their manuals, computed here."""
 
 import math
 import pickle
@@ -58,7 +58,7 @@ MANUALS = [
 
 @pytest.mark.medium(fast=2)
 @pytest.mark.parametrize(("kind", "parameters", "formula"), MANUALS)
-def test_a_curve_is_that_of_the_manual(kind, parameters, formula):
+def test_curve_values_match_the_manual(kind, parameters, formula):
     made = curve(kind, *parameters)
     places = np.linspace(0.0, 10.0, 4001)
     expected = [formula(x) for x in places.tolist()]
@@ -71,7 +71,7 @@ def test_a_curve_is_that_of_the_manual(kind, parameters, formula):
     assert made.area((0.0, 10.0)) == pytest.approx(area, abs=2e-3 if kind in ("arc", "semi_ellipse") else 1e-9)
 
 
-def test_every_kind_is_tried():
+def test_every_kind_has_a_case():
     assert {kind for kind, _, _ in MANUALS} == set(KINDS)
 
 
@@ -79,7 +79,7 @@ def test_every_kind_is_tried():
 @pytest.mark.parametrize("kind", [kind for kind, face in KINDS.items() if face.inverse])
 @pytest.mark.parametrize("parameters", [(1.0, 3.0), (3.0, 1.0)])
 @given(share=st.floats(0.05, 0.999))
-def test_the_place_of_a_degree_has_that_degree(kind, parameters, share):
+def test_inverse_returns_a_position_of_the_degree(kind, parameters, share):
     if kind in ("s_shape", "z_shape") and parameters[0] > parameters[1]:
         return
     made = curve(kind, *parameters, height=0.8)
@@ -101,7 +101,7 @@ def test_the_place_of_a_degree_has_that_degree(kind, parameters, share):
         ("arc", (2, 2), "expected two places"),
     ],
 )
-def test_what_makes_no_curve_is_refused(kind, parameters, fault):
+def test_invalid_curve_parameters_are_rejected(kind, parameters, fault):
     with pytest.raises(DefinitionError, match=fault):
         curve(kind, *parameters)
 
@@ -112,7 +112,7 @@ def test_a_height_is_above_0_and_at_most_1(height):
         curve("gaussian", 0, 1, height=height)
 
 
-def test_far_out_nothing_overflows():
+def test_extreme_inputs_do_not_overflow():
     for kind, parameters, _ in MANUALS:
         made = curve(kind, *parameters)
         for x in (-1e308, -1e200, 1e200, 1e308):
@@ -120,14 +120,14 @@ def test_far_out_nothing_overflows():
             assert made.of_many(np.array([x]))[0] == pytest.approx(made(x)), kind
 
 
-def test_no_number_has_no_degree():
+def test_nan_input_gives_nan_degree():
     for kind, parameters, _ in MANUALS:
         made = curve(kind, *parameters)
         assert math.isnan(made(math.nan))
         assert np.isnan(made.of_many(np.array([math.nan, 4.0]))).tolist() == [True, False]
 
 
-def test_a_step_has_the_greater_degree_where_it_jumps():
+def test_step_takes_the_greater_degree_at_its_jump():
     step = curve("s_shape", 4.0, 4.0)
     assert (step(3.999), step(4.0), step(4.001)) == (0.0, 1.0, 1.0)
     assert step.of_many(np.array([4.0]))[0] == 1.0

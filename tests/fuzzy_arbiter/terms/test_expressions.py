@@ -1,4 +1,4 @@
-"""Expressions: against Python's own arithmetic on sound ones, and refused otherwise."""
+"""Expressions: valid ones against Python's arithmetic, and rejected ones."""
 
 import math
 
@@ -27,7 +27,7 @@ texts = st.recursive(
 
 
 @given(texts, st.floats(-3, 3), st.floats(-3, 3))
-def test_it_is_what_python_makes_of_the_same_text(text, a, b):
+def test_expression_value_equals_python(text, a, b):
     known = {"a": a, "b": b, "pi": math.pi, "sin": math.sin, "max": max}
     try:
         expected = eval(text.replace("^", "**"), {"__builtins__": {}}, known)
@@ -56,7 +56,7 @@ def test_values_that_are_known(text, value):
 
 
 @pytest.mark.parametrize("text", ["0 / 0", "sqrt(-1)", "log(-1)", "acos(2)", "(-8) ^ 0.5", "sin(1 / 0)", "fmod(1, 0)"])
-def test_what_has_no_value_is_no_number(text):
+def test_undefined_expression_is_nan(text):
     assert math.isnan(Expression(text)({}))
 
 
@@ -96,13 +96,13 @@ def test_numbers_and_arrays_have_the_same_functions(name, data):
         (5, "5 came, expected text"),
     ],
 )
-def test_what_is_no_expression_is_refused(text, fault):
+def test_invalid_expressions_are_rejected(text, fault):
     with pytest.raises(DefinitionError, match=fault):
         Expression(text)
 
 
 @given(st.text(max_size=60))
-def test_no_text_ends_in_a_traceback(text):
+def test_arbitrary_text_raises_only_typed_errors(text):
     fault = None
     try:
         Expression(text)
@@ -111,7 +111,7 @@ def test_no_text_ends_in_a_traceback(text):
     assert fault is None or fault.isprintable()
 
 
-def test_linear_values_read_back_from_their_sum():
+def test_linear_values_round_trip():
     made = Linear((2.0, 0.0, -0.5), 1.5)
     names = ("a", "b", "c")
     assert made.number(names, ())([1.0, 9.0, 4.0]) == 1.5
@@ -135,6 +135,6 @@ def test_linear_values_read_back_from_their_sum():
         (lambda: Formula("1 / x").within((0, 1)), "gives inf at x = 0, expected at most 1"),
     ],
 )
-def test_what_is_no_value_is_refused(make, fault):
+def test_invalid_values_are_rejected(make, fault):
     with pytest.raises(DefinitionError, match=fault):
         make()

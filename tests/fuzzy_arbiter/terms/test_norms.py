@@ -58,7 +58,7 @@ degrees = (
 @pytest.mark.medium(fast=10)
 @pytest.mark.parametrize("name", {**T_NORMS, **S_NORMS})
 @given(degrees, degrees, degrees)
-def test_it_keeps_the_laws_of_norms(name, a, b, c):
+def test_norm_axioms_hold(name, a, b, c):
     of = NORMS[name].number
     assert of(a, b) == of(b, a)  # to the last bit
     assert 0.0 <= of(a, b) <= 1.0
@@ -95,6 +95,6 @@ def test_a_hedge_is_as_defined(hedge, formula):
     assert HEDGES[hedge].array(degrees) == pytest.approx(expected, abs=1e-15)
 
 
-def test_all_are_tried():
+def test_every_norm_has_a_case():
     assert set(NORMS) == set(DEFINED)
     assert set(HEDGES) == {"very", "somewhat", "extremely", "seldom", "cubed", "cube_root"}

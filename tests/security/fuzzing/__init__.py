@@ -1,1 +1,1 @@
-"""Every reader of the product, and changes of what it reads."""
+"""Every reader of the product, and mutations of its input."""

@@ -1,4 +1,4 @@
-"""Folders that are sound, for all readers."""
+"""Valid folders for all readers."""
 
 import pytest
 

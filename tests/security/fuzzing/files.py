@@ -1,4 +1,4 @@
-"""Readers of single files: those that people write, and FMUs."""
+"""Readers of single files: handwritten ones, and FMUs."""
 
 from __future__ import annotations
 

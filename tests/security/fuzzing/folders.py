@@ -104,7 +104,7 @@ def part(seeds: Seeds) -> Case:
 
 @reader("run", "parquet", "cosim.results.record:_opened", "cosim.results.run_result:_lines")
 def run(seeds: Seeds) -> Case:
-    """All that is made of a run, whatever the numbers are."""
+    """Make every output of a run, for any numbers."""
     folder, flown = seeds.folder(seeds.run), load_run(seeds.run)
     names = names_of(flown.planned)
     seeds.patch.setattr("cosim.simulation.columns.names_of", lambda _: names)

@@ -1,4 +1,4 @@
-"""Changes of sound files: of their bytes, and of what stands in them. Each follows from the file and a number alone."""
+"""Mutations of valid files: of their bytes, and of their values."""
 
 from __future__ import annotations
 
@@ -212,7 +212,7 @@ def _xml(content: bytes, choose: random.Random) -> bytes:
 
 
 def _zip(content: bytes, choose: random.Random) -> bytes:
-    """Change one member, or what the archive says of it."""
+    """Change one member, or its entry in the archive."""
     made = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(content)) as source, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as target:
         members = source.namelist()

@@ -1,4 +1,4 @@
-"""Readers: what a sound content of each is, how it is read, and which functions of the product that goes through."""
+"""Readers: valid content of each, how it is read, and the product's functions that read it."""
 
 from __future__ import annotations
 

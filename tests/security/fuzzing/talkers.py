@@ -1,4 +1,4 @@
-"""Every reader of what comes over a connection or stands on a command line."""
+"""Every reader of data from a connection or from the command line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rich.console import Console
 from controller.laws import LAWS
 from cosim.campaigns import vary_from
 from cosim.campaigns.scenes.law_gains import gains_from
-from cosim.live.address import parse_live, stranger
+from cosim.live.address import foreign_origin, parse_live
 from cosim.live.command_desk import LONGEST, CommandDesk
 from cosim.live.messages import bytes_of, text_of
 from cosim.live.watching import looks, picture
@@ -59,7 +59,7 @@ def command(seeds: Seeds) -> Case:
 
 
 class _Connection:
-    """A live view that says what it is told to."""
+    """A live view with given answers."""
 
     def __init__(self, messages: list[str | bytes]) -> None:
         self._messages = messages
@@ -248,11 +248,11 @@ def address(seeds: Seeds) -> Case:
     return _argument(parse_live, "127.0.0.1:8765", "8765")
 
 
-@reader("host and origin", "text", "cosim.live.address:stranger")
+@reader("host and origin", "text", "cosim.live.address:foreign_origin")
 def origin(seeds: Seeds) -> Case:
     def read(text: str) -> None:
         host, _, site = text.partition(" ")
-        said = stranger(parse_live(""), host, site or None)
+        said = foreign_origin(parse_live(""), host, site or None)
         assert said is None or "\n" not in said
 
     return _argument(read, "127.0.0.1:8765 http://127.0.0.1:8765", "localhost:8765")

@@ -1,4 +1,4 @@
-"""Every reader takes any change of a sound file, or refuses it in one short printable line that names the file."""
+"""Every reader accepts a mutated file or rejects it in one short printable line that names the file."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ assert files and folders and talkers  # which register
 
 
 def fault_of(case: Case, content: bytes) -> str:
-    """Return what is wrong with how a content is read, "" if nothing is."""
+    """Return the error in reading a content, "" if none."""
     try:
         case.read(content)
     except KINDS as error:
@@ -53,13 +53,13 @@ def tried(case: Case, kind: str, numbers: range) -> Counter[str]:
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("name", READERS)
-def test_some_changes_of_what_is_read(name, seeds):
+def test_readers_survive_a_few_mutations(name, seeds):
     assert not tried(READERS[name].case(seeds), READERS[name].kind, range(FEW))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", READERS)
-def test_many_changes_of_what_is_read(name, seeds):
+def test_readers_survive_many_mutations(name, seeds):
     case = READERS[name].case(seeds)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     assert not tried(case, READERS[name].kind, range(FEW, MANY))
@@ -68,7 +68,7 @@ def test_many_changes_of_what_is_read(name, seeds):
 
 @pytest.mark.medium(fast=11)
 @pytest.mark.parametrize("name", READERS)
-def test_what_is_sound_is_taken(name, seeds):
+def test_unmodified_files_are_accepted(name, seeds):
     case = READERS[name].case(seeds)
     for content in case.contents:
         if name == "model description, run":  # which have no binary

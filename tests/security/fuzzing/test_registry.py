@@ -1,4 +1,4 @@
-"""No reader of the product is forgotten, and each goes through the functions that it is registered for."""
+"""Every reader of the product is registered, and uses its registered functions."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def parsing() -> Iterator[str]:
 
 
 @pytest.mark.medium
-def test_whoever_parses_is_fuzzed_or_reads_its_own():
+def test_every_parser_is_fuzzed_or_reads_own_files():
     opened = {name for reader in READERS.values() for name in reader.opens}
     found = set(parsing())
     assert sorted(found - opened - ITS_OWN.keys()) == []
@@ -79,7 +79,7 @@ def test_whoever_parses_is_fuzzed_or_reads_its_own():
 
 @pytest.mark.medium(fast=8)
 @pytest.mark.parametrize("name", READERS)
-def test_sound_content_goes_through_what_is_named(name, seeds):
+def test_unmodified_files_pass_through_the_named_parsers(name, seeds):
     case, met = READERS[name].case(seeds), set()
     for kept in (unpacking._tree_of, instance._described):  # which may have read the same before
         kept.cache_clear()

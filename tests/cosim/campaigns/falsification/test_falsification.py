@@ -1,4 +1,4 @@
-"""``cosim falsify``: from its flags to a folder whose rows can be flown again, whoever flies them."""
+"""``cosim falsify``: from its flags to a folder with reproducible rows."""
 
 import json
 
@@ -41,12 +41,12 @@ def varied(objective="clearance", budget=30):
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    """Return a search whose scenes take long enough to come near to something."""
+    """Return a search whose scenes last long enough to approach an obstacle."""
     return run_falsification(search(60, NEARING), tmp_path_factory.mktemp("found") / "out")
 
 
 @pytest.mark.medium
-def test_a_search_finds_worse_scenes_than_as_many_of_the_generator(found):
+def test_search_finds_worse_scenes_than_random_sampling(found):
     s = found.summary
     assert found.flown == s["flown"] == s["random"]["flown"] == 60
     assert s["worst"][0]["cost"] == found.results["min_clearance"].min() < s["random"]["worst"][0]["cost"]
@@ -60,7 +60,7 @@ def test_a_search_finds_worse_scenes_than_as_many_of_the_generator(found):
 
 
 @pytest.mark.medium
-def test_its_page_shows_search_and_dice_and_the_worst_moving(found):
+def test_page_shows_search_random_and_worst_replays(found):
     page = check(write_falsification_page(found.folder, 1))
     worst, dice = found.summary["worst"], found.summary["random"]["worst"]
     assert page.asked == [f"worst/{worst[0]['row']}/replay.html"]
@@ -74,7 +74,7 @@ def test_its_page_shows_search_and_dice_and_the_worst_moving(found):
 
 
 @pytest.mark.medium
-def test_its_rows_are_those_of_a_campaign_and_come_again(found, tmp_path):
+def test_falsification_rows_are_reproducible(found, tmp_path):
     key = found.summary["worst"][0]["row"]
     again = rerun(found.folder, key, tmp_path / "run")
     assert again.differing == {} and again.apart == {} and again.run is not None
@@ -83,7 +83,7 @@ def test_its_rows_are_those_of_a_campaign_and_come_again(found, tmp_path):
 
 
 @pytest.mark.medium
-def test_rows_of_a_scenario_come_again_with_the_values_that_were_found(tmp_path):
+def test_scenario_rows_are_reproducible_with_the_found_values(tmp_path):
     found = run_falsification(varied(), tmp_path / "out")
     first, last = found.results.table.to_pylist()[0], found.results.table.to_pylist()[-1]
     assert -2.0 <= last["initial.position.1"] <= 2.0 and last["limit.force"] in (400.0, 800.0)
@@ -102,7 +102,7 @@ def test_conflicts_are_searched_for_the_greatest_violation_weighted_by_priority(
 
 
 def interrupt_after(monkeypatch, tables):
-    """Have Ctrl-C come once so many tables are written."""
+    """Raise KeyboardInterrupt after the given number of tables."""
     add, left = CampaignFolder.add, [tables]
 
     def counting(folder, table):
@@ -116,7 +116,7 @@ def interrupt_after(monkeypatch, tables):
 
 @pytest.mark.parametrize("make", [search, varied])
 @pytest.mark.slow
-def test_what_was_interrupted_goes_on_to_the_same_rows(make, tmp_path, monkeypatch):
+def test_resumed_search_gives_the_same_rows(make, tmp_path, monkeypatch):
     whole = run_falsification(make(), tmp_path / "whole")
     with monkeypatch.context() as patch:
         interrupt_after(patch, 6)
@@ -137,14 +137,14 @@ def test_rows_are_the_same_for_any_number_of_workers(tmp_path):
 
 
 @pytest.mark.medium
-def test_another_search_has_a_folder_of_its_own(tmp_path):
+def test_folder_of_another_search_is_rejected(tmp_path):
     run_falsification(search(), tmp_path / "out")
     with pytest.raises(RunError, match=r"holds another campaign \(search.seed is 0, now 1\)"):
         run_falsification(search(seed=1), tmp_path / "out")
 
 
 @pytest.mark.slow
-def test_a_rate_is_estimated_from_the_flights_and_shown_level_by_level(tmp_path):
+def test_failure_rate_is_estimated_by_multilevel_splitting(tmp_path):
     found = run_falsification(search(200, Conditions(duration=8.0), rare_event=True), tmp_path / "out")
     estimate = found.summary["estimate"]
     assert 100 < found.flown == len(found.results) <= 200
@@ -157,7 +157,7 @@ def test_a_rate_is_estimated_from_the_flights_and_shown_level_by_level(tmp_path)
 
 
 @pytest.mark.slow
-def test_a_rate_that_is_not_small_is_that_of_the_dice(tmp_path):
+def test_large_failure_rate_equals_monte_carlo(tmp_path):
     """A barrier that is off has a violation in some per cent of plain scenes."""
     from cosim.campaigns import run_campaign
 
@@ -171,7 +171,7 @@ def test_a_rate_that_is_not_small_is_that_of_the_dice(tmp_path):
     assert max(estimate["low"], counted["low"]) < min(estimate["high"], counted["high"])
 
 
-def test_costs_say_what_is_worse():
+def test_costs_rank_outcomes_by_severity():
     def row(seed, clearance, time, stopped=-1):
         from cosim.campaigns.scenes.flyer import Score
 
@@ -184,7 +184,7 @@ def test_costs_say_what_is_worse():
     assert costs_of(table, "arrival", 120.0).tolist() == [-20.0, -30.0, -120.0, -120.0, module._REFUSED]
 
 
-def test_of_rows_that_are_near_to_each_other_one_is_listed(found):
+def test_similar_rows_are_listed_once(found):
     points = np.tile(np.linspace(0.0, 1.0, 60)[:, None], 3)
     costs = np.linspace(1.0, 0.0, 60)
     listed = module._worst(found.folder, found.results, costs, points)
@@ -215,14 +215,14 @@ def test_of_rows_that_are_near_to_each_other_one_is_listed(found):
         ("docking --vary sensing.seed=1:5", "sensing.seed is a whole number"),
     ],
 )
-def test_what_cannot_be_searched_is_said_in_one_line(words, message, tmp_path, capsys):
+def test_unsupported_search_gives_one_line_error(words, message, tmp_path, capsys):
     assert main(["falsify", *words.split(), "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr()
     assert message in said.err and said.err.count("\n") == 1 and said.out == ""
     assert not (tmp_path / "out").exists()
 
 
-def test_without_cma_nothing_is_flown(tmp_path, capsys, monkeypatch):
+def test_without_cma_no_run_starts(tmp_path, capsys, monkeypatch):
     import sys
 
     monkeypatch.setitem(sys.modules, "cma", None)
@@ -232,7 +232,7 @@ def test_without_cma_nothing_is_flown(tmp_path, capsys, monkeypatch):
 
 
 @pytest.mark.medium
-def test_the_command_says_what_was_found(tmp_path, capsys, monkeypatch):
+def test_command_prints_the_search_result(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("cosim.campaigns.scenes.conditions.Conditions.duration", 0.4)
     words = ["falsify", "hard", "--law", "pd", "--budget", "20", "--replays", "0", "--out", str(tmp_path / "out")]
     for lines in (4, 5):

@@ -1,4 +1,4 @@
-"""The search for the least cost, beside dice and beside the package's own bookkeeping."""
+"""The search for the least cost against random sampling and the package's own bookkeeping."""
 
 import sys
 
@@ -13,7 +13,7 @@ DIMENSION = 60
 
 
 class Valley:
-    """Least, 0, in a place of ten coordinates; the others do not count. With some noise."""
+    """A noisy cost with minimum 0 that depends on ten coordinates only."""
 
     def __init__(self, noise=0.0):
         self.place, self.points = np.linspace(0.05, 0.95, 10), []
@@ -29,7 +29,7 @@ class Valley:
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("noise", [0.0, 0.02])
-def test_a_search_comes_far_below_the_dice(noise):
+def test_search_beats_random_sampling(noise):
     found, dice = Valley(noise), Valley(noise)
     minimize(found, DIMENSION, 1500, 0)
     dice(np.random.default_rng(0).random((1500, DIMENSION)))
@@ -45,7 +45,7 @@ def test_exactly_the_budget_is_evaluated_inside_the_cube(budget):
     assert points.shape == (budget, DIMENSION) and ((points >= 0.0) & (points <= 1.0)).all()
 
 
-def test_the_least_at_a_corner_is_met():
+def test_minimum_at_a_corner_is_found():
     found = []
 
     def cost(points):
@@ -56,7 +56,7 @@ def test_the_least_at_a_corner_is_met():
     assert min(point.sum() for point in found) < 0.02
 
 
-def test_a_search_that_stalls_begins_elsewhere():
+def test_stalled_search_restarts():
     """The cost is flat, so no generation is better than the first of its search."""
     points = []
 
@@ -80,7 +80,7 @@ def test_the_same_seed_gives_the_same_points_and_no_state_is_shared():
     assert np.random.get_state()[1].tolist() == before
 
 
-def test_without_the_package_one_line_says_how_to_get_it(monkeypatch):
+def test_missing_package_error_names_the_install_command(monkeypatch):
     monkeypatch.setitem(sys.modules, "cma", None)
     with pytest.raises(RunError, match=r"^a search needs cma \(the extra falsify\); .* install .*cma>=") as error:
         minimize(Valley(), DIMENSION, 10, 0)

@@ -1,4 +1,4 @@
-"""Scenes as points of a cube: drawn evenly they are those of the generator, and never outside of its family."""
+"""Scenes as points of a cube: uniform points give the generator's distribution within its family."""
 
 import json
 
@@ -76,14 +76,14 @@ def test_no_point_leaves_the_family(kind):
         assert not hard or (1 <= scene.failed_thruster.index <= 8 and 5.0 <= scene.failed_thruster.time <= 30.0)
 
 
-def test_without_a_limit_a_flight_follows_from_its_point_alone():
+def test_scene_is_determined_by_its_point():
     space, rng = SceneSpace("hard"), np.random.default_rng(4)
     for point in rng.random((20, space.dimension)):
         one, other = (json.loads(space.line(point, seed)) for seed in (1, 2))
         assert one | {"seed": 2} == other and one["noise"]["seed"] == int(point[-1] * 2**31)
 
 
-def test_an_obstacle_that_is_drawn_again_changes_no_other_one():
+def test_redrawn_obstacle_leaves_others_unchanged():
     space, rng, changed = SceneSpace("hard"), np.random.default_rng(5), 0
     for point in rng.random((60, space.dimension)):
         other = point.copy()
@@ -95,7 +95,7 @@ def test_an_obstacle_that_is_drawn_again_changes_no_other_one():
     assert changed > 0
 
 
-def test_the_noise_of_a_flight_is_that_of_its_own_seed():
+def test_sensing_noise_uses_the_scene_noise_seed():
     line = json.loads(SceneSpace("hard").line(np.full(SceneSpace("hard").dimension, 0.4), 3))
     sensing = scene_scenario(decode_scene(json.dumps(line).encode()), "pd", LAWS["pd"].gains_type(), Conditions())
     assert sensing.sensing.seed == int(0.4 * 2**31)
@@ -112,7 +112,7 @@ def test_near_points_are_near_scenes():
     assert here != there
 
 
-def test_the_middle_is_the_middle_of_each_range():
+def test_cube_center_maps_to_range_centers():
     space = SceneSpace("plain")
     scene = scene_at(space, np.full(space.dimension, 0.5))
     assert scene.start == (0.0, 0.0, 2.75) and scene.goal.centre == (10.0, 0.0, 3.0)
@@ -149,7 +149,7 @@ def test_conflicts_drawn_evenly_are_those_of_the_generator(family):
 
 @pytest.mark.medium
 @pytest.mark.parametrize("family", CONFLICTS)
-def test_a_conflict_follows_from_its_point_alone_and_can_be_flown(family):
+def test_conflict_scene_is_determined_by_its_point_and_valid(family):
     space, rng = SceneSpace(family), np.random.default_rng(3)
     for i, point in enumerate([*rng.integers(0, 2, (20, space.dimension)), *rng.random((40, space.dimension))]):
         one, other = (json.loads(space.line(point.astype(float), seed)) for seed in (i, i + 100))
@@ -158,6 +158,6 @@ def test_a_conflict_follows_from_its_point_alone_and_can_be_flown(family):
         assert scene_at(space, point.astype(float), i).seed == i
 
 
-def test_numbers_that_may_come_twice_are_refused():
+def test_sampling_with_replacement_is_rejected():
     with pytest.raises(NotImplementedError):
         Shares(np.empty(0), np.random.default_rng(0)).choice(3, 2, True)

@@ -1,4 +1,4 @@
-"""Probabilities of rare events beside closed forms and plain counting."""
+"""Probabilities of rare events against closed forms and plain counting."""
 
 import json
 
@@ -85,7 +85,7 @@ def test_intervals_on_scenes_meet_plain_counting():
     assert 0.4 < np.mean([one.probability for one in found]) / 0.01 < 2.5
 
 
-def test_a_rate_that_is_not_small_is_that_of_plain_counting():
+def test_large_rate_equals_plain_counting():
     (one,) = estimates(HalfSpace(0.8), 4000, 1)
     points = np.random.default_rng(5).random((20_000, DIMENSION))
     assert one.low < (HalfSpace(0.8)(points) < 0.0).mean() < one.high
@@ -107,7 +107,7 @@ def test_the_levels_fall_and_end_in_the_estimate():
     assert costs[-1] == 0.0 and shares[-1] == one.probability
 
 
-def test_what_is_certain_and_what_cannot_be():
+def test_certain_and_impossible_events_have_exact_probability():
     def constant(value):
         return lambda points: np.full(len(points), value)
 

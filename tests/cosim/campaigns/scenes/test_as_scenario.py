@@ -1,4 +1,4 @@
-"""A scored scene, said as a scenario: the readable master goes where the compiled loop goes."""
+"""A scored scene as a scenario: the reference master gives the same run as the compiled loop."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ SCENE = Scene(
         ("ismail_dunnigan", {}),
     ],
 )
-def test_master_and_compiled_loop_fly_the_same_way(law, changes):
+def test_master_and_compiled_loop_give_the_same_run(law, changes):
     conditions = Conditions(duration=12.0, **changes)
     with SceneFlyer(law, conditions) as flyer:
         score, trace = flyer.fly(SCENE, trace=True)

@@ -1,4 +1,4 @@
-"""``cosim scenes``: the scored scenes, as the generator that defines them prints them (tests/data/ORIGIN.md)."""
+"""``cosim scenes`` against the generator that defines the scored scenes (tests/data/ORIGIN.md)."""
 
 import errno
 import hashlib
@@ -45,7 +45,7 @@ def test_two_hundred_scenes_are_those_of_the_reference(kind, first, capsys):
     assert digest.hexdigest() == expected["sha256"]
 
 
-def test_a_file_holds_what_standard_output_does_and_campaigns_can_read_it(tmp_path, capsys):
+def test_scene_file_equals_standard_output_and_is_readable(tmp_path, capsys):
     file = tmp_path / "scenes.jsonl"
     file.write_text("older\n")
     assert printed(capsys, "--kind", "hard", "--count", 3, "--seed", 7, "--out", file) == f"{file}\n"
@@ -59,7 +59,7 @@ def test_a_hundred_plain_scenes_from_seed_0_are_the_default(capsys):
 
 
 @pytest.mark.parametrize("flags", [["--count", "0"], ["--seed", "-1"], ["--count", "9" * 5000], ["--kind", "soft"]])
-def test_what_cannot_be_generated_is_refused(flags, capsys):
+def test_invalid_generator_arguments_are_rejected(flags, capsys):
     with pytest.raises(SystemExit) as left:
         main(["scenes", *flags])
     assert left.value.code == 2
@@ -67,7 +67,7 @@ def test_what_cannot_be_generated_is_refused(flags, capsys):
     assert said.out == "" and flags[0] in said.err and len(said.err) < 500
 
 
-def test_a_file_that_cannot_be_written_is_one_line_and_leaves_nothing(tmp_path, capsys, monkeypatch):
+def test_unwritable_file_gives_one_line_error_and_no_file(tmp_path, capsys, monkeypatch):
     assert main(["scenes", "--out", str(tmp_path / "nowhere" / "s.jsonl")]) == 2
     assert main(["scenes", "--out", str(tmp_path)]) == 2
 
@@ -84,7 +84,7 @@ def test_a_file_that_cannot_be_written_is_one_line_and_leaves_nothing(tmp_path, 
 
 
 @pytest.mark.medium
-def test_scenes_need_nothing_of_runs():
+def test_scene_generation_imports_no_heavy_library():
     code = (
         "import sys; from cosim.command_line.cli import main; main(['scenes', '--count', '1']); "
         "print(*sys.modules, sep=chr(10))"

@@ -1,4 +1,4 @@
-"""Scenes that are scenarios: conflicts and trials as their pages say, flown by their own rules, refused by name."""
+"""Scenes that are scenarios: documented conflicts and trials, their own rules, and rejected keys."""
 
 import collections
 import json
@@ -38,7 +38,7 @@ def made(make, wanted, count=1):
 
 
 @pytest.mark.parametrize("kind", ["conflict", "tour", "trial"])
-def test_scenes_are_those_of_their_seed(kind):
+def test_scenes_are_determined_by_their_seed(kind):
     one, other = (list(generate_scenes(4, 7, kind)) for _ in range(2))
     assert one == other and list(generate_scenes(1, 9, kind)) == one[2:3]
     assert [decode_scene(line.encode()).seed for line in one] == [7, 8, 9, 10]
@@ -56,14 +56,14 @@ def test_priorities_follow_the_order_of_the_criteria():
 
 
 @pytest.mark.medium
-def test_kinds_and_vehicles_are_about_as_frequent():
+def test_kinds_and_vehicles_are_evenly_distributed():
     kinds = collections.Counter(make_conflict(seed)["kind"] for seed in range(900))
     assert len(kinds) == 18 and min(kinds.values()) > 25 and max(kinds.values()) < 80  # 50 expected
     trials = collections.Counter(make_trial(seed)["kind"] for seed in range(700))
     assert len(trials) == 7 and min(trials.values()) > 65 and max(trials.values()) < 140  # 100 expected
 
 
-def test_a_tour_has_goals_in_turn_on_both_sides_of_what_conflicts():
+def test_tour_has_successive_goals_on_both_sides_of_the_conflict():
     kinds = collections.Counter(make_conflict(seed, "tour")["kind"] for seed in range(300))
     assert len(kinds) == 9 and min(kinds.values()) > 15  # 33 expected
     for seed in range(20):
@@ -77,7 +77,7 @@ def test_a_tour_has_goals_in_turn_on_both_sides_of_what_conflicts():
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("kind", ["ceiling", "dock"])
-def test_faces_that_close_leave_no_place_at_the_end(kind):
+def test_closing_faces_leave_no_feasible_position(kind):
     for table in made(make_conflict, kind, 5):
         scenario = scenario_of(table)
         packed = pack([secondary.region for secondary in scenario.regions])
@@ -90,7 +90,7 @@ def test_faces_that_close_leave_no_place_at_the_end(kind):
             assert (best > 1.4) if free else (best < -0.05)
 
 
-def test_a_squeeze_has_no_place_where_both_depths_are_kept():
+def test_squeeze_has_no_position_that_satisfies_both_depth_regions():
     for table in made(make_conflict, "squeeze", 5):
         least, greatest = scenario_of(table).regions
         assert not least.region.hard and not greatest.region.hard
@@ -98,7 +98,7 @@ def test_a_squeeze_has_no_place_where_both_depths_are_kept():
 
 
 @pytest.mark.medium
-def test_the_ways_of_sides_and_door_are_barred_by_soft_regions():
+def test_soft_regions_block_the_passages_of_sides_and_door():
     for table in made(make_conflict, "sides", 5) + made(make_conflict, "door", 5):
         hard = [r for r in scenario_of(table).regions if r.region.hard]
         soft = [r for r in scenario_of(table).regions if not r.region.hard]
@@ -106,7 +106,7 @@ def test_the_ways_of_sides_and_door_are_barred_by_soft_regions():
 
 
 @pytest.mark.medium
-def test_a_trial_is_far_from_nominal_in_what_it_tries():
+def test_trial_deviates_from_nominal_in_its_tested_condition():
     (heavy,) = made(make_trial, "net weight")
     vehicle = load_vehicle(heavy["scenario"]["vehicle"])
     net = abs(vehicle.weight - heavy["scenario"]["plant"]["parameters"]["buoyancy"])
@@ -120,7 +120,7 @@ def test_a_trial_is_far_from_nominal_in_what_it_tries():
     assert len(made(make_trial, "pocket")[0]["scenario"]["regions"]) == 4
 
 
-def test_conditions_change_what_they_say_and_no_more():
+def test_conditions_change_only_their_own_keys():
     (table,) = made(make_conflict, "view")
     plain = scenario_of(table).table
     changed = scenario_of(table, arbiter="reversed", sensing="sensors", tell_failures=True).table
@@ -146,7 +146,7 @@ def test_the_weighted_violation_is_the_integral_of_depth_times_priority():
     assert score.weighted_violation == pytest.approx(expected, rel=1e-9) and expected > 0.0
 
 
-def test_a_scene_of_its_own_vehicle_is_flown_by_it():
+def test_scene_uses_its_own_vehicle():
     tables = [made(make_conflict, f"squeeze, {vehicle}")[0] for vehicle in ("bluerov2_heavy", "odin")]
     with SceneFlyer("pd", Conditions(settled=1.0)) as flyer:
         for table in tables:
@@ -156,8 +156,8 @@ def test_a_scene_of_its_own_vehicle_is_flown_by_it():
             assert kind_of(scene_of(table)) == table["kind"]
 
 
-def test_rules_of_a_file_weigh_the_criteria_of_any_scene(tmp_path):
-    """The paper's rules, from a file, fly a scene as the scenario's own do; others refuse what they do not know."""
+def test_arbiter_file_weights_the_criteria_of_any_scene(tmp_path):
+    """The paper's rules, from a file, give the same run as the scenario's own; others reject unknown criteria."""
     file = tmp_path / "mine.json"
     Arbiter(system=prioritised()).save(file)
     (scene,) = (decode_scene(line.encode()) for line in generate_scenes(1, 3, "hard"))
@@ -178,7 +178,7 @@ def test_rules_of_a_file_weigh_the_criteria_of_any_scene(tmp_path):
         ("empty.fcl", r"--arbiter: .*empty\.fcl: "),
     ],
 )
-def test_what_is_no_arbiter_is_refused(tmp_path, monkeypatch, arbiter, said):
+def test_invalid_arbiter_is_rejected(tmp_path, monkeypatch, arbiter, said):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty.fcl").touch()
     with pytest.raises(ScenarioError, match=said):
@@ -203,7 +203,7 @@ SCENARIO = make_conflict(0)["scenario"]
         ({"more": 1}, r"more: unknown key"),
     ],
 )
-def test_what_cannot_be_is_refused_by_name(change, said):
+def test_invalid_scene_keys_are_rejected_by_name(change, said):
     table = {"seed": 0, "kind": "mine", "scenario": SCENARIO} | change
     with pytest.raises(ScenarioError, match=said):
         scene_of(table)

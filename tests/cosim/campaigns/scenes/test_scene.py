@@ -1,4 +1,4 @@
-"""Scenes: read line by line, refused with the line and the key, and given to the law without what it must not know."""
+"""Scenes: parsed by line, rejected by line and key, and passed to the law without undisclosed conditions."""
 
 import json
 from dataclasses import replace
@@ -31,7 +31,7 @@ def test_a_line_is_read_whole():
     assert (SCENE.noise.position, SCENE.noise.velocity) == (0.02, 0.01)
 
 
-def test_blank_lines_are_passed_over(tmp_path):
+def test_blank_lines_are_skipped(tmp_path):
     file = tmp_path / "scenes.jsonl"
     file.write_text(f"\n{json.dumps(LINE)}\n  \n{json.dumps(LINE)}")
     assert list(read_scenes(file)) == [SCENE, SCENE]
@@ -63,7 +63,7 @@ def test_blank_lines_are_passed_over(tmp_path):
         ({"current": [True, 0, 0]}, "current"),
     ],
 )
-def test_a_line_that_is_no_scene_is_named_with_its_key(tmp_path, text, words):
+def test_invalid_scene_line_is_rejected_by_key(tmp_path, text, words):
     file = tmp_path / "scenes.jsonl"
     bad = text.encode("latin-1") if isinstance(text, str) else json.dumps(LINE | text).encode()
     file.write_bytes(json.dumps(LINE).encode() + b"\n" + bad)
@@ -73,12 +73,12 @@ def test_a_line_that_is_no_scene_is_named_with_its_key(tmp_path, text, words):
 
 
 @pytest.mark.parametrize("name", ["nowhere.jsonl", "."])
-def test_a_file_that_cannot_be_read(tmp_path, name):
+def test_unreadable_file_is_rejected(tmp_path, name):
     with pytest.raises(ScenarioError, match=r"No such file|directory"):
         list(read_scenes(tmp_path / name))
 
 
-def test_the_plant_has_what_the_scene_sets():
+def test_plant_parameters_match_the_scene():
     vehicle = load_vehicle("odin")
     values = plant_values(SCENE, vehicle, 0.01)
     assert vehicle.weight - values["buoyancy"] == pytest.approx(SCENE.weight_minus_buoyancy)
@@ -139,7 +139,7 @@ def _frozen(value):
 
 @pytest.fixture
 def spied(monkeypatch):
-    """Return a function that flies a scene for half a second, and what the law was made of and given."""
+    """Return a function that runs a scene for half a second and returns the law's arguments and inputs."""
     monkeypatch.setitem(LAWS, "spy", _Spy)
 
     def fly(scene, tell=False):
@@ -152,7 +152,7 @@ def spied(monkeypatch):
 
 @pytest.mark.medium(fast=4)
 @pytest.mark.parametrize("change", UNTOLD.values(), ids=UNTOLD)
-def test_what_is_untold_changes_the_plant_alone(spied, change):
+def test_undisclosed_conditions_affect_only_the_plant(spied, change):
     before, after = SCENE, replace(SCENE, **change)
     made, steps = spied(before)
     made_after, steps_after = spied(after)
@@ -171,11 +171,11 @@ def test_what_is_untold_changes_the_plant_alone(spied, change):
 
 
 @pytest.mark.parametrize("change", TOLD.values(), ids=TOLD)
-def test_what_is_told_arrives(spied, change):
+def test_disclosed_conditions_reach_the_law(spied, change):
     assert spied(replace(SCENE, **change)) != spied(SCENE)
 
 
-def test_the_law_hears_of_a_failure_only_when_told(spied):
+def test_law_receives_failure_only_if_configured(spied):
     scene = replace(SCENE, failed_thruster=Failure(3, 0.2))
     healths = [np.frombuffer(step[0][3]) for step in spied(scene, tell=True)[1]]
     assert all((h == 1.0).all() for h in healths[:10])
@@ -183,7 +183,7 @@ def test_the_law_hears_of_a_failure_only_when_told(spied):
     assert all((np.frombuffer(step[0][3]) == 1.0).all() for step in spied(scene)[1])
 
 
-def test_regions_come_with_their_present_place_and_velocity(spied):
+def test_law_receives_current_region_positions_and_velocities(spied):
     _, steps = spied(SCENE)
     shifts, velocities = (np.frombuffer(steps[20][2][i]).reshape(-1, 3) for i in (4, 5))
     np.testing.assert_allclose(shifts, 0.4 * velocities, rtol=1e-12)

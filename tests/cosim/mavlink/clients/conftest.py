@@ -1,4 +1,4 @@
-"""Real clients: each in an environment of its own, made once and kept in pytest's cache; and the vehicle they meet."""
+"""Real clients in cached environments of their own, and the vehicle that they connect to."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _install(command, folder=None):
 
 @contextlib.contextmanager
 def cosim_run(folder, profile, *endpoints):
-    """Run the command as a user does, until the context ends by Ctrl-C; it is armed and heeds commands."""
+    """Run the command as a user does, until the context ends by Ctrl-C; it is armed and accepts commands."""
     links = [word for endpoint in endpoints for word in ("--mavlink", endpoint)]
     process = subprocess.Popen(
         [sys.executable, "-m", "cosim", "run", "paper-limited", "--set", "time.duration=3600", "--commands",

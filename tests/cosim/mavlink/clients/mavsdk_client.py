@@ -168,7 +168,7 @@ async def steps(vehicle, address):  # noqa: C901 - one step after the other
         return [[fields(item, "command", "x", "y", "z") for item in some] for some in (items, back)] + [shown]
 
     async def speed():
-        """Return how fast the clock goes, once the estimate, which takes some messages, has come near to 1."""
+        """Return the clock's speed once its estimate, which needs some messages, is close to 1."""
         while True:
             with contextlib.suppress(InfoError):
                 if abs((factor := await vehicle.info.get_speed_factor()) - 1.0) < SETTLED:
@@ -201,7 +201,7 @@ async def main(address):
         try:
             value = await asyncio.wait_for(work, PATIENCE)
             done[name] = {"value": value, "seconds": round(time.monotonic() - began, 3)}
-        except Exception as error:  # noqa: BLE001  whatever it is, it is told, and the next step is tried
+        except Exception as error:  # noqa: BLE001  any error is reported, and the next step is tried
             text = f"{type(error).__name__}: {error}"
             done[name] = {"error": text, "seconds": round(time.monotonic() - began, 3)}
             if name == "connect":

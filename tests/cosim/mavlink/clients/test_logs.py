@@ -1,4 +1,4 @@
-"""A .tlog of a running vehicle, read by pymavlink's tools and by a decoder of other make."""
+"""A .tlog of a running vehicle, read by pymavlink's tools and by an independent decoder."""
 
 import json
 import re
@@ -29,7 +29,7 @@ LOGS = [
 
 
 class RecordingLink(GroundLink):
-    """Writes all that it hears into a log of its own, as ground stations do."""
+    """Write all received frames into a log, as ground stations do."""
 
     def __init__(self, endpoint, log):
         super().__init__(endpoint)
@@ -81,7 +81,7 @@ def test_mavlogdump_reads_every_frame(met, which, some, ardupilots_tools):
 
 
 @pytest.mark.parametrize(("which", "some"), LOGS)
-def test_mavloss_misses_nothing_of_the_vehicle(met, which, some, ardupilots_tools):
+def test_mavloss_reports_no_lost_frames(met, which, some, ardupilots_tools):
     python = ardupilots_tools
     done = subprocess.run(
         [python, python.parent / "mavloss.py", "--dialect", "all", met[which]], capture_output=True, text=True,
@@ -92,7 +92,7 @@ def test_mavloss_misses_nothing_of_the_vehicle(met, which, some, ardupilots_tool
 
 
 @pytest.mark.parametrize(("which", "some"), LOGS)
-def test_a_decoder_of_other_make_decodes_every_frame(met, which, some, node_mavlink):
+def test_independent_decoder_decodes_every_frame(met, which, some, node_mavlink):
     done = subprocess.run(
         [shutil.which("node"), HERE / "decode.mjs", met[which]], capture_output=True, text=True, timeout=READING,
         cwd=node_mavlink,

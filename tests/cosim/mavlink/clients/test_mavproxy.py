@@ -1,4 +1,4 @@
-"""MAVProxy, headless, with its commands on standard input, as a pilot types them."""
+"""MAVProxy, headless, with commands on standard input."""
 
 import contextlib
 import os
@@ -50,7 +50,7 @@ class MavProxy:
         raise AssertionError(f"{pattern!r} was not seen in:\n{self.text[-3000:]}")
 
     def parameters(self, count):
-        """Return the text of the file that it writes after it has told of so many parameters."""
+        """Return the text of the file that it writes after it has listed that many parameters."""
         file, end = self.folder / "mav.parm", time.monotonic() + PATIENCE
         while (text := file.read_text() if file.exists() else "").count("\n") < count and time.monotonic() < end:
             time.sleep(0.05)
@@ -76,7 +76,7 @@ class MavProxy:
         self.process.stdout.close()
 
 
-def test_a_pilot_connects_arms_changes_modes_and_lists_what_there_is(ardupilots_tools, udp_port, tmp_path):
+def test_mavproxy_connects_arms_changes_modes_and_lists_parameters(ardupilots_tools, udp_port, tmp_path):
     python, port, folder = ardupilots_tools, udp_port(), tmp_path / "run"
     with cosim_run(folder, "ardusub", f"udpout:127.0.0.1:{port}"), MavProxy(python, tmp_path, port) as mavproxy:
         mavproxy.see(r"Detected vehicle 1:1")

@@ -1,4 +1,4 @@
-"""MAVSDK, the present generation and the one before, does what its users do with a running vehicle."""
+"""The current and the previous generation of MAVSDK connected to a running vehicle."""
 
 import json
 import subprocess
@@ -40,11 +40,11 @@ def value(flown, step):
     return flown[step]["value"]
 
 
-def test_every_step_comes_to_its_end(flown):
+def test_every_mavsdk_step_completes(flown):
     assert {name: done["error"] for name, done in flown.items() if "error" in done and name != "commands"} == {}
 
 
-def test_health_is_all_ok(flown):
+def test_mavsdk_reports_healthy(flown):
     assert value(flown, "health") is True
 
 
@@ -66,30 +66,30 @@ def test_parameters_are_read_changed_and_refused(flown):
     assert word != "taken" and after == pytest.approx(before)
 
 
-def test_an_unknown_parameter_is_told_of(flown):
+def test_unknown_parameter_is_reported(flown):
     assert "DOES_NOT_EXIST" in value(flown, "unknown_param")  # without an answer it would be a TIMEOUT
 
 
-def test_a_go_to_moves_the_vehicle(flown):
+def test_goto_location_moves_the_vehicle(flown):
     before, after, target = value(flown, "go_to")
     assert abs(after - target) < abs(before - target)
 
 
-def test_a_mission_of_regions_is_uploaded_read_back_and_begun(flown):
+def test_mission_is_uploaded_read_back_and_started(flown):
     items, back, mode = value(flown, "mission")
     assert len(back) == 3 and mode == "MISSION"
     for sent, came in zip(items, back, strict=True):
         assert came[:3] == sent[:3] and came[3] == pytest.approx(sent[3], abs=1e-3)
 
 
-def test_hold_and_offboard_are_shown_as_such(flown):
+def test_hold_and_offboard_modes_are_shown(flown):
     assert value(flown, "hold") == "HOLD"
     assert value(flown, "offboard") == "OFFBOARD"
 
 
-def test_what_was_commanded_is_in_the_log_of_the_run(flown):
+def test_commands_are_in_the_commands_log(flown):
     assert {"arm", "set_mode", "set_target", "change_setting", "set_mission"} <= set(flown["commands"])
 
 
-def test_its_clock_goes_as_the_wall_clock_does(flown):
+def test_vehicle_clock_runs_at_wall_clock_rate(flown):
     assert value(flown, "speed") == pytest.approx(1.0, abs=0.1)

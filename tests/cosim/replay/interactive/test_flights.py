@@ -67,7 +67,7 @@ def assert_same(flown, run):
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_a_page_repeats_its_run_to_the_last_bit(scene, fly, tmp_path):
+def test_page_simulation_equals_its_run_bit_for_bit(scene, fly, tmp_path):
     name, overrides = SCENES[scene]
     run = flown_run(load_scenario(name, overrides), tmp_path / "run")
     flown = fly(run)
@@ -78,7 +78,7 @@ def test_a_page_repeats_its_run_to_the_last_bit(scene, fly, tmp_path):
 @pytest.mark.parametrize(
     ("values", "failure"), [(MOVED | WATER, None), (NOISE | GAINS, FAILS)], ids=["places and water", "noise and gains"]
 )
-def test_a_saved_scenario_repeats_the_flight_to_the_last_bit(values, failure, fly, shipped_run, tmp_path):
+def test_saved_scenario_reproduces_the_run_bit_for_bit(values, failure, fly, shipped_run, tmp_path):
     flown = fly(load_run(shipped_run("docking").folder), values, failure)
     (tmp_path / "saved.toml").write_text(flown.toml)
     saved = load_scenario(tmp_path / "saved.toml")
@@ -96,13 +96,13 @@ def test_noise_can_be_added_to_an_exact_run(fly, tmp_path):
     assert_same(flown, flown_run(noisy, tmp_path / "noisy"))
 
 
-def test_a_hard_scene_is_flown_as_scored_scenes_are(fly, tmp_path):
+def test_hard_scene_equals_its_scored_run(fly, tmp_path):
     scene = list(read_scenes(HARD))[1]
     run = flown_run(scene_scenario(scene, "deployable", DeployableGains(), Conditions(duration=20.0)), tmp_path / "run")
     assert_same(fly(run), run)
 
 
-def test_a_number_that_the_plant_refuses_is_said(fly, shipped_run):
+def test_value_rejected_by_the_plant_is_named(fly, shipped_run):
     run = load_run(shipped_run("docking").folder)
     refused = fly(run, {"plant.parameters.buoyancy": -5.0})
     assert "buoyancy" in refused

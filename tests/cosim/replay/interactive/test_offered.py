@@ -30,7 +30,7 @@ def docking():
     return flight, memory, *find_slots(flight, memory)
 
 
-def test_every_gain_the_water_the_noise_and_all_that_has_a_place_are_offered(docking):
+def test_gains_water_noise_and_positions_are_adjustable(docking):
     flight, _, slots, moves = docking
     keys = {slot.key for slot in slots}
     assert keys > {f"law.gains.{name}" for name in flight.scenario.law.gains._fields}
@@ -39,7 +39,7 @@ def test_every_gain_the_water_the_noise_and_all_that_has_a_place_are_offered(doc
     assert [name for name, axes in zip(names, moves, strict=True) if axes is None] == ["heading"]
 
 
-def test_numbers_put_into_their_places_make_the_flight_of_the_scenario_that_has_them(docking):
+def test_values_in_memory_equal_those_of_the_changed_scenario(docking):
     flight, memory, slots, _ = docking
     changes = {slot.key: slot.value + 1.3e-4 * (i + 1) for i, slot in enumerate(slots)}
     other = Flight(changed_scenario(flight.scenario, changes))
@@ -56,7 +56,7 @@ def test_numbers_put_into_their_places_make_the_flight_of_the_scenario_that_has_
     assert [gains[i] for i in range(len(gains))] == list(other.law.gains)
 
 
-def test_a_number_that_others_are_made_of_is_not_offered():
+def test_parameters_of_derived_shape_values_are_not_adjustable():
     ends = "type = 'cylinder', start = [9,5,1], end = [9,5,6], radius = 0.3"
     cylinder = f"{{name = 'leg', criterion = 'obstacle', keep = 'out', gain = 100.0, shape = {{{ends}}}}}"
     flight, memory = Flight(load_scenario("docking", [f"regions=[{cylinder}]", "intersection=[]"])), Memory()
@@ -66,7 +66,7 @@ def test_a_number_that_others_are_made_of_is_not_offered():
     assert not [slot.key for slot in slots if slot.key.startswith("regions")]
 
 
-def test_the_template_filled_with_its_own_numbers_is_the_scenario(docking, tmp_path):
+def test_filled_template_equals_the_scenario(docking, tmp_path):
     flight, _, slots, _ = docking
     template, values = scenario_template(flight.scenario, slots), {slot.key: repr(slot.value) for slot in slots}
     filled = [values.get(key, '"Again"') for key in template.keys]
@@ -77,7 +77,7 @@ def test_the_template_filled_with_its_own_numbers_is_the_scenario(docking, tmp_p
     assert again.table | {"title": ""} == flight.scenario.table | {"title": ""}
 
 
-def test_widths_of_the_noise_are_those_that_numpy_draws_by():
+def test_ziggurat_widths_match_numpy():
     text, checked = ziggurat(), 0
     widths = [float(x) for x in text.partition("WIDTHS[] = {")[2].partition("}")[0].split(",")]
     inner = [int(x) for x in re.findall(r"UINT64_C\((\d+)\)", text)]
@@ -93,7 +93,7 @@ def test_widths_of_the_noise_are_those_that_numpy_draws_by():
     assert checked > 1000
 
 
-def test_the_tail_of_the_noise_is_a_table():
+def test_tail_draws_of_the_noise_are_tabulated():
     scenario = load_scenario("docking")
     drawn = np.random.default_rng([scenario.sensing.seed, 1]).standard_normal(18000)
     tail = dict(tail_draws(scenario, 3000))
@@ -109,18 +109,18 @@ def test_the_tail_of_the_noise_is_a_table():
         ("docking", ["commands.enabled=true"], "commands.enabled is True, expected False for a page that flies"),
     ],
 )
-def test_what_a_page_cannot_fly_is_refused_by_its_key(name, changes, said):
+def test_unsupported_scenarios_are_rejected_by_key(name, changes, said):
     with pytest.raises(RunError, match=said):
         Flight(load_scenario(name, changes))
 
 
-def test_several_runs_are_refused_and_no_file_is_written(tmp_path, capsys):
+def test_several_runs_are_rejected_without_a_file(tmp_path, capsys):
     assert main(["replay", "one", "other", "--interactive", "--out", str(tmp_path / "page.html")]) != 0
     assert "2 runs, expected one for a page that flies" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
-def test_without_a_compiler_for_webassembly_one_line_says_what_to_install(monkeypatch, tmp_path):
+def test_missing_webassembly_compiler_error_names_the_install_command(monkeypatch, tmp_path):
     monkeypatch.setattr("platformdirs.user_cache_dir", lambda *_: str(tmp_path))
     found = importlib.util.find_spec
     monkeypatch.setattr(
@@ -130,7 +130,7 @@ def test_without_a_compiler_for_webassembly_one_line_says_what_to_install(monkey
         flight_module(load_scenario("docking", ["time.duration=0.1"]))
 
 
-def test_an_imported_log_is_refused():
+def test_imported_log_is_rejected():
     run = SimpleNamespace(folder="dive", scenario=SimpleNamespace(log="dive.tlog"))
     with pytest.raises(RunError, match=r"imported from dive\.tlog"):
         flight_data(run, ())

@@ -49,7 +49,7 @@ def end_of(browser, run):
     return browser.js("const r = subreach.runs[arguments[0]]; return r.pose(r.end).position", run)
 
 
-def test_the_page_is_small_asks_nobody_and_repeats_its_record_to_the_last_bit(browser, page):
+def test_page_is_small_self_contained_and_reproduces_its_record(browser, page):
     assert page.stat().st_size < 1_000_000
     opened(browser, page)
     asked, complaints = browser.logs()
@@ -58,7 +58,7 @@ def test_the_page_is_small_asks_nobody_and_repeats_its_record_to_the_last_bit(br
     assert browser.js("return subreach.runs.length") == 1
 
 
-def test_a_goal_that_is_dragged_is_flown_to_and_r_goes_back(browser, page):
+def test_dragged_goal_is_simulated_and_r_resets(browser, page):
     from selenium.webdriver.common.action_chains import ActionChains
 
     opened(browser, page)
@@ -79,7 +79,7 @@ def test_a_goal_that_is_dragged_is_flown_to_and_r_goes_back(browser, page):
     assert not browser.js("return subreach.whatIf.changed")
 
 
-def test_numbers_and_keys_do_without_a_mouse(browser, page):
+def test_page_is_operable_by_keyboard(browser, page):
     from selenium.webdriver.common.keys import Keys
 
     opened(browser, page)
@@ -101,7 +101,7 @@ def test_numbers_and_keys_do_without_a_mouse(browser, page):
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (390, 844)], ids=["desktop", "phone"])
-def test_the_numbers_hide_no_button(size, browser, page):
+def test_panels_do_not_cover_buttons(size, browser, page):
     opened(browser, page, size)
     assert not browser.js(OVERLAP)
     browser.js("subreach.whatIf.set('plant.current.1', 0.3)")
@@ -125,7 +125,7 @@ def test_without_webassembly_it_is_the_plain_replay(browser, page):
 
 
 @pytest.mark.skipif(FIREFOX is None, reason="no Firefox: apt install firefox-esr")
-def test_firefox_flies_too(page, tmp_path):
+def test_page_runs_in_firefox(page, tmp_path):
     firefox = Firefox(tmp_path)
     try:
         firefox.open(page, (1280, 806))

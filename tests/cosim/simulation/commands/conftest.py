@@ -1,4 +1,4 @@
-"""Runs that are commanded about."""
+"""Runs that receive commands."""
 
 import numpy as np
 import pytest

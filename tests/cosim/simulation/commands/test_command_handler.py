@@ -1,4 +1,4 @@
-"""The command handler: commands change where the vehicle goes, at their step, and can be repeated to the last bit."""
+"""The command handler: commands take effect at their step and replay bit for bit."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ SHORT = "time.duration=20"
 OPEN = ["regions=[]", "sensing.position_noise=0", "sensing.velocity_noise=0", "plant.current=[0.0,0.0,0.0]"]
 
 
-def test_without_commands_nothing_differs(fly):
+def test_without_commands_the_run_is_unchanged(fly):
     commanded = fly({}, "time.duration=5")
     plain = load_scenario("pipe-inspection", ["time.duration=5"])
     rows = []
@@ -47,7 +47,7 @@ def test_without_commands_nothing_differs(fly):
         assert np.array_equal(values, commanded[column.name]), column.name
 
 
-def test_disarmed_thrusters_give_nothing_and_armed_ones_work_again(fly):
+def test_disarmed_thrusters_give_zero_and_recover_when_armed(fly):
     run = fly({200: [Arm(False)], 400: [Arm(True)]}, "time.duration=8")
     thrusts = np.abs(run.stack(*(f"thrust[{i}]" for i in range(1, 9)))).max(axis=1)
     assert thrusts[:200].max() > 1.0 and thrusts[400:].max() > 1.0
@@ -55,7 +55,7 @@ def test_disarmed_thrusters_give_nothing_and_armed_ones_work_again(fly):
     assert set(run["commands.armed"][200:400]) == {0.0} and set(run["commands.armed"][:200]) == {1.0}
 
 
-def test_an_aimed_target_is_reached(fly):
+def test_commanded_target_is_reached(fly):
     run = fly({100: [SetTarget((3.0, 2.0, 4.0), radius=0.4)]}, SHORT)
     assert np.linalg.norm(run.position[-1] - [3.0, 2.0, 4.0]) < 0.4
     assert run["goal.clearance"][-1] == pytest.approx(0.4 - np.linalg.norm(run.position[-1] - [3.0, 2.0, 4.0]), abs=0.1)
@@ -63,7 +63,7 @@ def test_an_aimed_target_is_reached(fly):
     assert run.stack("target.x", "target.y", "target.z")[-1] == pytest.approx([3.0, 2.0, 4.0])
 
 
-def test_a_target_without_a_radius_is_the_goal_moved(fly):
+def test_target_without_radius_keeps_the_goal_shape(fly):
     run = fly({100: [SetTarget((3.0, 2.0, 4.0), velocity=(0.0, -0.1, 0.0))]}, SHORT, *OPEN)
     k = 1500
     middle = np.array([3.0, 2.0 - 0.1 * (k - 100) / STEPS, 4.0])
@@ -74,7 +74,7 @@ def test_a_target_without_a_radius_is_the_goal_moved(fly):
     assert shifts + load_scenario("pipe-inspection").goal.centre == pytest.approx(middle, abs=1e-9)
 
 
-def test_holding_keeps_the_place_of_the_order(fly):
+def test_hold_keeps_the_position_at_the_command(fly):
     run = fly({300: [SetMode("hold")]}, SHORT, *OPEN)
     place = run.stack("target.x", "target.y", "target.z")[300]
     assert place == pytest.approx(run.position[300], abs=1e-9)
@@ -83,21 +83,21 @@ def test_holding_keeps_the_place_of_the_order(fly):
 
 
 @pytest.mark.slow
-def test_back_to_reaching_is_back_to_the_target_that_was(fly):
+def test_reach_mode_restores_the_previous_target(fly):
     run = fly({100: [SetMode("hold")], 300: [SetMode("reach")]}, "time.duration=60")
     straight = fly({}, "time.duration=60")
     assert run["goal.clearance"][-1] > 0.0 and straight["goal.clearance"][-1] > 0.0
     assert run["target.x"][-1] == pytest.approx(straight["target.x"][-1], abs=1e-9)  # it travels
 
 
-def test_surfacing_goes_up_where_it_is(fly):
+def test_surface_mode_ascends_vertically(fly):
     run = fly({300: [SetMode("surface")]}, SHORT, *OPEN)
     assert run.position[-1][2] == pytest.approx(0.5, abs=0.3)
     assert np.linalg.norm(run.position[-1][:2] - run.position[300][:2]) < 0.35
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2, 5])
-def test_sticks_push_along_their_axis(fly, axis):
+def test_manual_control_acts_along_its_axis(fly, axis):
     part = [0.0] * 6
     part[axis] = 1.0
     run = fly({0: [SetMode("manual"), ManualControl(tuple(part))]}, "time.duration=2", *OPEN)
@@ -115,7 +115,7 @@ def sticks(*values):
     return ManualControl(tuple(values))
 
 
-def test_stabilized_sticks_keep_level_and_heading_where_bare_ones_do_not(fly):
+def test_stabilize_mode_holds_attitude_and_heading(fly):
     push = [sticks(0.5, 0.0, 0.0, 0.0, 0.0, 0.0)]
     bare = fly({0: [SetMode("manual"), *push]}, "time.duration=10", *OPEN)
     helped = fly({0: [SetMode("stabilize"), *push]}, "time.duration=10", *OPEN)
@@ -126,7 +126,7 @@ def test_stabilized_sticks_keep_level_and_heading_where_bare_ones_do_not(fly):
 
 
 @pytest.mark.medium
-def test_depth_is_kept_until_the_vertical_stick_asks_for_a_rate(fly):
+def test_depth_hold_holds_depth_and_follows_the_vertical_stick(fly):
     commands = {0: [SetMode("depth_hold")], 1000: [sticks(0, 0, 1.0, 0, 0, 0)], 1500: [sticks(0, 0, 0, 0, 0, 0)]}
     run = fly(commands, "time.duration=30", *OPEN)
     depth = run.position[:, 2]
@@ -135,7 +135,7 @@ def test_depth_is_kept_until_the_vertical_stick_asks_for_a_rate(fly):
     assert np.ptp(depth[2500:]) < 0.05
 
 
-def test_the_yaw_stick_asks_for_a_rate_and_the_heading_is_kept_then(fly):
+def test_yaw_stick_sets_a_rate_and_heading_is_held_afterwards(fly):
     commands = {0: [SetMode("stabilize"), sticks(0, 0, 0, 0, 0, 0.25)], 400: [sticks(0, 0, 0, 0, 0, 0)]}
     yaw = np.unwrap(fly(commands, "time.duration=10", *OPEN)["attitude.yaw"])
     assert np.diff(yaw[200:400]).mean() * STEPS == pytest.approx(np.radians(0.5 * 0.25 * 202.5), rel=0.1)
@@ -150,7 +150,7 @@ def tilted(yaw, pitch):
 
 
 @pytest.mark.medium
-def test_an_attitude_is_kept_beside_the_sticks_and_ends_with_the_mode(fly):
+def test_commanded_attitude_is_held_with_sticks_until_the_mode_ends(fly):
     attitude = SetAttitude(tuple(tilted(0.5, 0.1)))
     commands = {0: [SetMode("depth_hold"), attitude, sticks(0.3, 0, 0, 0, 0, 0.9)], 1500: [SetMode("depth_hold")]}
     run = fly(commands, "time.duration=25", *OPEN)
@@ -161,7 +161,7 @@ def test_an_attitude_is_kept_beside_the_sticks_and_ends_with_the_mode(fly):
 
 
 @pytest.mark.medium
-def test_an_attitude_with_a_force_takes_the_laws_place_until_another_target_comes(fly):
+def test_attitude_with_force_replaces_the_law_until_the_next_target(fly):
     attitude = SetAttitude(tuple(tilted(0.4, 0.0)), (0.2, 0.0, 0.0))
     run = fly({100: [attitude], 900: [SetMode("hold")]}, "time.duration=20", *OPEN)
     vehicle = load_vehicle("bluerov2_heavy")
@@ -172,14 +172,14 @@ def test_an_attitude_with_a_force_takes_the_laws_place_until_another_target_come
     assert np.linalg.norm(run.position[-1] - place) < 0.3
 
 
-def test_channels_that_are_overridden_push_without_the_pilots_gain(fly):
+def test_rc_override_is_not_scaled_by_the_pilot_gain(fly):
     run = fly({0: [SetMode("manual"), ManualControl((0.5, 0, 0, 0, 0, 0), by_gain=False)]}, "time.duration=0.1", *OPEN)
     vehicle = load_vehicle("bluerov2_heavy")
     greatest = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
     assert run["command.X"][-1] == pytest.approx(0.5 * greatest[0])
 
 
-def test_greatest_wrench_is_where_the_first_thruster_is_at_its_limit():
+def test_greatest_wrench_puts_one_thruster_at_its_limit():
     vehicle = load_vehicle("bluerov2_heavy")
     matrix, limit = vehicle.thruster_matrix, vehicle.thrust_max[0]
     greatest = greatest_wrench(matrix, vehicle.thrust_min, vehicle.thrust_max)
@@ -189,7 +189,7 @@ def test_greatest_wrench_is_where_the_first_thruster_is_at_its_limit():
     assert greatest_wrench(np.zeros((6, 2)), -np.ones(2), np.ones(2)) == pytest.approx(np.zeros(6))
 
 
-def test_a_mission_goes_from_region_to_region(fly):
+def test_mission_visits_its_regions_in_order(fly):
     items = (
         MissionItem((1.0, 0.0, 3.0), 0.3),
         MissionItem((0.0, 2.0, 2.0), None, 2.0),
@@ -205,7 +205,7 @@ def test_a_mission_goes_from_region_to_region(fly):
     assert np.linalg.norm(run.position[-1] - items[2].position) < 0.3
 
 
-def test_what_a_mission_does_at_once_counts_from_then_on(fly):
+def test_immediate_mission_commands_stay_in_effect(fly):
     slowly = MissionItem(None, commands=(ChangeSetting("law.gains.speed", 0.2), SetHeading(0.8)))
     items = (
         slowly,
@@ -227,7 +227,7 @@ def test_what_a_mission_does_at_once_counts_from_then_on(fly):
     assert run["attitude.yaw"][-1] == pytest.approx(0.8, abs=0.05)
 
 
-def test_an_item_to_stay_at_is_not_left_but_on_order(fly):
+def test_unlimited_stay_ends_only_by_command(fly):
     items = (MissionItem((1.0, 0.0, 3.0), 0.3, None), MissionItem((0.0, 1.0, 2.0), 0.3))
     run = fly({0: [SetMission(items), SetMode("mission")], 1500: [SetCurrentItem(1)]}, SHORT, *OPEN)
     assert set(run["commands.item"][:1500]) == {0.0} and set(run["commands.item"][1500:]) == {1.0}
@@ -235,7 +235,7 @@ def test_an_item_to_stay_at_is_not_left_but_on_order(fly):
 
 
 @pytest.mark.slow
-def test_another_heading_is_kept(fly):
+def test_commanded_heading_is_held(fly):
     run = fly({100: [SetHeading(1.2)]}, SHORT, *OPEN)
     assert run["attitude.yaw"][-1] == pytest.approx(1.2, abs=0.05)
     by_wrench = fly({100: [SetHeading(1.2)]}, "time.duration=15", name="paper")
@@ -243,7 +243,7 @@ def test_another_heading_is_kept(fly):
 
 
 @pytest.mark.medium
-def test_an_obstacle_that_comes_is_kept_out_of(fly):
+def test_added_obstacle_is_avoided(fly):
     centre = (2.5, 0.0, 3.0)
     way = [SetTarget((5.0, 0.0, 3.0), 0.4)]
     through = fly({0: way}, SHORT, *OPEN)
@@ -256,14 +256,14 @@ def test_an_obstacle_that_comes_is_kept_out_of(fly):
     assert np.linalg.norm(gone.position - centre, axis=1).min() < 0.3
 
 
-def test_obstacles_beyond_the_room_are_refused_and_known_ones_move(fly, caplog):
+def test_excess_obstacles_are_rejected_and_known_obstacles_move(fly, caplog):
     far = [AddObstacle(i, (50.0, float(i), 3.0), 0.5) for i in range(3)]
     run = fly({0: far, 5: [AddObstacle(1, (60.0, 0.0, 3.0), 0.5)]}, "time.duration=0.1", "commands.obstacles=2", *OPEN)
     assert "no room for obstacle 2" in caplog.text
     assert run["seen 2.shift.x"][4:6].tolist() == [50.0, 60.0]
 
 
-def test_moved_regions_keep_their_shape_and_the_record_has_where_they_are(fly):
+def test_shifted_regions_keep_their_shape_and_are_recorded(fly):
     travels = AddObstacle(4, (30.0, 0.0, 3.0), 0.5, velocity=(1.0, 0.0, 0.0))
     away, back = (0.0, 3.0, -1.0), (0.0, -3.0, 1.0)
     script = {
@@ -293,14 +293,14 @@ def test_moved_regions_keep_their_shape_and_the_record_has_where_they_are(fly):
         ("seen 2", "no such obstacle has come"),
     ],
 )
-def test_what_is_not_there_is_not_moved(fly, caplog, region, why):
+def test_shift_of_an_unknown_region_is_rejected(fly, caplog, region, why):
     run = fly({1: [ShiftRegion(region, (1.0, 1.0, 1.0))]}, "time.duration=0.05")
     assert why in caplog.text
     moved = [f"{name}.shift.{axis}" for name in ("pipe", "seen 1", "seen 2") for axis in "xyz"]
     assert not run.stack(*moved).any()
 
 
-def test_numbers_change_while_it_runs(fly):
+def test_settings_change_during_a_run(fly):
     changes = [
         ChangeSetting("law.gains.speed", 0.15), ChangeSetting("goal.radius", 0.9),
         ChangeSetting("regions.pipe.shape.radius", 0.8),
@@ -314,14 +314,14 @@ def test_numbers_change_while_it_runs(fly):
     assert run["thruster_force[1]"][300:].max() <= 3.0 + 1e-9
 
 
-def test_a_change_of_a_gain_reaches_a_law_that_takes_over_later(fly):
+def test_gain_change_reaches_a_law_activated_later(fly):
     run = fly(
         {10: [SetMode("manual"), ChangeSetting("law.gains.speed", 0.2)], 100: [SetMode("reach")]}, "time.duration=2"
     )
     assert run.master.law.gains.speed == 0.2
 
 
-def test_gains_and_limits_of_the_direct_wrench(fly):
+def test_force_limit_and_region_gain_change_during_a_run(fly):
     run = fly(
         {500: [ChangeSetting("limit.force", 20.0), ChangeSetting("regions.SR1.gain", 3.0)]},
         "time.duration=1",
@@ -345,14 +345,14 @@ def test_gains_and_limits_of_the_direct_wrench(fly):
         (ChangeSetting("law.gains.speed", 0.0), "expected a finite number above 0"),
     ],
 )
-def test_what_cannot_be_followed_is_logged_and_changes_nothing(fly, caplog, command, why):
+def test_invalid_command_is_logged_and_has_no_effect(fly, caplog, command, why):
     run = fly({5: [command]}, "time.duration=0.2")
     assert why in caplog.text
     plain = fly({}, "time.duration=0.2")
     assert np.array_equal(run.rows, plain.rows)
 
 
-def test_no_shape_that_cannot_be_flown_by_is_taken(fly, caplog):
+def test_degenerate_shape_is_rejected(fly, caplog):
     """What is too short to have a direction is refused when it is set, not found out in the step."""
     end = ChangeSetting("regions.mooring.shape.end.2", 1e-38)
     run = fly({5: [end]}, "time.duration=0.2", name="depth-transit")
@@ -360,7 +360,7 @@ def test_no_shape_that_cannot_be_flown_by_is_taken(fly, caplog):
     assert run.master.command_handler.settings.shapes["mooring"].end[2] > 1.0
 
 
-def test_a_lost_position_cannot_be_held(fly, caplog):
+def test_hold_requires_a_known_position(fly, caplog):
     lost = ["sensing.dead_from=0.1", "sensing.dead_for=1.0"]
     run = fly({20: [SetMode("hold")]}, "time.duration=0.5", *lost)
     assert "needs a position" in caplog.text
@@ -385,7 +385,7 @@ class KnownScene:
                 self.queue.submit(command)
 
 
-def test_nothing_moves_before_it_is_armed_and_the_wait_repeats_to_the_last_bit(fly, tmp_path):
+def test_vehicle_waits_for_arming_and_replays_bit_for_bit(fly, tmp_path):
     queue = CommandQueue()
     told = KnownScene(queue, 5, [ChangeSetting("law.gains.speed", 0.5), SetMode("hold"), Arm(True), SetMode("reach")])
     await_arm = ["commands.await_arm=true", "time.duration=3"]
@@ -398,13 +398,13 @@ def test_nothing_moves_before_it_is_armed_and_the_wait_repeats_to_the_last_bit(f
     assert np.array_equal(live.rows, again.rows)
 
 
-def test_an_empty_log_does_not_wait_for_ever(fly, tmp_path):
+def test_empty_log_does_not_wait_for_arming(fly, tmp_path):
     (tmp_path / "commands.jsonl").touch()
     run = fly(ReplayedCommands(tmp_path / "commands.jsonl"), "commands.await_arm=true", "time.duration=0.1")
     assert not run["commands.armed"].any()
 
 
-def test_commands_of_a_run_repeat_it_to_the_last_bit(tmp_path):
+def test_logged_commands_replay_bit_for_bit(tmp_path):
     """Through the run folder: a scenario and a log are all that is needed."""
     scenario = load_scenario("pipe-inspection", ["commands.enabled=true", "time.duration=1.8"])
     log = tmp_path / "commands.jsonl"
@@ -429,7 +429,7 @@ def test_commands_of_a_run_repeat_it_to_the_last_bit(tmp_path):
 
 @pytest.mark.parametrize("name", ["paper", "paper-limited"])
 @pytest.mark.parametrize("away", [300.0, 1e5])
-def test_no_target_is_too_far_for_the_run_to_go_on(fly, name, away):
+def test_distant_target_saturates_and_does_not_abort(fly, name, away):
     """The paper's law's force grows with the cube of the distance."""
     run = fly({100: [SetTarget((away, 0.0, 5.0))]}, "time.duration=0.5", name=name)
     asked = np.abs(run.stack(*(f"command.{axis}" for axis in "XYZ"))).max()
@@ -438,7 +438,7 @@ def test_no_target_is_too_far_for_the_run_to_go_on(fly, name, away):
     assert run["allocation_saturated"][-1] == 1.0 and run["allocation_saturated"][0] == 0.0
 
 
-def test_a_wrench_that_is_no_number_is_none():
+def test_saturation_zeroes_non_finite_wrenches():
     wrench = np.array([np.nan, 1.0, np.inf, 2 * MAX_WRENCH, -MAX_WRENCH, 0.0])
     assert saturate(wrench)
     assert wrench.tolist() == [0.0, 0.0, 0.0, MAX_WRENCH, -MAX_WRENCH / 2, 0.0]
@@ -446,14 +446,14 @@ def test_a_wrench_that_is_no_number_is_none():
 
 
 @pytest.mark.parametrize(("gain", "value"), [("k_p2", 3e38), ("sigma_a", 3e38), ("gamma", 1e-45)])
-def test_no_gain_ends_a_run_by_the_moment_that_is_asked_for(fly, gain, value):
+def test_extreme_gain_saturates_and_does_not_abort(fly, gain, value):
     run = fly({10: [ChangeSetting(f"law.gains.{gain}", value)]}, "time.duration=0.5", name="paper")
     assert len(run["time"]) == 501
     assert run["allocation_saturated"].max() == 1.0
 
 
 @pytest.mark.slow
-def test_a_run_that_is_reset_in_its_first_step_has_a_report(tmp_path):
+def test_run_reset_in_its_first_step_has_a_report(tmp_path):
     (log := tmp_path / "commands.jsonl").write_bytes(b'{"step":0,"command":{"command":"reset"}}\n')
     run = run_scenario(load_scenario("harbour", ["commands.enabled=true"]), tmp_path / "run", commands_log=log)
     assert run.summary["status"] == "reset" and run.summary["simulated_time"] == 0.0

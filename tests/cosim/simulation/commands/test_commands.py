@@ -61,7 +61,7 @@ COMMANDS_LOG = st.one_of(
 
 
 @given(st.lists(st.tuples(st.integers(0, 9), COMMANDS_LOG), max_size=20))
-def test_the_log_gives_back_every_order_at_its_step(tmp_path_factory, given_commands):
+def test_log_replays_every_command_at_its_step(tmp_path_factory, given_commands):
     file = tmp_path_factory.mktemp("log") / "commands.jsonl"
     queue, by_step = CommandQueue(), {}
     for k, command in given_commands:
@@ -80,14 +80,14 @@ def test_the_log_gives_back_every_order_at_its_step(tmp_path_factory, given_comm
     assert recorded.exhausted
 
 
-def test_a_flood_is_refused_not_kept():
+def test_full_queue_rejects_commands():
     queue = CommandQueue()
     assert all(queue.submit(Arm(True)) for _ in range(QUEUED))
     assert not queue.submit(Arm(False))
     assert len(queue.take(0)) == QUEUED
 
 
-def test_what_was_meant_for_a_run_that_is_over_is_followed_by_no_other():
+def test_commands_for_a_finished_run_are_rejected():
     queue = CommandQueue()
     assert queue.submit(Arm(True), run=0)
     queue.end_run()
@@ -124,7 +124,7 @@ def test_what_was_meant_for_a_run_that_is_over_is_followed_by_no_other():
         SetMission((MissionItem(None, commands=(SetHeading(math.nan),)),)),
     ],
 )
-def test_absurd_numbers_are_refused(command):
+def test_non_finite_or_out_of_range_numbers_are_rejected(command):
     with pytest.raises(CommandError, match=r"is .*, expected"):
         validate_command(command)
     with pytest.raises(CommandError):
@@ -146,7 +146,7 @@ def test_a_broken_log_names_the_line(tmp_path, line):
 
 
 @pytest.mark.parametrize("size", [1, 30, 62])
-def test_a_last_line_that_was_cut_off_does_not_count(tmp_path, size):
+def test_truncated_last_line_is_ignored(tmp_path, size):
     file, line = (
         tmp_path / "commands.jsonl",
         b'{"step":1,"command":{"command":"set_target","position":[1.25,0.0,0.0]}}\n',
@@ -161,12 +161,12 @@ def test_a_last_line_that_was_cut_off_does_not_count(tmp_path, size):
         ReplayedCommands(file)
 
 
-def test_no_log_is_one_line(tmp_path):
+def test_missing_log_gives_one_line_error(tmp_path):
     with pytest.raises(RunError, match="No such file"):
         ReplayedCommands(tmp_path / "none.jsonl")
 
 
-def test_a_line_of_the_log_reads_well(tmp_path):
+def test_log_line_is_readable_json(tmp_path):
     logged = LoggedCommands(queue := CommandQueue(), tmp_path / "log")
     queue.submit(SetTarget((1.0, 2.0, 3.0), 0.5))
     logged.take(7)
@@ -189,7 +189,7 @@ UNREADABLE = {
 
 
 @pytest.mark.parametrize("line", UNREADABLE.values(), ids=UNREADABLE)
-def test_d3_a_log_that_no_parser_reads_is_refused_with_its_line(tmp_path, line):
+def test_d3_unparsable_log_is_rejected_with_its_line(tmp_path, line):
     file = tmp_path / "commands.jsonl"
     file.write_bytes(ARMED + line + b"\n" + ARMED)
     with pytest.raises(RunError) as caught:
@@ -199,19 +199,19 @@ def test_d3_a_log_that_no_parser_reads_is_refused_with_its_line(tmp_path, line):
 
 
 @pytest.mark.parametrize("cut", range(1, 7))
-def test_d3_a_last_line_that_was_cut_off_within_a_letter_does_not_count(tmp_path, cut):
+def test_d3_last_line_truncated_within_a_character_is_ignored(tmp_path, cut):
     line = '{"step":1,"command":{"command":"shift_region","region":"ΩΩΩ"'.encode()[:-1]
     (tmp_path / "commands.jsonl").write_bytes(ARMED + line[:-cut])
     assert len(ReplayedCommands(tmp_path / "commands.jsonl").take(9)) == 1
 
 
 @pytest.mark.parametrize("index", ["9" * 5000, "٣", "-1", "01", "", "0.0"])
-def test_d4_an_index_that_is_none_is_refused(index):
+def test_d4_invalid_index_is_rejected(index):
     with pytest.raises(CommandError, match="no setting"):
         LiveSettings(load_scenario("paper")).change(f"goal.centre.{index}", 1.0)
 
 
-def test_a_log_of_an_older_version_is_refused_by_its_word(tmp_path):
+def test_log_of_an_older_version_is_rejected_by_its_key(tmp_path):
     (log := tmp_path / "orders.jsonl").write_bytes(b'{"step":0,"order":{"order":"arm","armed":true}}\n')
     with pytest.raises(RunError, match=r"orders\.jsonl: has the words of an older version \('order'\), expected"):
         ReplayedCommands(log)

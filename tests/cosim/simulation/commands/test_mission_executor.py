@@ -1,4 +1,4 @@
-"""The course of a mission: which item follows, and the way from one to another."""
+"""Mission execution: the next item, and the path between items."""
 
 import math
 
@@ -31,12 +31,12 @@ def test_items_follow_each_other_and_the_last_one_stays():
     assert followed([PLACE, AT_ONCE]) == [0, 1]
 
 
-def test_only_a_place_has_to_be_reached():
+def test_only_position_items_must_be_reached():
     assert followed([AT_ONCE, AT_ONCE, PLACE, PLACE], clearance=-0.1) == [0, 1, 2]
     assert followed([PLACE, PLACE], clearance=math.nan) == [0]
 
 
-def test_a_stay_counts_from_within_and_anew_after_leaving():
+def test_stay_time_restarts_after_leaving_the_region():
     course = MissionExecutor()
     course.take((MissionItem((0.0, 0.0, 0.0), stay=2.0), PLACE))
     course.begin(0)
@@ -48,7 +48,7 @@ def test_a_stay_counts_from_within_and_anew_after_leaving():
     assert followed([MissionItem(None, stay=None), PLACE]) == [0]
 
 
-def test_jumps_are_made_as_often_as_they_say():
+def test_jumps_repeat_their_stated_count():
     assert followed([PLACE, MissionItem(None, jump=0, times=2), PLACE]) == [0, 1, 0, 1, 0, 1, 2]
     assert followed([PLACE, MissionItem(None, jump=0, times=0), PLACE]) == [0, 1, 2]
     assert followed([PLACE, MissionItem(None, jump=0)], steps=5) == [0, 1, 0, 1, 0, 1]
@@ -56,7 +56,7 @@ def test_jumps_are_made_as_often_as_they_say():
     assert followed([PLACE, MissionItem(None, jump=3, times=1), PLACE, PLACE]) == [0, 1, 3]
 
 
-def test_begun_anew_all_jumps_can_be_made_again():
+def test_restarting_the_mission_resets_jump_counts():
     course = MissionExecutor()
     course.take((PLACE, MissionItem(None, jump=0, times=1), PLACE))
     for _ in range(2):
@@ -68,7 +68,7 @@ def test_begun_anew_all_jumps_can_be_made_again():
         course.begin(3)
 
 
-def test_the_region_is_that_of_the_last_place():
+def test_current_region_is_that_of_the_last_position_item():
     course = MissionExecutor()
     course.take((AT_ONCE, PLACE, AT_ONCE, AT_ONCE))
     assert course.enter(3) is AT_ONCE and course.region() is PLACE
@@ -76,7 +76,7 @@ def test_the_region_is_that_of_the_last_place():
     assert course.region() is None
 
 
-def test_the_way_goes_through_what_is_done_at_once():
+def test_path_between_items_includes_immediate_items():
     items = [PLACE, AT_ONCE, MissionItem(None, jump=0, times=2), PLACE, PLACE]
     assert way(items, 0, 1) == [1] and way(items, 0, 3) == [1, 2, 3] and way(items, 3, 4) == [4]
     assert way(items, 1, 0) == [2, 0]

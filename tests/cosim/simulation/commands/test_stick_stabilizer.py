@@ -1,4 +1,4 @@
-"""Sticks with help, where the state that they need comes late or is missing for a while."""
+"""Stabilized manual control with late or missing state estimates."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def know(state, depth):
     state.quaternion[:] = [1.0, 0.0, 0.0, 0.0]
 
 
-def test_what_is_kept_is_what_is_known_first():
+def test_setpoint_is_the_first_known_state():
     """A navigation filter gives no state before it is aligned."""
     state = unknown()
     keeper = StickStabilizer(load_vehicle("bluerov2_heavy"), state, 0.02, REACH)
@@ -30,7 +30,7 @@ def test_what_is_kept_is_what_is_known_first():
     assert keeper.wrench(np.zeros(6), 0.5, True)[2] < -1.0
 
 
-def test_a_depth_that_is_lost_for_a_while_is_kept_again():
+def test_depth_hold_resumes_after_a_depth_outage():
     state = unknown()
     know(state, 3.0)
     keeper = StickStabilizer(load_vehicle("bluerov2_heavy"), state, 0.02, REACH)
