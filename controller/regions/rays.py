@@ -16,6 +16,7 @@ from controller.stack_array import zeros
 
 TOUCHING = 1e-4  # m, the clearance at which a ray has met a surface
 LOOKS = 64  # steps along a ray, for each region
+_PARALLEL = 1e-100  # part of a direction below which it is 0: its square, or a division by it, would leave the range
 
 _ELLIPSOID = Ellipsoid.kind
 _PIPE = Pipe.kind
@@ -91,7 +92,7 @@ def _meet(
     at = zeros(3)
     for k in range(distances.size):
         dx, dy, dz = directions[k, 0], directions[k, 1], directions[k, 2]
-        if notched and abs(x * dy - y * dx) > radius * hypotenuse(dx, dy):
+        if notched and abs(x * dy - y * dx) > radius * hypotenuse(dx, dy) + _PARALLEL:
             continue  # it passes by the circle and cannot meet the prism
         nearest = farthest if distances[k] > farthest else distances[k]
         here, way = first, 0.0
@@ -114,7 +115,7 @@ def _stride(kind: int, convex: bool, outward: float, here: Evaluation, dx: float
     if not (convex or (kind == _PRISM and outward > 0.0 and gx == 0.0 and gy == 0.0)):
         return outward * distance
     along = gx * dx + gy * dy + gz * dz
-    if along >= 0.0:
+    if along >= -_PARALLEL:
         return math.inf
     if kind == _ELLIPSOID:  # its gradient is that of g alone: sqrt(g + 1) - 1 is convex, and nearly straight far away
         gauge = math.sqrt(g + 1.0)

@@ -121,6 +121,13 @@ def test_ray_to_cylinder_matches_closed_form(bearing):
     assert over == math.inf
 
 
+def test_direction_components_near_zero_count_as_zero():
+    assert rays(out(DepthBand(2.5, 0.4)), (0.0, 0.0, 0.0), (0.0, 1.0, 2e-309)) == math.inf
+    below_edge = (0.0, 0.0, 0.0)  # the prism's vertical edge is straight below
+    (met,) = rays(out(L_SHAPED), below_edge, (0.0, 1e-190, 1.0))
+    assert met == pytest.approx(1.0, abs=20.0 * TOUCHING)
+
+
 # ---- any shape -----------------------------------------------------------------------------------------------------
 
 
@@ -128,7 +135,7 @@ def test_ray_to_cylinder_matches_closed_form(bearing):
 @each_shape
 @settings(max_examples=examples(60), deadline=None)
 @given(origins, directions)
-def test_a_ray_ends_where_walking_along_it_ends(shape, origin, way):
+def test_ray_distance_matches_dense_sampling(shape, origin, way):
     (region,) = regions = out(shape)
     (met,) = rays(regions, origin, way)
     steps = np.arange(0.0, 15.0, 0.01)
@@ -143,7 +150,7 @@ def test_a_ray_ends_where_walking_along_it_ends(shape, origin, way):
 
 
 @given(origins, directions)
-def test_the_first_of_several_regions_ends_it(origin, way):
+def test_ray_ends_at_nearest_of_several_regions(origin, way):
     together = out(*CONVEX[:1], *CONVEX[3:], *BENT)
     alone = [rays([region], origin, way)[0] for region in together]
     assert rays(together, origin, way)[0] == pytest.approx(min(alone), abs=1e-9)
