@@ -1,5 +1,7 @@
 """The companion flies our own vehicle through its autopilot, whose clock is the run's; nothing here waits."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
@@ -389,9 +391,11 @@ def test_what_a_real_vehicle_cannot_be_made_to_do_is_refused():
 
 @pytest.mark.medium
 def test_the_page_of_a_flight_shows_states_ages_modes_and_sticks(tmp_path):
-    with LiveView(parse_live("0")) as live, Viewer(live.url) as viewer:
-        flight = Flight(tmp_path, 3.0, live=live)
-        end = viewer.until("end")
+    with LiveView(parse_live("0")) as live, ThreadPoolExecutor(1) as pool:
+        flying = pool.submit(Flight, tmp_path, 3.0, live=live)
+        with Viewer(live.url) as viewer:
+            end = viewer.until("end")
+        flight = flying.result()
     assert end["status"] == "completed"
     assert "engaging, waits for mode 458752" in viewer.said("info") and "steering" in viewer.said("info")
     table = flight.run.table()
