@@ -7,8 +7,7 @@ import contextlib
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.link_flags import origin
-from cosim.command_line.live_flag import add_live_flag, open_live
+from cosim.command_line.link_flags import add_live_flag, open_live, origin
 from cosim.command_line.numbers import number, whole
 from cosim.command_line.process import INTERRUPTED, tell
 from cosim.command_line.results import print_run

@@ -1,17 +1,21 @@
-"""Flags of the verbs that act as a MAVLink vehicle: endpoints, profile, and accepted senders."""
+"""Flags of the verbs that show a vehicle: MAVLink endpoints, profile, accepted senders, and the live page."""
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cosim.command_line.numbers import number, whole
+from cosim.command_line.process import tell
 from cosim.errors import TelemetryError
+from cosim.live.address import HOST, PORT, parse_live
 from cosim.mavlink.wire.options import LOSS_ACTIONS, PROFILES, MavlinkOptions
 
 if TYPE_CHECKING:
+    from cosim.live.view import LiveView
     from cosim.mavlink.wire.endpoint import Endpoint
 
 _GREATEST_TIMEOUT = 3600.0  # s
@@ -130,3 +134,28 @@ def origin(text: str) -> tuple[float, float]:
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
         raise argparse.ArgumentTypeError(f"{text!r}: expected degrees of latitude and longitude, such as 55.9,-3.3")
     return latitude, longitude
+
+
+def add_live_flag(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add the flag to a verb, with words for `what` it does."""
+    parser.add_argument(
+        "--live", nargs="?", const="", metavar="[HOST:]PORT",
+        help=f"{what} (default: {HOST}:{PORT}, or another port if that is taken)",
+    )  # fmt: skip
+
+
+def open_live(options: argparse.Namespace, stack: contextlib.ExitStack) -> LiveView | None:
+    """Open the page that the flag asks for until the stack ends, and tell where it is; None where it asks for none.
+
+    Raises
+    ------
+    TelemetryError
+        If the address is none, leaves this machine without leave, or cannot be opened.
+    """
+    if options.live is None:
+        return None
+    from cosim.live.view import LiveView
+
+    live = stack.enter_context(LiveView(parse_live(options.live, options.allow_remote)))
+    tell(f"the run is shown at {live.url}")
+    return live

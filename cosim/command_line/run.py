@@ -8,8 +8,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cosim.command_line.link_flags import add_link_flags, links_from
-from cosim.command_line.live_flag import add_live_flag, open_live
+from cosim.command_line.link_flags import add_link_flags, add_live_flag, links_from, open_live
 from cosim.command_line.numbers import rate
 from cosim.command_line.process import INTERRUPTED
 from cosim.command_line.results import print_run

@@ -9,6 +9,7 @@ import numpy as np
 
 from controller.quaternion import from_axis_angle, multiply, rotation_matrix
 from cosim.companion.vehicle_state import ReportedState
+from cosim.mavlink.vehicle.layout import euler_of
 from cosim.mavlink.wire.thrust_body import THRUST_BODY_SET, with_thrust_body
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
@@ -17,7 +18,8 @@ FASTEST = 0.5  # m/s, of the law that steers by velocity: a loop that it asks th
 _FASTEST_ASKED, _FASTEST_TURN = 0.8, 0.6  # m/s, rad/s, that are asked for
 _OBSERVED = 1.5  # rad/s, of both poles of the observer of what a velocity loop does beside its lag
 _RATE_LAG, _ANGLE_LAG = 0.3, 0.3  # s, of an autopilot's loops of rate and angle
-_FARTHEST = 0.35  # rad, by which an attitude that is asked for leads the present one
+_FARTHEST, _TILT = 0.35, 0.1  # rad, by which angles that are asked for lead the present ones; greatest roll and pitch
+_NORTH, _EAST, _DOWN = np.eye(3)
 _VELOCITY_ONLY, _YAW_RATE_IGNORED = 0b010111000111, 1 << 11  # type_mask of positions and velocities
 _RATES_IGNORED, _THRUST_IGNORED = 0b111, 1 << 6  # of attitudes
 _LOCAL_NED = 1
@@ -49,12 +51,16 @@ class TurnLead:
         return min(max(float(self.rates(wrench, state)[2]), -_FASTEST_TURN), _FASTEST_TURN)
 
     def attitude(self, wrench: Array, state: ReportedState) -> Array:
-        """Return the attitude as a quaternion, shape (4,), at most 0.35 rad from the present one."""
-        lead = _ANGLE_LAG * self.rates(wrench, state)
-        angle = float(np.linalg.norm(lead))
-        if not 0.0 < angle < math.inf:
-            return state.quaternion.copy()
-        result: Array = multiply(state.quaternion, from_axis_angle(lead / angle, min(angle, _FARTHEST)))
+        """Return the attitude as a quaternion, shape (4,), at most 0.35 rad from the present one in each angle.
+
+        Roll and pitch are at most 0.1 rad: the autopilot rights the vehicle by itself, and what the law's moments do
+        against weight, drag and thrusters beside the center is none of a tilt that is asked for.
+        """
+        roll, pitch, yaw = np.clip(_ANGLE_LAG * self.rates(wrench, state), -_FARTHEST, _FARTHEST)
+        now = euler_of(state.quaternion.tolist())
+        asked = [min(max(angle + lead, -_TILT), _TILT) for angle, lead in zip(now[:2], (roll, pitch), strict=True)]
+        heading = from_axis_angle(_DOWN, now[2] + yaw)
+        result: Array = multiply(heading, multiply(from_axis_angle(_EAST, asked[1]), from_axis_angle(_NORTH, asked[0])))
         return result
 
 

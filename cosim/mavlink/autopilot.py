@@ -21,10 +21,9 @@ from cosim.mavlink.services.modes import Modes
 from cosim.mavlink.services.obstacles import Obstacles
 from cosim.mavlink.services.origin import Origin
 from cosim.mavlink.services.parameters import Parameters
-from cosim.mavlink.services.requests import Requests, banner
+from cosim.mavlink.services.requests import Requests, Timing, banner
 from cosim.mavlink.services.service import Handler, Service
 from cosim.mavlink.services.targets import Targets
-from cosim.mavlink.services.timing import Timing
 from cosim.mavlink.vehicle.vehicle_context import COMPONENT_ID, Sender, VehicleContext
 from cosim.mavlink.wire.message_sink import MessageSink
 from cosim.mavlink.wire.options import MavlinkOptions

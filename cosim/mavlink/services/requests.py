@@ -1,4 +1,4 @@
-"""Requests for messages: once, or at an interval."""
+"""Requests for messages, once or at an interval, and for the time."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from cosim.mavlink.wire.message_sink import MessageSink
 _SECOND = 1_000_000
 _ALL = 0
 _GREATEST_RATE = 100  # Hz
+_NANO = 1000  # ns in a µs
 
 
 class Requests(Service):
@@ -105,3 +106,21 @@ def banner(context: VehicleContext) -> list[str]:
     elif not context.accepts_commands:
         lines.append("Read-only: commands are off")
     return lines
+
+
+class Timing(Service):
+    """TIMESYNC and PING, answered with the time since boot."""
+
+    def __init__(self, context: VehicleContext) -> None:
+        super().__init__(context)
+        self.messages = {"TIMESYNC": self._synchronize, "PING": self._ping}
+
+    def _synchronize(self, sender: Sender, message: Any) -> None:
+        if message.tc1 == 0:
+            boot = max(1, self.context.view.boot_us * _NANO)  # 0 would be a request
+            sender.link.send(self.context.make("TIMESYNC", boot, message.ts1))
+
+    def _ping(self, sender: Sender, message: Any) -> None:
+        if message.target_system == 0 and message.target_component == 0:  # a request, not an answer
+            to = sender.system, sender.component
+            sender.link.send(self.context.make("PING", message.time_usec, message.seq, *to))

@@ -1,5 +1,7 @@
 """The companion flies our own vehicle through its autopilot, whose clock is the run's; nothing here waits."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
@@ -10,6 +12,8 @@ from cosim.companion.frame_alignment import SceneOrigin
 from cosim.companion.options import CompanionOptions
 from cosim.companion.safety import CONDITIONS, MEANINGS, STATES
 from cosim.errors import RunError
+from cosim.live.address import parse_live
+from cosim.live.view import LiveView
 from cosim.mavlink.wire.options import ORIGIN
 from cosim.results.run_result import load_run
 from cosim.run.run_folder import report_again
@@ -17,24 +21,25 @@ from cosim.scenario.scenario import load_scenario
 from cosim.simulation.environment import RegionEnvironment
 from tests.architecture.modules import ROOT
 from tests.cosim.companion.stand_in import IDENTITY, StandIn
+from tests.cosim.live.conftest import Viewer
 
 SHIFT = (0.9, -1.6, 1.9)  # m: what a real ArduSub's origin was off by
 GLOBE = SceneOrigin(geodetic=ORIGIN)
 EVENT = 3.0  # s of the stand-in's time, while it is steered
-STICKS = ("MANUAL_CONTROL", "SET_POSITION_TARGET_LOCAL_NED")
+STICKS = ("MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE", "SET_POSITION_TARGET_LOCAL_NED", "SET_ATTITUDE_TARGET")
 
 
 class Flight:
     """A flight, its states with their times, and its record."""
 
-    def __init__(self, tmp_path, seconds=6.0, events=(), link=None, **options):
+    def __init__(self, tmp_path, seconds=6.0, events=(), link=None, live=None, **options):
         self.link = link or StandIn(profile="generic", shift=SHIFT)
         self.link.events += [(EVENT, event) for event in events]
         options = {"profile": "generic", "origin": GLOBE, "timeout": 10.0, **options}
         scenario = load_scenario("pipe-inspection", [f"time.duration={seconds}"])
         self.companion = Companion(scenario, self.link, CompanionOptions(**options))
         self.states = []
-        self.run = self.companion.run(tmp_path / "run", report=False, on_state=self._tell)
+        self.run = self.companion.run(tmp_path / "run", report=False, on_state=self._tell, live=live)
         self.status = self.run.summary["status"]
 
     def _tell(self, state, missing):
@@ -70,12 +75,28 @@ class Flight:
             assert (message.x, message.y, message.z, message.r) == (0, 0, 0, 0)
 
 
-@pytest.mark.medium
-@pytest.mark.parametrize(
-    "steer_by", ["sticks", *(pytest.param(by, marks=pytest.mark.slow) for by in ("wrench", "velocity"))]
-)
-def test_goal_is_reached_and_regions_satisfied_by_the_true_state(tmp_path, steer_by):
-    flight = Flight(tmp_path, 30.0, steer_by=steer_by)
+OUTPUTS = [  # profile, steered by, sticks by, and what carries it
+    ("generic", "sticks", "manual-control", {"MANUAL_CONTROL"}),
+    ("generic", "wrench", "manual-control", {"MANUAL_CONTROL"}),
+    ("generic", "velocity", "manual-control", {"SET_POSITION_TARGET_LOCAL_NED"}),
+    ("generic", "attitude", "manual-control", {"SET_ATTITUDE_TARGET"}),
+    ("px4", "sticks", "manual-control", {"MANUAL_CONTROL"}),
+    ("px4", "attitude", "manual-control", {"SET_ATTITUDE_TARGET"}),
+    ("ardusub", "sticks", "rc-override", {"RC_CHANNELS_OVERRIDE"}),
+    ("ardusub", "wrench", "rc-override", {"RC_CHANNELS_OVERRIDE"}),
+    ("ardusub", "attitude", "manual-control", {"SET_ATTITUDE_TARGET", "MANUAL_CONTROL"}),
+    ("ardusub", "attitude", "rc-override", {"SET_ATTITUDE_TARGET", "RC_CHANNELS_OVERRIDE"}),
+]
+
+
+@pytest.mark.slow(fast=1)
+@pytest.mark.parametrize(("profile", "steer_by", "sticks_by", "carried_by"), OUTPUTS)
+def test_goal_is_reached_and_regions_satisfied_by_the_true_state(tmp_path, profile, steer_by, sticks_by, carried_by):
+    flight = Flight(
+        tmp_path, 30.0, link=StandIn(profile=profile, shift=SHIFT), profile=profile, steer_by=steer_by,
+        sticks_by=sticks_by,
+    )  # fmt: skip
+    assert {m.get_type() for _, m in flight.link.sent} & set(STICKS) == carried_by
     link, goal = flight.link, flight.companion.scenario.goal
     assert flight.status == "completed" and [s for _, s in flight.states][-1] == "steering"
     true = np.array([link.now(f"position.{axis}") for axis in "xyz"])
@@ -124,6 +145,14 @@ def test_dry_run_sends_no_setpoints_and_only_message_requests(tmp_path):
     assert not [m for _, m in flight.link.sent if m.get_type() in STICKS]
     assert {m.command for _, m in flight.link.sent if m.get_type() == "COMMAND_LONG"} == {511}
     assert np.abs(flight.run.table()["stick.Y"].to_numpy()).max() > 0.05  # what it would have sent
+
+
+def test_a_dry_run_sends_nothing_either_once_something_ends_it(tmp_path):
+    flight = Flight(tmp_path, 4.0, dry_run=True, events=[lambda: flight_link.silent.add("LOCAL_POSITION_NED")], link=(
+        flight_link := StandIn(profile="generic", shift=SHIFT)))  # fmt: skip
+    assert flight.status == "held: stale estimate"
+    assert not [m for _, m in flight_link.sent if m.get_type() in STICKS]
+    assert {m.command for _, m in flight_link.sent if m.get_type() == "COMMAND_LONG"} == {511}
 
 
 # ---- what ends steering: each condition of the table ----
@@ -275,6 +304,32 @@ def test_pilot_takes_over_within_one_second(tmp_path, reason):
     assert (last.x, last.y, last.z, last.r) == (0, 0, 0, 0)
 
 
+def channels(message):
+    return [getattr(message, f"chan{i}_raw") for i in range(1, 7)]
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("end", ["pilot", "held", "over"])
+def test_overridden_channels_rest_in_the_middle_and_are_then_given_back(tmp_path, end):
+    """An ArduSub without a radio keeps what it heard last of a channel that it gets back."""
+    link = StandIn(profile="ardusub", shift=SHIFT)
+    events = {
+        "pilot": lambda: command(link, 176, 1.0, 16.0),
+        "held": lambda: command(link, 193, 0.0, system=IDENTITY[0], component=IDENTITY[1]),
+        "over": lambda: None,
+    }
+    link.events = [(6.0, events[end])]  # once its failsafe parameters are read, which takes 3 s
+    flight = Flight(tmp_path, 5.0, link=link, profile="ardusub", sticks_by="rc-override")
+    since = flight.time_of("steering") + 5.0 if end == "over" else flight.time_of(end) - 1e-6
+    sent = [(at, channels(m)) for at, m in link.sent if m.get_type() == "RC_CHANNELS_OVERRIDE"]
+    steered = [pulses for at, pulses in sent if at - 100.0 < since]
+    assert any(pulse not in (0, 1500) for pulses in steered[10:] for pulse in pulses)
+    *middle, (last_at, last) = [(at, pulses) for at, pulses in sent if pulses in ([1500] * 6, [0] * 6)][-4:]
+    assert last == [0] * 6 and all(pulses == [1500] * 6 for _, pulses in middle) and last_at == sent[-1][0]
+    assert last_at - 100.0 >= since + 0.15
+    assert link.autopilot._context.sticks == (0.0,) * 6
+
+
 def test_conflicting_system_id_is_reported_once(tmp_path, caplog):
     link = StandIn(profile="generic", shift=SHIFT)
     beat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
@@ -332,6 +387,21 @@ def test_scenario_keys_of_simulation_only_are_rejected():
         scenario_to_steer(load_scenario("paper", ["record.lyapunov=true"]))
     steered = scenario_to_steer(load_scenario("pipe-inspection"))
     assert steered.time.step == steered.time.control == 0.02 and steered.sensing.exact
+
+
+@pytest.mark.medium
+def test_the_page_of_a_flight_shows_states_ages_modes_and_sticks(tmp_path):
+    with LiveView(parse_live("0")) as live, ThreadPoolExecutor(1) as pool:
+        flying = pool.submit(Flight, tmp_path, 3.0, live=live)
+        with Viewer(live.url) as viewer:
+            end = viewer.until("end")
+        flight = flying.result()
+    assert end["status"] == "completed"
+    assert "engaging, waits for mode 458752" in viewer.said("info") and "steering" in viewer.said("info")
+    table = flight.run.table()
+    rows = np.round(viewer.column("time") / 0.02).astype(int)
+    for name in ("autopilot.age", "autopilot.mode", "companion.state", "stick.X", "stick.N", "companion.lateness"):
+        assert np.array_equal(viewer.column(name), table[name].to_numpy()[rows], equal_nan=True), name
 
 
 @pytest.mark.slow
