@@ -89,8 +89,11 @@ OUTPUTS = [  # profile, steered by, sticks by, and what carries it
 ]
 
 
-@pytest.mark.slow(fast=1)
-@pytest.mark.parametrize(("profile", "steer_by", "sticks_by", "carried_by"), OUTPUTS)
+@pytest.mark.medium
+@pytest.mark.parametrize(
+    ("profile", "steer_by", "sticks_by", "carried_by"),
+    [OUTPUTS[0], *(pytest.param(*output, marks=pytest.mark.slow) for output in OUTPUTS[1:])],
+)
 def test_goal_is_reached_and_regions_satisfied_by_the_true_state(tmp_path, profile, steer_by, sticks_by, carried_by):
     flight = Flight(
         tmp_path, 30.0, link=StandIn(profile=profile, shift=SHIFT), profile=profile, steer_by=steer_by,
