@@ -35,7 +35,8 @@ def verdict(fit: Fit) -> str:
     determined = len(free) - len(fit.resting())
     seconds = sum(window.steps for window in fit.windows) * fit.step
     text = (
-        f"{determined} of {len(free)} numbers are determined by {seconds:.0f} s of motion in {len(fit.windows)} windows"
+        f"{determined} of {len(free)} numbers are determined by {seconds:.0f} s of motion in {len(fit.windows)} "
+        f"window{'s' if len(fit.windows) > 1 else ''}"
     )
     return f"{text}; chi² is {fit.intervals.chi2:.2f} by degrees of freedom."
 
