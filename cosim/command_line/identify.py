@@ -47,13 +47,18 @@ def add_verbs(verbs: Any) -> None:
     )  # fmt: skip
     identify.add_argument(
         "--nuisance", nargs="*", metavar="NAME",
-        help="what is estimated beside: current, force, delay, lever, bias, scale (default: current lever bias)",
+        help="what is estimated beside: current, force, delay, lever, bias, scale, asymmetry (default: current, lever, "
+        "bias and scale)",
     )  # fmt: skip
     identify.add_argument(
         "--held-out", nargs="+", type=Path, default=[], metavar="RUN", help="run folders that are predicted, not fitted"
     )
     identify.add_argument(
-        "--out", type=Path, required=True, metavar="FILE.toml", help="the vehicle; its page beside it"
+        "--out",
+        type=Path,
+        required=True,
+        metavar="FILE.toml",
+        help="the vehicle; beside it its page and FILE.posterior.jsonl",
     )
 
 
@@ -106,6 +111,7 @@ def identify(options: argparse.Namespace) -> int:
     from cosim.identification.identify import write_vehicle
     from cosim.identification.page import write_page
     from cosim.identification.parameters import DEFAULT_FREE, DEFAULT_NUISANCES
+    from cosim.identification.posterior import write_posterior
     from cosim.identification.vehicle_file import name_of_file
     from cosim.run.progress import ProgressBar
 
@@ -117,7 +123,8 @@ def identify(options: argparse.Namespace) -> int:
             DEFAULT_NUISANCES if options.nuisance is None else options.nuisance, options.held_out, bar.update_to,
         )  # fmt: skip
     write_vehicle(done, options.out)
+    posterior = write_posterior(done.fit, done.vehicle, options.out)
     page = write_page(done, options.out)
-    say(options, findings.verdict(done.fit), *findings.warnings(done.fit, done.logs), str(page))
+    say(options, findings.verdict(done.fit), *findings.warnings(done.fit, done.logs), str(posterior), str(page))
     print(options.out)
     return 0

@@ -17,6 +17,7 @@ _EPILOG = """examples:
   cosim sweep docking --vary initial.position.1=-4:-2 law.gains.speed=0.3:1.5:log --samples 1000 --out sweeps/start
   cosim sweep paper --set arbiter.engine=closed --vary law.gains.k_p1=10:30:5 law.gains.k_q=5,10,20 --design grid \\
       --workers 2 --out sweeps/gains
+  cosim sweep pool.toml --set arbiter.engine=closed --vehicles mine.posterior.jsonl --out sweeps/mine
   cosim rerun sweeps/start 17 --out runs/worst
 """
 
@@ -34,13 +35,20 @@ def add_verbs(verbs: Any) -> None:
         epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
     sweep.add_argument("scenario", help="a shipped name (see cosim list), or a TOML file; it stands before --vary")
-    sweep.add_argument(
-        "--vary", nargs="+", action="extend", required=True, metavar="KEY=LOW:HIGH[:N][:log]",
+    varied = sweep.add_mutually_exclusive_group(required=True)
+    varied.add_argument(
+        "--vary", nargs="+", action="extend", metavar="KEY=LOW:HIGH[:N][:log]",
         help="a key of the scenario and its range, with the number of points on a grid; or KEY=A,B,C",
+    )  # fmt: skip
+    varied.add_argument(
+        "--vehicles", type=Path, metavar="FILE.jsonl",
+        help="vehicles that cosim identify has drawn: each is the plant of a row, and the law knows the scenario's own",
     )  # fmt: skip
     sweep.add_argument("--samples", type=int, metavar="N", help="rows, unless the design is a grid")
     sweep.add_argument(
-        "--design", default="random", metavar="grid|random|sobol|lhs", help="how rows are spread (default: random)"
+        "--design",
+        metavar="grid|random|sobol|lhs|paired",
+        help="how rows are spread (default: random; of --vehicles: paired)",
     )
     sweep.add_argument("--seed", type=int, default=0, metavar="S", help="of the design and the rows (default: 0)")
     sweep.add_argument(
@@ -71,12 +79,14 @@ def sweep(options: argparse.Namespace) -> int:
     """Run ``cosim sweep``."""
     from cosim.campaigns.pages.sweep_page import sweep_lines, write_sweep_page
     from cosim.campaigns.sweep import run_sweep
-    from cosim.campaigns.sweeps.design import Design, vary_from
+    from cosim.campaigns.sweeps.design import Design, vary_from, vary_vehicles
     from cosim.scenario.scenario import load_scenario
 
     if options.scheduler and options.workers:
         raise RunError("--workers: expected none with --scheduler: the cluster has as many as it has")
-    design = Design(vary_from(options.vary), options.design, options.samples, options.seed)
+    vary = vary_vehicles(options.vehicles) if options.vehicles else vary_from(options.vary)
+    kind: Any = options.design or ("paired" if options.vehicles else "random")
+    design = Design(vary, kind, options.samples, options.seed)
     both = {vary.key for vary in design.vary} & {text.partition("=")[0].strip() for text in options.overrides}
     if both:
         raise RunError(f"{min(both)} is set and varies, expected either")

@@ -25,6 +25,7 @@ class Actuation:
     wrench: Array  # (steps, 2, 6) N, N m
     by_lag: Array  # (steps, 2, 6) N/s, N m/s, by the time constant of all thrusters
     by_scale: Array  # (thrusters, steps, 2, 6) N, N m, by a factor of each thruster
+    by_loss: Array  # (thrusters, steps, 2, 6) N, N m, by the part that each thruster lacks backward
 
 
 class CommandedForces:
@@ -51,18 +52,23 @@ class CommandedForces:
         self.step, self.start = step, float(log.times[0])
         self.steps = max(1, math.floor((log.times[-1] - self.start) / step))
         forces = np.concatenate([steady_forces(log.thrust, vehicle), log.wrench], axis=1)
-        spans = np.diff(log.times, append=log.times[-1])
         self._times = log.times - self.start
-        self._impulse = np.cumsum(forces * spans[:, None], axis=0) - forces * spans[:, None]
         self._forces = forces
         self._matrix = vehicle.thruster_matrix
 
-        edges = np.arange(self.steps + 1) * step
-        at = np.clip(np.searchsorted(self._times, edges, side="right") - 1, 0, len(self._times) - 1)
-        impulse = self._impulse[at] + forces[at] * (edges - self._times[at])[:, None]
-        self._mean: Array = np.diff(impulse, axis=0) / step
+        self._mean = self._means(forces)
+        self._mean_backward = self._means(np.minimum(forces[:, : vehicle.n_thrusters], 0.0))
 
-    def actuation(self, lag: float, scales: Array) -> Actuation:
+    def _means(self, forces: Array) -> Array:
+        """Return the mean of held values over each step of the grid."""
+        held = forces * np.diff(self._times, append=self._times[-1])[:, None]
+        edges = np.arange(self.steps + 1) * self.step
+        at = np.clip(np.searchsorted(self._times, edges, side="right") - 1, 0, len(self._times) - 1)
+        impulse = (np.cumsum(held, axis=0) - held)[at] + forces[at] * (edges - self._times[at])[:, None]
+        means: Array = np.diff(impulse, axis=0) / self.step
+        return means
+
+    def actuation(self, lag: float, scales: Array, losses: Array | None = None) -> Actuation:
         """Return the wrench of each step.
 
         Parameters
@@ -71,6 +77,8 @@ class CommandedForces:
             Time constant of all thrusters [s].
         scales : ndarray, shape (thrusters,)
             Factor of each thruster's force.
+        losses : ndarray, shape (thrusters,), optional
+            Part of its force that each thruster lacks backward; default: none.
 
         Returns
         -------
@@ -78,12 +86,15 @@ class CommandedForces:
             With its derivatives.
         """
         n = self._matrix.shape[1]
-        force, by_lag = _lagged(self._mean[:, :n], lag, self.step)
+        lost = np.zeros(n) if losses is None else losses
+        force, by_lag = _lagged(self._mean[:, :n] - lost * self._mean_backward, lag, self.step)
+        backward, _ = _lagged(self._mean_backward, lag, self.step)
         matrix = (self._matrix * scales).T
         wrench = force @ matrix
         wrench[:, 0] += self._mean[:, n:]
         by_scale = self._matrix.T[:, None, None, :] * np.moveaxis(force, 2, 0)[..., None]
-        return Actuation(wrench, by_lag @ matrix, by_scale)
+        by_loss = -matrix[:, None, None, :] * np.moveaxis(backward, 2, 0)[..., None]
+        return Actuation(wrench, by_lag @ matrix, by_scale, by_loss)
 
 
 def steady_forces(commands: Array, vehicle: Vehicle) -> Array:

@@ -26,7 +26,7 @@ def figures_of(fit: Fit, predictions: Sequence[Prediction]) -> Iterator[NamedFig
 
 
 _NUMBERS = (
-    "What the runs have told: each number less its start, in standard deviations of what was known before, with its "
+    "What the runs add: each number less its start, in standard deviations of what was known before, with its "
     "95 % interval. A bar that fills the grey band rests on its prior."
 )
 _RESIDUALS = "Residuals of the last stage by component, in standard deviations of the sensor's noise, over all windows."

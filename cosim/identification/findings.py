@@ -14,6 +14,8 @@ from cosim.identification.log import UNITS, Log
 _LOST = 10.0  # chi2 by degrees of freedom, above which nothing was identified
 _ALIKE = 0.95  # correlation, beyond which runs do not separate two numbers
 _LISTED = 6
+NAMED = 0.1  # part of what is not explained, above which a cause is named
+_LATE = 0.15  # s, of samples behind the commands: a lag of the thrusters seldom looks like more
 _APART = 0.9  # correlation of a delay and the lag, beyond which runs do not separate them
 _NEEDS = {  # motions that tell the numbers of a key apart
     "hydrodynamics.added_mass": "quick changes of speed along and about the axis: steps of full stick, a second each",
@@ -33,7 +35,8 @@ def verdict(fit: Fit) -> str:
     determined = len(free) - len(fit.resting())
     seconds = sum(window.steps for window in fit.windows) * fit.step
     text = (
-        f"{determined} of {len(free)} numbers are determined by {seconds:.0f} s of motion in {len(fit.windows)} windows"
+        f"{determined} of {len(free)} numbers are determined by {seconds:.0f} s of motion in {len(fit.windows)} "
+        f"window{'s' if len(fit.windows) > 1 else ''}"
     )
     return f"{text}; chi² is {fit.intervals.chi2:.2f} by degrees of freedom."
 
@@ -59,9 +62,10 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
             f"The model does not explain these runs to within the sensors' noise: chi² is {fit.intervals.chi2:.2f} by "
             f"degrees of freedom, and more than {DISAGREES} says that something is missing in it. Worst is the "
             f"{worst.replace('_', ' ')}: its residuals are {size:.1f} times its noise. The intervals are those of a "
-            "jackknife, and hold as far as the pieces of the runs are alike. Look for a disturbance, unequal "
-            "thrusters, a delay (--nuisance delay), the DVL's scale (--nuisance scale), a tether (--nuisance force)."
+            "jackknife, and hold as far as the pieces of the runs are alike."
         )
+    if fit.intervals.chi2 > DISAGREES:
+        yield _cause(fit)
     if fit.windows[0].steps * fit.step < 0.5 * STAGES[-1]:
         yield (
             f"Predictions over {STAGES[-1]:g} s fail, as they do where a motion is unstable without its control: the "
@@ -82,6 +86,12 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
             "All is in units of the thrust that the start vehicle's thrusters give. If they give 5 % more, damping, "
             "mass with added mass, and weight less buoyancy are 5 % greater."
         )
+    losses = [float(x) for p, x in zip(fit.parameters, fit.values, strict=True) if p.kind == "asymmetry"]
+    if losses:
+        yield (
+            f"Thrusters give {100.0 * min(losses):.0f} to {100.0 * max(losses):.0f} % less backward than forward. A "
+            "vehicle's file has no number for that: correct the curve from pulse to force that imports runs."
+        )
     if fit.rejected:
         counts = "; ".join(f"{n} since {reason}" for reason, n in fit.rejected.most_common())
         yield f"{fit.rejected.total()} windows were rejected: {counts}."
@@ -90,6 +100,30 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
     missing = {"velocity", "angular_velocity", "depth"} - {topic.name for log in logs for topic in log.topics}
     for name in sorted(missing):
         yield f"There are no samples of {name.replace('_', ' ')} in these runs."
+
+
+def _cause(fit: Fit) -> str:
+    """Return what the fit lacks, by name where there is a number for it."""
+    late = {name: x for name, x in fit.delays.items() if x > _LATE}
+    if late and not any(p.kind == "delay" for p in fit.parameters):
+        said = ", ".join(f"{name.replace('_', ' ')} {x:.2f} s" for name, x in late.items())
+        return f"Samples come late behind the commands: {said}. Estimate that: --nuisance delay."
+    named = [cause for cause in fit.causes if cause.share > NAMED]
+    if named:
+        said = ", ".join(f"{_CAUSES[c.flag.split()[1]]} ({100 * c.share:.0f} %: {c.flag})" for c in named[:3])
+        return f"What would explain most of that, in one step of the fit: {said}."
+    return (
+        "No delay, scale, constant force or factor of a thruster explains that: look for what changes in time, such as "
+        "waves, a tether or a current that varies, and for parts that the model has not."
+    )
+
+
+_CAUSES = {
+    "delay": "late samples", "scale": "the DVL's scale", "force": "a constant force, as of a tether",
+    "asymmetry": "thrusters that are weaker backward", "thrusters.matrix": "unequal thrusters",
+    "thrusters.time_constant": "a lag of the thrusters", "current": "a current", "lever": "the DVL's lever arm",
+    "bias": "biases of the gyro",
+}  # fmt: skip
 
 
 def require_apart(fit: Fit) -> None:

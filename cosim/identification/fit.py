@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,8 @@ from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
 from cosim.errors import IdentificationError
+from cosim.identification.causes import Cause, find_causes
+from cosim.identification.delays import find_delays, move_back, within_margins
 from cosim.identification.intervals import DISAGREES, RESTS, Intervals, estimate_intervals
 from cosim.identification.log import Log
 from cosim.identification.parameters import Parameter
@@ -29,7 +31,6 @@ _HELD, _ROUGH, _PRECISION = 0.1, 1e-2, 1e-6  # part of the cost, below which a s
 _FAR = 0.03  # weight of all residuals in the first round: starts as sampled are off by some 30 deviations of the noise
 _EVALUATIONS = 20  # of each round, at the most
 _ROUNDS = (3, 2)  # of each stage: fit, weigh anew; the first of all from starts as sampled
-_WORSE = 3.0  # times the chi2 of short windows, beyond which long ones are not explained, and the short ones count
 _HUBER = 3.0  # standard deviations, beyond which a residual counts by its magnitude
 _OUTLIER = 6.0  # standard deviations, beyond which a sample is called an outlier
 _INSIDE = 0.05  # of a deviation: how far from its bound a number starts
@@ -47,8 +48,9 @@ class Fit:
     residuals: tuple[Reduced, ...]  # of each window, weighted
     outliers: int  # samples' components
     samples: int  # samples' components in all
-
     step: float  # s, of the integration
+    delays: dict[str, float]  # s, of the topics, as found before the fit
+    causes: tuple[Cause, ...] = ()  # of a fit that disagrees with the runs, the greatest first
 
     def vehicle_part(self) -> list[int]:
         """Return the places of the vehicle's own numbers."""
@@ -120,8 +122,16 @@ def single_thread() -> AbstractContextManager[object]:
 def _fit(
     logs: Sequence[Log], vehicle: Vehicle, parameters: tuple[Parameter, ...], progress: Callable[[float], None]
 ) -> Fit:
-    margins = MARGINS if any(p.kind == "delay" for p in parameters) else (0.0, 0.0)
-    values, step = _inside(parameters), integration_step(logs)
+    step = integration_step(logs)
+    delays = find_delays(logs, vehicle, step)
+    values, margins = _inside(parameters), (0.0, 0.0)
+    if any(p.kind == "delay" for p in parameters):
+        margins = MARGINS
+        logs = [move_back(log, delays) for log in logs]
+        parameters = tuple(within_margins(p, delays) for p in parameters)
+        values = np.array([
+            delays.get(p.plant, 0.0) if p.kind == "delay" else x for p, x in zip(parameters, values, strict=True)
+        ])  # fmt: skip
     found: list[Fit] = []
     done, total = 0, sum(_ROUNDS) * _EVALUATIONS
     for length, rounds in zip(STAGES, _ROUNDS, strict=True):
@@ -151,18 +161,21 @@ def _fit(
             done = begun + _EVALUATIONS
             if turn < rounds - 1:
                 problem.reweigh()
-        found.append(_result(problem, values, windows, rejected, step))
+        result = _result(problem, values, rejected, step, delays)
+        if result.intervals.chi2 > DISAGREES:
+            result = replace(result, causes=tuple(find_causes(logs, vehicle, problem.residuals, values, step)))
+        found.append(result)
     progress(1.0)
     first, last = found[0], found[-1]
-    return last if last.intervals.chi2 <= max(DISAGREES, _WORSE * first.intervals.chi2) else first
+    return last if last.intervals.chi2 <= max(DISAGREES, first.intervals.chi2) else first
 
 
-def _result(problem: Problem, values: Array, windows: Sequence[Window], rejected: Counter[str], step: float) -> Fit:
-    parameters, reduced = problem.residuals.parameters, problem.reduced
+def _result(problem: Problem, values: Array, rejected: Counter[str], step: float, delays: dict[str, float]) -> Fit:
+    parameters, windows, reduced = problem.residuals.parameters, problem.residuals.windows, problem.reduced
     plain = [r.residual / w for r, w in zip(reduced, problem.residuals.weights, strict=True)]
     return Fit(
         parameters, values, estimate_intervals(parameters, values, reduced, windows), tuple(windows), rejected,
-        tuple(reduced), sum(int((np.abs(r) > _OUTLIER).sum()) for r in plain), sum(map(len, plain)), step,
+        tuple(reduced), sum(int((np.abs(r) > _OUTLIER).sum()) for r in plain), sum(map(len, plain)), step, delays,
     )  # fmt: skip
 
 

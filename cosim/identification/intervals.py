@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 DISAGREES = 1.2  # chi2 by degrees of freedom, above which the model is called wrong
 RESTS = 0.5  # of the prior's deviation: above it, a number rests on its prior
 _BLOCK = 5.0  # s, of residuals that stay together in the jackknife
+_LONG_BLOCK = 20.0  # s, of windows that stay together where the model is wrong: what it lacks may last for seconds
 _FEWEST_RUNS = 8  # from which on whole runs are left out instead
 _COVERED = 0.95
 
@@ -62,8 +63,9 @@ def estimate_intervals(
     Returns
     -------
     Intervals
-        By a jackknife over pieces of 5 s, or over runs where there are eight or more: each left out in turn, in one
-        Gauss-Newton step (Bell and McCaffrey 2002, CR3). Nominal ones hold for white noise and a right model alone.
+        By a jackknife over pieces of 5 s, of 20 s where the model is wrong, or over runs where there are eight or more:
+        each left out in turn, in one Gauss-Newton step (Bell and McCaffrey 2002, CR3). Nominal ones hold for white
+        noise and a right model alone.
     """
     prior = np.array([1.0 / p.deviation**2 for p in parameters])
     information = np.diag(prior) + sum(r.jacobian.T @ r.jacobian for r in reduced)
@@ -73,7 +75,7 @@ def estimate_intervals(
     inverse = np.linalg.inv(information)
     nominal = np.sqrt(np.diag(inverse))
 
-    pieces, clusters = _pieces(reduced, windows)
+    pieces, clusters = _pieces(reduced, windows, chi2 > DISAGREES)
     moved = np.stack([
         np.linalg.solve(information - jacobian.T @ jacobian, jacobian.T @ residual) for jacobian, residual in pieces
     ])  # fmt: skip
@@ -89,15 +91,22 @@ def estimate_intervals(
     )  # fmt: skip
 
 
-def _pieces(reduced: Sequence[Reduced], windows: Sequence[Window]) -> tuple[list[tuple[Array, Array]], str]:
+def _pieces(
+    reduced: Sequence[Reduced], windows: Sequence[Window], wrong: bool
+) -> tuple[list[tuple[Array, Array]], str]:
     """Return rows that stay together, and what they are."""
-    runs = sorted({window.run for window in windows})
-    if len(runs) >= _FEWEST_RUNS:
-        of_runs = []
-        for run in runs:
-            own = [r for r, window in zip(reduced, windows, strict=True) if window.run == run]
-            of_runs.append((np.concatenate([r.jacobian for r in own]), np.concatenate([r.residual for r in own])))
-        return of_runs, f"each of {len(runs)} runs"
+    runs = len({window.run for window in windows})
+    if runs >= _FEWEST_RUNS or wrong:
+        whole = runs >= _FEWEST_RUNS
+        together: dict[tuple[int, int], list[Reduced]] = {}
+        for r, window in zip(reduced, windows, strict=True):
+            together.setdefault((window.run, 0 if whole else int(window.begin / _LONG_BLOCK)), []).append(r)
+        joined = [
+            (np.concatenate([r.jacobian for r in own]), np.concatenate([r.residual for r in own]))
+            for own in together.values()
+        ]
+        if whole or len(joined) > 1:
+            return joined, f"each of {runs} runs" if whole else f"each of {len(joined)} pieces of {_LONG_BLOCK:g} s"
     found = []
     for r in reduced:
         block = (r.times / _BLOCK).astype(int)

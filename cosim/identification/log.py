@@ -58,6 +58,7 @@ class Topic:
     times: Array  # (n,) s, rising
     values: Array  # (n, m): m/s, rad/s, m, or a quaternion
     noise: Array  # (c,) standard deviation of each component of the residual
+    shift: float = 0.0  # s, by which the stamps are moved back
 
     @property
     def components(self) -> tuple[str, ...]:

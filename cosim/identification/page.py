@@ -54,7 +54,11 @@ def _page(done: Identification, out: Path, figures: dict[str, Html]) -> Page:
     page.verdict(findings.verdict(fit))
     for text in findings.warnings(fit, done.logs):
         page.paragraph(text)
-    page.paragraph(f'The vehicle\'s file is {out.name}; it begins a scenario as vehicle = "{out.name}".', faint=True)
+    page.paragraph(
+        f'The vehicle\'s file is {out.name}; it begins a scenario as vehicle = "{out.name}". Vehicles drawn from these '
+        f"numbers, for cosim sweep --vehicles, are in {out.stem}.posterior.jsonl.",
+        faint=True,
+    )
     page.heading("The numbers")
     page.table(("Number", "Start", "Found", "± 95 %", "Unit", "Rests on"), _rows(done, nuisance=False))
     page.paragraph(

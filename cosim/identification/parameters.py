@@ -15,15 +15,15 @@ from cosim.identification.log import TOPICS, Log
 from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
-Kind = Literal["plant", "lag", "thrust", "current", "force", "delay", "lever", "bias", "scale"]
+Kind = Literal["plant", "lag", "thrust", "current", "force", "delay", "lever", "bias", "scale", "asymmetry"]
 
 # what is freed unless the user says otherwise: mass, weight, centre of gravity and inertia are known better by scales
 DEFAULT_FREE = (
     "hydrodynamics.added_mass", "hydrodynamics.linear_damping", "hydrodynamics.quadratic_damping",
     "hydrostatics.buoyancy", "hydrostatics.center_of_buoyancy", "thrusters.time_constant",
 )  # fmt: skip
-NUISANCES: tuple[Kind, ...] = ("current", "force", "delay", "lever", "bias", "scale")
-DEFAULT_NUISANCES = ("current", "lever", "bias")
+NUISANCES: tuple[Kind, ...] = ("current", "force", "delay", "lever", "bias", "scale", "asymmetry")
+DEFAULT_NUISANCES = ("current", "lever", "bias", "scale")
 
 _ELEMENT = re.compile(r"(?P<key>[a-z_]+\.[a-z_]+)(?:\.(?P<row>\d+)(?:\.(?P<column>\d+))?|\.(?P<part>diagonal))?")
 _SIX = "XYZKMN"
@@ -34,7 +34,7 @@ _BUOYANCY = 0.05  # of the weight
 _CENTER = 0.03  # m
 _MASS, _INERTIA = 0.02, 0.2  # parts
 _LAG, _MOST_LAG = 0.2, 2.0  # s
-_THRUST = 0.05  # part
+_THRUST = 0.1  # part, of each thruster: 3.5 % of all eight together
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,8 @@ def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
     ----------
     names : sequence of str
         Of `NUISANCES`: a current and a constant force of each run, north and east; the delay of each topic behind the
-        commands; the lever arm and the scale error of the DVL; the gyro's biases of each run.
+        commands; the lever arm and the scale error of the DVL; the gyro's biases of each run; the part of its force
+        that each thruster lacks backward.
     logs : sequence of Log
         The runs.
 
@@ -114,7 +115,10 @@ def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
     IdentificationError
         If a name is unknown.
     """
-    topics = [name for name in TOPICS if any(log.topic(name) for log in logs)]
+    places = {
+        "delay": [name for name in TOPICS if any(log.topic(name) for log in logs)],
+        "asymmetry": [f"{i + 1}" for i in range(logs[0].thrust.shape[1])],
+    }
     made: list[Parameter] = []
     if odd := [name for name in names if name not in NUISANCES]:
         raise IdentificationError(f"--nuisance {odd[0]}: is unknown, expected some of {', '.join(NUISANCES)}")
@@ -122,7 +126,7 @@ def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
         label, unit, deviation, axes = _NUISANCES[name]
         for run in range(len(logs)) if name in ("current", "force", "bias") else (None,):
             said = "" if run is None else f" of run {run + 1}"
-            for index, axis in enumerate(topics if name == "delay" else axes):
+            for index, axis in enumerate(places.get(name, axes)):
                 plant = f"current.{axis}" if name == "current" else axis if name == "delay" else ""
                 made.append(Parameter(
                     f"{label} {axis}".strip() + said, unit, name, 0.0, deviation, plant=plant, index=index, run=run
@@ -237,6 +241,7 @@ _NUISANCES: dict[str, tuple[str, str, float, str]] = {  # name, unit, deviation 
     "lever": ("DVL lever", "m", 0.3, "xyz"),
     "bias": ("gyro bias", "rad/s", 0.01, "pqr"),
     "scale": ("DVL scale error", "", 0.01, " "),
+    "asymmetry": ("loss backward of thruster", "", 0.1, ""),
 }
 _KEYS = {
     "_of_body": (

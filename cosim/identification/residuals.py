@@ -104,7 +104,7 @@ class Residuals:
     def _setting(self, run: int, values: Array) -> Setting:
         plant: dict[str, float] = {}
         scales, lag, delays = np.ones(self._thrusters), self._lag, dict[str, float]()
-        force, lever, bias, scale = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
+        force, lever, bias, scale, losses = np.zeros(3), np.zeros(3), np.zeros(3), 0.0, np.zeros(self._thrusters)
         for p, x in zip(self.parameters, values, strict=True):
             if p.run not in (None, run):
                 continue
@@ -115,6 +115,8 @@ class Residuals:
                     lag = float(x)
                 case "thrust":
                     scales[p.index] = x
+                case "asymmetry":
+                    losses[p.index] = x
                 case "delay":
                     delays[p.plant] = float(x)
                 case "force":
@@ -125,7 +127,8 @@ class Residuals:
                     bias[p.index] = x
                 case "scale":
                     scale = float(x)
-        return Setting(plant, self._forces[run].actuation(lag, scales), force, Errors(lever, scale, bias), delays)
+        actuation = self._forces[run].actuation(lag, scales, losses)
+        return Setting(plant, actuation, force, Errors(lever, scale, bias), delays)
 
     def raw(self, i: int, settings: Sequence[Setting], start: Array, full: bool) -> tuple[Array, Array, Array]:
         """Return residuals of a window from a start, with derivatives by the start and, if `full`, the free numbers.
@@ -159,7 +162,7 @@ class Residuals:
         setting = settings[window.run]
         inside = slice(window.first, window.first + window.steps)
         moving = [j for j, p in enumerate(self.parameters) if full and self._moves(p, window.run)]
-        times = [topic.times - setting.delays.get(topic.name, 0.0) for topic in window.topics]
+        times = [topic.times + topic.shift - setting.delays.get(topic.name, topic.shift) for topic in window.topics]
         order = np.argsort(np.concatenate(times), kind="stable")
         motion = self._shooter.predict(
             setting.plant, start, setting.actuation.wrench[inside], self._step, np.concatenate(times)[order],
@@ -185,7 +188,7 @@ class Residuals:
     @staticmethod
     def _moves(p: Parameter, run: int) -> bool:
         """Whether a parameter changes the motion of a run, rather than what is measured of it."""
-        return p.run in (None, run) and p.kind in ("plant", "lag", "thrust", "current", "force")
+        return p.run in (None, run) and p.kind in ("plant", "lag", "thrust", "asymmetry", "current", "force")
 
     def _directions(self, moving: Sequence[int], setting: Setting, inside: slice, start: Array) -> Directions:
         n, count = len(self._starts), len(self._starts) + len(moving)
@@ -206,8 +209,9 @@ class Residuals:
                 force[row, p.index] = 1.0
             else:
                 inputs[row] = len(wrenches)
-                change = setting.actuation.by_lag if p.kind == "lag" else setting.actuation.by_scale[p.index]
-                wrenches.append(change[inside])
+                actuation = setting.actuation
+                changes = {"lag": actuation.by_lag[None], "thrust": actuation.by_scale, "asymmetry": actuation.by_loss}
+                wrenches.append(changes[p.kind][p.index][inside])
         wrench = np.stack(wrenches) if wrenches else np.empty((0, 0, 2, 6))
         return Directions(tangents, names, inputs, force, wrench)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-MARGINS = (0.4, 0.1)  # s, at the ends of a window without samples, where delays are free
+MARGINS = (0.1, 0.2)  # s, at the ends of a window without samples, where delays are free
 
 _SHORTEST = 0.6  # part of a full window, below which the rest of a run is dropped
 _SETTLED = 1.0  # s, after a run's first command: forces that lag are then known by the commands since
@@ -91,7 +91,7 @@ def _window(log: Log, run: int, first: int, steps: int, step: float, margins: tu
     topics = []
     for topic in log.topics:
         inside = (topic.times >= begin + margins[0]) & (topic.times < end - margins[1])
-        topics.append(Topic(topic.name, topic.times[inside] - begin, topic.values[inside], topic.noise))
+        topics.append(replace(topic, times=topic.times[inside] - begin, values=topic.values[inside]))
     return Window(run, first, steps, begin, tuple(topics), _start(log, begin))
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cosim.errors import ImportLogError
 from cosim.logs.frames import BODIES, UNITS, WORLDS, quaternions_of_angles, turn_quaternions
@@ -18,6 +19,7 @@ from plant_fmu.errors import TableError
 from plant_fmu.toml_tables import decode, read_toml
 
 _ORDER = re.compile(r"[XYZ]{3}|[xyz]{3}")
+_MOST_ODD = 0.1  # part of quaternions that may be of another length than 1: those are damaged, and not known
 World = Literal["NED", "ENU", "NWU"]
 Body = Literal["FRD", "FLU", "RFU"]
 
@@ -121,19 +123,22 @@ def source_name(mapped: MappedQuantity) -> str:
 
 
 def _attitudes(mapped: MappedQuantity, values: Array, world: str, body: str) -> Array:
-    known = np.isfinite(values).all(axis=1)
+    known: NDArray[np.bool_] = np.asarray(np.isfinite(values).all(axis=1))
     if mapped.euler:
         angles = values[known] * UNITS["rad"][mapped.unit or "rad"]
         _require_angles(mapped, angles)
         quaternions = quaternions_of_angles(angles, mapped.euler)
     else:
         quaternions = values[known] if mapped.quaternion == "wxyz" else values[known][:, [3, 0, 1, 2]]
-        length = np.linalg.norm(quaternions, axis=1)
-        if (np.abs(length - 1.0) > 0.05).any():
+        length = np.hypot.reduce(quaternions, axis=1)
+        odd = np.abs(length - 1.0) > 0.05
+        if odd.sum() > _MOST_ODD * len(odd):
             worst = float(length[np.argmax(np.abs(length - 1.0))])
             raise ImportLogError(
                 f"{source_name(mapped)}: quaternion of length {worst:.4g}, expected 1; for angles set euler"
             )
+        known[np.flatnonzero(known)[odd]] = False
+        quaternions = quaternions[~odd]
     if mapped.inverse:
         quaternions = quaternions * np.array([1.0, -1.0, -1.0, -1.0])
     result = np.full((len(values), 4), np.nan)

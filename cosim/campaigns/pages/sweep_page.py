@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 PAGE = "sweep.html"
 _LEAST_SHARE, _LEAST_RHO = 0.01, 0.1  # least effects and rank correlations in the table
+_SHOWN, _VALUES = 8, 12  # greatest number of keys in figures and table; of written values of a list
 
 
 def write_sweep_page(folder: Path, replays: int) -> Path:
@@ -120,7 +121,7 @@ def _drawings(results: Results, s: dict[str, Any]) -> Iterator[NamedFigure]:
         Key(s["words"][name], column, bool(s["vary"][name].get("log")))
         for name in _by_weight(s)
         if np.ptp(column := results.number(name)[flown]) > 0.0
-    ]
+    ][:_SHOWN]
     if keys:
         reached, violated = results.fact("reached")[flown], results.fact("violated")[flown]
         caption = (
@@ -200,8 +201,9 @@ def _verdict(s: dict[str, Any]) -> str:
 
 
 def _effects(page: Page, s: dict[str, Any]) -> None:
-    """Add a table of the effects and rank correlations of each key with each outcome."""
-    keys, rows = list(s["vary"]), []
+    """Add a table of the effects and rank correlations of the most important keys with each outcome."""
+    ranked = set(_by_weight(s)[:_SHOWN])
+    keys, rows = [key for key in s["vary"] if key in ranked], []
     for name in FIELDS:
         effects = [s["effects"][key][name] for key in keys]
         cells = [_effect(of, s["rank_correlations"][key][name]) for key, of in zip(keys, effects, strict=True)]
@@ -218,7 +220,7 @@ def _effects(page: Page, s: dict[str, Any]) -> None:
         "together, or with what is random. The last column is what chance reaches in one cell of a hundred; shares "
         "below it are left out. ρ: rank correlation by Spearman, above 0 where the outcome goes up with the key; left "
         f"out within {number(_LEAST_RHO)} of 0, and where chance gives as much in one cell of a hundred. All are in "
-        "summary.json.",
+        "summary.json" + (f", with the other {more} keys." if (more := len(s["vary"]) - len(keys)) else "."),
         faint=True,
     )
 
@@ -238,6 +240,8 @@ def _percent(share: float) -> str:
 
 
 def _range(vary: dict[str, Any]) -> str:
+    if len(vary.get("values", ())) > _VALUES:
+        return f"{len(vary['values'])} values, {min(vary['values']):.4g} to {max(vary['values']):.4g}"
     if "values" in vary:
         return ", ".join(f"{x:g}" for x in vary["values"])
     points = f", {vary['points']} points" if "points" in vary else ""

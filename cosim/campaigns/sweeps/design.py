@@ -7,15 +7,17 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Literal, get_args
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from cosim.campaigns.workers.work import Rows
 from cosim.errors import RunError
 
-Kind = Literal["grid", "random", "sobol", "lhs"]
+Kind = Literal["grid", "random", "sobol", "lhs", "paired"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 MOST = 10_000_000  # rows
 _MOST_SOBOL = 21201  # keys
@@ -79,9 +81,9 @@ class Design:
         The keys, at least one.
     kind : str
         ``"grid"``, all combinations, the last key fastest; ``"random"``, independent rows; ``"sobol"``, a scrambled
-        Sobol' sequence; or ``"lhs"``, a Latin hypercube.
+        Sobol' sequence; ``"lhs"``, a Latin hypercube; or ``"paired"``, the values of all lists with the same index.
     samples : int, optional
-        Number of rows; None on a grid, where the points determine it.
+        Number of rows; None on a grid or in pairs, where the points or the lists' length determine it.
     seed : int
         Of the values, and of the seeds of the rows.
 
@@ -112,6 +114,8 @@ class Design:
             raise RunError(f"seed is {self.seed}, expected a whole number from 0 to 2^63 - 1")
         if self.kind == "grid":
             self._check_grid()
+        elif self.kind == "paired":
+            self._check_lists()
         else:
             self._check_samples()
         if self.rows > MOST:
@@ -124,6 +128,13 @@ class Design:
             if not vary.steps:
                 low, high = f"{vary.low:g}", f"{vary.high:g}"
                 raise RunError(f"{vary.key}: a grid needs to know how many points, expected {vary.key}={low}:{high}:N")
+
+    def _check_lists(self) -> None:
+        lengths = {len(vary.values) for vary in self.vary}
+        if len(lengths) > 1 or 0 in lengths:
+            raise RunError("the design paired takes one value of each list for a row, expected lists of one length")
+        if self.samples is not None and not 1 <= self.samples <= max(lengths):
+            raise RunError(f"samples is {self.samples}, expected 1 to {max(lengths)}, as the lists are long")
 
     def _check_samples(self) -> None:
         if self.samples is None:
@@ -139,7 +150,9 @@ class Design:
     @property
     def rows(self) -> int:
         """Number of rows."""
-        return math.prod(vary.steps for vary in self.vary) if self.samples is None else self.samples
+        if self.samples is not None:
+            return self.samples
+        return len(self.vary[0].values) if self.kind == "paired" else math.prod(vary.steps for vary in self.vary)
 
     def values(self, rows: Rows) -> NDArray[np.float64]:
         """Return the values of some rows.
@@ -157,6 +170,8 @@ class Design:
         if self.kind == "grid":
             places = np.unravel_index(rows, [vary.steps for vary in self.vary])
             columns = [vary.on_grid(place) for vary, place in zip(self.vary, places, strict=True)]
+        elif self.kind == "paired":
+            columns = [np.array(vary.values)[rows] for vary in self.vary]
         else:
             shares = self._shares(rows)
             columns = [vary.at(shares[:, i]) for i, vary in enumerate(self.vary)]
@@ -268,6 +283,46 @@ def vary_from(texts: Sequence[str]) -> tuple[Vary, ...]:
             raise RunError(f"{vary.key} varies twice, expected each key once")
         found.append(vary)
     return tuple(found)
+
+
+def vary_vehicles(path: Path) -> tuple[Vary, ...]:
+    """Return what varies between vehicles, from the file that ``cosim identify`` writes.
+
+    Parameters
+    ----------
+    path : Path
+        One JSON object a line, whose ``parameters`` are those of the vehicle's FMU, the same on each line.
+
+    Returns
+    -------
+    tuple of Vary
+        Lists for the design ``"paired"``.
+
+    Raises
+    ------
+    RunError
+        If it cannot be read, or a line has other parameters than the first.
+    """
+    lists: dict[str, list[float]] = {}
+    try:
+        lines = [line for line in path.read_bytes().splitlines() if line.strip()]
+        plants = [msgspec.json.decode(line, type=_Drawn).parameters for line in lines]
+    except OSError as error:
+        raise RunError(f"{path}: {error.strerror or error}") from error
+    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        raise RunError(f"{path}: holds no vehicles, expected lines with parameters: {error}") from error
+    for number, plant in enumerate(plants, 1):
+        if plant.keys() != plants[0].keys() or not plant:
+            raise RunError(f"{path}: line {number} has other parameters than the first, expected the same")
+        for name, value in plant.items():
+            lists.setdefault(f"plant.parameters.{name}", []).append(value)
+    if not lists:
+        raise RunError(f"{path}: is empty, expected a vehicle a line")
+    return tuple(Vary(key, values=tuple(values)) for key, values in lists.items())
+
+
+class _Drawn(msgspec.Struct):
+    parameters: dict[str, float]
 
 
 def _vary(text: str) -> Vary:

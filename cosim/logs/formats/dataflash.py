@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import math
 import struct
 from collections.abc import Callable, Iterator
@@ -182,7 +184,8 @@ def _learn(fields: tuple[Any, ...], formats: dict[int, tuple[DFFormat, struct.St
     kind, size, *texts = fields
     name, letters, columns = (text.split(b"\0")[0].decode("ascii", "replace") for text in texts)
     try:
-        form = DFFormat(kind, name, size, letters, columns)
+        with contextlib.redirect_stdout(io.StringIO()):  # it prints a letter that it does not know
+            form = DFFormat(kind, name, size, letters, columns)
         unpack = struct.Struct(form.msg_struct)
     except Exception as error:
         raise ImportLogError(f"message {name!r} has the format {letters!r}, which is unknown") from error

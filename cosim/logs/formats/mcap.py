@@ -22,7 +22,17 @@ from plant_fmu.toml_tables import hint
 _LARGEST = 1 << 28  # bytes of a record
 _WAITING = 4096  # messages of a quantity that are written together
 _PART = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+)\]")
-_FAILURES = (ValueError, KeyError, IndexError, struct.error, UnicodeDecodeError, EOFError, OSError, AttributeError)
+_FAILURES = (
+    ValueError,
+    KeyError,
+    IndexError,
+    struct.error,
+    UnicodeDecodeError,
+    EOFError,
+    OSError,
+    AttributeError,
+    RuntimeError,
+)
 
 Getter = Callable[[Any], float]
 
@@ -32,6 +42,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
     from mcap.exceptions import McapError
     from mcap.reader import NonSeekingReader
     from mcap_ros2.decoder import DecoderFactory
+    from zstandard import ZstdError
 
     assert columns is not None
     nameless = next((name for name, mapped in columns.quantities.items() if not mapped.topic), None)
@@ -58,7 +69,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
                 for taker in takers[channel.topic]:
                     taker.take(decoded, written)
                 moved(file.tell() / total)
-        except (McapError, *_FAILURES) as error:
+        except (McapError, ZstdError, *_FAILURES) as error:
             if not topics:
                 raise ImportLogError(f"cannot be read as a bag: {error}") from error
             contents.remarks.append(f"The bag breaks off: {error or type(error).__name__}"[:200])

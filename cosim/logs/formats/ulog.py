@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import struct
 from pathlib import Path
 from typing import Any
@@ -43,7 +45,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
     from pyulog.core import ULogException
 
     try:
-        with path.open("rb") as file:
+        with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):  # it prints what is damaged
             log = ULog(file, list(_TOPICS), True)
     except (ULogException, *_FAILURES) as error:
         raise ImportLogError(f"cannot be read as a ULog file: {error}") from error
@@ -51,9 +53,10 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
     contents.parameters |= {name: float(value) for name, value in log.initial_parameters.items()}
     contents.kind = kind_of(int(contents.parameters.get("MAV_TYPE", 0)))
     names = {f"{data.name}[{data.multi_id}]" for data in log.data_list}
-    for data in log.data_list:
-        _take(data, contents, f"{data.name}[{data.multi_id}]")
-        moved(1.0)
+    with np.errstate(invalid="ignore"):  # by signalling NaN of damaged samples
+        for data in log.data_list:
+            _take(data, contents, f"{data.name}[{data.multi_id}]")
+            moved(1.0)
     for name in log.message_formats:
         if name not in _TOPICS and not any(known.startswith(f"{name}[") for known in names):
             contents.unread[name] += 1

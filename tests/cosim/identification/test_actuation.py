@@ -61,6 +61,21 @@ def test_wrench_derivatives_match_central_differences(vehicle, lag):
         bit = np.where(np.arange(8) == i, h, 0.0)
         both = [forces.actuation(lag, scales + sign * bit).wrench for sign in (1, -1)]
         assert found.by_scale[i] == pytest.approx((both[0] - both[1]) / (2.0 * h), abs=1e-6)
+    losses = np.linspace(0.0, 0.2, 8)
+    found = forces.actuation(lag, scales, losses)
+    for i in range(8):
+        bit = np.where(np.arange(8) == i, h, 0.0)
+        both = [forces.actuation(lag, scales, losses + sign * bit).wrench for sign in (1, -1)]
+        assert found.by_loss[i] == pytest.approx((both[0] - both[1]) / (2.0 * h), abs=1e-6)
+
+
+def test_a_loss_backward_is_one_of_negative_commands_alone(vehicle):
+    """As commands of less force are, where those are negative."""
+    log, losses, scales = log_of(vehicle), np.linspace(0.0, 0.3, 8), np.linspace(0.9, 1.1, 8)
+    less = dataclasses.replace(log, thrust=np.where(log.thrust < 0.0, (1.0 - losses) * np.clip(log.thrust, -40.0, 0.0),
+                                                    log.thrust))  # fmt: skip
+    found = CommandedForces(log, vehicle, STEP).actuation(0.1, scales, losses)
+    assert found.wrench == pytest.approx(CommandedForces(less, vehicle, STEP).actuation(0.1, scales).wrench, abs=1e-9)
 
 
 def test_lag_conserves_the_impulse(vehicle):

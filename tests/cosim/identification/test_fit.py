@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from cosim.errors import IdentificationError
+from cosim.identification.delays import find_delays
 from cosim.identification.findings import require_apart, warnings
 from cosim.identification.fit import fit, integration_step
 from cosim.identification.log import Log, make_topic
@@ -130,6 +131,42 @@ def test_topic_delay_is_estimated(log, vehicle):
     assert done.values[0] == pytest.approx(TRUTH["quadratic_damping[1]"], rel=0.02)
 
 
+@pytest.fixture(scope="module")
+def late(log):
+    """A run of which all samples come 0.2 s late."""
+    return dataclasses.replace(log, topics=tuple(dataclasses.replace(t, times=t.times + 0.2) for t in log.topics))
+
+
+@pytest.mark.medium
+def test_delays_are_found_before_any_number_is_fitted(log, late, vehicle):
+    """The thrusters have no lag, which would look like a delay. Angular velocities of single sines say nothing."""
+    for run, delay in ((log, 0.0), (late, 0.2)):
+        found = find_delays([run], vehicle, 0.025)
+        assert [found[topic.name] for topic in run.topics] == pytest.approx([delay] * 4, abs=0.05)
+
+
+@pytest.mark.slow
+def test_samples_that_are_all_late_are_found_late(late, vehicle):
+    parameters = free_parameters(vehicle, FREE) + nuisances(("current", "bias", "delay"), [late])
+    done = fit([late], vehicle, parameters)
+    delays = [x for p, x in zip(parameters, done.values, strict=True) if p.kind == "delay"]
+    assert delays == pytest.approx([0.2] * 4, abs=0.01)
+    assert done.values[0] == pytest.approx(TRUTH["quadratic_damping[1]"], rel=0.02)
+    assert done.intervals.chi2 < 1.1 and not done.causes
+
+
+@pytest.mark.slow
+def test_a_cause_that_is_not_estimated_is_named(log, late, vehicle):
+    """Samples that are late, and a DVL that measures 5 % too much; what changes in time has no name."""
+    parameters = free_parameters(vehicle, FREE) + nuisances(("current", "bias"), [log])
+    said = " ".join(warnings(fit([late], vehicle, parameters), [late]))
+    assert "Samples come late" in said and "--nuisance delay" in said
+    scaled = tuple(dataclasses.replace(t, values=1.05 * t.values) if t.name == "velocity" else t for t in log.topics)
+    done = fit([dataclasses.replace(log, topics=scaled)], vehicle, parameters)
+    assert done.causes[0].flag == "--nuisance scale" and done.causes[0].share > 0.3
+    assert "the DVL's scale (" in " ".join(warnings(done, [log]))
+
+
 @pytest.mark.slow
 def test_disturbance_is_reported_and_widens_the_intervals(log, vehicle):
     """A velocity that wanders by 2 cm/s within seconds: the noise alone does not explain it."""
@@ -139,6 +176,7 @@ def test_disturbance_is_reported_and_widens_the_intervals(log, vehicle):
     done = fit([dataclasses.replace(log, topics=moved)], vehicle, parameters)
     said = " ".join(warnings(done, [log]))
     assert done.intervals.chi2 > 1.2 and "does not explain" in said and "the velocity:" in said
+    assert "look for what changes in time" in said
     assert (done.intervals.deviations[:3] > 1.5 * done.intervals.nominal[:3]).any()
 
 

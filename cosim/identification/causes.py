@@ -1,0 +1,82 @@
+"""What a fit that disagrees with its runs lacks: which numbers that were not free would explain most of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.errors import IdentificationError
+from cosim.identification.log import Log
+from cosim.identification.parameters import NUISANCES, free_parameters, nuisances
+from cosim.identification.residuals import Residuals
+from plant_fmu.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Numbers that were not free, and how much they would explain."""
+
+    flag: str  # by which they are freed
+    share: float  # of the squares beyond those of the noise, in one Gauss-Newton step
+
+
+def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values: Array, step: float) -> list[Cause]:
+    """Find what the fit lacks, by a score test of each group of numbers that were not free (Rao 1948).
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        The runs.
+    vehicle : Vehicle
+        Where the search started.
+    fitted : Residuals
+        Of the fit: what was free, windows and weights.
+    values : ndarray, shape (p,)
+        As fitted.
+    step : float
+        Of the integration [s].
+
+    Returns
+    -------
+    list of Cause
+        The one that explains most first; empty where no motion is predicted.
+    """
+    parameters, windows = fitted.parameters, fitted.windows
+    kinds = {p.kind for p in parameters}
+    groups = {f"--nuisance {name}": nuisances((name,), logs) for name in NUISANCES if name not in kinds}
+    if "thrust" not in kinds:
+        groups["--free thrusters.matrix"] = free_parameters(vehicle, ("thrusters.matrix",))
+    if "lag" not in kinds:
+        groups["--free thrusters.time_constant"] = free_parameters(vehicle, ("thrusters.time_constant",))
+    every = [*parameters, *(p for group in groups.values() for p in group)]
+    problem = Residuals(logs, vehicle, every, windows, step)
+    problem.weights = fitted.weights
+    at = np.concatenate([values, [p.start for p in every[len(values) :]]])
+    settings = problem.settings(at)
+    try:
+        reduced = [problem.reduced(i, settings, at) for i in range(len(windows))]
+    except IdentificationError:
+        return []
+    deviation, start = (np.array([getattr(p, name) for p in every]) for name in ("deviation", "start"))
+    information = np.diag(deviation**-2.0) + sum(r.jacobian.T @ r.jacobian for r in reduced)
+    score = (at - start) / deviation**2 + sum(r.jacobian.T @ r.residual for r in reduced)
+    squares = sum(float(r.residual @ r.residual) for r in reduced)
+    excess = squares - sum(len(r.residual) for r in reduced)
+    if excess <= 0.0:
+        return []
+
+    def explained(places: list[int]) -> float:
+        return float(score[places] @ np.linalg.solve(information[np.ix_(places, places)], score[places]))
+
+    free, count, found = list(range(len(values))), len(values), []
+    already = explained(free)
+    for flag, group in groups.items():
+        own = list(range(count, count + len(group)))
+        count += len(group)
+        found.append(Cause(flag, (explained(free + own) - already) / excess))
+    return sorted(found, key=lambda cause: -cause.share)

@@ -1,0 +1,137 @@
+"""How late the samples of runs come behind the commands, before any number of the vehicle is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.identification.actuation import CommandedForces
+from cosim.identification.log import TOPICS, Log, Topic
+from cosim.identification.parameters import Parameter
+from cosim.identification.windows import MARGINS
+from plant_fmu.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+_SPAN = 0.3  # s, over which a change of velocity is taken
+_GRID = np.arange(-0.1, 0.601, 0.02)  # s
+_LAGS = (0.0, 0.1, 0.2)  # s, of the thrusters: the one that explains most counts
+_FEWEST = 50  # changes
+_DECIDED = 20.0  # twice the log-likelihood by which a topic's own delay must be better
+_SLOW = ("depth", "position")  # whose second differences are noise: they get the least delay of the others
+
+
+def find_delays(logs: Sequence[Log], vehicle: Vehicle, step: float) -> dict[str, float]:
+    """Find the delay of each topic behind the commands, to some hundredths of a second.
+
+    Changes of a velocity over 0.3 s are regressed on the impulse of the commanded wrench over the same time, shifted by
+    a delay and behind a lag, and on the velocity itself. All topics get the delay that leaves least unexplained, and a
+    topic that says so clearly another one. No number of the vehicle enters but its thrusters' directions.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        The runs.
+    vehicle : Vehicle
+        Its thrusters.
+    step : float
+        Of the grid of the commanded wrench [s].
+
+    Returns
+    -------
+    dict of str to float
+        Delays by topic [s]; empty where no topic says one.
+    """
+    evidence: dict[str, Array] = {}
+    for log in logs:
+        forces = CommandedForces(log, vehicle, step)
+        ones = np.ones(vehicle.n_thrusters)
+        wrenches = [forces.actuation(lag, ones).wrench[:, 0] for lag in _LAGS]
+        impulses = [np.concatenate([np.zeros((1, 6)), step * np.cumsum(w, axis=0)]) for w in wrenches]
+        edges = forces.start + step * np.arange(forces.steps + 1)
+        for topic in (t for t in log.topics if t.name not in _SLOW):
+            found = _unexplained(*_velocities(topic), log, edges, impulses)
+            if found is not None:
+                evidence[topic.name] = evidence.get(topic.name, 0.0) + found
+    against = {name: part.min(axis=0) for name, part in evidence.items()}
+    against = {name: part for name, part in against.items() if 0 < np.argmin(part) < len(_GRID) - 1}  # a real minimum
+    if not against:
+        return {}
+    common = int(np.argmin(np.sum(list(against.values()), axis=0)))
+    places = {name: int(np.argmin(part)) for name, part in against.items()}
+    delays = {
+        name: float(_GRID[places[name] if part[common] - part[places[name]] > _DECIDED else common])
+        for name, part in against.items()
+    }
+    present = (name for name in TOPICS if any(log.topic(name) for log in logs))
+    return {name: delays.get(name, min(delays.values())) for name in present}
+
+
+def move_back(log: Log, delays: dict[str, float]) -> Log:
+    """Return a log whose samples are where they would be without delays.
+
+    Parameters
+    ----------
+    log : Log
+        The run.
+    delays : dict of str to float
+        Of its topics [s].
+    """
+    return replace(log, topics=tuple(
+        replace(t, times=t.times - delays.get(t.name, 0.0), shift=delays.get(t.name, 0.0)) for t in log.topics
+    ))  # fmt: skip
+
+
+def within_margins(p: Parameter, delays: dict[str, float]) -> Parameter:
+    """Return a delay with bounds that keep samples in their windows; other numbers as they are."""
+    if p.kind != "delay":
+        return p
+    late = delays.get(p.plant, 0.0)
+    return replace(p, least=late - MARGINS[1], most=late + MARGINS[0])
+
+
+def _velocities(topic: Topic) -> tuple[Array, Array]:
+    """Return times and velocities of a topic: as measured, of an attitude by its differences over the span."""
+    if topic.name != "attitude":
+        return topic.times, topic.values
+    m = _pairs(topic.times)
+    spans = (topic.times[m:] - topic.times[:-m])[:, None]
+    middle = 0.5 * (topic.times[m:] + topic.times[:-m])
+    (e0, v), (f0, w) = ((q[:, :1], q[:, 1:]) for q in (topic.values[:-m], topic.values[m:]))
+    return middle, 2.0 * (e0 * w - f0 * v - np.cross(v, w)) / spans  # vector part of conj(q) q'
+
+
+def _pairs(times: Array) -> int:
+    """Return how many samples later the second of a pair comes."""
+    return max(1, round(_SPAN / float(np.median(np.diff(times)))))
+
+
+def _unexplained(times: Array, velocity: Array, log: Log, edges: Array, impulses: Sequence[Array]) -> Array | None:
+    """Return minus twice the log-likelihood, shape (lags, delays), but for a constant; None for too few changes."""
+    m, attitude = _pairs(times), log.topic("attitude")
+    if len(times) <= m or attitude is None:
+        return None
+    e0, e1, e2, e3 = (np.interp(times, attitude.times, x) for x in attitude.values.T)
+    down = np.column_stack([e1 * e3 - e0 * e2, e2 * e3 + e0 * e1])  # half of it, body axes x and y
+    drags = np.hstack([velocity, velocity * np.abs(velocity), down])
+    pieces = np.diff(times)[:, None] * 0.5 * (drags[1:] + drags[:-1])
+    sums = np.concatenate([np.zeros((1, pieces.shape[1])), np.cumsum(pieces, axis=0)])
+    inside = (times[:-m] - _GRID[-1] > edges[0]) & (times[m:] - _GRID[0] < edges[-1])
+    inside &= times[m:] - times[:-m] < 2.0 * _SPAN  # no gap
+    if inside.sum() < _FEWEST:
+        return None
+    begin, end = times[:-m][inside], times[m:][inside]
+    change = (velocity[m:] - velocity[:-m])[inside]
+    known = np.column_stack([(sums[m:] - sums[:-m])[inside], end - begin])
+    apart = float(np.median(np.diff(times))) / _SPAN  # changes overlap: how much each adds
+    left = np.empty((len(impulses), len(_GRID)))
+    for i, impulse in enumerate(impulses):
+        for j, delay in enumerate(_GRID):
+            both = (np.column_stack([np.interp(t - delay, edges, x) for x in impulse.T]) for t in (end, begin))
+            pushed = np.column_stack([np.subtract(*both), known])
+            found, *_ = np.linalg.lstsq(pushed, change)
+            left[i, j] = float(np.log(np.square(change - pushed @ found).sum(axis=0) + 1e-12).sum())
+    return apart * len(change) * left
