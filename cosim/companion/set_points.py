@@ -145,11 +145,11 @@ def attitude_target(mavlink: Any, system: int, attitude: Array, force: Array | N
     mavlink : module
         The dialect.
     system : int
-        The autopilot's.
+        System id of the autopilot.
     attitude : ndarray, shape (4,)
-        From body to world, scalar first.
+        Quaternion from body to world, scalar first.
     force : ndarray, shape (3,), optional
-        Parts of the greatest force along each body axis, as PX4 has it; without it the sticks push.
+        Fractions of the greatest force along each body axis [-], for PX4; None: the sticks command the force.
     """
     mask = _RATES_IGNORED | (_THRUST_IGNORED if force is None else THRUST_BODY_SET)
     fields = 0, system, 1, mask, attitude.tolist(), 0.0, 0.0, 0.0, 0.0

@@ -73,7 +73,7 @@ def step(
     memory: DeployableMemory,
     forces: Array,
 ) -> None:
-    """Run a step of the deployable law, as specified by `CompiledLaw.step`."""
+    """Run a step of the deployable law, as specified by `CompiledLaw.step`; `forces` are those of the thrusters [N]."""
     estimate, thrusters, dynamics, period = memory.state_estimate, memory.thrusters, memory.dynamics, memory.period[0]
     input_validation.smooth_weights(weights, memory.weights, regions.hard, period / (period + gains.price_smoothing))
     R, desired, acceleration, free, against, wrench = zeros(3, 3), zeros(3), zeros(6), zeros(6), zeros(6), zeros(6)

@@ -31,7 +31,7 @@ class ItemError(Exception):
 def decode_mission_item(
     context: VehicleContext, item: ReceivedMissionItem, before: Sequence[MissionItem], count: int
 ) -> MissionItem:
-    """Decode a received mission item.
+    """Decode a received mission item, and return it.
 
     NAV_WAYPOINT is a sphere about its position, of its acceptance radius (parameter 2), or for 0 the scenario's goal
     region moved there; parameter 1 is the time to stay. NAV_SPLINE_WAYPOINT is the goal region, without its spline.

@@ -13,7 +13,7 @@ _ALL_ONES = 0xFFFFFFFF
 
 
 def packed(parameters: Sequence[tuple[str, float]], total: int) -> bytes:
-    """Encode parameters as a packed file.
+    """Return parameters encoded as a packed file.
 
     Each has its type, the lengths of the prefix shared with the previous name and of the rest, the rest of the name,
     and its value, little-endian. A header has a magic number, their number, and the number of all parameters.

@@ -183,7 +183,7 @@ class VehicleContext:
         return self.home[0], self.home[1], 0.0
 
     def thrust_parts(self) -> list[float]:
-        """Return the force of each thruster as a fraction of its limit in that direction, from -1 to 1."""
+        """Return the force of each thruster as a fraction [-] of its limit in that direction, from -1 to 1."""
         return self._parts(self.view.thruster_forces)
 
     def servo_pulses(self) -> list[float]:

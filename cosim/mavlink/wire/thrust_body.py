@@ -13,16 +13,16 @@ _HEADER = 10  # bytes of MAVLink 2
 
 
 def with_thrust_body(mavlink: Any, *fields: Any, thrust_body: tuple[float, float, float]) -> Any:
-    """Return SET_ATTITUDE_TARGET with a thrust along each body axis, as parts of the greatest.
+    """Return SET_ATTITUDE_TARGET with a thrust along each body axis [-].
 
     Parameters
     ----------
     mavlink : module
         The dialect.
     fields
-        Of the message before the extension, in pymavlink's order.
+        Fields of the message before the extension, in pymavlink's order.
     thrust_body : tuple of float
-        Ahead, right and down, -1 to 1.
+        Fractions of the greatest thrust ahead, right and down [-], -1 to 1.
     """
     message = mavlink.MAVLink_set_attitude_target_message(*fields)
     whole = message.pack
@@ -40,7 +40,7 @@ def with_thrust_body(mavlink: Any, *fields: Any, thrust_body: tuple[float, float
 
 
 def thrust_body_of(message: Any) -> tuple[float, float, float]:
-    """Return the thrust along each body axis of a SET_ATTITUDE_TARGET that came; 0 where it has none."""
+    """Return the thrust along each body axis [-] of a received SET_ATTITUDE_TARGET; 0 where the field is missing."""
     frame = bytes(message.get_msgbuf() or b"")
     payload = frame[_HEADER : _HEADER + frame[1]] if len(frame) > _HEADER else b""
     ahead, right, down = _FIELD.unpack(payload[_AT : _AT + _FIELD.size].ljust(_FIELD.size, b"\0"))

@@ -81,7 +81,7 @@ class SetAttitude(_Command, frozen=True):
     """
 
     quaternion: tuple[float, float, float, float] | None  # from body to world, scalar first
-    force: Vector3 | None = None  # fractions of the greatest force along each body axis, -1 to 1; None: the sticks'
+    force: Vector3 | None = None  # fractions [-] of the greatest force along each body axis; None: the sticks'
     rate_down: float | None = None  # m/s, of the depth, in place of a vertical force
 
 
