@@ -400,7 +400,7 @@ def test_the_page_of_a_flight_shows_states_ages_modes_and_sticks(tmp_path):
             end = viewer.until("end")
         flight = flying.result()
     assert end["status"] == "completed"
-    assert "engaging, waits for mode 458752" in viewer.said("info") and "steering" in viewer.said("info")
+    assert "engaging, waits for mode 458752" in viewer.texts_of("info") and "steering" in viewer.texts_of("info")
     table = flight.run.table()
     rows = np.round(viewer.column("time") / 0.02).astype(int)
     for name in ("autopilot.age", "autopilot.mode", "companion.state", "stick.X", "stick.N", "companion.lateness"):
