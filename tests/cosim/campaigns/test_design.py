@@ -14,6 +14,7 @@ from cosim.campaigns.sweeps.design import KINDS, MOST, Design, Vary, design_of, 
 from cosim.errors import RunError
 
 TWO = vary_from(["a=-2:2", "b=1:1000:log"])
+KEYS = (("a", 1), ("b", 2), ("c", -1))  # of pairs, with a factor for each
 
 
 def all_rows(design):
@@ -60,13 +61,22 @@ def test_lists_are_drawn_from_evenly():
     assert np.unique(found.values(all_rows(found))[:, 0], return_counts=True)[1].tolist() == [100, 100, 100]
 
 
+def design_of_kind(kind, rows, seed):
+    """Return a design of a number of rows, a multiple of 15, that varies three keys."""
+    match kind:
+        case "grid":
+            vary, samples = ["a=-2:2:5", "b=1:1000:3:log", f"c=1:9:{rows // 15}"], None
+        case "paired":
+            vary, samples = [f"{key}={','.join(str(i * factor) for i in range(rows))}" for key, factor in KEYS], None
+        case _:
+            vary, samples = ["a=-2:2", "b=1:9:log", "c=1,2,3"], rows
+    return Design(vary_from(vary), kind, samples, seed)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @given(st.sets(st.integers(0, 59), min_size=1), st.integers(0, 2**63 - 1))
 def test_row_values_do_not_depend_on_other_requested_rows(kind, rows, seed):
-    vary = vary_from(
-        ["a=-2:2:4", "b=1:1000:5:log", "c=1,2,3"] if kind == "grid" else ["a=-2:2", "b=1:9:log", "c=1,2,3"]
-    )
-    found = Design(vary, kind, None if kind == "grid" else 60, seed)
+    found = design_of_kind(kind, 60, seed)
     asked = np.array(sorted(rows))
     assert np.array_equal(found.values(asked), found.values(all_rows(found))[asked])
     assert np.array_equal(found.seeds(asked), found.seeds(all_rows(found))[asked])
@@ -151,9 +161,7 @@ def test_invalid_designs_are_rejected(vary, kind, samples, seed, words):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_design_round_trips_through_the_plan(kind):
-    grid = kind == "grid"
-    vary = vary_from(["a=-2:2:4", "b=1:9:3:log", "c=1,2,3"] if grid else ["a=-2:2", "b=1:9:log", "c=1,2,3"])
-    design = Design(vary, kind, None if grid else 30, 4)
+    design = design_of_kind(kind, 30, 4)
     again = design_of(json.loads(json.dumps(design.table())))
     assert again.rows == design.rows
     assert np.array_equal(again.values(all_rows(design)), design.values(all_rows(design)))

@@ -33,6 +33,7 @@ ITS_OWN = {  # what parses nothing that comes from outside: why
     "cosim.mavlink.conformance.parameters:parameter_file": "a head whose length was just asked for",
     "cosim.mavlink.services.parameters:Parameters._send_hash": "its own hash",
     "cosim.mavlink.services.parameters:_as_float32": "its own number",
+    "cosim.mavlink.wire.thrust_body:thrust_body_of": "twelve bytes of a message whose checksum fits, made up to length",
     "cosim.results.recorder:Recorder._append_parts": "the parts that it has just written",
     "cosim.scenario.membership_terms:_read": "text made of a scenario's table, which is fuzzed",
     "cosim.scenario.scenario:Scenario.replace": "its own text",
