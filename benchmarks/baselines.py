@@ -74,7 +74,7 @@ FROM_PD: dict[str, tuple[str, ...]] = {
 
 
 class Outcome(NamedTuple):
-    """What gains came to over some scenes; `rank` orders outcomes, the least is the best."""
+    """Outcome of gains over some scenes; `rank` orders outcomes, the least is the best."""
 
     scenes: int
     violations: int
@@ -96,7 +96,7 @@ class Candidate(NamedTuple):
 
     @property
     def outcome(self) -> Outcome:
-        """What its scores come to."""
+        """Outcome of its scores."""
         return outcome(self.scores.values())
 
     @property
@@ -106,12 +106,12 @@ class Candidate(NamedTuple):
 
 
 def is_clean(score: Score) -> bool:
-    """Return whether nothing was violated; a scene whose plant failed or lost its position is."""
+    """Return True if nothing was violated; a scene whose plant failed or lost its position counts as violated."""
     return score.min_clearance >= 0.0 and score.failed_step < 0
 
 
 def outcome(scores: Iterable[Score]) -> Outcome:
-    """Return what scores come to."""
+    """Return the outcome of scores."""
     scores = tuple(scores)
     clean = [score for score in scores if is_clean(score)]
     arrived = [score for score in clean if score.reached]

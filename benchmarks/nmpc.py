@@ -161,7 +161,7 @@ class NmpcLaw(CompiledLaw):
 
 
 def _setup(gains: NmpcGains, vehicle: VehicleModel) -> dict[str, Any]:
-    """Return what the peer is made of."""
+    """Return the setup of the peer."""
     weights = {name: value for name, value in gains._asdict().items() if name.startswith("w_")}
     return weights | {
         "stages": round(gains.stages),

@@ -1,4 +1,4 @@
-"""Puts a page that flies on the site, where its WebAssembly can be built, and a link to it on the front page.
+"""Add an interactive replay to the site if its WebAssembly can be built, and a link to it on the front page.
 
 A hook of MkDocs (`hooks` in mkdocs.yml).
 """
@@ -26,7 +26,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 
 
 def on_post_build(config: MkDocsConfig) -> None:
-    """Fly the run, and write its page."""
+    """Simulate the run, and write its page."""
     if not _can_build():
         return
     from cosim.replay.pages import replay

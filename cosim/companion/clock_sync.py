@@ -57,7 +57,7 @@ class ClockSync:
 
     @property
     def round_trip(self) -> float:
-        """Of the quickest answer that is kept [s]; NaN before there is one."""
+        """Round-trip time of the fastest kept answer [s]; NaN before the first answer."""
         return min(self._answers)[0] if self._answers else math.nan
 
 

@@ -1,4 +1,4 @@
-"""What the autopilot does by itself when the companion falls silent: its parameters, read and shown, never set."""
+"""The failsafe parameters of the autopilot for a lost companion: read and shown, never set."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class Failsafes:
         self._first, self._last = math.inf, -math.inf  # s, of requests
 
     def wanted(self, now: float) -> list[str]:
-        """Return what is to be asked for now, by name; empty most of the time. `now` is our time [s]."""
+        """Return the names of the parameters to request at the local time `now` [s]; most often none."""
         if self.is_read(now) or now - self._last < _EVERY:
             return []
         self._first = min(self._first, now)
@@ -102,11 +102,11 @@ class Failsafes:
                 self.values[name] = float(value)
 
     def is_read(self, now: float) -> bool:
-        """Return whether all has come, or what has not is not to be waited for any more."""
+        """Return True if all parameters were received, or the wait for the missing ones is over."""
         return not self._missing() or now - self._first > _PATIENCE
 
     def text(self) -> list[str]:
-        """Return what was read, in lines for people; the last ones are warnings."""
+        """Return the received parameters as lines of text; the last ones are warnings."""
         lines = [self._line(parameter) for parameter in PARAMETERS[self._profile] if parameter.name in self.values]
         silent = [name for name in self._missing() if name not in _STICK_SYSTEM]
         if silent:

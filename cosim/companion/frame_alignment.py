@@ -107,7 +107,7 @@ class FrameAlignment:
         return result
 
     def missing(self, state: ReportedState) -> str:
-        """Return what the frame still waits for, in words; empty once it is known."""
+        """Return the missing inputs of the alignment as text; empty once the frame is known."""
         if self.offset is not None:
             return ""
         if self._frame is None:

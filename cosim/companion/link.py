@@ -1,4 +1,4 @@
-"""What the companion needs of a link, and the real one."""
+"""The interface of the companion's link, and its implementation by MAVLink."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class AutopilotLink(Protocol):
         ...
 
     def receive(self, timeout: float) -> Sequence[Heard]:
-        """Return what has come, waiting for the first of it for `timeout` seconds at the most."""
+        """Return the received messages; wait at most `timeout` [s] for the first one."""
         ...
 
     def send(self, message: Any) -> bool:
@@ -72,6 +72,6 @@ class NetworkLink(GroundLink):
         return self._speedup * time.monotonic()
 
     def receive(self, timeout: float) -> list[Heard]:
-        """Return what has come, as `GroundLink.receive` does, by this clock."""
+        """Return the received messages as `GroundLink.receive` does, with times of this clock."""
         heard = super().receive(timeout / self._speedup)
         return [one._replace(time=self._speedup * one.time) for one in heard]

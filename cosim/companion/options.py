@@ -1,4 +1,4 @@
-"""What a user says of a flight that the companion steers."""
+"""The user's options of a companion flight."""
 
 from __future__ import annotations
 

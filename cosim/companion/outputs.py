@@ -1,4 +1,4 @@
-"""How the law's wrench reaches an autopilot: what each takes, and the messages of a step."""
+"""Outputs of the companion: the messages that command a wrench, and the inputs that each autopilot accepts."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ _PX4_REFUSES: dict[str, str] = {
     "velocity": "its uuv_pos_control follows positions alone; expected sticks or attitude",
     "rc-override": "it gives channels a meaning by its own RC_MAP_*, and none for surge; expected manual-control",
 }
-_CENTERED_FOR = 0.2  # s, for which overridden channels rest in the middle before they are given back
+_CENTERED_FOR = 0.2  # s, during which overridden channels are centered before their release
 _NEUTRAL: Array = np.zeros(6)
 
 
 def require_taken(profile: ProfileName, steer_by: SteerBy, sticks_by: SticksBy) -> None:
-    """Raise where an autopilot does not take what it is to be steered by.
+    """Raise an error if an autopilot does not accept an output.
 
     Raises
     ------
     RunError
-        That says why not, and what it takes.
+        With the reason, and the accepted outputs.
     """
     for flag, value in (("--steer-by", steer_by), ("--sticks-by", sticks_by)):
         if profile == "px4" and value in _PX4_REFUSES:
@@ -46,42 +46,42 @@ def require_taken(profile: ProfileName, steer_by: SteerBy, sticks_by: SticksBy) 
 
 
 def uses_sticks(profile: ProfileName, steer_by: SteerBy) -> bool:
-    """Return whether sticks are sent: an ArduSub's also beside attitudes, for it has no other force along them."""
+    """Return True if sticks are sent: to an ArduSub also with attitudes, whose set-points have no horizontal force."""
     return steer_by in ("sticks", "wrench") or (steer_by == "attitude" and profile == "ardusub")
 
 
 def steered_in(profile: ProfileName, steer_by: SteerBy) -> Mode:
-    """Return the mode in which an autopilot takes what it is steered by."""
+    """Return the mode in which an autopilot accepts an output."""
     return "depth_hold" if steer_by == "attitude" and profile == "ardusub" else _STEERED_IN[steer_by]
 
 
 class Output:
-    """Makes the messages that ask an autopilot for a wrench, and notes what is in them.
+    """Make the messages that command a wrench, and keep their values for the record.
 
     Parameters
     ----------
     mavlink : module
         The dialect.
     vehicle : Vehicle
-        Whose model and limits count.
+        Vehicle, for its model and limits.
     profile : str
-        Which autopilot it is.
+        Name of the autopilot's profile.
     steer_by, sticks_by : str
-        What it gets.
+        Output, and message that carries the sticks.
     pilot_gain : float
-        Part of the greatest wrench that full sticks give.
+        Fraction of the greatest wrench that a full stick commands.
     lags : (float, float)
-        Of its velocity loop [s], horizontally and vertically.
+        Lags of its velocity loop [s], horizontal and vertical.
 
     Attributes
     ----------
     sticks, velocity, attitude : ndarray, shape (6,), (3,), (4,)
-        As asked for last: -1 to 1, [m/s, NED], a quaternion; zero where they are not.
+        Last commands: -1 to 1, [m/s, NED], a quaternion; zero for unused ones.
 
     Raises
     ------
     RunError
-        If the autopilot does not take that.
+        If the autopilot does not accept the output.
     """
 
     def __init__(
@@ -100,19 +100,19 @@ class Output:
         self._uses_sticks = uses_sticks(profile, steer_by)
         self._scale = scale_of(vehicle, self._profile, pilot_gain, sticks_by)
         self._turn, self._lead = TurnLead(vehicle), VelocityLead(vehicle, *lags)
-        self._overridden = False  # channels are, and were not given back
+        self._overridden = False  # True while overridden channels are not released
         self.sticks, self.velocity, self.attitude = np.zeros(6), np.zeros(3), np.zeros(4)
 
     def restart(self) -> None:
-        """Forget what the autopilot's loops do: something else steers."""
+        """Reset the estimates of the autopilot's loops, after another controller has steered."""
         self._lead.restart()
 
     def clear(self) -> None:
-        """Note that nothing is asked for."""
+        """Set all commands to zero."""
         self.sticks[:], self.velocity[:], self.attitude[:] = 0.0, 0.0, 0.0
 
     def messages(self, wrench: Array, state: ReportedState, period: float) -> Sequence[Any]:
-        """Return what asks for a wrench, shape (6,) [N, N m], body frame, a `period` [s] after the last one."""
+        """Return the messages that command a wrench, shape (6,) [N, N m], body frame, for a `period` [s]."""
         system = state.system or 0
         match self._steer_by:
             case "velocity":
@@ -131,7 +131,7 @@ class Output:
         return (self._sticks(system),)
 
     def still(self, state: ReportedState) -> Sequence[Any]:
-        """Return what asks for no motion, before the mode is on in which that counts."""
+        """Return the messages that command no motion, to be sent until the autopilot is in its mode."""
         self.clear()
         system = state.system or 0
         if self._uses_sticks:
@@ -142,10 +142,10 @@ class Output:
         return (velocity_target(self._mavlink, system, self.velocity, turn),)
 
     def released(self, state: ReportedState, since: float) -> Sequence[Any]:
-        """Return what lets go of the sticks, `since` seconds after that began.
+        """Return the messages that release the sticks, `since` [s] after the start of the release.
 
-        Channels that are overridden rest in the middle first, for an ArduSub without a radio keeps what it heard last;
-        then they are given back, once.
+        Overridden channels are centered first, since an ArduSub without a radio keeps their last values; then they are
+        released, once.
         """
         self.clear()
         if not self._uses_sticks:
@@ -160,11 +160,11 @@ class Output:
 
     @property
     def releases_for(self) -> float:
-        """For how long sticks are released before others steer [s]; an ArduSub keeps the last ones for seconds."""
+        """Duration of the release before another controller steers [s]; an ArduSub keeps sticks for seconds."""
         return 0.0 if self._sticks_by == "manual-control" else 2.0 * _CENTERED_FOR
 
     def _attitude(self, wrench: Array, state: ReportedState, period: float) -> Sequence[Any]:
-        """Return the attitude with forces; an ArduSub's are sticks ahead and aside, and one for a rate of depth."""
+        """Return the messages of an attitude with forces; an ArduSub's are sticks of surge, sway and depth rate."""
         system, level = state.system or 0, wrench.copy()
         level[3:] = 0.0
         if not self._uses_sticks:

@@ -23,7 +23,7 @@ MEANINGS: dict[State, str] = {
 
 @dataclass(frozen=True)
 class Condition:
-    """What ends steering.
+    """A reason to end steering.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Supervisor:
 
     @property
     def is_steering(self) -> bool:
-        """Whether the law is at work."""
+        """True while the law steers."""
         return self.state in ("steering", "dry_run")
 
     def asked_for_mode(self, now: float) -> None:

@@ -156,7 +156,7 @@ class AutopilotSession:
             self.exchange(np.zeros(6), now, now + 0.05)
 
     def missing(self) -> str:
-        """Return what steering waits for, in words."""
+        """Return the missing conditions for steering as text."""
         reported, now = self.reported, self._link.clock()
         if reported.system is None:
             return "a heartbeat of an autopilot"

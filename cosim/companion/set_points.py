@@ -1,4 +1,4 @@
-"""Set-points of velocity and attitude: what an autopilot's inner loops are to be asked for to do as a wrench would."""
+"""Set-points of velocity and attitude, by which an autopilot's inner loops give the acceleration of a wrench."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from cosim.mavlink.wire.thrust_body import THRUST_BODY_SET, with_thrust_body
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
-FASTEST = 0.5  # m/s, of the law that steers by velocity: a loop that it asks through brakes later than thrusters do
-_FASTEST_ASKED, _FASTEST_TURN = 0.8, 0.6  # m/s, rad/s, that are asked for
-_OBSERVED = 1.5  # rad/s, of both poles of the observer of what a velocity loop does beside its lag
+FASTEST = 0.5  # m/s, greatest speed of a law that steers by velocity: a velocity loop brakes later than thrusters
+_FASTEST_ASKED, _FASTEST_TURN = 0.8, 0.6  # m/s, rad/s, greatest set-points
+_OBSERVED = 1.5  # rad/s, both poles of the observer
 _RATE_LAG, _ANGLE_LAG = 0.3, 0.3  # s, of an autopilot's loops of rate and angle
-_FARTHEST, _TILT = 0.35, 0.1  # rad, by which angles that are asked for lead the present ones; greatest roll and pitch
+_FARTHEST, _TILT = 0.35, 0.1  # rad, greatest lead of set-points of angles; greatest roll and pitch
 _NORTH, _EAST, _DOWN = np.eye(3)
 _VELOCITY_ONLY, _YAW_RATE_IGNORED = 0b010111000111, 1 << 11  # type_mask of positions and velocities
 _RATES_IGNORED, _THRUST_IGNORED = 0b111, 1 << 6  # of attitudes
@@ -26,35 +26,35 @@ _LOCAL_NED = 1
 
 
 class TurnLead:
-    """Turns a moment into the rate of yaw, or the attitude, that an autopilot is to be asked for.
+    """Convert a moment to a set-point of yaw rate or attitude.
 
-    An angle loop around a rate loop asks for the rate (asked - angle) / lag, and accelerates by (rate asked - rate) /
-    rate lag. So an angle that leads by lag (rate + rate lag a) asks for the acceleration a of the moment.
+    An angle loop around a rate loop commands the rate (set-point - angle) / lag, and accelerates by (commanded rate -
+    rate) / rate lag. So a set-point that leads the angle by lag (rate + rate lag a) gives the acceleration a.
 
     Parameters
     ----------
     vehicle : Vehicle
-        Whose inertia, with the added one, counts.
+        Vehicle, for its inertia with added inertia.
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._inertia: Array = np.diag(vehicle.inertia) + np.diag(vehicle.added_mass)[3:]
 
     def rates(self, wrench: Array, state: ReportedState) -> Array:
-        """Return body rates, shape (3,) [rad/s], to be asked for; the present ones where a moment is not finite."""
+        """Return the set-point of body rates, shape (3,) [rad/s]; the present rate where a moment is not finite."""
         moment = np.where(np.isfinite(wrench[3:]), wrench[3:], 0.0)
         result: Array = state.rates + _RATE_LAG * moment / self._inertia
         return result
 
     def yaw_rate(self, wrench: Array, state: ReportedState) -> float:
-        """Return the rate of yaw [rad/s], of at most 0.6 rad/s."""
+        """Return the set-point of the yaw rate [rad/s], at most 0.6 rad/s."""
         return min(max(float(self.rates(wrench, state)[2]), -_FASTEST_TURN), _FASTEST_TURN)
 
     def attitude(self, wrench: Array, state: ReportedState) -> Array:
-        """Return the attitude as a quaternion, shape (4,), at most 0.35 rad from the present one in each angle.
+        """Return the set-point of the attitude, a quaternion, shape (4,), within 0.35 rad of the present one by angle.
 
-        Roll and pitch are at most 0.1 rad: the autopilot rights the vehicle by itself, and what the law's moments do
-        against weight, drag and thrusters beside the center is none of a tilt that is asked for.
+        Roll and pitch are at most 0.1 rad: the autopilot levels the vehicle itself, and the law's moments against
+        weight, drag and eccentric thrusters do not mean a tilt.
         """
         roll, pitch, yaw = np.clip(_ANGLE_LAG * self.rates(wrench, state), -_FARTHEST, _FARTHEST)
         now = euler_of(state.quaternion.tolist())
@@ -65,30 +65,30 @@ class TurnLead:
 
 
 class VelocityLead:
-    """Turns a wrench into the velocity that an inner loop is to be asked for.
+    """Convert a wrench to a set-point of velocity.
 
-    A first-order loop accelerates by (asked - v) / lag + d. So v + lag (a - d) asks for the acceleration a that the
-    wrench would give the vehicle, by its mass, added mass and damping. A Luenberger observer finds d, of which current,
-    drag and a loop without integral action are parts, from what was asked for and what the velocity did.
+    A first-order loop accelerates by (set-point - v) / lag + d. So the set-point v + lag (a - d) gives the acceleration
+    a of the wrench, by mass, added mass and damping. A Luenberger observer estimates d, which includes current, drag
+    and the missing integral action of a loop, from set-points and measured velocities.
 
     Parameters
     ----------
     vehicle : Vehicle
-        Whose model counts.
+        Vehicle, for its model.
     lag, vertical_lag : float
-        Of the autopilot's velocity loop [s], horizontally and vertically.
+        Lags of the autopilot's velocity loop [s], horizontal and vertical.
     """
 
     def __init__(self, vehicle: Vehicle, lag: float, vertical_lag: float) -> None:
         self._mass: Array = vehicle.mass + np.diag(vehicle.added_mass)[:3]
         self._linear, self._quadratic = vehicle.linear_damping[:3], vehicle.quadratic_damping[:3]
         self._lag: Array = np.array([lag, lag, vertical_lag])
-        self._asked: Array | None = None  # last [m/s, NED]
+        self._asked: Array | None = None  # last set-point [m/s, NED]
         self._expected: Array = np.zeros(3)  # velocity as the observer has it
         self._beside: Array = np.zeros(3)  # d [m/s2]
 
     def restart(self) -> None:
-        """Forget what the loop does: something else steers."""
+        """Reset the observer, after another controller has steered."""
         self._asked, self._beside = None, np.zeros(3)
 
     def velocity(self, wrench: Array, state: ReportedState, period: float) -> Array:
@@ -97,11 +97,11 @@ class VelocityLead:
         Parameters
         ----------
         wrench : ndarray, shape (6,)
-            [N, N m], body frame; what is not finite asks for nothing.
+            [N, N m], body frame; components that are not finite count as 0.
         state : ReportedState
-            Of the vehicle now.
+            Present state.
         period : float
-            Since the last call [s].
+            Time since the last call [s].
         """
         speed = state.velocity_body[:3]
         force = np.where(np.isfinite(wrench[:3]), wrench[:3], 0.0)

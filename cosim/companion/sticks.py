@@ -1,4 +1,4 @@
-"""Sticks: what full ones give, and the messages that carry them."""
+"""Sticks: their scale, and the messages that carry them."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ from plant_fmu import Vehicle
 SticksBy = Literal["manual-control", "rc-override"]
 STICKS_BY: tuple[SticksBy, ...] = get_args(SticksBy)
 
-PILOT_SPEED = 0.5  # m/s, of a full vertical stick where the depth is kept: ArduSub's PILOT_SPEED_UP
+PILOT_SPEED = 0.5  # m/s, depth rate of a full vertical stick in ALT_HOLD: ArduSub's PILOT_SPEED_UP
 _FULL = 1000.0
 _PITCH, _ROLL = 1, 2  # enabled_extensions
 _CENTER, _SWING, _AXES = 1500, 400, 6  # us of a channel; channels
-_RELEASED, _LEFT_ALONE = 0, 0xFFFF  # what channels 1 to 8 are told so by
+_RELEASED, _LEFT_ALONE = 0, 0xFFFF  # values that release a channel, and leave it unchanged
 
 
 @dataclass(frozen=True)
 class StickScale:
-    """What full sticks give.
+    """Relation between sticks and wrench of a vehicle.
 
     Attributes
     ----------
     efforts : ndarray, shape (n, 6)
-        Each thruster's part of its greatest force for a wrench along or about each body axis [1/N, 1/(N m)].
+        Fraction of each thruster's greatest force, for a unit wrench along or about each body axis [1/N, 1/(N m)].
     mixer : ndarray, shape (n, 6)
-        What a full stick of each axis, at a gain of 1, asks of each thruster: 1, 0 or -1 of its greatest force. Of an
-        autopilot that allocates forces by itself, both are of axes instead of thrusters.
+        Command of each thruster, 1, 0 or -1, by a full stick of each axis at a gain of 1. For an autopilot that
+        allocates forces itself, both have a row for each axis in place of each thruster.
     gain : float
-        What scales the sticks of surge, sway, heave and yaw: the pilot's; 1 for channels that are overridden.
+        Gain of the sticks of surge, sway, heave and yaw: the pilot gain; 1 for overridden channels.
     scales_all : bool
-        Whether it scales those of roll and pitch, too.
+        True if the gain applies to roll and pitch as well.
     quadratic : bool
-        Whether a thruster's force goes with the square of what the autopilot asks of it.
+        True if a thruster's force is proportional to the square of its command.
     dead_zones : float
-        What scales the dead zones of the sticks that ask for rates: the pilot's gain; 0 where there are none.
+        Factor of the dead zones of rate sticks: the pilot gain; 0 without dead zones.
     """
 
     efforts: Array
@@ -54,15 +54,15 @@ class StickScale:
     dead_zones: float
 
     def sticks(self, wrench: Array) -> Array:
-        """Return the sticks that ask for a wrench, shape (6,), X Y Z K M N from -1 to 1.
+        """Return the sticks that command a wrench, shape (6,), X Y Z K M N from -1 to 1.
 
-        An autopilot adds what all sticks ask of a thruster, and where its force goes with the square, it goes with the
-        square of that sum. So each thruster's force is turned into what it is to be asked for, and that into sticks.
+        An autopilot adds the commands of all sticks to a thruster; a quadratic force is that of the sum. So each
+        thruster's force is converted to its command, and the commands to sticks.
 
         Parameters
         ----------
         wrench : ndarray, shape (6,)
-            [N, N m], body frame; what is not finite asks for nothing.
+            [N, N m], body frame; components that are not finite count as 0.
         """
         share = self.efforts @ np.where(np.isfinite(wrench), wrench, 0.0)
         if self.quadratic:
@@ -75,11 +75,11 @@ class StickScale:
         return clipped
 
     def yaw_rate_stick(self, rate: float) -> float:
-        """Return the yaw stick that asks for a rate of turn [rad/s]; 0 for one that is not finite."""
+        """Return the yaw stick that commands a yaw rate [rad/s]; 0 for one that is not finite."""
         return self._rate_stick(rate / YAW_RATE, YAW_DEAD_ZONE)
 
     def climb_stick(self, rate_down: float) -> float:
-        """Return the stick Z that asks for a rate of the depth [m/s], likewise."""
+        """Return the heave stick that commands a depth rate [m/s]; 0 for one that is not finite."""
         return self._rate_stick(rate_down / PILOT_SPEED, CLIMB_DEAD_ZONE)
 
     def _rate_stick(self, part: float, dead_zone: float) -> float:
@@ -90,18 +90,18 @@ class StickScale:
 
 
 def scale_of(vehicle: Vehicle, profile: Profile, pilot_gain: float, sticks_by: SticksBy) -> StickScale:
-    """Return what full sticks give of a vehicle.
+    """Return the scale of the sticks of a vehicle.
 
     Parameters
     ----------
     vehicle : Vehicle
-        Its thrusters' limits count, and as ArduSub the curve of its table ``autopilot``.
+        Vehicle with its thrusters' limits and, for an ArduSub, the curve of its table ``autopilot``.
     profile : Profile
-        Which autopilot it is.
+        Profile of the autopilot.
     pilot_gain : float
-        Above 0 to 1.
+        Pilot gain, above 0 to 1.
     sticks_by : str
-        Which message carries them.
+        Message that carries the sticks.
     """
     gain = pilot_gain if sticks_by == "manual-control" else 1.0
     reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
@@ -115,7 +115,7 @@ def scale_of(vehicle: Vehicle, profile: Profile, pilot_gain: float, sticks_by: S
 
 
 def manual_control(mavlink: Any, system: int, profile: Profile, sticks: Array, all_axes: bool) -> Any:
-    """Return MANUAL_CONTROL; roll and pitch are in it where `all_axes` are steered."""
+    """Return MANUAL_CONTROL; with `all_axes` it includes roll and pitch."""
     surge, sway, heave, roll, pitch, yaw = sticks.tolist()
     center = profile.centred_stick
     x, y, r = (round(_FULL * part) for part in (surge, sway, yaw))
@@ -136,7 +136,7 @@ def channels_override(mavlink: Any, system: int, sticks: Array) -> Any:
 
 
 def channels_released(mavlink: Any, system: int) -> Any:
-    """Return RC_CHANNELS_OVERRIDE that gives the channels back to the radio."""
+    """Return RC_CHANNELS_OVERRIDE that releases the channels to the radio."""
     return _override(mavlink, system, [_RELEASED] * _AXES)
 
 

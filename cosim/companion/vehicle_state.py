@@ -37,7 +37,7 @@ _MILLI, _MICRO = 1e-3, 1e-6
 
 
 class ReportedState:
-    """What one autopilot says, taken message by message. Nothing is estimated here.
+    """The state of one autopilot, as its messages report it. Nothing is estimated here.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class ReportedState:
         self._handlers[kind](message, now)
 
     def age(self, now: float) -> float:
-        """Return how old the older one of position and attitude is [s]; infinite before both have come.
+        """Return the age of the older one of position and attitude [s]; infinite before both were received.
 
         By the autopilot's own stamps where clocks are aligned, and never less than the time since it came.
         """
@@ -202,7 +202,7 @@ class ReportedState:
 
 
 def _is_deflected(message: Any, autopilot: int) -> bool:
-    """Return whether somebody holds a stick away from its rest."""
+    """Return True if a stick is away from its center."""
     if message.get_type() == "RC_CHANNELS_OVERRIDE":
         pulses = (getattr(message, f"chan{i}_raw") for i in range(1, 7))
         return any(abs(pulse - _CENTER) > _DEFLECTED_PULSE for pulse in pulses if 0 < pulse < 0xFFFF)

@@ -98,7 +98,7 @@ class CommandedForces:
 
 
 def steady_forces(commands: Array, vehicle: Vehicle) -> Array:
-    """Return what commands come to once lags are over, as the plant limits and bends them.
+    """Return the steady-state forces of commands, with the plant's limits and curve.
 
     Parameters
     ----------

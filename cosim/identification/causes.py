@@ -1,4 +1,4 @@
-"""What a fit that disagrees with its runs lacks: which numbers that were not free would explain most of it."""
+"""Causes of a poor fit: the fixed numbers that would explain most of its residuals if they were free."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Cause:
-    """Numbers that were not free, and how much they would explain."""
+    """A group of fixed numbers, and the share of the residuals that it would explain."""
 
     flag: str  # by which they are freed
     share: float  # of the squares beyond those of the noise, in one Gauss-Newton step
 
 
 def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values: Array, step: float) -> list[Cause]:
-    """Find what the fit lacks, by a score test of each group of numbers that were not free (Rao 1948).
+    """Find the causes of a poor fit, by a score test of each group of fixed numbers (Rao 1948).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How late the samples of runs come behind the commands, before any number of the vehicle is fitted."""
+"""Start values of the delays of samples behind the commands, found before the fit."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def find_delays(logs: Sequence[Log], vehicle: Vehicle, step: float) -> dict[str,
     """Find the delay of each topic behind the commands, to some hundredths of a second.
 
     Changes of a velocity over 0.3 s are regressed on the impulse of the commanded wrench over the same time, shifted by
-    a delay and behind a lag, and on the velocity itself. All topics get the delay that leaves least unexplained, and a
-    topic that says so clearly another one. No number of the vehicle enters but its thrusters' directions.
+    a delay and filtered by a lag, and on the velocity itself. All topics get the delay with the least residual; a topic
+    whose own delay fits clearly better gets that. Of the vehicle only its thrusters' directions are used.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def find_delays(logs: Sequence[Log], vehicle: Vehicle, step: float) -> dict[str,
     Returns
     -------
     dict of str to float
-        Delays by topic [s]; empty where no topic says one.
+        Delays by topic [s]; empty if no topic determines one.
     """
     evidence: dict[str, Array] = {}
     for log in logs:
@@ -105,7 +105,7 @@ def _velocities(topic: Topic) -> tuple[Array, Array]:
 
 
 def _pairs(times: Array) -> int:
-    """Return how many samples later the second of a pair comes."""
+    """Return the number of samples between the two of a pair."""
     return max(1, round(_SPAN / float(np.median(np.diff(times)))))
 
 

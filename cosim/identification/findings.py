@@ -1,4 +1,4 @@
-"""What an identification says in words: how far to trust it, what the runs cannot tell, and what to drive next."""
+"""Findings of an identification as text: its reliability, what the runs do not determine, and the next manoeuvre."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
 
 
 def _cause(fit: Fit) -> str:
-    """Return what the fit lacks, by name where there is a number for it."""
+    """Return the causes of a poor fit as text, by name where a number of the fit stands for one."""
     late = {name: x for name, x in fit.delays.items() if x > _LATE}
     if late and not any(p.kind == "delay" for p in fit.parameters):
         said = ", ".join(f"{name.replace('_', ' ')} {x:.2f} s" for name, x in late.items())

@@ -38,7 +38,7 @@ _INSIDE = 0.05  # of a deviation: how far from its bound a number starts
 
 @dataclass(frozen=True)
 class Fit:
-    """What came of an identification."""
+    """Result of an identification."""
 
     parameters: tuple[Parameter, ...]
     values: Array  # (p,)

@@ -1,4 +1,4 @@
-"""What a run recorded, as identification needs it: commands, and samples of each topic with their noise."""
+"""The recorded data of a run for identification: commands, and samples of each topic with their noise."""
 
 from __future__ import annotations
 

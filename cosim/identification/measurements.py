@@ -1,4 +1,4 @@
-"""What sensors measure of a predicted motion: residuals of each topic, and their exact derivatives."""
+"""Predicted measurements of a motion: residuals of each topic, and their exact derivatives."""
 
 from __future__ import annotations
 

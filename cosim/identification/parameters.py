@@ -1,4 +1,4 @@
-"""What is free in an identification: keys of the vehicle's file, and nuisances of the runs, with their priors."""
+"""Free numbers of an identification: keys of the vehicle's file, and nuisances of the runs, with their priors."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Parameter:
 
     @property
     def is_nuisance(self) -> bool:
-        """Whether it is no number of the vehicle."""
+        """True for a nuisance, which is no number of the vehicle."""
         return self.kind not in ("plant", "lag", "thrust")
 
 

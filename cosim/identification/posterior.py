@@ -1,4 +1,4 @@
-"""Vehicles drawn from what an identification leaves open, as plants of a sweep."""
+"""Vehicles drawn from the uncertainty of an identification, as plants of a sweep."""
 
 from __future__ import annotations
 

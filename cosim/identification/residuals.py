@@ -33,7 +33,7 @@ _MOST_SOLVES = 12
 
 @dataclass(frozen=True)
 class Setting:
-    """What the free numbers mean for one run."""
+    """Settings of one run by the free numbers."""
 
     plant: dict[str, float]
     actuation: Actuation
@@ -98,7 +98,7 @@ class Residuals:
         self.weights: list[Array] = [np.ones(rows_of(window)) for window in windows]
 
     def settings(self, values: Array) -> list[Setting]:
-        """Return what the free numbers mean for each run."""
+        """Return the settings of each run by the free numbers."""
         return [self._setting(run, values) for run in range(len(self._forces))]
 
     def _setting(self, run: int, values: Array) -> Setting:
@@ -187,7 +187,7 @@ class Residuals:
 
     @staticmethod
     def _moves(p: Parameter, run: int) -> bool:
-        """Whether a parameter changes the motion of a run, rather than what is measured of it."""
+        """Return True if a parameter changes the motion of a run, and not only its measurements."""
         return p.run in (None, run) and p.kind in ("plant", "lag", "thrust", "asymmetry", "current", "force")
 
     def _directions(self, moving: Sequence[int], setting: Setting, inside: slice, start: Array) -> Directions:
@@ -304,7 +304,7 @@ class Residuals:
 
 
 def rows_of(window: Window) -> int:
-    """Return how many residuals a window has."""
+    """Return the number of residuals of a window."""
     return sum(len(topic.times) * len(topic.components) for topic in window.topics)
 
 

@@ -14,23 +14,23 @@ from controller.regions.region_set import of_attitude
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
-FARTHEST = 100.0  # m, that it says where it meets nothing
-_LEVEL = 0.1  # cosine of the tilt, from which on a flat bottom is met at all
+FARTHEST = 100.0  # m, output when the beam meets nothing
+_LEVEL = 0.1  # cosine of the tilt, below which the beam does not meet a flat bottom
 
 
 class Rangefinder:
-    """Measures how far it is to what is below.
+    """Measure the distance to the bottom, or to the nearest hard region, along the body's vertical axis.
 
     Parameters
     ----------
     scenario : Scenario
-        Its plant's ``bottom_depth`` is met; without one, hard regions that stand still are: their surfaces, which have
-        the vehicle's own size added where the scenario adds it.
+        Scenario, for its plant's ``bottom_depth``. Without one the beam meets static hard regions: their surfaces,
+        which include the vehicle's size where the scenario adds it.
 
     Attributes
     ----------
     is_fitted : bool
-        Whether there is anything to be met at all.
+        True if there is a bottom or a region for the beam to meet.
 
     Examples
     --------
@@ -61,9 +61,9 @@ class Rangefinder:
         position_ned : ndarray, shape (3,)
             [m].
         quaternion : ndarray, shape (4,)
-            From body to world, scalar first.
+            Quaternion from body to world, scalar first.
         altitude : float
-            Above the plant's bottom, as its sensor measures it [m]; only where there is one.
+            Altitude above the plant's bottom, as its sensor measures it [m]; unused without a bottom.
         """
         self._beam[0] = rotation_matrix(quaternion)[:, 2]
         if self._has_bottom:

@@ -179,7 +179,7 @@ def draw_others(scenario: Scenario, parameters: Sequence[Parameter], rng: np.ran
 
 
 def farthest(flown: Rehearsal, scenario: Scenario, box: tuple[float, float, float]) -> float:
-    """Return how far from the center a run goes, in parts of half the box: above 1 it leaves it."""
+    """Return the greatest distance of a run from the center, as a fraction of half the box [-]."""
     away = np.abs(flown.states[:, :3] - np.array(scenario.initial.position)) / (0.5 * np.array(box))
     return float(away.max())
 
@@ -245,7 +245,7 @@ def _within(segment: Segment, trial: Scenario, box: tuple[float, float, float]) 
 
 
 def _choose(found: Sequence[Array], parameters: Sequence[Parameter], count: int) -> list[int]:
-    """Return which candidates are taken: greedy, then exchanged one by one while that adds information."""
+    """Return the chosen candidates: greedy, then exchanged one by one while that adds information."""
     free = [i for i, p in enumerate(parameters) if not p.is_nuisance]
     scale = np.array([p.deviation for p in parameters])
     matrices = [matrix * np.outer(scale, scale) for matrix in found]

@@ -34,7 +34,7 @@ class Rehearsal:
     thrust: Array  # (rows, thrusters) N, commanded
 
     def log(self) -> Log:
-        """Return what sensors measure of it, without their noise, of which the size is given."""
+        """Return the measurements of the sensors without noise, and with its standard deviations."""
         every = max(1, round(DVL_PERIOD / float(self.times[1] - self.times[0])))
         parts = {
             "velocity": (slice(None, None, every), slice(7, 10)), "angular_velocity": (slice(None), slice(10, 13)),

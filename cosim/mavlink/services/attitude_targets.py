@@ -1,4 +1,4 @@
-"""SET_ATTITUDE_TARGET: an attitude, and what pushes beside it."""
+"""SET_ATTITUDE_TARGET: set-points of attitude and force."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class AttitudeTargets(Service):
             self._last = None
 
     def tick(self) -> None:
-        """End an attitude that is not sent any more."""
+        """End an attitude that is no longer sent."""
         context, mode = self.context, self.context.mode_ahead
         if self._last is None or mode not in _LASTS or context.now - self._heard < _LASTS[mode]:
             return
@@ -75,7 +75,7 @@ class AttitudeTargets(Service):
             self._last = command
 
     def _fault(self, message: Any) -> str:
-        """Return what of a set-point cannot be followed, in words; empty where all can."""
+        """Return the reason why a set-point is refused, as text; empty if it is accepted."""
         mask, thrust = message.type_mask, message.thrust
         if mask & _ATTITUDE_IGNORED:
             return "rates alone are not followed; an attitude is"
@@ -93,7 +93,7 @@ class AttitudeTargets(Service):
         return bool(self.context.mode_ahead == ("depth_hold" if sticks_push else "reach"))
 
     def _wait(self) -> None:
-        """Say of set-points that wait for their mode, once they have come for a while."""
+        """Report set-points that are not applied in the present mode, once they have been received for 3 s."""
         context = self.context
         if self._waits_since == -math.inf or context.now - self._heard > 1.0:
             self._waits_since = context.now

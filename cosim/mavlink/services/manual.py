@@ -93,10 +93,10 @@ class Manual(Service):
             context.sticks = sticks
 
     def _parts(self, sticks: Vector6, by_gain: bool) -> Vector6:
-        """Return which parts of the greatest wrench the sticks ask for, before the pilot's gain.
+        """Return the fractions of the greatest wrench that the sticks command, before the pilot gain.
 
-        An ArduSub asks its thrusters for gain times stick, and their force goes with the square of the sum. The gain
-        does not scale channels that are overridden.
+        ArduSub commands its thrusters by gain times stick, and their force is proportional to the square of the sum.
+        The gain does not apply to overridden channels.
         """
         context, mode = self.context, self.context.mode_ahead
         if context.profile.name != "ardusub":

@@ -1,4 +1,4 @@
-"""What an ArduSub makes of sticks: each thruster adds what they ask of it, and rates begin beyond dead zones."""
+"""The sticks of an ArduSub: each thruster adds the commands of all sticks, and rate sticks have dead zones."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ import numpy as np
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
-# parts of a stick's way at a pilot gain of 1 that ask for nothing
+# deflections of a stick at a pilot gain of 1 up to which the rate is 0
 YAW_DEAD_ZONE = 0.1  # 40 of 400 us
 CLIMB_DEAD_ZONE = 0.2  # THR_DZ: 100 of 500
-_MOSTLY = 0.6  # of the greatest part that a thruster has in an axis, from which on it works for that axis
+_MOSTLY = 0.6  # of a thruster's greatest matrix element, above which it is mixed into an axis
 
 
 class MotorMixer:
-    """Adds what full sticks ask of each thruster, 1, 0 or -1 of its greatest force, and squares the sum.
+    """Add the commands of the sticks to each thruster, 1, 0 or -1 for a full stick, and square the sum.
 
     Parameters
     ----------
     vehicle : Vehicle
-        Its thrusters, their limits, and as its table ``autopilot`` says whether their force goes with the square.
+        Vehicle, for its thrusters, their limits, and the curve of its table ``autopilot``.
 
     Attributes
     ----------
     asked : ndarray, shape (n, 6)
-        Of each thruster by a full stick of each axis.
+        Command of each thruster by a full stick of each axis.
     greatest : ndarray, shape (n,)
         Force of each thruster [N], the mean of both ways.
     is_quadratic : bool
-        Whether it squares.
+        True if the force is proportional to the square of the command.
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
@@ -41,26 +41,26 @@ class MotorMixer:
         self.is_quadratic = table is not None and table.curve == "quadratic"
 
     def wrench(self, sticks: Array) -> Array:
-        """Return the wrench, shape (6,) [N, N m], that sticks of X Y Z K M N give, as the gain has scaled them."""
+        """Return the wrench, shape (6,) [N, N m], of sticks of X Y Z K M N that include the gain."""
         sums = np.clip(self.asked @ sticks, -1.0, 1.0)
         result: Array = self._matrix @ (self.greatest * (sums * np.abs(sums) if self.is_quadratic else sums))
         return result
 
 
 def beyond_dead_zone(deflection: float, dead_zone: float) -> float:
-    """Return the part of a full rate that a stick asks for.
+    """Return the fraction of a full rate that a stick commands.
 
     Parameters
     ----------
     deflection : float
-        Of the stick, times the gain that scales it, -1 to 1.
+        Deflection of the stick times its gain, -1 to 1.
     dead_zone : float
-        Part of the way that asks for nothing, below 1.
+        Deflection up to which the rate is 0, below 1.
 
     Returns
     -------
     float
-        -1 to 1; 0 within the dead zone, and straight from its end on.
+        -1 to 1; 0 within the dead zone, and linear beyond it.
 
     Examples
     --------
@@ -73,5 +73,5 @@ def beyond_dead_zone(deflection: float, dead_zone: float) -> float:
 
 
 def deflection_of(part: float, dead_zone: float) -> float:
-    """Return the deflection that asks for a part of a full rate: the inverse of `beyond_dead_zone`; 0 for 0."""
+    """Return the deflection that commands a fraction of a full rate: the inverse of `beyond_dead_zone`; 0 for 0."""
     return math.copysign(dead_zone + (1.0 - dead_zone) * abs(part), part) if part else 0.0

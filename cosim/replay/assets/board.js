@@ -21,7 +21,7 @@ class Board {
     press("charts-whole", () => this.whole());
   }
 
-  /** @param {Run[]} runs of the page  @param {boolean[]} shown which of them are  @param {number} selected whose values are told */
+  /** @param {Run[]} runs of the page  @param {boolean[]} shown which of them are  @param {number} selected whose values are shown */
   setRuns(runs, shown, selected) {
     const specs = chartsOf(runs);
     const keys = JSON.stringify(specs.map((spec) => [spec.key, spec.signals.map((of) => [of.name, of.faint])]));

@@ -191,8 +191,8 @@ class Chart {
     this.canvas = element("canvas");
     this.canvas.setAttribute("role", "img");
     const names = this.spec.signals.map((of) => of.label);
-    const told = names.slice(0, 8).join(", ") + (names.length > 8 ? ` and ${names.length - 8} more` : "");
-    this.canvas.setAttribute("aria-label", `${this.spec.title} against time: ${told}. Values at the cursor stand above.`);
+    const listed = names.slice(0, 8).join(", ") + (names.length > 8 ? ` and ${names.length - 8} more` : "");
+    this.canvas.setAttribute("aria-label", `${this.spec.title} against time: ${listed}. Values at the cursor stand above.`);
     this.ghost = element("div", "ghost");
     this.cursor = element("div", "cursor");
     this.brush = element("div", "brush");

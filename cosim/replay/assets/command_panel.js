@@ -46,9 +46,9 @@ class CommandPanel {
     const armed = run.has("commands.armed") ? run.held("commands.armed", run.end) > 0 : true;
     let state = "watching";
     if (link.over) state = "the run has ended";
-    else if (run.header.commands) state = link.heeded ? `${armed ? "armed" : "disarmed"}, ${mode ?? "waiting"}` : "no connection";
+    else if (run.header.commands) state = link.acceptsCommands ? `${armed ? "armed" : "disarmed"}, ${mode ?? "waiting"}` : "no connection";
     setText(this.state, state);
-    this.body.inert = Boolean(run.header.commands) && !link.heeded;
+    this.body.inert = Boolean(run.header.commands) && !link.acceptsCommands;
     for (const button of this.body.querySelectorAll("[data-mode]")) button.setAttribute("aria-pressed", String(button.dataset.mode === mode));
     for (const button of this.body.querySelectorAll("[data-armed]")) button.setAttribute("aria-pressed", String(button.dataset.armed === String(armed)));
     for (const row of this._rows) this._place(row);

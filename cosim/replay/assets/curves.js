@@ -88,11 +88,11 @@ function clearances(runs, unit) {
   }
   const near = [...found.values()].filter(({ region }) => region.criterion).sort((a, b) => a.least - b.least);
   const named = new Set(near.slice(0, NAMED).map(({ region }) => region.name));
-  let told = 0;
+  let drawn = 0;
   return [...found.values()].map(({ region }) => {
     const faint = Boolean(region.criterion) && !named.has(region.name);
     return signal(`${region.name}.clearance`, region.name, faint ? "grey" : hueOf(region.colour), {
-      dash: faint ? [] : DASHES[told++ % DASHES.length],
+      dash: faint ? [] : DASHES[drawn++ % DASHES.length],
       faint,
       values: clearanceOf(region),
     });

@@ -106,7 +106,7 @@ class Run {
     return this._isThere(region, row) && Vec.norm(Vec.sub(a, b)) > 0;
   }
 
-  /** Whether a region is there at a time: obstacles that were told of while the run went on come and go. */
+  /** Whether a region is there at a time: obstacles that were reported during the run come and go. */
   there(region, t) {
     return this._isThere(region, this.row(t));
   }

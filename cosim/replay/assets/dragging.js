@@ -8,7 +8,7 @@ const SETTLES = 250; // ms, for which the ghost stays after its region was let g
 /** Lets a pointer drag regions, and draws where they will be. */
 class Dragging {
   /**
-   * @param {LiveLink|WhatIf} link with page, run, heeded; time, at which regions are where they are taken; refusal, why
+   * @param {LiveLink|WhatIf} link with page, run, acceptsCommands; time, at which regions are where they are taken; refusal, why
    * nothing can be moved now; canMove(region); move(region, from, to)
    */
   constructor(link) {
@@ -42,7 +42,7 @@ class Dragging {
   _under(x, y) {
     const { link } = this;
     const scene = link.page.scene();
-    if (!link.heeded || !scene) return null;
+    if (!link.acceptsCommands || !scene) return null;
     const found = scene.pick(x, y);
     if (!found || !link.canMove(found.region) || isFlat(link.run, found.region)) return null;
     // the walls of what is to be kept within are all around; its name alone is a handle

@@ -1,6 +1,6 @@
 // The keyboard: one table that the handler obeys and the help tells.
 
-/** Keys of the page: how each is told, what it does, and the events it answers to; `whatIf` where it flies. */
+/** Keys of the page: label, action and events of each; `whatIf` where the page can simulate. */
 function keysOf(page, whatIf = null) {
   const { player, stage, board } = page;
   const turn = (dx, dy) => () => stage.camera("orbit", dx, dy);
@@ -116,9 +116,9 @@ function fillHelp(dialog, keys) {
   const groups = [...new Set(keys.map((key) => key.group))].map((group) => {
     const section = element("section");
     const list = element("dl");
-    for (const { keys: told, text } of keys.filter((key) => key.group === group)) {
+    for (const { keys: label, text } of keys.filter((key) => key.group === group)) {
       const name = element("dt");
-      for (const part of told.split(" ")) name.append(element("kbd", "", part.length > 1 ? part.replace(",", "") : part), " ");
+      for (const part of label.split(" ")) name.append(element("kbd", "", part.length > 1 ? part.replace(",", "") : part), " ");
       list.append(name, element("dd", "", text));
     }
     section.append(element("h3", "", group), list);

@@ -16,7 +16,7 @@ class LiveLink {
   }
 
   /** Whether commands can be given now. */
-  get heeded() {
+  get acceptsCommands() {
     return Boolean(this.run?.header.commands) && !this.over && this._socket?.readyState === WebSocket.OPEN;
   }
 
@@ -62,7 +62,7 @@ class LiveLink {
 
   /** Command the run, in the words of its log of commands; whether it could be sent. */
   command(command) {
-    if (!this.heeded) {
+    if (!this.acceptsCommands) {
       this.page.say(this.over ? "The run has ended: nothing can be commanded any more." : "Nothing can be commanded: the connection is lost, or commands are off.", "warning");
       return false;
     }

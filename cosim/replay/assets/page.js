@@ -1,4 +1,4 @@
-// The page: what is shown of which runs, and what every part of it is told when something changes.
+// The page: the shown runs, and the updates of each of its parts when something changes.
 
 /** Ties player, stage, board, panel and timeline together. startLive() gets this object. */
 class Page {

@@ -12,7 +12,7 @@ function setMark(mark, run, region) {
   mark.style.background = region ? cssHue(hueOf(region.colour)) : "";
 }
 
-/** A row with a bar: built once, then only told new numbers. */
+/** A row with a bar: built once, then only given new numbers. */
 class BarRow {
   constructor(label, hue) {
     this.element = element("li", "bar-row");

@@ -105,7 +105,7 @@ class Player {
     this._tell();
   }
 
-  /** Go some rows of a run (the first one, unless told) on or back, and halt there. */
+  /** Go some rows of a run (default: the first one) on or back, and halt there. */
   stepRows(n, run = this.runs.find((any) => any.rows)) {
     if (!run) return;
     this.playing = false;

@@ -147,7 +147,7 @@ class Stage {
   }
 }
 
-/** A pointer that rests on a region is told its name; the scene itself lets pointers move the camera. */
+/** A pointer that rests on a region shows its name; in the scene itself pointers move the camera. */
 function tellPointed(stage, view) {
   const { canvas } = view;
   const tip = document.getElementById("pointed");

@@ -57,7 +57,7 @@ class Timeline {
     const part = this.axis.x(t);
     this.input.value = part;
     setText(this.clock, `${clock(t)} / ${clock(end, 1)}`);
-    // told to who reads with the ears only when the cursor rests
+    // announced to screen readers only when the cursor rests
     if (!playing && !live) this.input.setAttribute("aria-valuetext", this.run ? `${clock(t)}, ${activeWords(this.run, t).name} active` : clock(t));
     this.input.parentElement.style.setProperty("--part", part.toFixed(5));
   }

@@ -14,7 +14,7 @@ class WhatIf {
 
   // ---- what Dragging asks ----
 
-  get heeded() {
+  get acceptsCommands() {
     return true;
   }
 

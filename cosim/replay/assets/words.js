@@ -73,7 +73,7 @@ function clearanceWords(clearance, region) {
   return clearance < 0 ? `violated by ${size}` : `${size} clear`;
 }
 
-/** Whether a vehicle is slow enough to be told of as at rest, as in cosim/replay/activity.py. */
+/** Whether a vehicle is slow enough to be shown as at rest, as in cosim/replay/activity.py. */
 function slow(run, t) {
   return Math.hypot(...["u", "v", "w"].map((axis) => run.held(`velocity.${axis}`, t))) < 0.02; // m/s
 }
@@ -166,9 +166,9 @@ function troubles(run) {
   const { gaps = {} } = run.header; // of the whole record, which may have more rows than the page
   const holes = run.header.signals.map(({ name }) => name).filter((name) => gaps[name] || run.column(name).includes(NaN));
   if (holes.length) {
-    const told = holes.slice(0, 4).map((name) => (gaps[name] ? `${name} (${gaps[name]} steps)` : name));
+    const listed = holes.slice(0, 4).map((name) => (gaps[name] ? `${name} (${gaps[name]} steps)` : name));
     const more = holes.length > 4 ? ` and ${holes.length - 4} more` : "";
-    said.push(`No number at some times in ${told.join(", ")}${more}: gaps in the curves are gaps in the record.`);
+    said.push(`No number at some times in ${listed.join(", ")}${more}: gaps in the curves are gaps in the record.`);
   }
   return said;
 }

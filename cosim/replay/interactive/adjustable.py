@@ -1,7 +1,7 @@
-"""Which numbers of a scenario a page may change, and where they stand in the WebAssembly of its flight.
+"""The numbers of a scenario that a page may change, and their places in the WebAssembly of its flight.
 
-Each key is tried: what changes in the flight's arrays with it says whether its number stands there as it is. A key
-whose number something else is made of is not offered: the page puts numbers in, and works nothing out of them.
+Each key is tried: if its new number appears unchanged in the flight's arrays, its places are known. A key whose number
+is only used to compute others is not offered: the page writes numbers, and computes none from them.
 """
 
 from __future__ import annotations
@@ -31,10 +31,8 @@ NOISE = ("sensing.position_noise", "sensing.velocity_noise")
 _POINTS = ("centre", "feature", "point", "start", "end")  # of shapes: vectors that say where they are
 _LISTS = ("points", "corners")  # lists of such
 _DEPTHS = ("top", "bottom", "depth")
-_STEP, _APART = (
-    0.0037291,
-    1.7e-5,
-)  # by which numbers that are tried differ from the scenario's, and these steps from each other
+# tried numbers differ from the scenario's by the first, and these differences from each other by the second
+_STEP, _APART = 0.0037291, 1.7e-5
 
 
 @dataclass(frozen=True)
@@ -46,11 +44,11 @@ class Slot:
     key : str
         As ``--set`` takes it.
     words, unit : str
-        What it is called.
+        Description and unit for the page.
     value : float
-        As the scenario has it.
+        Value in the scenario.
     places : tuple of (str, int)
-        Where it stands: ``number`` or ``gain`` with a place in the module's arrays, ``start`` with a value reference of
+        Places: ``number`` or ``gain`` with a place in the module's arrays, ``start`` with a value reference of
         the plant, ``noise`` with 0 or 1.
     """
 
@@ -62,14 +60,14 @@ class Slot:
 
 
 def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[tuple[tuple[str, ...], ...] | None]]:
-    """Return what a page may change.
+    """Return the numbers that a page may change.
 
     Parameters
     ----------
     flight : Flight
-        Of the scenario.
+        Flight of the scenario.
     memory : Memory
-        With the places of its arrays.
+        Memory, for the places of its arrays.
 
     Returns
     -------
@@ -103,7 +101,7 @@ def changed_scenario(scenario: Scenario, changes: Mapping[str, float]) -> Scenar
     ScenarioError
         If it cannot be.
     """
-    table = _copied(scenario.table)
+    table = copied_table(scenario.table)
     for key, value in changes.items():
         if key.startswith(PARAMETERS):
             table["plant"]["parameters"][key.removeprefix(PARAMETERS)] = value
@@ -135,7 +133,7 @@ def _moving_keys(path: str, shape: dict[str, Any]) -> tuple[tuple[str, ...], ...
 
 
 def _search(flight: Flight, memory: Memory, keys: Sequence[str]) -> Iterator[tuple[str, tuple[tuple[str, int], ...]]]:
-    """Yield keys with where their numbers stand; many are tried at once, and fewer where that does not tell."""
+    """Yield keys with the places of their numbers; many are tried at once, and fewer if their places are ambiguous."""
     for sign in (1.0, -1.0):
         changes = {key: _value(flight.scenario, key) + sign * (_STEP + _APART * i) for i, key in enumerate(keys)}
         try:
@@ -159,9 +157,9 @@ def _value(scenario: Scenario, key: str) -> float:
 def _places(
     flight: Flight, memory: Memory, other: Flight, keys: Mapping[float, str]
 ) -> dict[str, list[tuple[str, int]]] | None:
-    """Return where numbers stand in the flight, of which another one has those of `keys` there.
+    """Return the places of numbers in the flight, by comparison with another one that has the numbers of `keys` there.
 
-    None if anything else differs: then some number is not put in as it is.
+    None if anything else differs: then some number is not copied unchanged.
     """
     found: dict[str, list[tuple[str, int]]] = {}
 
@@ -194,7 +192,7 @@ def _places(
 
 
 def _numbers(value: Any) -> Iterator[Any]:
-    """Yield what of the loop's arguments is no array."""
+    """Yield the loop's arguments that are no arrays."""
     if isinstance(value, tuple):
         for item in value:
             yield from _numbers(item)
@@ -207,8 +205,8 @@ def _equal(one: np.ndarray, other: np.ndarray) -> NDArray[np.bool_]:
     return np.asarray(same | (np.isnan(one) & np.isnan(other))) if one.dtype == np.float64 else same
 
 
-def _copied(value: Any) -> Any:
-    """Return a table of its own, with lists for what a scenario keeps as tuples."""
+def copied_table(value: Any) -> Any:
+    """Return a deep copy of a scenario's table, with lists in place of tuples."""
     if isinstance(value, dict):
-        return {key: _copied(item) for key, item in value.items()}
-    return [_copied(item) for item in value] if isinstance(value, list | tuple) else copy.copy(value)
+        return {key: copied_table(item) for key, item in value.items()}
+    return [copied_table(item) for item in value] if isinstance(value, list | tuple) else copy.copy(value)

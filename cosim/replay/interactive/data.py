@@ -1,4 +1,4 @@
-"""What a page needs to fly its run again: the WebAssembly, and what its numbers mean."""
+"""The data of an interactive page: the WebAssembly, and the meaning of its numbers."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from cosim.ssp.memory import Memory
 
 
 def flight_data(run: Run, columns: Sequence[Column]) -> dict[str, Any]:
-    """Return what a page needs to fly a run again, with other numbers.
+    """Return the data by which a page simulates a run again, with other numbers.
 
     Parameters
     ----------
     run : Run
-        Of a scenario that the fused loop flies.
+        Run of a scenario that the fused loop supports.
     columns : sequence of Column
-        That a view of the run has.
+        Columns of the page's view of the run.
 
     Returns
     -------
     dict
-        As JSON knows it. The WebAssembly is deflated without a header, in base64.
+        Values for JSON. The WebAssembly is deflated without a header, in base64.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def flight_data(run: Run, columns: Sequence[Column]) -> dict[str, Any]:
     TranslationError, UnsupportedError
         If a law or the arbiter's rules have no C.
     BuildError
-        If the WebAssembly is to be compiled, and the ziglang package is not there.
+        If the WebAssembly must be compiled, and the ziglang package is not installed.
     """
     scenario = run.scenario
     if scenario.log:
@@ -88,7 +88,7 @@ def flight_data(run: Run, columns: Sequence[Column]) -> dict[str, Any]:
 
 
 def _restoring(flight: Flight) -> dict[str, Any]:
-    """Return how the true restoring parameters (12) go with buoyancy."""
+    """Return the true restoring parameters (12) as a linear function of the buoyancy."""
     scenario = flight.scenario
     begun, more = (
         s.true_restoring_parameters
@@ -103,7 +103,7 @@ def _buoyancy(scenario: Any) -> float:
 
 
 def _failures(flight: Flight, memory: Memory) -> dict[str, Any] | None:
-    """Return where failures of thrusters stand; None where the wrench acts on the body itself."""
+    """Return the places of thruster failures; None where the wrench acts on the body itself."""
     setup, allocator = flight.setup, flight.allocator
     if not setup.thrusters:
         return None

@@ -1,4 +1,4 @@
-"""A scenario's flight as the fused loop flies it, all its arrays made, before there is a plant."""
+"""A scenario's flight with all arrays of the fused loop, before a plant exists."""
 
 from __future__ import annotations
 
@@ -25,27 +25,27 @@ from cosim.simulation.signals import Array
 from plant_fmu.running.native import Native
 from plant_fmu.variables import variables
 
-NEVER = -1  # step of a failure that does not come
+NEVER = -1  # step of an unused failure
 
 
 class Flight:
-    """What `cosim.batch.fused_loop.fly` is given for a scenario, with one more failure of a thruster, never to come.
+    """The arguments of `cosim.batch.fused_loop.fly` for a scenario, with a slot for one more thruster failure.
 
     Parameters
     ----------
     scenario : Scenario
-        What is flown.
+        Scenario to simulate.
 
     Attributes
     ----------
     law : CompiledLaw
-        As it begins.
+        Law in its initial state.
     decide : tuple
         Arguments of the law's function.
     fly : tuple
         Arguments of the loop.
     start : dict of str to float
-        What the plant is told before initialisation.
+        Start values of the plant, set before initialisation.
     exact : bool
         Whether nothing but noise could keep the law from the true state.
 

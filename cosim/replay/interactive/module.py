@@ -23,7 +23,7 @@ from plant_fmu.vehicle_component import of_vehicle
 
 @dataclass(frozen=True)
 class FlightModule:
-    """A flight with its WebAssembly, and where its arrays stand in that."""
+    """A flight with its WebAssembly, and the places of its arrays there."""
 
     flight: Flight
     memory: Memory
@@ -36,21 +36,21 @@ def flight_module(scenario: Scenario) -> FlightModule:
     Parameters
     ----------
     scenario : Scenario
-        With a built-in law.
+        Scenario with a built-in law.
 
     Returns
     -------
     FlightModule
-        From the cache where it is there.
+        The module, from the cache if it is there.
 
     Raises
     ------
     RunError
-        If the scenario has what the fused loop does not fly; with the key.
+        If the fused loop does not support a key of the scenario; with the key.
     TranslationError, UnsupportedError
         If a law or the arbiter's rules have no C.
     BuildError
-        If the ziglang package is not there, or its compiler fails.
+        If the ziglang package is not installed, or its compiler fails.
     """
     flight, memory = Flight(scenario), Memory()
     component = of_vehicle(scenario.vehicle)

@@ -1,26 +1,24 @@
-"""The scenario of a page as TOML with gaps, which the page fills with its numbers."""
+"""The scenario of a page as TOML with gaps for the page's numbers."""
 
 from __future__ import annotations
 
-import copy
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from cosim.replay.interactive.adjustable import Slot
+from cosim.replay.interactive.adjustable import Slot, copied_table
 from cosim.scenario.key_names import PARAMETERS
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario
 from cosim.scenario.toml_file import place_of
 from cosim.scenario.toml_text import scenario_text
 
-_MARK = 730000000.5  # begins a row of numbers that stand for what the page fills in, all equally long as text
+_MARK = 730000000.5  # first of a row of placeholders for the page's numbers, of equal length as text
 _TITLE = "title-of-what-if"
 
 
 @dataclass(frozen=True)
 class ScenarioTemplate:
-    """Parts of a text, and what goes between them: the keys of numbers, and ``title``."""
+    """Parts of a text, and the keys of the values between them: numbers, and ``title``."""
 
     parts: tuple[str, ...]
     keys: tuple[str, ...]
@@ -32,12 +30,11 @@ def scenario_template(scenario: Scenario, slots: Sequence[Slot]) -> ScenarioTemp
     Parameters
     ----------
     scenario : Scenario
-        That the page is of.
+        Scenario of the page.
     slots : sequence of Slot
         Numbers that the page may change.
     """
-    table = copy.deepcopy(dict(scenario.table))
-    table = _listed(table)
+    table = copied_table(scenario.table)
     if not table["failures"]:
         del table["failures"]
     if scenario.vehicle_file:
@@ -53,9 +50,3 @@ def scenario_template(scenario: Scenario, slots: Sequence[Slot]) -> ScenarioTemp
     marks[f'"{_TITLE}"'] = "title"
     parts = re.split(f"({'|'.join(map(re.escape, marks))})", scenario_text(table, {}))
     return ScenarioTemplate(tuple(parts[::2]), tuple(marks[mark] for mark in parts[1::2]))
-
-
-def _listed(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _listed(item) for key, item in value.items()}
-    return [_listed(item) for item in value] if isinstance(value, list | tuple) else value

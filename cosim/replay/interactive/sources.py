@@ -69,11 +69,11 @@ def flight_sources(flight: Flight, memory: Memory, token: str) -> dict[str, byte
     Parameters
     ----------
     flight : Flight
-        What is flown.
+        Flight to compile.
     memory : Memory
         An empty one: arrays get their places.
     token : str
-        Of the plant's description.
+        Token of the plant's description.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def flight_sources(flight: Flight, memory: Memory, token: str) -> dict[str, byte
     Raises
     ------
     TranslationError
-        If a function is beyond what is translated.
+        If the translator does not support a function.
     UnsupportedError
         If the arbiter's rules have no C.
     """
@@ -127,7 +127,7 @@ def flight_sources(flight: Flight, memory: Memory, token: str) -> dict[str, byte
 
 
 def _name_arrays(flight: Flight, memory: Memory) -> None:
-    """Give those arrays their places that are no part of the model, or not always."""
+    """Name the arrays that are outside the model, or not always in it."""
     for array, name in ((flight.noise, "NOISE"), (flight.trace, "TRACE"), (flight.reasons, "REASONS")):
         memory.name(array, name)
     memory.name(NOTHING_EXPECTED, "NOTHING")
@@ -154,7 +154,7 @@ def _strengths(system: System) -> System:
 
 
 def _scene(flight: Flight, token: str) -> Iterator[str]:
-    """Yield what is told to the plant, and what noise is drawn, as C."""
+    """Yield the start values of the plant, and the seed and tail draws of the noise, as C."""
     scenario = flight.scenario
     table = {v.name: (i, v.type) for i, v in enumerate(variables(scenario.vehicle))}
     yield f'#define PLANT_TOKEN "{token}"'
@@ -163,10 +163,10 @@ def _scene(flight: Flight, token: str) -> Iterator[str]:
         ("integer", "WHOLE", "WHOLE_STARTS", "fmi3Int32"),
         ("boolean", "FLAG", "FLAG_STARTS", "fmi3Boolean"),
     ):
-        told = [(table[name][0], value) for name, value in flight.start.items() if table[name][1] == kind]
-        values = [number(float(value)) if kind == "real" else str(int(value)) for _, value in told]
-        yield f"#define N_{names} {len(told)}"
-        references = [str(at) for at, _ in told] or ["0"]
+        given = [(table[name][0], value) for name, value in flight.start.items() if table[name][1] == kind]
+        values = [number(float(value)) if kind == "real" else str(int(value)) for _, value in given]
+        yield f"#define N_{names} {len(given)}"
+        references = [str(at) for at, _ in given] or ["0"]
         yield f"static const fmi3ValueReference {prefix}_REFERENCES[] = {_braced(references)};"
         yield f"static const {c} {prefix}_VALUES[] = {_braced(values or ['0'])};"
     upper, lower, increment, rest = generator_state(scenario.sensing.seed, STREAM)
@@ -178,12 +178,12 @@ def _scene(flight: Flight, token: str) -> Iterator[str]:
 
 
 def tail_draws(scenario: Scenario, rows: int) -> list[tuple[int, float]]:
-    """Return the places and values of those numbers of the noise that NumPy's generator takes logarithms for.
+    """Return the places and values of the noise's tail draws, for which NumPy's generator takes logarithms.
 
     Parameters
     ----------
     scenario : Scenario
-        Whose seed counts.
+        Scenario, for its seed.
     rows : int
         Control steps, of six numbers each.
     """

@@ -1,4 +1,4 @@
-"""Time axes that are broken where the vehicle has come to rest: its tail does not squeeze what it did before."""
+"""Time axes with a break where the vehicle has come to rest, so that its motion before has most of the width."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _TAIL = 0.15  # of the axis
 
 
 def rests_from(record: Rows) -> float | None:
-    """Return from when on the vehicle stays where it is at the end [s], as replays have it.
+    """Return the time from which the vehicle stays at its final pose [s], by the rule of replays.
 
     Parameters
     ----------
     record : Rows
-        Of a run.
+        Rows of a run.
 
     Returns
     -------
@@ -48,7 +48,7 @@ def rests_from(record: Rows) -> float | None:
 
 
 def break_time(axes: Sequence[Axes], rest: float, end: float) -> None:
-    """Draw the time from `rest` to `end` [s] short, on grey, in axes that show a whole run and share their time."""
+    """Shorten the time from `rest` to `end` [s], on grey, in axes of a whole run that share their time."""
     slope = _TAIL / (1.0 - _TAIL) * rest / (end - rest)
 
     def forward(t: Array) -> Array:
