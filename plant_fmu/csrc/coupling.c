@@ -9,23 +9,26 @@
 
 static const double LEAST_PULSE = 1100.0, MOST_PULSE = 1900.0; /* us */
 
-/* Force [N] of a T200 at a pulse [us] and a supply voltage [V], linear between the published points, and how it follows the two. */
+/* Force [N] of a T200 at a pulse [us] and a supply voltage [V], linear between the published points, and its derivatives
+   by the two: at a published point, those from below. */
 static double force_of_pulse(double pulse, double voltage, double *of_pulse, double *of_voltage)
 {
     const double x = fmin(fmax(pulse, LEAST_PULSE), MOST_PULSE), u = (voltage - T200_FIRST_VOLTAGE) / T200_VOLTAGE_STEP;
-    int i = 0, row = (int)fmin(fmax(floor(u), 0.0), N_T200_VOLTAGES - 2.0);
+    int i = 0, row = 0;
 
-    while (i < N_T200_PULSES - 2 && x > T200_PULSES[i + 1])
+    while (x > T200_PULSES[i + 1]) /* whose last is MOST_PULSE */
         i++;
+    while (u > row + 1.0) /* no voltage outside the published ones is accepted */
+        row++;
     const double part = (x - T200_PULSES[i]) / (T200_PULSES[i + 1] - T200_PULSES[i]);
-    const double share = fmin(fmax(u - row, 0.0), 1.0);
+    const double share = u - row;
     const double *low = T200_FORCES[row] + i, *high = T200_FORCES[row + 1] + i;
     const double at_low = low[0] + part * (low[1] - low[0]), at_high = high[0] + part * (high[1] - high[0]);
 
     *of_pulse = pulse == x ? (low[1] - low[0] + share * (high[1] - high[0] - (low[1] - low[0]))) /
                                  (T200_PULSES[i + 1] - T200_PULSES[i])
                            : 0.0;
-    *of_voltage = share > 0.0 && share < 1.0 ? (at_high - at_low) / T200_VOLTAGE_STEP : 0.0;
+    *of_voltage = (at_high - at_low) / T200_VOLTAGE_STEP;
     return at_low + share * (at_high - at_low);
 }
 

@@ -38,7 +38,7 @@ def test_without_coupling_inputs_the_variables_are_unchanged():
     assert {v.role for v in coupled if v.name not in kept} == {"input", "parameter"}
 
 
-@pytest.mark.slow
+@pytest.mark.medium
 def test_zero_coupling_inputs_change_no_bit(coupled):
     np.testing.assert_array_equal(fly(coupled), fly("odin"))
     np.testing.assert_array_equal(
@@ -46,13 +46,13 @@ def test_zero_coupling_inputs_change_no_bit(coupled):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.medium
 def test_a_current_is_that_of_the_parameters(coupled):
     got = fly(coupled, {"current.x": 0.1}, **{"current_input.x": 0.2, "current_input.z": -0.1})
     np.testing.assert_allclose(got, fly("odin", {"current.x": 0.3, "current.z": -0.1}), rtol=0.0, atol=1e-15)
 
 
-@pytest.mark.slow
+@pytest.mark.medium
 def test_current_rate_acts_within_a_step(coupled):
     """Held at each step, its velocity alone lags by half a step; with its rate it is the straight line."""
 
@@ -71,7 +71,7 @@ def test_current_rate_acts_within_a_step(coupled):
     assert abs(drift(0.1, False) - fine) > 1e-3
 
 
-@pytest.mark.slow
+@pytest.mark.medium
 def test_a_wrench_in_the_body_frame_is_that_of_the_wrench_input(coupled):
     point, force, moment = np.array([0.3, -0.1, 0.2]), np.array([5.0, 2.0, -3.0]), np.array([0.5, 1.0, -0.7])
     total = moment + np.cross(point, force)
@@ -84,7 +84,7 @@ def test_a_wrench_in_the_body_frame_is_that_of_the_wrench_input(coupled):
     np.testing.assert_allclose(fly(coupled, **inputs), fly("odin", **wrench), rtol=0.0, atol=1e-14)
 
 
-@pytest.mark.slow
+@pytest.mark.medium
 def test_a_force_in_the_world_frame_at_the_centre_of_buoyancy_is_buoyancy(coupled):
     """However the vehicle turns meanwhile."""
     with Plant("odin") as plant:
@@ -97,7 +97,7 @@ def test_a_force_in_the_world_frame_at_the_centre_of_buoyancy_is_buoyancy(couple
     np.testing.assert_allclose(fly(coupled, **inputs), fly("odin", {"buoyancy": buoyancy + 7.0}), rtol=0.0, atol=1e-13)
 
 
-@pytest.mark.slow
+@pytest.mark.medium
 def test_commands_of_thrusters_in_other_units(coupled):
     with Plant("odin") as plant:
         plant.initialise()
@@ -111,7 +111,7 @@ def test_commands_of_thrusters_in_other_units(coupled):
         np.testing.assert_allclose(got, fly("odin", **{"thrust[2]": force}), rtol=0.0, atol=1e-13)
 
 
-@pytest.mark.slow
+@pytest.mark.medium
 def test_failure_reduces_the_thruster_force(coupled):
     got = fly(coupled, {"thrust_effectiveness[1]": 0.8}, **{"thrust[1]": 20.0, "thrust_failure[1]": 0.25})
     np.testing.assert_allclose(
@@ -119,20 +119,28 @@ def test_failure_reduces_the_thruster_force(coupled):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.medium
 def test_derivatives_by_these_inputs_are_those_of_differences(coupled):
     rng = np.random.default_rng(3)
     with Plant(coupled) as plant:
         plant.set({"position.z": 2.0, "velocity.u": 0.4, "quaternion.e1": 0.3, "quaternion.e2": -0.4})
+        plant.set({"supply_voltage": 13.3})  # between two published ones
         plant.initialise()
         names = [
             n for n in plant.inputs.names if n.startswith(("current_input", "external", "thrust_nor", "thrust_fail"))
         ]
         for name in names:
             plant.set({name: float(rng.uniform(0.05, 0.4))})
-        for i in range(8):
-            plant.set({f"thrust[{i + 1}]": 5.0, f"thrust_pulse[{i + 1}]": 1610.0 + 11.0 * i})
-        names += [f"thrust_pulse[{i + 1}]" for i in range(8)]
+        thrusters = range(1, 9)
+        for i in thrusters:
+            forward = (-1.0) ** i  # every other thruster is commanded backward
+            plant.set({f"thrust[{i}]": 5.0, f"thrust_pulse[{i}]": 1500.0 + forward * (101.0 + 11.0 * i)})
+            plant.set({f"thrust_normalized[{i}]": 0.1 * forward, f"thrust_effectiveness[{i}]": 0.9})
+        names += ["supply_voltage"]
+        names += [
+            f"{name}[{i}]" for name in ("thrust_pulse", "thrust_min", "thrust_max", "thrust_effectiveness")
+            for i in thrusters
+        ]  # fmt: skip
         unknowns = [f"der(velocity.{name})" for name in "uvwpqr"]
         exact = plant.jacobian(unknowns, names)
         for j, name in enumerate(names):
