@@ -142,6 +142,26 @@ def test_single_outlier_is_rejected_and_third_consecutive_is_accepted():
     assert memory.position[0] == pytest.approx(before[0], abs=0.05)
 
 
+@pytest.mark.parametrize("sensor", [DEPTH_SENSOR, USBL])
+def test_third_consecutive_outlier_widens_the_position_by_its_innovation(sensor):
+    """Before it corrects; all other errors start again, as a Kalman filter in plain matrices does then."""
+    memory, _, _ = begun(np.random.default_rng(8))
+    set_first_covariance(memory, SENSORS)
+    start = memory.covariance.copy()
+    memory.covariance[:3, :3], memory.accepted[sensor] = 1e-4 * np.eye(3), 3.0
+    H, off = rows_by_differences(memory, sensor), np.array([0.3, 1.2, -0.1])[-len(ideal_measurement(memory, sensor)) :]
+    measurements = empty_measurements()
+    measurements.values[PLACES[sensor]] = ideal_measurement(memory, sensor) + off
+    for _ in range(3):
+        measurements.times[sensor] = memory.time[0]
+        correct_by_sensor(memory, measurements, sensor, SENSORS)
+    P = start
+    P[:3, :3] = 1e-4 * np.eye(3)
+    P[range(3), range(3)] += H[:, :3].T @ off**2
+    K = P @ H.T @ np.linalg.inv(H @ P @ H.T + NOISE[sensor] ** 2 * np.eye(len(H)))
+    assert memory.covariance == pytest.approx((np.eye(N_ERRORS) - K @ H) @ P, rel=1e-5, abs=1e-9)
+
+
 def test_heading_innovation_wraps_around():
     memory, _, _ = begun(np.random.default_rng(6))
     set_first_covariance(memory, SENSORS)
