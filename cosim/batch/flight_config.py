@@ -46,7 +46,7 @@ class FlightConfig(NamedTuple):
     failed: NDArray[np.int64]  # (f,) thrusters that fail, from 0, in the order of their failures
     failure_steps: NDArray[np.int64]  # (f,) plant steps before which they fail
     remaining: Array  # (f,) remaining effectiveness; NaN for a thruster that is stuck at its last force
-    tell: bool  # True if failures are reported to the law
+    report_failures: bool  # True if failures are reported to the law
     thrusters: int  # number of thrusters that give the wrench; 0: it acts on the body directly
     bound: int  # index of the law's bound of the clearances in its report, -1: it has none
     clock: NDArray[np.int64]  # of `c_calls.Clock`; (0,) if the law is not timed

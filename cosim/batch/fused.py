@@ -277,7 +277,7 @@ def configure_flight(scenario: Scenario, thrusters: int, clock: NDArray[np.int64
         failed=np.array([thruster for _, thruster, _ in failures], np.int64),
         failure_steps=np.array([at for at, _, _ in failures], np.int64),
         remaining=np.array([remaining for _, _, remaining in failures]),
-        tell=scenario.tell_failures,
+        report_failures=scenario.report_failures,
         thrusters=thrusters,
         bound=find_bound(LAWS[scenario.law.name].diagnostics),
         clock=clock,
@@ -302,7 +302,7 @@ def failure_stages(scenario: Scenario, setup: FlightConfig) -> Allocator:
     vehicle, limits = scenario.vehicle, scenario.actuation.limits
     health, stages = np.ones(vehicle.n_thrusters), []
     total = setup.failed[~(setup.remaining > 0.0)]
-    for failed in (None, *total) if setup.tell else (None,):
+    for failed in (None, *total) if setup.report_failures else (None,):
         if failed is not None:
             health[failed] = 0.0
         lower, upper = vehicle.thrust_min * health, vehicle.thrust_max * health

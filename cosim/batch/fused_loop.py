@@ -104,7 +104,7 @@ def fly(  # noqa: C901 - one loop, as a whole
                 effectiveness.inputs[j] = remaining
             else:
                 workspace.stuck[j] = inputs[j]
-            if setup.tell and not remaining > 0.0:
+            if setup.report_failures and not remaining > 0.0:
                 state.thruster_health[j] = 0.0
                 known_failures = min(known_failures + 1, allocator.lower.shape[0] - 1)
             failures += 1

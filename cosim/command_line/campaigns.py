@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.command_line.numbers import whole
-from cosim.command_line.process import INTERRUPTED, tell
+from cosim.command_line.process import INTERRUPTED, print_status
 from cosim.command_line.results import say
 
 WORKERS = whole(1, 1024)
@@ -55,7 +55,7 @@ def _add_scenes(verb: argparse.ArgumentParser, arbiter: bool = True) -> None:
     )  # fmt: skip
     verb.add_argument("--workers", type=WORKERS, default=1, metavar="N", help="processes (default: 1)")
     add_replays(verb)
-    verb.add_argument("--tell-failures", action="store_true", help="report failing thrusters to the law")
+    verb.add_argument("--report-failures", action="store_true", help="report failing thrusters to the law")
     verb.add_argument(
         "--sensing", choices=("state", "sensors"), default="state",
         help="what the law is given: the state with the scenes' noise, or what a navigation filter makes of IMU, DVL, "
@@ -82,7 +82,7 @@ def _conditions(options: argparse.Namespace) -> Any:
     from cosim.campaigns.scenes.conditions import Conditions
 
     arbiter = getattr(options, "arbiter", "ordered")
-    return Conditions.by_arbiter(arbiter, tell_failures=options.tell_failures, sensing=options.sensing)
+    return Conditions.by_arbiter(arbiter, report_failures=options.report_failures, sensing=options.sensing)
 
 
 def campaign(options: argparse.Namespace) -> int:
@@ -170,6 +170,6 @@ def resumable(run: Callable[[], None], out: Path) -> int:
     try:
         run()
     except KeyboardInterrupt:
-        tell(f"interrupted; what is flown is kept in {out}, and the same command goes on")
+        print_status(f"interrupted; what is flown is kept in {out}, and the same command goes on")
         return INTERRUPTED
     return 0

@@ -30,7 +30,7 @@ from cosim.command_line import (
     sweep,
     watch,
 )
-from cosim.command_line.process import FAULT, run_guarded, signals_held, tell
+from cosim.command_line.process import FAULT, print_status, run_guarded, signals_held
 
 _EPILOG = """examples:
   cosim run paper
@@ -75,7 +75,7 @@ class _Parser(argparse.ArgumentParser):
 
         verb = self.prog.removeprefix("cosim").strip()
         shown = one_line(message)
-        tell(f"{verb}: {shown}; see cosim {verb} --help" if verb else f"{shown}; see cosim --help")
+        print_status(f"{verb}: {shown}; see cosim {verb} --help" if verb else f"{shown}; see cosim --help")
         self.exit(FAULT)
 
 
@@ -173,11 +173,11 @@ def _run(arguments: Sequence[str]) -> int:
                     importlib.import_module(package)
                 from cosim.run.progress import announce_compilation
             if not options.quiet:
-                stack.enter_context(announce_compilation(tell))
+                stack.enter_context(announce_compilation(print_status))
         try:
             return _VERBS[options.verb](options)
         except _user_errors() as error:
-            tell(str(error))
+            print_status(str(error))
             return FAULT
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from cosim.command_line.link_flags import add_live_flag, open_live, origin
 from cosim.command_line.numbers import number, whole
-from cosim.command_line.process import INTERRUPTED, tell
+from cosim.command_line.process import INTERRUPTED, print_status
 from cosim.command_line.results import print_run
 from cosim.mavlink.wire.options import PROFILES
 
@@ -133,8 +133,8 @@ def companion(options: argparse.Namespace) -> int:
         def show(state: str, missing: str) -> None:
             if state != "waiting" and untold:
                 for line in untold.pop().text():
-                    tell(line)
-            tell(state.replace("_", " ") + ("" if missing == "nothing" else f", waits for {missing}"))
+                    print_status(line)
+            print_status(state.replace("_", " ") + ("" if missing == "nothing" else f", waits for {missing}"))
 
         run = companion.run(options.out, not options.no_report, show, live)
     print_run(options, run, not options.no_report)

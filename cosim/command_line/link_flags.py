@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cosim.command_line.numbers import number, whole
-from cosim.command_line.process import tell
+from cosim.command_line.process import print_status
 from cosim.errors import TelemetryError
 from cosim.live.address import HOST, PORT, parse_live
 from cosim.mavlink.wire.options import LOSS_ACTIONS, PROFILES, MavlinkOptions
@@ -145,7 +145,7 @@ def add_live_flag(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def open_live(options: argparse.Namespace, stack: contextlib.ExitStack) -> LiveView | None:
-    """Open the page that the flag asks for until the stack ends, and tell where it is; None where it asks for none.
+    """Open the page that the flag asks for until the stack ends, and print where it is; None where it asks for none.
 
     Raises
     ------
@@ -157,5 +157,5 @@ def open_live(options: argparse.Namespace, stack: contextlib.ExitStack) -> LiveV
     from cosim.live.view import LiveView
 
     live = stack.enter_context(LiveView(parse_live(options.live, options.allow_remote)))
-    tell(f"the run is shown at {live.url}")
+    print_status(f"the run is shown at {live.url}")
     return live

@@ -13,7 +13,7 @@ from typing import Any
 
 from cosim.command_line.link_flags import add_link_flags, links_from
 from cosim.command_line.numbers import number, rate, whole
-from cosim.command_line.process import tell
+from cosim.command_line.process import print_status
 from cosim.command_line.results import say
 from cosim.mavlink.wire.options import PROFILES
 
@@ -132,7 +132,7 @@ def stream(options: argparse.Namespace) -> int:
     done = replay(options.folder, endpoints, mavlink, None if options.rate == math.inf else options.rate)
     say(options, f"{options.folder}: {done.simulated:.1f} s streamed in {done.wall:.1f} s")
     for trouble in done.troubles:
-        tell(trouble)
+        print_status(trouble)
     return 0
 
 

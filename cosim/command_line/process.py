@@ -31,7 +31,7 @@ def run_guarded(run: Callable[[], int]) -> int:
         reader of the output has closed it.
     """
     if sys.stdout is None:  # closed by the parent: the next file that is opened would get its descriptor
-        tell("standard output is closed; expected it open, such as on /dev/null")
+        print_status("standard output is closed; expected it open, such as on /dev/null")
         return FAULT
     try:
         try:
@@ -40,7 +40,7 @@ def run_guarded(run: Callable[[], int]) -> int:
         finally:
             _flush()
     except KeyboardInterrupt:
-        tell("interrupted")
+        print_status("interrupted")
         return INTERRUPTED
     except OSError as error:
         unread = isinstance(error, BrokenPipeError) and _is_unread()
@@ -48,12 +48,12 @@ def run_guarded(run: Callable[[], int]) -> int:
             from plant_fmu.errors import one_line
 
             what = error.strerror or error
-            tell(one_line(f"{error.filename}: {what}" if error.filename else what))
+            print_status(one_line(f"{error.filename}: {what}" if error.filename else what))
         _drop_output()
         return NO_READER if unread else FAULT
 
 
-def tell(what: str) -> None:
+def print_status(what: str) -> None:
     """Print a line for the user on standard error; ignore it if that is closed."""
     if sys.stderr is not None:  # for None `print` would use standard output
         with contextlib.suppress(OSError):

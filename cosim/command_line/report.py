@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.process import FAULT, tell
+from cosim.command_line.process import FAULT, print_status
 from cosim.command_line.results import say
 
 _FORMATS = ("html", "png")
@@ -63,7 +63,7 @@ def report(options: argparse.Namespace) -> int:
         try:
             summary, files = report_again(folder, formats)
         except (CosimError, ControllerError, PlantFmuError) as error:
-            tell(str(error))
+            print_status(str(error))
             bad += 1
             continue
         say(options, verdict(summary))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim.command_line.numbers import number, whole
-from cosim.command_line.process import INTERRUPTED, tell
+from cosim.command_line.process import INTERRUPTED, print_status
 from cosim.command_line.results import print_run, say
 from cosim.io.network_address import resolved
 from cosim.sitl.ports import PORTS
@@ -86,13 +86,13 @@ def sitl(options: argparse.Namespace) -> int:
     server: JsonServer | HilServer
     link = None
     if options.backend == "px4":
-        server = HilServer(Flights(chosen, options.backend, law_of_controls), address, options.timeout, tell)
-        tell("waiting for PX4 on TCP {}:{}".format(*server.address))
+        server = HilServer(Flights(chosen, options.backend, law_of_controls), address, options.timeout, print_status)
+        print_status("waiting for PX4 on TCP {}:{}".format(*server.address))
     else:
         link = _autopilot_link(options)
         flights = Flights(chosen, options.backend, lambda vehicle: law_of_pwm(vehicle, link))
-        server = JsonServer(flights, address, options.timeout, tell)
-        tell("waiting for ArduPilot on UDP {}:{}".format(*server.address))
+        server = JsonServer(flights, address, options.timeout, print_status)
+        print_status("waiting for ArduPilot on UDP {}:{}".format(*server.address))
     with contextlib.closing(link) if link is not None else contextlib.nullcontext():
         outcome = server.serve()
     c = outcome.counts

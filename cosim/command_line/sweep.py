@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.command_line.campaigns import WORKERS, add_replays, resumable
-from cosim.command_line.process import INTERRUPTED, tell
+from cosim.command_line.process import INTERRUPTED, print_status
 from cosim.command_line.results import print_run, say
 from cosim.errors import RunError
 
@@ -116,13 +116,13 @@ def rerun(options: argparse.Namespace) -> int:
 
     done = rerun_row(options.folder, options.row, options.out, progress=not options.quiet)
     if done.other_code:
-        tell("the code is not that which flew the row")
+        print_status("the code is not that which flew the row")
     for name, (before, now) in done.differing.items():
-        tell(f"row {done.key}: {name} was {before!r}, is {now!r} now")
+        print_status(f"row {done.key}: {name} was {before!r}, is {now!r} now")
     if not done.differing:
         say(options, f"row {done.key}: flown again, identical to the last bit")
     for name, (before, now) in done.apart.items():
-        tell(f"row {done.key}, step by step: {name} was {before!r}, is {now!r} now")
+        print_status(f"row {done.key}, step by step: {name} was {before!r}, is {now!r} now")
     if done.stopped is not None:
         say(options, f"row {done.key}: step by step too the plant stops: {done.stopped}")
     if done.run is not None:

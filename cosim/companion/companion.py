@@ -178,7 +178,7 @@ class Companion:
         """
         warm_up(self.scenario, self._options)
 
-        def tell(state: State, missing: str) -> None:
+        def show_state(state: State, missing: str) -> None:
             if on_state is not None:
                 on_state(state, missing)
             if live is not None:
@@ -187,7 +187,7 @@ class Companion:
         with Master(self.scenario, plant=RemoteVehicle(self.scenario, self.session)) as master:
             if live is not None:
                 live.begin(self.scenario, master.signals.columns, _NO_COMMANDS)
-            self.prepare(tell)
+            self.prepare(show_state)
             folder = claim(out, self.scenario)
             try:
                 recorder = Recorder(folder.path, master.signals.columns)
@@ -196,7 +196,7 @@ class Companion:
                 raise
             started = time.perf_counter()
             try:
-                status = self._steer(master, [recorder] if live is None else [recorder, live], tell)
+                status = self._steer(master, [recorder] if live is None else [recorder, live], show_state)
             finally:
                 self.session.release(_RELEASE)
                 wall_time = time.perf_counter() - started
@@ -239,7 +239,7 @@ class Companion:
                 master.step(k, session)
                 for observer in observers:
                     observer.observe(k, master.row)
-                master.environment.doubt_positions(self._doubt() / SPREADS)
+                master.environment.inflate_position_uncertainty(self._doubt() / SPREADS)
                 violated = clearances[self._hard]
                 session.outside = float(max(0.0, -np.nanmin(violated))) if np.isfinite(violated).any() else 0.0
                 self._report(on_state)

@@ -123,7 +123,7 @@ class AutopilotSession:
         state = self.supervisor.update(self._observation(now))
         if state != before:
             self._held_at = now
-            self._tell(state)
+            self._announce(state)
             self.output.restart()
             if before in ("engaging", "steering") and state == "pilot":
                 self._lets_go_until = now + self.output.releases_for
@@ -265,8 +265,8 @@ class AutopilotSession:
         filled = [*parameters, *[0.0] * (7 - len(parameters))]
         self._link.send(self._mavlink.MAVLink_command_long_message(self.reported.system or 0, 1, number, 0, *filled))
 
-    def _tell(self, state: State) -> None:
-        """Say in which state the companion is now, to logs and to whoever listens on the link."""
+    def _announce(self, state: State) -> None:
+        """Log the new state, and send it as a STATUSTEXT."""
         reason = f": {self.supervisor.reason}" if self.supervisor.reason else ""
         text = f"Companion {state.replace('_', ' ')}{reason}"
         log.log(logging.WARNING if reason else logging.INFO, "%s", text)

@@ -274,7 +274,9 @@ def _setting(run: Run) -> Table:
     if math.isfinite(s.limit.force) or s.limit.time_constant > 0.0:
         rows.append(("limit on the force [N], lag [s]", f"{s.limit.force:g}, {s.limit.time_constant:g}"))
     if s.failures:
-        rows.append(("failures", f"{len(s.failures)}, {'reported' if s.tell_failures else 'not reported'} to the law"))
+        rows.append(
+            ("failures", f"{len(s.failures)}, {'reported' if s.report_failures else 'not reported'} to the law")
+        )
     if s.outages:
         rows.append(
             ("outages of sensors", ", ".join(f"{o.sensor} {o.time:g} to {o.time + o.duration:g} s" for o in s.outages))

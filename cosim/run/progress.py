@@ -51,9 +51,9 @@ class ProgressBar:
 class _Notice(logging.Handler):
     """Shows one notice at the first compilation."""
 
-    def __init__(self, tell: Callable[[str], None]) -> None:
+    def __init__(self, report: Callable[[str], None]) -> None:
         super().__init__()
-        self._show, self._announced = tell, False
+        self._show, self._announced = report, False
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show the notice once; a progress bar is redrawn below it."""
@@ -64,15 +64,15 @@ class _Notice(logging.Handler):
 
 
 @contextlib.contextmanager
-def announce_compilation(tell: Callable[[str], None]) -> Iterator[None]:
+def announce_compilation(report: Callable[[str], None]) -> Iterator[None]:
     """Show one notice if code is compiled within a block.
 
     Parameters
     ----------
-    tell : callable
+    report : callable
         Shows a line to the user.
     """
-    notice, logger = _Notice(tell), logging.getLogger("controller.compiling.first_use")
+    notice, logger = _Notice(report), logging.getLogger("controller.compiling.first_use")
     before = logger.level
     logger.setLevel(logging.INFO)
     logger.addHandler(notice)

@@ -38,7 +38,7 @@ KEYS = {
     ),
     "compare": Key("", '`"paper"` puts the paper\'s claims beside the run'),
     "intersection": Key("", "names of the regions, to be kept out of, whose overlap is reported", default="all"),
-    "tell_failures": Key("", "law and allocation are informed when a thruster fails"),
+    "report_failures": Key("", "law and allocation are informed when a thruster fails"),
     "time.duration": Key("s", "of the run"),
     "time.step": Key("s", "co-simulation step; the other periods are whole multiples"),
     "time.control": Key("s", "period of the law", default="the step"),

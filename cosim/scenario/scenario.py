@@ -102,7 +102,7 @@ class Scenario:
     master: MasterSetup
     record: RecordSetup
     commands: Commands
-    tell_failures: bool  # the law receives them when they happen
+    report_failures: bool  # the law receives them when they happen
     goal: Shape  # the primary region, kept within, at time 0
     goal_velocity: Vector3  # m/s, NED
     goal_streamed: bool  # moved from outside during the run
@@ -363,7 +363,7 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
         master=file.master,
         record=file.record,
         commands=file.commands,
-        tell_failures=file.tell_failures,
+        report_failures=file.report_failures,
         goal=goal,
         goal_velocity=motion.velocity,
         goal_streamed=motion.streamed or file.commands.enabled,

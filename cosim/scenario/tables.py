@@ -210,7 +210,7 @@ class File:
     changed: tuple[str, ...] = ()  # keys, since the title was written
     compare: Literal["", "paper"] = ""
     intersection: tuple[str, ...] = ()
-    tell_failures: bool = False
+    report_failures: bool = False
     plant: PlantSetup = PlantSetup()
     law: LawEntry = LawEntry()
     arbiter: ArbiterSetup = ArbiterSetup()

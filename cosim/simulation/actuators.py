@@ -61,7 +61,7 @@ class Actuators:
             self._stuck[failure.thruster - 1] = float(self._plant.inputs.values[failure.thruster - 1])
         else:
             self._plant.set({f"thrust_effectiveness[{failure.thruster}]": failure.effectiveness})
-        if self._scenario.tell_failures and failure.is_total:
+        if self._scenario.report_failures and failure.is_total:
             self.health[failure.thruster - 1] = 0.0
             self._allocate_to_the_healthy()
 

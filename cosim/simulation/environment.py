@@ -106,7 +106,7 @@ class RegionEnvironment:
         for i, at in enumerate(self._moving):
             shifts[i] = self.regions.shifts[at - 1] if at else self.target - self._middle
 
-    def doubt_positions(self, deviation: float) -> None:
+    def inflate_position_uncertainty(self, deviation: float) -> None:
         """Add a standard deviation [m] to the position uncertainty of every region, which widens the margins."""
         np.hypot(self._deviations, deviation, out=self.regions.deviations)
 

@@ -51,7 +51,7 @@ class HilServer:
         Address to bind; port 0 for any free one.
     timeout : float, optional
         Seconds of the wall clock without data, after which the session ends; default: no limit.
-    tell : callable, optional
+    report : callable, optional
         Shows a line of progress to the user.
     origin : (float, float)
         Latitude and longitude [deg] of position 0.
@@ -74,11 +74,11 @@ class HilServer:
         flights: Flights,
         address: tuple[str, int],
         timeout: float | None = None,
-        tell: Callable[[str], None] | None = None,
+        report: Callable[[str], None] | None = None,
         origin: tuple[float, float] = ORIGIN,
     ) -> None:
         self._mavlink = dialect()
-        self._flights, self._timeout, self._tell, self._origin = flights, timeout, tell or log.info, origin
+        self._flights, self._timeout, self._report, self._origin = flights, timeout, report or log.info, origin
         self.counts = Counts()
         self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
@@ -109,7 +109,7 @@ class HilServer:
             with connection:
                 connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
                 flight = self._flights.begin(RATE)
-                self._tell(f"{flight.folder}: {peer[0]}:{peer[1]} flies, {RATE} frames a simulated second")
+                self._report(f"{flight.folder}: {peer[0]}:{peer[1]} flies, {RATE} frames a simulated second")
                 try:
                     self._fly(flight, connection)
                 except _GoneError:

@@ -33,7 +33,7 @@ class JsonServer:
         Address to bind; port 0 for any free one.
     timeout : float, optional
         Seconds of the wall clock without a frame, after which the session ends; default: no limit.
-    tell : callable, optional
+    report : callable, optional
         Shows a line of progress to the user.
 
     Attributes
@@ -54,9 +54,9 @@ class JsonServer:
         flights: Flights,
         address: tuple[str, int],
         timeout: float | None = None,
-        tell: Callable[[str], None] | None = None,
+        report: Callable[[str], None] | None = None,
     ) -> None:
-        self._flights, self._timeout, self._tell = flights, timeout, tell or log.info
+        self._flights, self._timeout, self._report = flights, timeout, report or log.info
         self.counts = Counts()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -154,7 +154,7 @@ class JsonServer:
             self._flights.end(RESTARTED)
         flight = self._flights.begin(frame_rate)
         sender = f"{self._sender[0]}:{self._sender[1]}" if self._sender else "no sender"
-        self._tell(f"{flight.folder}: {sender} flies, {frame_rate} frames a simulated second")
+        self._report(f"{flight.folder}: {sender} flies, {frame_rate} frames a simulated second")
 
     def _lose(self, missed: int) -> None:
         self.counts.lost += missed

@@ -215,7 +215,7 @@ def _scene(
             *(_braced([number(at * setup.step), thruster, number(left)]) for thruster, at, left in failures),
             "{0.0, -1, 0.0}",
         ]),
-        "SCENE_REPORTS_FAILURES": str(int(setup.tell)),
+        "SCENE_REPORTS_FAILURES": str(int(setup.report_failures)),
         "SCENE_STAGES": str(len(loop.allocator.lower)),
         "SCENE_OUTAGES": _braced([
             *(_braced([number(at * setup.step), sensor, number(float(loss == 1.0))]) for at, sensor, loss in outages),

@@ -206,7 +206,7 @@ class Tour:
                 used = True
                 status = int((of_command(STATUS, step.words) or ["0"])[-1])
                 endless = next((one for one in ENDLESS if of_command([(one.begins, "")], step.words)), None)
-                self._tell(f"{page_name(page)}:{step.line}", step.shown, reader.run(step.text, status, endless))
+                self._note(f"{page_name(page)}:{step.line}", step.shown, reader.run(step.text, status, endless))
 
     def _fresh(self) -> Reader:
         """Return a reader before a clone of its own; that of the one before is removed."""
@@ -217,7 +217,7 @@ class Tour:
         subprocess.run(["git", "clone", "--quiet", self._source, clone], check=True)
         return Reader(clone, scratch)
 
-    def _tell(self, where: str, what: str, outcome: Outcome) -> None:
+    def _note(self, where: str, what: str, outcome: Outcome) -> None:
         self.done += 1
         self.failed += bool(outcome.why)
         verdict = f"FAILED: {outcome.why}" if outcome.why else outcome.note or "ok"

@@ -273,7 +273,7 @@ static void fly(Fleet *f)
     }
 }
 
-static void tell(const Fleet *f, int i, double marks[N_MARKS])
+static void write_marks(const Fleet *f, int i, double marks[N_MARKS])
 {
     const Marks *m = &f->marks;
 
@@ -334,7 +334,7 @@ int lanes_fly(const Batch *b)
             const int n = board(fleet, starter, &next, seated);
             fly(fleet);
             for (int i = 0; i < n; i++)
-                tell(fleet, i, b->marks + (size_t)seated[i] * N_MARKS);
+                write_marks(fleet, i, b->marks + (size_t)seated[i] * N_MARKS);
         }
     }
     starter_free(starter);

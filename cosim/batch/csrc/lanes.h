@@ -15,7 +15,7 @@ enum { /* of criteria, in the order of the arbiter's inputs */
     N_CRITERIA = 3
 };
 
-enum { /* what a flight is told by */
+enum { /* what is counted of a flight */
     FIRST_INSIDE,    /* step, -1: never */
     LAST_ENTERED,    /* step, -1: never */
     INSIDE,          /* at the end: 0 or 1 */

@@ -64,7 +64,7 @@ def summarise(plan: Plan, results: Results, folder: Path) -> dict[str, Any]:
             "stopped": seeds[stopped].tolist(),
         },
         "worst": worst_table(results, folder),
-        "tell_failures": plan.conditions.tell_failures,
+        "report_failures": plan.conditions.report_failures,
         **{key: value for key, value in plan.table().items() if key not in ("law", "scenes")},
     }
 

@@ -69,7 +69,7 @@ def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions
         "sensing": _sensing(scene, conditions),
         "outages": [dataclasses.asdict(outage) for outage in conditions.outages],
         "failures": _failures(scene, conditions),
-        "tell_failures": conditions.tell_failures,
+        "report_failures": conditions.report_failures,
         "regions": _regions(scene),
     }
     return validate_scenario(table, f"{law}-scene-{scene.seed}", vehicle)
@@ -78,7 +78,7 @@ def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions
 def _changes(scene: ScenarioScene, conditions: Conditions) -> dict[str, Any]:
     """Return the tables of a scenario that conditions change."""
     table = scene.scenario
-    changes: dict[str, Any] = {"tell_failures": conditions.tell_failures}
+    changes: dict[str, Any] = {"report_failures": conditions.report_failures}
     changes["arbiter"] = conditions.arbiter_table(table.get("arbiter", {}))
     if conditions.sensing == "sensors":
         changes["sensing"] = {"through": "sensors", "seed": scene.seed}

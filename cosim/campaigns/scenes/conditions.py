@@ -27,7 +27,7 @@ class Conditions:
     plant_steps: int = 2  # plant steps per control step, with one integration step each
     settled: float = 10.0  # s, least time in the goal region at the end
     ramp: float = 0.2  # m, width of the arbiter's memberships
-    tell_failures: bool = False
+    report_failures: bool = False
     sensing: Literal["state", "sensors"] = "state"  # source of the law's state, as `Sensing.through`
     outages: tuple[Outage, ...] = ()  # of sensors
     arbiter: RuleVariant = "ordered"  # rule variant, as `ArbiterSetup.rules`

@@ -42,14 +42,14 @@ class Flight {
 
   /** All failures in the order of their steps, and the limits that allocation goes by once they are reported. */
   _fail({ numbers, integers }, { thruster, time }) {
-    const { failed, steps, remaining, own, tell, lower, upper, limits } = this.data.failures;
+    const { failed, steps, remaining, own, reported, lower, upper, limits } = this.data.failures;
     const step = Math.ceil(time / this.data.step - 1e-6); // as cosim/batch/fused.py has it
     const all = [...own, [step, thruster - 1, 0]].sort((a, b) => a[0] - b[0] || a[1] - b[1] || (a[2] ?? NaN) - (b[2] ?? NaN));
     all.forEach(([at, which, left], i) => {
       integers.push([steps + i, at], [failed + i, which]);
       numbers.push([remaining + i, left ?? NaN]);
     });
-    if (!tell) return;
+    if (!reported) return;
     const health = limits[0].map(() => 1);
     let stage = 0;
     for (const [, which, left] of all) {

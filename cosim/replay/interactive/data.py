@@ -117,7 +117,7 @@ def _failures(flight: Flight, memory: Memory) -> dict[str, Any] | None:
         "steps": memory.keep(setup.failure_steps),
         "remaining": memory.keep(setup.remaining),
         "own": [[int(step), int(thruster), float(left)] for step, thruster, left in own if step >= 0],
-        "tell": bool(setup.tell),
+        "reported": bool(setup.report_failures),
         "lower": places(allocator.lower),
         "upper": places(allocator.upper),
         "limits": [np.asarray(side[0]).tolist() for side in (allocator.lower, allocator.upper)],

@@ -73,7 +73,7 @@ class Flight:
             failure_steps=np.append(self.setup.failure_steps, NEVER),
             remaining=np.append(self.setup.remaining, 1.0),
         )
-        if self.setup.tell:
+        if self.setup.report_failures:
             inverse, lower, upper = (np.concatenate([rows, rows[-1:]]) for rows in stages[:3])
             stages = Allocator(inverse, lower, upper, stages.direction)
         self.allocator = stages

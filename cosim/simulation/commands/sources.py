@@ -190,14 +190,14 @@ class LoggedCommands:
         Source of the commands.
     file : Path
         The log; made when the first command is taken.
-    tell : callable, optional
+    report : callable, optional
         Called with the step and its commands once they are written.
     """
 
     def __init__(
-        self, source: CommandSource, file: Path, tell: Callable[[int, Sequence[Command]], None] | None = None
+        self, source: CommandSource, file: Path, report: Callable[[int, Sequence[Command]], None] | None = None
     ) -> None:
-        self._source, self._file, self._tell = source, file, tell
+        self._source, self._file, self._report = source, file, report
 
     @property
     def exhausted(self) -> bool:
@@ -209,8 +209,8 @@ class LoggedCommands:
         commands = self._source.take(k)
         if commands:
             self._write(_Entry(k, command) for command in commands)
-            if self._tell is not None:
-                self._tell(k, commands)
+            if self._report is not None:
+                self._report(k, commands)
         return commands
 
     def _write(self, entries: Iterable[_Entry]) -> None:

@@ -99,7 +99,7 @@ def test_runs_on_sensors_equal_the_master():
     ],
 )
 def test_thruster_failures_equal_the_master(told, failures):
-    given = [*BRISK, "actuation.through=thrusters", failures, f"tell_failures={told}"]
+    given = [*BRISK, "actuation.through=thrusters", failures, f"report_failures={told}"]
     assert_same_flight(load_scenario("paper", [*given, "law.name=pd"]))
 
 

@@ -136,7 +136,7 @@ def test_damaged_part_is_recomputed(tmp_path, scenes, monkeypatch):
     ("change", "words"),
     [
         ({"gains": Gains(k_p1=10.0)}, r"gains.k_p1 is 18.8, now 10.0"),
-        ({"conditions": replace(BRIEF, tell_failures=True)}, "conditions.tell_failures is False, now True"),
+        ({"conditions": replace(BRIEF, report_failures=True)}, "conditions.report_failures is False, now True"),
         ({"scenes": many(19)}, "scenes is 20, now 19"),
         ({"scenes": [*many(19), PLAIN[0]]}, "scenes_sha256"),
         ({"code": True}, "code_sha256"),
@@ -249,7 +249,7 @@ def test_the_summary_follows_from_the_rows(tmp_path):
         Score(False, math.inf, 0.1, 900.0, 90.0, 2e-6, -1),
         Score(False, math.inf, 0.4, 5.0, 5.0, 1e-6, 10),
     ]
-    plan = plan_of("ismail_dunnigan", Gains(), Conditions(tell_failures=True), 4, "abc")
+    plan = plan_of("ismail_dunnigan", Gains(), Conditions(report_failures=True), 4, "abc")
     lines = [json.dumps(scene) for scene in (*PLAIN[:2], *HARD[:2])]
     told = [row_of(9 - i, s, 0.01, line) for i, (s, line) in enumerate(zip(scores, lines, strict=True))]
     found = results_of(tmp_path / "rows.parquet", told[::-1])
@@ -274,7 +274,7 @@ def test_the_summary_follows_from_the_rows(tmp_path):
     }  # fmt: skip
     assert kinds["plain"]["quantiles"]["reach_time"]["0.5"] == 40.0
     assert summary["quantiles"]["min_clearance"]["0.5"] == pytest.approx(0.15)
-    assert summary["tell_failures"] is True and summary["gains"] == Gains()._asdict()
+    assert summary["report_failures"] is True and summary["gains"] == Gains()._asdict()
     assert summary["conditions"]["duration"] == 120.0 and summary["versions"]["numpy"] == np.__version__
     json.dumps(summary, allow_nan=False)
 

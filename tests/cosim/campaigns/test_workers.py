@@ -116,12 +116,12 @@ def test_scenes_are_read_from_standard_input(tmp_path, capsys, monkeypatch):
     words = ["--law", "ismail_dunnigan", "--out", str(out), "--replays", "0"]
     with scenes.open() as stream:
         monkeypatch.setattr("sys.stdin", stream)
-        assert main(["campaign", "-", *words, "--tell-failures"]) == 0
+        assert main(["campaign", "-", *words, "--report-failures"]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == str(out / "campaign.html")
-    assert main(["campaign", str(scenes), *words, "--tell-failures"]) == 0
+    assert main(["campaign", str(scenes), *words, "--report-failures"]) == 0
     assert "was complete already" in capsys.readouterr().out
     assert main(["campaign", str(scenes), *words]) == 2
-    assert "conditions.tell_failures is True, now False" in capsys.readouterr().err
+    assert "conditions.report_failures is True, now False" in capsys.readouterr().err
 
 
 def test_compare_command_rejects_invalid_laws(tmp_path, capsys):

@@ -39,10 +39,10 @@ class Flight:
         scenario = load_scenario("pipe-inspection", [f"time.duration={seconds}"])
         self.companion = Companion(scenario, self.link, CompanionOptions(**options))
         self.states = []
-        self.run = self.companion.run(tmp_path / "run", report=False, on_state=self._tell, live=live)
+        self.run = self.companion.run(tmp_path / "run", report=False, on_state=self._note, live=live)
         self.status = self.run.summary["status"]
 
-    def _tell(self, state, missing):
+    def _note(self, state, missing):
         if not self.states or self.states[-1][1] != state:
             self.states.append((self.link.clock() - 100.0, state))
 
@@ -240,8 +240,10 @@ def test_frame_drift_holds_the_vehicle(tmp_path):
 @pytest.mark.medium
 def test_frame_drift_widens_margins(tmp_path, monkeypatch):
     """Of sources that come apart by 0.3 m, the margins of all regions are as much wider, and it goes on."""
-    doubts, doubt = [], RegionEnvironment.doubt_positions
-    monkeypatch.setattr(RegionEnvironment, "doubt_positions", lambda self, by: (doubts.append(by), doubt(self, by)))
+    doubts, doubt = [], RegionEnvironment.inflate_position_uncertainty
+    monkeypatch.setattr(
+        RegionEnvironment, "inflate_position_uncertainty", lambda self, by: (doubts.append(by), doubt(self, by))
+    )
     link = StandIn(profile="generic", shift=SHIFT)
     flight = Flight(tmp_path, 8.0, link=link, events=[lambda: position_creeps(link, 0.3)])
     assert flight.status == "completed"
@@ -250,8 +252,10 @@ def test_frame_drift_widens_margins(tmp_path, monkeypatch):
 
 
 def test_dead_reckoning_widens_margins_with_distance(tmp_path, monkeypatch):
-    doubts, doubt = [], RegionEnvironment.doubt_positions
-    monkeypatch.setattr(RegionEnvironment, "doubt_positions", lambda self, by: (doubts.append(by), doubt(self, by)))
+    doubts, doubt = [], RegionEnvironment.inflate_position_uncertainty
+    monkeypatch.setattr(
+        RegionEnvironment, "inflate_position_uncertainty", lambda self, by: (doubts.append(by), doubt(self, by))
+    )
     link = StandIn(profile="generic", shift=SHIFT)
     link.tamper["EKF_STATUS_REPORT"] = link.tamper["ESTIMATOR_STATUS"] = lambda m: setattr(m, "flags", 8)
     flight = Flight(tmp_path, 6.0, link=link, reckoning_error=0.05)

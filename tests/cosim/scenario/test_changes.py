@@ -70,7 +70,7 @@ def test_the_numbers_of_shipped_titles_are_those_of_their_scenarios():
         (['goal={type="box",centre=[8,0,5],size=[1,1,1]}'], " (changed: goal)"),
         (["intersection=[]", "regions=[]"], " (changed: regions = none)"),
         (["vehicle=rexrov"], " (changed: vehicle = rexrov)"),
-        (["tell_failures=true"], " (changed: tell_failures = true)"),
+        (["report_failures=true"], " (changed: report_failures = true)"),
         (["plant.parameters.weight=1230"], " (changed: plant.parameters.weight = 1230 N)"),
         (["plant.parameters.r_B.z=0.5"], " (changed: plant.parameters.r_B.z = 0.5 m)"),
         (["law.name=pd"], " (changed: law.name = pd)"),

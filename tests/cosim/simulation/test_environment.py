@@ -101,8 +101,8 @@ def test_invalid_region_moves_are_rejected_by_name(name, to, velocity, words):
 def test_position_uncertainty_adds_in_quadrature():
     environment = RegionEnvironment(load_scenario("pipe-inspection"))
     environment._deviations[1] = 0.3
-    environment.doubt_positions(0.4)
+    environment.inflate_position_uncertainty(0.4)
     assert environment.regions.deviations[1] == pytest.approx([0.5] * 3)
     assert environment.regions.deviations[2] == pytest.approx([0.4] * 3)
-    environment.doubt_positions(0.0)
+    environment.inflate_position_uncertainty(0.0)
     assert environment.regions.deviations[:2] == pytest.approx(np.array([[0.0] * 3, [0.3] * 3]))

@@ -114,7 +114,7 @@ def test_failed_thruster_gives_zero_after_its_failure_time():
 
 
 def test_reported_failure_reaches_law_and_allocation(spy):
-    given, kept = spy("failures=[{thruster=3,time=1.0}]", "tell_failures=true", "law.gains.k_p1=0.01")
+    given, kept = spy("failures=[{thruster=3,time=1.0}]", "report_failures=true", "law.gains.k_p1=0.01")
     health = [arguments[3] for arguments in given.steps]
     assert all(h.all() for h in health[:100])
     assert [list(h) for h in health[100:]] == [[1, 1, 0, 1, 1, 1, 1, 1]] * 101

@@ -30,7 +30,7 @@ SCENE = Scene(
     ("law", "changes"),
     [
         ("deployable", {}),
-        ("deployable", {"tell_failures": True}),
+        ("deployable", {"report_failures": True}),
         ("deployable", {"sensing": "sensors", "outages": (Outage("dvl", 2.0, 3.0),)}),
         ("ismail_dunnigan", {}),
     ],

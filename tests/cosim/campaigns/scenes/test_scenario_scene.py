@@ -123,10 +123,10 @@ def test_trial_deviates_from_nominal_in_its_tested_condition():
 def test_conditions_change_only_their_own_keys():
     (table,) = made(make_conflict, "view")
     plain = scenario_of(table).table
-    changed = scenario_of(table, arbiter="reversed", sensing="sensors", tell_failures=True).table
+    changed = scenario_of(table, arbiter="reversed", sensing="sensors", report_failures=True).table
     assert changed["arbiter"]["rules"] == "reversed" and changed["sensing"]["through"] == "sensors"
-    assert changed["tell_failures"] and not plain["tell_failures"]
-    for key in plain.keys() - {"arbiter", "sensing", "tell_failures"}:
+    assert changed["report_failures"] and not plain["report_failures"]
+    for key in plain.keys() - {"arbiter", "sensing", "report_failures"}:
         assert changed[key] == plain[key], key
 
 

@@ -142,8 +142,8 @@ def spied(monkeypatch):
     """Return a function that runs a scene for half a second and returns the law's arguments and inputs."""
     monkeypatch.setitem(LAWS, "spy", _Spy)
 
-    def fly(scene, tell=False):
-        with SceneFlyer("spy", Conditions(duration=0.5, tell_failures=tell)) as flyer:
+    def fly(scene, reported=False):
+        with SceneFlyer("spy", Conditions(duration=0.5, report_failures=reported)) as flyer:
             flyer.fly(scene)
         return _Spy.made, _Spy.steps
 
@@ -177,7 +177,7 @@ def test_disclosed_conditions_reach_the_law(spied, change):
 
 def test_law_receives_failure_only_if_configured(spied):
     scene = replace(SCENE, failed_thruster=Failure(3, 0.2))
-    healths = [np.frombuffer(step[0][3]) for step in spied(scene, tell=True)[1]]
+    healths = [np.frombuffer(step[0][3]) for step in spied(scene, reported=True)[1]]
     assert all((h == 1.0).all() for h in healths[:10])
     assert all(h.tolist() == [1, 1, 0, 1, 1, 1, 1, 1] for h in healths[10:])
     assert all((np.frombuffer(step[0][3]) == 1.0).all() for step in spied(scene)[1])

@@ -13,16 +13,18 @@ BASELINES = ["pd", "sun_cheah", "unarbitrated", "antonelli", "pid_cbf"]
 QUICKER = ["pid_cbf"]  # on plain scenes, and less thrifty
 
 
-def scores(law, first, count, hard=False, tell=False):
-    with SceneFlyer(law, Conditions(tell_failures=tell)) as flyer:
+def scores(law, first, count, hard=False, reported=False):
+    with SceneFlyer(law, Conditions(report_failures=reported)) as flyer:
         scenes = generate_scenes(count, first, "hard" if hard else "plain")
         return [flyer.fly(msgspec.json.decode(line, type=Scene))[0] for line in scenes]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("hard", "tell"), [(False, False), (True, False), (True, True)], ids=["plain", "hard", "told"])
-def test_every_goal_is_reached_without_violation(hard, tell):
-    flown = scores("deployable", 70_000, 40, hard, tell)
+@pytest.mark.parametrize(
+    ("hard", "reported"), [(False, False), (True, False), (True, True)], ids=["plain", "hard", "reported"]
+)
+def test_every_goal_is_reached_without_violation(hard, reported):
+    flown = scores("deployable", 70_000, 40, hard, reported)
     assert min(score.min_clearance for score in flown) > 0.0
     assert all(score.reached and score.failed_step < 0 for score in flown)
 

@@ -39,7 +39,7 @@ SCENES = {
     ),
     "known failures": (
         "docking",
-        ("tell_failures=true", "failures=[{thruster = 2, time = 3.0}, {thruster = 5, time = 1.0, stuck = true}]",
+        ("report_failures=true", "failures=[{thruster = 2, time = 3.0}, {thruster = 5, time = 1.0, stuck = true}]",
          "time.duration=15", "sensing.dead_from=8", "sensing.dead_for=1"),
     ),
 }  # fmt: skip
