@@ -1,12 +1,12 @@
-/* What stands between commands and the body: limits, the thrusters' curves, lag, rate limits, and where forces act. */
+/* Actuators between commands and the body: limits, thruster curves, lag, rate limits, and points of action. */
 #include <string.h>
 
 #include "elementary.h"
 #include "linear.h"
 #include "plant.h"
 
-/* The force that a command within the limits asks for: nothing in the dead band, then from linear to quadratic in the
- * rest of the range, up to the limit itself. */
+/* Returns the force of a command within the limits: 0 in the dead band, then linear to quadratic in the rest of the range,
+ * up to the limit itself. */
 static Real after_curve(const Parameters *p, int i, Real command)
 {
     const Real dead = p->thrust_dead_band[i], curve = p->thrust_curve[i];
@@ -41,7 +41,7 @@ void actuators_target(const Parameters *p, const Inputs *inputs, Actuators *targ
 
 /* ---- lag and rate limit ------------------------------------------------------------------------------------ */
 
-/* Shorter lags than a nanosecond are none: their rates would be beyond numbers. */
+/* Lags below a nanosecond count as 0: their rates would overflow. */
 static Real lag(Real time_constant)
 {
     return choose(time_constant > 1e-9, time_constant, splat(0.0));
@@ -69,7 +69,7 @@ void actuators_settle(const Plant *plant, const Actuators *start, const Actuator
         out->wrench[i] = choose(d->wrench_lag > 0.0, start->wrench[i], target->wrench[i]);
 }
 
-/* exp(-dt / T) - 1, kept for the next that has the same lag. */
+/* exp(-dt / T) - 1, cached for the next actuator with the same lag. */
 typedef struct {
     Real dt, T, value;
 } Fade;
@@ -92,7 +92,7 @@ static Real lagged(Real from, Real to, Real dt, Real T, Real limit, Fade *last)
 
     if (!any(ramps))
         return choose(T > 0.0, from - gap * fade(last, dt, T), to);
-    const Real ramp = choose(ramps, real_fabs(gap) / limit - T, splat(0.0)); /* time for which the limit holds */
+    const Real ramp = choose(ramps, real_fabs(gap) / limit - T, splat(0.0)); /* time during which the rate limit acts */
     const Mask outlasts = ramps & (dt <= ramp);
     const Real on_ramp = from + real_copysign(limit * dt, gap);
     if (all(outlasts))
@@ -135,7 +135,7 @@ void actuators_wrench(const Parameters *p, const Actuators *now, Real tau[6])
     memcpy(tau, now->wrench, sizeof now->wrench);
     for (int j = 0; j < N_THRUSTERS; j++) {
         const Real force = p->thrust_effectiveness[j] * now->thrust[j];
-        if (any(force != 0.0)) /* where the wrench is given directly, all thrusters rest */
+        if (any(force != 0.0)) /* saves the time where a direct wrench is used */
             for (int i = 0; i < 6; i++)
                 tau[i] += p->thruster_matrix[i][j] * force;
     }

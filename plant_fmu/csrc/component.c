@@ -1,4 +1,4 @@
-/* The plant as a component behind the FMI wrappers: what contradicts what, where initialisation ends, what a step may be. */
+/* The plant as a component behind the FMI wrappers: checks of parameters, end of initialisation, validity of steps. */
 #include <math.h>
 #include <string.h>
 
@@ -11,7 +11,7 @@ static void rewind_clocks(Model *m)
     memset(&m->held, 0, sizeof m->held);
 }
 
-/* Tells which parameters contradict each other. */
+/* Refuses parameters that contradict each other, by name. */
 static Status check_parameters(const Instance *instance)
 {
     static const struct {
@@ -77,10 +77,10 @@ static void evaluate(Instance *instance)
     Model *m = &instance->model;
     const Flags flags = m->outputs.flags;
 
-    if (instance_starting(instance)) /* the first samples and the first current are those that will be */
+    if (instance_starting(instance)) /* the first samples and the first current are drawn now */
         model_tick(m);
     model_evaluate(m);
-    if (instance->mode == MODE_CONTINUOUS) /* discrete variables change at events alone */
+    if (instance->mode == MODE_CONTINUOUS) /* discrete variables change only at events */
         m->outputs.flags = flags;
 }
 
@@ -122,7 +122,7 @@ static Status advance(Instance *instance, double end)
                            before, failed);
 }
 
-/* Whether every clock is one that runs forwards, and every held number one that can be. */
+/* True if every clock runs forward and every held number is valid. */
 static bool possible(const Model *m)
 {
     bool good = true;

@@ -1,4 +1,4 @@
-/* Constants that follow from the parameters, and whether the parameters are those of a body. */
+/* Constants derived from the parameters, and checks that the parameters describe a body. */
 #include <string.h>
 
 #include "linear.h"
@@ -65,7 +65,7 @@ void plant_mass_matrix(const Parameters *p, double M[6][6])
             M[i][j] += rigid[i][j];
 }
 
-/* Greatest sum of the magnitudes in a row of a block of the inverse mass matrix: no eigenvalue of the block is above. */
+/* Returns the greatest absolute row sum of a block of the inverse mass matrix, an upper bound of its eigenvalues. */
 static double mobility(const Derived *d, int first, int last, int *row)
 {
     double greatest = 0.0;

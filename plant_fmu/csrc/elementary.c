@@ -7,7 +7,7 @@ static const double LN2_HIGH = 0.6931471803691238, LN2_LOW = 1.9082149292705877e
 static const double HALF_PI = 1.5707963267948966, HALF_PI_LOW = 6.123233995736766e-17; /* the number is their sum */
 static const double TURN = 6.283185307179586;
 
-/* arcus tangens of eighths, each a number and what it lacks */
+/* arctangents of the eighths, each as a double and its rounding error */
 static const double ATAN[9][2] = {
     {0.0, 0.0},
     {0.12435499454676144, -3.1253241424539383e-18},
@@ -52,7 +52,7 @@ double elementary_expm1(double x)
     return scale * (r + r * series) + (scale - 1.0);
 }
 
-/* sine or cosine of at most an eighth of a turn, beside the nearest quarter */
+/* sine or cosine of the angle from the nearest quarter turn, at most an eighth of a turn */
 double elementary_cos_turns(double turns)
 {
     const double quarters = floor(4.0 * turns + 0.5);

@@ -9,7 +9,7 @@ double elementary_log(double x); /* of a finite number above 0 */
 double elementary_expm1(double x); /* exp(x) - 1 of a number up to 0 */
 double elementary_cos_turns(double turns); /* the cosine of a part of a turn in [0, 1) */
 double elementary_atan2(double y, double x); /* of finite numbers */
-double elementary_hypot(double x, double y); /* of numbers whose squares are numbers */
+double elementary_hypot(double x, double y); /* of numbers whose squares do not overflow */
 
 static inline Real real_expm1(Real x)
 {

@@ -1,4 +1,4 @@
-/* The water and what bounds it: a current, a free surface at z = 0, a flat bottom. */
+/* The water and its boundaries: a current, a free surface at z = 0, a flat bottom. */
 #include "plant.h"
 
 void environment_current(const Parameters *p, const Drift *drift, double time, Real depth, Real velocity[3])
@@ -14,7 +14,7 @@ Real environment_submerged(const Parameters *p, Real depth)
 {
     const Real r = p->hull_radius;
     const Mask dry = depth <= -r, under = mask_not(p->free_surface) | (depth >= r);
-    const Real part = (depth + r) / (2.0 * r); /* of the diameter; a spherical cap's volume */
+    const Real part = (depth + r) / (2.0 * r); /* submerged fraction of the diameter; volume of a spherical cap */
 
     return choose(under, splat(1.0), choose(dry, splat(0.0), part * part * (3.0 - 2.0 * part)));
 }
@@ -42,7 +42,7 @@ void environment_contact(const Plant *plant, Real sunk, const Real velocity_worl
     const Real spring = x / (1.0 + x / environment_softening(T)) / (T * T);
     const Real normal = m * real_fmax(spring + 2.0 / T * u * x / (x + 0.5 * T * real_fabs(u)), zero);
 
-    /* Coulomb's friction at any speed of note, viscous below 1 cm/s, and never faster than the contact itself */
+    /* Coulomb friction, viscous below 1 cm/s, and never faster than the contact itself */
     const Real speed =
         real_sqrt(velocity_world[0] * velocity_world[0] + velocity_world[1] * velocity_world[1] + 1e-4);
     const Real drag = real_fmin(p->bottom_friction * normal / speed, m / T);

@@ -16,21 +16,21 @@ static inline void cross(const Real a[3], const Real b[3], Real out[3])
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* R^T x: a world vector seen from the body. */
+/* Writes R^T x, a world vector in body axes. */
 static inline void to_body(const Real R[3][3], const Real x[3], Real out[3])
 {
     for (int i = 0; i < 3; i++)
         out[i] = R[0][i] * x[0] + R[1][i] * x[1] + R[2][i] * x[2];
 }
 
-/* R x: a body vector seen from the world. */
+/* Writes R x, a body vector in world axes. */
 static inline void to_world(const Real R[3][3], const Real x[3], Real out[3])
 {
     for (int i = 0; i < 3; i++)
         out[i] = dot3(R[i], x);
 }
 
-/* E(e) w / 2: the rate of a quaternion that turns at w, seen from the body (10). */
+/* Writes E(e) w / 2, the rate of a quaternion that turns at w, body axes (10). */
 static inline void quaternion_rate(const Real e[4], const Real w[3], Real out[4])
 {
     out[0] = -0.5 * (e[1] * w[0] + e[2] * w[1] + e[3] * w[2]);
@@ -39,7 +39,7 @@ static inline void quaternion_rate(const Real e[4], const Real w[3], Real out[4]
     out[3] = 0.5 * (-e[2] * w[0] + e[1] * w[1] + e[0] * w[2]);
 }
 
-/* The symmetric matrix of which the upper triangle is given. */
+/* Writes the symmetric matrix of an upper triangle. */
 static inline void symmetric6(const double upper[6][6], double whole[6][6])
 {
     for (int i = 0; i < 6; i++)
@@ -47,7 +47,7 @@ static inline void symmetric6(const double upper[6][6], double whole[6][6])
             whole[i][j] = i < j ? upper[i][j] : upper[j][i];
 }
 
-/* A x of a symmetric matrix: a sum of its rows, which lie side by side in memory as its columns do not. */
+/* Writes A x of a symmetric matrix, as a sum of its rows, which are contiguous in memory. */
 static inline void multiply6(const Real A[6][6], const Real x[6], Real out[6])
 {
     for (int i = 0; i < 6; i++)

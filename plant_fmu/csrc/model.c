@@ -21,7 +21,7 @@ static double period_wanted(const Parameters *p, int clock)
     return p->sensor_rate[clock] > 0.0 ? fmin(1.0 / p->sensor_rate[clock], LONGEST_PERIOD) : 0.0;
 }
 
-/* Lets the current's variation stand as it is now, until its next knot. */
+/* Holds the current's variation at its present value until its next knot. */
 static void hold_current(Model *m)
 {
     Drift *drift = &m->held.drift;
@@ -59,7 +59,7 @@ const char *model_prepare(Model *m)
     for (int i = 0; i < N_CLOCKS; i++) {
         Clock *clock = &m->held.clocks[i];
         const double period = period_wanted(p, i);
-        /* a changed deviation of the current is a new knot, too */
+        /* a changed deviation of the current starts a new knot, too */
         const int anew = period != clock->period ||
                          (i == CURRENT_CLOCK && memcmp(drift->deviation, p->current_variation, sizeof drift->deviation));
         if (!anew)
@@ -82,7 +82,7 @@ double model_next_tick(const Model *m)
     return m->held.next_tick;
 }
 
-/* The current's variation from one knot of a first-order Gauss-Markov process to the next (exact at the knots). */
+/* Draws the next knot of the current's first-order Gauss-Markov variation (exact at the knots). */
 static void tick_current(Model *m, unsigned long long count)
 {
     const Parameters *p = &m->plant.parameters;
@@ -96,7 +96,7 @@ static void tick_current(Model *m, unsigned long long count)
         const unsigned stream = (unsigned)(CURRENT_STREAM + i);
         if (deviation == 0.0)
             continue;
-        if (drift->deviation[i] == 0.0) /* an axis begins: from the process's own distribution */
+        if (drift->deviation[i] == 0.0) /* first knot of an axis: from the stationary distribution */
             drift->value[i] = deviation * random_normal(p->seed, count ? stream + 3 : stream, count);
         const double next = kept * drift->value[i] + fresh * deviation * random_normal(p->seed, stream, count + 1);
         drift->slope[i] = (next - drift->value[i]) / period;
@@ -129,7 +129,7 @@ static void take_sample(Model *m, int sensor, unsigned long long count, const do
 
     if (!sensors_sample(&m->plant.parameters, sensor, count, ideal, sample))
         return;
-    if (held->pending[sensor] >= MAX_PENDING) /* the delay was longer when they were taken */
+    if (held->pending[sensor] >= MAX_PENDING) /* the delay was longer when these samples were taken */
         deliver_sample(held, sensor);
     Pending *last = &held->queue[sensor][(int)held->pending[sensor]];
     for (int i = 0; i < N_MEASURED; i++)
@@ -147,15 +147,15 @@ static int tick_alone(Model *m)
 
     if (m->held.next_tick == INFINITY) /* no clock runs */
         return 0;
-    for (int i = N_CLOCKS - 1; i >= 0; i--) { /* the current before the sensors, which may feel it */
+    for (int i = N_CLOCKS - 1; i >= 0; i--) { /* the current before the sensors, which may measure it */
         Clock *clock = &m->held.clocks[i];
-        /* importers add up their time, and so may come a little early */
+        /* importers add up their time, which may be early by rounding */
         const double due = m->time + 1e-6 * clock->period + 1e-15 * (fabs(m->time) + fabs(clock->since));
 
         if (!(next_tick_of(clock) <= due))
             continue;
         const double passed = fmax(clock->ticks, floor((due - clock->since) / clock->period)) + 1.0;
-        clock->samples += passed - clock->ticks; /* every tick that has gone by takes its place in the stream */
+        clock->samples += passed - clock->ticks; /* every missed tick takes its place in the stream */
         clock->ticks = passed;
         ticked = 1;
         const unsigned long long count = (unsigned long long)clock->samples - 1;
@@ -195,7 +195,7 @@ int model_tick(Model *m)
 
 /* ---- evaluation -------------------------------------------------------------------------------------------- */
 
-/* Whether a sensor shows a sample. */
+/* Returns true if a sensor shows a sample. */
 static int holds(const Model *m, int sensor)
 {
     return m->held.clocks[sensor].period > 0.0 && m->held.delivered[sensor] > 0.0;
@@ -206,14 +206,14 @@ int model_holds(const Model *m, int channel)
     return holds(m, sensors_of_channel(channel));
 }
 
-/* Roll, pitch, yaw (zyx) of a quaternion. */
+/* Writes roll, pitch, yaw (zyx) of a quaternion. */
 static void euler_angles(const double e[4], double euler[3])
 {
     double R[3][3];
 
     plant_rotation(e, R);
     const double cosine = elementary_hypot(R[2][1], R[2][2]);
-    const int upright = cosine > UPRIGHT; /* else roll and yaw are one, and all is called yaw */
+    const int upright = cosine > UPRIGHT; /* at gimbal lock roll is 0 and yaw takes the whole angle */
 
     euler[0] = upright ? elementary_atan2(R[2][1], R[2][2]) : 0.0;
     euler[1] = elementary_atan2(-R[2][0], cosine);

@@ -4,8 +4,8 @@
 
 #include "linear.h"
 
-static const double MOST_DAMPED = 2.5; /* h times rate: beyond 2.785 the method grows what it should damp */
-static const double MOST_TURNED = 1.0; /* rad in h: beyond 2.83 it grows what should swing, and is far off before */
+static const double RK4_STABILITY_LIMIT = 2.5; /* h times rate: unstable beyond 2.785 */
+static const double RK4_TURN_LIMIT = 1.0; /* rad in h: unstable beyond 2.83, inaccurate well before */
 
 /* ---- attitude ---------------------------------------------------------------------------------------------- */
 
@@ -39,10 +39,10 @@ Mask plant_normalise(Real rigid[N_RIGID])
 
 /* ---- dynamics ---------------------------------------------------------------------------------------------- */
 
-/* What is different in water that moves at v_c, of which R^T v_c changes at R^T v_c' - w x R^T v_c seen from the body: the
- * motion through it v_r, the momentum M_RB v + M_A v_r, and the wrench by the part of -M_A v_r' that is not in v' and by
- * what v_r x M_A v_r differs from v x M_A v_r. */
-static void ride_current(const Plant *plant, const Drift *drift, double time, const Real rigid[N_RIGID],
+/* Adds the effects of water that moves at v_c. In body axes R^T v_c changes at R^T v_c' - w x R^T v_c. Writes the relative
+ * velocity v_r and the momentum M_RB v + M_A v_r; adds to the wrench the part of -M_A v_r' that is not in v', and the
+ * difference of v_r x M_A v_r from v x M_A v_r. */
+static void add_current_effects(const Plant *plant, const Drift *drift, double time, const Real rigid[N_RIGID],
                          const Real R[3][3], const Real velocity_world[3], Real nu_r[6], Real momentum[6], Real wrench[6])
 {
     const Parameters *p = &plant->parameters;
@@ -78,8 +78,8 @@ static void ride_current(const Plant *plant, const Drift *drift, double time, co
     }
 }
 
-/* Adds the wrench that other components put on the body. */
-static void push(const External *external, const Real R[3][3], Real wrench[6])
+/* Adds the external wrench of other components. */
+static void add_external(const External *external, const Real R[3][3], Real wrench[6])
 {
     Real force[3], moment[3], lever[3];
 
@@ -108,7 +108,7 @@ void plant_derivative(const Plant *plant, const Drift *drift, double time, const
     memcpy(wrench, tau, sizeof wrench);
     multiply6(plant->derived.mass_matrix, nu, momentum);
     if (plant->derived.water_moves)
-        ride_current(plant, drift, time, rigid, (const Real(*)[3])R, rate, nu_r, momentum, wrench);
+        add_current_effects(plant, drift, time, rigid, (const Real(*)[3])R, rate, nu_r, momentum, wrench);
 
     /* C(v) v of the body and of the water that moves along, in the Kirchhoff form: its matrix [0, -S(a); -S(a), -S(b)],
      * with a and b the linear and the angular momentum, is skew (Property 2), so that it does no work */
@@ -143,14 +143,14 @@ void plant_derivative(const Plant *plant, const Drift *drift, double time, const
     }
 
     if (plant->external.acts)
-        push(&plant->external, (const Real(*)[3])R, wrench);
+        add_external(&plant->external, (const Real(*)[3])R, wrench);
 
     multiply6(plant->derived.mass_inverse, wrench, rate + 7);
 }
 
 /* ---- what steps can follow ---------------------------------------------------------------------------------- */
 
-/* A bound of the fastest rate at which damping and bottom now make a velocity decay, 1/s. */
+/* Returns an upper bound of the fastest present decay rate of a velocity by damping and bottom, 1/s. */
 static Real damping_rate(const Plant *plant, const Drift *drift, double time, const Real rigid[N_RIGID])
 {
     const Parameters *p = &plant->parameters;
@@ -168,14 +168,14 @@ static Real damping_rate(const Plant *plant, const Drift *drift, double time, co
         Real sum = splat(0.0);
         for (int j = 0; j < 6; j++)
             sum += real_fabs(plant->derived.mass_inverse[i][j]) * root[j];
-        bound = choose(root[i] * sum <= bound, bound, root[i] * sum); /* also where it is no number */
+        bound = choose(root[i] * sum <= bound, bound, root[i] * sum); /* NaN propagates */
     }
     const Real stopping = 2.0 / plant->derived.contact_time;
     return bound + choose(environment_sunk(p, rigid[2]) > 0.0, stopping, splat(0.0));
 }
 
-/* Whether steps of h are well within what damping_rate allows, by a bound that needs no roots and no attitude: the trace
- * of D^1/2 M^-1 D^1/2, that no row sum of a positive matrix of six rows exceeds by more than (1 + sqrt 6) / 2. */
+/* Returns true if steps of h are well within the limit of damping_rate, by a bound without roots and attitude: the trace
+ * of D^1/2 M^-1 D^1/2. No row sum of a positive matrix of six rows exceeds its trace by more than (1 + sqrt 6) / 2. */
 static Mask follows_easily(const Plant *plant, const Drift *drift, double time, double h, const Real rigid[N_RIGID])
 {
     const Parameters *p = &plant->parameters;
@@ -189,18 +189,18 @@ static Mask follows_easily(const Plant *plant, const Drift *drift, double time, 
         const Real speed = i < 3 ? real_fabs(rigid[7 + i]) + current : real_fabs(rigid[7 + i]);
         trace += plant->derived.mass_inverse[i][i] * (p->linear_damping[i] + 2.0 * p->quadratic_damping[i] * speed);
     }
-    return (1.75 * h * trace < MOST_DAMPED) & (environment_sunk(p, rigid[2]) <= 0.0);
+    return (1.75 * h * trace < RK4_STABILITY_LIMIT) & (environment_sunk(p, rigid[2]) <= 0.0);
 }
 
-/* Whether steps of h can follow the damping, the swinging and the turning of now. */
+/* Returns true if steps of h are stable for the present damping, oscillation and turning. */
 static Mask follows(const Plant *plant, const Drift *drift, double time, double h, const Real rigid[N_RIGID])
 {
     const Real *omega = rigid + 10;
-    const Mask turning = h * (real_sqrt(dot3(omega, omega)) + plant->derived.swing) < MOST_TURNED;
+    const Mask turning = h * (real_sqrt(dot3(omega, omega)) + plant->derived.swing) < RK4_TURN_LIMIT;
 
     if (all(turning & follows_easily(plant, drift, time, h, rigid)))
         return turning;
-    return turning & (h * damping_rate(plant, drift, time, rigid) < MOST_DAMPED);
+    return turning & (h * damping_rate(plant, drift, time, rigid) < RK4_STABILITY_LIMIT);
 }
 
 /* ---- stepping ---------------------------------------------------------------------------------------------- */
@@ -211,7 +211,7 @@ static void move(const Real from[N_RIGID], const Real rate[N_RIGID], double h, R
         to[i] = from[i] + h * rate[i];
 }
 
-/* One Runge-Kutta step of order four. Whether h was followed is asked of its end; of its start the caller has. */
+/* Makes one Runge-Kutta step of order four. Checks stability at its end; the caller has checked its start. */
 static Mask step(const Plant *plant, const Drift *drift, double time, const Actuators *target, double h, State *state)
 {
     const Parameters *p = &plant->parameters;
@@ -239,7 +239,7 @@ static Mask step(const Plant *plant, const Drift *drift, double time, const Actu
     move(state->rigid, k2, 0.5 * h, trial);
     plant_derivative(plant, drift, time + 0.5 * h, trial, tau_middle, k3);
     move(state->rigid, k3, h, trial);
-    const Mask followed = follows(plant, drift, time + h, h, trial); /* a step may end in rest by chance, but not all its stages */
+    const Mask followed = follows(plant, drift, time + h, h, trial); /* a step may end at rest by chance, but not all its stages */
     if (!any(followed))
         return followed;
     plant_derivative(plant, drift, time + h, trial, tau_end, k4);

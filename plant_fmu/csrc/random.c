@@ -1,4 +1,4 @@
-/* Random numbers without a state: a keyed hash of where in which stream the number stands. A run repeats whatever the
+/* Random numbers without a state: a keyed hash of stream and place. A run repeats whatever the
  * steps, a saved state needs no generator, and streams do not disturb each other. */
 #include "elementary.h"
 
@@ -19,7 +19,7 @@ static void philox(uint32_t c[4], uint32_t key0, uint32_t key1)
     }
 }
 
-/* Four words at a place of a stream. */
+/* Writes four words at a place of a stream. */
 static void draw(int seed, unsigned stream, unsigned long long count, uint32_t c[4])
 {
     c[0] = (uint32_t)count;
@@ -29,7 +29,7 @@ static void draw(int seed, unsigned stream, unsigned long long count, uint32_t c
     philox(c, (uint32_t)seed, 0);
 }
 
-/* A number of 53 bits, uniform in [0, 1). */
+/* Returns a number of 53 bits, uniform in [0, 1). */
 static double uniform(const uint32_t high, const uint32_t low)
 {
     return ((double)(high >> 5) * 67108864.0 + (double)(low >> 6)) / 9007199254740992.0;

@@ -1,9 +1,9 @@
-/* The number of the mathematics: a double or, compiled with -DLANES=n, n doubles side by side, one for each of n vehicles.
+/* The number type of the model: a double or, compiled with -DLANES=n, n doubles side by side, one for each of n vehicles.
  *
- * What is written with Real serves both. Arithmetic and comparisons are C's own and go lane by lane; a literal may stand
- * next to a Real in them (2.0 * x), but is no Real itself: splat(2.0) is. A comparison gives a Mask. Masks are joined by &
- * and |, inverted by mask_not, and decide by choose, which works out both sides: in place of if, ?:, && and ||. Lanes do
- * not know of each other, so each gets the bits that it would get alone. */
+ * Code written with Real serves both. Arithmetic and comparisons are C's own and act on each lane; a literal may stand
+ * next to a Real (2.0 * x), but is no Real itself: splat(2.0) is. A comparison gives a Mask. Masks are combined by & and |,
+ * inverted by mask_not, and used by choose, which evaluates both sides: in place of if, ?:, && and ||. Lanes are
+ * independent, so each gets the bits that it would get alone. */
 #ifndef REAL_H
 #define REAL_H
 
@@ -27,7 +27,7 @@ static inline void set_mask_lane(Mask *which, int i, int yes) { (void)i, *which 
 
 static inline Real real_sqrt(Real x) { return sqrt(x); }
 static inline Real real_fabs(Real x) { return fabs(x); }
-static inline Real real_fmax(Real x, Real y) { return x > y ? x : y; } /* y where either is no number */
+static inline Real real_fmax(Real x, Real y) { return x > y ? x : y; } /* y where either is NaN */
 static inline Real real_fmin(Real x, Real y) { return x < y ? x : y; }
 static inline Real real_copysign(Real x, Real sign) { return copysign(x, sign); }
 

@@ -1,4 +1,4 @@
-/* What instruments on the vehicle tell: truth, bias, and noise at each sample. */
+/* Sensors of the vehicle: truth, bias, and noise at each sample. */
 #include "plant.h"
 
 #include <math.h>

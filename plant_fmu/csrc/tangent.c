@@ -87,7 +87,7 @@ static void subtract_cross(const double a[3], const double da[3], const double b
         out[i] -= left[i] + right[i];
 }
 
-/* Of subtract_coriolis of plant.c: p holds the momenta, linear and angular. */
+/* Tangent of subtract_coriolis in plant.c: p holds the momenta, linear and angular. */
 static void subtract_coriolis_tangent(const double p[6], const double dp[6], const double nu[6], const double dnu[6],
                                       double dwrench[6])
 {
@@ -96,7 +96,7 @@ static void subtract_coriolis_tangent(const double p[6], const double dp[6], con
     subtract_cross(nu + 3, dnu + 3, p + 3, dp + 3, dwrench + 3); /* w x b */
 }
 
-/* Tangent of the mass matrix: column by column what momentum_tangent says of a motion that stays. */
+/* Tangent of the mass matrix: column by column, momentum_tangent of a constant motion. */
 static void mass_matrix_tangent(const Parameters *p, const Parameters *dp, double dM[6][6])
 {
     static const double still[6] = {0.0};
@@ -111,7 +111,7 @@ static void mass_matrix_tangent(const Parameters *p, const Parameters *dp, doubl
     }
 }
 
-/* Of push of plant.c. */
+/* Tangent of add_external in plant.c. */
 static void add_external_tangent(const External *x, const External *dx, const double R[3][3], const double dR[3][3],
                                  double dwrench[6])
 {
@@ -132,7 +132,7 @@ static void add_external_tangent(const External *x, const External *dx, const do
     }
 }
 
-/* Of plant_derivative, whose result `rate` is known. */
+/* Tangent of plant_derivative, whose result `rate` is given. */
 static void derivative_tangent(const Model *m, const Model *seed, const double rate[N_RIGID], const double dtau[6],
                                double R[3][3], double dR[3][3], double dwater[3], double drate[N_RIGID])
 {
@@ -152,7 +152,7 @@ static void derivative_tangent(const Model *m, const Model *seed, const double r
     for (int i = 0; i < 4; i++)
         drate[3 + i] = left[i] + right[i];
 
-    /* motion through the water */
+    /* velocity relative to the water */
     const double below = fmax(x[2], 0.0), under = x[2] > 0.0 ? 1.0 : 0.0;
     double water[3], current[3], dcurrent[3], nu_r[6], dnu_r[6], nu_c_rate[6] = {0.0}, dnu_c_rate[6] = {0.0};
     environment_current(p, drift, m->time, x[2], water);
