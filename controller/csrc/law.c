@@ -1,7 +1,7 @@
 /* See law.h. */
 #include "law.h"
 
-/* max(0, g), as in (16), (17), (20) and (22); NaN stays NaN, lest a lost measurement looked like safety. */
+/* max(0, g), as in (16), (17), (20) and (22); NaN stays NaN, so that a lost measurement does not look safe. */
 static Real positive_part(Real value)
 {
     return choose(value <= 0.0, splat(0.0), value);
@@ -21,7 +21,7 @@ static void rotation_matrix(const Real e[4], Real R[9])
     R[8] = 1.0 - 2.0 * (e[1] * e[1] + e[2] * e[2]);
 }
 
-/* R^T x: a world vector seen from the body. */
+/* Writes R^T x, a world vector in body axes. */
 static void to_body(const Real R[9], const Real x[3], Real out[3])
 {
     for (int i = 0; i < 3; i++)
@@ -62,7 +62,7 @@ void law_step(const Real quaternion[4], const Real velocity[6], const Real desir
 {
     Real R[9], e_p[3], e_s[3], e_att[3], asked[3], pull[3], drive[6];
     rotation_matrix(quaternion, R);
-    const Real *k = R + 6; /* R^T e3: gravity seen from the body, of which Z = [-k 0; 0 S(k)] is made (12) */
+    const Real *k = R + 6; /* R^T e3, the direction of gravity in body axes, for Z = [-k 0; 0 S(k)] (12) */
 
     /* (20) to (23) */
     for (int j = 0; j < 3; j++)

@@ -18,7 +18,7 @@ static Real clamp(Real x, Real low, Real high)
     return choose(above > high, high, above);
 }
 
-/* numerator / denominator where that is above zero, else 0. */
+/* numerator / denominator where the denominator is above zero, else 0. */
 static Real ratio(Real numerator, Real denominator)
 {
     Mask good = denominator > 0.0;
@@ -35,7 +35,7 @@ static Real length2(Real x, Real y)
     return real_sqrt(x * x + y * y);
 }
 
-/* Lane by lane: it is rare, and needs no speed. */
+/* Lane by lane: it is rarely used. */
 static Real arc_tangent(Real y, Real x)
 {
     Real angle = y;
@@ -60,8 +60,8 @@ static void to_world(const Real R[9], Real x, Real y, Real z, Real world[3])
         world[i] = R[3 * i] * x + R[3 * i + 1] * y + R[3 * i + 2] * z;
 }
 
-/* Signed distance to the product of two sets in perpendicular directions, of the signed distances to either, and how it
- * follows each. */
+/* Returns the signed distance to the product of two sets in perpendicular directions, given the signed distance to each, and
+ * its derivatives by the two. */
 static Product product_distance(Real first, Real second)
 {
     Product result;
@@ -71,7 +71,7 @@ static Product product_distance(Real first, Real second)
     result.distance = choose(outside_both, corner, choose(farther, first, second));
     result.of_first = choose(outside_both, ratio(first, corner), choose(farther, splat(1.0), splat(0.0)));
     result.of_second = choose(outside_both, ratio(second, corner), choose(farther, splat(0.0), splat(1.0)));
-    /* a lost position is no safe one */
+    /* NaN stays NaN: a lost position is not safe */
     Real sum = first + second;
     Mask whole = sum == sum;
     result.distance = choose(whole, result.distance, sum);
@@ -85,7 +85,7 @@ static Real signed_like(Real size, Real sign)
     return choose(sign >= 0.0, size, -size);
 }
 
-#include "shape_functions.h" /* the functions of the shapes, and which kind is which: generated */
+#include "shape_functions.h" /* generated: the functions of the shapes, and their kinds */
 
 void regions_evaluate(const Regions *regions, const Real position[3], const Real quaternion[4], Real value[],
                       Real gradient[][3], Real clearance[])
@@ -109,6 +109,6 @@ Real regions_ramp(Real clearance, Real width)
 {
     Mask smooth = width > 0.0;
     Real fallen = clearance / choose(smooth, width, splat(1.0));
-    Real between = choose(smooth, 1.0 - fallen, clearance); /* NaN alone comes to the latter */
+    Real between = choose(smooth, 1.0 - fallen, clearance); /* the last only for NaN */
     return choose(clearance <= 0.0, splat(1.0), choose(clearance >= width, splat(0.0), between));
 }

@@ -1,8 +1,8 @@
-/* Regions in a scene: which shapes, kept within or kept out of, evaluated all at once. The same functions as those of
+/* Regions of a scene, to be kept within or out of, evaluated together. The same functions as those of
  * controller/regions, in the same order of operations. One sign everywhere: g <= 0 is satisfied, g > 0 is violated.
  *
- * Written for the number `Real` of real.h: a double, or several side by side. What depends on data is chosen, not
- * branched on; kinds, signs and offsets are the same in all lanes. */
+ * Written for the type `Real` of real.h: a double, or several side by side. Code selects by data with masks, not
+ * branches; kinds, signs and offsets are the same in all lanes. */
 #ifndef REGIONS_H
 #define REGIONS_H
 
@@ -13,9 +13,9 @@ typedef struct {
     int n;
     const int *kinds;
     const double *signs;      /* +1 kept within, -1 kept out of */
-    const int *offsets;       /* n + 1 of them, into numbers */
-    const Real *numbers;      /* what each shape reads, one behind the other, as `packed` gives it */
-    const Real (*shifts)[3];  /* m, NED: how far each has moved from where its numbers have it */
+    const int *offsets;       /* n + 1 offsets, into numbers */
+    const Real *numbers;      /* of all shapes in their order, as `packed` gives them */
+    const Real (*shifts)[3];  /* m, NED: shift of each from the place of its numbers */
 } Regions;
 
 /* Evaluates every region at a pose: value g_i, at most 0 where satisfied, in the unit of the shape; its gradient
@@ -23,8 +23,8 @@ typedef struct {
 void regions_evaluate(const Regions *regions, const Real position[3], const Real quaternion[4], Real value[],
                       Real gradient[][3], Real clearance[]);
 
-/* To what degree a region matters, given the clearance: 1 where it is violated, falling to 0 at `width` outside; NaN
- * for a clearance that is NaN. */
+/* Returns the membership of a region, given the clearance: 1 where it is violated, decreasing to 0 at `width` outside; NaN
+ * for NaN. */
 Real regions_ramp(Real clearance, Real width);
 
 #endif

@@ -1,6 +1,6 @@
 
-/* Centroid of clipped terms, joined by their maximum; not all cuts are 0. In each piece the lines of the terms have one
-   order, the highest first; each fills what is above the cuts of those before it, up to its own. */
+/* Returns the centroid of clipped terms, aggregated by maximum; not all cuts are 0. In each piece the lines of the terms
+   have one order, the highest first; each adds the area between the cuts of those before it and its own. */
 static double centroid_of_clipped(const double *cuts, int terms, int pieces, const double *places,
                                   const double *left, const double *right, const int *order)
 {
@@ -9,7 +9,7 @@ static double centroid_of_clipped(const double *cuts, int terms, int pieces, con
         largest = cuts[t] > largest ? cuts[t] : largest;
     }
     if (largest < 1e-120) {
-        larger = 0x1p266; /* if no cut is greater, all are made larger alike: the centroid stays, nothing underflows */
+        larger = 0x1p266; /* scales all cuts if the greatest is tiny: the centroid stays, nothing underflows */
     }
     for (int piece = 0; piece < pieces; piece++, left += terms, right += terms, order += terms) {
         double width = places[piece + 1] - places[piece], start = places[piece] - places[0], below = 0.0;

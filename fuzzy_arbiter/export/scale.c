@@ -1,5 +1,5 @@
 
-/* Puts a place where the envelope may break among those before it, in rising order. */
+/* Inserts a possible kink of the envelope among those before it, in increasing order. */
 static void insert(double *breaks, int n, double place)
 {
     while (n > 0 && breaks[n - 1] > place) {
@@ -9,7 +9,7 @@ static void insert(double *breaks, int n, double place)
     breaks[n] = place;
 }
 
-/* Centroid of scaled terms, joined by their maximum; not all cuts are 0. */
+/* Returns the centroid of scaled terms, aggregated by maximum; not all cuts are 0. */
 static double centroid_of_scaled(const double *given, int terms, int pieces, const double *places,
                                  const double *left, const double *right, const int *order)
 {
@@ -19,12 +19,12 @@ static double centroid_of_scaled(const double *given, int terms, int pieces, con
         largest = given[t] > largest ? given[t] : largest;
     }
     for (int t = 0; t < terms; t++) {
-        /* if no cut is greater, all are made larger alike: the centroid stays, and nothing underflows */
+        /* scales all cuts if the greatest is tiny: the centroid stays, nothing underflows */
         cuts[t] = largest < 1e-120 ? given[t] * 0x1p266 : given[t];
     }
     for (int piece = 0; piece < pieces; piece++, left += terms, right += terms) {
         double width = places[piece + 1] - places[piece], start = places[piece] - places[0];
-        /* where the envelope may break, in shares of the piece */
+        /* possible kinks of the envelope, as fractions of the piece */
         double breaks[2 + TERMS * TERMS] = {0.0, 1.0};
         int n = 2;
         for (int t = 0; t < terms; t++) {
@@ -39,7 +39,7 @@ static double centroid_of_scaled(const double *given, int terms, int pieces, con
         for (int i = 0; i < n; i++) {
             double x1 = breaks[i];
             if (x0 < x1) {
-                /* the middle tells which line is the greatest; at an end it would be lost to rounding */
+                /* the greatest line is that of the middle; at an end rounding would hide it */
                 double height = 0.0, y0 = 0.0, y1 = 0.0, w = (x1 - x0) * width;
                 for (int t = 0; t < terms; t++) {
                     double rise = right[t] - left[t], degree = (left[t] + rise * ((x0 + x1) / 2)) * cuts[t];

@@ -63,10 +63,10 @@ static Status begin(Instance *instance)
     if (!plant_normalise(m->state.rigid))
         return instance_refuse(instance, "quaternion.e0 to e3 have length 0, expected a direction");
     if (fabs(norm - 1.0) > 1e-3)
-        instance_tell(instance, LOG_WARNINGS, "quaternion of length %.9g made a unit quaternion", norm);
+        instance_log(instance, LOG_WARNINGS, "quaternion of length %.9g made a unit quaternion", norm);
     const double deep = m->state.rigid[2] + m->plant.parameters.hull_radius - m->plant.parameters.bottom_depth;
     if (deep > 0.0)
-        instance_tell(instance, LOG_WARNINGS, "the hull begins %.9g m deep in the bottom", deep);
+        instance_log(instance, LOG_WARNINGS, "the hull begins %.9g m deep in the bottom", deep);
     model_settle(m);
     model_tick(m);
     return STATUS_OK;

@@ -1,15 +1,15 @@
 /* See ellipsoid.py; a part of regions.c. */
-enum { MOST_STEPS = 200 }; /* more than the root below ever takes */
+enum { MOST_STEPS = 200 }; /* more than the root search below ever needs */
 
-/* Distance from a point of the first octant to the surface: Newton's method from the left of the root of a function
- * that falls and is convex, so that it only grows, see controller/regions/ellipsoid.py. */
+/* Returns the distance from a point of the first octant to the surface, by Newton's method from the left of the root of a
+ * decreasing convex function, so that its iterates increase; see ellipsoid.py. */
 static Real surface_distance(const Real point[3], const Real axes[3])
 {
     Real least = real_fmin(real_fmin(axes[0], axes[1]), axes[2]);
     Real excess[3], x[3], s;
     for (int i = 0; i < 3; i++) {
         excess[i] = axes[i] * axes[i] - least * least;
-        /* a point in a plane of symmetry is moved out of it by less than rounding shows */
+        /* moves a point out of a plane of symmetry, by less than rounding */
         Real smallest = 1e-14 * axes[i];
         x[i] = choose(point[i] < smallest, smallest, point[i]);
         Real start = axes[i] * x[i] - excess[i];

@@ -14,7 +14,7 @@ static Evaluation pipe(const Real p[3], const Real e[4], const Real q[], int siz
         for (int j = 0; j < 3; j++)
             d[j] = d[j] - along * e[j];
         Real distance = length3(d[0], d[1], d[2]);
-        Mask kept = distance >= nearest; /* so that NaN comes through */
+        Mask kept = distance >= nearest; /* so that NaN stays NaN */
         nearest = choose(kept, nearest, distance);
         for (int j = 0; j < 3; j++)
             off[j] = choose(kept, off[j], d[j]);

@@ -11,9 +11,9 @@ static Evaluation prism(const Real p[3], const Real e[4], const Real q[], int si
         Real x = p[0] - a[0], y = p[1] - a[1];
         Real along = clamp((x * ex + y * ey) / (length * length), splat(0.0), splat(1.0));
         Real dx = x - along * ex, dy = y - along * ey, distance = length2(dx, dy);
-        Mask kept = distance >= nearest; /* so that NaN comes through */
+        Mask kept = distance >= nearest; /* so that NaN stays NaN */
         Mask at_corner = (distance > 0.0) & ((along == 0.0) | (along == 1.0));
-        /* on both sides of an edge the signed distance grows along its outward normal */
+        /* on both sides of an edge the signed distance increases along its outward normal */
         gx = choose(kept, gx, choose(at_corner, ratio(dx, distance), ey / length));
         gy = choose(kept, gy, choose(at_corner, ratio(dy, distance), -ex / length));
         corner_sign = choose(kept, corner_sign, choose(at_corner, splat(-1.0), splat(1.0)));

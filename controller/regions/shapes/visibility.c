@@ -14,13 +14,13 @@ static Evaluation visibility(const Real p[3], const Real e[4], const Real q[], i
         b[i] = R[i] * d[0] + R[i + 3] * d[1] + R[i + 6] * d[2] - q[6 + i];
     Real square = b[0] * b[0] + b[1] * b[1] + b[2] * b[2];
 
-    /* the angle to the axis a, and how it follows b: ((a . b) b / |b|^2 - a) / |a x b| */
+    /* the angle to the axis a, and its gradient by b: ((a . b) b / |b|^2 - a) / |a x b| */
     Real along = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     Real aside = length3(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]);
     Real k = ratio(along, square);
     for (int i = 0; i < 3; i++)
         s[i] = ratio(k * b[i] - a[i], aside);
-    Real angle = choose(square == 0.0, splat(PI), arc_tangent(aside, along)); /* in the camera itself: behind it */
+    Real angle = choose(square == 0.0, splat(PI), arc_tangent(aside, along)); /* at the camera: as if behind it */
 
     /* db = -R^T dp */
     Evaluation result;

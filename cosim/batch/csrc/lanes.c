@@ -21,7 +21,7 @@ typedef struct { /* what OUTCOME is made of */
 typedef struct { /* N_LANES vehicles and their scenes */
     const Batch *batch;
     Mask flying;
-    Model model; /* of which plant, state and inputs are used */
+    Model model; /* only its plant, state and inputs are used */
     Actuators target;
     Real desired[4], estimate[4], ramp;
     Gains gains;
@@ -41,7 +41,7 @@ int lanes_count(void)
 
 /* ---- seats ------------------------------------------------------------------------------------------------- */
 
-/* Returns `count` numbers of the block that `at` goes through, or what they would take if there is none. */
+/* Returns `count` numbers of the block at `at`, and advances it. */
 static Real *claim(Real **at, int count)
 {
     Real *claimed = *at;
@@ -72,7 +72,7 @@ static void lay_out(Fleet *f, const Batch *b, Real *block)
     f->regions = (Regions){n, b->kinds, b->signs, b->offsets, f->numbers, (const Real(*)[3])f->shifts};
 }
 
-/* Puts a vehicle that is at its start, and its scene, into a lane. */
+/* Puts a vehicle in its start state, and its scene, into a lane. */
 static void seat(Fleet *f, int i, const Start *start, const double *row)
 {
     const Batch *b = f->batch;
@@ -151,8 +151,8 @@ static void mark(Fleet *f, int k)
     m->max_speed_squared = real_fmax(speed_squared, m->max_speed_squared);
 }
 
-/* Clearances to memberships, of the most pressing region of each criterion, and these to weights, lane by lane: unless they
- * are what they were, as they are far from all regions. */
+/* Computes the memberships of the most critical region of each criterion, and the weights, lane by lane; skips lanes whose
+ * memberships have not changed, as far from all regions. */
 static void arbitrate(Fleet *f)
 {
     Real memberships[N_CRITERIA];
@@ -179,7 +179,7 @@ static void arbitrate(Fleet *f)
     }
 }
 
-/* The least thruster forces that give a wrench, as controller/allocation.py has them. */
+/* Computes the least thruster forces that give a wrench, as controller/allocation.py. */
 static void allocate(const Batch *b, const Real wrench[6], Real forces[N_THRUSTERS])
 {
     Real greatest = splat(0.0), scale = splat(1.0);
@@ -197,7 +197,7 @@ static void allocate(const Batch *b, const Real wrench[6], Real forces[N_THRUSTE
             const Real bound = choose(above, splat(b->upper[i]), splat(b->lower[i]));
             scale = choose(above | below, real_fmin(bound / f, scale), scale);
         }
-    for (int i = 0; i < N_THRUSTERS; i++) { /* what is no number is no limit: the plant shall refuse it */
+    for (int i = 0; i < N_THRUSTERS; i++) { /* NaN stays NaN: the plant refuses it */
         const Real lower = splat(b->lower[i]), upper = splat(b->upper[i]), f = scale * forces[i];
         forces[i] = choose(f < lower, lower, choose(f > upper, upper, f));
     }
@@ -294,8 +294,8 @@ static void write_marks(const Fleet *f, int i, double marks[N_MARKS])
     marks[STOPPED] = lane(m->stopped, i);
 }
 
-/* Fills the lanes with the next rows that can start; the rest fly along as copies of the first, which nobody looks at.
- * Returns how many of them are rows of their own. */
+/* Fills the lanes with the next rows that can start; the remaining lanes hold copies of the first, whose results are not
+ * used. Returns the number of lanes with rows of their own. */
 static int board(Fleet *f, Starter *starter, int *next, int seated[N_LANES])
 {
     const Batch *b = f->batch;
@@ -307,7 +307,7 @@ static int board(Fleet *f, Starter *starter, int *next, int seated[N_LANES])
         const double *row = b->rows + (size_t)*next * (size_t)b->width;
         if (!starter_prepare(starter, b, row, &start, b->refusals + (size_t)*next * REFUSAL))
             continue;
-        if (n == 0) /* whoever has no lane of its own: numbers that can fly */
+        if (n == 0) /* fill all lanes with the first */
             for (int i = 1; i < N_LANES; i++)
                 seat(f, i, &start, row);
         seat(f, n, &start, row);

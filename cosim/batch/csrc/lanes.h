@@ -1,4 +1,4 @@
-/* Flights of many vehicles, several side by side: what Python hands over and gets back, and what one vehicle starts from.
+/* Flights of many vehicles, several side by side: the arguments and results of Python's call, and a vehicle's start.
  * Plain C for both compilations, that of doubles and that of lanes. */
 #ifndef LANES_H
 #define LANES_H
@@ -9,7 +9,7 @@
 #define EXPORTED __attribute__((visibility("default")))
 #endif
 
-enum { REFUSAL = 512 }; /* bytes of a message, its end included */
+enum { REFUSAL = 512 }; /* bytes of a message with its terminating NUL */
 
 enum { /* of criteria, in the order of the arbiter's inputs */
     N_CRITERIA = 3
@@ -22,24 +22,24 @@ enum { /* what is counted of a flight */
     LEAST_CLEARANCE, /* m, of hard regions of place; INFINITY: there are none */
     LEAST_ANGLE,     /* rad, of hard regions of attitude */
     GOAL_CLEARANCE,  /* m, the greatest */
-    WEIGHTED_VIOLATION, /* m s, rad s: of each region its depth times its priority, over time, summed */
+    WEIGHTED_VIOLATION, /* m s, rad s: integral of each region's violation times its priority, summed */
     EFFORT,          /* N s */
     MAX_FORCE,       /* N */
     MAX_SPEED,       /* m/s */
     FINAL_POSITION,
     ESTIMATE = FINAL_POSITION + 3,
-    STOPPED = ESTIMATE + 4, /* step that was refused, -1: none */
+    STOPPED = ESTIMATE + 4, /* step that the plant refused, -1: none */
     N_MARKS
 };
 
 typedef struct { /* a batch of flights; each row of `rows` is one */
     int n_rows, width;        /* numbers in a row */
     int n_reals, n_integers;  /* start values of the plant */
-    int n_regions, n_numbers; /* the goal, first, and the others; what their shapes read in all */
+    int n_regions, n_numbers; /* the goal first, then the others; total of the shapes' numbers */
     int steps, control_every, arbiter_every;
-    int moving;    /* whether any region moves */
-    int thrusters; /* whether they carry the wrench */
-    int keep_direction; /* of a wrench beyond what they can */
+    int moving;    /* 1: some region moves */
+    int thrusters; /* 1: thrusters produce the wrench */
+    int keep_direction; /* of a wrench beyond their limits */
     double step, period, substep; /* s */
 
     const unsigned *reals;    /* (n_reals,) value references */
@@ -56,27 +56,27 @@ typedef struct { /* a batch of flights; each row of `rows` is one */
     const double *rows; /* (n_rows, width): reals and integers of the plant, desired attitude (4), gains of the law (8), ramp,
                          * gains of the regions but the goal, numbers of the shapes, velocities of the regions (3 each) */
     double *marks;      /* (n_rows, N_MARKS) */
-    char *refusals;     /* (n_rows, REFUSAL) why the plant cannot start so; "" where it can */
+    char *refusals;     /* (n_rows, REFUSAL) the plant's reason for refusing the start; "": none */
 } Batch;
 
-typedef struct Starter Starter; /* brings vehicles to where they start, by the functions of the FMU */
+typedef struct Starter Starter; /* sets up vehicles at their start, by the functions of the FMU */
 
 typedef struct {           /* one vehicle at its start */
     const double *values;  /* of all variables that are set, by value reference */
-    const double *derived; /* the numbers of Derived, one behind the other */
+    const double *derived; /* the numbers of Derived, in their order */
     int lags, water_moves;
 } Start;
 
 Starter *starter_create(void);
 void starter_free(Starter *starter);
 
-/* Sets up a vehicle as the FMU would. Returns 0 and the reason if it would not. */
+/* Sets up a vehicle as the FMU does. Returns 0, and writes the reason, if it refuses. */
 int starter_prepare(Starter *starter, const Batch *batch, const double *row, Start *start, char reason[REFUSAL]);
 
-/* Flies the batch. Returns 0 if there is no memory for it. */
+/* Flies the batch. Returns 0 if memory is short. */
 EXPORTED int lanes_fly(const Batch *batch);
 
-/* How many vehicles are side by side. */
+/* Returns the number of lanes. */
 EXPORTED int lanes_count(void);
 
 #endif

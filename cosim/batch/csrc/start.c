@@ -1,4 +1,4 @@
-/* One vehicle at its start, set up by the same functions as in the FMU: what it refuses, it refuses here in the same words. */
+/* A vehicle at its start, set up by the functions of the FMU, with the same refusals in the same words. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,7 +9,7 @@
 struct Starter {
     Instance *instance;
     double *values; /* (N_VARIABLES,) */
-    char *reason;   /* where the first message goes */
+    char *reason;   /* receives the first message */
 };
 
 static void keep_message(const Instance *instance, Status status, const char *category, const char *message)

@@ -2,7 +2,7 @@
 
 #define AT(member) offsetof(Model, member)
 
-static const Variable PLACES[] = {COMPONENT_VARIABLES}; /* those of the FMU, and where they are in a Model of lanes */
+static const Variable PLACES[] = {COMPONENT_VARIABLES}; /* variables of the FMU, with their places in a Model of lanes */
 
 enum { N_PLACES = sizeof PLACES / sizeof PLACES[0], N_DERIVED = offsetof(Derived, lags) / sizeof(Real) };
 
@@ -47,14 +47,14 @@ Mask vehicles_take(const Inputs *inputs)
 
 Mask vehicles_advance(Model *model, const Actuators *target, double start, double end, double substep, Mask going)
 {
-    static const Drift STILL; /* a current that varies has no lanes */
+    static const Drift STILL; /* lanes have no varying current */
     const State before = model->state;
     Real *is = (Real *)&model->state;
     const Real *was = (const Real *)&before;
     double h;
 
     going &= plant_advance(&model->plant, &STILL, start, end, substep, target, &model->state, &h);
-    for (int j = 0; j < N_RIGID; j++) /* forces stay between those that were commanded */
+    for (int j = 0; j < N_RIGID; j++) /* forces stay between commanded ones */
         going &= within(&PLACES[FIRST_STATE + j], is[j]);
     if (!all(going))
         for (int j = 0; j < N_STATES; j++)

@@ -5,17 +5,17 @@
 #include "instance.h"
 #include "lanes.h"
 
-/* Forgets who was there, before the first is seated. */
+/* Clears all lanes. */
 void vehicles_leave(Model *model);
 
-/* Puts a vehicle that is at its start into a lane. */
+/* Puts a vehicle in its start state into a lane. */
 void vehicles_seat(Model *model, int i, const Start *start);
 
-/* Which of the vehicles take their inputs: numbers, and within their ranges. */
+/* Returns the lanes whose inputs are finite and within their ranges. */
 Mask vehicles_take(const Inputs *inputs);
 
-/* Steps those that are `going`; the others, and those that cannot follow or leave the ranges of their states, stay where they
- * are. Returns which have gone. */
+/* Steps the lanes `going`; the others, and those with unstable steps or states out of range, stay as they are. Returns the
+ * lanes that have advanced. */
 Mask vehicles_advance(Model *model, const Actuators *target, double start, double end, double substep, Mask going);
 
 #endif

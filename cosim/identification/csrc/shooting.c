@@ -1,13 +1,13 @@
 /* Prediction of the plant's motion from a start, with exact sensitivities.
  *
  * The equations are the FMU's own: plant_derivative moves the state, and its exact tangent moves the sensitivities, both
- * through the same Runge-Kutta steps of order four. So the sensitivities are those of the numbers that come out, to rounding. */
-#include "tangent.c" /* derivative_tangent, which no other file sees */
+ * through the same Runge-Kutta steps of order four. So the sensitivities are those of the computed numbers, to rounding. */
+#include "tangent.c" /* for derivative_tangent, which is static */
 
 #include "instance.h"
 #include "shooting.h"
 
-static const double FASTEST = 1e3; /* m/s, rad/s: a motion beyond is none of a vehicle */
+static const double FASTEST = 1e3; /* m/s, rad/s: faster than any vehicle */
 
 typedef struct {
     Model model, seed;
@@ -15,7 +15,7 @@ typedef struct {
     double *tangent, *stage, *slopes[4]; /* (n_directions, 13) each */
 } Shooter;
 
-/* Rate of the state in the model at a part of step k, and of each direction's tangent in `along`. */
+/* Computes the rate of the model's state at a fraction of step k, and that of each direction's tangent in `along`. */
 static void evaluate(Shooter *s, int k, double part, const double *along, double rate[N_RIGID], double *slope)
 {
     const Prediction *asked = s->asked;
@@ -55,7 +55,7 @@ static void evaluate(Shooter *s, int k, double part, const double *along, double
     }
 }
 
-/* Puts the state and all tangents to where a slope leads from the beginning of the step. */
+/* Sets the state and all tangents to those at the end of a slope from the beginning of the step. */
 static void move(Shooter *s, const double from[N_RIGID], const double rate[N_RIGID], const double *slope, double h)
 {
     for (int i = 0; i < N_RIGID; i++)
@@ -64,7 +64,7 @@ static void move(Shooter *s, const double from[N_RIGID], const double rate[N_RIG
         s->stage[i] = s->tangent[i] + h * slope[i];
 }
 
-/* The state at a part of the step, and its rate: the dense output of the method, of order three within the step. */
+/* Writes the state at a fraction of the step, and its rate: dense output of order three. */
 static void sample(const Shooter *s, int n, double part, const double from[N_RIGID], const double rates[4][N_RIGID])
 {
     const Prediction *asked = s->asked;
@@ -114,7 +114,7 @@ static int is_a_motion(const double rigid[N_RIGID])
     return 1;
 }
 
-/* One Runge-Kutta step, and the samples that lie in it. Returns 0 where the motion ends. */
+/* Makes one Runge-Kutta step, and writes the samples within it. Returns 0 where the motion ends. */
 static int advance(Shooter *s, int k, int *next)
 {
     const Prediction *asked = s->asked;

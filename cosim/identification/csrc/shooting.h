@@ -1,4 +1,4 @@
-/* Prediction of the plant's motion from a start, with exact sensitivities: what Python hands over and gets back. */
+/* Prediction of the plant's motion from a start, with exact sensitivities: arguments and results of Python's call. */
 #ifndef SHOOTING_H
 #define SHOOTING_H
 
@@ -11,10 +11,10 @@
 enum { STATE_SIZE = 13 }; /* position 3, quaternion 4, velocity 6 */
 
 typedef struct { /* one prediction; arrays are row by row */
-    int n_parameters; /* that are given, of the FMU */
+    int n_parameters; /* given parameters of the FMU */
     int n_steps;
-    int n_directions; /* along which there are sensitivities */
-    int n_inputs;     /* ways in which the wrench may change */
+    int n_directions; /* directions of the sensitivities */
+    int n_inputs;     /* inputs that change the wrench */
     int n_samples;
     double step; /* s */
 
@@ -36,7 +36,7 @@ typedef struct { /* one prediction; arrays are row by row */
     double *work;           /* (6, n_directions, 13) */
 } Prediction;
 
-/* Predicts. Returns NULL, or what is wrong with the parameters or the motion. */
+/* Predicts the motion. Returns NULL, or a message on invalid parameters or motion. */
 EXPORTED const char *shooting_predict(const Prediction *prediction);
 
 #endif

@@ -1,4 +1,4 @@
-/* A period that is counted: what is due at the beginning of a step, whatever the importer's sum of its steps has become. */
+/* Counted periods: ticks due at the beginning of a step, whatever the rounding of the importer's summed time. */
 #ifndef TICKS_H
 #define TICKS_H
 
@@ -9,10 +9,10 @@ typedef struct {
     double period; /* s; 0: not begun */
     double since;  /* s, time of tick 0 */
     double count;  /* of ticks that were done */
-    double warned; /* 1: of a tick that was late */
+    double warned; /* 1: a late tick has been warned of */
 } Ticks;
 
-/* Begins to count, anew where the period is another. */
+/* Starts to count, again if the period has changed. */
 static inline void ticks_begin(Ticks *ticks, double period, double time)
 {
     if (ticks->period == period)
@@ -23,14 +23,14 @@ static inline void ticks_begin(Ticks *ticks, double period, double time)
     ticks->warned = 0.0;
 }
 
-/* Up to when a tick is due at a time: sums may lag a little. */
+/* Returns the time up to which ticks are due, with a tolerance for summed steps. */
 static inline double ticks_by(const Ticks *ticks, double time)
 {
     return time + 1e-6 * ticks->period + 1e-15 * (fabs(time) + fabs(ticks->since));
 }
 
-/* How late the tick comes that is due [s], 0 if it is in time or another was late before: then the master's steps do not
- * divide the period, which is worth one warning. */
+/* Returns the lateness of the tick that is due [s]; 0 if it is in time, or an earlier one was late. Lateness means that the
+ * master's steps do not divide the period, which is worth one warning. */
 static inline double ticks_first_late(Ticks *ticks, double time)
 {
     const double late = time - (ticks->since + ticks->count * ticks->period);
@@ -41,7 +41,7 @@ static inline double ticks_first_late(Ticks *ticks, double time)
     return late;
 }
 
-/* Whether a tick is due; then it is done, with all that have gone by. */
+/* Returns true if a tick is due, and counts it with all missed ones. */
 static inline bool ticks_due(Ticks *ticks, double time)
 {
     const double by = ticks_by(ticks, time);
@@ -52,13 +52,13 @@ static inline bool ticks_due(Ticks *ticks, double time)
     return true;
 }
 
-/* Whether a step is so long that a tick would be left out. */
+/* Returns true if a step is so long that it would skip a tick. */
 static inline bool ticks_left_out(const Ticks *ticks, double step)
 {
     return step > ticks->period * (1.0 + 1e-6);
 }
 
-/* Whether counts that were restored can be. */
+/* Returns true if restored counts are valid. */
 static inline bool ticks_possible(const Ticks *ticks)
 {
     return ticks->period >= 0.0 && ticks->period < 1e9 && fabs(ticks->since) <= 1e9 && ticks->count >= 0.0 &&

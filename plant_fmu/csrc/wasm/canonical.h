@@ -1,5 +1,5 @@
-/* The Component Model's canonical ABI, as far as the draft fmi-ls-wasm needs it: memory that a call brings or returns,
- * and the place of a result<..., status>. An instance runs one call at a time, so one place is enough. */
+/* The Component Model's canonical ABI, as far as the draft fmi-ls-wasm needs it: memory of arguments and results, and the
+ * place of a result<..., status>. An instance runs one call at a time, so one place suffices. */
 #ifndef CANONICAL_H
 #define CANONICAL_H
 
@@ -10,10 +10,10 @@
 #include "instance.h" /* names the functions, before */
 #include "fmi3Functions.h"
 
-/* An instance as the importer holds it. */
+/* An instance, as the importer's handle points to it. */
 typedef struct {
     fmi3Instance fmu;
-    char *name; /* which goes with each message */
+    char *name; /* passed with each message */
 } Handle;
 
 typedef struct {
@@ -89,7 +89,7 @@ static Result *success(void)
     return &result;
 }
 
-/* `place` is that of what a success would hold. */
+/* Writes a failure; `place` is that of a success's payload. */
 static Result *failure(fmi3Status status, int place)
 {
     result.at.bytes[0] = 1;

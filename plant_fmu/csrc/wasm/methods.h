@@ -107,7 +107,7 @@ METHOD("set-boolean") int NAME(set_boolean)(Handle *self, const unsigned r[], si
     return done(fmi3SetBoolean(self->fmu, r, n, values, nv));
 }
 
-/* types that no variable of this FMU has: it answers alone who asks for none */
+/* types without a variable in this FMU: only an empty list succeeds */
 #define NONE_GOT(method, x, ...)                                                             \
     METHOD(method) Result *NAME(x)(Handle *self, const unsigned references[], size_t n)      \
     {                                                                                        \
@@ -147,7 +147,7 @@ NONE_SET("set-interval-decimal", set_interval_decimal, fmi3SetIntervalDecimal(se
 NONE_SET("set-interval-fraction", set_interval_fraction, fmi3SetIntervalFraction(self->fmu, references, n, NULL, NULL))
 NONE_SET("set-shift-decimal", set_shift_decimal, fmi3SetShiftDecimal(self->fmu, references, n, NULL))
 NONE_SET("set-shift-fraction", set_shift_fraction, fmi3SetShiftFraction(self->fmu, references, n, NULL, NULL))
-/* its list is of pairs, whose size alone counts */
+/* its list is of pairs; only its length matters */
 NONE_GOT("get-output-derivatives", get_output_derivatives,
          fmi3GetOutputDerivatives(self->fmu, references, n, NULL, NULL, n))
 

@@ -1,8 +1,8 @@
-/* What a component offers to the FMI wrappers: everything else in this folder is the same for all of them.
+/* Interface of a component to the FMI wrappers; everything else in this folder is the same for all components.
  *
  * A component brings a header model.h and a file that defines COMPONENT. The header defines
- *     Model     all that an instance is, as plain data, which FMU states copy; has the members time and stop_time,
- *     N_STATES  how many continuous states there are, which stand side by side in it, as their derivatives do,
+ *     Model     the whole state of an instance, as plain data, which FMU states copy; with the members time and stop_time,
+ *     N_STATES  number of continuous states, which are contiguous in it, as are their derivatives,
  * and includes the generated table of variables: COMPONENT_VARIABLES, FIRST_STATE, FIRST_DERIVATIVE,
  * INSTANTIATION_TOKEN, and the prefixes of names. */
 #ifndef COMPONENT_H
@@ -17,30 +17,30 @@ typedef enum { STATUS_OK, STATUS_WARNING, STATUS_DISCARD, STATUS_ERROR, STATUS_F
 typedef struct Instance Instance;
 
 typedef struct {
-    const char *name; /* of what steps, in messages */
+    const char *name; /* in messages */
 
-    /* Forgets what was sampled, so that time can begin. */
+    /* Clears samples and clocks before time begins. */
     void (*rewind)(Model *model);
-    /* Brings constants and clocks up to the parameters; refuses those that contradict each other. */
+    /* Updates constants and clocks from the parameters; refuses parameters that contradict each other. */
     Status (*prepare)(Instance *instance);
-    /* Ends initialisation: mends the start or refuses it, and does what is due at once. */
+    /* Ends initialisation: corrects or refuses the start values, and executes the clocks that are due. */
     Status (*begin)(Instance *instance);
-    /* Fills the outputs from all the rest. */
+    /* Computes the outputs. */
     void (*evaluate)(Instance *instance);
-    /* Refuses a step [s] that is too long to be taken. */
+    /* Refuses a step [s] that is too long. */
     Status (*fits)(const Instance *instance, double step);
-    /* Takes a step that ends at a time; if it refuses, the model is as before. */
+    /* Makes a step that ends at a time; on refusal the model stays as before. */
     Status (*advance)(Instance *instance, double end);
-    /* Whether a restored model can be, beyond its variables being in their ranges. */
+    /* True if a restored model is valid; the ranges of its variables are checked elsewhere. */
     bool (*possible)(const Model *model);
 
-    /* Of model exchange; all NULL where there are no states: then co-simulation alone is offered, no derivatives. */
+    /* For model exchange; all NULL without states: then the FMU offers co-simulation alone, and no derivatives. */
 
-    /* Puts states that follow the inputs at once to where these are. Returns whether any changed. */
+    /* Sets states without lag to their inputs. Returns 1 if any changed. */
     int (*settle)(Model *model);
-    /* Does what clocks say is due. Returns whether there was any. */
+    /* Executes the clocks that are due. Returns 1 if there was one. */
     int (*tick)(Model *model);
-    /* Time of the next tick, INFINITY if none is to come. */
+    /* Returns the time of the next tick; INFINITY: none. */
     double (*next_tick)(const Model *model);
     /* Exact directional derivative of states and outputs along a seed, see derivatives.c. */
     void (*tangent)(const Model *model, const Model *seed, int starting, Model *tangent);

@@ -1,5 +1,5 @@
-/* Directional and adjoint derivatives, by the table of variables: a seed stands in a Model of its own, at the place of
- * what it is the seed of, and a sensitivity is read from where its variable stands. */
+/* Directional and adjoint derivatives by the table of variables: a second Model holds each seed at the place of its
+ * variable, and a third the sensitivities at those of theirs. */
 #include <string.h>
 
 #include "instance.h"

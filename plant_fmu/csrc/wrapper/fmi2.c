@@ -199,7 +199,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
     REFUSE_NULL(1, value);
     if (s != fmi2Terminated)
         return (fmi2Status)instance_unsupported(c, "fmi2GetBooleanStatus of this kind");
-    *value = fmi2False; /* no component ends a simulation */
+    *value = fmi2False; /* no component terminates a simulation */
     return fmi2OK;
 }
 
@@ -207,7 +207,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
 
 fmi2Status fmi2EnterEventMode(fmi2Component c)
 {
-    return (fmi2Status)instance_enter_event_mode(c, MODE_EVENT | MODE_CONTINUOUS); /* again is no fault in 2.0 */
+    return (fmi2Status)instance_enter_event_mode(c, MODE_EVENT | MODE_CONTINUOUS); /* repeating it is allowed in 2.0 */
 }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo)
@@ -285,7 +285,7 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal
         return (fmi2Status)instance_unsupported(c, #function);     \
     }
 
-/* reading or writing no variable at all is no fault */
+/* an empty list of variables is allowed */
 #define UNSUPPORTED_VALUES(function, type)                                                            \
     fmi2Status function(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, type value[])     \
     {                                                                                                 \

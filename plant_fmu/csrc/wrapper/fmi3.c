@@ -253,7 +253,7 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance)
     return (fmi3Status)instance_enter_event_mode(instance, MODE_CONTINUOUS);
 }
 
-/* There is nothing to evaluate that would not be, and no flag that offers it: importers may call it all the same. */
+/* Does nothing: all is evaluated already. No flag offers it, but importers may call it. */
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance)
 {
     return (fmi3Status)instance_require(instance, MODE_INITIALISING | MODE_EVENT, "evaluating discrete states");

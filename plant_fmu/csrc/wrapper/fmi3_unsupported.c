@@ -1,4 +1,4 @@
-/* The functions of FMI 3.0 that this FMU does not offer: each logs, and returns an error. */
+/* Functions of FMI 3.0 that this FMU does not offer: each logs and returns an error. */
 #include "instance.h" /* names the functions, before */
 #include "fmi3Functions.h"
 
@@ -9,7 +9,7 @@
         return (fmi3Status)instance_unsupported(instance, #function);                   \
     }
 
-/* reading or writing no variable at all is no fault */
+/* an empty list of variables is allowed */
 #define UNSUPPORTED_FOR_ALL(function, parameters, ...)                                               \
     fmi3Status function parameters                                                                   \
     {                                                                                                \

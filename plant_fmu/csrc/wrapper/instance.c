@@ -43,7 +43,7 @@ Status instance_refuse(const Instance *instance, const char *format, ...)
     return STATUS_ERROR;
 }
 
-Status instance_tell(const Instance *instance, LogCategories category, const char *format, ...)
+Status instance_log(const Instance *instance, LogCategories category, const char *format, ...)
 {
     for (int i = 0; i < N_CATEGORIES; i++)
         if (CATEGORIES[i].category == category) {
@@ -129,7 +129,7 @@ Instance *instance_create(const char *name, const char *token, Interface kind, b
     }
     strcpy(instance->name, shown);
     instance->kind = kind;
-    instance->categories = logging_on ? LOG_ALL : LOG_ERRORS | LOG_WARNINGS; /* these until they are switched off */
+    instance->categories = logging_on ? LOG_ALL : LOG_ERRORS | LOG_WARNINGS; /* errors and warnings until they are switched off */
     instance->log = log;
     instance->environment = environment;
     instance->logger = logger;
@@ -193,7 +193,7 @@ Status instance_update(Instance *instance)
 {
     if (!instance->outdated)
         return STATUS_OK;
-    if (instance_starting(instance)) { /* what is sampled first is what will be */
+    if (instance_starting(instance)) { /* the outputs will show the first samples */
         COMPONENT.rewind(&instance->model);
         instance->unprepared = true;
     }
@@ -248,7 +248,7 @@ Status instance_exit_initialisation(Instance *instance)
         return STATUS_ERROR;
     instance->mode = instance->kind == CO_SIMULATION ? MODE_STEPPING : MODE_EVENT;
     instance->outdated = true;
-    instance_tell(instance, LOG_EVENTS, "initialised at t = %.9g s", instance->model.time);
+    instance_log(instance, LOG_EVENTS, "initialised at t = %.9g s", instance->model.time);
     return STATUS_OK;
 }
 

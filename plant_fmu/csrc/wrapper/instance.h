@@ -21,7 +21,7 @@ typedef enum {
     MODE_EVENT = 8,       /* model exchange */
     MODE_CONTINUOUS = 16, /* model exchange */
     MODE_TERMINATED = 32
-} Mode; /* bits, so that a call can name all the modes it is allowed in */
+} Mode; /* bits, so that a call can name all the modes in which it is allowed */
 
 typedef enum { LOG_EVENTS = 1, LOG_WARNINGS = 2, LOG_DISCARDS = 4, LOG_ERRORS = 8, LOG_ALL = 15 } LogCategories;
 
@@ -43,14 +43,14 @@ struct Instance {
     Interface kind;
     Mode mode;
     double start_time;    /* s, of the experiment */
-    bool refused;         /* the times of the experiment: there is no initialisation until others are accepted */
+    bool refused;         /* invalid experiment times: no initialisation until valid ones are set */
     bool unprepared;      /* parameters changed since the component was prepared */
     bool outdated;        /* outputs are older than the state, the inputs or the parameters */
-    unsigned categories;  /* of LogCategories, that are wanted */
+    unsigned categories;  /* enabled LogCategories */
     char *name;
     LogCallback *log;
     void *environment;    /* of the importer, */
-    void (*logger)(void); /* whose callback has another type in each FMI version */
+    void (*logger)(void); /* its type differs between FMI versions */
 };
 
 /* ---- instance.c: life, modes, messages ---- */
@@ -60,42 +60,42 @@ Instance *instance_create(const char *name, const char *token, Interface kind, b
 void instance_free(Instance *instance);
 Status instance_reset(Instance *instance);
 
-/* Refuses to enter initialisation where that is over, or was entered already. */
+/* Refuses to enter initialisation twice, or after it has ended. */
 Status instance_require_new(const Instance *instance);
-/* Sets the experiment's times; a stop time of INFINITY is none. */
+/* Sets the experiment's times; a stop time of INFINITY: none. */
 Status instance_set_experiment(Instance *instance, double start_time, double stop_time);
 Status instance_enter_initialisation(Instance *instance);
 Status instance_exit_initialisation(Instance *instance);
 Status instance_terminate(Instance *instance);
 
-/* Refuses an action outside the modes it is allowed in. */
+/* Refuses an action outside its allowed modes. */
 Status instance_require(const Instance *instance, unsigned modes, const char *action);
 
-/* Brings the outputs up to date; fails where the parameters contradict each other. */
+/* Updates the outputs; fails if parameters contradict each other. */
 Status instance_update(Instance *instance);
 
-/* Brings constants and clocks up to the parameters. */
+/* Updates constants and clocks from the parameters. */
 Status instance_prepare(Instance *instance);
 
-/* Whether initialisation has not ended. */
+/* True until initialisation ends. */
 bool instance_starting(const Instance *instance);
 
-/* Logs an error in printf's manner, unless errors were switched off or there is no instance, and returns STATUS_ERROR, so
+/* Logs an error with printf's arguments, unless errors are switched off or there is no instance. Returns STATUS_ERROR, so
  * that a check is one line. */
 Status instance_refuse(const Instance *instance, const char *format, ...);
 
-/* Logs, if the category is wanted, in printf's manner. Returns the status that goes with the category. */
-Status instance_tell(const Instance *instance, LogCategories category, const char *format, ...);
+/* Logs with printf's arguments, if the category is enabled. Returns the status of the category. */
+Status instance_log(const Instance *instance, LogCategories category, const char *format, ...);
 
 Status instance_set_logging(Instance *instance, bool on, size_t n, const char *const categories[]);
 
-/* Status of a function that this FMU does not offer. */
+/* Refuses a function that this FMU does not offer. */
 Status instance_unsupported(const Instance *instance, const char *function);
 
-/* Refuses NULL as the argument at that place among names with commas between them. */
+/* Refuses NULL as the argument at a place among names that commas separate. */
 Status instance_refuse_null(const Instance *instance, const char *function, const char *names, size_t place);
 
-/* Whether there is an instance and, where n is above 0, no NULL among the pointers to n values each. */
+/* True if there is an instance and, for n above 0, no NULL among the pointers to n values each. */
 static inline bool instance_given(const Instance *instance, const char *function, size_t n,
                                   const void *const pointers[], size_t n_pointers, const char *names)
 {
@@ -105,7 +105,7 @@ static inline bool instance_given(const Instance *instance, const char *function
     return instance != NULL;
 }
 
-/* instance_given of the function that it stands in, as INSTANCE_GIVEN(instance, n, first, second). */
+/* Calls instance_given for the enclosing function, as INSTANCE_GIVEN(instance, n, first, second). */
 #define INSTANCE_GIVEN(instance, n, ...)                                                  \
     instance_given(instance, __func__, n, (const void *const[]){__VA_ARGS__},             \
                    sizeof((const void *const[]){__VA_ARGS__}) / sizeof(void *), #__VA_ARGS__)
@@ -114,13 +114,13 @@ static inline bool instance_given(const Instance *instance, const char *function
 
 extern const Variable VARIABLES[]; /* by value reference */
 extern const unsigned N_VARIABLES;
-extern const char TOKEN[]; /* INSTANTIATION_TOKEN, in the same file: no other has anything of one vehicle alone */
+extern const char TOKEN[]; /* INSTANTIATION_TOKEN; its file alone depends on the vehicle */
 
-/* Where the model keeps a variable. */
+/* Returns the place of a variable in the model. */
 double *variable_real(Model *model, const Variable *variable);
 int *variable_integer(Model *model, const Variable *variable);
 
-/* Puts every variable but the outputs to its start value, and all else to zero. */
+/* Sets every variable but the outputs to its start value, and all else to zero. */
 void variables_start(Model *model);
 
 Status instance_get_reals(Instance *instance, const unsigned references[], size_t n, double values[]);
@@ -128,16 +128,16 @@ Status instance_set_reals(Instance *instance, const unsigned references[], size_
 Status instance_get_integer(Instance *instance, Type type, unsigned reference, int *value);
 Status instance_set_integer(Instance *instance, Type type, unsigned reference, int value);
 
-/* The first variable that is no number or out of its range, among those that are not calculated; NULL if there is none. */
+/* Returns the first independent variable that is not finite or out of its range; NULL: none. */
 const Variable *variables_stray(const Model *model);
-/* The same among the states alone. */
+/* The same for the states alone. */
 const Variable *variables_stray_state(const Model *model);
 
 /* ---- stepping.c ---- */
 
 Status instance_step(Instance *instance, double time, double step);
 
-/* `from` are the modes that it may be entered from. */
+/* Enters event mode, which is allowed in the modes `from`. */
 Status instance_enter_event_mode(Instance *instance, unsigned from);
 Status instance_enter_continuous_mode(Instance *instance);
 Status instance_update_discrete(Instance *instance, bool *states_changed, double *next_event_time);

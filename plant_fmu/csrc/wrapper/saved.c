@@ -1,4 +1,4 @@
-/* FMU states: all that an instance is, as one block of plain data. */
+/* FMU states: the whole instance as one block of plain data. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -7,11 +7,11 @@
 #include "instance.h"
 
 struct Saved {
-    uint64_t zero;     /* stays 0: some importers hand the block itself to a function that frees what it points to */
-    uint32_t magic;    /* tells a foreign block, and one of a machine with the other byte order */
+    uint64_t zero;     /* stays 0: some importers pass the block itself to a function that frees the pointer at its start */
+    uint32_t magic;    /* marks a block of this format and byte order */
     uint32_t size;
-    uint64_t origin;   /* hash of the instantiation token: blocks of another FMU do not fit */
-    uint64_t checksum; /* of a serialised block: of all that follows */
+    uint64_t origin;   /* hash of the instantiation token: refuses blocks of another FMU */
+    uint64_t checksum; /* of a serialised block: checksum of all that follows */
     int32_t kind, mode, unprepared, refused;
     double start_time;
     Model model;
@@ -47,7 +47,7 @@ static Status check_block(const Instance *instance, const Saved *saved)
 
 Status instance_save(Instance *instance, Saved **saved)
 {
-    if (*saved && check_block(instance, *saved) != STATUS_OK) /* one that exists is written again */
+    if (*saved && check_block(instance, *saved) != STATUS_OK) /* an existing block is overwritten */
         return STATUS_ERROR;
     if (!*saved)
         *saved = calloc(1, sizeof **saved);
@@ -114,7 +114,7 @@ Status instance_serialise(Instance *instance, const Saved *saved, unsigned char 
     return STATUS_OK;
 }
 
-/* Whether what was read can be a state: every value a number and in its range, and the rest as the component wants it. */
+/* Checks a state that was read: every value finite and in its range, the rest by the component. */
 static Status check_content(const Instance *instance, const Saved *saved)
 {
     const Model *m = &saved->model;
@@ -126,7 +126,7 @@ static Status check_content(const Instance *instance, const Saved *saved)
         return instance_refuse(instance, "serialised FMU state: %s is outside [%.9g, %.9g]", stray->name, stray->min,
                                stray->max);
     const int32_t modes[] = {MODE_INSTANTIATED, MODE_INITIALISING, MODE_TERMINATED, MODE_STEPPING, MODE_EVENT, MODE_CONTINUOUS};
-    bool known = false; /* the last three belong to one interface each */
+    bool known = false; /* each of the last three belongs to one interface */
     for (int i = 0; i < 6; i++)
         known = known || (saved->mode == modes[i] && (i < 3 || (i == 3) == (saved->kind == CO_SIMULATION)));
     good = good && known;
@@ -151,7 +151,7 @@ Status instance_deserialise(Instance *instance, const unsigned char bytes[], siz
         return status;
     }
     s->checksum = 0;
-    s->unprepared = 1; /* constants are made anew from the parameters, not believed */
+    s->unprepared = 1; /* constants are computed from the parameters, not read */
     *saved = s;
     return STATUS_OK;
 }

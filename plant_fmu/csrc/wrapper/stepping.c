@@ -1,4 +1,4 @@
-/* How time goes on: steps of co-simulation, or an importer's own integrator in model exchange. */
+/* Advance of time: steps of co-simulation, or an importer's own integrator in model exchange. */
 #include <math.h>
 #include <string.h>
 
@@ -6,7 +6,7 @@
 
 /* ---- co-simulation ----------------------------------------------------------------------------------------- */
 
-/* Whether a step from `time` fits the experiment. Masters add up their time: they are allowed their rounding. */
+/* Checks that a step from `time` fits the experiment, within the rounding of a master's summed time. */
 static Status check_step(const Instance *instance, double time, double step)
 {
     const Model *m = &instance->model;
@@ -38,7 +38,7 @@ Status instance_step(Instance *instance, double time, double step)
 
 /* ---- model exchange ---------------------------------------------------------------------------------------- */
 
-/* Where the states stand, or their derivatives, one behind the other. */
+/* Returns the place of the contiguous states, or of their derivatives. */
 static double *states_at(Model *model, int first)
 {
     return variable_real(model, &VARIABLES[first]);
@@ -65,7 +65,7 @@ Status instance_enter_event_mode(Instance *instance, unsigned from)
 Status instance_enter_continuous_mode(Instance *instance)
 {
     if (instance_require(instance, MODE_EVENT, "entering continuous-time mode") != STATUS_OK ||
-        instance_update(instance) != STATUS_OK) /* sets the discrete outputs for the time that comes */
+        instance_update(instance) != STATUS_OK) /* sets the discrete outputs for the next interval */
         return STATUS_ERROR;
     instance->mode = MODE_CONTINUOUS;
     return STATUS_OK;
@@ -80,7 +80,7 @@ Status instance_update_discrete(Instance *instance, bool *states_changed, double
         return STATUS_ERROR;
     *states_changed = COMPONENT.settle(m) != 0;
     if (COMPONENT.tick(m))
-        instance_tell(instance, LOG_EVENTS, "sampled at t = %.9g s", m->time);
+        instance_log(instance, LOG_EVENTS, "sampled at t = %.9g s", m->time);
     *next_event_time = COMPONENT.next_tick(m);
     instance->outdated = true;
     return STATUS_OK;
@@ -114,7 +114,7 @@ Status instance_set_states(Instance *instance, const double states[], size_t n)
     if (stray) { /* an integrator may try again with a shorter step */
         const double value = *variable_real(m, stray);
         memcpy(states_at(m, FIRST_STATE), before, N_STATES * sizeof(double));
-        return instance_tell(instance, LOG_DISCARDS, "%s = %.9g discarded: outside [%.9g, %.9g]", stray->name, value,
+        return instance_log(instance, LOG_DISCARDS, "%s = %.9g discarded: outside [%.9g, %.9g]", stray->name, value,
                              stray->min, stray->max);
     }
     instance->outdated = true;

@@ -1,4 +1,4 @@
-/* The table of variables, and what may be read and written when. */
+/* The table of variables, and the modes in which each may be read and written. */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -39,7 +39,7 @@ void variables_start(Model *model)
 
 /* ---- reading ----------------------------------------------------------------------------------------------- */
 
-/* Whether a reference is of that type. */
+/* Checks that a reference has a type. */
 static Status check_reference(const Instance *instance, Type type, unsigned reference)
 {
     if (reference < N_VARIABLES && VARIABLES[reference].type == type)

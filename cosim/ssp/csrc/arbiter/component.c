@@ -1,5 +1,5 @@
-/* The fuzzy arbiter as a component behind the FMI wrappers. The weights are worked out in a step, from the inputs at
- * its beginning; before the first they are 0. */
+/* The fuzzy arbiter as a component behind the FMI wrappers. A step computes the weights from the inputs at its beginning;
+ * before the first step they are 0. */
 #include <math.h>
 #include <string.h>
 
@@ -46,7 +46,7 @@ static Status advance(Instance *instance, double end)
 
     const double late = ticks_first_late(&m->ticks, m->time);
     if (late > 0.0)
-        instance_tell(instance, LOG_WARNINGS, "the arbiter runs at t = %.9g s, %.3g s late: steps do not divide time.arbiter = %.9g s",
+        instance_log(instance, LOG_WARNINGS, "the arbiter runs at t = %.9g s, %.3g s late: steps do not divide time.arbiter = %.9g s",
                       m->time, late, m->ticks.period);
     if (ticks_due(&m->ticks, m->time)) {
         if (EVALUATE_RULES(m->inputs, weights) != 0) {

@@ -2,7 +2,7 @@
 #ifndef MODEL_H
 #define MODEL_H
 
-#include "variables.h" /* generated: how many criteria there are, and the table of variables */
+#include "variables.h" /* generated: number of criteria, and the table of variables */
 
 #include "ticks.h"
 
@@ -14,7 +14,7 @@ typedef struct {
     Ticks ticks;
     double weights[N_CRITERIA];
     double time;
-    double stop_time; /* INFINITY if there is none */
-} Model; /* plain data: all that an FMU state holds */
+    double stop_time; /* INFINITY: none */
+} Model; /* plain data: the whole FMU state */
 
 #endif

@@ -1,5 +1,5 @@
-/* Law, regions and what is sensed as a component behind the FMI wrappers: the stages of a step in the master's order. Everything
- * is worked out in a step, from the inputs at its beginning; before the first all outputs are 0. */
+/* Law, regions and sensing as a component behind the FMI wrappers: the stages of a step in the master's order. A step
+ * computes the outputs from the inputs at its beginning; before the first step all outputs are 0. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,22 +10,22 @@
 static const int OFFSETS[N_ALL + 1] = REGION_OFFSETS;
 static const int CRITERIA[N_ALL] = REGION_CRITERIA;
 static const char *const NAMES[N_ALL] = REGION_NAMES;
-static const int RAMPS[] = RAMP_PLACES; /* of the memberships that fall over arbiter.ramp; the last is -1 */
+static const int RAMPS[] = RAMP_PLACES; /* memberships that decrease over arbiter.ramp; -1 ends the list */
 
-/* What must hold among the numbers of all shapes, beyond their ranges; the last has no fault. */
+/* Constraints among the numbers of the shapes, beyond their ranges; one without a message ends the list. */
 typedef struct Constraint {
     enum { HOLDS_UNIT, HOLDS_ROTATION, HOLDS_ABOVE } what;
     int region, place;
-    int more; /* how many numbers, or the place of the one to exceed */
+    int more; /* number of numbers, or the place of the one to exceed */
     const char *fault;
 } Constraint;
 
 static const Constraint CONSTRAINTS[] = REGION_CONSTRAINTS;
 
-typedef struct { /* the last has no thruster */
+typedef struct { /* one without a thruster ends the list */
     double time; /* s */
     int thruster;
-    double remaining; /* effectiveness; NaN: stuck */
+    double remaining; /* remaining effectiveness; NaN: stuck */
 } Failure;
 
 static const Failure FAILURES[] = SCENE_FAILURES;
@@ -37,8 +37,8 @@ typedef struct { /* the last is at INFINITY */
 } Outage;
 
 static const Outage OUTAGES[] = SCENE_OUTAGES;
-static const double GOAL_PLACES[][3] = SCENE_GOAL_PLACES; /* m, where the goal is next, in turn; one more than there are */
-static const double HAIR = 1e-6 * SCENE_STEP;             /* s: sums of steps may lag a little */
+static const double GOAL_PLACES[][3] = SCENE_GOAL_PLACES; /* m, next places of the goal, in turn; one more than there are */
+static const double HAIR = 1e-6 * SCENE_STEP;             /* s: tolerance for rounding of summed steps */
 
 /* ---- numbers ----------------------------------------------------------------------------------------------- */
 
@@ -69,7 +69,7 @@ static bool is_rotation(const double R[9])
     return true;
 }
 
-/* Where the numbers of a region's shape stand: the goal's apart from all others. */
+/* Returns the place of the numbers of a region's shape: the goal's are apart from all others. */
 static const double *shape_of(const Model *m, int region)
 {
     return m->numbers + (region ? AT_REGION_NUMBERS + OFFSETS[region] : AT_GOAL_NUMBERS);
@@ -136,8 +136,8 @@ static Status fits(const Instance *instance, double step)
 
 /* ---- the stages of a step ---------------------------------------------------------------------------------- */
 
-/* Where the vehicle is: as the inputs say; at the start while all of them are 0, as masters leave them that have not
- * heard of the plant yet. A quaternion of zeros is read as identity. */
+/* Writes the vehicle's motion from the inputs; the start while all of them are 0, as masters leave them before the
+ * plant's first outputs. A quaternion of zeros counts as identity. */
 static void motion_now(const Model *m, double motion[13])
 {
     bool all_zero = true;
@@ -152,7 +152,7 @@ static void motion_now(const Model *m, double motion[13])
         motion[3] = 1.0;
 }
 
-/* Lets law and allocation know of the thrusters that have failed altogether. */
+/* Reports total failures of thrusters to law and allocation. */
 static void report_failures(Model *m)
 {
     for (const Failure *f; (f = &FAILURES[(int)m->memory.reported])->thruster >= 0 && f->time <= m->time + HAIR;) {
@@ -165,7 +165,7 @@ static void report_failures(Model *m)
     }
 }
 
-/* Writes what law and arbiter are given of a true motion: with noise, held, or lost. */
+/* Writes the state that law and arbiter receive of a true motion: with noise, held, or lost. */
 static void sense_state(Model *m, const double motion[13], bool anew)
 {
     static const double DEVIATIONS[6] = SCENE_DEVIATIONS;
@@ -192,8 +192,8 @@ static void sense_state(Model *m, const double motion[13], bool anew)
 }
 
 #if SCENE_SENSORS
-/* Writes what the navigation filter makes of the samples. Inputs that are all 0 are those of a master that has not heard of
- * the plant yet: then there are no samples. */
+/* Writes the state that the navigation filter estimates from the samples. Inputs that are all 0 come before the plant's
+ * first outputs: then there are no samples. */
 static void sense_samples(Model *m)
 {
     bool all_zero = true;
@@ -218,13 +218,13 @@ static void move_regions(Model *m)
         m->numbers[AT_REGION_SHIFTS + i] = m->numbers[AT_REGION_VELOCITIES + i] * m->time;
 }
 
-/* Evaluates the regions at the pose that is known, and what the arbiter's rules get, for when the step has ended. */
+/* Evaluates the regions at the known pose, and the inputs of the arbiter's rules, for the end of the step. */
 static void decide(Model *m, double end)
 {
     Outputs *out = &m->outputs;
 
     if (!is_finite(m->numbers + AT_POSITION, 3))
-        return; /* nothing to decide by: the last memberships hold */
+        return; /* unknown pose: the last memberships hold */
     m->numbers[AT_NOW] = end;
     control_decide(m);
     memcpy(out->values, m->numbers + AT_VALUES, sizeof out->values);
@@ -234,7 +234,7 @@ static void decide(Model *m, double end)
 }
 
 #if SCENE_N_PLACES
-/* Lets the goal go on, from the next step on, once the vehicle has stayed in it long enough. */
+/* Moves the goal to its next place, from the next step on, once the vehicle has stayed in it long enough. */
 static void advance_goal(Model *m, const double motion[13])
 {
     memcpy(m->numbers + AT_TRUE_POSITION, motion, 3 * sizeof(double));
@@ -252,7 +252,7 @@ static void advance_goal(Model *m, const double motion[13])
 }
 #endif
 
-/* Works out the forces of the coming period; none before anything is known to steer by. */
+/* Computes the forces of the next period; 0 before a state is known. */
 static void steer(Model *m)
 {
     Outputs *out = &m->outputs;
@@ -280,7 +280,7 @@ static void steer(Model *m)
             out->thrusts[i] = m->numbers[AT_THRUSTS + i];
 }
 
-/* Lets thrusters fail, and sensors fall out, that do so in the step which these outputs are for. */
+/* Applies failures of thrusters and outages of sensors that are scheduled for the next step. */
 static void fail(Model *m, double end)
 {
     Memory *memory = &m->memory;
@@ -305,7 +305,7 @@ static Status take_step(Instance *instance, double end)
 
     const double late = ticks_first_late(&m->memory.control, m->time);
     if (late > 0.0)
-        instance_tell(instance, LOG_WARNINGS, "the law runs at t = %.9g s, %.3g s late: steps do not divide time.control = %.9g s",
+        instance_log(instance, LOG_WARNINGS, "the law runs at t = %.9g s, %.3g s late: steps do not divide time.control = %.9g s",
                       m->time, late, m->parameters.period);
     const bool due = ticks_due(&m->memory.control, m->time);
 

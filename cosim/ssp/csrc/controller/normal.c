@@ -8,7 +8,7 @@
 #define FACTOR_HIGH UINT64_C(2549297995355413924) /* of PCG's linear congruential generator of 128 bits */
 #define FACTOR_LOW UINT64_C(4865540595714422341)
 
-/* Upper half of a product of 64 bits by 64. */
+/* Returns the upper half of a product of 64 bits by 64. */
 static uint64_t high_product(uint64_t a, uint64_t b)
 {
     const uint64_t a0 = a & 0xffffffffu, a1 = a >> 32, b0 = b & 0xffffffffu, b1 = b >> 32;
