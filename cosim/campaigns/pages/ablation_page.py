@@ -119,7 +119,7 @@ def _page(
         page.heading("By kind of scene")
         for name, of in variants.items():
             if name != WHOLE:
-                page.paragraph(Html(f"{code(name)}: {of['what']}."))
+                page.paragraph(Html(f"{code(name)}: {of['description']}."))
                 _table(page, of["kinds"], "kind")
     if changed:
         page.heading("Where it changed most")

@@ -82,7 +82,7 @@ def campaign_lines(summary: dict[str, Any]) -> Iterator[str]:
     Parameters
     ----------
     summary : dict
-        From `cosim.campaigns.analysis.summary.summarise`.
+        From `cosim.campaigns.analysis.summary.summarize_campaign`.
 
     Yields
     ------

@@ -61,7 +61,7 @@ def write_falsification_page(folder: Path, replays: int) -> Path:
 
 
 def falsification_lines(summary: dict[str, Any]) -> Iterator[str]:
-    """Yield the lines that tell a search on a terminal.
+    """Yield the lines that summarize a search on a terminal.
 
     Parameters
     ----------

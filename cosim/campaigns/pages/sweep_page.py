@@ -86,7 +86,7 @@ def sweep_lines(summary: dict[str, Any]) -> Iterator[str]:
     Parameters
     ----------
     summary : dict
-        From `summarise_sweep`.
+        From `summarize_sweep`.
 
     Yields
     ------
