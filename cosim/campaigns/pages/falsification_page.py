@@ -137,7 +137,7 @@ def _page(s: dict[str, Any], figures: Mapping[str, Html], shown: Mapping[int, Re
     page.paragraph(f"Of {unit}s that are near to each other, the worst one. A replay shows the flight in the browser.")
     label, random = _LABELS[search["objective"]], s["random"]["worst"] if s["random"] else []
     page.table(
-        [f"{unit} found", label, *(["at random", label] if random else []), "to be seen", "again, with full record"],
+        [f"{unit} found", label, *(["at random", label] if random else []), "replay", "command that repeats it"],
         [
             [
                 *_cells(s, found),
