@@ -3,8 +3,8 @@
 Gains are drawn log-uniformly, half of them from `RANGES`, the others around the best so far; those without a range
 keep the values of their source. Each draw flies plain and hard scenes by turns, 300 of each from seed 10000 on. Safety
 counts first: better is fewer violations over both, then more reached, then the lower median reach time. A draw flies
-the scenes first in which the best fails, and is given up as soon as it falls behind the best over the scenes flown: who
-repairs none of these cannot be safer. The other laws begin with what was found for `pd`.
+the scenes first in which the best fails, and is given up as soon as it falls behind the best over the scenes flown: a
+draw that fails in all of these cannot be safer. The other laws begin with what was found for `pd`.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def draws(law: str, count: int, rng: np.random.Generator, best: Any = None, near
     count : int
         How many.
     rng : Generator
-        Whence they come.
+        Source of the random numbers.
     best : NamedTuple, optional
         Gains to draw around.
     near : float
@@ -192,7 +192,7 @@ def search(law: str, count: int, seed: int, workers: int, pd: PdGains | None = N
             better = min([best, *finished], key=lambda candidate: candidate.outcome.rank)
             if better is not best:
                 best = better
-                print(f"{law}: {_sentence(best.outcome)}", flush=True)
+                print(f"{law}: {format_outcome(best.outcome)}", flush=True)
     return best
 
 
@@ -237,7 +237,8 @@ def _scene(index: int) -> Scene:
     return msgspec.convert(make_scene(FIRST_SEED + index // len(KINDS), KINDS[index % len(KINDS)]), Scene)
 
 
-def _sentence(found: Outcome) -> str:
+def format_outcome(found: Outcome) -> str:
+    """Format an outcome as one line."""
     return (
         f"{found.violations} violations and {found.reached} reached of {found.scenes} scenes; "
         f"medians over those reached without violation: {found.reach_time:.2f} s, {found.effort:.0f} N s"
@@ -269,4 +270,4 @@ def main(laws: Iterable[str], count: int, seed: int, workers: int) -> None:
         flown = _fly_on((law, Candidate(gains, {}), range(SCENES), Conditions().duration)).scores
         for first, kind in enumerate(KINDS):
             found = outcome(flown[i] for i in range(first, SCENES, len(KINDS)))
-            print(f"{law}, {kind}, in full: {_sentence(found)}", flush=True)
+            print(f"{law}, {kind}, in full: {format_outcome(found)}", flush=True)

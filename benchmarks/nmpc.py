@@ -16,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple
 import msgspec
 import numpy as np
 
-from benchmarks.baselines import FIRST_SEED, KINDS, Outcome, outcome
+from benchmarks.baselines import FIRST_SEED, KINDS, format_outcome, outcome
 from benchmarks.peer_environment import Environment
 from benchmarks.peer_process import PeerProcess, peer
 from controller import LAWS, VehicleModel, VehicleState
@@ -63,11 +63,11 @@ MARGINS = (0.05, 0.1)  # m, of the search
 
 
 class _Step:
-    """A law's function, of which the loop calls back: observer at each step, a plan at some."""
+    """The law's function, which the loop calls back: the observer at each step, a plan at some."""
 
     process: PeerProcess | None = None
     times: ClassVar[list[float]] = []  # s, of all plans
-    failures = 0  # plans that the solver did not end
+    failures = 0  # plans that did not converge
 
     def __call__(
         self,
@@ -216,23 +216,16 @@ def search(environment: Environment) -> NmpcGains:
         with planner(gains, environment):
             for margin in MARGINS:
                 gains = gains._replace(margin=margin)
-                came = outcome(score for kind in KINDS for score in fly(gains, kind, FIRST_SEED, SEARCHED))
-                print(f"{stages:g} stages of {interval} s, margin {margin} m: {_sentence(came)}", flush=True)
-                found.append((came.rank, gains))
+                flown = outcome(score for kind in KINDS for score in fly(gains, kind, FIRST_SEED, SEARCHED))
+                print(f"{stages:g} stages of {interval} s, margin {margin} m: {format_outcome(flown)}", flush=True)
+                found.append((flown.rank, gains))
     return min(found)[1]
-
-
-def _sentence(found: Outcome) -> str:
-    return (
-        f"{found.violations} violations, {found.reached} reached of {found.scenes}, {found.reach_time:.2f} s, "
-        f"{found.effort:.0f} N s"
-    )
 
 
 def main(
     kinds: Iterable[str], seed: int, count: int, searches: bool, python: str | None = None, out: Path | None = None
 ) -> None:
-    """Fly scenes of some kinds, and print what it came to; or search first.
+    """Fly scenes of some kinds, and print the outcome; or search first.
 
     Parameters
     ----------
@@ -243,7 +236,7 @@ def main(
     count : int
         Scenes of a kind.
     searches : bool
-        Whether the settings are searched, not the defaults.
+        Search the settings, instead of the defaults.
     python : str, optional
         That has CasADi; default: the benchmarks' own.
     out : Path, optional
@@ -255,7 +248,8 @@ def main(
         for kind in kinds:
             scores = fly(gains, kind, seed, count)
             times, failures = sorted(1e3 * t for t in NmpcLaw.function.times), NmpcLaw.function.failures
-            print(f"{kind}: {_sentence(outcome(scores))}; least clearance {min(s.min_clearance for s in scores):.3f} m")
+            least = min(score.min_clearance for score in scores)
+            print(f"{kind}: {format_outcome(outcome(scores))}; least clearance {least:.3f} m")
             print(
                 f"  a plan: median {statistics.median(times):.1f} ms, 99 % {times[int(0.99 * len(times))]:.1f} ms, "
                 f"longest {times[-1]:.1f} ms; {failures} of {len(times)} not converged",

@@ -12,7 +12,7 @@ import numpy as np
 
 from cosim.campaigns.analysis.statistics import Facts, mean_ratio, median_difference, paired, rate
 from cosim.campaigns.campaign import Campaign, run_campaign
-from cosim.campaigns.comparison import completed, refuse_strangers
+from cosim.campaigns.comparison import completed, refuse_other_files
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.kinds import scene_kinds
 from cosim.campaigns.scenes.law_gains import gains_from
@@ -33,7 +33,7 @@ _ZERO = 1e-9  # for a bound that must be above 0
 class Variant(NamedTuple):
     """The law without a part."""
 
-    what: str  # description
+    description: str
     gains: Mapping[str, float] = {}
     arbiter: RuleVariant = "ordered"
 
@@ -117,11 +117,11 @@ def ablate(
             raise RunError(f"variant {name!r} is unknown; {hint(name, VARIANTS)}")
     if not variants or len(set(variants)) < len(variants):
         raise RunError(f"variants are {', '.join(variants) or 'none'}, expected one or more, each once")
-    refuse_strangers(out, {NUMBERS, PAGE, WHOLE, *VARIANTS}, "an ablation")
+    refuse_other_files(out, {NUMBERS, PAGE, WHOLE, *VARIANTS}, "an ablation")
+    flown = {WHOLE: Variant("all of it")} | {name: VARIANTS[name] for name in variants}
     gains, conditions, campaigns = gains_from(LAW, settings), conditions or Conditions(), {}
     with SceneStore(scenes) as store:
-        for name in (WHOLE, *variants):
-            variant = VARIANTS.get(name, Variant("all of it"))
+        for name, variant in flown.items():
             campaigns[name] = run_campaign(
                 store, LAW, out / name, dataclasses.replace(conditions, arbiter=variant.arbiter),
                 gains._replace(**variant.gains), workers, progress=progress,
@@ -132,11 +132,8 @@ def ablate(
             "scenes": len(store),
             "scenes_sha256": store.digest,
             "variants": {
-                name: {
-                    "what": VARIANTS[name].what if name in VARIANTS else "all of it",
-                    **_beside(whole, campaign.results),
-                }
-                for name, campaign in campaigns.items()
+                name: {"description": variant.description, **_beside(whole, campaigns[name].results)}
+                for name, variant in flown.items()
             },
             "versions": campaigns[WHOLE].summary["versions"],
             "code_sha256": campaigns[WHOLE].summary["code_sha256"],

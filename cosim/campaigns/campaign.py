@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.campaigns.analysis.summary import summarise
+from cosim.campaigns.analysis.summary import summarize_campaign
 from cosim.campaigns.runner import carry_out
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.law_gains import gains_from
@@ -106,7 +106,7 @@ def run_campaign(
         summary: dict[str, Any] = {}
 
         def conclude(results: Results) -> None:
-            summary.update(summarise(work.flown, results, out))
+            summary.update(summarize_campaign(work.flown, results, out))
             write_atomic(out / SUMMARY, json_text(summary))
 
         done = carry_out(work, out, workers, executor, progress, conclude)

@@ -99,7 +99,7 @@ def compare(
         law_named(law)
     if len(laws) < 2 or len(set(laws)) < len(laws):
         raise RunError(f"laws are {', '.join(laws) or 'none'}, expected two or more, each once")
-    refuse_strangers(out, {NUMBERS, PAGE, *LAWS}, "a comparison")
+    refuse_other_files(out, {NUMBERS, PAGE, *LAWS}, "a comparison")
     campaigns = {}
     with SceneStore(scenes) as store:
         for law in laws:
@@ -111,13 +111,13 @@ def compare(
             "scenes_sha256": store.digest,
             "laws": {law: campaign.summary for law, campaign in campaigns.items()},
             "pairs": [
-                pair(one, campaigns[one].results, other, campaigns[other].results)
+                medians_where_completed(one, campaigns[one].results, other, campaigns[other].results)
                 for one in laws
                 for other in laws
                 if one != other
             ],
             "paired": [
-                difference(one, campaigns[one].results, other, campaigns[other].results)
+                paired_differences(one, campaigns[one].results, other, campaigns[other].results)
                 for one, other in itertools.combinations(laws, 2)
             ],
         }
@@ -128,7 +128,7 @@ def compare(
     return Comparison(out, campaigns, numbers)
 
 
-def pair(one: str, results: Results, other: str, others: Results) -> dict[str, Any]:
+def medians_where_completed(one: str, results: Results, other: str, others: Results) -> dict[str, Any]:
     """Compare two laws on the scenes that one of them completes without a violation.
 
     Parameters
@@ -157,7 +157,7 @@ def pair(one: str, results: Results, other: str, others: Results) -> dict[str, A
     }
 
 
-def difference(one: str, results: Results, other: str, others: Results) -> dict[str, Any]:
+def paired_differences(one: str, results: Results, other: str, others: Results) -> dict[str, Any]:
     """Compare two laws scene by scene.
 
     Parameters
@@ -190,10 +190,10 @@ def completed(results: Results) -> Any:
     return results["reached"] & ~results["violation"]
 
 
-def refuse_strangers(out: Path, own: set[str], what: str) -> None:
-    """Raise `RunError` if a folder holds files other than `own` and those of pages; `what` names the expected kind."""
+def refuse_other_files(out: Path, own: set[str], kind: str) -> None:
+    """Raise `RunError` if a folder holds files other than `own` and those of pages; `kind` names the expected one."""
     if out.is_dir():
         known = {*own, *(f".{name}" for name in own), FIGURES, WORST}
-        strange = sorted(p.name for p in out.iterdir() if p.name not in known and not p.name.startswith(f".{FIGURES}"))
-        if strange:
-            raise RunError(f"{out}: holds {strange[0]!r}, expected a new folder or that of {what}")
+        others = sorted(p.name for p in out.iterdir() if p.name not in known and not p.name.startswith(f".{FIGURES}"))
+        if others:
+            raise RunError(f"{out}: holds {others[0]!r}, expected a new folder or that of {kind}")

@@ -79,7 +79,7 @@ def carry_out(
     """
     if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing itself checks
         raise RunError(
-            "a process that starts reads the script again, and came to this call; "
+            "a worker process runs the script again, and reached this call; "
             "expected it below: if __name__ == '__main__':"
         )
     if workers < 1:
@@ -99,7 +99,7 @@ def carry_out(
             conclude(results)
         except OSError as error:
             raise RunError(
-                f"{out}: {error.strerror or error}; what is flown is kept, and can be gone on from"
+                f"{out}: {error.strerror or error}; what is flown is kept, and the same command goes on"
             ) from error
     return Done(results, flown)
 

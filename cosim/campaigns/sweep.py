@@ -12,7 +12,7 @@ from cosim.campaigns.store.folder import SUMMARY
 from cosim.campaigns.store.results import Results
 from cosim.campaigns.sweeps.design import Design
 from cosim.campaigns.sweeps.rows import SweepWork
-from cosim.campaigns.sweeps.summary import summarise_sweep
+from cosim.campaigns.sweeps.summary import summarize_sweep
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
 from cosim.scenario.scenario import Scenario
@@ -100,7 +100,7 @@ def run_sweep(
     summary: dict[str, Any] = {}
 
     def conclude(results: Results) -> None:
-        summary.update(summarise_sweep(work, results, out))
+        summary.update(summarize_sweep(work, results, out))
         write_atomic(out / SUMMARY, json_text(summary))
 
     done = carry_out(work, out, workers, executor, progress, conclude)

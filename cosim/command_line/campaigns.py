@@ -145,7 +145,7 @@ def ablate(options: argparse.Namespace) -> int:
             weighted = "" if violated is None else f", weighted violation {violated:.4g} m s on average"
             say(
                 options,
-                f"{name} ({of['what']}): {of['completed']['rows']} of {of['scenes']} scenes completed{weighted}",
+                f"{name} ({of['description']}): {of['completed']['rows']} of {of['scenes']} scenes completed{weighted}",
             )
         print(write_ablation_page(options.out, options.replays))
 

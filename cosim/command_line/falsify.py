@@ -14,7 +14,7 @@ _EPILOG = """examples:
   cosim falsify hard --law pd --budget 2000 --out falsified/pd
   cosim falsify conflict --law deployable --objective violation --out falsified/conflict
   cosim falsify hard --law deployable --rare-event --out falsified/rate
-  cosim falsify docking --vary initial.position.1=-4:-2 plant.current.2=-0.2:0.2 --objective arrival \\
+  cosim falsify docking --vary initial.position.1=-4:-2 plant.current.1=-0.2:0.2 --objective arrival \\
       --out falsified/dock
 """
 

@@ -20,8 +20,8 @@ _REASONS = 5  # greatest number of listed reasons for refusing scenes
 MEDIANS = ("reach_time", "effort", "thrust_variation", "min_clearance", "worst_step_time")
 
 
-def summarise(plan: Plan, results: Results, folder: Path) -> dict[str, Any]:
-    """Summarise a campaign.
+def summarize_campaign(plan: Plan, results: Results, folder: Path) -> dict[str, Any]:
+    """Summarize a campaign.
 
     Parameters
     ----------

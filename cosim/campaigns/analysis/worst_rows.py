@@ -17,6 +17,11 @@ ORDER = (
 )
 
 
+def violated_column(results: Results) -> str:
+    """Return the name of the column of violations, which scenes and sweeps call differently."""
+    return "violation" if "violation" in results.schema.names else "violated"
+
+
 class Worst(NamedTuple):
     """A row with the reason why it is among the worst."""
 
@@ -42,7 +47,7 @@ def worst_rows(results: Results, count: int = LISTED) -> list[Worst]:
     names = results.schema.names
     keys, reached = results[names[0]], results.fact("reached")
     stopped = results.number("stopped_at")
-    violated = results.fact("violation" if "violation" in names else "violated") | np.isfinite(stopped)
+    violated = results.fact(violated_column(results)) | np.isfinite(stopped)
     clearance, time = results.number("min_clearance"), results.number("reach_time")
     depth = np.where(np.isfinite(clearance), np.maximum(-clearance, 0.0), 0.0)
     far = results.number("closest_to_goal", 0.0) if "closest_to_goal" in names else np.zeros(len(keys))

@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from cosim.campaigns.analysis.worst_rows import rerun_command
+from cosim.campaigns.analysis.worst_rows import rerun_command, violated_column
 from cosim.campaigns.falsification.search import minimize
 from cosim.campaigns.falsification.splitting import estimate_probability
 from cosim.campaigns.falsification.work import Objective, ScenarioSearch, SceneSearch
@@ -179,13 +179,12 @@ def _summarize(
 
 def _counts(results: Results, costs: NDArray[np.float64]) -> dict[str, Any]:
     """Return the number of rows of each kind, and the rows at which the least cost so far decreases."""
-    violation = "violation" if "violation" in results.schema.names else "violated"
     least = np.minimum.accumulate(costs)
     falls = np.flatnonzero(np.diff(least, prepend=np.inf) < 0.0)
     return {
         "flown": len(results),
         "best": [[int(i) + 1, float(least[i])] for i in falls if least[i] < _REFUSED],
-        "violations": int((results.fact(violation) & results.absent("refused")).sum()),
+        "violations": int((results.fact(violated_column(results)) & results.absent("refused")).sum()),
         "not_reached": int((~results.fact("reached") & results.absent("refused")).sum()),
         "refused": int((~results.absent("refused")).sum()),
     }

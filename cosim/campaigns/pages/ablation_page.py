@@ -11,7 +11,7 @@ import numpy as np
 from cosim.campaigns.ablation import NUMBERS, PAGE, VARIANTS, WHOLE
 from cosim.campaigns.analysis.worst_rows import LISTED
 from cosim.campaigns.pages.replays import Replay, write_page_with_replays
-from cosim.campaigns.pages.sections import basis
+from cosim.campaigns.pages.sections import basis, with_interval
 from cosim.campaigns.reruns.repeat import complete_results
 from cosim.campaigns.scenes.kinds import scene_kinds
 from cosim.campaigns.scenes.rows import SCHEMA
@@ -119,7 +119,7 @@ def _page(
         page.heading("By kind of scene")
         for name, of in variants.items():
             if name != WHOLE:
-                page.paragraph(Html(f"{code(name)}: {of['what']}."))
+                page.paragraph(Html(f"{code(name)}: {of['description']}."))
                 _table(page, of["kinds"], "kind")
     if changed:
         page.heading("Where it changed most")
@@ -170,22 +170,10 @@ def _table(page: Page, rows: dict[str, Any], first: str = "variant") -> None:
                 str(of["paired"]["only_other"]),
                 number(of["paired"]["p"], 2),
                 number(of["weighted_violation"]["other"]),
-                _ratio(of["weighted_violation"]),
-                _difference(of["reach_time"]),
-                _ratio(of["thrust_variation"]),
+                with_interval(of["weighted_violation"], "ratio", 3),
+                with_interval(of["reach_time"], "median", 3),
+                with_interval(of["thrust_variation"], "ratio", 3),
             ]
             for name, of in rows.items()
         ],
     )  # fmt: skip
-
-
-def _ratio(of: dict[str, Any]) -> str:
-    if of["ratio"] is None:
-        return "–"
-    return f"{number(of['ratio'], 3)} ({number(of['low'], 3)} to {number(of['high'], 3)})"
-
-
-def _difference(of: dict[str, Any]) -> str:
-    if of["median"] is None:
-        return "–"
-    return f"{number(of['median'], 3)} ({number(of['low'], 3)} to {number(of['high'], 3)})"

@@ -82,7 +82,7 @@ def campaign_lines(summary: dict[str, Any]) -> Iterator[str]:
     Parameters
     ----------
     summary : dict
-        From `cosim.campaigns.analysis.summary.summarise`.
+        From `cosim.campaigns.analysis.summary.summarize_campaign`.
 
     Yields
     ------
@@ -194,7 +194,7 @@ def _page(
     page.heading("What it rests on")
     page.paragraph(
         Html(
-            f"Every scene is a row of {code(RESULTS)}, with what came of it; every number of this page is in "
+            f"Every scene is a row of {code(RESULTS)}, with its result; every number of this page is in "
             f"{code(SUMMARY)}. The rows follow from the law with its gains, the conditions of the flights, the scenes "
             f"and the code alone, all named in {code(PLAN)}."
         )

@@ -13,7 +13,7 @@ from cosim.campaigns.analysis.summary import SPREADS
 from cosim.campaigns.analysis.worst_rows import ORDER, Worst, rerun_command, worst_rows
 from cosim.campaigns.pages.campaign_page import FACTS, group_of, spreads_of
 from cosim.campaigns.pages.replays import Replay, write_page_with_replays
-from cosim.campaigns.pages.sections import LABELS, basis, quantiles_table, rates_table
+from cosim.campaigns.pages.sections import LABELS, basis, quantiles_table, rates_table, with_interval
 from cosim.campaigns.reruns.repeat import complete_results
 from cosim.campaigns.scenes.rows import SCHEMA
 from cosim.campaigns.store.folder import SUMMARY
@@ -85,9 +85,7 @@ def _drawings(results: Mapping[str, Results], numbers: dict[str, Any]) -> Iterat
     yield from distributions(columns, "Effort and variation of the thrust: where the law reached the goal.")
     first, *others = laws
     for other in others:
-        caption = (
-            f"Each scene by what it came to with {first} (across) and {other} (up). On the line both come to the same."
-        )
+        caption = f"Each scene by its value with {first} (across) and {other} (up). On the line both are equal."
         drawn = side_by_side(first, results[first], other, results[other], [(name, LABELS[name]) for name in _SEEN])
         yield NamedFigure(f"scenes-{first}-{other}", caption, drawn)
 
@@ -161,23 +159,17 @@ def _paired(page: Page, numbers: dict[str, Any]) -> None:
                 " against ".join(of["laws"]),
                 *(str(of[name]) for name in ("both", "only_one", "only_other", "neither")),
                 number(of["p"], 2),
-                *(_difference(of["differences"][name]) for name in ("reach_time", "effort")),
+                *(with_interval(of["differences"][name], "median") for name in ("reach_time", "effort")),
             ]
             for of in numbers["paired"]
         ],
     )
     page.paragraph(
-        "p: how likely it is that the scenes which one law alone completes fall out at least so unevenly if both laws "
-        "were as good (McNemar, exact). Last columns: over the scenes that both complete, the median of the first "
+        "p: probability that the scenes which one law alone completes are at least so uneven if both laws are equally "
+        "good (McNemar, exact). Last columns: over the scenes that both complete, the median of the first "
         "law's less the second's, with its 95 % interval.",
         faint=True,
     )
-
-
-def _difference(of: dict[str, Any]) -> str:
-    if of["median"] is None:
-        return "–"
-    return f"{number(of['median'])} ({number(of['low'])} to {number(of['high'])})"
 
 
 def _completed_by(page: Page, numbers: dict[str, Any]) -> None:
@@ -189,17 +181,17 @@ def _completed_by(page: Page, numbers: dict[str, Any]) -> None:
         rows.append([one, str(pair["scenes"]), other, str(pair["completed_by_both"]), *medians])
     page.table(head, rows)
     page.paragraph(
-        "Medians of both laws over the scenes that the law in the first column completes. What the other law never "
-        "reaches counts as taking for ever.",
+        "Medians of both laws over the scenes that the law in the first column completes. A scene that the other law "
+        "does not reach counts as infinite.",
         faint=True,
     )
 
 
 def _worst(page: Page, folder: Path, worst: Mapping[str, list[Worst]], shown: Mapping[int, Replay]) -> None:
     page.heading("The worst scenes of each law")
-    page.paragraph(f"{ORDER} A replay shows the flights of all laws in the browser, moving.")
+    page.paragraph(f"{ORDER} A replay shows the flights of all laws in the browser.")
     page.table(
-        ["law", "scene", "what came of it", "to be seen", "again, with full record"],
+        ["law", "scene", "result", "replay", "command that repeats it"],
         [
             [
                 law,

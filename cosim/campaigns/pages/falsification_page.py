@@ -61,7 +61,7 @@ def write_falsification_page(folder: Path, replays: int) -> Path:
 
 
 def falsification_lines(summary: dict[str, Any]) -> Iterator[str]:
-    """Yield the lines that tell a search on a terminal.
+    """Yield the lines that summarize a search on a terminal.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def _page(s: dict[str, Any], figures: Mapping[str, Html], shown: Mapping[int, Re
     page.paragraph(f"Of {unit}s that are near to each other, the worst one. A replay shows the flight in the browser.")
     label, random = _LABELS[search["objective"]], s["random"]["worst"] if s["random"] else []
     page.table(
-        [f"{unit} found", label, *(["at random", label] if random else []), "to be seen", "again, with full record"],
+        [f"{unit} found", label, *(["at random", label] if random else []), "replay", "command that repeats it"],
         [
             [
                 *_cells(s, found),

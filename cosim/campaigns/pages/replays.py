@@ -130,10 +130,10 @@ def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Repla
             scratch.replace(place)
         finally:
             shutil.rmtree(scratch, ignore_errors=True)
-    said = read_json(place / _FLOWN).get("remarks")
-    if not (isinstance(said, list) and all(isinstance(remark, str) for remark in said)):
+    stored = read_json(place / _FLOWN).get("remarks")
+    if not (isinstance(stored, list) and all(isinstance(remark, str) for remark in stored)):
         raise RunError(f"{place / _FLOWN}: cannot be read: remarks are missing")
-    return Replay(f"{WORST}/{key}/{REPLAY}" if (place / REPLAY).exists() else None, tuple(said))
+    return Replay(f"{WORST}/{key}/{REPLAY}" if (place / REPLAY).exists() else None, tuple(stored))
 
 
 def _flown(repeat: Repeat, folder: Path) -> tuple[dict[str, Any] | None, str]:
@@ -157,10 +157,10 @@ def _flown(repeat: Repeat, folder: Path) -> tuple[dict[str, Any] | None, str]:
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     differences = ", ".join(
-        f"{name} {_said(now)} in the place of {_said(before)}" for name, (before, now) in apart.items()
+        f"{name} {_formatted(now)} instead of {_formatted(before)}" for name, (before, now) in apart.items()
     )
-    return trace, f"step by step it came out otherwise: {differences}" if differences else remark
+    return trace, f"the flight step by step differs: {differences}" if differences else remark
 
 
-def _said(value: Any) -> str:
+def _formatted(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else {None: "none", True: "yes", False: "no"}[value]

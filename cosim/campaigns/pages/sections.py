@@ -112,9 +112,9 @@ def worst_section(
         Kind of each row by key; empty if all are of one kind.
     """
     page.heading(f"The worst {unit}s")
-    page.paragraph(f"{ORDER} A replay shows the flight in the browser, moving.")
+    page.paragraph(f"{ORDER} A replay shows the flight in the browser.")
     page.table(
-        [unit, *(["kind"] if kinds else []), "what came of it", "to be seen", "again, with full record"],
+        [unit, *(["kind"] if kinds else []), "result", "replay", "command that repeats it"],
         [
             [
                 str(w.key),
@@ -126,6 +126,13 @@ def worst_section(
             for w in worst
         ],
     )
+
+
+def with_interval(of: Mapping[str, float | None], name: str, digits: int = 4) -> str:
+    """Format the number `name` of a statistic with its interval, a dash for None."""
+    if of[name] is None:
+        return "–"
+    return f"{number(of[name], digits)} ({number(of['low'], digits)} to {number(of['high'], digits)})"
 
 
 def refused_section(page: Page, unit: str, refused: int, reasons: Mapping[str, str]) -> None:

@@ -86,7 +86,7 @@ def sweep_lines(summary: dict[str, Any]) -> Iterator[str]:
     Parameters
     ----------
     summary : dict
-        From `summarise_sweep`.
+        From `summarize_sweep`.
 
     Yields
     ------
@@ -115,7 +115,7 @@ def _drawings(results: Results, s: dict[str, Any]) -> Iterator[NamedFigure]:
     )
 
     columns = {name: {"": results.number(name)[flown]} for name in s["quantiles"]}
-    yield from distributions(columns, "What never comes leaves a curve below 100 %.")
+    yield from distributions(columns, "Rows without a value leave a curve below 100 %.")
 
     keys = [
         Key(s["words"][name], column, bool(s["vary"][name].get("log")))

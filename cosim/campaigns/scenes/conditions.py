@@ -31,9 +31,7 @@ class Conditions:
     sensing: Literal["state", "sensors"] = "state"  # source of the law's state, as `Sensing.through`
     outages: tuple[Outage, ...] = ()  # of sensors
     arbiter: RuleVariant = "ordered"  # rule variant, as `ArbiterSetup.rules`
-    arbiter_file: str = (
-        ""  # name of a rule file instead, whose inputs are named like criteria or signals of the vehicle
-    )
+    arbiter_file: str = ""  # name of a rule file instead; its inputs are named like criteria or signals
     arbiter_text: str = ""  # content of the file
     arbiter_engine: Literal["closed", "exact"] = "closed"  # engine for these rules
 

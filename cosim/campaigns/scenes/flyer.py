@@ -9,14 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller import LAWS
 from cosim.batch.c_calls import Clock
 from cosim.batch.flight_config import FlightMetrics
 from cosim.batch.fused import fly_scenario
 from cosim.campaigns.scenes.as_scenario import VEHICLE, scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.law_gains import law_named
 from cosim.campaigns.scenes.scenario_scene import AnyScene
-from cosim.errors import RunError
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu import Plant
@@ -75,14 +74,13 @@ class SceneFlyer:
     """
 
     def __init__(self, law: str, conditions: Conditions | None = None, gains: Any = None) -> None:
-        if law not in LAWS:
-            raise RunError(f"law is {law!r}, expected one of {', '.join(sorted(LAWS))}")
+        of = law_named(law)
         self.law = law
         self.conditions = conditions or Conditions()
-        self.gains = LAWS[law].gains_type() if gains is None else gains
+        self.gains = of.gains_type() if gains is None else gains
         vehicle = load_vehicle(VEHICLE)
         model, level = vehicle_model(vehicle), np.array(_LEVEL)
-        LAWS[law].for_vehicle(model, self.gains, level, self.conditions.control, 0)  # raises an error for invalid gains
+        of.for_vehicle(model, self.gains, level, self.conditions.control, 0)  # raises an error for invalid gains
         self._clock = Clock()
         self._plants = {VEHICLE: Plant(vehicle)}
 

@@ -30,7 +30,7 @@ class ScenarioScene:
     """
 
     seed: int
-    kind: str  # scenes of a kind are summarised together
+    kind: str  # scenes of a kind are summarized together
     scenario: dict[str, Any]  # table of the scenario, without a law
 
     def with_law(self, law: str, gains: dict[str, float], changes: dict[str, Any]) -> Scenario:

@@ -75,7 +75,7 @@ def _sphere(rng: Generator) -> Table:
 
 
 def _net_weight(rng: Generator, vehicle: Vehicle, table: Table) -> None:
-    """Make the vehicle heavy or light by 25 to 50 N, or by 1 to 2.5 % of its weight."""
+    """Make the vehicle heavy or light by 25 to 50 N, or by 1.25 to 2.5 % of its weight if that is more."""
     most = max(50.0, 0.025 * vehicle.weight)
     net = rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.0) * most
     table["plant"]["parameters"]["buoyancy"] = float(vehicle.weight - net)

@@ -21,8 +21,8 @@ SPREADS = ("reach_time", "settle_time", "min_clearance", "effort", "max_force", 
 _REASONS = 5  # greatest number of listed reasons for refusing rows
 
 
-def summarise_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str, Any]:
-    """Summarise a sweep.
+def summarize_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str, Any]:
+    """Summarize a sweep.
 
     Parameters
     ----------

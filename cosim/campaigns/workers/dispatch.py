@@ -14,7 +14,7 @@ from cosim.errors import RunError
 
 log = logging.getLogger(__name__)
 
-KILLED = "the process that flew it died each time (killed, or out of memory)"
+KILLED = "the process that flew it crashed each time (killed, or out of memory)"
 _CHECK_PERIOD = 5.0  # s between checks of the pool while no batch finishes
 _MAX_CRASHES = 30  # in a row without a finished batch: the cause is not a row
 
@@ -77,12 +77,10 @@ def fly_all(work: Work, batches: Batches, pool: WorkerPool) -> Generator[Any, No
                 continue
             crashes += received.crash_count > 0
             if crashes > _MAX_CRASHES:
-                raise RunError(
-                    f"{crashes} processes died one after the other, whatever they flew; what is flown is kept"
-                )
+                raise RunError(f"{crashes} processes crashed in a row, with any rows; what is flown is kept")
             refused += _retry(work, batches, batch, received)
     if refused and not n_finished:
-        raise RunError("every process died, whatever it flew (killed, or out of memory)")
+        raise RunError("every process crashed, with any rows (killed, or out of memory)")
     yield from refused
 
 
@@ -91,10 +89,10 @@ def _retry(work: Work, batches: Batches, batch: Batch, crash: WorkerCrash) -> li
     if not crash.crash_count:
         batches.put_back(batch)
     elif not (crash.certain or batch.alone):
-        log.warning("a process died; what it may have died of is flown again alone")
+        log.warning("a process crashed; the batches that may be the cause are flown again one by one")
         batches.put_back(Batch(batch.rows, batch.crash_count, alone=True))
     elif (crash_count := batch.crash_count + crash.crash_count) < FATAL:
-        log.warning("a process died (killed, or out of memory); its %d rows are flown again", len(batch.rows))
+        log.warning("a process crashed (killed, or out of memory); its %d rows are flown again", len(batch.rows))
         batches.put_back(Batch(batch.rows, crash_count, batch.alone))
     elif len(batch.rows) > 1:
         for half in reversed(batch.halves(FATAL - 1)):

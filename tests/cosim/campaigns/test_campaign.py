@@ -14,7 +14,7 @@ from controller import LawError
 from controller.paper_law import Gains
 from cosim.campaigns import campaign as module
 from cosim.campaigns import run_campaign
-from cosim.campaigns.analysis.summary import summarise
+from cosim.campaigns.analysis.summary import summarize_campaign
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.flyer import SceneFlyer, Score
 from cosim.campaigns.scenes.law_gains import gains_by_law, gains_from
@@ -253,7 +253,7 @@ def test_the_summary_follows_from_the_rows(tmp_path):
     lines = [json.dumps(scene) for scene in (*PLAIN[:2], *HARD[:2])]
     told = [row_of(9 - i, s, 0.01, line) for i, (s, line) in enumerate(zip(scores, lines, strict=True))]
     found = results_of(tmp_path / "rows.parquet", told[::-1])
-    summary = summarise(plan, found, tmp_path)
+    summary = summarize_campaign(plan, found, tmp_path)
     assert (summary["law"], summary["scenes"], summary["reached"], summary["violations"]) == (
         "ismail_dunnigan",
         4,

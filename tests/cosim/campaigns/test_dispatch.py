@@ -21,7 +21,7 @@ class Work:
         return rows.tolist()
 
     def refused(self, row, reason):
-        assert "died" in reason
+        assert "crashed" in reason
         return [-row]
 
 
@@ -110,9 +110,9 @@ def test_worker_crash_loses_no_row():
 
 
 def test_persistent_worker_crashes_abort_without_rejecting_rows():
-    with pytest.raises(RunError, match="processes died one after the other, whatever they flew"):
+    with pytest.raises(RunError, match="processes crashed in a row, with any rows"):
         flown(WorkerPool(range(200)))
-    with pytest.raises(RunError, match="every process died, whatever it flew"):
+    with pytest.raises(RunError, match="every process crashed, with any rows"):
         flown(WorkerPool(range(3)), 3)
 
 

@@ -153,7 +153,7 @@ def test_replay_that_differs_is_marked_on_the_page(tmp_path, monkeypatch):
     run_campaign(write(tmp_path / "s.jsonl", PLAIN[:1]), "ismail_dunnigan", out, BRIEF)
     monkeypatch.setattr(Repeat, "apart", lambda self, came: {"min_clearance": (0.5, came["min_clearance"])})
     write_campaign_page(out, 1)
-    assert "it came out otherwise: min_clearance" in (out / "campaign.html").read_text()
+    assert "the flight step by step differs: min_clearance" in (out / "campaign.html").read_text()
 
 
 @pytest.mark.medium(fast=1)

@@ -95,7 +95,7 @@ def test_rows_that_crash_workers_are_rejected_and_others_complete(tmp_path, fake
 
 @pytest.mark.slow
 def test_crash_of_every_worker_rejects_no_row(tmp_path, fakes):
-    with pytest.raises(RunError, match="every process died, whatever it flew"):
+    with pytest.raises(RunError, match="every process crashed, with any rows"):
         run_sweep(paper(), design(1), tmp_path / "out", "deadly", workers=2)
     assert not (tmp_path / "out" / RESULTS).exists()
 

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from controller import LAWS
-from cosim.campaigns.analysis.summary import summarise
+from cosim.campaigns.analysis.summary import summarize_campaign
 from cosim.campaigns.pages.campaign_page import write_campaign_page
 from cosim.campaigns.pages.comparison_page import NUMBERS, write_comparison_page
 from cosim.campaigns.pages.replays import replay_of
@@ -161,7 +161,7 @@ def results(seeds: Seeds) -> Case:
     def read(path: Path) -> None:
         repeat_of(path.parent, seed)
         found = Results(path, SCHEMA)
-        summarise(of, found, path.parent)
+        summarize_campaign(of, found, path.parent)
         list(found.pieces("scene"))
 
     case = seeds.file(RESULTS, read, of=seeds.comparison / "ismail_dunnigan")
