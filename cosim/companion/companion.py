@@ -13,7 +13,7 @@ from controller.laws.deployable.gains import SPREADS
 from controller.regions.region_set import of_attitude
 from cosim.companion.link import AutopilotLink
 from cosim.companion.options import CompanionOptions
-from cosim.companion.outputs import SteerBy, uses_sticks
+from cosim.companion.outputs import SteerBy
 from cosim.companion.remote_vehicle import RemoteVehicle
 from cosim.companion.safety import State
 from cosim.companion.session import AutopilotSession
@@ -224,11 +224,10 @@ class Companion:
                 raise RunError(f"{self._options.timeout:g} s have gone by, waiting for {session.missing()}")
 
     def _require_ears(self) -> None:
-        """RunError if the autopilot would not take our sticks."""
-        o, session = self._options, self.session
-        deaf = session.failsafes.deaf_to(session.identity[0])
-        if deaf and uses_sticks(o.profile, o.steer_by) and not o.dry_run:
-            raise RunError(f"{deaf}; expected the same number, or --steer-by velocity")
+        """RunError if the autopilot would not follow our sticks as they are meant."""
+        refused = self.session.refuses_sticks()
+        if refused:
+            raise RunError(refused)
 
     def _steer(self, master: Master, observers: Sequence[Observer], on_state: Callable[[State, str], None]) -> str:
         session = self.session

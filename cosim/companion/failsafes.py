@@ -30,6 +30,7 @@ PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
     "ardusub": (
         Parameter("FS_PILOT_INPUT", "on sticks that stop coming", _ON_SILENCE),
         Parameter("FS_PILOT_TIMEOUT", "s until then"),
+        Parameter("RC_OVERRIDE_TIME", "s for which it keeps the last sticks, -1 for ever"),
         Parameter("FS_GCS_ENABLE", "on a ground station that falls silent", _ON_GCS_LOSS),
         Parameter("FS_GCS_TIMEOUT", "s until then"),
         Parameter("FS_EKF_ACTION", "on an estimate that is not to be trusted", _ON_SILENCE),
@@ -56,6 +57,8 @@ _ACTS = {  # of which one at least must not be 0, for anything to follow when th
     "px4": ("COM_OBL_RC_ACT", "NAV_RCL_ACT", "NAV_DLL_ACT"),
 }
 _STICK_SYSTEM = ("SYSID_MYGCS", "MAV_GCS_SYSID")
+_KEPT = ("RC_OVERRIDE_TIME", "FS_PILOT_TIMEOUT")  # how long sticks act with a radio, and without one
+_LONGEST_KEPT = 1.0  # s
 
 
 class Failsafes:
@@ -115,6 +118,12 @@ class Failsafes:
         if acts and all(self.values.get(name, 0.0) == 0.0 for name in acts):
             lines.append(
                 f"WARNING: nothing is known to follow if the companion dies: {', '.join(acts)} are 0 or unknown"
+            )
+        kept = [(name, self.values[name]) for name in _KEPT if name in self.values]
+        if any(not 0.0 <= time <= _LONGEST_KEPT for _, time in kept):
+            now = ", ".join(f"{name} is {time:g}" for name, time in kept)
+            lines.append(
+                f"WARNING: the last sticks act on where the link is cut: {now}; expected {_LONGEST_KEPT:g} s or less"
             )
         return lines
 

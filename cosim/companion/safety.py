@@ -46,12 +46,15 @@ class Condition:
     then: State
 
 
+GAIN_OFF = 0.01  # most by which two gains differ that are the same
+
 CONDITIONS: tuple[Condition, ...] = (
     Condition("pilot's sticks", 0.0, "", "somebody else sends sticks that are deflected", "pilot"),
     Condition("takeover", 0.0, "", "DO_PAUSE_CONTINUE with 0 came for the companion", "held"),
     Condition("disarmed", 0.0, "", "the vehicle is disarmed", "pilot"),
     Condition("mode taken", 0.0, "", "the mode that is steered in was on, and is not any more", "pilot"),
     Condition("refused mode", 0.8, "s", "since the mode was asked for, without it", "held"),
+    Condition("pilot gain", GAIN_OFF, "", "the autopilot's pilot gain is not the one that the user said", "held"),
     Condition("lost link", 0.4, "s", "since anything came from the autopilot", "held"),
     Condition("stale estimate", 0.5, "s", "age of the older one of position and attitude", "held"),
     Condition("late loop", 0.3, "s", "by which a step begins too late", "held"),

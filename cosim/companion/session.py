@@ -14,8 +14,8 @@ from cosim.companion.failsafes import Failsafes
 from cosim.companion.frame_alignment import FrameAlignment
 from cosim.companion.link import AutopilotLink
 from cosim.companion.options import CompanionOptions
-from cosim.companion.outputs import Output, steered_in
-from cosim.companion.safety import Observation, State, Supervisor
+from cosim.companion.outputs import Output, steered_in, uses_sticks
+from cosim.companion.safety import GAIN_OFF, Observation, State, Supervisor
 from cosim.companion.vehicle_state import RATES, ReportedState
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.wire.dialect import dialect
@@ -169,7 +169,29 @@ class AutopilotSession:
             "pilot": f"somebody to resume after: {self.supervisor.reason}", "engaging": f"mode {self._mode}",
         }.get(self.supervisor.state, "nothing")  # fmt: skip
 
+    def refuses_sticks(self) -> str:
+        """Return why the autopilot would not follow our sticks as they are meant; empty where nothing is known."""
+        o = self._options
+        if o.dry_run or not uses_sticks(o.profile, o.steer_by):
+            return ""
+        deaf = self.failsafes.deaf_to(self.identity[0])
+        if deaf:
+            return f"{deaf}; expected the same number, or --steer-by velocity"
+        if self._gain_off() > GAIN_OFF:
+            return f"the autopilot's pilot gain is {self._gain():g}, expected {o.pilot_gain:g} of --pilot-gain"
+        return ""
+
     # ---- what is decided by ----
+
+    def _gain_off(self) -> float:
+        """Return the difference between the autopilot's pilot gain and the user's; 0 where it is not known."""
+        off = abs(self._gain() - self._options.pilot_gain)
+        return off if math.isfinite(off) else 0.0
+
+    def _gain(self) -> float:
+        """Return the autopilot's pilot gain: as it says, or as it was at its start; NaN where neither is known."""
+        now = self.reported.pilot_gain
+        return now if math.isfinite(now) else self.failsafes.values.get("JS_GAIN_DEFAULT", math.nan)
 
     def _observation(self, now: float) -> Observation:
         reported, alignment = self.reported, self.alignment
@@ -193,6 +215,7 @@ class AutopilotSession:
                 "disarmed": float(not reported.is_armed),
                 "mode taken": float(self.supervisor.state == "steering" and not in_mode),
                 "refused mode": self.supervisor.waited_for_mode(now),
+                "pilot gain": self._gain_off() if uses_sticks(self._options.profile, self._options.steer_by) else 0.0,
             }
         return Observation(now, has_state, alignment.offset is not None, reported.is_armed, in_mode, values)
 

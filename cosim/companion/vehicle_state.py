@@ -60,6 +60,8 @@ class ReportedState:
         Outside [hPa]; NaN where none is reported.
     is_reckoned : bool
         The autopilot says that it has no fix of its horizontal position, and reckons it from velocities.
+    pilot_gain : float
+        Of an ArduSub's sticks, as it is now; NaN where none is reported.
     heard_at, beaten_at, pilot_at : float
         Our time [s] at which anything came, a heartbeat, and sticks of somebody else.
     sync : ClockSync
@@ -76,7 +78,7 @@ class ReportedState:
         self.rates: Array = np.zeros(3)
         self.mode, self.is_armed, self.in_failsafe = -1, False, False
         self.global_position: tuple[float, float, float] | None = None
-        self.pressure = self.altitude = self.battery = math.nan
+        self.pressure = self.altitude = self.battery = self.pilot_gain = math.nan
         self.pulses: tuple[int, ...] = ()
         self.is_leaking = self.is_reckoned = False
         self.resets = 0  # of the autopilot's estimate, as it counts them
@@ -98,6 +100,7 @@ class ReportedState:
             "DISTANCE_SENSOR": self._distance,
             "SERVO_OUTPUT_RAW": self._servos,
             "SYS_STATUS": self._status,
+            "NAMED_VALUE_FLOAT": self._named,
             "EKF_STATUS_REPORT": self._estimator,
             "ESTIMATOR_STATUS": self._estimator,
             "STATUSTEXT": self._text,
@@ -189,6 +192,10 @@ class ReportedState:
 
     def _status(self, m: Any, now: float) -> None:
         self.battery = float(m.battery_remaining) if m.battery_remaining >= 0 else math.nan
+
+    def _named(self, m: Any, now: float) -> None:
+        if m.name == "PilotGain":
+            self.pilot_gain = m.value
 
     def _estimator(self, m: Any, now: float) -> None:
         self.is_reckoned = bool(m.flags & _RELATIVE) and not m.flags & _ABSOLUTE

@@ -196,6 +196,10 @@ def command(link, number, *parameters, system=1, component=1):
     link.hear(mavlink.MAVLink_command_long_message(system, component, number, 0, *filled))
 
 
+def says_the_pilot_gain(link, gain):
+    link.hear(mavlink.MAVLink_named_value_float_message(0, b"PilotGain", gain), 1, 1)
+
+
 FAULTS = {
     "lost link": lambda link: setattr(link, "cut", True),
     "stale estimate": lambda link: link.silent.add("LOCAL_POSITION_NED"),
@@ -204,6 +208,7 @@ FAULTS = {
     "frame jump": lambda link: position_off(link, 1.0),
     "battery": lambda link: changed(link, "SYS_STATUS", battery_remaining=12),
     "leak": lambda link: link.autopilot._context.say("Leak Detected"),
+    "pilot gain": lambda link: says_the_pilot_gain(link, 1.0),
     "takeover": lambda link: command(link, 193, 0.0, system=IDENTITY[0], component=IDENTITY[1]),
 }
 
@@ -271,6 +276,14 @@ def test_setpoints_are_not_sent_to_an_autopilot_that_ignores_them(tmp_path):
     told = mavlink.MAVLink_param_value_message(b"SYSID_MYGCS", 250.0, 9, 1, 0)
     link.events = [(0.5, lambda: link.hear(told, 1, 1))]
     with pytest.raises(RunError, match=r"SYSID_MYGCS is 250, and the companion's system id 255"):
+        Flight(tmp_path, link=link, profile="ardusub")
+    assert not [m for _, m in link.sent if m.get_type() in STICKS]
+
+
+def test_an_ardusub_of_another_pilot_gain_is_refused_before_anything_is_sent(tmp_path):
+    link = StandIn(profile="ardusub", shift=SHIFT)
+    link.events = [(0.5, lambda: says_the_pilot_gain(link, 0.25))]
+    with pytest.raises(RunError, match=r"the autopilot's pilot gain is 0.25, expected 0.5 of --pilot-gain"):
         Flight(tmp_path, link=link, profile="ardusub")
     assert not [m for _, m in link.sent if m.get_type() in STICKS]
 

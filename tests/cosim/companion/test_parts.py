@@ -336,7 +336,7 @@ def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
     failsafes = Failsafes("ardusub")
     assert not failsafes.is_read(0.0)
     asked = [len(failsafes.wanted(0.25 * k)) for k in range(9)]
-    assert asked == [12, 0, 12, 0, 12, 0, 12, 0, 12]
+    assert asked == [13, 0, 13, 0, 13, 0, 13, 0, 13]
     values = {"FS_GCS_ENABLE": 2.0, "FS_GCS_TIMEOUT": 5.0, "SOMETHING_ELSE": 1.0, "FS_EKF_ACTION": float("nan")}
     for name, value in values.items():
         failsafes.take(decoded(value_of(name, value)))
@@ -356,6 +356,17 @@ def test_missing_failsafe_and_ignored_station_are_reported():
     assert failsafes.deaf_to(255) == ""
     failsafes.take(decoded(value_of("SYSID_MYGCS", 250.0)))
     assert failsafes.deaf_to(250) == "" and "SYSID_MYGCS is 250" in failsafes.deaf_to(255)
+
+
+@pytest.mark.parametrize(
+    ("override", "pilot", "warns"), [(3.0, 1.0, True), (0.5, 3.0, True), (-1.0, 1.0, True), (0.5, 1.0, False)]
+)
+def test_sticks_that_outlast_a_cut_link_by_more_than_a_second_are_warned_of(override, pilot, warns):
+    failsafes = Failsafes("ardusub")
+    for name, value in (("FS_GCS_ENABLE", 2.0), ("RC_OVERRIDE_TIME", override), ("FS_PILOT_TIMEOUT", pilot)):
+        failsafes.take(decoded(value_of(name, value)))
+    said = f"RC_OVERRIDE_TIME is {override:g}, FS_PILOT_TIMEOUT is {pilot:g}; expected 1 s or less"
+    assert any(line.startswith("WARNING") and line.endswith(said) for line in failsafes.text()) == warns
 
 
 def test_px4_integer_parameters_are_decoded_from_bits():
