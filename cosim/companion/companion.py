@@ -219,13 +219,13 @@ class Companion:
             now = session.clock()
             session.exchange(np.zeros(6), now, now + period)
             self._report(on_state)
-            self._require_ears()
+            self._require_accepted_sticks()
             if self._options.timeout is not None and now - begun > self._options.timeout:
                 raise RunError(f"{self._options.timeout:g} s have gone by, waiting for {session.missing()}")
 
-    def _require_ears(self) -> None:
-        """RunError if the autopilot would not follow our sticks as they are meant."""
-        refused = self.session.refuses_sticks()
+    def _require_accepted_sticks(self) -> None:
+        """Raise `RunError` if the autopilot would ignore or misread the sticks."""
+        refused = self.session.stick_refusal()
         if refused:
             raise RunError(refused)
 

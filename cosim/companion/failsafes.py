@@ -127,8 +127,8 @@ class Failsafes:
             )
         return lines
 
-    def deaf_to(self, system: int) -> str:
-        """Return why sticks of a system id are not taken, in words; empty where nothing is known against them."""
+    def ignored_sticks(self, system: int) -> str:
+        """Return the reason why the autopilot ignores sticks of a system id; empty if none is known."""
         for name in _STICK_SYSTEM:
             heard = self.values.get(name)
             if heard is not None and heard != system:

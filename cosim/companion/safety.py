@@ -46,7 +46,7 @@ class Condition:
     then: State
 
 
-GAIN_OFF = 0.01  # most by which two gains differ that are the same
+GAIN_OFF = 0.01  # tolerance of the pilot gain
 
 CONDITIONS: tuple[Condition, ...] = (
     Condition("pilot's sticks", 0.0, "", "somebody else sends sticks that are deflected", "pilot"),

@@ -169,19 +169,19 @@ class AutopilotSession:
             "pilot": f"somebody to resume after: {self.supervisor.reason}", "engaging": f"mode {self._mode}",
         }.get(self.supervisor.state, "nothing")  # fmt: skip
 
-    def refuses_sticks(self) -> str:
-        """Return why the autopilot would not follow our sticks as they are meant; empty where nothing is known."""
+    def stick_refusal(self) -> str:
+        """Return the reason why the autopilot would ignore or misread the sticks; empty if none is known."""
         o = self._options
         if o.dry_run or not uses_sticks(o.profile, o.steer_by):
             return ""
-        deaf = self.failsafes.deaf_to(self.identity[0])
-        if deaf:
-            return f"{deaf}; expected the same number, or --steer-by velocity"
+        ignored = self.failsafes.ignored_sticks(self.identity[0])
+        if ignored:
+            return f"{ignored}; expected the same number, or --steer-by velocity"
         if self._gain_off() > GAIN_OFF:
             return f"the autopilot's pilot gain is {self._gain():g}, expected {o.pilot_gain:g} of --pilot-gain"
         return ""
 
-    # ---- what is decided by ----
+    # ---- observation ----
 
     def _gain_off(self) -> float:
         """Return the difference between the autopilot's pilot gain and the user's; 0 where it is not known."""
@@ -189,7 +189,7 @@ class AutopilotSession:
         return off if math.isfinite(off) else 0.0
 
     def _gain(self) -> float:
-        """Return the autopilot's pilot gain: as it says, or as it was at its start; NaN where neither is known."""
+        """Return the autopilot's pilot gain: reported, else that of its start; NaN if neither is known."""
         now = self.reported.pilot_gain
         return now if math.isfinite(now) else self.failsafes.values.get("JS_GAIN_DEFAULT", math.nan)
 

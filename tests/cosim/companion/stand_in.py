@@ -40,7 +40,7 @@ class StandIn:
         options = MavlinkOptions(profile=profile, commands=True)
         self.autopilot = Autopilot(self.master.scenario, self.master.signals.columns, options, self.queue)
         self.shift = np.array(shift)  # m: of the scene's origin in the autopilot's own frame
-        self.cut, self.deaf, self.silent = (
+        self.cut, self.refused_commands, self.silent = (
             False,
             set(),
             set(silent),
@@ -102,7 +102,7 @@ class StandIn:
             return True
         (decoded,) = self._its_reader.parse_buffer(message.pack(self._ours))
         self.sent.append((self.clock(), decoded))
-        refused = message.get_type() == "COMMAND_LONG" and message.command in self.deaf
+        refused = message.get_type() == "COMMAND_LONG" and message.command in self.refused_commands
         if not self.cut and not refused:
             self._up.append((self.clock() + UP, decoded))
         return True

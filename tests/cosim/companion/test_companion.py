@@ -226,7 +226,7 @@ def test_fault_holds_the_vehicle_within_one_second(tmp_path, reason):
 @pytest.mark.medium
 def test_rejected_mode_holds_within_one_second(tmp_path):
     link = StandIn(profile="generic", shift=SHIFT)
-    link.deaf.add(176)
+    link.refused_commands.add(176)
     with pytest.raises(RunError, match="somebody to resume after: refused mode"):
         Flight(tmp_path, link=link)
     first = min(at for at, m in link.sent if m.get_type() == "COMMAND_LONG" and m.command == 176)

@@ -353,9 +353,9 @@ def test_missing_failsafe_and_ignored_station_are_reported():
     for name in ("FS_PILOT_INPUT", "FS_GCS_ENABLE"):
         failsafes.take(decoded(value_of(name, 0.0)))
     assert failsafes.text()[-1].startswith("WARNING: nothing is known to follow if the companion dies")
-    assert failsafes.deaf_to(255) == ""
+    assert failsafes.ignored_sticks(255) == ""
     failsafes.take(decoded(value_of("SYSID_MYGCS", 250.0)))
-    assert failsafes.deaf_to(250) == "" and "SYSID_MYGCS is 250" in failsafes.deaf_to(255)
+    assert failsafes.ignored_sticks(250) == "" and "SYSID_MYGCS is 250" in failsafes.ignored_sticks(255)
 
 
 @pytest.mark.parametrize(
