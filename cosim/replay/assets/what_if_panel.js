@@ -174,13 +174,13 @@ class WhatIfPanel {
 /** Why some regions cannot be moved here. */
 function wordsOfFixed(regions) {
   const named = (those) => those.map(({ name }) => name).join(", ");
-  const turned = regions.filter(({ shape }) => shape.kind === "orientation");
-  const placed = regions.filter(({ shape }) => shape.kind !== "orientation");
+  const isTurned = ({ shape }) => shape.kind in SIGHTS && !shape.feature;
+  const [turned, placed] = [regions.filter(isTurned), regions.filter((region) => !isTurned(region))];
   return [
     turned.length ? `Attitude alone, without a place: ${named(turned)}.` : "",
     placed.length ? `Not moved in this page, as the law is given other numbers than the scenario: ${named(placed)}.` : "",
     "Change these in the saved scenario.",
-  ].join(" ").trim();
+  ].filter(Boolean).join(" ");
 }
 
 /** A number as a field has it. */

@@ -99,6 +99,8 @@ def test_page_is_operable_by_keyboard(browser, page):
     from selenium.webdriver.common.keys import Keys
 
     opened(browser, page)
+    said = browser.js("return document.getElementById('commands').textContent")
+    assert "without a place: heading. Change these" in said
     field = browser.driver.find_element("css selector", "[aria-label='current east in metres a second']")
     field.send_keys(Keys.ARROW_UP, Keys.ARROW_UP)
     wait_until(browser, FLOWN)
