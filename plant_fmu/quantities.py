@@ -116,6 +116,7 @@ SCALE_ERROR = Quantity("", -0.5, 0.5)
 ACCELERATION = Quantity("m/s2", -100.0, 100.0)
 SHARE = Quantity("", -1.0, 1.0)
 PULSE = Quantity("", 0.0, 1e4)  # us; without a unit, as SI has none for it
+RPM = Quantity("", -1e4, 1e4)  # rev/min, likewise
 VOLTAGE = Quantity("V", 10.0, 20.0)
 SUBSTEP = Quantity("s", 1e-6, 1.0)
 FORCE_LIMIT = Quantity("N", 0.0, 1e10)  # its maximum is above the norm of any force: no limit

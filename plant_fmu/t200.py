@@ -1,4 +1,4 @@
-"""The published force of Blue Robotics' T200 thruster by pulse and voltage, for C and Python."""
+"""The published force of Blue Robotics' T200 thruster by pulse, or by revolutions, and voltage, for C and Python."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 STANDARD_GRAVITY = 9.80665  # m/s2, of a kilogram-force
 # us; at bollard, from the maker's performance table of September 2019, at some of its pulses
 PULSES = np.array([
-    1100, 1150, 1200, 1250, 1300, 1350, 1400, 1440, 1460, 1468, 1500, 1532, 1540, 1560, 1600, 1650, 1700, 1750, 1800,
-    1850, 1900,
+    1100, 1148, 1200, 1248, 1300, 1348, 1400, 1440, 1460, 1468, 1500, 1532, 1540, 1560, 1600, 1648, 1700, 1748, 1800,
+    1848, 1900,
 ], float)  # fmt: skip
 VOLTAGES = np.array([10.0, 12.0, 14.0, 16.0, 18.0, 20.0])  # V
 _KILOGRAMS = np.array([  # kgf, forward where the pulse is above 1500 us; a row a voltage
@@ -28,6 +28,21 @@ _KILOGRAMS = np.array([  # kgf, forward where the pulse is above 1500 us; a row 
 ])  # fmt: skip
 
 FORCES: NDArray[np.float64] = STANDARD_GRAVITY * _KILOGRAMS  # N
+# rev/min at the same pulses, signed as the force; the table calls what is below 300 unsteady, and 0
+RPM = np.array([
+    [-2662, -2472, -2198, -1936, -1615, -1294, -883, -504, 0, 0, 0, 0, 0, 500, 873, 1250, 1596, 1889, 2179, 2436,
+     2668],
+    [-2976, -2755, -2457, -2159, -1815, -1470, -1023, -597, -346, 0, 0, 0, 342, 592, 1009, 1424, 1796, 2118, 2456, 2751,
+     2995],
+    [-3233, -3004, -2697, -2366, -1995, -1625, -1150, -683, -400, 0, 0, 0, 399, 675, 1136, 1562, 1967, 2312, 2693, 3011,
+     3279],
+    [-3465, -3223, -2865, -2548, -2140, -1738, -1246, -758, -450, -317, 0, 308, 441, 749, 1237, 1699, 2129, 2498, 2888,
+     3242, 3533],
+    [-3643, -3420, -2985, -2638, -2218, -1796, -1308, -823, -501, -357, 0, 347, 494, 805, 1267, 1716, 2171, 2577, 2985,
+     3417, 3742],
+    [-3783, -3498, -3046, -2679, -2229, -1779, -1315, -876, -547, -389, 0, 379, 532, 857, 1273, 1685, 2186, 2621, 3088,
+     3561, 3931],
+], float)  # fmt: skip
 
 
 def force_of_pulse(pulses: NDArray[np.float64], voltages: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -51,28 +66,66 @@ def force_of_pulse(pulses: NDArray[np.float64], voltages: NDArray[np.float64]) -
     >>> force_of_pulse(np.array([1900.0, 1500.0]), np.array([16.0, 16.0])).round(2).tolist()
     [51.48, 0.0]
     """
-    at = np.clip((voltages - VOLTAGES[0]) / 2.0, 0.0, len(VOLTAGES) - 1.0)
-    whole = np.minimum(np.nan_to_num(at).astype(int), len(VOLTAGES) - 2)
-    part = at - whole
+    low, high, share = _between(voltages)
     rows = np.array([np.interp(pulses, PULSES, row) for row in FORCES])
-    low, high = (np.take_along_axis(rows, (whole + k)[None], axis=0)[0] for k in (0, 1))
-    force: NDArray[np.float64] = low + part * (high - low)
+    at_low, at_high = (np.take_along_axis(rows, row[None], axis=0)[0] for row in (low, high))
+    force: NDArray[np.float64] = at_low + share * (at_high - at_low)
     return force
+
+
+def force_of_rpm(rpm: NDArray[np.float64], voltages: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the force of a T200 at rest by its revolutions, linear between the published points.
+
+    A pulse's revolutions and its force belong together at voltages between the published ones too.
+
+    Parameters
+    ----------
+    rpm : ndarray
+        [rev/min], above 0 where the force is, whichever way the propeller is handed; cut at those of 1100 and 1900 us.
+    voltages : ndarray of the same shape
+        [V], cut at 10 and 20.
+
+    Returns
+    -------
+    ndarray
+        [N]; NaN where the revolutions or the voltage are.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> force_of_rpm(np.array([3533.0, 0.0, 9999.0]), np.array([16.0, 16.0, 10.0])).round(2).tolist()
+    [51.48, 0.0, 28.73]
+    """
+    low, high, share = _between(voltages)
+    part = share[..., None]
+    at, forces = (rows[low] + part * (rows[high] - rows[low]) for rows in (RPM, FORCES))
+    table = zip(rpm.ravel(), at.reshape(-1, PULSES.size), forces.reshape(-1, PULSES.size), strict=True)
+    return np.array([np.interp(turns, points, row) for turns, points, row in table], float).reshape(rpm.shape)
+
+
+def _between(voltages: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
+    """Return the two rows between which each voltage is, and how much of the second there is."""
+    at = np.clip((voltages - VOLTAGES[0]) / 2.0, 0.0, len(VOLTAGES) - 1.0)
+    low = np.minimum(np.nan_to_num(at).astype(np.intp), len(VOLTAGES) - 2)
+    return low, low + 1, at - low
 
 
 def t200_header() -> str:
     """Return the C header ``t200.h`` with the published points."""
-    rows = ", ".join(f"{{{', '.join(map(repr, row))}}}" for row in FORCES.tolist())
+    forces, turns = (", ".join(f"{{{', '.join(map(repr, row))}}}" for row in rows.tolist()) for rows in (FORCES, RPM))
+    pulses = ", ".join(map(repr, PULSES.tolist()))
     return "\n".join([
-        "/* Forces of a T200 at bollard [N] by pulse [us] and supply voltage [V], of Blue Robotics: generated. */",
+        "/* Forces of a T200 at bollard [N] and its revolutions [rev/min] by pulse [us] and supply",
+        "   voltage [V], of Blue Robotics: generated. */",
         "#ifndef T200_H",
         "#define T200_H",
         "",
         f"#define T200_FIRST_VOLTAGE {float(VOLTAGES[0])!r}",
         f"#define T200_VOLTAGE_STEP {float(VOLTAGES[1] - VOLTAGES[0])!r}",
         f"enum {{ N_T200_PULSES = {PULSES.size}, N_T200_VOLTAGES = {VOLTAGES.size} }};",
-        f"static const double T200_PULSES[N_T200_PULSES] = {{{', '.join(map(repr, PULSES.tolist()))}}};",
-        f"static const double T200_FORCES[N_T200_VOLTAGES][N_T200_PULSES] = {{{rows}}};",
+        f"static const double T200_PULSES[N_T200_PULSES] = {{{pulses}}};",
+        f"static const double T200_FORCES[N_T200_VOLTAGES][N_T200_PULSES] = {{{forces}}};",
+        f"static const double T200_RPM[N_T200_VOLTAGES][N_T200_PULSES] = {{{turns}}};",
         "",
         "#endif",
         "",

@@ -8,6 +8,7 @@ from pathlib import Path
 from cosim.errors import RunError
 from cosim.replay.interactive.data import flight_data
 from cosim.replay.page import is_page, write_page
+from cosim.replay.sampling import FLYING_BYTES, MOST_BYTES
 from cosim.replay.trace import trace_of
 from cosim.replay.viewing import Viewing
 from cosim.results.run_result import REPLAY, Run, load_run
@@ -40,7 +41,8 @@ def write_replay(run: Run, out: Path | None = None, title: str | None = None, in
         If it is to fly, and there is no compiler for WebAssembly, or a law or the arbiter's rules have no C.
     """
     flight = flight_data(run, Viewing(run.scenario, run.record.columns).columns) if interactive else None
-    return write_page(out or run.folder / REPLAY, [trace_of(run).as_json()], title or run.scenario.title, flight)
+    trace = trace_of(run, FLYING_BYTES if interactive else MOST_BYTES)
+    return write_page(out or run.folder / REPLAY, [trace.as_json()], title or run.scenario.title, flight)
 
 
 def replay(

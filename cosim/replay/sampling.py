@@ -13,13 +13,19 @@ from cosim.simulation.signals import Array
 
 _BYTES = 400_000  # of numbers, for the first minute
 _BYTES_A_MINUTE = 150_000  # for each further one
-_MOST_BYTES = 6_000_000
+MOST_BYTES = 6_000_000
+FLYING_BYTES = 650_000  # most of a page that flies, whose own flight has more rows
 _PARTS = 100  # most parts of the run, from each of which the extremes are kept
 _OF_EXTREMES = 0.5  # most of the rows for extremes
 
 
 def sampled_rows(
-    record: Rows, columns: int, telling: Iterable[Sequence[Array]], signals: int, moments: NDArray[np.intp]
+    record: Rows,
+    columns: int,
+    telling: Iterable[Sequence[Array]],
+    signals: int,
+    moments: NDArray[np.intp],
+    most_bytes: int = MOST_BYTES,
 ) -> NDArray[np.intp]:
     """Return the rows of a page: evenly spaced ones, extremes of the main signals, and events.
 
@@ -35,6 +41,8 @@ def sampled_rows(
         Number of these signals.
     moments : ndarray of int
         Steps of events, which are kept with the steps before them.
+    most_bytes : int
+        Most bytes of numbers, however long the run.
 
     Returns
     -------
@@ -43,7 +51,7 @@ def sampled_rows(
     """
     n = len(record)
     minutes = (record.value("time", -1) - record.value("time", 0)) / 60.0
-    budget = min(_BYTES + _BYTES_A_MINUTE * max(0.0, minutes - 1.0), _MOST_BYTES)
+    budget = min(_BYTES + _BYTES_A_MINUTE * max(0.0, minutes - 1.0), most_bytes)
     most = max(2, int(budget / (8 * columns)))
     if n <= most:
         return np.arange(n)

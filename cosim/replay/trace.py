@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cosim.io.strict_json import nan_to_none
 from cosim.replay.events import events_of
 from cosim.replay.header import header_of
-from cosim.replay.sampling import sampled_rows
+from cosim.replay.sampling import MOST_BYTES, sampled_rows
 from cosim.replay.steering import changes_of, log_of
 from cosim.replay.viewing import Viewing
 from cosim.results.extremes import rows_at
@@ -53,13 +53,15 @@ class Trace:
         return {**self.header, "rows": len(self.rows), "data": base64.b64encode(packed).decode()}
 
 
-def trace_of(run: Run) -> Trace:
+def trace_of(run: Run, most_bytes: int = MOST_BYTES) -> Trace:
     """Return the trace of a run.
 
     Parameters
     ----------
     run : Run
         The run.
+    most_bytes : int
+        Most bytes of numbers, however long the run.
 
     Returns
     -------
@@ -79,7 +81,7 @@ def trace_of(run: Run) -> Trace:
     moments = rows_at(record, [*(change["time"] for change in changes), *times])
     clearances = ["goal.clearance", *(f"{secondary.region.name}.clearance" for secondary in scenario.regions)]
     telling = (_telling(block, clearances) for block in record.blocks([*_FORCE, *clearances]))
-    steps = sampled_rows(record, len(viewing.columns), telling, 1 + len(clearances), moments)
+    steps = sampled_rows(record, len(viewing.columns), telling, 1 + len(clearances), moments, most_bytes)
     names = [record.columns[i].name for i in viewing.picked]
     picked, missing = _read(record, names, steps)
     rows, columns = viewing.extended(picked), viewing.columns

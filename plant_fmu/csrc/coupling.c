@@ -5,31 +5,58 @@
 #include <string.h>
 
 #include "linear.h"
-#include "t200.h" /* generated: the published forces */
+#include "t200.h" /* generated: the published points */
 
-static const double LEAST_PULSE = 1100.0, MOST_PULSE = 1900.0; /* us */
+typedef struct {
+    double value, by_command, by_voltage;
+} Curve;
 
-/* Force [N] of a T200 at a pulse [us] and a supply voltage [V], linear between the published points, and its derivatives
-   by the two: at a published point, those from below. */
-static double force_of_pulse(double pulse, double voltage, double *of_pulse, double *of_voltage)
+static double mix(double low, double high, double share)
 {
-    const double x = fmin(fmax(pulse, LEAST_PULSE), MOST_PULSE), u = (voltage - T200_FIRST_VOLTAGE) / T200_VOLTAGE_STEP;
-    int i = 0, row = 0;
+    return low + share * (high - low);
+}
 
-    while (x > T200_PULSES[i + 1]) /* whose last is MOST_PULSE */
+/* Force [N] of a T200 at a command and a supply voltage [V], linear between the published points, and its derivatives by
+   the two: at a published point, those from below. `low` and `high` are the commands of those points at the published
+   voltages `row` and `row` + 1. */
+static Curve between(double command, double voltage, int row, const double *low, const double *high)
+{
+    const double share = (voltage - T200_FIRST_VOLTAGE) / T200_VOLTAGE_STEP - row;
+    const double *low_force = T200_FORCES[row], *high_force = T200_FORCES[row + 1];
+    int i = 0;
+
+    while (i < N_T200_PULSES - 2 && command > mix(low[i + 1], high[i + 1], share))
         i++;
-    while (u > row + 1.0) /* no voltage outside the published ones is accepted */
-        row++;
-    const double part = (x - T200_PULSES[i]) / (T200_PULSES[i + 1] - T200_PULSES[i]);
-    const double share = u - row;
-    const double *low = T200_FORCES[row] + i, *high = T200_FORCES[row + 1] + i;
-    const double at_low = low[0] + part * (low[1] - low[0]), at_high = high[0] + part * (high[1] - high[0]);
+    const double start = mix(low[i], high[i], share), width = mix(low[i + 1], high[i + 1], share) - start;
+    const double force = mix(low_force[i], high_force[i], share);
+    const double rise = mix(low_force[i + 1], high_force[i + 1], share) - force;
+    const double whole = (command - start) / width, part = fmin(fmax(whole, 0.0), 1.0);
+    const double slope = whole == part ? rise / width : 0.0;
+    const double moves = mix(high[i] - low[i], high[i + 1] - low[i + 1], part);
+    const double grows = mix(high_force[i] - low_force[i], high_force[i + 1] - low_force[i + 1], part);
 
-    *of_pulse = pulse == x ? (low[1] - low[0] + share * (high[1] - high[0] - (low[1] - low[0]))) /
-                                 (T200_PULSES[i + 1] - T200_PULSES[i])
-                           : 0.0;
-    *of_voltage = (at_high - at_low) / T200_VOLTAGE_STEP;
-    return at_low + share * (at_high - at_low);
+    return (Curve){force + part * rise, slope, (grows - slope * moves) / T200_VOLTAGE_STEP};
+}
+
+static int row_of(double voltage)
+{
+    int row = 0;
+
+    while ((voltage - T200_FIRST_VOLTAGE) / T200_VOLTAGE_STEP > row + 1.0) /* no voltage outside the published ones is accepted */
+        row++;
+    return row;
+}
+
+static Curve force_of_pulse(double pulse, double voltage)
+{
+    return between(pulse, voltage, row_of(voltage), T200_PULSES, T200_PULSES);
+}
+
+static Curve force_of_rpm(double rpm, double voltage)
+{
+    const int row = row_of(voltage);
+
+    return between(rpm, voltage, row, T200_RPM[row], T200_RPM[row + 1]);
 }
 
 bool coupling_acts(const Model *m)
@@ -63,7 +90,6 @@ void coupling_apply(const Model *m, Model *out)
 {
     const Coupling *c = &m->coupling;
     Parameters *p = &out->plant.parameters;
-    double of_pulse, of_voltage;
 
     *out = *m;
     if (!COUPLED)
@@ -80,7 +106,8 @@ void coupling_apply(const Model *m, Model *out)
         const double share = c->thrust_normalized[i];
         out->inputs.thrust[i] += share < 0.0 ? -share * p->thrust_min[i] : share * p->thrust_max[i];
         if (c->thrust_pulse[i] > 0.0)
-            out->inputs.thrust[i] += force_of_pulse(c->thrust_pulse[i], c->supply_voltage, &of_pulse, &of_voltage);
+            out->inputs.thrust[i] += force_of_pulse(c->thrust_pulse[i], c->supply_voltage).value;
+        out->inputs.thrust[i] += force_of_rpm(c->thrust_rpm[i], c->supply_voltage).value;
         p->thrust_effectiveness[i] *= 1.0 - c->thrust_failure[i];
     }
     for (int i = 0; i < N_SENSORS; i++)
@@ -92,7 +119,7 @@ void coupling_tangent(const Model *m, const Model *seed, Model *out)
     const Coupling *c = &m->coupling, *dc = &seed->coupling;
     const Parameters *p = &m->plant.parameters, *dp = &seed->plant.parameters;
     External *external = &out->plant.external;
-    double left[3], right[3], of_pulse, of_voltage;
+    double left[3], right[3];
 
     *out = *seed;
     if (!COUPLED)
@@ -115,9 +142,11 @@ void coupling_tangent(const Model *m, const Model *seed, Model *out)
         out->inputs.thrust[i] += share < 0.0 ? -dshare * p->thrust_min[i] - share * dp->thrust_min[i]
                                              : dshare * p->thrust_max[i] + share * dp->thrust_max[i];
         if (c->thrust_pulse[i] > 0.0) {
-            force_of_pulse(c->thrust_pulse[i], c->supply_voltage, &of_pulse, &of_voltage);
-            out->inputs.thrust[i] += of_pulse * dc->thrust_pulse[i] + of_voltage * dc->supply_voltage;
+            const Curve pulse = force_of_pulse(c->thrust_pulse[i], c->supply_voltage);
+            out->inputs.thrust[i] += pulse.by_command * dc->thrust_pulse[i] + pulse.by_voltage * dc->supply_voltage;
         }
+        const Curve rpm = force_of_rpm(c->thrust_rpm[i], c->supply_voltage);
+        out->inputs.thrust[i] += rpm.by_command * dc->thrust_rpm[i] + rpm.by_voltage * dc->supply_voltage;
         out->plant.parameters.thrust_effectiveness[i] = dp->thrust_effectiveness[i] * (1.0 - c->thrust_failure[i]) -
                                                         p->thrust_effectiveness[i] * dc->thrust_failure[i];
     }

@@ -58,11 +58,12 @@ typedef struct {
 } Load;
 
 typedef struct { /* what other components do, see coupling.h; real numbers alone */
-    double supply_voltage;                 /* V, of thrusters that are given pulses */
+    double supply_voltage;                 /* V, of thrusters that are given pulses or revolutions */
     double current[3], current_rate[3];    /* m/s, m/s2, world frame, beside that of the parameters */
     Load world, body;                      /* in the frame of that name */
     double thrust_normalized[N_THRUSTERS]; /* -1 to 1, of the thrusters' limits */
     double thrust_pulse[N_THRUSTERS];      /* us, 0: none */
+    double thrust_rpm[N_THRUSTERS];      /* rev/min, signed as the force */
     double thrust_failure[N_THRUSTERS];    /* part of the force that is lost */
     double outage[N_SENSORS];              /* probability that a sample is lost, at least */
 } Coupling;

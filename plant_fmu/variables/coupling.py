@@ -34,6 +34,7 @@ def coupling_inputs(vehicle: Vehicle) -> Iterator[Variable]:
     for name, quantity, what in (
         ("normalized", q.SHARE, "Command of thruster {} as a share of its limits, beside its commanded force"),
         ("pulse", q.PULSE, "Command of thruster {} as a pulse of a T200 [us], beside its commanded force; 0: none"),
+        ("rpm", q.RPM, "Command of thruster {} as revolutions of a T200 [rev/min], beside its commanded force"),
         ("failure", q.FRACTION, "Part of the force of thruster {} that is lost"),
     ):
         for i in range(vehicle.n_thrusters):
@@ -45,5 +46,5 @@ def coupling_inputs(vehicle: Vehicle) -> Iterator[Variable]:
 
 def coupling_parameters() -> Iterator[Variable]:
     """Yield the parameters that belong to the inputs."""
-    description = "Supply voltage of thrusters that are commanded by pulses"
+    description = "Supply voltage of thrusters that are commanded by pulses or revolutions"
     yield Variable("supply_voltage", "parameter", "coupling.supply_voltage", q.VOLTAGE, description, 16.0)

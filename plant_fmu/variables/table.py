@@ -109,7 +109,7 @@ def _inputs(vehicle: Vehicle) -> Iterator[Variable]:
 
 _THRUSTER = (
     "thrust", "thrust_min", "thrust_max", "thrust_dead_band", "thrust_curve", "thrust_time_constant",
-    "thrust_normalized", "thrust_pulse",
+    "thrust_normalized", "thrust_pulse", "thrust_rpm",
 )  # fmt: skip
 _WRENCH = ("wrench.X", "wrench.Y", "wrench.Z", "wrench_force_limit", "wrench_time_constant")
 _RANDOM = ("seed", "outlier_scale")
@@ -336,7 +336,7 @@ def _discrete(vehicle: Vehicle) -> Iterator[Variable]:
         description = f"The command of thruster {i + 1} is beyond its limits"
         yield flag(
             f"thrust_saturated[{i + 1}]", f"flags.thrust_cut[{i}]", description,
-            *_of_thruster(i, *_THRUSTER[:3], *_THRUSTER[-2:]), "supply_voltage",
+            *_of_thruster(i, *_THRUSTER[:3], *_THRUSTER[-3:]), "supply_voltage",
         )  # fmt: skip
     description = "The force of the wrench input is beyond its limit"
     yield flag("wrench_saturated", "flags.wrench_cut", description, *_WRENCH[:4])

@@ -5,7 +5,7 @@ import pytest
 
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.build import cached_fmu
-from plant_fmu.t200 import force_of_pulse
+from plant_fmu.t200 import force_of_pulse, force_of_rpm
 from plant_fmu.variables import variables
 from plant_fmu.vehicle_component import of_vehicle
 
@@ -109,6 +109,10 @@ def test_commands_of_thrusters_in_other_units(coupled):
         force = float(force_of_pulse(np.array([pulse]), np.array([voltage]))[0])
         got = fly(coupled, {"supply_voltage": voltage}, **{"thrust_pulse[2]": pulse})
         np.testing.assert_allclose(got, fly("odin", **{"thrust[2]": force}), rtol=0.0, atol=1e-13)
+    for rpm, voltage in ((-9e3, 13.0), (-2455.0, 15.1), (-130.0, 10.0), (0.0, 11.0), (700.0, 17.0), (3600.0, 19.9)):
+        force = float(force_of_rpm(np.array([rpm]), np.array([voltage]))[0])
+        got = fly(coupled, {"supply_voltage": voltage}, **{"thrust_rpm[2]": rpm})
+        np.testing.assert_allclose(got, fly("odin", **{"thrust[2]": force}), rtol=0.0, atol=1e-13)
 
 
 @pytest.mark.medium
@@ -135,10 +139,11 @@ def test_derivatives_by_these_inputs_are_those_of_differences(coupled):
         for i in thrusters:
             forward = (-1.0) ** i  # every other thruster is commanded backward
             plant.set({f"thrust[{i}]": 5.0, f"thrust_pulse[{i}]": 1500.0 + forward * (101.0 + 11.0 * i)})
+            plant.set({f"thrust_rpm[{i}]": forward * (150.0 + 410.0 * i)})  # the last is beyond those of 13.3 V
             plant.set({f"thrust_normalized[{i}]": 0.1 * forward, f"thrust_effectiveness[{i}]": 0.9})
         names += ["supply_voltage"]
         names += [
-            f"{name}[{i}]" for name in ("thrust_pulse", "thrust_min", "thrust_max", "thrust_effectiveness")
+            f"thrust_{name}[{i}]" for name in ("pulse", "rpm", "min", "max", "effectiveness")
             for i in thrusters
         ]  # fmt: skip
         unknowns = [f"der(velocity.{name})" for name in "uvwpqr"]

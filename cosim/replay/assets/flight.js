@@ -33,6 +33,7 @@ class Flight {
     for (const [key, value] of values) {
       for (const [kind, place] of this.slots.get(key).places) {
         if (kind === "noise") job.noise[place] = value;
+        else if (kind === "middle") job.numbers.push([place, (value + (values.get(otherEnd(key)) ?? this.slots.get(otherEnd(key)).value)) / 2]);
         else to[kind].push([place, value]);
       }
     }
@@ -69,17 +70,24 @@ class Flight {
   }
 }
 
+/** The key of the other end of a cylinder. */
+function otherEnd(key) {
+  return key.includes(".start.") ? key.replace(".start.", ".end.") : key.replace(".end.", ".start.");
+}
+
 const MOST_ROWS = 6000; // of a run that is flown here; more would not be seen
 
-/** The numbers of a flight as a run that the page shows; `header` is that of the scenario as it was flown. */
-function runOfFlight(data, result, header) {
+/** The numbers of a flight as a run that the page shows, also at some times; `header` is that of the scenario as it was flown. */
+function runOfFlight(data, result, header, times = []) {
   const refused = result.metrics[12];
   const rows = refused >= 0 ? Math.max(1, Math.ceil(refused / data.every)) : data.rows;
   const stride = Math.ceil(rows / MOST_ROWS);
-  const kept = Array.from({ length: Math.ceil(rows / stride) }, (_, i) => i * stride);
-  if (kept.at(-1) !== rows - 1) kept.push(rows - 1);
-  const signals = header.signals.filter(({ name }) => name in data.signals);
   const number = (array, place) => (row) => result[array][row * data.widths[array] + place];
+  const time = number("trace", 0);
+  const asked = Array.from(times, (t) => Math.round(t / (data.step * data.every))).filter((row, i) => row < rows && time(row) === times[i]);
+  const even = Array.from({ length: Math.ceil(rows / stride) }, (_, i) => i * stride);
+  const kept = [...new Set([...even, ...asked, rows - 1])].sort((a, b) => a - b);
+  const signals = header.signals.filter(({ name }) => name in data.signals);
   const columns = signals.map(({ name }) => Float64Array.from(kept, signalOf(data, data.signals[name], number, header)));
   const run = new Run({ ...header, signals }, columns);
   const active = signals.findIndex((signal) => signal.name === "active");

@@ -35,7 +35,11 @@ class WhatIf {
     const axes = this.flight.data.moves[region];
     const by = Vec.sub(to, from);
     axes.forEach((keys, axis) => {
-      for (const key of keys) if (by[axis]) this._put(key, Number((this.value(key) + by[axis]).toFixed(4)));
+      const values = keys.map((key) => this.value(key));
+      // both ends of a cylinder by the same to the last bit, so that its length stays
+      const along = this.flight.slots.get(keys[0])?.places[0][0] === "middle" && values[0] !== values[1];
+      const step = Math.round(1024 * by[axis]) / 1024;
+      if (by[axis]) keys.forEach((key, i) => this._put(key, along ? values[i] + step : Number((values[i] + by[axis]).toFixed(4))));
     });
     this.later(0);
   }
@@ -97,7 +101,7 @@ class WhatIf {
     this._flying = false;
     this.last = result;
     if (result.refused) this._refuse(result.refused);
-    else this._show(runOfFlight(this.flight.data, result, header), result, changed, failure);
+    else this._show(runOfFlight(this.flight.data, result, header, changed ? [] : this.recorded.time), result, changed, failure);
     if (this._again) {
       this._again = false;
       this._fly();
@@ -115,6 +119,7 @@ class WhatIf {
     this.page.say("");
     if (!changed) {
       this._compare(run);
+      this._refine(run);
       this.flown = null;
       if (this.page.runs.length > 1) this.page.show([this.recorded], true);
     } else if (this.flown) {
@@ -144,6 +149,19 @@ class WhatIf {
       for (const axis of ["x", "y", "z"]) most = Math.max(most, Math.abs(run.column(`position.${axis}`)[row] - recorded.column(`position.${axis}`)[i]));
     }
     this.repeats = most;
+  }
+
+  /** Show all rows of a flight that repeats the record, which has fewer of them in the file. */
+  _refine(run) {
+    const { recorded } = this;
+    const { step, every } = this.flight.data; // the flight has a row for each decision, the record for each step
+    const whole = recorded.end - run.end <= step * every;
+    if (this.repeats !== 0 || !whole || run.rows <= recorded.rows) return;
+    // what a flight does not leave, such as whether allocation saturates, is held from row to row of the record, as it is drawn
+    const columns = recorded.header.signals.map(({ name }) => run.column(name) ?? run.time.map((t) => recorded.held(name, t)));
+    this.recorded = new Run(recorded.header, columns);
+    this.run = this.recorded;
+    if (this.page.runs.length === 1) this.page.replace([this.recorded]);
   }
 
   /** The header of the recorded run, with the numbers of now. */

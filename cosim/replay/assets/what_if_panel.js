@@ -149,7 +149,8 @@ class WhatIfPanel {
     const { whatIf } = this;
     const list = element("div", "command-list");
     list.append(element("p", "hint", "Drag the goal and regions in the scene (Shift: up and down), or give their places in metres."));
-    whatIf.recorded.header.regions.forEach(({ name }, region) => {
+    const { regions } = whatIf.recorded.header;
+    regions.forEach(({ name }, region) => {
       const axes = whatIf.flight.data.moves[region];
       if (!axes) return;
       const set = this._set(name);
@@ -164,8 +165,22 @@ class WhatIfPanel {
       });
       list.append(set);
     });
+    const fixed = regions.filter((_, region) => !whatIf.canMove(region));
+    if (fixed.length) list.append(element("p", "hint", wordsOfFixed(fixed)));
     return list;
   }
+}
+
+/** Why some regions cannot be moved here. */
+function wordsOfFixed(regions) {
+  const named = (those) => those.map(({ name }) => name).join(", ");
+  const isTurned = ({ shape }) => shape.kind in SIGHTS && !shape.feature;
+  const [turned, placed] = [regions.filter(isTurned), regions.filter((region) => !isTurned(region))];
+  return [
+    turned.length ? `Attitude alone, without a place: ${named(turned)}.` : "",
+    placed.length ? `Not moved in this page, as the law is given other numbers than the scenario: ${named(placed)}.` : "",
+    "Change these in the saved scenario.",
+  ].filter(Boolean).join(" ");
 }
 
 /** A number as a field has it. */

@@ -33,6 +33,11 @@ _LISTS = ("points", "corners")  # lists of such
 _DEPTHS = ("top", "bottom", "depth")
 # tried numbers differ from the scenario's by the first, and these differences from each other by the second
 _STEP, _APART = 0.0037291, 1.7e-5
+_TOGETHER = (
+    2.0**-8,
+    2.0**-9,
+    2.0**-10,
+)  # m, by which both ends of a cylinder are tried: its length is rounded to the same
 
 
 @dataclass(frozen=True)
@@ -49,7 +54,7 @@ class Slot:
         Value in the scenario.
     places : tuple of (str, int)
         Places: ``number`` or ``gain`` with a place in the module's arrays, ``start`` with a value reference of
-        the plant, ``noise`` with 0 or 1.
+        the plant, ``noise`` with 0 or 1; ``middle`` with the place of the mean of a cylinder's two ends.
     """
 
     key: str
@@ -84,6 +89,9 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[tuple[t
     moving = [_moving_keys(path, shape) for path, shape in shapes]
     of_moves = [key for axes in moving for keys in axes for key in keys]
     places = dict(_search(flight, memory, [*numbers, *of_moves]))
+    for path, shape in shapes:
+        if shape["type"] == "cylinder":
+            places |= _ends_of_cylinder(flight, memory, path)
     moves = [axes if any(axes) and all(key in places for keys in axes for key in keys) else None for axes in moving]
     offered = {key for axes in moves if axes for keys in axes for key in keys}.union(numbers)
     slots = []
@@ -130,6 +138,21 @@ def _moving_keys(path: str, shape: dict[str, Any]) -> tuple[tuple[str, ...], ...
             for axis in range(len(vector)):
                 axes[axis].append(f"{at}.{axis}")
     return tuple(map(tuple, axes))
+
+
+def _ends_of_cylinder(flight: Flight, memory: Memory, path: str) -> dict[str, tuple[tuple[str, int], ...]]:
+    """Return both ends of a cylinder with the places of its middle, which alone changes when both move by the same."""
+    ends = [(f"{path}.start.{axis}", f"{path}.end.{axis}") for axis in range(3)]
+    changes = {key: _value(flight.scenario, key) + by for pair, by in zip(ends, _TOGETHER, strict=True) for key in pair}
+    try:
+        other = Flight(changed_scenario(flight.scenario, changes))
+    except ScenarioError:
+        return {}
+    middles = {(changes[start] + changes[end]) / 2.0: start for start, end in ends}
+    found = _places(flight, memory, other, middles) or {}
+    if len(found) < len(ends):
+        return {}
+    return {key: tuple(("middle", place) for _, place in found[pair[0]]) for pair in ends for key in pair}
 
 
 def _search(flight: Flight, memory: Memory, keys: Sequence[str]) -> Iterator[tuple[str, tuple[tuple[str, int], ...]]]:

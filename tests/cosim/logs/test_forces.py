@@ -1,4 +1,4 @@
-"""Pulses, sticks and wrenches as forces: the maker's numbers, and the curves that a simulated autopilot flies by."""
+"""Pulses, sticks and wrenches as forces: the curves that a simulated autopilot flies by."""
 
 import numpy as np
 import pytest
@@ -8,34 +8,12 @@ from cosim.logs.forces import channels_of, commands_of
 from cosim.logs.topics import Topic
 from plant_fmu import load_vehicle
 from plant_fmu.autopilot import effort_of_pulse
-from plant_fmu.t200 import force_of_pulse
 
 HEAVY = load_vehicle("bluerov2_heavy")
 
 
 def topic(quantity, size=16):
     return Topic(quantity, "RCOU", None, size)
-
-
-@pytest.mark.parametrize(
-    ("pulse", "voltage", "kilograms"),  # of the maker's table; the middle ones are none of the points kept here
-    [
-        (1900, 10, 2.93), (1100, 12, -2.90), (1900, 12, 3.71), (1900, 14, 4.52), (1100, 16, -4.07), (1900, 16, 5.25),
-        (1900, 18, 6.02), (1900, 20, 6.72), (1500, 16, 0.0), (1700, 16, 1.82), (1300, 16, -1.44),
-    ],
-)  # fmt: skip
-def test_t200_force_matches_manufacturer_data(pulse, voltage, kilograms):
-    force = force_of_pulse(np.array([float(pulse)]), np.array([float(voltage)]))[0]
-    assert force == pytest.approx(kilograms * 9.80665, abs=1e-9)
-
-
-def test_t200_force_grows_with_voltage_and_is_zero_at_neutral():
-    pulses = np.arange(1100.0, 1901.0, 5.0)
-    low, high = (force_of_pulse(pulses, np.full_like(pulses, volts)) for volts in (12.0, 15.3))
-    assert (np.diff(high) >= 0.0).all()
-    assert (np.abs(high) >= np.abs(low)).all()
-    assert not force_of_pulse(np.array([1470.0, 1530.0]), np.array([13.0, 13.0])).any()
-    assert np.isnan(force_of_pulse(np.array([np.nan, 1600.0]), np.array([15.0, np.nan]))).all()
 
 
 def test_pulse_forces_match_the_simulated_autopilot():

@@ -212,7 +212,7 @@ def _told(path):
     run = load_run(path)
     contents_of(run)
     story_of(run)
-    trace_of(run).as_json()
+    trace_of(run, 500_000).as_json()
 
 
 def _exported(path):
@@ -225,7 +225,6 @@ def test_memory_does_not_grow_with_the_rows(tmp_path, monkeypatch):
     monkeypatch.setattr("cosim.results.record._SMALL", 2**21)
     monkeypatch.setattr("cosim.report.figures.sampled_rows._MOST", 5000)
     monkeypatch.setattr("cosim.report.figures.sampled_rows._WHOLE", 5000)
-    monkeypatch.setattr("cosim.replay.sampling._MOST_BYTES", 500_000)
     rows = {n: tmp_path / str(n) for n in (40_000, 160_000)}
     for n, path in rows.items():
         write_long_run(path, n)

@@ -120,6 +120,22 @@ def test_masters_reproduce_shipped_scenarios(name, master, fmi, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("master", "fmi"), [("fmpy", 2), ("ecos", 2), ("ecos", 3), ("libcosim", 2), ("oms", 2)])
+def test_masters_reproduce_flights_on_sensors(master, fmi, tmp_path):
+    """With noise, delays, lost samples and outliers of the data sheets, two outages and a failed thruster."""
+    outages = "outages=[{sensor='dvl', time=1.0, duration=1.5}, {sensor='usbl', time=2.015, duration=9.0}]"
+    settings = [
+        "sensing.through=sensors", "sensing.position_noise=0", "sensing.velocity_noise=0", "sensing.seed=4", outages,
+        "failures=[{thruster=3, time=2.0}]", "time.duration=6.0",
+    ]  # fmt: skip
+    scenario = load_scenario("docking", settings)
+    path = package_system(scenario, tmp_path / "s.ssp", fmi)
+    compared(
+        jacobi("docking", settings), in_master(master, path, scenario.steps, scenario.time.step, tmp_path / "rows.npy")
+    )
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "settings"),
     [

@@ -86,6 +86,21 @@ def test_saved_scenario_reproduces_the_run_bit_for_bit(values, failure, fly, shi
     assert_same(flown, flown_run(saved, tmp_path / "run"))
 
 
+def test_moved_cylinder_and_saved_scenario_equal_their_run(fly, tmp_path):
+    run = flown_run(load_scenario("harbour", ["time.duration=12"]), tmp_path / "first")
+    shape = run.scenario.table["regions"][2]["shape"]
+    values = {
+        f"regions.2.shape.{end}.{axis}": shape[end][axis] + by
+        for end in ("start", "end")
+        for axis, by in ((0, -1.2), (1, 0.4), (2, 0.5))
+    }
+    flown = fly(run, values)
+    (tmp_path / "saved.toml").write_text(flown.toml)
+    saved = flown_run(load_scenario(tmp_path / "saved.toml"), tmp_path / "run")
+    assert_same(flown, saved)
+    assert (flown.columns["pile 1.clearance"] != fly(run).columns["pile 1.clearance"]).any()
+
+
 def test_noise_can_be_added_to_an_exact_run(fly, tmp_path):
     run = flown_run(
         load_scenario("docking", ["sensing.position_noise=0", "sensing.velocity_noise=0", "time.duration=8"]),

@@ -56,14 +56,26 @@ def test_values_in_memory_equal_those_of_the_changed_scenario(docking):
     assert [gains[i] for i in range(len(gains))] == list(other.law.gains)
 
 
-def test_parameters_of_derived_shape_values_are_not_adjustable():
-    ends = "type = 'cylinder', start = [9,5,1], end = [9,5,6], radius = 0.3"
+def test_a_cylinder_moves_by_its_middle():
+    """The law is given middle, axis and half length, of which the last two stay when both ends move by the same."""
+    ends = "type = 'cylinder', start = [9,5.1,1], end = [9,5.1,6], radius = 0.3"
     cylinder = f"{{name = 'leg', criterion = 'obstacle', keep = 'out', gain = 100.0, shape = {{{ends}}}}}"
     flight, memory = Flight(load_scenario("docking", [f"regions=[{cylinder}]", "intersection=[]"])), Memory()
     flight_sources(flight, memory, "token")
     slots, moves = find_slots(flight, memory)
-    assert moves[0] is not None and moves[1] is None  # the law is given middle and half length, not the ends
-    assert not [slot.key for slot in slots if slot.key.startswith("regions")]
+    path = "regions.0.shape"
+    assert moves[1] == tuple((f"{path}.start.{axis}", f"{path}.end.{axis}") for axis in range(3))
+    changes = {slot.key: slot.value + 0.34 for slot in slots if slot.key.startswith(path) and slot.key[-1] == "1"}
+    other = Flight(changed_scenario(flight.scenario, changes))
+    places = {place for slot in slots if slot.key in changes for kind, place in slot.places if kind == "middle"}
+    assert len(changes) == 2
+    differs = set()
+    for array, changed in zip(flight.arrays(), other.arrays(), strict=True):
+        if array.dtype == np.float64 and array.size and not memory.is_named(array):
+            at = memory.keep(array) + np.flatnonzero((array != changed).ravel() & ~np.isnan(array).ravel())
+            differs |= set(at.tolist())
+            assert (changed.ravel()[at - memory.keep(array)] == sum(changes.values()) / 2.0).all()
+    assert differs == places and len(places) >= 1
 
 
 def test_filled_template_equals_the_scenario(docking, tmp_path):

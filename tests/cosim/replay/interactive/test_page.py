@@ -58,6 +58,22 @@ def test_page_is_small_self_contained_and_reproduces_its_record(browser, page):
     assert browser.js("return subreach.runs.length") == 1
 
 
+def test_page_shows_the_rows_of_a_flight_that_repeats_its_record(browser, page, tmp_path, monkeypatch):
+    """Of a long run the file has fewer than its flight; they are among those of the flight."""
+    monkeypatch.setattr("cosim.replay.pages.FLYING_BYTES", 80_000)
+    opened(browser, replay([page.parent / "run"], tmp_path / "page.html", interactive=True))
+    rows = browser.js(
+        "return [subreach.runs.length, subreach.runs[0].rows, subreach.charts[0].series()[0].time.length]"
+    )
+    assert rows == [1, 600, 600]
+    browser.js("subreach.whatIf.set('plant.current.1', 0.3)")
+    wait_until(browser, FLOWN)
+    assert browser.js("return subreach.runs[0].header.name") == "as recorded"
+    browser.press("r")
+    wait_until(browser, "subreach.runs.length === 1")
+    assert browser.js("return subreach.runs[0].rows") == rows[1]
+
+
 def test_dragged_goal_is_simulated_and_r_resets(browser, page):
     from selenium.webdriver.common.action_chains import ActionChains
 
@@ -83,6 +99,8 @@ def test_page_is_operable_by_keyboard(browser, page):
     from selenium.webdriver.common.keys import Keys
 
     opened(browser, page)
+    said = browser.js("return document.getElementById('commands').textContent")
+    assert "without a place: heading. Change these" in said
     field = browser.driver.find_element("css selector", "[aria-label='current east in metres a second']")
     field.send_keys(Keys.ARROW_UP, Keys.ARROW_UP)
     wait_until(browser, FLOWN)
