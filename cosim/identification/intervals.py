@@ -69,9 +69,9 @@ def estimate_intervals(
     -------
     Intervals
         By a jackknife over pieces of 5 s, of 20 s where the model is wrong or a random force is estimated, or over runs
-        where there are eight or more: each left out in turn, in one Gauss-Newton step, with degrees of freedom of each
-        number by the pieces that determine it (Bell and McCaffrey 2002, CR3). Nominal ones hold for white noise and a
-        right model alone.
+        where there are eight or more: each left out in turn, in one Gauss-Newton step. Where pieces are of 20 s, each
+        number has degrees of freedom by the pieces that determine it (Bell and McCaffrey 2002, CR3). Nominal ones hold
+        for white noise and a right model alone.
     """
     prior = np.array([1.0 / p.deviation**2 for p in parameters])
     information = np.diag(prior) + sum(r.jacobian.T @ r.jacobian for r in reduced)
@@ -81,10 +81,13 @@ def estimate_intervals(
     inverse: Any = np.linalg.inv(information)
     nominal = np.sqrt(np.diag(inverse))
 
-    pieces, clusters = _pieces(reduced, windows, random_force or chi2 > DISAGREES)
+    are_alike = random_force or chi2 > DISAGREES
+    pieces, clusters = _pieces(reduced, windows, are_alike)
     half = NORMAL * nominal
     if len(pieces) > 1:
         jackknife, freedom = _jackknife(information, inverse, pieces)
+        if not are_alike:  # nominal ones are right as far as anybody knows: few pieces need no more
+            freedom = np.full_like(freedom, len(pieces) - 1.0)
         half = np.maximum(half, jackknife * student.ppf(0.5 + _COVERED / 2.0, freedom))
     scale = half / (NORMAL * nominal)
     covariance: Any = inverse * np.outer(scale, scale)
