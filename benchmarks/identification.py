@@ -33,6 +33,7 @@ from cosim.identification.log import Log, make_topic
 from cosim.identification.parameters import (
     DEFAULT_FREE,
     DEFAULT_NUISANCES,
+    RANDOM_FORCE,
     Parameter,
     free_parameters,
     nuisances,
@@ -48,7 +49,7 @@ Array = NDArray[np.float64]
 VEHICLE, DEPTH, BOX = "bluerov2_heavy", 5.0, (10.0, 10.0, 4.0)  # m: depth of the box's center, and its sizes
 # what is freed beside the default, and which nuisances are estimated
 ESTIMATED: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "none": ((), DEFAULT_NUISANCES), "force": ((), DEFAULT_NUISANCES), "bias": ((), DEFAULT_NUISANCES),
+    "none": ((), DEFAULT_NUISANCES), "force": ((), (*DEFAULT_NUISANCES, RANDOM_FORCE)), "bias": ((), DEFAULT_NUISANCES),
     "scale": ((), DEFAULT_NUISANCES), "thrusters": (("thrusters.matrix",), DEFAULT_NUISANCES),
     "asymmetric": (("thrusters.matrix",), (*DEFAULT_NUISANCES, "asymmetry")),
     "delay": ((), (*DEFAULT_NUISANCES, "delay")),
@@ -194,7 +195,7 @@ def jacobian_times(log: Log, vehicle: Vehicle, parameters: list[Parameter], done
         problem.raw(i, settings, window.start, full=True)
     exact = time.process_time() - started
     started = time.process_time()
-    for x in (done.values, *(done.values + row for row in np.diag(1e-6 * done.intervals.deviations))):
+    for x in (done.values, *(done.values + row for row in np.diag(1e-6 * done.intervals.nominal))):
         settings = problem.settings(x)
         for i, window in enumerate(windows):
             problem.raw(i, settings, window.start, full=False)
@@ -226,15 +227,15 @@ def measure(
         log, gone = fly(scenario, commands, nuisance, noise, rng)
         parameters = [*truths, *free_parameters(vehicle, free), *nuisances(beside, [log])]
         wall, process = time.perf_counter(), time.process_time()
-        done = fit([log], vehicle, parameters)
+        done = fit([log], vehicle, parameters, random_force=RANDOM_FORCE in beside)
         wall, process = time.perf_counter() - wall, time.process_time() - process
         n = len(truths)
         off = np.abs(done.values[:n] - truth)
-        deviations = done.intervals.factor * done.intervals.deviations[:n]
-        inside = off <= deviations
+        halves = done.intervals.half[:n]
+        inside = off <= halves
         covered += inside.tolist()
         nominal += (off <= 1.96 * done.intervals.nominal[:n]).tolist()
-        half += (deviations / np.array([p.deviation for p in truths])).tolist()
+        half += (halves / np.array([p.deviation for p in truths])).tolist()
         farthest.append(gone)
         errors = relative_errors(truths, truth, done.values[:n])
         for name, values in errors.items():

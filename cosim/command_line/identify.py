@@ -17,7 +17,7 @@ _EPILOG = """examples:
 
 _EXCITE_EPILOG = """examples:
   cosim excite --vehicle bluerov2_heavy --out pool
-  cosim excite --vehicle mine.toml --box 5 4 2 --depth 1.5 --time 600 --out pool
+  cosim excite --vehicle mine.toml --box 5 4 2 --depth 1.5 --current 0.05 --time 600 --out pool
   cosim run pool/excite.toml --replay-commands pool/commands.jsonl --out runs/pool
   cosim identify runs/pool --vehicle bluerov2_heavy --out mine.toml
 """
@@ -47,8 +47,8 @@ def add_verbs(verbs: Any) -> None:
     )  # fmt: skip
     identify.add_argument(
         "--nuisance", nargs="*", metavar="NAME",
-        help="what is estimated beside: current, force, delay, lever, bias, scale, asymmetry (default: current, lever, "
-        "bias and scale)",
+        help="what is estimated beside: current, force, delay, lever, bias, scale, asymmetry, random_force (default: "
+        "current, lever, bias and scale)",
     )  # fmt: skip
     identify.add_argument(
         "--held-out", nargs="+", type=Path, default=[], metavar="RUN", help="run folders that are predicted, not fitted"
@@ -77,6 +77,9 @@ def _add_excite(verbs: Any) -> None:
     excite.add_argument("--time", type=number(1.0, 36000.0), default=300.0, help="of the whole [s] (default: 300)")
     excite.add_argument("--free", nargs="+", metavar="KEY", help="what is to be identified, as for cosim identify")
     excite.add_argument("--nuisance", nargs="*", metavar="NAME", help="what is estimated beside, as for cosim identify")
+    excite.add_argument(
+        "--current", type=number(0.0, 2.0), default=0.1, help="that the box allows for [m/s] (default: 0.1)"
+    )
     excite.add_argument("--seed", type=whole(0, 2**31), default=0, help="of the candidates (default: 0)")
     excite.add_argument(
         "--out", type=Path, required=True, metavar="DIR", help="a new folder: scenario, commands, sticks.csv, page"
@@ -97,6 +100,7 @@ def excite(options: argparse.Namespace) -> int:
             options.vehicle, tuple(options.box), options.depth, options.time,
             DEFAULT_FREE if options.free is None else options.free,
             DEFAULT_NUISANCES if options.nuisance is None else options.nuisance, options.seed, bar.update_to,
+            options.current,
         )  # fmt: skip
     page = folder.write_folder(done, options.out)
     say(options, folder.verdict(done), *folder.warnings(done), str(page))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
 from cosim.identification.log import Log
-from cosim.identification.parameters import NUISANCES, free_parameters, nuisances
+from cosim.identification.parameters import NUISANCES, RANDOM_FORCE, free_parameters, nuisances
 from cosim.identification.residuals import Residuals
 from plant_fmu.vehicle import Vehicle
 
@@ -54,7 +54,8 @@ def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values
     if "lag" not in kinds:
         groups["--free thrusters.time_constant"] = free_parameters(vehicle, ("thrusters.time_constant",))
     every = [*parameters, *(p for group in groups.values() for p in group)]
-    problem = Residuals(logs, vehicle, every, windows, step)
+    problem = Residuals(logs, vehicle, every, windows, step, fitted.force_deviation is not None)
+    problem.force_deviation = fitted.force_deviation
     problem.weights = fitted.weights
     at = np.concatenate([values, [p.start for p in every[len(values) :]]])
     settings = problem.settings(at)
@@ -73,10 +74,31 @@ def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values
     def explained(places: list[int]) -> float:
         return float(score[places] @ np.linalg.solve(information[np.ix_(places, places)], score[places]))
 
-    free, count, found = list(range(len(values))), len(values), []
+    free, count, found = list(range(len(values))), len(values), list[Cause]()
     already = explained(free)
+    if fitted.force_deviation is None:
+        left = _left_by_random_force(
+            Residuals(logs, vehicle, parameters, windows, step, random_force=True), fitted, values
+        )
+        found.append(Cause(f"--nuisance {RANDOM_FORCE}", (squares - already - left) / excess))
     for flag, group in groups.items():
         own = list(range(count, count + len(group)))
         count += len(group)
         found.append(Cause(flag, (explained(free + own) - already) / excess))
     return sorted(found, key=lambda cause: -cause.share)
+
+
+def _left_by_random_force(forced: Residuals, fitted: Residuals, values: Array) -> float:
+    """Return the squares that are left, a Gauss-Newton step on, where each window has a constant force of its own."""
+    forced.weights = fitted.weights
+    settings = forced.settings(values)
+    try:
+        reduced = [forced.reduced(i, settings, values) for i in range(len(forced.windows))]
+    except IdentificationError:
+        return np.inf
+    information = np.diag([p.deviation**-2.0 for p in forced.parameters])
+    information = information + sum(r.jacobian.T @ r.jacobian for r in reduced)
+    score = np.array([(x - p.start) / p.deviation**2 for p, x in zip(forced.parameters, values, strict=True)])
+    score = score + sum(r.jacobian.T @ r.residual for r in reduced)
+    squares = sum(float(r.residual @ r.residual) for r in reduced)
+    return squares - float(score @ np.linalg.solve(information, score))

@@ -44,7 +44,7 @@ def _numbers(fit: Fit) -> Figure:
     deviation = np.array([fit.parameters[i].deviation for i in places])
     start = np.array([fit.parameters[i].start for i in places])
     x = (fit.values[places] - start) / deviation
-    half = fit.intervals.factor * fit.intervals.deviations[places] / deviation
+    half = fit.intervals.half[places] / deviation
     rows = np.arange(len(places))[::-1]
     axes.axvspan(-2.0, 2.0, color=BLACK, alpha=0.06, linewidth=0)
     axes.errorbar(x, rows, xerr=half, fmt="o", color=BLUE, markersize=3.5, linewidth=1.2)

@@ -9,13 +9,15 @@ import numpy as np
 from cosim.errors import IdentificationError
 from cosim.identification.fit import STAGES, Fit
 from cosim.identification.intervals import DISAGREES
-from cosim.identification.log import UNITS, Log
+from cosim.identification.log import UNITS, Log, command_period
 
 _LOST = 10.0  # chi2 by degrees of freedom, above which nothing was identified
 _ALIKE = 0.95  # correlation, beyond which runs do not separate two numbers
 _LISTED = 6
 NAMED = 0.1  # part of what is not explained, above which a cause is named
 _LATE = 0.15  # s, of samples behind the commands: a lag of the thrusters seldom looks like more
+_SLOW = 0.2  # s between changes of the commands, from which on added mass and lag are not to be trusted
+_SLOW_SAMPLES = 0.05  # s, of the samples in a log: between them an autopilot that stabilizes changes its outputs
 _APART = 0.9  # correlation of a delay and the lag, beyond which runs do not separate them
 _NEEDS = {  # motions that tell the numbers of a key apart
     "hydrodynamics.added_mass": "quick changes of speed along and about the axis: steps of full stick, a second each",
@@ -65,8 +67,15 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
             "jackknife, and hold as far as the pieces of the runs are alike."
         )
     if fit.intervals.chi2 > DISAGREES:
-        yield _cause(fit)
-    if fit.windows[0].steps * fit.step < 0.5 * STAGES[-1]:
+        yield _cause(fit, any(slow_commands(log) for log in logs))
+    if fit.forces is not None:
+        sizes = ", ".join(f"{x:.2g}" for x in np.sqrt(np.mean(np.square(fit.forces), axis=0)))
+        yield (
+            f"A force that changes in time was estimated beside, constant within windows of {STAGES[0]:g} s: {sizes} N "
+            "north, east and down (root mean square). Its mean over the runs looks like weight less buoyancy or a "
+            "current; longer runs make that smaller."
+        )
+    elif fit.windows[0].steps * fit.step < 0.5 * STAGES[-1]:
         yield (
             f"Predictions over {STAGES[-1]:g} s fail, as they do where a motion is unstable without its control: the "
             f"numbers are those of windows of {STAGES[0]:g} s."
@@ -97,24 +106,42 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
         yield f"{fit.rejected.total()} windows were rejected: {counts}."
     if fit.outliers:
         yield f"{fit.outliers} of {fit.samples} measured components are outliers, and count by Huber's weights."
+    for log in logs:
+        if said := slow_commands(log):
+            yield said
     missing = {"velocity", "angular_velocity", "depth"} - {topic.name for log in logs for topic in log.topics}
     for name in sorted(missing):
         yield f"There are no samples of {name.replace('_', ' ')} in these runs."
 
 
-def _cause(fit: Fit) -> str:
+def slow_commands(log: Log) -> str:
+    """Return what a run's slow servo data can and cannot say; empty where its commands change quickly."""
+    period = command_period(log)
+    if period < (_SLOW_SAMPLES if log.sampled else _SLOW):
+        return ""
+    return (
+        f"Commands of {log.name}, sampled at {1.0 / period:.2g} Hz, show changes of thrust up to {period:.1g} s late: "
+        "they determine damping and weight less buoyancy where thrust rests for seconds, not added mass, lag or delays."
+    )
+
+
+def _cause(fit: Fit, slow: bool) -> str:
     """Return the causes of a poor fit as text, by name where a number of the fit stands for one."""
     late = {name: x for name, x in fit.delays.items() if x > _LATE}
-    if late and not any(p.kind == "delay" for p in fit.parameters):
+    if late and not slow and not any(p.kind == "delay" for p in fit.parameters):
         said = ", ".join(f"{name.replace('_', ' ')} {x:.2f} s" for name, x in late.items())
         return f"Samples come late behind the commands: {said}. Estimate that: --nuisance delay."
     named = [cause for cause in fit.causes if cause.share > NAMED]
     if named:
         said = ", ".join(f"{_CAUSES[c.flag.split()[1]]} ({100 * c.share:.0f} %: {c.flag})" for c in named[:3])
         return f"What would explain most of that, in one step of the fit: {said}."
+    if fit.forces is not None:
+        return "The force may change within windows too: no delay, scale or factor of a thruster explains the rest."
+    if slow:
+        return "The commands are sampled too slowly to explain these runs, see below."
     return (
-        "No delay, scale, constant force or factor of a thruster explains that: look for what changes in time, such as "
-        "waves, a tether or a current that varies, and for parts that the model has not."
+        "No delay, scale, force or factor of a thruster explains that: look for a current or an error of a sensor "
+        "that changes in time, and for parts that the model has not."
     )
 
 
@@ -122,7 +149,7 @@ _CAUSES = {
     "delay": "late samples", "scale": "the DVL's scale", "force": "a constant force, as of a tether",
     "asymmetry": "thrusters that are weaker backward", "thrusters.matrix": "unequal thrusters",
     "thrusters.time_constant": "a lag of the thrusters", "current": "a current", "lever": "the DVL's lever arm",
-    "bias": "biases of the gyro",
+    "bias": "biases of the gyro", "random_force": "a force that changes in time, such as of waves or a tether",
 }  # fmt: skip
 
 

@@ -51,6 +51,7 @@ class Fit:
     step: float  # s, of the integration
     delays: dict[str, float]  # s, of the topics, as found before the fit
     causes: tuple[Cause, ...] = ()  # of a fit that disagrees with the runs, the greatest first
+    forces: Array | None = None  # (windows, 3) N, north, east, down, where a random force is estimated
 
     def vehicle_part(self) -> list[int]:
         """Return the places of the vehicle's own numbers."""
@@ -85,6 +86,7 @@ def fit(
     vehicle: Vehicle,
     parameters: Sequence[Parameter],
     progress: Callable[[float], None] = lambda part: None,
+    random_force: bool = False,
 ) -> Fit:
     """Find the numbers under which windows of runs are predicted best.
 
@@ -98,6 +100,8 @@ def fit(
         What is free.
     progress : callable
         Told what part of the work is done, 0 to 1.
+    random_force : bool
+        Estimate a constant force of each window beside. Windows then stay short, since it is none over long ones.
 
     Returns
     -------
@@ -110,7 +114,7 @@ def fit(
         If no window is left, or the start predicts no motion.
     """
     with single_thread():
-        return _fit(logs, vehicle, tuple(parameters), progress)
+        return _fit(logs, vehicle, tuple(parameters), progress, random_force)
 
 
 def single_thread() -> AbstractContextManager[object]:
@@ -120,8 +124,9 @@ def single_thread() -> AbstractContextManager[object]:
 
 
 def _fit(
-    logs: Sequence[Log], vehicle: Vehicle, parameters: tuple[Parameter, ...], progress: Callable[[float], None]
-) -> Fit:
+    logs: Sequence[Log], vehicle: Vehicle, parameters: tuple[Parameter, ...], progress: Callable[[float], None],
+    random_force: bool,
+) -> Fit:  # fmt: skip
     step = integration_step(logs)
     delays = find_delays(logs, vehicle, step)
     values, margins = _inside(parameters), (0.0, 0.0)
@@ -133,12 +138,13 @@ def _fit(
             delays.get(p.plant, 0.0) if p.kind == "delay" else x for p, x in zip(parameters, values, strict=True)
         ])  # fmt: skip
     found: list[Fit] = []
-    done, total = 0, sum(_ROUNDS) * _EVALUATIONS
-    for length, rounds in zip(STAGES, _ROUNDS, strict=True):
+    stages = tuple(zip(STAGES, _ROUNDS, strict=True))[: 1 if random_force else None]
+    done, total = 0, sum(rounds for _, rounds in stages) * _EVALUATIONS
+    for length, rounds in stages:
         windows, rejected = cut_windows(logs, vehicle, step, length, margins)
         if not windows:
             raise IdentificationError(_nothing_left(rejected))
-        problem = Problem(Residuals(logs, vehicle, parameters, windows, step))
+        problem = Problem(Residuals(logs, vehicle, parameters, windows, step, random_force))
         for turn in range(rounds):
             begun = done
 
@@ -161,6 +167,8 @@ def _fit(
             done = begun + _EVALUATIONS
             if turn < rounds - 1:
                 problem.reweigh()
+                if not problem.residuals.holds_starts:
+                    problem.residuals.update_force_deviation()
         result = _result(problem, values, rejected, step, delays)
         if result.intervals.chi2 > DISAGREES:
             result = replace(result, causes=tuple(find_causes(logs, vehicle, problem.residuals, values, step)))
@@ -172,10 +180,13 @@ def _fit(
 
 def _result(problem: Problem, values: Array, rejected: Counter[str], step: float, delays: dict[str, float]) -> Fit:
     parameters, windows, reduced = problem.residuals.parameters, problem.residuals.windows, problem.reduced
-    plain = [r.residual / w for r, w in zip(reduced, problem.residuals.weights, strict=True)]
+    plain = [r.residual[: len(w)] / w for r, w in zip(reduced, problem.residuals.weights, strict=True)]
+    forced = problem.residuals.force_deviation is not None
+    intervals = estimate_intervals(parameters, values, reduced, windows, problem.residuals.eliminated, forced)
     return Fit(
-        parameters, values, estimate_intervals(parameters, values, reduced, windows), tuple(windows), rejected,
-        tuple(reduced), sum(int((np.abs(r) > _OUTLIER).sum()) for r in plain), sum(map(len, plain)), step, delays,
+        parameters, values, intervals, tuple(windows), rejected, tuple(reduced),
+        sum(int((np.abs(r) > _OUTLIER).sum()) for r in plain), sum(map(len, plain)), step, delays,
+        forces=problem.residuals.forces() if forced else None,
     )  # fmt: skip
 
 
@@ -219,7 +230,7 @@ class Problem:
     def reweigh(self) -> None:
         """Weigh the residuals by Huber's function of what they are now."""
         for i, reduced in enumerate(self.reduced):
-            size = np.abs(reduced.residual / self.residuals.weights[i])
+            size = np.abs(reduced.residual[: len(self.residuals.weights[i])] / self.residuals.weights[i])
             self.residuals.weights[i] = np.sqrt(np.minimum(1.0, _HUBER / np.maximum(size, 1e-12)))
 
     def _evaluate(self, values: Array) -> tuple[Array, Array]:
@@ -231,7 +242,7 @@ class Problem:
             try:
                 reduced = [self.residuals.reduced(i, settings, values) for i in range(len(self.residuals.windows))]
             except IdentificationError:
-                rows = sum(min(len(w), p + 1) for w in self.residuals.weights) + p
+                rows = sum(min(self.residuals.rows(i), p + 1) for i in range(len(self.residuals.windows))) + p
                 return np.full(rows, np.nan), np.full((rows, p), np.nan)
             few = [np.linalg.qr(np.column_stack([r.jacobian, r.residual]), mode="r") for r in reduced]
             rows_of_all = np.concatenate([*few, np.column_stack([

@@ -10,7 +10,13 @@ from cosim.errors import IdentificationError
 from cosim.identification import findings
 from cosim.identification.fit import Fit, fit
 from cosim.identification.log import Log, load_log
-from cosim.identification.parameters import DEFAULT_FREE, DEFAULT_NUISANCES, free_parameters, nuisances
+from cosim.identification.parameters import (
+    DEFAULT_FREE,
+    DEFAULT_NUISANCES,
+    RANDOM_FORCE,
+    free_parameters,
+    nuisances,
+)
 from cosim.identification.validation import Prediction, validate
 from cosim.identification.vehicle_file import name_of_file, vehicle_text
 from cosim.io.atomic_file import write_atomic
@@ -82,7 +88,13 @@ def identify(
         raise IdentificationError("--free: nothing is free, expected one key at the least")
     logs, others = (tuple(load_log(run, vehicle) for run in folders) for folders in (runs, held_out))
     parameters += nuisances(nuisance, logs)
-    found = fit(logs, vehicle, parameters, progress)
+    try:
+        found = fit(logs, vehicle, parameters, progress, RANDOM_FORCE in nuisance)
+    except IdentificationError as error:
+        slow = [said for log in logs if (said := findings.slow_commands(log))]
+        if not slow:
+            raise
+        raise IdentificationError(f"{error}. {' '.join(slow)}") from error
     findings.require_apart(found)
     predictions = validate(others or logs, vehicle, parameters, found.values, found.step)
     return Identification(start, vehicle, logs, others, found, tuple(predictions))

@@ -19,19 +19,19 @@ Array = NDArray[np.float64]
 DISAGREES = 1.2  # chi2 by degrees of freedom, above which the model is called wrong
 RESTS = 0.5  # of the prior's deviation: above it, a number rests on its prior
 _BLOCK = 5.0  # s, of residuals that stay together in the jackknife
-_LONG_BLOCK = 20.0  # s, of windows that stay together where the model is wrong: what it lacks may last for seconds
+_LONG_BLOCK = 20.0  # s, of windows that stay together that are alike: what a model lacks may last for seconds
 _FEWEST_RUNS = 8  # from which on whole runs are left out instead
 _COVERED = 0.95
+NORMAL = 1.96  # standard deviations: half of a 95 % interval
 
 
 @dataclass(frozen=True)
 class Intervals:
     """Uncertainty of p numbers."""
 
-    deviations: Array  # (p,) standard, as stated: of the jackknife, or nominal where that is greater
+    half: Array  # (p,) of the 95 % interval: of the jackknife, or nominal where that is greater
     nominal: Array  # (p,) as white noise of the sensors alone would have it
-    covariance: Array  # (p, p) with `deviations`, and the correlation of the fit
-    factor: float  # of a deviation: half of the 95 % interval
+    covariance: Array  # (p, p) of a normal distribution with these intervals and the correlation of the fit
     clusters: str  # what the jackknife leaves out
     chi2: float  # by degrees of freedom
     prior_part: Array  # (p,) nominal deviation, in deviations of the prior
@@ -45,8 +45,9 @@ class Intervals:
 
 
 def estimate_intervals(
-    parameters: Sequence[Parameter], values: Array, reduced: Sequence[Reduced], windows: Sequence[Window]
-) -> Intervals:
+    parameters: Sequence[Parameter], values: Array, reduced: Sequence[Reduced], windows: Sequence[Window],
+    eliminated: int, random_force: bool,
+) -> Intervals:  # fmt: skip
     """Return the uncertainty of a fit.
 
     Parameters
@@ -59,44 +60,70 @@ def estimate_intervals(
         Of each window, at those values.
     windows : sequence of Window
         The windows.
+    eliminated : int
+        Unknowns of each window that are no parameters: its start.
+    random_force : bool
+        Whether one is estimated: those of windows that follow each other are alike.
 
     Returns
     -------
     Intervals
-        By a jackknife over pieces of 5 s, of 20 s where the model is wrong, or over runs where there are eight or more:
-        each left out in turn, in one Gauss-Newton step (Bell and McCaffrey 2002, CR3). Nominal ones hold for white
-        noise and a right model alone.
+        By a jackknife over pieces of 5 s, of 20 s where the model is wrong or a random force is estimated, or over runs
+        where there are eight or more: each left out in turn, in one Gauss-Newton step. Where pieces are of 20 s, each
+        number has degrees of freedom by the pieces that determine it (Bell and McCaffrey 2002, CR3). Nominal ones hold
+        for white noise and a right model alone.
     """
     prior = np.array([1.0 / p.deviation**2 for p in parameters])
     information = np.diag(prior) + sum(r.jacobian.T @ r.jacobian for r in reduced)
     rows = sum(len(r.residual) for r in reduced)
-    starts = 10 * len(windows)
+    starts = eliminated * len(windows)
     chi2 = float(sum(r.residual @ r.residual for r in reduced)) / max(1, rows - len(values) - starts)
-    inverse = np.linalg.inv(information)
+    inverse: Any = np.linalg.inv(information)
     nominal = np.sqrt(np.diag(inverse))
 
-    pieces, clusters = _pieces(reduced, windows, chi2 > DISAGREES)
-    moved = np.stack([
-        np.linalg.solve(information - jacobian.T @ jacobian, jacobian.T @ residual) for jacobian, residual in pieces
-    ])  # fmt: skip
-    n = len(pieces)
-    jackknife = np.sqrt((n - 1.0) / n * np.sum(np.square(moved - moved.mean(axis=0)), axis=0)) if n > 1 else nominal
-    deviations = np.maximum(jackknife, nominal)
-    scale = deviations / nominal
+    are_alike = random_force or chi2 > DISAGREES
+    pieces, clusters = _pieces(reduced, windows, are_alike)
+    half = NORMAL * nominal
+    if len(pieces) > 1:
+        jackknife, freedom = _jackknife(information, inverse, pieces)
+        if not are_alike:  # nominal ones are right as far as anybody knows: few pieces need no more
+            freedom = np.full_like(freedom, len(pieces) - 1.0)
+        half = np.maximum(half, jackknife * student.ppf(0.5 + _COVERED / 2.0, freedom))
+    scale = half / (NORMAL * nominal)
     covariance: Any = inverse * np.outer(scale, scale)
     return Intervals(
-        deviations=deviations, nominal=nominal, covariance=covariance,
-        factor=float(student.ppf(0.5 + _COVERED / 2.0, max(1, n - 1))), clusters=clusters, chi2=chi2,
+        half=half, nominal=nominal, covariance=covariance, clusters=clusters, chi2=chi2,
         prior_part=nominal * np.sqrt(prior),
     )  # fmt: skip
 
 
+def _jackknife(information: Array, inverse: Array, pieces: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Return deviations of the numbers by leaving out each piece, and their degrees of freedom.
+
+    A number that few pieces determine has few: those of a chi² distribution with the mean and the variance that the
+    squared deviation has where the noise is white (Satterthwaite 1946).
+    """
+    own = [jacobian.T @ jacobian for jacobian, _ in pieces]
+    left_out = [np.linalg.inv(information - part) for part in own]  # (p, p) each, symmetric
+    scores = [jacobian.T @ residual for jacobian, residual in pieces]
+    moved = np.stack([inv @ score for inv, score in zip(left_out, scores, strict=True)])
+    n = len(pieces)
+    deviations: Array = np.sqrt((n - 1.0) / n * np.sum(np.square(moved), axis=0))
+    reached = np.stack([part @ inv for part, inv in zip(own, left_out, strict=True)])  # (n, p, p)
+    across = -np.einsum("gkj,kl,hlj->jgh", reached, inverse, reached, optimize=True)  # covariances of moves of pieces
+    alone = np.einsum("gkj,gkj->gj", np.stack(left_out), reached)
+    across[:, range(n), range(n)] += alone.T
+    trace = np.trace(across, axis1=1, axis2=2)
+    freedom: Array = np.square(trace) / np.sum(np.square(across), axis=(1, 2))
+    return deviations, np.maximum(1.0, freedom)
+
+
 def _pieces(
-    reduced: Sequence[Reduced], windows: Sequence[Window], wrong: bool
+    reduced: Sequence[Reduced], windows: Sequence[Window], are_alike: bool
 ) -> tuple[list[tuple[Array, Array]], str]:
     """Return rows that stay together, and what they are."""
     runs = len({window.run for window in windows})
-    if runs >= _FEWEST_RUNS or wrong:
+    if runs >= _FEWEST_RUNS or are_alike:
         whole = runs >= _FEWEST_RUNS
         together: dict[tuple[int, int], list[Reduced]] = {}
         for r, window in zip(reduced, windows, strict=True):

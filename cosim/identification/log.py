@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
+from cosim.results.log_facts import IMPORT
 from cosim.results.record import Record, load_record
 from cosim.results.run_result import SCENARIO
 from plant_fmu.toml_tables import read_toml
@@ -75,6 +76,7 @@ class Log:
     thrust: Array  # (rows, thrusters) N, commanded
     wrench: Array  # (rows, 6) N, N m, commanded beside the thrusters
     topics: tuple[Topic, ...]
+    sampled: bool = False  # commands are samples of a log, and may change between its rows
 
     def topic(self, name: str) -> Topic | None:
         """Return a topic by its name, None where the run has none."""
@@ -121,6 +123,13 @@ def make_topic(name: str, times: Array, values: Array, noise: float | None = Non
     return Topic(name, times, values, np.maximum(deviations, least))
 
 
+def command_period(log: Log) -> float:
+    """Return the time between changes of the commands that one in twenty falls short of [s]; 0 without changes."""
+    commands = np.concatenate([log.thrust, log.wrench], axis=1)
+    spans = np.diff(log.times[1:][(np.diff(commands, axis=0) != 0.0).any(axis=1)])
+    return float(np.quantile(spans, 0.05)) if len(spans) else 0.0
+
+
 def load_log(folder: Path, vehicle: Vehicle) -> Log:
     """Read what a run recorded.
 
@@ -165,7 +174,7 @@ def load_log(folder: Path, vehicle: Vehicle) -> Log:
             raise IdentificationError(f"{folder}: has no {said} that changes, expected {_FEWEST} samples at the least")
     n = vehicle.n_thrusters
     _require_steady_actuators(folder, bool(np.any(commands[known, n:])))
-    return Log(folder.name, time[known], commands[known, :n], commands[known, n:], topics)
+    return Log(folder.name, time[known], commands[known, :n], commands[known, n:], topics, (folder / IMPORT).exists())
 
 
 def _require_steady_actuators(folder: Path, has_wrench: bool) -> None:

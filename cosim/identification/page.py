@@ -110,7 +110,7 @@ def _rows(done: Identification, nuisance: bool) -> list[tuple[str, ...]]:
     for i, p in enumerate(fit.parameters):
         if p.is_nuisance != nuisance:
             continue
-        half = fit.intervals.factor * fit.intervals.deviations[i]
+        half = fit.intervals.half[i]
         rests = "prior" if i in resting or (nuisance and fit.intervals.prior_part[i] > 0.5) else "runs"
         cells = (p.name, number(p.start), number(float(fit.values[i])), number(float(half), 2), p.unit, rests)
         rows.append(cells)

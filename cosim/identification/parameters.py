@@ -23,6 +23,7 @@ DEFAULT_FREE = (
     "hydrostatics.buoyancy", "hydrostatics.center_of_buoyancy", "thrusters.time_constant",
 )  # fmt: skip
 NUISANCES: tuple[Kind, ...] = ("current", "force", "delay", "lever", "bias", "scale", "asymmetry")
+RANDOM_FORCE = "random_force"  # a nuisance that is eliminated from each window, and no parameter
 DEFAULT_NUISANCES = ("current", "lever", "bias", "scale")
 
 _ELEMENT = re.compile(r"(?P<key>[a-z_]+\.[a-z_]+)(?:\.(?P<row>\d+)(?:\.(?P<column>\d+))?|\.(?P<part>diagonal))?")
@@ -101,7 +102,7 @@ def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
     names : sequence of str
         Of `NUISANCES`: a current and a constant force of each run, north and east; the delay of each topic behind the
         commands; the lever arm and the scale error of the DVL; the gyro's biases of each run; the part of its force
-        that each thruster lacks backward.
+        that each thruster lacks backward. `RANDOM_FORCE` makes no parameter.
     logs : sequence of Log
         The runs.
 
@@ -120,8 +121,9 @@ def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
         "asymmetry": [f"{i + 1}" for i in range(logs[0].thrust.shape[1])],
     }
     made: list[Parameter] = []
-    if odd := [name for name in names if name not in NUISANCES]:
-        raise IdentificationError(f"--nuisance {odd[0]}: is unknown, expected some of {', '.join(NUISANCES)}")
+    if odd := [name for name in names if name not in (*NUISANCES, RANDOM_FORCE)]:
+        expected = ", ".join((*NUISANCES, RANDOM_FORCE))
+        raise IdentificationError(f"--nuisance {odd[0]}: is unknown, expected some of {expected}")
     for name in (known for known in NUISANCES if known in names):
         label, unit, deviation, axes = _NUISANCES[name]
         for run in range(len(logs)) if name in ("current", "force", "bias") else (None,):

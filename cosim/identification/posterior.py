@@ -17,7 +17,6 @@ from plant_fmu.vehicle import Vehicle
 Array = NDArray[np.float64]
 
 DRAWS = 256
-_NORMAL = 1.96  # standard deviations: half of a 95 % interval
 _TRIES = 100  # for each vehicle that has a mass matrix
 
 
@@ -81,7 +80,7 @@ def draw_plants(fit: Fit, vehicle: Vehicle, seed: int, count: int = DRAWS) -> li
     places = fit.vehicle_part()
     parameters = [fit.parameters[i] for i in places]
     least, most = (np.array([getattr(p, name) for p in parameters]) for name in ("least", "most"))
-    covariance = fit.intervals.covariance[np.ix_(places, places)] * (fit.intervals.factor / _NORMAL) ** 2
+    covariance = fit.intervals.covariance[np.ix_(places, places)]
     rng = np.random.default_rng([seed, 28])
     found: list[dict[str, float]] = []
     for _ in range(_TRIES * count):

@@ -27,6 +27,9 @@ from plant_fmu.vehicle import Vehicle
 Array = NDArray[np.float64]
 
 _START_DEVIATIONS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0)  # m, rad, m/s, rad/s
+_FORCES = range(12, 15)  # places of a window's force behind those of its state
+_FORCE = 0.5  # N, standard deviation of a random force before any residual is known
+_LEAST_FORCE = 0.01  # N
 _SOLVED = 0.05  # of a start's standard deviation: what is left is linear
 _MOST_SOLVES = 12
 
@@ -55,7 +58,7 @@ class Reduced:
 class _Start:
     """The best start of a window, and how it changes with the free numbers about where it was found."""
 
-    state: Array  # (13,)
+    state: Array  # (13,), or (16,) with a force
     values: Array
     slope: Array  # (starts, parameters)
 
@@ -75,6 +78,8 @@ class Residuals:
         What is predicted.
     step : float
         Of the integration and of the windows' grid [s].
+    random_force : bool
+        Whether a constant force of each window is eliminated beside its start: normal, of mean zero.
     """
 
     def __init__(
@@ -84,6 +89,7 @@ class Residuals:
         parameters: Sequence[Parameter],
         windows: Sequence[Window],
         step: float,
+        random_force: bool = False,
     ) -> None:
         self.parameters, self.windows = tuple(parameters), tuple(windows)
         self._shooter, self._step, self._thrusters = Shooter(vehicle), step, vehicle.n_thrusters
@@ -92,6 +98,10 @@ class Residuals:
         has_position = any(topic.name == "position" for log in logs for topic in log.topics)
         has_depth = has_position or any(topic.name == "depth" for log in logs for topic in log.topics)
         self._starts = [*((0, 1) if has_position else ()), *((2,) if has_depth else ()), *range(3, 12)]
+        self.force_deviation = np.full(3, _FORCE) if random_force else None  # N, north, east, down
+        self._deviations = np.array([_START_DEVIATIONS[k] for k in self._starts])
+        if random_force:
+            self._starts += [*_FORCES]
         self.holds_starts = False  # as samples have them, while the free numbers are far off
         self._found: dict[int, _Start] = {}
         self._tried: dict[int, _Start] = {}
@@ -140,7 +150,7 @@ class Residuals:
         settings : sequence of Setting
             Of each run.
         start : ndarray, shape (13,)
-            Where it begins.
+            Where it begins; with a random force (16,), that force last [N, NED].
         full : bool
             Whether the derivatives by the free numbers are asked for.
 
@@ -165,8 +175,8 @@ class Residuals:
         times = [topic.times + topic.shift - setting.delays.get(topic.name, topic.shift) for topic in window.topics]
         order = np.argsort(np.concatenate(times), kind="stable")
         motion = self._shooter.predict(
-            setting.plant, start, setting.actuation.wrench[inside], self._step, np.concatenate(times)[order],
-            self._directions(moving, setting, inside, start), setting.force,
+            setting.plant, start[:13], setting.actuation.wrench[inside], self._step, np.concatenate(times)[order],
+            self._directions(moving, setting, inside, start), setting.force + (start[13:] if len(start) > 13 else 0.0),
         )  # fmt: skip
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
@@ -194,7 +204,9 @@ class Residuals:
         n, count = len(self._starts), len(self._starts) + len(moving)
         tangents, force = np.zeros((count, STATE_SIZE)), np.zeros((count, 3))
         for row, which in enumerate(self._starts):
-            if 3 <= which < 6:
+            if which in _FORCES:
+                force[row, which - _FORCES.start] = 1.0
+            elif 3 <= which < 6:
                 tangents[row, 3:7] = _turn(start[3:7], which - 3)
             else:
                 tangents[row, which if which < 3 else which + 1] = 1.0
@@ -231,9 +243,11 @@ class Residuals:
                     jacobian[:, j] = by.ravel()
 
     def solve_start(self, i: int, settings: Sequence[Setting], values: Array) -> Array:
-        """Return the best start of a window, shape (13,)."""
+        """Return the best start of a window, shape (13,), or (16,) with a force."""
         known = self._found.get(i)
         state = self.windows[i].start
+        if self.force_deviation is not None:
+            state = np.concatenate([state, np.zeros(3)])
         if self.holds_starts:
             return state
         if known is not None:
@@ -242,7 +256,8 @@ class Residuals:
         for _ in range(_MOST_SOLVES):
             try:
                 residual, by_start, _ = self.raw(i, settings, state, full=False)
-                cost = float(np.sum(np.square(weight * residual)))
+                left, by_start = self._with_prior(weight * residual, weight[:, None] * by_start, state)
+                cost = float(left @ left)
             except IdentificationError:  # no motion from there
                 if best == np.inf:
                     raise
@@ -251,9 +266,9 @@ class Residuals:
                 step = 0.5 * step
                 state = self._moved(base, step)
                 continue
-            best, base, step = cost, state, self._step_of(weight * residual, weight[:, None] * by_start)
+            best, base, step = cost, state, self._step_of(left, by_start)
             state = self._moved(base, step)
-            if float(np.sum(np.square(weight * (by_start @ step)))) < _SOLVED**2:
+            if float(np.sum(np.square(by_start @ step))) < _SOLVED**2:
                 break
         return state
 
@@ -268,25 +283,60 @@ class Residuals:
         weight = self.weights[i]
         left: Array = weight * residual
         by_start, jacobian = weight[:, None] * by_start, weight[:, None] * jacobian
-        deviations = np.array([_START_DEVIATIONS[k] for k in self._starts])
+        left, by_start = self._with_prior(left, by_start, state)
+        times = self._row_times(i)
+        if added := len(left) - len(times):
+            jacobian = np.concatenate([jacobian, np.zeros((added, jacobian.shape[1]))])
+            times = np.concatenate([times, np.zeros(added)])
         q: Any
         r: Any
-        q, r = np.linalg.qr(np.concatenate([by_start, np.diag(1.0 / deviations)]))
+        q, r = np.linalg.qr(np.concatenate([by_start, self._start_prior()]))
         top = q[: len(by_start)]
         slope: Array = -np.linalg.solve(r, top.T @ jacobian)
         if self.holds_starts:
-            return Reduced(left, jacobian, self._row_times(i))
+            return Reduced(left, jacobian, times)
         self._tried[i] = _Start(state, values.copy(), slope)
         step: Any = -np.linalg.solve(r, top.T @ left)
         best: Any = left + by_start @ step
-        return Reduced(best, jacobian + by_start @ slope, self._row_times(i))
+        return Reduced(best, jacobian + by_start @ slope, times)
+
+    @property
+    def eliminated(self) -> int:
+        """Unknowns of each window that are eliminated."""
+        return len(self._starts)
+
+    def rows(self, i: int) -> int:
+        """Return the number of rows of a window in `reduced`."""
+        return len(self.weights[i]) + (0 if self.force_deviation is None else len(_FORCES))
+
+    def forces(self) -> Array:
+        """Return the force of each window as eliminated last, shape (windows, 3) [N, NED]."""
+        return np.array([self._tried[i].state[13:] for i in range(len(self.windows))])
+
+    def update_force_deviation(self) -> None:
+        """Take the deviation of the random force from the windows' forces."""
+        if self.force_deviation is not None:
+            self.force_deviation = np.maximum(_LEAST_FORCE, np.sqrt(np.mean(np.square(self.forces()), axis=0)))
+
+    def _with_prior(self, left: Array, by_start: Array, state: Array) -> tuple[Array, Array]:
+        """Return residuals and derivatives by the start, with those of the prior of a window's force behind them."""
+        if self.force_deviation is None:
+            return left, by_start
+        rows = np.zeros((3, by_start.shape[1]))
+        rows[:, -3:] = np.diag(1.0 / self.force_deviation)
+        return np.concatenate([left, state[13:] / self.force_deviation]), np.concatenate([by_start, rows])
+
+    def _start_prior(self) -> Array:
+        """Return the derivatives of the weak prior of a start, shape (12, starts)."""
+        result: Array = np.eye(len(self._deviations), len(self._starts)) / self._deviations[:, None]
+        return result
 
     def _row_times(self, i: int) -> Array:
         return np.concatenate([np.repeat(t.times, len(t.components)) for t in self.windows[i].topics])
 
     def _step_of(self, residual: Array, by_start: Array) -> Array:
-        deviations = np.array([_START_DEVIATIONS[k] for k in self._starts])
-        normal = by_start.T @ by_start + np.diag(deviations**-2.0)
+        prior = self._start_prior()
+        normal = by_start.T @ by_start + prior.T @ prior
         result: Any = np.linalg.solve(normal, by_start.T @ residual)
         step: Array = -result
         return step

@@ -106,7 +106,7 @@ def _about(key: str, fit: Fit) -> Iterator[str]:
         if p.name != key and not p.name.startswith(f"{key}."):
             continue
         place = p.name.removeprefix(key).lstrip(".")
-        half = fit.intervals.factor * fit.intervals.deviations[i]
+        half = fit.intervals.half[i]
         at = f"({place.replace('.', ',')}) " if place else ""
         rests = ", rests on its prior" if i in fit.resting() else ""
         words.append(f"{at}{fit.values[i]:.4g} ± {half:.2g} {p.unit}".rstrip() + rests)

@@ -40,6 +40,10 @@ class Clock:
             self._last = time
         return time
 
+    def is_behind(self, said: float) -> bool:
+        """Return True if a reading [s] would be taken for a jump back."""
+        return said + self._shift < self._last - _BACK
+
     def times(self, said: Array) -> Array:
         """Return the times [s] of clock readings [s], shape (n,)."""
         turned: Array = np.asarray(said, float) + self._shift

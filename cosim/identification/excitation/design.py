@@ -34,7 +34,9 @@ _FASTEST = 2.0  # rad/s
 _STEEPEST = math.sin(math.radians(55.0))
 _SMALLER = 0.7  # part of the sticks, each time a segment leaves the limits
 _TRIES = 7
-_OTHERS, _CURRENT = 4, 0.1  # vehicles that the schedule is tried on beside; m/s
+CURRENT = 0.1  # m/s, that the schedule allows for unless the user says otherwise
+_OTHERS = 8  # vehicles for which the schedule is made smaller, and again as many on which it is tried
+_INSIDE = 1.0  # part of half the box that those may use
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,8 @@ class Design:
     parameters: tuple[Parameter, ...]
     deviations: Array  # (p,) standard, expected of the numbers
     rehearsal: Rehearsal
-    excursions: tuple[float, ...]  # parts of half the box, of other vehicles in a current
+    current: float  # m/s, of the other vehicles' water
+    excursions: tuple[float, ...]  # parts of half the box, of other vehicles in that current
 
     def vehicle_part(self) -> list[int]:
         """Return the places of the vehicle's own numbers."""
@@ -69,6 +72,7 @@ def design(
     nuisance: Sequence[str] = DEFAULT_NUISANCES,
     seed: int = 0,
     progress: Callable[[float], None] = lambda part: None,
+    current: float = CURRENT,
 ) -> Design:
     """Choose stick inputs under which the free numbers are known best.
 
@@ -88,6 +92,8 @@ def design(
         Of the candidates.
     progress : callable
         Gets what part of the work is done, 0 to 1.
+    current : float
+        That the schedule allows for [m/s].
 
     Returns
     -------
@@ -99,15 +105,15 @@ def design(
     VehicleError, ScenarioError
         If the vehicle cannot be loaded, or the box is none.
     IdentificationError
-        If the time or the box is too small for any segment.
+        If the time or the box is too small for any segment, or for the current.
     """
     with single_thread():
-        return _design(start, box, depth, duration, free, nuisance, seed, progress)
+        return _design(start, box, depth, duration, free, nuisance, seed, progress, current)
 
 
 def _design(
     start: str, box: tuple[float, float, float], depth: float, duration: float, free: Sequence[str],
-    nuisance: Sequence[str], seed: int, progress: Callable[[float], None],
+    nuisance: Sequence[str], seed: int, progress: Callable[[float], None], current: float,
 ) -> Design:  # fmt: skip
     vehicle = load_vehicle(start)
     count = math.floor((duration - BEGIN + RETURN) / (SECONDS + RETURN))
@@ -118,6 +124,12 @@ def _design(
         raise IdentificationError(
             f"--depth {depth:g}: the box of {box[2]:g} m leaves the water, expected "
             f"{0.5 * box[2] + vehicle.hull_radius:g} m or more"
+        )
+    most = _INSIDE * 0.5 * min(box[:2]) / SECONDS
+    if current > most:
+        raise IdentificationError(
+            f"--current {current:g}: carries the vehicle out of the box within a segment of {SECONDS:g} s, expected "
+            f"{most:.2g} m/s or less, or a larger --box"
         )
     trial = load(scenario_text(start, depth, _SETTLE + SECONDS, "trial"), start)
     reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
@@ -140,24 +152,27 @@ def _design(
     if not kept:
         raise IdentificationError(f"--box {box[0]:g} {box[1]:g} {box[2]:g}: is too small for any segment")
     order = _choose(found, parameters, count)
-    segments = tuple(kept[i] for i in order)
-    commands = tuple(schedule(segments))
     whole = load(scenario_text(start, depth, BEGIN + count * (SECONDS + RETURN) - RETURN, "excite"), start)
+    rng = np.random.default_rng([seed, 1])
+    segments = keep_inside([kept[i] for i in order], whole, box, fastest_others(whole, parameters, current))
+    commands = tuple(schedule(segments))
     rehearsal = rehearse(whole, commands)
     matrix = information([rehearsal.log()], vehicle, parameters)
     if matrix is None:
         raise IdentificationError("the schedule leaves no window that can be predicted")
     covariance = np.linalg.inv(matrix + _prior(parameters))
-    others = draw_others(whole, parameters, np.random.default_rng([seed, 1]))
-    excursions = tuple(farthest(rehearse(other, commands), whole, box) for other in others)
+    others = draw_others(whole, parameters, current, rng)
+    excursions = tuple(float(farthest(rehearse(other, commands), whole, box, count).max()) for other in others)
     progress(1.0)
     return Design(
         start, vehicle, box, depth, whole.time.duration, segments, len(tried), len(tried) - len(kept), commands,
-        tuple(parameters), np.sqrt(np.diag(covariance)), rehearsal, excursions,
+        tuple(parameters), np.sqrt(np.diag(covariance)), rehearsal, current, excursions,
     )  # fmt: skip
 
 
-def draw_others(scenario: Scenario, parameters: Sequence[Parameter], rng: np.random.Generator) -> list[Scenario]:
+def draw_others(
+    scenario: Scenario, parameters: Sequence[Parameter], current: float, rng: np.random.Generator
+) -> list[Scenario]:
     """Return scenarios of vehicles as they may be, each in a current.
 
     Parameters
@@ -166,6 +181,8 @@ def draw_others(scenario: Scenario, parameters: Sequence[Parameter], rng: np.ran
         Of the vehicle as it is known.
     parameters : sequence of Parameter
         What is free. Damping and the diagonal of the added mass are drawn from half to one and a half times.
+    current : float
+        Its size [m/s]; its direction is drawn.
     rng : Generator
         Of the draws.
     """
@@ -173,15 +190,70 @@ def draw_others(scenario: Scenario, parameters: Sequence[Parameter], rng: np.ran
     for _ in range(_OTHERS):
         parts = {p.plant: p.start * rng.uniform(0.5, 1.5) for p in parameters if _is_uncertain(p)}
         angle = rng.uniform(0.0, 2.0 * math.pi)
-        current = [_CURRENT * math.cos(angle), _CURRENT * math.sin(angle), 0.0]
-        found.append(scenario.replace({"plant.current": current, "plant.parameters": parts}))
+        flow = [current * math.cos(angle), current * math.sin(angle), 0.0]
+        found.append(scenario.replace({"plant.current": flow, "plant.parameters": parts}))
     return found
 
 
-def farthest(flown: Rehearsal, scenario: Scenario, box: tuple[float, float, float]) -> float:
-    """Return the greatest distance of a run from the center, as a fraction of half the box [-]."""
+def fastest_others(scenario: Scenario, parameters: Sequence[Parameter], current: float) -> list[Scenario]:
+    """Return scenarios of the vehicle of `draw_others` that moves fastest, in currents of all directions.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of the vehicle as it is known.
+    parameters : sequence of Parameter
+        What is free. Damping and the diagonal of the added mass are half.
+    current : float
+        Its size [m/s].
+    """
+    parts = {p.plant: 0.5 * p.start for p in parameters if _is_uncertain(p)}
+    found = []
+    for angle in 2.0 * math.pi * np.arange(_OTHERS) / _OTHERS:
+        flow = [current * math.cos(angle), current * math.sin(angle), 0.0]
+        found.append(scenario.replace({"plant.current": flow, "plant.parameters": parts}))
+    return found
+
+
+def keep_inside(
+    segments: Sequence[Segment], scenario: Scenario, box: tuple[float, float, float], others: Sequence[Scenario]
+) -> tuple[Segment, ...]:
+    """Return segments with smaller forces where other vehicles would come near the sides of the box.
+
+    Parameters
+    ----------
+    segments : sequence of Segment
+        As chosen.
+    scenario : Scenario
+        Of the vehicle as it is known, from the center of the box.
+    box : tuple of float
+        Its sizes [m].
+    others : sequence of Scenario
+        As `fastest_others` makes them.
+
+    Returns
+    -------
+    tuple of Segment
+        Forces are made smaller some times at the most: against a current alone that may not suffice.
+    """
+    found = list(segments)
+    for _ in range(_TRIES):
+        commands = schedule(found)
+        parts = np.max([farthest(rehearse(other, commands), scenario, box, len(found)) for other in others], axis=0)
+        if (parts <= _INSIDE).all():
+            break
+        found = [
+            Segment(s.title, s.mode, s.sticks * np.repeat([_SMALLER, 1.0], 3)) if part > _INSIDE else s
+            for s, part in zip(found, parts, strict=True)
+        ]
+    return tuple(found)
+
+
+def farthest(flown: Rehearsal, scenario: Scenario, box: tuple[float, float, float], count: int) -> Array:
+    """Return the greatest distance from the center in each segment and the return after it, in halves of the box."""
     away = np.abs(flown.states[:, :3] - np.array(scenario.initial.position)) / (0.5 * np.array(box))
-    return float(away.max())
+    segment = ((flown.times - BEGIN) / (SECONDS + RETURN)).clip(0, count - 1).astype(int)
+    return np.array([away[segment == k].max() for k in range(count)])
 
 
 def schedule(segments: Sequence[Segment]) -> list[tuple[int, Command]]:

@@ -43,7 +43,7 @@ def warnings(done: Design) -> Iterator[str]:
     said = f"{leaves} leave the box" if leaves else "none leaves the box"
     yield (
         f"Of {len(done.excursions)} other vehicles, with half to one and a half times the damping and added mass and "
-        f"in a current of 0.1 m/s, {said}: the farthest goes {100 * worst:.0f} % of the way to a side."
+        f"in a current of {done.current:g} m/s, {said}: the farthest goes {100 * worst:.0f} % of the way to a side."
     )
 
 

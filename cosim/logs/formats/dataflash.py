@@ -61,6 +61,7 @@ class _Takers:
     def __init__(self, contents: LogContents) -> None:
         self._contents = contents
         self.clock = Clock()
+        self._rate_stamp = _NOTHING
         self._takers: dict[str, Callable[[Fields, float], None]] = {
             name.removeprefix("_on_").upper(): getattr(self, name) for name in dir(self) if name.startswith("_on_")
         }
@@ -68,11 +69,18 @@ class _Takers:
 
     def take(self, name: str, m: Fields) -> None:
         """Add a message."""
+        if name == "RATE" and self._is_stale(m["TimeUS"] * 1e-6):
+            return
         at = self.clock.time(m["TimeUS"] * 1e-6) if "TimeUS" in m else _NOTHING
         try:
             self._takers[name](m, at)
         except KeyError as error:
             raise ImportLogError(f"message {name} has no field {error}, expected it as ArduPilot has it") from error
+
+    def _is_stale(self, stamp: float) -> bool:
+        """Return True for a RATE of an autopilot whose rate controller rests, as in MANUAL: its last stamp repeats."""
+        last, self._rate_stamp = self._rate_stamp, stamp
+        return stamp == last or self.clock.is_behind(stamp)
 
     def conclude(self) -> None:
         """Set the preferences among several sources."""
@@ -137,8 +145,8 @@ class _Takers:
             self._contents.unread[f"RFND of orientation {m['Orient']}"] += 1
 
     def _on_viso(self, m: Fields, at: float) -> None:
-        if m["tDelta"] > 0.0:
-            self._put("dvl", "VISO", at, *(m[f"PosD{axis}"] / m["tDelta"] for axis in "XYZ"))
+        if m["dt"] > 0.0:  # the mean over dt, which ends at the stamp
+            self._put("dvl", "VISO", at - 0.5 * m["dt"], *(m[f"PosD{axis}"] / m["dt"] for axis in "XYZ"))
 
     def _on_rcou(self, m: Fields, at: float) -> None:
         self._put("pulses", "RCOU", at, *(float(m[f"C{i}"]) for i in range(1, 33) if f"C{i}" in m))

@@ -8,7 +8,7 @@ import pytest
 
 from cosim.command_line.cli import main
 from cosim.identification.excitation import design as designing
-from cosim.identification.excitation.design import BEGIN, RETURN, information, schedule
+from cosim.identification.excitation.design import BEGIN, RETURN, farthest, information, keep_inside, schedule
 from cosim.identification.excitation.rehearsal import rehearse
 from cosim.identification.excitation.scenario_text import ROW, load, scenario_text
 from cosim.identification.excitation.segments import PERIOD, SECONDS, Segment, candidates
@@ -76,11 +76,27 @@ def test_segment_choice_complements_known_information(vehicle):
     assert sorted(designing._choose(found, parameters, 2)) == [0, 2]
 
 
+def test_segment_is_made_smaller_until_other_vehicles_stay_inside():
+    """Steps of full surge, and vehicles with half the damping in a current: forces become smaller, moments stay."""
+    full = next(s for s in tried() if s.mode == "manual" and s.title.startswith("all axes: steps of 2"))
+    box, text = (6.0, 6.0, 4.0), scenario_text("bluerov2_heavy", 4.0, BEGIN + SECONDS + RETURN, "test")
+    scenario = load(text, "bluerov2_heavy")
+    halved = {f"quadratic_damping[{i}]": 0.5 * float(x) for i, x in enumerate(scenario.vehicle.quadratic_damping, 1)}
+    other = scenario.replace({"plant.current": [0.05, 0.05, 0.0], "plant.parameters": halved})
+    before = farthest(rehearse(other, schedule([full])), scenario, box, 1)
+    (made,) = keep_inside([full], scenario, box, [other])
+    after = farthest(rehearse(other, schedule([made])), scenario, box, 1)
+    assert before[0] > 1.0 >= after[0]
+    assert np.abs(made.sticks[:, :3]).max() < np.abs(full.sticks[:, :3]).max()
+    assert (made.sticks[:, 3:] == full.sticks[:, 3:]).all()
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (["--time", "10"], "--time 10: is too short, expected 22 s or more"),
         (["--depth", "1"], "--depth 1: the box of 4 m leaves the water"),
+        (["--current", "0.3"], "--current 0.3: carries the vehicle out of the box within a segment of 20 s"),
     ],
 )
 def test_invalid_limits_are_rejected_by_name(arguments, said, tmp_path, capsys):

@@ -6,8 +6,10 @@ import re
 
 import pytest
 
+from cosim import import_log
 from cosim.command_line.cli import main
 from plant_fmu import Plant, load_vehicle
+from tests.cosim.logs.conftest import LOGS
 
 TRUTH = {"quadratic_damping[1]": 100.0, "buoyancy": 130.5}
 SCENARIO = """
@@ -60,6 +62,17 @@ def test_identified_vehicle_file_builds(run, tmp_path, capsys):
 def test_invalid_vehicle_name_is_rejected_before_the_fit(run, tmp_path, capsys):
     assert main(["identify", str(run), "--vehicle", "odin", "--out", str(tmp_path / "1.toml")]) == 2
     assert "no vehicle's file" in capsys.readouterr().err
+
+
+@pytest.mark.medium
+def test_slow_servo_data_are_named_where_no_window_is_left(tmp_path, capsys):
+    """A telemetry log of ArduSub at the surface, with servo outputs at 2 Hz."""
+    log = import_log(LOGS / "small.tlog", "bluerov2_heavy", tmp_path / "small", report=False)
+    assert main(["identify", str(log.folder), "--vehicle", "bluerov2_heavy", "--out", str(tmp_path / "a.toml")]) == 2
+    said = capsys.readouterr().err
+    assert "the hull is at the surface" in said and "Commands of small, sampled at 2 Hz" in said
+    assert "not added mass, lag or delays" in said
+    assert not (tmp_path / "a.toml").exists()
 
 
 def test_unknown_nuisance_is_rejected_by_name(run, tmp_path, capsys):

@@ -18,26 +18,24 @@ from plant_fmu import load_vehicle
 VEHICLE = load_vehicle("bluerov2_heavy")
 
 
-def fit_of(keys, values=None, deviations=0.05, factor=1.96):
+def fit_of(keys, values=None, deviations=0.05):
     """A fit as `identify` has it, with standard deviations in parts of the prior's."""
     parameters = free_parameters(VEHICLE, keys)
     found = np.array([p.start for p in parameters] if values is None else values)
     size = deviations * np.array([p.deviation for p in parameters])
-    intervals = SimpleNamespace(covariance=np.diag(size**2), factor=factor)
+    intervals = SimpleNamespace(covariance=np.diag(size**2))
     return SimpleNamespace(
         parameters=parameters, values=found, intervals=intervals, vehicle_part=lambda: list(range(len(parameters)))
     )
 
 
 def test_draws_lie_within_the_intervals_as_often_as_those_say():
-    """In 95 of 100, also where the intervals are wide because there are few pieces to leave out."""
-    for factor in (1.96, 2.6):
-        fit = fit_of(("hydrodynamics.quadratic_damping", "hydrostatics.buoyancy"), factor=factor)
-        plants = draw_plants(fit, VEHICLE, 0, 2000)
-        values = np.array([[plant[p.plant] for p in fit.parameters] for plant in plants])
-        half = factor * np.sqrt(np.diag(fit.intervals.covariance))
-        inside = np.abs(values - fit.values) <= half
-        assert np.abs(inside.mean(axis=0) - 0.95).max() < 0.02
+    """In 95 of 100: the covariance is that of a normal distribution with these intervals."""
+    fit = fit_of(("hydrodynamics.quadratic_damping", "hydrostatics.buoyancy"))
+    plants = draw_plants(fit, VEHICLE, 0, 2000)
+    values = np.array([[plant[p.plant] for p in fit.parameters] for plant in plants])
+    inside = np.abs(values - fit.values) <= 1.96 * np.sqrt(np.diag(fit.intervals.covariance))
+    assert np.abs(inside.mean(axis=0) - 0.95).max() < 0.02
 
 
 def test_correlations_and_seeds_are_kept():
