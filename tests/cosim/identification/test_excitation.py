@@ -76,6 +76,7 @@ def test_segment_choice_complements_known_information(vehicle):
     assert sorted(designing._choose(found, parameters, 2)) == [0, 2]
 
 
+@pytest.mark.medium
 def test_segment_is_made_smaller_until_other_vehicles_stay_inside():
     """Steps of full surge, and vehicles with half the damping in a current: forces become smaller, moments stay."""
     full = next(s for s in tried() if s.mode == "manual" and s.title.startswith("all axes: steps of 2"))

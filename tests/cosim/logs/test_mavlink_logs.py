@@ -275,6 +275,7 @@ def test_visual_odometry_is_the_mean_velocity_of_its_interval(contents):
     assert next(source.blocks())[0, 1:] == pytest.approx([1.9, 0.5, -0.1, 0.0])
 
 
+@pytest.mark.medium
 def test_report_replay_and_export_work_on_an_imported_log(tlog, tmp_path):
     folder = tmp_path / "small"
     shutil.copytree(tlog.folder, folder)
