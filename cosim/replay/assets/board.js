@@ -10,7 +10,7 @@ class Board {
     this.window = null; // null for the whole run
     this.holder = document.getElementById("charts");
     this._out = new Set(["memberships", "asked", "acting", "moments", "turning"]); // until the reader asks for them
-    this._told = 0;
+    this._updated = 0;
     this._pending = 0;
     const watch = (entries) => this._seen(entries);
     this._watcher = new IntersectionObserver(watch, { rootMargin: "200px" });
@@ -89,13 +89,13 @@ class Board {
       this._show(live ? t - length : t, length); // a page on; of a live run always the last seconds
     }
     const now = performance.now();
-    const tell = !playing || now - this._told > 90; // nobody reads faster
-    if (tell) this._told = now;
+    const due = !playing || now - this._updated > 90; // nobody reads faster
+    if (due) this._updated = now;
     for (const chart of this.charts) {
       if (!chart.near || chart.element.hidden) continue;
       chart.paint();
       chart.point(live && !this.window ? Math.min(t, chart.window[1]) : t); // the newest rows are not drawn yet
-      if (tell && !this._hovering) chart.tell(t, this.selected);
+      if (due && !this._hovering) chart.update(t, this.selected);
     }
   }
 
@@ -105,7 +105,7 @@ class Board {
       chart.stale = true;
       chart.paint(onPaper ? this.player.t : null);
       chart.point(this.player.t);
-      chart.tell(this.player.t, this.selected);
+      chart.update(this.player.t, this.selected);
     }
   }
 
@@ -176,7 +176,7 @@ class Board {
     for (const chart of this.charts) {
       if (!chart.near) continue;
       chart.hover(t, chart === over ? y : null);
-      chart.tell(t ?? this.player.t, this.selected);
+      chart.update(t ?? this.player.t, this.selected);
     }
   }
 

@@ -102,7 +102,7 @@ class Chart {
   }
 
   /** Tell the values at a time in the legend, of one run. */
-  tell(t, index) {
+  update(t, index) {
     for (const { of, value } of this._entries) {
       const curve = this.curves.find((one) => one.signal === of && one.index === index);
       const text = curve ? reading(valueAt(curve, t), this.spec.unit) : "";

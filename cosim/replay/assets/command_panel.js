@@ -35,11 +35,11 @@ class CommandPanel {
     } else {
       this.body.append(this._buttons(), this._list(), this._adding());
     }
-    this.tell();
+    this.update();
   }
 
   /** Show how things stand. */
-  tell() {
+  update() {
     const { run, link } = this;
     if (!run) return;
     const mode = run.rows && run.has("commands.mode") ? MODE_NAMES[run.held("commands.mode", run.end)] : null;

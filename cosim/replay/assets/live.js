@@ -49,7 +49,7 @@ class LiveLink {
         this._wait = RETRY[0];
       };
       socket.onmessage = ({ data }) => {
-        if (typeof data === "string") this._told(JSON.parse(data));
+        if (typeof data === "string") this._receive(JSON.parse(data));
         else this._rows(new Float64Array(data));
         settled();
       };
@@ -70,7 +70,7 @@ class LiveLink {
     return true;
   }
 
-  _told(message) {
+  _receive(message) {
     const does = {
       header: () => this._begin(message.run),
       changes: () => this.run.header.changes.push(...message.changes),
@@ -113,12 +113,12 @@ class LiveLink {
     player.growing = false;
     this.page.select(0); // which tells the verdict
     this.page.say(`The run has ended (${status}). This page replays what it has received.`, "good");
-    this.commandPanel.tell();
+    this.commandPanel.update();
   }
 
   _lost() {
     this.dragging.cancel();
-    this.commandPanel.tell();
+    this.commandPanel.update();
     if (this.over) return;
     this.page.say(this.run ? "The connection is lost; trying again …" : "No run answers here; trying again …", "warning");
     if (!this.run) this.page.nothing("Waiting for a run.");
@@ -131,7 +131,7 @@ class LiveLink {
     this._next ||= requestAnimationFrame(() => {
       this._next = 0;
       this.page.refresh();
-      this.commandPanel.tell();
+      this.commandPanel.update();
       this.dragging.draw();
     });
   }

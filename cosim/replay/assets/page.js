@@ -157,7 +157,7 @@ class Page {
     const { player } = this;
     this.stage.draw(player.t, player.follow);
     this.board.point();
-    this.panel.tell();
+    this.panel.update();
     this.timeline.point();
     this._buttons();
     clearTimeout(this._quiet);

@@ -28,7 +28,7 @@ class BarRow {
   }
 
   /** @param {number} part between 0 and 1  @param {?number} mark another part, as a tick */
-  tell(part, text, mark = null) {
+  update(part, text, mark = null) {
     const whole = Number.isFinite(part) ? Math.min(1, Math.max(0, part)) : 0;
     this.fill.style.transform = `scaleX(${whole.toFixed(4)})`;
     if (this.value.textContent !== text) this.value.textContent = text;
@@ -45,7 +45,7 @@ class Panel {
     this.player = player;
     this.on = on;
     this.holder = document.getElementById("panel");
-    this._told = 0;
+    this._updated = 0;
   }
 
   setRuns(runs, shown, selected) {
@@ -60,14 +60,14 @@ class Panel {
     this._distances();
     this._numbers();
     this._events();
-    this.tell(true);
+    this.update(true);
   }
 
   /** Tell the panel what the cursor is at; some times a second while it moves. */
-  tell(atOnce = false) {
+  update(atOnce = false) {
     const now = performance.now();
-    if (!this.run || (!atOnce && this.player.playing && now - this._told < 90)) return;
-    this._told = now;
+    if (!this.run || (!atOnce && this.player.playing && now - this._updated < 90)) return;
+    this._updated = now;
     const { run } = this;
     const t = this.player.t;
     const active = activeWords(run, t);
@@ -80,10 +80,10 @@ class Panel {
     if (over) setText(this.over, `This run ended at ${clock(run.end)}; it stays as it was then.`);
     for (const [name, row] of this.weights) {
       const [weight, asks] = ["weight", "membership"].map((kind) => run.held(`${kind}.${name}`, t));
-      row.tell(weight, `${figure(weight, 2)} (asks ${figure(asks, 2)})`, asks);
+      row.update(weight, `${figure(weight, 2)} (asks ${figure(asks, 2)})`, asks);
     }
     const rules = firedRules(run, t);
-    rules.forEach(({ strength }, i) => this.rules[i].tell(strength, figure(strength, 2)));
+    rules.forEach(({ strength }, i) => this.rules[i].update(strength, figure(strength, 2)));
     setText(this.ruled, `${rules.filter(({ strength }) => strength > 0).length} of ${rules.length} fire`);
     this._sort(distancesAt(run, t), active.index);
     numbersAt(run, t).forEach(([, text], i) => setText(this.numbers[i], text));

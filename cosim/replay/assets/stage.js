@@ -142,17 +142,17 @@ class Stage {
 
   _view(made) {
     const view = { element: made, canvas: made.querySelector("canvas"), caption: made.querySelector(".caption"), scene: null, blank: true, indices: [], covered: [] };
-    tellPointed(this, view);
+    showPointed(this, view);
     return view;
   }
 }
 
 /** A pointer that rests on a region shows its name; in the scene itself pointers move the camera. */
-function tellPointed(stage, view) {
+function showPointed(stage, view) {
   const { canvas } = view;
   const tip = document.getElementById("pointed");
   let next = 0;
-  const tell = (x, y) => {
+  const show = (x, y) => {
     const found = stage.under(view, x, y);
     tip.hidden = !found;
     if (!found) return;
@@ -171,7 +171,7 @@ function tellPointed(stage, view) {
   canvas.addEventListener("pointermove", (event) => {
     cancelAnimationFrame(next);
     if (event.buttons) tip.hidden = true;
-    else next = requestAnimationFrame(() => tell(event.offsetX, event.offsetY));
+    else next = requestAnimationFrame(() => show(event.offsetX, event.offsetY));
   });
   canvas.addEventListener("pointerleave", away);
   canvas.addEventListener("pointerdown", away);

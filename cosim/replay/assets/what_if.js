@@ -83,7 +83,7 @@ class WhatIf {
   /** Fly soon: once the numbers have rested for a moment, and the flight before has come back. */
   later(wait = LATER) {
     this.run = this.recorded.withHeader(this._header());
-    this.panel.tell();
+    this.panel.update();
     clearTimeout(this._next);
     this._next = setTimeout(() => this._fly(), wait);
   }

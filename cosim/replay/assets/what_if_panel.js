@@ -18,7 +18,7 @@ class WhatIfPanel {
     this.holder.append(summary, this.body);
     document.getElementById("stage").append(this.holder);
     whatIf.page.stage.coveredBy(this.holder);
-    this.tell();
+    this.update();
   }
 
   say(text) {
@@ -26,7 +26,7 @@ class WhatIfPanel {
   }
 
   /** Write how things stand, but for what its reader writes. */
-  tell() {
+  update() {
     for (const { field, now } of this._fields) {
       if (field === document.activeElement && field.tagName === "INPUT") continue;
       const text = now();
@@ -58,7 +58,7 @@ class WhatIfPanel {
     field.addEventListener("input", () => {
       if (Number.isFinite(field.valueAsNumber)) changed(field.valueAsNumber);
     });
-    field.addEventListener("blur", () => this.tell());
+    field.addEventListener("blur", () => this.update());
     holder.append(field);
     set.append(holder);
     this._fields.push({ field, now });
@@ -112,13 +112,13 @@ class WhatIfPanel {
     const choice = element("select");
     choice.setAttribute("aria-label", "thruster that fails");
     choice.append(new Option("none", "0"), ...failures.limits[0].map((_, i) => new Option(`thruster ${i + 1}`, String(i + 1))));
-    const tell = () => whatIf.fail(choice.value === "0" ? null : { thruster: Number(choice.value), time });
-    choice.addEventListener("change", tell);
+    const apply = () => whatIf.fail(choice.value === "0" ? null : { thruster: Number(choice.value), time });
+    choice.addEventListener("change", apply);
     set.append(choice);
     this._fields.push({ field: choice, now: () => String(whatIf.failure?.thruster ?? 0) });
     this._number(set, "at s", "time at which it fails, in seconds", 0.5, () => String(time), (value) => {
       time = Math.min(Math.max(0, value), whatIf.recorded.header.duration);
-      if (whatIf.failure) tell();
+      if (whatIf.failure) apply();
     }).min = "0";
     return set;
   }
@@ -134,7 +134,7 @@ class WhatIfPanel {
     choice.setAttribute("aria-label", "gain");
     const options = keys.map((key) => new Option("", key));
     choice.append(...options);
-    choice.addEventListener("change", () => this.tell());
+    choice.addEventListener("change", () => this.update());
     set.append(choice);
     const names = () => options.forEach((option, i) => setText(option, `${whatIf.values.has(keys[i]) ? "• " : ""}${keys[i].slice(10).replaceAll("_", " ")}`));
     const now = () => {
