@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from controller.navigation.estimate import N_ERRORS, empty_memory
-from controller.navigation.inertial import estimate_at, propagate
+from controller.navigation.inertial import estimate_at, propagate, rotate
 from controller.navigation.measurements import SensorModel
 
 SENSORS = SensorModel()
@@ -30,6 +30,18 @@ def rotation(quaternion):
 
 def skew(a):
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+def test_small_rotations_are_exact_to_1e_7():
+    """Of half a radian, about any axis."""
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        quaternion, axis = Rotation.random(random_state=rng).as_quat()[[3, 0, 1, 2]], rng.normal(size=3)
+        turn = 0.5 * axis / np.linalg.norm(axis)
+        expected = rotation(quaternion) * Rotation.from_rotvec(turn)
+        rotate(quaternion, turn)
+        assert abs(quaternion @ expected.as_quat()[[3, 0, 1, 2]]) == pytest.approx(1.0, abs=1e-14)
+        assert (rotation(quaternion).inv() * expected).magnitude() < 2e-7
 
 
 def test_strapdown_integration_matches_scipy():
