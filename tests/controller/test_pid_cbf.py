@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from controller import LAWS, LawError, VehicleState
+from controller.laws import pid_cbf
 from controller.regions import DepthBand, Region, Sphere, pack
 from tests.controller.deployable.scenery import GOAL, LEVEL, ODIN, Sea
 
@@ -120,6 +121,28 @@ def test_reported_failed_thruster_gets_zero_command():
     health[2] = 0.0
     law.step(VehicleState(np.zeros(3), LEVEL, np.zeros(6), health), pack([GOAL]), pack([]), np.zeros(0), forces)
     assert forces[2] == 0.0 and np.abs(forces).max() > 1.0
+
+
+def test_position_error_decays_with_the_pole():
+    """At rest in still water: by z a period, as z = 1 / (1 + omega T)."""
+    law, off = law_of(observer=3.0), np.array([0.4, -0.2, 0.1])
+    memory, rest = law.memory, VehicleState(np.array([1.0, 2.0, 3.0]), LEVEL, np.zeros(6), np.ones(8))
+    memory.position[:], memory.started[0] = rest.position + off, 1.0
+    for k in range(1, 6):
+        pid_cbf.observe(memory, rest, np.eye(3), law.gains)
+        assert memory.position - rest.position == pytest.approx(off / (1.0 + 3.0 * PERIOD) ** k, rel=1e-12)
+
+
+@pytest.mark.parametrize("at", range(9))
+def test_observer_ignores_a_measurement_with_a_number_that_is_not_finite(at):
+    law, numbers = law_of(), np.array([1.0, 2.0, 3.0, 0.4, -0.3, 0.2, 0.1, -0.1, 0.2])
+    numbers[at] = math.nan
+    memory = law.memory
+    pid_cbf.observe(memory, VehicleState(numbers[:3], LEVEL, numbers[3:], np.ones(8)), np.eye(3), law.gains)
+    assert memory.started[0] == 0.0
+    memory.started[0], memory.velocity[0] = 1.0, 0.5
+    pid_cbf.observe(memory, VehicleState(numbers[:3], LEVEL, numbers[3:], np.ones(8)), np.eye(3), law.gains)
+    assert memory.position.tolist() == [0.5 * PERIOD, 0.0, 0.0] and not memory.disturbance.any()
 
 
 def test_missing_position_is_propagated_by_the_model():

@@ -271,6 +271,17 @@ def test_detection_requires_threshold_and_lead_over_the_next_hypothesis():
         assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == found
 
 
+def test_half_lost_thruster_is_kept_with_the_other_half():
+    """As the sums of evidence say: their quotient is the likeliest loss."""
+    estimate, thrusters, state = started()
+    before = estimate.state[EFFECTIVENESS + 4]
+    state.ratio[4], state.sums[0, 4], state.sums[1, 4] = 21.0, 21.0, 42.0
+    estimate.deviation[4, EFFECTIVENESS + 4] = -before
+    assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == -1
+    assert estimate.state[EFFECTIVENESS + 4] == pytest.approx(0.5 * before)
+    assert thrusters.health.all() and not state.tentative.any() and not state.ratio.any() and not state.sums.any()
+
+
 def test_zero_threshold_detects_nothing():
     for threshold, found in ((12.0, 3), (0.0, -1)):
         estimate, thrusters, state = started()
