@@ -34,6 +34,7 @@ def functions(once):
             "double expm1_(double x) { return elementary_expm1(x); }\n"
             "double cos_(double x) { return elementary_cos_turns(x); }\n"
             "double atan2_(double y, double x) { return elementary_atan2(y, x); }\n"
+            "double hypot_(double x, double y) { return elementary_hypot(x, y); }\n"
         )
         files = [folder / "shown.c", folder / "elementary.c"]
         compile_library(find_compiler(), native_platform(), files, [folder, FMI_HEADERS], folder / "shown.so")
@@ -102,3 +103,10 @@ def test_atan2_matches_reference(functions):
         for x in (0.0, -0.0, 1.0, -1.0):
             got, want = atan2(y, x), math.atan2(y, x)
             assert (got, math.copysign(1.0, got)) == (want, math.copysign(1.0, want))
+
+
+@pytest.mark.medium
+def test_hypotenuse_matches_reference(functions):
+    hypot = functions("hypot", 2)
+    for x, y in [*ANY.normal(size=(200, 2)), *(ANY.normal(size=(50, 2)) * [1e-9, 1.0])]:
+        assert abs(hypot(x, y) - math.hypot(x, y)) <= WITHIN * math.ulp(math.hypot(x, y))
