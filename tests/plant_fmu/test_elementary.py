@@ -2,6 +2,7 @@
 
 import ctypes
 import math
+import re
 from decimal import Decimal, getcontext
 
 import numpy as np
@@ -110,3 +111,21 @@ def test_hypotenuse_matches_reference(functions):
     hypot = functions("hypot", 2)
     for x, y in [*ANY.normal(size=(200, 2)), *(ANY.normal(size=(50, 2)) * [1e-9, 1.0])]:
         assert abs(hypot(x, y) - math.hypot(x, y)) <= WITHIN * math.ulp(math.hypot(x, y))
+
+
+def arctangent(x):
+    """Return the arcus tangens of a Decimal by its series, after four halvings."""
+    for _ in range(4):
+        x = x / (1 + (1 + x * x).sqrt())
+    return 16 * sum((-1) ** n * x ** (2 * n + 1) / (2 * n + 1) for n in range(40))
+
+
+def test_table_of_arctangents_holds_each_eighth_and_what_it_lacks():
+    getcontext().prec = 50
+    text = c_sources(of_vehicle(load_vehicle("odin")), 3)["elementary.c"].decode()
+    table = re.search(r"ATAN\[9\]\[2\] = \{(.*?)\};", text, re.DOTALL)
+    rows = re.findall(r"\{(.+?), (.+?)\}", table[1])
+    assert len(rows) == 9
+    for k, (number, rest) in enumerate(rows):
+        exact = arctangent(Decimal(k) / 8)
+        assert (float(number), float(rest)) == (float(exact), float(exact - Decimal(float(exact))))
