@@ -1,5 +1,6 @@
 """The PD law with observer and barriers: observer poles, barrier inequality, and closed-loop behavior."""
 
+import copy
 import math
 
 import numpy as np
@@ -7,6 +8,8 @@ import pytest
 
 from controller import LAWS, LawError, VehicleState
 from controller.laws import pid_cbf
+from controller.laws.deployable import model
+from controller.quaternion import error_parts, rotation_matrix
 from controller.regions import DepthBand, Region, Sphere, pack
 from tests.controller.deployable.scenery import GOAL, LEVEL, ODIN, Sea
 
@@ -49,6 +52,55 @@ def test_observer_poles_lie_at_its_bandwidth():
     missing = np.array(kept)
     assert missing[2:] - 2.0 * z * missing[1:-1] + z * z * missing[:-2] == pytest.approx(0.0, abs=1e-13)
     assert missing[0] == pytest.approx(acceleration) and abs(missing[-1]) < 0.2 * acceleration
+
+
+@pytest.mark.parametrize(
+    "ball",
+    [
+        Region("ball", Sphere((4.0, 0.6, 2.3), 0.7), "out", (-0.1, 0.05, 0.02)),
+        Region("ball", Sphere((2.6, -0.9, 2.9), 0.6), "out", (0.0, 0.1, -0.05)),
+    ],
+)
+def test_step_is_its_equations(ball):
+    """Observer, nominal forces and barrier in plain matrices; turned, near a ball."""
+    law, rng, forces = law_of((ball,)), np.random.default_rng(3), np.zeros(8)
+    memory, gains = law.memory, law.gains
+    turned = np.array([0.9, 0.2, -0.3, 0.1]) / np.linalg.norm([0.9, 0.2, -0.3, 0.1])
+    memory.started[0], memory.position[:], memory.velocity[:] = 1.0, (3.1, 0.0, 2.4), rng.normal(size=6) * 0.2
+    memory.velocity[:3] += np.array(ball.shape.centre) - memory.position
+    memory.disturbance[:], memory.thrusters.forces[:] = rng.normal(size=6) * 0.05, rng.normal(size=8) * 5.0
+    R = rotation_matrix(turned)
+    measured = np.r_[R.T @ memory.velocity[:3], memory.velocity[3:]] + rng.normal(size=6) * 0.05
+    state = VehicleState(np.array([3.1, 0.01, 2.39]), turned, measured, np.ones(8))
+    before, free = copy.deepcopy(memory), np.empty(6)
+    law.step(state, pack([GOAL]), pack([ball]), np.ones(1), forces)
+    p, v, d, M = memory.position, memory.velocity, memory.disturbance, memory.dynamics.mass
+    # observer
+    turning = np.kron(np.diag([1, 0]), R) + np.kron(np.diag([0, 1]), np.eye(3))
+    pushes = turning @ memory.dynamics.inverse_mass @ memory.thrusters.matrix
+    model.free_acceleration(memory.dynamics, R, before.velocity[:3], before.velocity[3:], memory.still, free)
+    z, change = 1.0 / (1.0 + gains.observer * PERIOD), free + pushes @ before.thrusters.forces + before.disturbance
+    predicted = before.velocity + PERIOD * change
+    off = turning @ measured - predicted
+    assert v == pytest.approx(predicted + (1.0 - z**2) * off, rel=1e-9)
+    assert d == pytest.approx(before.disturbance + (1.0 - z) ** 2 / PERIOD * off, rel=1e-9)
+    model.free_acceleration(memory.dynamics, R, v[:3], v[3:], memory.still, free)
+    # nominal forces
+    error, away = p - GOAL.shape.centre, p - ball.shape.centre
+    error *= min(1.0, gains.limit / gains.k_p1 / np.linalg.norm(error))
+    n, h = away / np.linalg.norm(away), np.linalg.norm(away) - ball.shape.radius
+    force = -gains.k_p1 * error - gains.k_v1 * v[:3] - np.trace(M[:3, :3]) / 3.0 * d[:3]
+    force += gains.repulsion * max(gains.reach - h, 0.0) * n
+    moment = -gains.k_p2 * np.array(error_parts(LEVEL, turned)[1:]) - gains.k_v2 * v[3:] - np.diag(M)[3:] * d[3:]
+    nominal = memory.thrusters.allocator @ np.r_[R.T @ force, moment]
+    assert memory.program.nominal == pytest.approx(nominal, rel=1e-9)
+    # barrier
+    relative = v[:3] - ball.velocity
+    rate = n @ relative
+    right = -(gains.pull_in + gains.brake) * rate - gains.pull_in * gains.brake * (h - gains.margin)
+    right -= n @ (free + d)[:3] + (relative @ relative - rate**2) / np.linalg.norm(away)
+    assert memory.program.rows[0] == pytest.approx(n @ pushes[:3], rel=1e-9, abs=1e-15)
+    assert memory.program.right[0] == pytest.approx(right, rel=2e-3)
 
 
 @pytest.mark.medium

@@ -101,6 +101,7 @@ def test_prediction_covariance_matches_a_kalman_filter():
     rng, thrusters = np.random.default_rng(1), make_thrusters(ODIN)
     for _ in range(20):
         estimate, dynamics = random_estimate(rng, thrusters)
+        dynamics.linear_damping[:] = rng.uniform(5.0, 50.0, 6)
         before, P = copy.deepcopy(estimate), estimate.covariance.copy()
         predict(estimate, dynamics, thrusters)
         before.by_lag[:] = estimate.by_lag

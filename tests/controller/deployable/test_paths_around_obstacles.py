@@ -112,6 +112,16 @@ def test_path_cost_matches_dense_evaluation():
     assert dear > 20 and long > 1 and soft > 3 and min(calls) == 1 and max(calls) > 1
 
 
+def test_approaching_region_is_evaluated_before_the_path_meets_it():
+    """Head-on, at half the vehicle's speed, from 23 m."""
+    packed, start, way = pack(REGIONS), np.array([-20.0, 0.2, 2.4]), np.zeros((CORNERS + 1, 3))
+    packed.velocities[:], way[0] = 0.0, (2.0, 0.2, 2.4)
+    packed.velocities[0, 0] = -0.5 * GAINS.speed
+    expected = expected_cost([start, way[0]], packed)
+    assert expected[1] > 10.0
+    assert cost_of(way, 1, packed, start)[0] == pytest.approx(expected, rel=1e-9)
+
+
 def test_evaluation_of_a_too_costly_path_stops_early():
     wall = pack([Region("wall", Box((2.0, 0.0, 2.5), (1.0, 9.0, 9.0)), "out")])
     way = np.zeros((CORNERS + 1, 3))
@@ -197,6 +207,7 @@ def test_nearest_goal_point_follows_the_gradient():
 
 def test_line_check_matches_dense_sampling():
     rng, packed, said = np.random.default_rng(3), pack(REGIONS), []
+    packed.deviations[:3] = 0.02 * np.eye(3)
     for _ in range(200):
         a, b = rng.normal([4.0, 0.0, 2.5], [1.5, 1.0, 0.7], size=(2, 3))
         least = min(clearance(packed, a + (b - a) * s) for s in np.linspace(0.0, 1.0, 60))
@@ -373,6 +384,16 @@ def test_root_closer_to_a_region_than_the_line_margin_keeps_its_tree():
         search.move_root(tree, np.array([x, 0.2, 2.5]), wall, MARGIN)
     assert (tree.size[0], tree.root[0]) == (2, 1) and tree.parents[:2].tolist() == [1, -1]
     assert tree.nodes[:2, 0].tolist() == [0.0, 3.94]
+
+
+def test_corner_is_dropped_even_where_the_path_starts_closer_than_the_line_margin():
+    wall, state = pack([Region("wall", HalfSpace((4.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in")]), search.empty_search()
+    start, way = np.array([3.94, 0.2, 2.5]), np.zeros((9, 3))
+    for tree, places in ((state.of_vehicle, (3.94, 3.0)), (state.of_goal, (1.0,))):
+        tree.size[0], tree.parents[: len(places)] = len(places), range(-1, len(places) - 1)
+        tree.nodes[: len(places)] = [(x, 0.2, 2.5) for x in places]
+    assert search._write_path(state, 0, 1, start, wall, MARGIN, way) == 1
+    assert way[0].tolist() == [1.0, 0.2, 2.5]
 
 
 def test_soft_regions_costlier_than_their_mean_are_closed_before_all_are():

@@ -72,6 +72,17 @@ def rows_by_differences(memory, sensor):
     return np.array(rows).T / (2.0 * step)
 
 
+def test_first_covariance_is_that_of_a_start_at_rest_with_constant_errors_of_the_data_sheets():
+    memory = empty_memory()
+    memory.covariance[:] = 7.0
+    sensors = SensorModel(*range(2, 13), gravity=9.8)
+    set_first_covariance(memory, sensors)
+    deviations = [np.hypot(0.1, sensors.position)] * 3 + [0.3] * 3 + [0.05, 0.05, 0.3]
+    deviations += [sensors.angular_velocity_bias] * 3 + [sensors.acceleration_bias] * 3
+    deviations += [sensors.heading_bias, sensors.depth_bias, sensors.velocity_scale]
+    assert memory.covariance == pytest.approx(np.diag(np.square(deviations)), rel=1e-12)
+
+
 @pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("sensor", list(PLACES))
 def test_a_sample_corrects_as_by_plain_matrices(sensor):
