@@ -165,13 +165,14 @@ def observe(memory: PidCbfMemory, state: VehicleState, R: Array, gains: PidCbfGa
     """Propagate the observer over the last period, and correct it by the finite measurements."""
     measured, acceleration, thrust, period = zeros(6), zeros(6), zeros(6), memory.period[0]
     position, velocity, disturbance = memory.position, memory.velocity, memory.disturbance
-    total = 0.0
+    known = True
     for i in range(3):
         for k in range(3):
             measured[i] += R[i, k] * state.velocity_body[k]
         measured[3 + i] = state.velocity_body[3 + i]
-        total += state.position[i] + measured[i] + measured[3 + i]
-    known = math.isfinite(total)
+        known = known and math.isfinite(state.position[i])
+    for i in range(6):
+        known = known and math.isfinite(measured[i])
     if memory.started[0] == 0.0:
         if known:
             copy(state.position, position)
@@ -269,7 +270,7 @@ class PidCbfLaw(CompiledLaw):
             report=np.zeros(0),
             field=field_of(n_regions),
             observation=empty_observation(n_regions),
-            dynamics=model.make_dynamics(vehicle, np.zeros(m + 1)),
+            dynamics=model.make_dynamics(vehicle, np.zeros(0)),
             thrusters=model.make_thrusters(vehicle),
             program=quadratic_program.empty_workspace(n_regions, m),
         )

@@ -1,11 +1,15 @@
 """The PD law with observer and barriers: observer poles, barrier inequality, and closed-loop behavior."""
 
+import copy
 import math
 
 import numpy as np
 import pytest
 
 from controller import LAWS, LawError, VehicleState
+from controller.laws import pid_cbf
+from controller.laws.deployable import model
+from controller.quaternion import error_parts, rotation_matrix
 from controller.regions import DepthBand, Region, Sphere, pack
 from tests.controller.deployable.scenery import GOAL, LEVEL, ODIN, Sea
 
@@ -48,6 +52,55 @@ def test_observer_poles_lie_at_its_bandwidth():
     missing = np.array(kept)
     assert missing[2:] - 2.0 * z * missing[1:-1] + z * z * missing[:-2] == pytest.approx(0.0, abs=1e-13)
     assert missing[0] == pytest.approx(acceleration) and abs(missing[-1]) < 0.2 * acceleration
+
+
+@pytest.mark.parametrize(
+    "ball",
+    [
+        Region("ball", Sphere((4.0, 0.6, 2.3), 0.7), "out", (-0.1, 0.05, 0.02)),
+        Region("ball", Sphere((2.6, -0.9, 2.9), 0.6), "out", (0.0, 0.1, -0.05)),
+    ],
+)
+def test_step_is_its_equations(ball):
+    """Observer, nominal forces and barrier in plain matrices; turned, near a ball."""
+    law, rng, forces = law_of((ball,)), np.random.default_rng(3), np.zeros(8)
+    memory, gains = law.memory, law.gains
+    turned = np.array([0.9, 0.2, -0.3, 0.1]) / np.linalg.norm([0.9, 0.2, -0.3, 0.1])
+    memory.started[0], memory.position[:], memory.velocity[:] = 1.0, (3.1, 0.0, 2.4), rng.normal(size=6) * 0.2
+    memory.velocity[:3] += np.array(ball.shape.centre) - memory.position
+    memory.disturbance[:], memory.thrusters.forces[:] = rng.normal(size=6) * 0.05, rng.normal(size=8) * 5.0
+    R = rotation_matrix(turned)
+    measured = np.r_[R.T @ memory.velocity[:3], memory.velocity[3:]] + rng.normal(size=6) * 0.05
+    state = VehicleState(np.array([3.1, 0.01, 2.39]), turned, measured, np.ones(8))
+    before, free = copy.deepcopy(memory), np.empty(6)
+    law.step(state, pack([GOAL]), pack([ball]), np.ones(1), forces)
+    p, v, d, M = memory.position, memory.velocity, memory.disturbance, memory.dynamics.mass
+    # observer
+    turning = np.kron(np.diag([1, 0]), R) + np.kron(np.diag([0, 1]), np.eye(3))
+    pushes = turning @ memory.dynamics.inverse_mass @ memory.thrusters.matrix
+    model.free_acceleration(memory.dynamics, R, before.velocity[:3], before.velocity[3:], memory.still, free)
+    z, change = 1.0 / (1.0 + gains.observer * PERIOD), free + pushes @ before.thrusters.forces + before.disturbance
+    predicted = before.velocity + PERIOD * change
+    off = turning @ measured - predicted
+    assert v == pytest.approx(predicted + (1.0 - z**2) * off, rel=1e-9)
+    assert d == pytest.approx(before.disturbance + (1.0 - z) ** 2 / PERIOD * off, rel=1e-9)
+    model.free_acceleration(memory.dynamics, R, v[:3], v[3:], memory.still, free)
+    # nominal forces
+    error, away = p - GOAL.shape.centre, p - ball.shape.centre
+    error *= min(1.0, gains.limit / gains.k_p1 / np.linalg.norm(error))
+    n, h = away / np.linalg.norm(away), np.linalg.norm(away) - ball.shape.radius
+    force = -gains.k_p1 * error - gains.k_v1 * v[:3] - np.trace(M[:3, :3]) / 3.0 * d[:3]
+    force += gains.repulsion * max(gains.reach - h, 0.0) * n
+    moment = -gains.k_p2 * np.array(error_parts(LEVEL, turned)[1:]) - gains.k_v2 * v[3:] - np.diag(M)[3:] * d[3:]
+    nominal = memory.thrusters.allocator @ np.r_[R.T @ force, moment]
+    assert memory.program.nominal == pytest.approx(nominal, rel=1e-9)
+    # barrier
+    relative = v[:3] - ball.velocity
+    rate = n @ relative
+    right = -(gains.pull_in + gains.brake) * rate - gains.pull_in * gains.brake * (h - gains.margin)
+    right -= n @ (free + d)[:3] + (relative @ relative - rate**2) / np.linalg.norm(away)
+    assert memory.program.rows[0] == pytest.approx(n @ pushes[:3], rel=1e-9, abs=1e-15)
+    assert memory.program.right[0] == pytest.approx(right, rel=2e-3)
 
 
 @pytest.mark.medium
@@ -120,6 +173,28 @@ def test_reported_failed_thruster_gets_zero_command():
     health[2] = 0.0
     law.step(VehicleState(np.zeros(3), LEVEL, np.zeros(6), health), pack([GOAL]), pack([]), np.zeros(0), forces)
     assert forces[2] == 0.0 and np.abs(forces).max() > 1.0
+
+
+def test_position_error_decays_with_the_pole():
+    """At rest in still water: by z a period, as z = 1 / (1 + omega T)."""
+    law, off = law_of(observer=3.0), np.array([0.4, -0.2, 0.1])
+    memory, rest = law.memory, VehicleState(np.array([1.0, 2.0, 3.0]), LEVEL, np.zeros(6), np.ones(8))
+    memory.position[:], memory.started[0] = rest.position + off, 1.0
+    for k in range(1, 6):
+        pid_cbf.observe(memory, rest, np.eye(3), law.gains)
+        assert memory.position - rest.position == pytest.approx(off / (1.0 + 3.0 * PERIOD) ** k, rel=1e-12)
+
+
+@pytest.mark.parametrize("at", range(9))
+def test_observer_ignores_a_measurement_with_a_number_that_is_not_finite(at):
+    law, numbers = law_of(), np.array([1.0, 2.0, 3.0, 0.4, -0.3, 0.2, 0.1, -0.1, 0.2])
+    numbers[at] = math.nan
+    memory = law.memory
+    pid_cbf.observe(memory, VehicleState(numbers[:3], LEVEL, numbers[3:], np.ones(8)), np.eye(3), law.gains)
+    assert memory.started[0] == 0.0
+    memory.started[0], memory.velocity[0] = 1.0, 0.5
+    pid_cbf.observe(memory, VehicleState(numbers[:3], LEVEL, numbers[3:], np.ones(8)), np.eye(3), law.gains)
+    assert memory.position.tolist() == [0.5 * PERIOD, 0.0, 0.0] and not memory.disturbance.any()
 
 
 def test_missing_position_is_propagated_by_the_model():

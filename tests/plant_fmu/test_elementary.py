@@ -2,6 +2,7 @@
 
 import ctypes
 import math
+import re
 from decimal import Decimal, getcontext
 
 import numpy as np
@@ -34,6 +35,7 @@ def functions(once):
             "double expm1_(double x) { return elementary_expm1(x); }\n"
             "double cos_(double x) { return elementary_cos_turns(x); }\n"
             "double atan2_(double y, double x) { return elementary_atan2(y, x); }\n"
+            "double hypot_(double x, double y) { return elementary_hypot(x, y); }\n"
         )
         files = [folder / "shown.c", folder / "elementary.c"]
         compile_library(find_compiler(), native_platform(), files, [folder, FMI_HEADERS], folder / "shown.so")
@@ -102,3 +104,28 @@ def test_atan2_matches_reference(functions):
         for x in (0.0, -0.0, 1.0, -1.0):
             got, want = atan2(y, x), math.atan2(y, x)
             assert (got, math.copysign(1.0, got)) == (want, math.copysign(1.0, want))
+
+
+@pytest.mark.medium
+def test_hypotenuse_matches_reference(functions):
+    hypot = functions("hypot", 2)
+    for x, y in [*ANY.normal(size=(200, 2)), *(ANY.normal(size=(50, 2)) * [1e-9, 1.0])]:
+        assert abs(hypot(x, y) - math.hypot(x, y)) <= WITHIN * math.ulp(math.hypot(x, y))
+
+
+def arctangent(x):
+    """Return the arcus tangens of a Decimal by its series, after four halvings."""
+    for _ in range(4):
+        x = x / (1 + (1 + x * x).sqrt())
+    return 16 * sum((-1) ** n * x ** (2 * n + 1) / (2 * n + 1) for n in range(40))
+
+
+def test_table_of_arctangents_holds_each_eighth_and_what_it_lacks():
+    getcontext().prec = 50
+    text = c_sources(of_vehicle(load_vehicle("odin")), 3)["elementary.c"].decode()
+    table = re.search(r"ATAN\[9\]\[2\] = \{(.*?)\};", text, re.DOTALL)
+    rows = re.findall(r"\{(.+?), (.+?)\}", table[1])
+    assert len(rows) == 9
+    for k, (number, rest) in enumerate(rows):
+        exact = arctangent(Decimal(k) / 8)
+        assert (float(number), float(rest)) == (float(exact), float(exact - Decimal(float(exact))))

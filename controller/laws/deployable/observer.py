@@ -230,15 +230,15 @@ def correct(estimate: Estimate, first: int, measured: Array, noise: float, gains
     bool
         False, without a change, if all components are NaN, or one is outside the gate.
     """
-    P, x, known = estimate.covariance, estimate.state, 0
+    P, x, known = estimate.covariance, estimate.state, False
     for axis in range(3):
         if np.isnan(measured[axis]):
             continue
-        known += 1
+        known = True
         spread = np.sqrt(P[first + axis, first + axis] + square(noise))
         if not abs(measured[axis] - x[first + axis]) <= _GATE * spread + 0.05:
             return False
-    if known == 0:
+    if not known:
         return False
     for axis in range(3):
         if not np.isnan(measured[axis]):

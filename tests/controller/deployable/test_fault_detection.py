@@ -116,6 +116,7 @@ def test_certain_or_reported_failure_is_not_retried():
     state.tentative[4] = 1
     fault_detection._isolate(state, estimate, thrusters, 6, -3.0)
     assert np.flatnonzero(thrusters.health == 0.0).tolist() == [1, 6]
+    assert estimate.covariance[EFFECTIVENESS + 6, EFFECTIVENESS + 6] == 0.5**2
     assert thrusters.stuck[6] == -3.0 and np.isnan(thrusters.stuck[[0, 1, 2, 3, 4, 5, 7]]).all()
 
 
@@ -271,6 +272,52 @@ def test_detection_requires_threshold_and_lead_over_the_next_hypothesis():
         assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == found
 
 
+def test_hypotheses_about_an_isolated_thruster_are_cleared_and_others_stay():
+    estimate, thrusters, state = started()
+    thrusters.health[5], state.ratio[:] = 0.0, 4.0
+    assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == -1
+    assert np.flatnonzero(state.ratio == 0.0).tolist() == [5, 8 + 5] and (np.sort(state.ratio)[2:] == 4.0).all()
+
+
+@pytest.mark.parametrize(("ratio", "following", "tentative"), [(30.0, 0.0, 1), (50.0, 0.0, 2), (50.0, 12.0, 1)])
+def test_isolation_is_tentative_up_to_a_lead_of_40(ratio, following, tentative):
+    estimate, thrusters, state = started()
+    state.ratio[2], state.ratio[5] = ratio, following
+    state.sums[:, 2], estimate.deviation[2, EFFECTIVENESS + 2] = 2.0 * ratio, -estimate.state[EFFECTIVENESS + 2]
+    assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == 2
+    assert state.tentative.tolist() == [0, 0, tentative, 0, 0, 0, 0, 0]
+
+
+def test_likelier_hypothesis_has_the_greater_log_likelihood_ratio():
+    """Of the likeliest loss, s^2 / (2 q), against that of a stuck thruster, s - q / 2."""
+    _, _, state = started()
+    for lost, stuck, likelier in (
+        ((4.0, 4.0), (3.0, 3.0), 3),
+        ((4.0, 4.0), (3.0, 1.0), 11),
+        ((-9.0, 4.0), (1.0, 1.0), 11),
+    ):
+        state.sums[:, 3], state.sums[:, 11] = lost, stuck
+        assert fault_detection._likelier(state, 3, 8) == likelier
+
+
+def test_isolated_thrusters_alone_are_tried_again():
+    estimate, thrusters, state = started()
+    thrusters.health[[3, 6]], state.waited[0] = 0.0, 100.0
+    assert fault_detection.try_again(state, estimate, thrusters, np.ones(8), True, 0.02) == 3
+
+
+def test_half_lost_thruster_is_kept_with_the_other_half():
+    """As the sums of evidence say: their quotient is the likeliest loss."""
+    estimate, thrusters, state = started()
+    before = estimate.state[EFFECTIVENESS + 4]
+    state.ratio[:] = 1.0
+    state.ratio[4], state.sums[0, 4], state.sums[1, 4] = 21.0, 21.0, 42.0
+    estimate.deviation[4, EFFECTIVENESS + 4] = -before
+    assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == -1
+    assert estimate.state[EFFECTIVENESS + 4] == pytest.approx(0.5 * before)
+    assert thrusters.health.all() and not state.tentative.any() and not state.ratio.any() and not state.sums.any()
+
+
 def test_zero_threshold_detects_nothing():
     for threshold, found in ((12.0, 3), (0.0, -1)):
         estimate, thrusters, state = started()
@@ -288,4 +335,4 @@ def test_ineffective_thruster_is_isolated_without_an_estimate_jump():
     assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == -1
     estimate.covariance[EFFECTIVENESS + 5, EFFECTIVENESS + 5] = 0.03**2
     assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == 5
-    assert thrusters.health[5] == 0.0 and estimate.state[EFFECTIVENESS + 5] == 0.0
+    assert thrusters.health[5] == 0.0 and estimate.state[EFFECTIVENESS + 5] == 0.0 and state.tentative[5] == 1

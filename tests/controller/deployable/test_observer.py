@@ -101,6 +101,7 @@ def test_prediction_covariance_matches_a_kalman_filter():
     rng, thrusters = np.random.default_rng(1), make_thrusters(ODIN)
     for _ in range(20):
         estimate, dynamics = random_estimate(rng, thrusters)
+        dynamics.linear_damping[:] = rng.uniform(5.0, 50.0, 6)
         before, P = copy.deepcopy(estimate), estimate.covariance.copy()
         predict(estimate, dynamics, thrusters)
         before.by_lag[:] = estimate.by_lag
@@ -117,6 +118,21 @@ def test_prediction_covariance_matches_a_kalman_filter():
         assert np.array_equal(estimate.covariance, estimate.covariance.T) or np.allclose(
             estimate.covariance, estimate.covariance.T, rtol=1e-12, atol=1e-18
         )
+
+
+def test_deviations_of_hypotheses_grow_as_errors_of_the_state_do():
+    """F d; where a thruster is stuck, also by the force that it lacks."""
+    rng, thrusters = np.random.default_rng(7), make_thrusters(ODIN)
+    estimate, dynamics = random_estimate(rng, thrusters)
+    estimate.deviation[:], estimate.supposed[:] = rng.normal(size=(16, N)), rng.normal(size=(2, 8)) * [[1.0], [9.0]]
+    before = copy.deepcopy(estimate)
+    predict(estimate, dynamics, thrusters)
+    before.by_lag[:] = estimate.by_lag
+    by_force = pushes(dynamics, thrusters, np.eye(3))
+    expected = before.deviation @ transition(before, dynamics, thrusters, by_force).T
+    missing = before.supposed[0] * (before.supposed[1] - thrusters.acting)
+    expected[8:, VELOCITY:CURRENT] += PERIOD * (by_force[:3] * missing).T
+    assert estimate.deviation == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
 def test_correction_matches_the_joint_kalman_update():
@@ -143,7 +159,8 @@ def test_moment_correction_matches_the_kalman_update():
         estimate, dynamics = random_estimate(rng, thrusters)
         thrusters.acting[:] = rng.uniform(-20.0, 20.0, 8)
         estimate.by_lag[:], estimate.curvature[:] = rng.normal(size=8), 0.1 * rng.normal(size=8)
-        estimate.acceleration[:] = rng.normal(size=3)
+        estimate.acceleration[:], estimate.state[HEIGHT] = rng.normal(size=3), 0.02
+        estimate.state[MOMENTS:HEIGHT] = rng.normal(size=3) * 20.0
         turned, omega, by_current = Rotation.random(random_state=rng), rng.normal(size=3), rng.normal(size=(3, 2))
         R, x, P = turned.as_matrix(), estimate.state.copy(), estimate.covariance.copy()
         k, e = R[2] + 0.5 * PERIOD * np.cross(omega, R[2]), x[EFFECTIVENESS:]
@@ -165,6 +182,9 @@ def test_moment_correction_matches_the_kalman_update():
         # each axis takes the row of the lag where the axis before has left the effectiveness
         assert seen.covariance == pytest.approx((np.eye(N) - K @ H) @ P, rel=1e-2, abs=2e-5)
         assert np.abs(seen.covariance - P).max() > 1e-2
+        seen = copy.deepcopy(estimate)
+        observer.correct_by_moment(seen, expected, *given[2:], GAINS, PERIOD)  # as predicted: nothing to correct
+        assert seen.state == pytest.approx(x, rel=1e-7, abs=1e-9)
 
 
 def test_bounds_are_enforced_by_the_most_likely_state():

@@ -34,8 +34,10 @@ PLACES = [0, 1, 2]  # hard regions of place
 
 
 def clearance(packed, point, later=0.0):
-    """Return the least clearance of the hard regions of place, each where it will be."""
-    return min(clearance_at(packed, i, point - packed.velocities[i] * later) for i in PLACES)
+    """Return the least clearance of the hard regions of place, each where it will be, less three deviations."""
+    return min(
+        clearance_at(packed, i, point - packed.velocities[i] * later) - 3.0 * packed.deviations[i].max() for i in PLACES
+    )
 
 
 def soft_clearance(packed, point, later=0.0):
@@ -98,6 +100,7 @@ def test_path_cost_matches_dense_evaluation():
         way, count = random_way(rng, 20.0 if k % 6 == 0 else 1.0)
         packed.move_to(0.1 * k)
         packed.velocities[:3] = rng.normal(size=(3, 3)) * rng.choice([0.05, 0.4])
+        packed.deviations[:3] = rng.uniform(0.0, 0.05, size=(3, 3))
         packed.crossing_costs[3] = rng.uniform(0.2, 10.0)
         expected, penalty, through = expected_cost([START, *way[:count]], packed)
         found, took = cost_of(way, count, packed)
@@ -107,6 +110,16 @@ def test_path_cost_matches_dense_evaluation():
         dear, long = dear + (penalty > 0.2 * length), long + (penalty > 50.0 * length)
         soft += through > 0.1
     assert dear > 20 and long > 1 and soft > 3 and min(calls) == 1 and max(calls) > 1
+
+
+def test_approaching_region_is_evaluated_before_the_path_meets_it():
+    """Head-on, at half the vehicle's speed, from 23 m."""
+    packed, start, way = pack(REGIONS), np.array([-20.0, 0.2, 2.4]), np.zeros((CORNERS + 1, 3))
+    packed.velocities[:], way[0] = 0.0, (2.0, 0.2, 2.4)
+    packed.velocities[0, 0] = -0.5 * GAINS.speed
+    expected = expected_cost([start, way[0]], packed)
+    assert expected[1] > 10.0
+    assert cost_of(way, 1, packed, start)[0] == pytest.approx(expected, rel=1e-9)
 
 
 def test_evaluation_of_a_too_costly_path_stops_early():
@@ -194,6 +207,7 @@ def test_nearest_goal_point_follows_the_gradient():
 
 def test_line_check_matches_dense_sampling():
     rng, packed, said = np.random.default_rng(3), pack(REGIONS), []
+    packed.deviations[:3] = 0.02 * np.eye(3)
     for _ in range(200):
         a, b = rng.normal([4.0, 0.0, 2.5], [1.5, 1.0, 0.7], size=(2, 3))
         least = min(clearance(packed, a + (b - a) * s) for s in np.linspace(0.0, 1.0, 60))
@@ -316,10 +330,10 @@ def shortened(start, points, packed):
     return kept
 
 
-def walk(seed, packed, steps):
+def walk(seed, packed, steps, end=(8.0, 0.5, 2.5)):
     """Search beside a transcription of it, and return the points of paths found."""
     rng, state, way, found = np.random.default_rng(seed), search.empty_search(), np.zeros((9, 3)), []
-    start, end, room, trees = START.copy(), np.array([8.0, 0.5, 2.5]), 3.0, []
+    start, end, room, trees = START.copy(), np.array(end), 3.0, []
     for k in range(steps):
         if k % 40 == 39:
             start = start + rng.normal(size=3) * [0.3, 0.3, 0.1]
@@ -354,6 +368,44 @@ def walk(seed, packed, steps):
 def test_search_matches_the_reference_transcription():
     found = walk(4, pack(REGIONS), 240)
     assert max(found) >= 3 and found.count(0) > 20
+
+
+@pytest.mark.medium
+def test_search_takes_longer_edges_towards_a_farther_end():
+    assert max(walk(4, pack(REGIONS), 60, (20.0, 9.0, 4.5))) > 0
+
+
+def test_root_closer_to_a_region_than_the_line_margin_keeps_its_tree():
+    wall, tree = (
+        pack([Region("wall", HalfSpace((4.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in")]),
+        search.empty_search().of_goal,
+    )
+    for x in (0.0, 3.94):
+        search.move_root(tree, np.array([x, 0.2, 2.5]), wall, MARGIN)
+    assert (tree.size[0], tree.root[0]) == (2, 1) and tree.parents[:2].tolist() == [1, -1]
+    assert tree.nodes[:2, 0].tolist() == [0.0, 3.94]
+
+
+def test_corner_is_dropped_even_where_the_path_starts_closer_than_the_line_margin():
+    wall, state = pack([Region("wall", HalfSpace((4.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in")]), search.empty_search()
+    start, way = np.array([3.94, 0.2, 2.5]), np.zeros((9, 3))
+    for tree, places in ((state.of_vehicle, (3.94, 3.0)), (state.of_goal, (1.0,))):
+        tree.size[0], tree.parents[: len(places)] = len(places), range(-1, len(places) - 1)
+        tree.nodes[: len(places)] = [(x, 0.2, 2.5) for x in places]
+    assert search._write_path(state, 0, 1, start, wall, MARGIN, way) == 1
+    assert way[0].tolist() == [1.0, 0.2, 2.5]
+
+
+def test_soft_regions_costlier_than_their_mean_are_closed_before_all_are():
+    """Of costs 1, 6 and 2, the mean is 3; the hard region is closed at any time."""
+    soft = [Region(f"soft {k}", Sphere((4.0, 3.0 * k, 2.5), 0.5), "out", hard=False) for k in range(3)]
+    packed, plan = pack([*soft[:1], REGIONS[0], *soft[1:]]), empty_plan(4, 1)
+    packed.crossing_costs[[0, 2, 3]] = 1.0, 6.0, 2.0
+    seen = []
+    for _ in range(201):
+        way_round._choose_closed(plan, False, START, np.array([8.0, 0.5, 2.5]), packed, MARGIN)
+        seen.append(plan.closed.tolist())
+    assert seen == [[False, True, True, False]] * 100 + [[True] * 4] * 100 + [[False, True, True, False]]
 
 
 @pytest.mark.medium

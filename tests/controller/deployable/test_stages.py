@@ -226,6 +226,33 @@ def test_measurements_are_rotated_to_the_world_frame():
     assert memory.state_estimate.position == pytest.approx(theirs.state_estimate.position, rel=1e-9)
 
 
+@pytest.mark.parametrize("axis", range(3))
+def test_uncertain_measurements_count_by_their_greatest_deviation(axis):
+    """Half a position's; a velocity's squared over 0.01 m/s, and less evidence of a failure by the square of both."""
+    memory, theirs = begun(), begun()
+    deviation, body = np.zeros(12), np.r_[TURNED.T @ [0.41, -0.31, 0.21], 0.1, 0.2, -0.3]
+    deviation[axis], deviation[3 + axis] = 0.3, 0.05
+    state = state_of(memory, position=np.array([1.01, 2.0, 3.0]), velocity_body=body, deviation=deviation)
+    assert input_validation.process_measurement(memory, state, GAINS)
+    actuator_lag.update_forces(theirs.state_estimate, theirs.thrusters, 0.02)
+    given = theirs.dynamics, theirs.thrusters, theirs.thruster_acceleration
+    observer.predict(theirs.state_estimate, *given, TURNED, body[3:], GAINS, 0.02)
+    for first, measured, noise in ((POSITION, state.position, 0.15), (VELOCITY, np.array([0.41, -0.31, 0.21]), 0.25)):
+        assert observer.correct(theirs.state_estimate, first, measured, noise, GAINS)
+    assert memory.state_estimate.state == pytest.approx(theirs.state_estimate.state, rel=1e-9, abs=1e-12)
+    assert memory.state_estimate.covariance == pytest.approx(theirs.state_estimate.covariance, rel=1e-9, abs=1e-15)
+    assert memory.state_estimate.weight[0] == pytest.approx((0.01 / 0.05) ** 2)
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize(("speed", "push", "new"), [(0.019, 0.049, True), (0.021, 0.0, False), (0.0, 0.051, False)])
+def test_repeated_measurement_is_new_only_at_rest_and_without_a_push(axis, speed, push, new):
+    for sign in (1.0, -1.0):
+        seen = begun().state_estimate
+        seen.velocity[:], seen.acceleration[:] = sign * speed * np.eye(3)[axis], -sign * push * np.eye(3)[axis]
+        assert input_validation._is_new(seen, 0, True, GAINS) == new
+
+
 def test_identical_measurements_while_moving_are_rejected():
     for moving in ((-0.05, 0.0, 0.0), (0.0, -0.05, 0.0), (0.0, 0.0, -0.05), (0.0, 0.0, 0.0)):
         memory = begun()

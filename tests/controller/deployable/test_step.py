@@ -13,7 +13,8 @@ from controller.laws.deployable.path_planning.planner import improve_path
 from controller.laws.deployable.path_planning.search import PathLimits
 from controller.quadratic_program import solve
 from controller.quaternion import rotation_matrix
-from controller.regions import HalfSpace, Orientation, Region, pack
+from controller.regions import HalfSpace, Orientation, Region, Sphere, pack
+from controller.regions.region_set import clearance_at
 from tests.controller.deployable.scenery import GOAL, ODIN, REGIONS, Sea, fly, law_for
 
 # of the generator of random numbers, on purpose
@@ -81,11 +82,17 @@ def test_step_is_the_sequence_of_its_stages():
     state[VELOCITY : VELOCITY + 3] = sea.velocity = np.array([0.5, 0.1, -0.05])
     publish(own.memory.state_estimate)
     goal, regions, forces, most = pack([GOAL]), pack(ALL), np.empty(8), 0
+    deviation = np.array([0.02, 0.01, 0.03, 0.004, 0.003, 0.005, 0.01, 0.02, 0.015, 0.001, 0.002, 0.001])
     for _ in range(4):
-        state, memory = sea.measured(), copy.deepcopy(own.memory)
+        state, memory = sea.measured()._replace(deviation=deviation), copy.deepcopy(own.memory)
         own.step(state, goal, regions, weights, forces)
         pushed, rows, program, wanted_forces = expected(memory, state, goal, regions, weights)
         most = max(most, rows)
+        seen, R = memory.state_estimate, rotation_matrix(memory.quaternion)
+        later = np.r_[seen.position + 0.02 * seen.velocity, R.T @ seen.velocity]
+        assert own.expected == pytest.approx(later, rel=1e-12, abs=1e-15)
+        for ours, theirs in zip(own.memory.plan.new_cost, memory.plan.new_cost, strict=True):
+            assert ours == pytest.approx(theirs, rel=1e-9, abs=1e-12)
         assert own.memory.filtered_acceleration == pytest.approx(pushed, rel=1e-10, abs=1e-12)
         for part in ("rows", "right", "price"):
             ours, theirs = getattr(own.memory.program, part), getattr(program, part)
@@ -95,6 +102,41 @@ def test_step_is_the_sequence_of_its_stages():
         assert np.array_equal(own.memory.thrusters.forces, forces)
         assert own.estimate.tolist() == [own.memory.state_estimate.net_weight[0], *own.memory.state_estimate.moments]
     assert most >= 2
+
+
+def test_soft_region_pushes_back_by_the_depth_in_the_goal_relative_to_the_end_of_the_path():
+    """What its weight adds to the nominal forces, half as deep in the goal as the path's end."""
+    soft = Region("soft", Sphere((8.2, 0.5, 2.5), 1.0), "out", hard=False)
+    own, sea, goal, regions, forces = law_for([soft]), Sea(), pack([GOAL]), pack([soft]), np.empty(8)
+    fly(own, sea, regions=[soft], steps=4)
+    own.memory.state_estimate.state[:3] = sea.position = np.array([7.65, 0.5, 2.5])
+    publish(own.memory.state_estimate)
+    memory, nominal = copy.deepcopy(own.memory), []
+    for weight in (1.0, 0.0):
+        own.memory = copy.deepcopy(memory)
+        own.step(sea.measured(), goal, regions, np.array([weight]), forces)
+        nominal.append(own.memory.program.nominal.copy())
+    plan, ahead, wanted, wrench = own.memory.plan, own.memory.predicted, np.empty(3), np.zeros(6)
+    desired_velocity(plan, ahead.position, goal.velocities[0], GAINS, wanted)
+    end = plan.path[plan.counts[0] - 1]
+    entered = clearance_at(goal, 0, ahead.position) / min(clearance_at(goal, 0, end), GAINS.depth)
+    R = rotation_matrix(ahead.quaternion)
+    law._soft_forces(own.memory.observation, regions, np.ones(1), wanted, entered, R, memory.dynamics, wrench)
+    assert 0.3 < entered < 0.7 and np.linalg.norm(wanted) < 0.3 and np.abs(wrench).max() > 0.1
+    assert nominal[0] - nominal[1] == pytest.approx(memory.thrusters.allocator @ wrench, rel=1e-9, abs=1e-9)
+
+
+def test_promised_clearance_is_less_by_the_spread_beyond_the_margins_and_by_the_slack():
+    """Between two walls that contradict each other; three deviations up to 0.6 m are in the margins."""
+    walls = [Region(f"wall {sign}", HalfSpace((sign * 0.5, 0.0, 0.0), (-sign, 0.0, 0.0)), "in") for sign in (1.0, -1.0)]
+    own, sea, forces = law_for(walls), Sea(), np.empty(8)
+    deviation = np.r_[0.25, np.zeros(11)]
+    for _ in range(3):
+        own.step(sea.measured()._replace(deviation=deviation), pack([GOAL]), pack(walls), np.ones(2), forces)
+    spread = 3.0 * np.sqrt(own.memory.state_estimate.covariance[0, 0] + 0.25**2)
+    slack = own.report[12] / (GAINS.barrier_rate * GAINS.barrier_slope)
+    assert spread > 0.65 and slack > 0.01 and abs(own.memory.promised[0]) > 0.01
+    assert own.report[16] == pytest.approx(own.memory.promised[0] - (spread - 0.6) - slack, rel=1e-12)
 
 
 def test_unequal_effectiveness_causes_no_opposing_forces_at_a_barrier():
@@ -131,6 +173,17 @@ def test_without_measurements_speed_is_limited_to_a_timely_stop():
             assert speed == pytest.approx(min(GAINS.speed, GAINS.acceleration * (GAINS.coast - since)), abs=1e-9)
         assert pushes == (since <= GAINS.coast)
     assert law.DIAGNOSTICS[8].name == "desired_speed"
+
+
+@pytest.mark.parametrize("rise", [0.0, 5.0])
+def test_weight_is_held_at_any_attitude_without_a_moment(rise):
+    memory, forces = law_for([]).memory, np.empty(8)
+    memory.state_estimate.time_since_measurement[0] = memory.attitude.started[0] = 1.0
+    memory.state_estimate.net_weight[0] = 9.0
+    R = rotation_matrix(np.array([0.8, 0.4, -0.4, 0.2]))
+    law._hold_weight(memory, R, GAINS._replace(rise=rise), forces)
+    held = np.r_[R.T @ [0.0, 0.0, -9.0 - rise], np.zeros(3)]
+    assert ODIN.thruster_matrix @ forces == pytest.approx(held, rel=5e-3, abs=0.05)  # allocated at a small cost
 
 
 def test_position_uncertainty_reduces_speed():

@@ -72,6 +72,17 @@ def rows_by_differences(memory, sensor):
     return np.array(rows).T / (2.0 * step)
 
 
+def test_first_covariance_is_that_of_a_start_at_rest_with_constant_errors_of_the_data_sheets():
+    memory = empty_memory()
+    memory.covariance[:] = 7.0
+    sensors = SensorModel(*range(2, 13), gravity=9.8)
+    set_first_covariance(memory, sensors)
+    deviations = [np.hypot(0.1, sensors.position)] * 3 + [0.3] * 3 + [0.05, 0.05, 0.3]
+    deviations += [sensors.angular_velocity_bias] * 3 + [sensors.acceleration_bias] * 3
+    deviations += [sensors.heading_bias, sensors.depth_bias, sensors.velocity_scale]
+    assert memory.covariance == pytest.approx(np.diag(np.square(deviations)), rel=1e-12)
+
+
 @pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("sensor", list(PLACES))
 def test_a_sample_corrects_as_by_plain_matrices(sensor):
@@ -91,7 +102,57 @@ def test_a_sample_corrects_as_by_plain_matrices(sensor):
         for ours, theirs in zip(memory[:4], expected[:4], strict=True):
             assert ours == pytest.approx(theirs, abs=2e-6)
         assert memory.innovations[sensor, 0] == pytest.approx(off @ error @ off, rel=1e-5)
-        assert memory.innovations[sensor, 1] == len(H)
+        assert memory.innovations[sensor].tolist()[1:] == [len(H), 0.0]
+        assert (memory.accepted[sensor], memory.rejected[sensor], memory.resets[sensor]) == (1.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_attitude_is_corrected_by_the_measured_velocity_while_the_estimated_one_is_unknown(axis):
+    """Along one axis of the world: the derivatives are those of a vehicle with the velocity of the sample."""
+    memory, _, _ = begun(np.random.default_rng(20 + axis))
+    memory.covariance[3 + axis, 3 + axis] += 0.3**2
+    error = np.zeros(N_ERRORS)
+    error[3 + axis] = 0.4
+    truth, P = moved(memory, error), memory.covariance.copy()
+    H, off = rows_by_differences(truth, DVL), ideal_measurement(truth, DVL) - ideal_measurement(memory, DVL)
+    K = P @ H.T @ np.linalg.inv(H @ P @ H.T + NOISE[DVL] ** 2 * np.eye(3))
+    expected, measurements = moved(memory, K @ off), empty_measurements()
+    measurements.values[PLACES[DVL]], measurements.times[DVL] = ideal_measurement(truth, DVL), memory.time[0]
+    correct_by_sensor(memory, measurements, DVL, SENSORS)
+    assert memory.covariance == pytest.approx((np.eye(N_ERRORS) - K @ H) @ P, rel=1e-5, abs=1e-9)
+    for ours, theirs in zip(memory[:4], expected[:4], strict=True):
+        assert ours == pytest.approx(theirs, abs=2e-6)
+
+
+@pytest.mark.parametrize("sensor", list(PLACES))
+def test_delayed_sample_corrects_as_by_plain_matrices(sensor):
+    """By H (I - t F) with H of the sample's time, t before now, and F of the growth of the errors since."""
+    rng, age = np.random.default_rng(30 + sensor), 0.1
+    memory, before, _ = begun(rng, age)
+    R, F = rotation(before.quaternion).as_matrix(), np.zeros((N_ERRORS, N_ERRORS))
+    F[0:3, 3:6], F[3:6, 12:15], F[6:9, 9:12] = np.eye(3), -R, -R
+    F[3:6, 6:9] = -np.cross(memory.acceleration - [0.0, 0.0, SENSORS.gravity], np.eye(3)).T  # -S(R f)
+    H, P = rows_by_differences(before, sensor) @ (np.eye(N_ERRORS) - age * F), memory.covariance.copy()
+    S = H @ P @ H.T + NOISE[sensor] ** 2 * np.eye(len(H))
+    off, K = rng.multivariate_normal(np.zeros(len(H)), S) * 0.5, P @ H.T @ np.linalg.inv(S)
+    expected, measurements = moved(memory, K @ off), empty_measurements()
+    measurements.values[PLACES[sensor]] = ideal_measurement(before, sensor) + off
+    measurements.times[sensor] = before.time[0]
+    correct_by_sensor(memory, measurements, sensor, SENSORS)
+    assert memory.covariance == pytest.approx((np.eye(N_ERRORS) - K @ H) @ P, rel=1e-5, abs=1e-9)
+    for ours, theirs in zip(memory[:4], expected[:4], strict=True):
+        assert ours == pytest.approx(theirs, abs=2e-6)
+
+
+@pytest.mark.parametrize("sensor", list(PLACES))
+def test_sample_from_before_the_history_counts_as_rejected_alone(sensor):
+    memory, _, _ = begun(np.random.default_rng(9))
+    expected, measurements = copy.deepcopy(memory), empty_measurements()
+    measurements.times[sensor] = memory.time[0] - 1.0
+    expected.innovations[sensor, 2] = 1.0
+    correct_by_sensor(memory, measurements, sensor, SENSORS)
+    for ours, theirs in zip(memory, expected, strict=True):
+        assert np.array_equal(ours, theirs, equal_nan=True)
 
 
 @pytest.mark.medium(fast=3)
@@ -155,6 +216,7 @@ def test_third_consecutive_outlier_widens_the_position_by_its_innovation(sensor)
     for _ in range(3):
         measurements.times[sensor] = memory.time[0]
         correct_by_sensor(memory, measurements, sensor, SENSORS)
+    assert (memory.accepted[sensor], memory.rejected[sensor], memory.resets[sensor]) == (1.0, 0.0, 1.0)
     P = start
     P[:3, :3] = 1e-4 * np.eye(3)
     P[range(3), range(3)] += H[:, :3].T @ off**2
@@ -162,17 +224,18 @@ def test_third_consecutive_outlier_widens_the_position_by_its_innovation(sensor)
     assert memory.covariance == pytest.approx((np.eye(N_ERRORS) - K @ H) @ P, rel=1e-5, abs=1e-9)
 
 
-def test_heading_innovation_wraps_around():
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_heading_innovation_wraps_around(side):
     memory, _, _ = begun(np.random.default_rng(6))
     set_first_covariance(memory, SENSORS)
-    memory.quaternion[:] = Rotation.from_euler("Z", np.pi - 0.01).as_quat()[[3, 0, 1, 2]]
+    memory.quaternion[:] = Rotation.from_euler("Z", side * (np.pi - 0.01)).as_quat()[[3, 0, 1, 2]]
     memory.constants[6] = 0.0
     measurements = empty_measurements()
-    measurements.values[11] = -np.pi + 0.01
+    measurements.values[11] = -side * (np.pi - 0.01)
     measurements.times[COMPASS] = memory.time[0]
     correct_by_sensor(memory, measurements, COMPASS, SENSORS)
     yaw = rotation(memory.quaternion).as_euler("ZYX")[0] + memory.constants[6]
-    assert abs((yaw - (np.pi + 0.01) + np.pi) % (2 * np.pi) - np.pi) < 1e-3
+    assert abs((yaw - side * (np.pi + 0.01) + np.pi) % (2 * np.pi) - np.pi) < 1e-3
 
 
 def test_compass_sample_is_ignored_at_vertical_pitch():
@@ -182,4 +245,5 @@ def test_compass_sample_is_ignored_at_vertical_pitch():
     measurements = empty_measurements()
     measurements.times[COMPASS] = memory.time[0]
     correct_by_sensor(memory, measurements, COMPASS, SENSORS)
-    assert np.array_equal(memory.covariance, before.covariance)
+    for ours, theirs in zip(memory, before, strict=True):
+        assert np.array_equal(ours, theirs, equal_nan=True)

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from controller.navigation.estimate import N_ERRORS, empty_memory
-from controller.navigation.inertial import estimate_at, propagate
+from controller.navigation.inertial import estimate_at, propagate, rotate
 from controller.navigation.measurements import SensorModel
 
 SENSORS = SensorModel()
@@ -30,6 +30,18 @@ def rotation(quaternion):
 
 def skew(a):
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+def test_small_rotations_are_exact_to_1e_7():
+    """Of half a radian, about any axis."""
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        quaternion, axis = Rotation.random(random_state=rng).as_quat()[[3, 0, 1, 2]], rng.normal(size=3)
+        turn = 0.5 * axis / np.linalg.norm(axis)
+        expected = rotation(quaternion) * Rotation.from_rotvec(turn)
+        rotate(quaternion, turn)
+        assert abs(quaternion @ expected.as_quat()[[3, 0, 1, 2]]) == pytest.approx(1.0, abs=1e-14)
+        assert (rotation(quaternion).inv() * expected).magnitude() < 2e-7
 
 
 def test_strapdown_integration_matches_scipy():
@@ -73,11 +85,26 @@ def test_strapdown_integration_matches_scipy():
     assert not estimate_at(memory, 1.2, position, velocity, quaternion)  # 128 samples are remembered
     assert estimate_at(memory, 2.01, position, velocity, quaternion)
     assert position == pytest.approx(truth(2.01)[:3], abs=3e-4)
+    assert velocity == pytest.approx(truth(2.01)[3:6], abs=3e-4)
     assert (rotation(quaternion) * rotation(truth(2.01)[6:]).inv()).magnitude() < 2e-4
 
 
+def test_past_motion_is_interpolated_between_its_two_samples():
+    """With forces that change at random from sample to sample."""
+    memory, rng = begun(np.random.default_rng(5)), np.random.default_rng(5)
+    for _ in range(6):
+        propagate(memory, rng.normal(size=3) * 20.0, rng.normal(size=3), SENSORS, 0.01)
+    found = []
+    for time in (0.02, 0.023, 0.03, 0.05, 0.053, 0.06):
+        position, velocity = np.zeros(3), np.zeros(3)
+        assert estimate_at(memory, time, position, velocity, np.zeros(4))
+        found.append(np.r_[position, velocity])
+    for k in (0, 3):
+        assert found[k + 1] == pytest.approx(0.7 * found[k] + 0.3 * found[k + 2], rel=1e-9, abs=1e-12)
+
+
 def test_the_covariance_is_propagated_as_by_plain_matrices():
-    rng = np.random.default_rng(2)
+    rng, sensors = np.random.default_rng(2), SENSORS._replace(acceleration_bias=3.0, angular_velocity_bias=2.0)
     for _ in range(10):
         memory, h = begun(rng), rng.uniform(0.005, 0.05)
         P, omega, force = memory.covariance.copy(), rng.normal(size=3), rng.normal(size=3) * 5.0
@@ -89,9 +116,9 @@ def test_the_covariance_is_propagated_as_by_plain_matrices():
         F[6:9, 9:12] = -h * R
         Q = np.zeros(N_ERRORS)
         Q[3:6], Q[6:9] = (SENSORS.acceleration * h) ** 2, (SENSORS.angular_velocity * h) ** 2
-        Q[9:12] = (1e-3 * SENSORS.angular_velocity_bias) ** 2 * h
-        Q[12:15] = (1e-3 * SENSORS.acceleration_bias) ** 2 * h
-        propagate(memory, force, omega, SENSORS, h)
+        Q[9:12] = (1e-3 * sensors.angular_velocity_bias) ** 2 * h
+        Q[12:15] = (1e-3 * sensors.acceleration_bias) ** 2 * h
+        propagate(memory, force, omega, sensors, h)
         assert memory.covariance == pytest.approx(F @ P @ F.T + np.diag(Q), rel=1e-9, abs=1e-12)
 
 

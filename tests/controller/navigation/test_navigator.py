@@ -35,9 +35,31 @@ def rest(navigator, seconds, first=0.0, sensors=range(5)):
 @pytest.mark.parametrize("missing", [DEPTH_SENSOR, IMU, COMPASS, USBL])
 def test_state_is_nan_until_every_required_sensor_has_a_sample(missing):
     navigator = Navigator(MODEL, make_vehicle_state())
-    state = rest(navigator, 0.1, sensors=[sensor for sensor in range(5) if sensor != missing])
-    for part in state[:3]:
-        assert np.isnan(part).all(), SENSORS[missing]
+    for time in (0.0, 0.5, 1.0):
+        level(navigator, time, sensors=[sensor for sensor in range(5) if sensor != missing])
+        navigator.step(time)
+        for part in navigator.state[:3]:
+            assert np.isnan(part).all(), SENSORS[missing]
+    for time in (1.5, 2.0):
+        level(navigator, time)
+        navigator.step(time)
+    for part in navigator.state[:3]:
+        assert np.isfinite(part).all(), SENSORS[missing]
+
+
+def test_known_constant_errors_of_the_imu_cause_no_motion():
+    navigator = Navigator(MODEL, make_vehicle_state())
+    rest(navigator, 1.2)
+    memory, before = navigator.memory, [part.copy() for part in navigator.memory[:3]]
+    assert navigator.started and before[0] == pytest.approx([1.0, 2.0, 5.0], abs=1e-3)
+    memory.constants[:6] = 0.01, -0.02, 0.03, 0.1, 0.2, -0.3
+    for k in range(1, 11):
+        level(navigator, 1.19 + 0.01 * k, sensors=[IMU])
+        navigator.measurements.values[5:11] += memory.constants[[3, 4, 5, 0, 1, 2]]
+        navigator.step(1.19 + 0.01 * k)
+    assert navigator.started and memory.time[0] == pytest.approx(1.29)
+    for part, was in zip(memory[:3], before, strict=True):
+        assert part == pytest.approx(was, abs=1e-4)
 
 
 def test_state_of_a_resting_vehicle_is_estimated():
