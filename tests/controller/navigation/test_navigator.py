@@ -7,7 +7,9 @@ from scipy.spatial.transform import Rotation
 
 from controller import VehicleState
 from controller.navigation import Navigator, SensorModel
+from controller.navigation.estimate import empty_memory
 from controller.navigation.measurements import COMPASS, DEPTH_SENSOR, DVL, IMU, SENSORS, USBL
+from controller.navigation.navigator import _write_state
 
 MODEL = SensorModel()
 
@@ -127,12 +129,28 @@ def test_initial_position_is_the_mean_of_two_fixes_with_their_spread():
     for apart, deviation in ((0.3, np.hypot(0.1, 0.15 / np.sqrt(2.0))), (1.2, np.hypot(0.6, 0.146))):
         navigator = Navigator(MODEL, make_vehicle_state())
         for time, north in ((0.0, 1.0), (1.0, 1.0 + apart)):
-            level(navigator, time, position=(north, 2.0, 5.0))
+            level(navigator, time, position=(north, 1.0 + north, 5.0))
             navigator.step(time)
-        assert navigator.state.position == pytest.approx([1.0 + 0.5 * apart, 2.0, 5.0], abs=1e-9)
-        assert navigator.state.deviation[0] == pytest.approx(deviation, rel=0.01)
+        assert navigator.state.position == pytest.approx([1.0 + 0.5 * apart, 2.0 + 0.5 * apart, 5.0], abs=1e-9)
+        assert navigator.state.deviation[:2] == pytest.approx([deviation] * 2, rel=0.01)
         rates = np.hypot(MODEL.angular_velocity_bias, MODEL.angular_velocity)
         assert navigator.state.deviation[9:] == pytest.approx(np.full(3, rates), rel=0.01)
+
+
+def test_written_state_is_the_estimate_with_the_deviation_of_each_axis():
+    memory, state, turned = empty_memory(), make_vehicle_state(), Rotation.from_euler("ZYX", [0.4, -0.3, 0.2])
+    memory.started[0] = memory.time[0] = 1.0
+    memory.quaternion[:], memory.velocity[:] = turned.as_quat()[[3, 0, 1, 2]], (0.3, -0.2, 0.1)
+    deviation = 0.01 * np.arange(1.0, 19.0)
+    memory.covariance[:] = np.diag(deviation**2)
+    _write_state(memory, MODEL, 1.0, state)
+    assert state.velocity_body[:3] == pytest.approx(turned.inv().apply([0.3, -0.2, 0.1]), abs=1e-12)
+    assert state.deviation[:9] == pytest.approx(deviation[:9], rel=1e-12)
+    assert state.deviation[9:] == pytest.approx(np.hypot(deviation[9:12], MODEL.angular_velocity), rel=1e-12)
+    for axis in range(3):  # which is unknown along one axis alone
+        memory.covariance[3:6, 3:6] = np.diag(np.where(np.arange(3) == axis, 0.6, 0.1) ** 2)
+        _write_state(memory, MODEL, 1.0, state)
+        assert np.isnan(state.velocity_body[:3]).all()
 
 
 def test_inconsistent_estimate_is_reset_and_realigned():
