@@ -1,11 +1,14 @@
-// Axes of a chart: time with a break, ticks at round numbers, the range that the curves need, and a curve as few strokes as pixels need.
+// Axes of a chart: time with a break, round ticks, the range of values, and curves that are reduced to the pixels.
 
-const LONG_TAIL = 0.3; // part of the time from which on a tail in which nothing moves is drawn short
-const SHORT_TAIL = 0.14; // part of the axis that it then takes
+const LONG_TAIL = 0.3; // share of the window above which a final rest is compressed
+const SHORT_TAIL = 0.14; // share of the axis that a compressed rest takes
 
-/** Where times stand along an axis: on a line, broken before a long tail in which nothing moves any more. */
+/** Linear time axis that compresses a long final rest behind a break. */
 class TimeAxis {
-  /** @param {number[]} window [s]  @param {?number} rest when the tail begins [s]  @param {number} left, right ends */
+  /**
+   * @param {number[]} window [from, to] [s]  @param {?number} rest start of the final rest [s]
+   * @param {number} left, right ends of the axis
+   */
   constructor([from, to], rest, left, right) {
     this.broken = rest !== null && rest > from && to - rest > LONG_TAIL * (to - from);
     this.rest = this.broken ? rest : to;
@@ -17,7 +20,7 @@ class TimeAxis {
   }
 }
 
-/** Round numbers between two: at most about `most` of them. */
+/** Return the multiples of a round step from low to high, at most about `most` of them. */
 function ticks(low, high, most) {
   const span = high - low;
   if (!(span > 0) || !Number.isFinite(span)) return [low];
@@ -29,7 +32,7 @@ function ticks(low, high, most) {
   return Array.from({ length: count + 1 }, (_, i) => (first + i) * step);
 }
 
-/** The texts of ticks: as many digits as tell them apart, k for thousands. */
+/** Return tick labels with just enough digits to differ; thousands as k from 10000 on. */
 function tickTexts(values) {
   const step = values.length > 1 ? Math.abs(values[1] - values[0]) : Math.abs(values[0]) || 1;
   const kilo = Math.max(...values.map(Math.abs)) >= 10000;
@@ -41,16 +44,18 @@ function tickTexts(values) {
   });
 }
 
-/** Rows of a run that a window of time needs: from the one before it to the one after it, [first, past the last]. */
+/** Return the rows that cover a time window, one beyond on each side: [first, past the last]. */
 function rowsIn(run, [from, to]) {
   if (!run.rows) return [0, 0];
   return [run.row(from), Math.min(run.rows, run.row(to) + 2)];
 }
 
 /**
- * The range of values that some curves have in a window of time; what is only for context does not stretch it far.
+ * Return the range of values of some curves in a time window, with a margin.
  *
- * @returns {?number[]} [low, high], with low < high, or null where there is no number
+ * Context curves widen the range only if they lie within two spans of the other curves. `zero` includes the value 0.
+ *
+ * @returns {?number[]} [low, high], with low < high; null if there is no number
  */
 function rangeOf(curves, window, zero) {
   const extent = (some) => {
@@ -78,8 +83,10 @@ function rangeOf(curves, window, zero) {
 }
 
 /**
- * Put a curve on the path of a context: every row, or where rows are denser than pixels the first, least, greatest and
- * last of each pixel column, which looks the same. Where there is no number the line has a gap.
+ * Add a curve to the path of a context.
+ *
+ * Where rows are denser than pixels, only the first, least, greatest and last value of each pixel column are drawn.
+ * Numbers that are not finite leave a gap.
  */
 function traceCurve(context, { run, values }, window, toX, toY) {
   const [first, last] = rowsIn(run, window);
@@ -101,7 +108,7 @@ function traceCurve(context, { run, values }, window, toX, toY) {
     }
     const x = toX(time[i]);
     point(x, values[i]);
-    if (alone(i)) context.lineTo(x + 1, toY(values[i])); // a single number between gaps is still seen
+    if (alone(i)) context.lineTo(x + 1, toY(values[i])); // a single number between gaps stays visible
     let [low, high, end] = [values[i], values[i], values[i]];
     i += 1;
     if (!dense) continue;

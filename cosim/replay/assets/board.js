@@ -1,6 +1,6 @@
-// All charts of the page: one window of time, one cursor.
+// All charts of the page, with one time window and one cursor.
 
-/** The charts below the scene. */
+/** Charts below the scene, with one time window and one cursor. */
 class Board {
   /** @param {Player} player  @param {string} theme "light" or "dark" */
   constructor(player, theme) {
@@ -9,7 +9,7 @@ class Board {
     this.charts = [];
     this.window = null; // null for the whole run
     this.holder = document.getElementById("charts");
-    this._out = new Set(["memberships", "asked", "acting", "moments", "turning"]); // until the reader asks for them
+    this._out = new Set(["memberships", "asked", "acting", "moments", "turning"]); // hidden until the reader selects them
     this._updated = 0;
     this._pending = 0;
     const watch = (entries) => this._seen(entries);
@@ -21,7 +21,10 @@ class Board {
     press("charts-whole", () => this.whole());
   }
 
-  /** @param {Run[]} runs of the page  @param {boolean[]} shown which of them are  @param {number} selected whose values are shown */
+  /**
+   * @param {Run[]} runs all runs  @param {boolean[]} shown visible runs
+   * @param {number} selected run whose values are shown
+   */
   setRuns(runs, shown, selected) {
     const specs = chartsOf(runs);
     const keys = JSON.stringify(specs.map((spec) => [spec.key, spec.signals.map((of) => [of.name, of.faint])]));
@@ -41,7 +44,7 @@ class Board {
     this._later();
   }
 
-  /** Rows were appended: paint again, a few times a second at most. */
+  /** Repaint after rows were appended, at most eight times a second. */
   grown() {
     if (this._pending) return;
     this._pending = setTimeout(() => {
@@ -53,7 +56,7 @@ class Board {
     }, 125);
   }
 
-  /** Make the window of time shorter or longer about a time. */
+  /** Multiply the length of the time window by a factor, about a time [s]. */
   zoom(factor, about = this.player.t) {
     const [from, to] = this.shownWindow();
     const length = Math.max((to - from) * factor, 0.02);
@@ -75,21 +78,21 @@ class Board {
     this._frame();
   }
 
-  /** The window of time that the charts show. */
+  /** Return the shown time window [from, to] [s]. */
   shownWindow() {
     const { start, end } = this.player;
     return this.window ?? [start, end > start ? end : start + 1];
   }
 
-  /** Move the cursor: every frame. */
+  /** Move the cursor and update the values; called every frame. */
   point() {
     const { t, playing, live } = this.player;
     if ((playing || live) && this.window && (t > this.window[1] || t < this.window[0])) {
       const length = this.window[1] - this.window[0];
-      this._show(live ? t - length : t, length); // a page on; of a live run always the last seconds
+      this._show(live ? t - length : t, length); // the next page; of a live run the last seconds
     }
     const now = performance.now();
-    const due = !playing || now - this._updated > 90; // nobody reads faster
+    const due = !playing || now - this._updated > 90; // limits the rate of text updates
     if (due) this._updated = now;
     for (const chart of this.charts) {
       if (!chart.near || chart.element.hidden) continue;
@@ -99,7 +102,7 @@ class Board {
     }
   }
 
-  /** Paint every chart, also those that are scrolled away; on paper with the cursor in the picture. */
+  /** Paint every chart, also those off screen; `onPaper` draws the cursor into the canvas. */
   paintAll(onPaper) {
     for (const chart of this.charts) {
       chart.stale = true;

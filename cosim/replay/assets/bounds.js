@@ -1,11 +1,11 @@
-// How large the scene is: where vehicles go and bounded regions are.
+// Bounds of the scene, from the paths of the vehicles and from the regions near them.
 
-const ROOM = 0.1; // of the way's diagonal: what is farther off is not brought into the picture
+const ROOM = 0.1; // share of the path's diagonal; regions farther away are not framed
 
-/** Whether a region is where it can be met: an obstacle that is not there yet waits far above the water. */
+/** Return true if a region is in the scene; an obstacle that is not there yet is parked far above the water. */
 const isThere = (place) => Vec.finite(place) && place[2] > -1e4;
 
-/** Points about a run's way and its goal: the corners of a box about the vehicle at each of some rows. */
+/** Return the corners of boxes about the vehicle at sampled rows, and about the goal at start and end. */
 function placesOf(run) {
   const { radius } = run.header.vehicle;
   const [xs, ys, zs] = ["x", "y", "z"].map((axis) => run.column(`position.${axis}`));
@@ -23,15 +23,15 @@ function placesOf(run) {
   return kept;
 }
 
-/** The corners of an upright box. */
+/** Return the eight corners of an axis-aligned box. */
 const cornersOf = (box) => [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [0, 1, 2].map((i) => box[(k >> i) & 1][i]));
 
-/** The upright box about some points. */
+/** Return the axis-aligned box [low, high] of some points. */
 function boxAbout(points) {
   return [Math.min, Math.max].map((most) => [0, 1, 2].map((i) => points.reduce((x, p) => most(x, p[i]), points[0][i])));
 }
 
-/** The upright box about a surface that is shifted. */
+/** Return the axis-aligned box [low, high] of a shifted surface. */
 function boxOfSolid({ points }, shift) {
   const box = [new Array(3).fill(Infinity), new Array(3).fill(-Infinity)];
   for (let k = 0; k < points.length; k++) {
@@ -43,9 +43,10 @@ function boxOfSolid({ points }, shift) {
 }
 
 /**
- * What of a region belongs into the picture: points. A bounded one counts where it is near the way, as far as the
- * limits go: neither a pipeline of a kilometre nor a pile of a hundred metres shall make a vehicle a dot. Of a plane
- * it is the point that is nearest to the way's middle.
+ * Return the points of a region that the camera frames.
+ *
+ * A bounded region counts where it is near the path, cut to the limits: a long pipeline must not reduce the vehicle to a
+ * dot. Of a plane it is the point that is nearest to the middle of the path.
  */
 function reachOf(shape, shift, middle, limits) {
   const solid = surfaceOf(shape);
@@ -58,15 +59,15 @@ function reachOf(shape, shift, middle, limits) {
   return planePoints(shape, shift, middle).filter((p) => p.every((x, k) => x >= limits[0][k] && x <= limits[1][k]));
 }
 
-/** The points of a region's planes that are nearest to a point. */
+/** Return the points of a region's planes that are nearest to a point. */
 function planePoints(shape, shift, middle) {
   const planes = shape.drawing?.planes ?? [];
   return planes.map(({ point, normal }) => Vec.along(middle, normal, Vec.dot(Vec.sub(Vec.add(point, shift), middle), normal)));
 }
 
 /**
- * The points that a camera shall have in its picture, those of them on the way, and the box in which all is drawn.
- * @param {Run[]} runs  @returns {{way: number[][], content: number[][], bounds: [number[], number[]]}}
+ * Return the points on the paths, all points that the camera frames, and the box in which everything is drawn.
+ * @param {Run[]} runs  @returns {{way: number[][], content: number[][], bounds: [number[], number[]]}} [m, NED]
  */
 function extentOf(runs) {
   const way = runs.flatMap(placesOf);
@@ -86,7 +87,7 @@ function extentOf(runs) {
       }
     });
   }
-  // a plane that is not far off is drawn too, as far as it is in the picture
+  // a plane that is near widens the bounds, but not what the camera frames
   const near = (p) => p.every((x, k) => x >= low[k] - 2 * room && x <= high[k] + 2 * room);
   const bounds = boxAbout([...content, ...beside.filter(near)].filter(Vec.finite));
   const step = roundStep(Math.max(bounds[1][0] - bounds[0][0], bounds[1][1] - bounds[0][1]) / 20);
@@ -94,7 +95,7 @@ function extentOf(runs) {
     bounds[0][axis] = step * Math.floor(bounds[0][axis] / step);
     bounds[1][axis] = step * Math.ceil(bounds[1][axis] / step);
   }
-  // the water's surface tells most where it is near
+  // extend the bounds to the water surface where it is near
   const height = bounds[1][2] - bounds[0][2];
   if (bounds[0][2] > 0 && bounds[0][2] < ROOM * height) bounds[0][2] = 0;
   bounds[1][2] += 0.04 * height;

@@ -1,27 +1,27 @@
-// The camera: where it looks from, and where a point of the world (north, east, down) is seen. Down is downwards.
+// Perspective camera: projection of points of the world (north, east, down) to pixels.
 
 const HALF_VIEW = (24 * Math.PI) / 180; // rad, half of the angle of view across the picture's diagonal
 const STEEPEST = Math.PI / 2;
 
-/** A perspective camera that goes around a target. Several scenes may share one. */
+/** Perspective camera that orbits a target. Several scenes may share one. */
 class Camera {
   constructor() {
     this.target = [0, 0, 0]; // m, NED
     this.azimuth = 2.2; // rad, bearing of the eye from the target
     this.elevation = 0.5; // rad, of the eye above the target
     this.distance = 10; // m
-    this.content = []; // points that fit() brings into the picture
-    this.way = []; // those of them that are of the vehicles' ways and their goals
-    this.bearing = 0; // rad, towards which the way goes
-    this.covered = 0; // pixels at the right that something hangs over
+    this.content = []; // points that fit() frames
+    this.way = []; // those of them on the vehicles' paths and goals
+    this.bearing = 0; // rad, direction of the path
+    this.covered = 0; // pixels at the right edge that an overlay covers
     this.listeners = new Set(); // called when the view changes
-    this.fitted = true; // nothing has moved it since all content was brought into the picture
+    this.fitted = true; // true while the view is as fit() left it
     this.width = 1;
     this.height = 1;
     this._update();
   }
 
-  /** Say how large the picture is [CSS pixels]. */
+  /** Set the size of the picture [CSS pixels]. */
   resize(width, height) {
     if (this.width === width && this.height === height) return;
     this.width = Math.max(1, width);
@@ -30,43 +30,43 @@ class Camera {
     else this._update();
   }
 
-  /** Say how much of the picture something hangs over at its right [CSS pixels]. */
+  /** Set the width that an overlay covers at the right edge [CSS pixels]. */
   cover(pixels) {
     if (this.covered === pixels) return;
     this.covered = pixels;
     if (this.fitted) this.fit();
   }
 
-  /** Go around the target, as a hand that drags the scene by so many CSS pixels. */
+  /** Rotate about the target for a drag of dx, dy [CSS pixels]. */
   orbit(dx, dy) {
     this.azimuth += 0.008 * dx;
     this.elevation = Math.min(STEEPEST, Math.max(-STEEPEST, this.elevation + 0.008 * dy));
     this._changed();
   }
 
-  /** Move so that the scene at the target goes along by so many CSS pixels. */
+  /** Translate the camera so that the scene at the target moves by dx, dy [CSS pixels]. */
   pan(dx, dy) {
     const metres = this.distance / this.focal;
     this.target = Vec.along(Vec.along(this.target, this.right, -dx * metres), this.up, dy * metres);
     this._changed();
   }
 
-  /** Come nearer by a factor; below 1 farther. */
+  /** Divide the distance to the target by a factor. */
   zoom(factor) {
     this.distance = Math.min(1e6, Math.max(0.2, this.distance / factor));
     this._changed();
   }
 
-  /** Put the target elsewhere, the direction of view kept. */
+  /** Set the target [m, NED] and keep the view direction. */
   aim(target) {
     this.target = [...target];
     this._changed();
   }
 
   /**
-   * Look from a known side, at all that there is.
-   * @param {"iso"|"top"|"side"|"front"} name top: north is up; side: from east, north to the right; front: towards
-   * north, east to the right
+   * Look from a named side and frame all content.
+   * @param {"iso"|"top"|"side"|"front"} name iso: oblique, where the path appears longest; top: north is up; side: from
+   * east, north to the right; front: towards north, east to the right
    */
   look(name) {
     const views = { top: [Math.PI, STEEPEST], side: [Math.PI / 2, 0], front: [Math.PI, 0] };
@@ -75,20 +75,20 @@ class Camera {
       this._fit();
       return this._lengthOfWay();
     };
-    // aslant, where the way is seen longest
+    // oblique: the direction from which the path appears longest
     const [best] = views[name] ? [views[name]] : this._aslant().sort((a, b) => length(b) - length(a));
     [this.azimuth, this.elevation] = best;
     this.fit();
   }
 
-  /** The diagonal of the box about the way in the picture [pixels]. */
+  /** Return the diagonal of the path's bounding box in the picture [pixels]. */
   _lengthOfWay() {
     const seen = this.way.map((p) => this.project(p));
     const extent = (k) => seen.reduce((x, p) => Math.max(x, p[k]), -Infinity) - seen.reduce((x, p) => Math.min(x, p[k]), Infinity);
     return Math.hypot(extent(0), extent(1));
   }
 
-  /** Directions aslant from which the way goes from left to right: [azimuth, elevation]. */
+  /** Return oblique directions [azimuth, elevation] [rad] from which the path runs from left to right. */
   _aslant() {
     return [0, Math.PI / 2].flatMap((axis) => {
       const along = axis + (Math.cos(this.bearing - axis) < 0 ? Math.PI : 0);
@@ -96,7 +96,7 @@ class Camera {
     });
   }
 
-  /** Bring the content into the picture, the direction of view kept. */
+  /** Frame all content and keep the view direction. */
   fit() {
     this._fit();
     this._changed();
@@ -115,7 +115,7 @@ class Camera {
     this.distance = Math.max(across.least, upright.least, 0.5);
     const [right, up] = [across, upright].map(({ middle }) => middle(this.distance));
     this.target = Vec.along(Vec.along(Vec.scale(this.forward, ahead), this.right, right), this.up, up);
-    // the target goes to the content's middle, so that the camera turns about that
+    // put the target at the middle depth of the content, since the camera rotates about it
     const depths = this.content.map((p) => Vec.dot(Vec.sub(p, this.target), this.forward));
     const middle = 0.5 * (Math.min(...depths) + Math.max(...depths));
     this.target = Vec.along(this.target, this.forward, middle);
@@ -123,7 +123,7 @@ class Camera {
     this._update();
   }
 
-  /** Pixels and depth [m] of a point: [x, y, depth]; meaningless unless depth is above `near`. */
+  /** Return pixels and depth [m] of a point: [x, y, depth]; valid only if depth exceeds `near`. */
   project(p) {
     const [x, y, z] = [p[0] - this.eye[0], p[1] - this.eye[1], p[2] - this.eye[2]];
     const depth = x * this.forward[0] + y * this.forward[1] + z * this.forward[2];
@@ -135,7 +135,7 @@ class Camera {
     ];
   }
 
-  /** The same for many points, three numbers each, that are shifted first; into `out`. */
+  /** Project `count` points, three numbers each, after a shift [m]; write x, y and depth of each to `out`. */
   projectAll(points, count, shift, out) {
     const [r, u, f] = [this.right, this.up, this.forward];
     const [ex, ey, ez] = Vec.sub(this.eye, shift);
@@ -153,21 +153,23 @@ class Camera {
     }
   }
 
-  /** The unit vector from the eye through a pixel. */
+  /** Return the unit vector from the eye through a pixel. */
   ray(x, y) {
     const right = (x - 0.5 * this.width) / this.focal;
     const up = (0.5 * this.height - y) / this.focal;
     return Vec.unit(Vec.along(Vec.along(this.forward, this.right, right), this.up, up));
   }
 
-  /** Pixels of a metre at a point. */
+  /** Return the scale at a point [pixels/m]. */
   scaleAt(p) {
     return this.focal / Vec.dot(Vec.sub(p, this.eye), this.forward);
   }
 
   /**
-   * How far off the eye is at least, so that all content is within two tangents of a direction across the view, and
-   * where the view's middle is then at a distance: closed, as each side bounds both linearly.
+   * Return the least distance from eye to target that frames all content along one axis of the picture.
+   *
+   * `below` and `above` are tangents of the half angles. `middle` maps a distance to the middle of the content along `side`.
+   * Both bounds are linear in the distance, so the solution is closed.
    */
   _bounded(side, below, above) {
     let most = -Infinity;

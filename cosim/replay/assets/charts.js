@@ -1,6 +1,6 @@
-// A strip chart: a figure with a legend that tells the values at the cursor, and a plot that seeks.
+// Strip chart: a legend with the values at the cursor, and a plot that seeks.
 
-/** An element with a class and a text. */
+/** Return a new element with a class and a text. */
 function element(tag, className = "", text = "") {
   const made = document.createElement(tag);
   if (className) made.className = className;
@@ -8,7 +8,7 @@ function element(tag, className = "", text = "") {
   return made;
 }
 
-/** A short line in the colour and dash of a curve, as SVG, so that it also prints. */
+/** Return a short SVG line in the color and dash of a curve; SVG also prints. */
 function swatch(colour, dash) {
   const space = "http://www.w3.org/2000/svg";
   const svg = document.createElementNS(space, "svg");
@@ -25,26 +25,26 @@ function swatch(colour, dash) {
 }
 
 /**
- * A strip chart of one kind of signals, of all runs that are shown.
+ * Strip chart of one kind of signals, for all shown runs.
  *
- * `element` goes into the page; `on` has what the chart asks of the board: seek(t), hover(t or null),
- * zoom(factor, t), pan(seconds), window(from, to), whole().
+ * `element` goes into the page. `on` has the callbacks of the board: seek(t), hover(t, chart, y) or hover(null),
+ * zoom(factor, t), pan(seconds), window(from, to), whole(), changed().
  */
 class Chart {
   constructor(spec, theme, on) {
     this.spec = spec;
     this.theme = theme;
     this.on = on;
-    this.near = true; // whether it is on the screen, or almost
+    this.near = true; // true if it is on the screen or close to it
     this.stale = true;
     this.window = [0, 1];
     this.curves = [];
     this.frame = null;
-    this._off = new Set(); // names of signals that the reader has put out
+    this._off = new Set(); // names of signals that the reader has hidden
     this._build();
   }
 
-  /** @param {{run: Run, index: number}[]} shown of all runs of the page  @param {boolean} several whether it has more */
+  /** @param {{run: Run, index: number, name: string}[]} shown  @param {boolean} several true if the page has several runs */
   setRuns(shown, several) {
     this._shown = shown;
     this._several = several;
@@ -52,7 +52,7 @@ class Chart {
     this._legend();
   }
 
-  /** What is drawn: the run's index in the page, the signal, its label, and all its numbers with their times. */
+  /** Return the drawn curves: index of the run in the page, signal, label, times [s] and values. */
   series() {
     return this.curves.map(({ index, run, signal: of, values }) => ({
       run: index, name: of.name, label: of.label, time: run.time, values,
@@ -65,19 +65,19 @@ class Chart {
     if (this._shown) this._legend();
   }
 
-  /** Show a span of time [s]; of the whole run also when nothing moves any more, or null. */
+  /** Show a time window [s]; `rest` is the start of the final rest [s], or null for a time axis without break. */
   setWindow(from, to, rest = null) {
     this.window = [from, to];
     this.rest = rest;
     this.stale = true;
   }
 
-  /** Rows were appended to the runs. */
+  /** Collect the curves again after rows were appended. */
   grown() {
     this._collect();
   }
 
-  /** Paint what is stale; costs nothing else. On paper the cursor is a part of the picture: at `cursor`. */
+  /** Paint the canvas if it is stale; with `cursor` [s], paint a cursor there too. */
   paint(cursor = null) {
     if (!this.stale || this.element.hidden) return;
     const { clientWidth: width, clientHeight: height } = this.plot;
@@ -96,12 +96,12 @@ class Chart {
     this.stale = false;
   }
 
-  /** Put the cursor at a time. */
+  /** Move the cursor to a time [s]. */
   point(t) {
     this._place(this.cursor, t);
   }
 
-  /** Tell the values at a time in the legend, of one run. */
+  /** Write the values of one run at a time [s] into the legend. */
   update(t, index) {
     for (const { of, value } of this._entries) {
       const curve = this.curves.find((one) => one.signal === of && one.index === index);
@@ -110,7 +110,7 @@ class Chart {
     }
   }
 
-  /** Show where the pointer is in any of the charts; in its own one also which curve is nearest to it. */
+  /** Show a line at the pointer's time [s]; with `y` [pixels], also a tip that names the nearest curve. */
   hover(t, y = null) {
     this._place(this.ghost, t);
     this.tip.hidden = t === null || y === null || !this.frame?.range;
@@ -204,12 +204,12 @@ class Chart {
   }
 }
 
-/** The number of a curve at a time; a run that grows may have rows that are not drawn yet. */
+/** Return the value of a curve at a time [s]; a growing run may have rows that the curve lacks. */
 function valueAt({ run, values }, t) {
   return values.length ? values[Math.min(run.row(t), values.length - 1)] : NaN;
 }
 
-/** Pointer on a plot: drag seeks, Shift and drag picks a window, Ctrl or Shift and wheel zooms, double click is all. */
+/** Listen to the pointer: drag seeks, Shift+drag selects a window, Ctrl or Shift+wheel zooms, double click resets. */
 function handlePlot(chart) {
   const { plot, on } = chart;
   let from = null; // {x, y, mode} of a press

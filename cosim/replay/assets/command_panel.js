@@ -1,10 +1,10 @@
-// Commands to a live run: buttons, and the places of target and regions as numbers, for who has no mouse.
+// Panel with commands to a live run: buttons, and the positions of target and regions as number fields.
 
 const MODE_NAMES = ["manual", "hold", "reach", "mission", "surface", "stabilize", "depth_hold"];
-const SURE = 4000; // ms, for which a button that was pressed once waits to be pressed again
-const NEW_OBSTACLES = 1001; // their numbers begin here, away from those that sensors give
+const SURE = 4000; // ms, within which Reset must be pressed again
+const NEW_OBSTACLES = 1001; // first number of obstacles from this page, above the numbers that sensors use
 
-/** Buttons and numbers beside the scene. */
+/** Panel of buttons and number fields over the scene. */
 class CommandPanel {
   /** @param {LiveLink} link */
   constructor(link) {
@@ -23,14 +23,14 @@ class CommandPanel {
     this._rows = [];
   }
 
-  /** Take the run of the link. */
+  /** Build the panel for a run of the link. */
   setRun(run) {
     this.run = run;
     this.holder.hidden = false;
     this._rows = [];
     this.body.replaceChildren();
     if (!run.header.commands) {
-      this.holder.open = false; // it would hide a part of the scene and offer nothing
+      this.holder.open = false; // it offers nothing, and would hide a part of the scene
       this.body.append(element("p", "", "Watching only. Start the run with --commands to steer it from here."));
     } else {
       this.body.append(this._buttons(), this._list(), this._adding());
@@ -38,7 +38,7 @@ class CommandPanel {
     this.update();
   }
 
-  /** Show how things stand. */
+  /** Show mode, arming, connection and current positions. */
   update() {
     const { run, link } = this;
     if (!run) return;
@@ -75,7 +75,7 @@ class CommandPanel {
     return group;
   }
 
-  /** To begin again is asked for twice. */
+  /** Return the reset button, which must be pressed twice. */
   _reset() {
     const button = element("button", "", "Reset");
     button.type = "button";
@@ -129,7 +129,7 @@ class CommandPanel {
     return set;
   }
 
-  /** Write where a thing is, unless its user writes. */
+  /** Write the position of a region into its fields, unless one of them has the focus. */
   _place({ index, set, fields }) {
     const place = placeOf(this.run, index, this.run.end);
     set.hidden = !place;
@@ -146,13 +146,13 @@ class CommandPanel {
     if (!from) return;
     const to = fields.map((field, axis) => {
       const written = field.valueAsNumber;
-      // what stands there rounded is left as it is
+      // a field that shows the rounded position keeps the exact one
       return !Number.isFinite(written) || Math.abs(written - from[axis]) <= 0.005 ? from[axis] : written;
     });
     if (Vec.norm(Vec.sub(to, from)) > 0) this.link.move(index, from, to);
   }
 
-  /** A new obstacle stands ahead of the vehicle, from where it may be dragged. */
+  /** Return the button that adds a spherical obstacle ahead of the vehicle. */
   _adding() {
     const button = element("button", "", "New obstacle");
     button.type = "button";

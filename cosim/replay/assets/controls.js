@@ -1,12 +1,14 @@
-// The hand on the scene: drag to orbit, with the right button or shift to pan, wheel or two fingers to zoom.
+// Camera control: drag orbits, right button or Shift pans, wheel or two fingers zoom.
 
 /**
- * Let pointers and wheel move a camera. Who wants a pointer for something else, such as dragging a region, listens on
- * the canvas in the capturing phase and calls preventDefault() on its pointerdown.
- * @param {HTMLCanvasElement} canvas  @param {function(): Camera} camera the one of this moment
+ * Connect pointer and wheel events of a canvas to a camera.
+ *
+ * A listener that handles a pointer itself, such as dragging a region, listens on the canvas in the capturing phase.
+ * It calls preventDefault() on the pointerdown event.
+ * @param {HTMLCanvasElement} canvas  @param {function(): Camera} camera returns the current camera
  */
 function controlCamera(canvas, camera) {
-  const held = new Map(); // pointers that are down, and where
+  const held = new Map(); // position [pixels] of each pressed pointer
   canvas.style.touchAction = "none"; // else a finger would scroll the page too
   const place = (event) => [event.offsetX, event.offsetY];
 
@@ -44,7 +46,7 @@ function controlCamera(canvas, camera) {
     "wheel",
     (event) => {
       event.preventDefault();
-      const lines = event.deltaMode === 1 ? 30 : 1; // some wheels tell lines instead of pixels
+      const lines = event.deltaMode === 1 ? 30 : 1; // some wheels report lines instead of pixels
       camera().zoom(Math.exp(-0.0016 * Math.max(-300, Math.min(300, lines * event.deltaY))));
     },
     { passive: false },

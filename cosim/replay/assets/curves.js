@@ -1,6 +1,6 @@
-// Which curves the charts have: signals of the runs with their names, colours and dashes.
+// Curves of the charts: signals of the runs with names, colors and dashes.
 
-// Okabe and Ito's colours, darker on white and lighter on black where a line would else be faint.
+// Colors of Okabe and Ito, darker on white and lighter on black for contrast.
 const HUES = {
   light: {
     vermillion: "#d55e00", orange: "#c98800", sky: "#2b87bd", green: "#008a65",
@@ -11,30 +11,30 @@ const HUES = {
     blue: "#8fa8ff", purple: "#e79ac8", ink: "#e8eef4", grey: "#5b6a78",
   },
 };
-// criteria in colours of the palette get the hue that a theme has of it, others their own
+// criterion colors of the palette map to hues of the theme; other colors stay
 const HUE_OF = { "#D55E00": "vermillion", "#E69F00": "orange", "#56B4E9": "sky", "#CC79A7": "purple", "#009E73": "green" };
 const IN_TURN = ["blue", "vermillion", "green", "purple"];
 const DASHES = [[], [7, 4], [2, 3], [10, 3, 2, 3], [14, 4], [4, 2, 1, 2, 1, 2]];
-const NAMED = 6; // regions that the chart of distances tells by name
+const NAMED = 6; // number of regions that the distance chart names
 
-/** The dash of a run, where a page has several. */
+/** Return the dash pattern of a run on a page with several. */
 function runDash(index) {
   return DASHES[index % DASHES.length];
 }
 
-/** The hue of a colour that the header has, "#RRGGBB". */
+/** Return the hue name of a header color "#RRGGBB"; the color itself if it has no name. */
 function hueOf(colour) {
   return HUE_OF[colour.toUpperCase()] ?? colour;
 }
 
-/** The criteria of some runs by their names, in the order of priority, each with its colour. */
+/** Return the criteria of some runs, each name once, in the order of priority. */
 function criteriaOf(runs) {
   const found = new Map();
   for (const run of runs) for (const one of run.header.criteria) if (!found.has(one.name)) found.set(one.name, one);
   return [...found.values()];
 }
 
-/** The CSS colour of a hue in a theme, or of "#rrggbb", moved by `shade` towards the ink. */
+/** Return the CSS color of a hue or of "#rrggbb" in a theme, mixed with the share `shade` of ink. */
 function hueColour(hue, theme, shade = 0) {
   const base = HUES[theme][hue] ?? legible(hue, theme);
   if (!shade) return base;
@@ -42,18 +42,18 @@ function hueColour(hue, theme, shade = 0) {
   return `rgb(${from.map((x, i) => Math.round(x + shade * (to[i] - x))).join(" ")})`;
 }
 
-/** A signal of a chart: the same of every run. */
+/** Return a signal of a chart; `more` overrides the defaults. */
 function signal(name, label, hue, more = {}) {
   return { name, label, hue, shade: 0, dash: [], faint: false, context: false, values: (run) => run.column(name), ...more };
 }
 
-/** Signals with names from a list, coloured in turn; from the fifth on darker and dashed. */
+/** Return signals with colors in turn; from the fifth on darker and dashed. */
 function inTurn(names, labels) {
   const again = { dash: [6, 3], shade: 0.45 };
   return names.map((name, i) => signal(name, labels[i], IN_TURN[i % 4], i < 4 ? {} : again));
 }
 
-/** Signals derived from others, kept until rows are added. */
+/** Return a function that computes a signal of a run and caches it until rows are appended. */
 function derived(compute) {
   const kept = new WeakMap();
   return (run) => {
@@ -65,7 +65,7 @@ function derived(compute) {
   };
 }
 
-/** Clearances of a region; of an obstacle that comes and goes no number while it is not there. */
+/** Return a function from run to clearances of a region; NaN while a temporary obstacle is absent. */
 function clearanceOf({ name, comes }) {
   if (!comes) return (run) => run.column(`${name}.clearance`);
   return derived((run) => {
@@ -75,13 +75,13 @@ function clearanceOf({ name, comes }) {
   });
 }
 
-/** Clearances of the regions with one unit: the nearest by name, the others thin and grey. */
+/** Return the clearance signals of regions with one unit: the nearest named, the others thin and grey. */
 function clearances(runs, unit) {
   const found = new Map();
   for (const run of runs) {
     for (const region of run.header.regions.filter((one) => one.unit === unit)) {
       const values = clearanceOf(region)(run);
-      if (!values || (region.comes && !values.some(Number.isFinite))) continue; // it has not come yet
+      if (!values || (region.comes && !values.some(Number.isFinite))) continue; // no value so far: not added yet
       const before = found.get(region.name) ?? { region, least: Infinity };
       found.set(region.name, { region, least: values.reduce((a, b) => (b < a ? b : a), before.least) });
     }
@@ -99,7 +99,7 @@ function clearances(runs, unit) {
   });
 }
 
-/** Estimates with what is true beside them, dashed. */
+/** Return signals of estimates, each with its true value as a dashed line. */
 function estimates(indices) {
   return indices.flatMap((i) => {
     const hue = IN_TURN[i % IN_TURN.length];
@@ -115,10 +115,10 @@ function estimates(indices) {
 }
 
 /**
- * The charts of some runs, without those for which no run has a signal.
+ * Return the charts of some runs, without charts for which no run has a signal.
  *
- * @returns {object[]} with key, title, unit, signals (name, label, hue, shade, dash, faint, context, values(run)), and
- *   where they hold zero (below it is violated), fixed ([least, most]), down (the axis points down)
+ * @returns {object[]} with key, title, unit, signals (name, label, hue, shade, dash, faint, context, values(run)); optional
+ *   are zero (values below 0 are violations), fixed ([least, most]), down (the axis points down)
  */
 function chartsOf(runs) {
   const criteria = (kind) =>
@@ -127,7 +127,7 @@ function chartsOf(runs) {
     );
   const axes = (kind, letters, words = letters) => inTurn([...letters].map((a) => `${kind}.${a}`), [...words]);
   const size = (kind) => derived((run) => sizes(run, ["X", "Y", "Z"].map((axis) => `${kind}.${axis}`)));
-  const driven = runs.filter((run) => run.header.through === "thrusters"); // the others would be level at 0
+  const driven = runs.filter((run) => run.header.through === "thrusters"); // the others would stay at 0
   const thrusters = Math.max(0, ...driven.map((run) => run.header.vehicle?.thrusters?.length ?? 0));
   const numbers = Array.from({ length: thrusters }, (_, i) => i + 1);
   return [

@@ -1,4 +1,4 @@
-// The runs of the page: numbers as they were recorded, and what they are at any time.
+// Runs of the page: recorded signals, and their values at any time.
 
 /** One run: its header, and a Float64Array for each signal. */
 class Run {
@@ -11,17 +11,17 @@ class Run {
     this._room = this.rows;
   }
 
-  /** A run of the same numbers with another header, of the same signals. */
+  /** Return a run with the same columns and another header of the same signals. */
   withHeader(header) {
     return new Run(header, this._columns.map((column) => column.subarray(0, this.rows)));
   }
 
-  /** The times of all rows [s], rising. */
+  /** Return the times of all rows [s], increasing. */
   get time() {
     return this.column("time");
   }
 
-  /** First and last time [s]. */
+  /** Return the first time [s]; 0 without rows. */
   get start() {
     return this.rows ? this.time[0] : 0;
   }
@@ -34,7 +34,7 @@ class Run {
     return this._at.has(name);
   }
 
-  /** The numbers of a signal, one for each row; null where there is no such signal. */
+  /** Return the values of a signal, one for each row; null if there is no such signal. */
   column(name) {
     const at = this._at.get(name);
     return at === undefined ? null : this._columns[at].subarray(0, this.rows);
@@ -44,7 +44,7 @@ class Run {
     return this.header.signals[this._at.get(name)].unit;
   }
 
-  /** Index of the last row at or before a time; 0 before the first. */
+  /** Return the index of the last row at or before a time [s]; 0 before the first row. */
   row(t) {
     const at = this._at.get("time");
     const time = this._columns[at];
@@ -58,13 +58,13 @@ class Run {
     return low;
   }
 
-  /** A signal at a time, as of the last row before it: for what switches. */
+  /** Return a signal at a time [s] as of the last row before it, for values that switch. */
   held(name, t) {
     const column = this.column(name);
     return column ? column[this.row(t)] : NaN;
   }
 
-  /** A signal at a time, on a line between the rows around it: for what moves. */
+  /** Return a signal at a time [s], interpolated between rows, for values that move. */
   at(name, t) {
     const column = this.column(name);
     if (!column || !this.rows) return NaN;
@@ -72,7 +72,7 @@ class Run {
     return part > 0 ? column[i] + part * (column[i + 1] - column[i]) : column[i];
   }
 
-  /** Where the vehicle is at a time: position [m, NED], and quaternion from body to world, scalar first. */
+  /** Return the pose at a time [s]: position [m, NED], and quaternion from body to world, scalar first. */
   pose(t) {
     const [i, part] = this._between(t);
     const position = ["x", "y", "z"].map((axis) => this.at(`position.${axis}`, t));
@@ -88,17 +88,17 @@ class Run {
     return { position, quaternion };
   }
 
-  /** How far a region is from where its shape has it at a time [m, NED]. */
+  /** Return the displacement of a region from its shape's place at a time [s] [m, NED]. */
   shift(region, t) {
     const { name, comes } = this.header.regions[region];
     if (!this.has(`${name}.shift.x`)) return [0, 0, 0];
     const names = ["x", "y", "z"].map((axis) => `${name}.shift.${axis}`);
-    // what comes and goes is not on the way from nowhere
+    // do not interpolate between the parked position and the scene
     const leaps = comes && !(this.there(region, t) && this._isThere(region, Math.min(this.row(t) + 1, this.rows - 1)));
     return names.map((signal) => (leaps ? this.held(signal, t) : this.at(signal, t)));
   }
 
-  /** Whether a region is on its way at a time: between the rows about it, or the last two. */
+  /** Return true if a region moves at a time [s]: between the rows about it, or the last two. */
   moves(region, t) {
     const row = Math.min(this.row(t), this.rows - 2);
     if (!(row >= 0) || !this.has(`${this.header.regions[region].name}.shift.x`)) return false;
@@ -106,12 +106,12 @@ class Run {
     return this._isThere(region, row) && Vec.norm(Vec.sub(a, b)) > 0;
   }
 
-  /** Whether a region is there at a time: obstacles that were reported during the run come and go. */
+  /** Return true if a region exists at a time [s]; obstacles that are reported during the run come and go. */
   there(region, t) {
     return this._isThere(region, this.row(t));
   }
 
-  /** The shape of a region at a time: what was changed on the way stands in header.changes, in the order of time. */
+  /** Return the shape of a region at a time [s]; header.changes has later shapes in the order of time. */
   shape(region, t) {
     let shape = this.header.regions[region].shape;
     for (const change of this.header.changes ?? []) {
@@ -120,13 +120,13 @@ class Run {
     return shape;
   }
 
-  /** Index of the region that the arbiter gives way to at a time; 0 is the goal. */
+  /** Return the index of the active region at a time [s]; 0 is the goal. */
   active(t) {
     const index = this.held("active", t);
     return Number.isFinite(index) ? index : 0;
   }
 
-  /** From when on the vehicle stays where it is at the end, the arbiter changes nothing, and no event comes [s]. */
+  /** Return the time [s] after which pose and active region stay as at the end and no event follows, plus 5 %. */
   get rest() {
     if (this._rest?.rows === this.rows) return this._rest.time;
     const all = (names) => names.map((name) => this.column(name)).filter(Boolean);
@@ -145,7 +145,7 @@ class Run {
     return this._rest.time;
   }
 
-  /** Append one row, as it comes from a live run. */
+  /** Append one row of a live run, in the order of the header's signals. */
   append(row) {
     if (this.rows === this._room) {
       this._room = Math.max(1024, 2 * this._room);
@@ -161,7 +161,7 @@ class Run {
 
   _isThere(region, row) {
     const { name, comes } = this.header.regions[region];
-    // an imported log has no goal, and with it no shift of one
+    // an imported log has no goal, hence no shift of one
     return !comes || (this.has(`${name}.shift.x`) && ["x", "y", "z"].some((axis) => this.column(`${name}.shift.${axis}`)[row] !== 0));
   }
 
@@ -188,7 +188,7 @@ async function unpacked(header) {
   return new Run(header, columns);
 }
 
-/** All runs of the page. */
+/** Unpack all runs of the page. */
 async function loadRuns() {
   const headers = JSON.parse(document.getElementById("runs").textContent);
   return Promise.all(headers.map(unpacked));

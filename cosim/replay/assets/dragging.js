@@ -1,15 +1,15 @@
-// Target and regions, dragged in the scene: of a live run, or of a run that is flown again with other numbers.
+// Dragging of target and regions in the scene, of a live run or of a what-if simulation.
 
 const BEGINS = 4; // pixels, below which a press is a click
-const EDGE_ON = 0.12; // sine of the angle below which a level plane is seen too much from its side to be dragged on
-const FARTHEST = 500; // m, that a region is dragged at once
-const SETTLES = 250; // ms, for which the ghost stays after its region was let go
+const EDGE_ON = 0.12; // sine of the camera's elevation below which a level plane is too edge-on for dragging
+const FARTHEST = 500; // m, limit of one drag
+const SETTLES = 250; // ms, for which the ghost stays after the release
 
-/** Lets a pointer drag regions, and draws where they will be. */
+/** Pointer drags of regions, with a preview of the new position. */
 class Dragging {
   /**
-   * @param {LiveLink|WhatIf} link with page, run, acceptsCommands; time, at which regions are where they are taken; refusal, why
-   * nothing can be moved now; canMove(region); move(region, from, to)
+   * @param {LiveLink|WhatIf} link with page, run, acceptsCommands; time, for which the regions are shown [s]; refusal, the
+   * reason why nothing can be moved, or ""; canMove(region); move(region, from, to)
    */
   constructor(link) {
     this.link = link;
@@ -17,7 +17,7 @@ class Dragging {
     this.ghost = new Ghost(this.canvas);
     this.held = null;
     const { canvas } = this;
-    // before the camera's own listeners, which leave alone what is taken
+    // in the capturing phase, before the camera's listeners, which skip events that are handled
     canvas.addEventListener("pointerdown", (event) => this._take(event), true);
     canvas.addEventListener("pointermove", (event) => this._move(event));
     canvas.addEventListener("pointerup", (event) => this._drop(event));
@@ -27,27 +27,27 @@ class Dragging {
     });
   }
 
-  /** Let go without a command. */
+  /** End the drag without a command. */
   cancel() {
     this.held = null;
     this.ghost.clear();
   }
 
-  /** Draw the ghost again, as the camera may have moved. */
+  /** Redraw the ghost, as the camera may have moved. */
   draw() {
     if (this.held?.moved) this.ghost.draw(this.link.page.scene(), this.held);
   }
 
-  /** The region under a point that may be dragged, or null. */
+  /** Return the index of the region at a pixel that may be dragged; null if there is none. */
   _under(x, y) {
     const { link } = this;
     const scene = link.page.scene();
     if (!link.acceptsCommands || !scene) return null;
     const found = scene.pick(x, y);
     if (!found || !link.canMove(found.region) || isFlat(link.run, found.region)) return null;
-    // the walls of what is to be kept within are all around; its name alone is a handle
+    // a keep-inside region surrounds the scene, so that its label is the only handle
     const { keep } = link.run.header.regions[found.region];
-    const named = scene.labels.nameAt(x, y) !== null; // a name is picked before what is behind it
+    const named = scene.labels.nameAt(x, y) !== null; // labels are picked before what is behind them
     return found.region === 0 || keep === "out" || named ? found.region : null;
   }
 
@@ -83,7 +83,7 @@ class Dragging {
     this.draw();
   }
 
-  /** Where the thing goes: along a level plane, or up and down; from the side, along the plane that faces the eye. */
+  /** Return the new position: on a level plane, vertical with `up`, or on the upright plane in an edge-on view. */
   _dragged(held, x, y, up) {
     const scene = this.link.page.scene();
     const edgeOn = Math.abs(scene.camera.forward[2]) < EDGE_ON;
@@ -115,7 +115,7 @@ class Dragging {
     }, SETTLES);
   }
 
-  /** Tell by the cursor that something can be taken; not more often than needed, as looking takes a while. */
+  /** Set the cursor shape over draggable regions, at most every 80 ms, as picking takes time. */
   _hint(x, y) {
     this._at = [x, y];
     this._looking ||= setTimeout(() => {
@@ -125,7 +125,7 @@ class Dragging {
   }
 }
 
-/** The point that is seen at some pixels on the upright plane through a point that faces the eye; null where none is. */
+/** Return the point [m, NED] at a pixel on the upright plane through a point that faces the eye; null if there is none. */
 function onUprightPlane(camera, x, y, through) {
   const level = [camera.forward[0], camera.forward[1], 0];
   if (Vec.norm(level) < 1e-3) return null; // from straight above no upright plane is seen

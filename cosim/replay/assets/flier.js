@@ -1,24 +1,24 @@
-// A worker that flies: it holds the WebAssembly of the scenario's flight, puts numbers in, and gives back what came of it.
+// Web worker that runs the scenario's WebAssembly: it sets the inputs, simulates, and returns the results.
 
-let flight = null; // what the module exports
+let flight = null; // exports of the module
 
-/** Put numbers where they stand in an array of the module: [[place, value], ...]. */
+/** Write numbers into an array of the module: [[index, value], ...]. */
 function put(array, numbers) {
   for (const [place, value] of numbers) array[place] = value;
 }
 
-/** A copy of some numbers of the module. */
+/** Return a copy of `count` numbers at an address of the module. */
 function copied(address, count) {
   return new Float64Array(flight.memory.buffer, address, count).slice();
 }
 
-/** What the plant said last. */
+/** Return the last message of the plant. */
 function said() {
   const bytes = new Uint8Array(flight.memory.buffer, flight.message(), 512);
   return new TextDecoder().decode(bytes.slice(0, bytes.indexOf(0)));
 }
 
-/** Fly once. */
+/** Simulate one flight and return its results. */
 function flown({ numbers, integers, gains, starts, noise, sizes, metrics }) {
   if (!flight.begin()) throw new Error(said());
   put(new Float64Array(flight.memory.buffer, flight.numbers()), numbers);

@@ -1,6 +1,6 @@
-// The flight of the page's scenario with other numbers: what goes to the worker, and what comes back as a run.
+// Simulation of the page's scenario with other numbers: inputs of the worker, and its results as a run.
 
-/** Flies in a worker, one flight at a time. */
+/** Simulation in a worker, one flight at a time. */
 class Flight {
   /** @param {object} data as cosim/replay/interactive/data.py makes it */
   constructor(data) {
@@ -8,7 +8,7 @@ class Flight {
     this.slots = new Map(data.slots.map((slot) => [slot.key, slot]));
   }
 
-  /** Start the worker; rejects where the browser has no WebAssembly, or no workers for pages from disk. */
+  /** Start the worker; reject if the browser has no WebAssembly, or no workers for pages from disk. */
   async start() {
     if (typeof WebAssembly === "undefined") throw new Error("no WebAssembly");
     const packed = Uint8Array.from(atob(this.data.wasm), (letter) => letter.charCodeAt(0));
@@ -21,9 +21,10 @@ class Flight {
   }
 
   /**
-   * Fly with other numbers.
-   * @param {Map<string, number>} values by key  @param {?{thruster: number, time: number}} failure one more, from 1
-   * @returns {Promise<object>} arrays as the worker gives them, or {refused}
+   * Simulate a flight with other numbers.
+   * @param {Map<string, number>} values by key
+   * @param {?{thruster: number, time: number}} failure an additional one; thrusters count from 1, time [s]
+   * @returns {Promise<object>} arrays of the worker, or {refused}
    */
   fly(values, failure) {
     const { data } = this;
@@ -41,10 +42,10 @@ class Flight {
     return this._ask(job);
   }
 
-  /** All failures in the order of their steps, and the limits that allocation goes by once they are reported. */
+  /** Add all failures in the order of their steps, and the limits that allocation uses once they are reported. */
   _fail({ numbers, integers }, { thruster, time }) {
     const { failed, steps, remaining, own, reported, lower, upper, limits } = this.data.failures;
-    const step = Math.ceil(time / this.data.step - 1e-6); // as cosim/batch/fused.py has it
+    const step = Math.ceil(time / this.data.step - 1e-6); // as in cosim/batch/fused.py
     const all = [...own, [step, thruster - 1, 0]].sort((a, b) => a[0] - b[0] || a[1] - b[1] || (a[2] ?? NaN) - (b[2] ?? NaN));
     all.forEach(([at, which, left], i) => {
       integers.push([steps + i, at], [failed + i, which]);
@@ -70,14 +71,18 @@ class Flight {
   }
 }
 
-/** The key of the other end of a cylinder. */
+/** Return the key of a cylinder's other end. */
 function otherEnd(key) {
   return key.includes(".start.") ? key.replace(".start.", ".end.") : key.replace(".end.", ".start.");
 }
 
-const MOST_ROWS = 6000; // of a run that is flown here; more would not be seen
+const MOST_ROWS = 6000; // limit of the rows of a simulated run; more would not be visible
 
-/** The numbers of a flight as a run that the page shows, also at some times; `header` is that of the scenario as it was flown. */
+/**
+ * Return the results of a flight as a run.
+ *
+ * `header` is that of the scenario as flown. `times` [s] are kept as rows where the flight has them.
+ */
 function runOfFlight(data, result, header, times = []) {
   const refused = result.metrics[12];
   const rows = refused >= 0 ? Math.max(1, Math.ceil(refused / data.every)) : data.rows;
@@ -95,7 +100,7 @@ function runOfFlight(data, result, header, times = []) {
   return run;
 }
 
-/** A function from a row to a signal there; of what rests on others, zeros. */
+/** Return a function from row to value of a signal; 0 for the active region, which is computed afterwards. */
 function signalOf(data, [kind, ...rest], number, header) {
   if (kind === "sum") {
     const [array, first, factors] = rest;
@@ -121,9 +126,9 @@ function signalOf(data, [kind, ...rest], number, header) {
   return kind === "active" ? () => 0 : number(kind, rest[0]);
 }
 
-const LEADS = 0.5; // weight from which on a criterion leads though the vehicle rests in the goal
+const LEADS = 0.5; // least weight with which a criterion leads while the vehicle rests in the goal
 
-/** Which region the arbiter gives way to at each row, as cosim/replay/activity.py has it. */
+/** Return the active region of each row, as in cosim/replay/activity.py. */
 function activeRegions(run, criteria) {
   const column = (name) => run.column(name);
   const names = run.header.criteria.map(({ name }) => name);

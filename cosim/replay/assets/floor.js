@@ -1,32 +1,32 @@
-// What tells places and sizes: a grid under the scene, a ruler of depth, shadows, north, and a scale.
+// Reference marks of the scene: floor grid, depth ruler, water surface, compass and scale bar.
 
-/** 1, 2 or 5 times a power of ten, at least so great. */
+/** Return the least of 1, 2 or 5 times a power of ten that is not below `least`. */
 function roundStep(least) {
   const power = 10 ** Math.floor(Math.log10(least));
   return power * [1, 2, 5, 10].find((k) => k * power >= least * (1 - 1e-9));
 }
 
-/** A number of metres, with the digits that a step asks for. */
+/** Return a length [m] as text, with the digits that a step needs. */
 function metres(x, step) {
   const text = x.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
   return Number(text) === 0 ? "0" : text.replace("-", "−");
 }
 
-/** The multiples of a step within two bounds. */
+/** Return the multiples of a step within two bounds. */
 function multiples(low, high, step) {
   const from = Math.ceil(low / step - 1e-6);
   const to = Math.floor(high / step + 1e-6);
   return Array.from({ length: Math.max(0, to - from + 1) }, (_, i) => (from + i) * step);
 }
 
-/** How far apart lines are: wide enough to be read where the camera looks, not too many for the bounds. */
+/** Return the grid spacing [m]: readable at the target, and not too many lines for the bounds. */
 function gridStep(camera, [low, high]) {
   const readable = (64 * camera.distance) / camera.focal;
   const extent = Math.max(high[0] - low[0], high[1] - low[1]);
   return roundStep(Math.max(readable, extent / 60));
 }
 
-/** The grid on the bounds' floor, with metres along the sides that are towards the eye. */
+/** Paint the floor grid of the bounds, with coordinates [m] along the sides towards the eye. */
 function paintFloor(painter, labels, bounds, colours, named) {
   const { camera } = painter;
   const [[n0, e0], [n1, e1, floor]] = bounds;
@@ -43,7 +43,7 @@ function paintFloor(painter, labels, bounds, colours, named) {
   painter.line([[n0, e0, floor], [n1, e0, floor], [n1, e1, floor], [n0, e1, floor], [n0, e0, floor]]);
   painter.stroke(colours.gridMajor, 1.2);
   if (!named) return;
-  // the side on which labels are nearer to the eye, unless the picture ends before it
+  // the side nearer to the eye, unless fewer than two of its labels are in the picture
   const seen = (p) => {
     const [x, y, depth] = camera.project(p);
     return depth > camera.near && x > 0 && y > 0 && x < camera.width && y < camera.height;
@@ -81,7 +81,7 @@ function paintFloor(painter, labels, bounds, colours, named) {
   }
 }
 
-/** A ruler of depth on the upright edge of the bounds that is farthest to the left. */
+/** Paint a depth ruler on the leftmost vertical edge of the bounds. */
 function paintRuler(painter, labels, bounds, colours, named) {
   const { camera } = painter;
   const [low, high] = bounds;
@@ -110,7 +110,7 @@ function paintRuler(painter, labels, bounds, colours, named) {
   if (named) labels.add({ ...title, x: head[0], y: head[1], gap: 9, sides: ["above"] });
 }
 
-/** Where the water ends, if the bounds reach up to it. */
+/** Paint the outline of the water surface if the bounds reach up to it. */
 function paintSurface(painter, bounds, colours) {
   const [[n0, e0, top], [n1, e1]] = bounds;
   if (top > 0) return;
@@ -119,7 +119,7 @@ function paintSurface(painter, bounds, colours) {
   painter.stroke(colours.gridMajor, 1, 0.9, [2, 4]);
 }
 
-/** North, east and down in a corner, and how long a metre is where the camera looks. */
+/** Paint the directions north, east and down in a corner. */
 function paintCompass(painter, labels, colours) {
   const { context, camera } = painter;
   const [x, y, size] = [46, camera.height - 46, 26];
@@ -147,7 +147,7 @@ function paintCompass(painter, labels, colours) {
   labels.block(x - 40, y - 40, 80, 80);
 }
 
-/** A length of the world at the target, and what else the picture's scale says. */
+/** Paint a scale bar for lengths at the target, and the magnification of the vehicle. */
 function paintScale(painter, labels, colours, magnified) {
   const { context, camera } = painter;
   const pixels = camera.focal / camera.distance;

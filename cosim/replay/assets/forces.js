@@ -1,15 +1,19 @@
-// The forces that act on a vehicle, as arrows.
+// Arrows of the forces that act on a vehicle.
 
-/** What a run says of forces at a time, for arrows. */
+/** Forces of a run at a time, scaled for arrows. */
 class Forces {
   constructor(run) {
     this.run = run;
-    this._looked = 0; // rows that are known
-    this._thrusters = false; // whether any thruster ever gave anything
+    this._looked = 0; // number of rows that are evaluated
+    this._thrusters = false; // true once any thruster had a force
     this._most = 0; // N, the greatest force on the body
   }
 
-  /** @returns {{at: number[], force: number[]}[]} body frame; a force of length 1 is the greatest there is */
+  /**
+   * Return the forces at a time [s], one for each thruster; without thruster forces, the force on the body.
+   * @returns {{at: number[], force: number[]}[]} body frame: point [m], and force relative to the thruster's limit; the
+   * force on the body has length 2 at its greatest
+   */
   at(t) {
     this._look();
     const { run } = this;
@@ -22,7 +26,7 @@ class Forces {
     }
     if (!(this._most > 0)) return [];
     const force = ["X", "Y", "Z"].map((axis) => run.at(`actuation.${axis}`, t));
-    return [{ at: [0, 0, 0], force: Vec.scale(force, 2 / this._most) }]; // one arrow has room to be twice as long
+    return [{ at: [0, 0, 0], force: Vec.scale(force, 2 / this._most) }]; // a single arrow may be twice as long
   }
 
   _look() {
@@ -39,7 +43,7 @@ class Forces {
   }
 }
 
-/** Arrows of force, all in one path for the shafts and one for the heads. */
+/** Draw arrows of force: one path of all shafts and heads for the halo, one for the color. */
 function paintForces(painter, pose, forces, size, real, theme) {
   const { camera, context } = painter;
   const colours = SCENE_THEMES[theme];
@@ -52,7 +56,7 @@ function paintForces(painter, pose, forces, size, real, theme) {
     if (a[2] > camera.near && b[2] > camera.near) arrows.push([a, b]);
   }
   context.lineCap = "round";
-  // small vehicles have fine arrows
+  // small vehicles get thinner arrows
   const fine = Math.min(1, Math.max(0.6, (size * camera.scaleAt(pose.position)) / 30));
   for (const [colour, width] of [[colours.halo, 5 * fine], [colours.thrust, 2.4 * fine]]) {
     context.beginPath();

@@ -1,6 +1,6 @@
-// Where a region that is dragged will be: its outline, its way there, and the numbers.
+// Preview of a dragged region: outline, displacement and coordinates.
 
-/** A canvas over that of the scene, which takes no pointers. */
+/** Preview canvas over the scene, without pointer events. */
 class Ghost {
   /** @param {HTMLCanvasElement} canvas of the scene */
   constructor(canvas) {
@@ -15,7 +15,7 @@ class Ghost {
     this.context.clearRect(0, 0, this.canvas.width, this.canvas.height);
   }
 
-  /** Draw a region of a run where it is held. */
+  /** Draw a dragged region of a run at its new position. */
   draw(scene, { run, region, time, from, to }) {
     const { context } = this;
     const { clientWidth: width, clientHeight: height } = this.below;
@@ -41,7 +41,7 @@ class Ghost {
       context.globalAlpha = 1;
       context.stroke();
     }
-    // first along the level, then up or down
+    // first horizontally, then vertically
     const corner = [to[0], to[1], from[2]];
     context.lineWidth = 1.5;
     this._path([from, corner, to].map((place) => scene.project(place)));
@@ -59,7 +59,7 @@ class Ghost {
     const text = `N ${north.toFixed(2)}  E ${east.toFixed(2)}  D ${down.toFixed(2)} m`;
     context.font = "600 12px system-ui, sans-serif";
     const wide = context.measureText(text).width + 12;
-    // towards the middle, away from what stands at the edges
+    // on the side towards the middle of the canvas
     const left = Math.max(4, x > width / 2 ? x - wide - 12 : x + 12);
     const top = Math.max(4, y - 30);
     context.fillStyle = ink;
@@ -76,7 +76,7 @@ class Ghost {
     points.forEach(([x, y], i) => (i ? this.context.lineTo(x, y) : this.context.moveTo(x, y)));
   }
 
-  /** The hull about the picture of a surface, moved by so much from where it is now; empty for what has none. */
+  /** Return the outline [pixels] of a surface, moved by `by` [m, NED]; empty for a shape without a surface. */
   _outline(scene, run, region, time, by) {
     const shape = run.shape(region, time);
     const solid = surfaceOf(shape);
@@ -89,7 +89,7 @@ class Ghost {
   }
 }
 
-/** The convex hull of points in a plane, after Andrew. */
+/** Return the convex hull of points in a plane, after Andrew. */
 function convexRing(points) {
   const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
   const half = (list) => {

@@ -1,6 +1,6 @@
-// The head of the page: what was asked, what happened, what a reader must know before; and the line between the halves.
+// Head of the page: task, verdict and warnings of the runs; and the splitter between scene and charts.
 
-/** Tell the head of the selected run, and of the troubles of all. */
+/** Write the head of the selected run, and the warnings of all runs. */
 function tellHead(runs, selected) {
   const title = document.getElementById("title");
   const run = runs[selected];
@@ -21,7 +21,7 @@ function tellHead(runs, selected) {
   document.getElementById("troubles").replaceChildren(...said.map((text) => element("li", "", text)));
 }
 
-/** A long text, of which the beginning is seen until it is opened. */
+/** Return a long text as an element that shows the beginning until it is opened. */
 function folded(text) {
   const details = element("details");
   const cut = text.lastIndexOf(",", 130) + 1 || 130;
@@ -31,7 +31,7 @@ function folded(text) {
   return details;
 }
 
-/** The line between scene and charts is dragged, or moved by the arrow keys. */
+/** Listen to pointer drags and arrow keys on the splitter between scene and charts. */
 function listenToSplitter() {
   const splitter = document.getElementById("splitter");
   const main = document.getElementById("main");

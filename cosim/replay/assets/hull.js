@@ -1,13 +1,14 @@
-// The vehicle's hull: schematic, of its size, not its likeness. Of a frame the yellow floats are on top; the dome is the
-// nose of any; the thrusters are where their lines of action are.
+// The vehicle's hull, schematic and to scale: yellow floats on top of a frame, a dome as the nose,
+// and ducts on the lines of action of the thrusters.
 
 /**
- * A face of a hull for a radius of 1, body axes: forward, starboard, down.
+ * Face of a hull for a radius of 1, body axes: forward, starboard, down.
  * @typedef {object} HullFace
- * @property {string} colour of a theme's hull  @property {number[][]} corners  @property {number[]} middle, normal
+ * @property {string} colour name of a color of the theme's hull
+ * @property {number[][]} corners  @property {number[]} middle, normal
  */
 
-/** Faces that share points, given by their indices, anticlockwise as seen from outside. */
+/** Return faces that share points, given by indices, anticlockwise as seen from outside. */
 function hullPart(colour, points, polygons) {
   return polygons.map((polygon) => {
     const corners = polygon.map((i) => points[i]);
@@ -16,7 +17,7 @@ function hullPart(colour, points, polygons) {
   });
 }
 
-/** Faces between rings of as many points each, one behind the other as the outward side is to the right of it. */
+/** Return the faces between two rings of `count` points, given by the indices of their first points. */
 function bandFaces(from, to, count) {
   return Array.from({ length: count }, (_, i) => {
     const next = (i + 1) % count;
@@ -24,7 +25,7 @@ function bandFaces(from, to, count) {
   });
 }
 
-/** A body between rings of as many points, closed at its ends. */
+/** Return the faces of a closed body between rings of as many points each. */
 function hullTube(colour, rings) {
   const n = rings[0].length;
   const around = Array.from({ length: n }, (_, i) => i);
@@ -33,14 +34,14 @@ function hullTube(colour, rings) {
   return hullPart(colour, rings.flat(), faces);
 }
 
-/** A profile, forward and down, pulled from one side to the other. */
+/** Return the faces of a profile (forward, down) that is extruded from one side to the other. */
 const hullProfile = (colour, profile, from, to) =>
   hullTube(colour, [from, to].map((y) => [...profile].reverse().map(([x, z]) => [x, y, z])));
 
 const hullBar = (colour, [x, y, z], [a, b, c]) =>
   hullProfile(colour, [[x + a, z - c], [x - a, z - c], [x - a, z + c], [x + a, z + c]], y - b, y + b);
 
-/** A ring of few points about an axis. */
+/** Return a ring of `count` points about an axis. */
 function hullRing(centre, axis, radius, count) {
   const [first, second] = Vec.aside(axis);
   return Array.from({ length: count }, (_, i) => {
@@ -49,7 +50,7 @@ function hullRing(centre, axis, radius, count) {
   });
 }
 
-/** The open frame with its floats, the tube between them and the dome. */
+/** Return the faces of an open frame with floats, a tube and a dome. */
 function frameFaces() {
   const faces = [];
   const float = [[0.98, -0.36], [0.8, -0.68], [-0.86, -0.68], [-0.98, -0.52], [-0.98, -0.24], [0.9, -0.24]];
@@ -66,14 +67,14 @@ function frameFaces() {
   return faces;
 }
 
-/** A ball, with a dome for its nose. */
+/** Return the faces of a sphere with a dome as the nose. */
 function ballFaces() {
   const ring = (k) => hullRing([-Math.cos((Math.PI * k) / 12), 0, 0], [1, 0, 0], Math.sin((Math.PI * k) / 12), 20);
   const rings = Array.from({ length: 12 }, (_, k) => ring(k + 0.5));
   return [...hullTube("float", rings.slice(0, 11)), ...hullTube("dome", rings.slice(10))];
 }
 
-/** Ducts at the thrusters, and struts to those that are outside of the frame. */
+/** Return the faces of the thrusters' ducts, and of struts to ducts outside of the frame. */
 function thrusterFaces({ thrusters, radius }) {
   return thrusters.flatMap(({ position, direction }) => {
     const axis = Vec.unit(direction);
@@ -87,10 +88,10 @@ function thrusterFaces({ thrusters, radius }) {
   });
 }
 
-const SHAPES = { frame: frameFaces(), sphere: ballFaces() }; // by the vehicle's file
+const SHAPES = { frame: frameFaces(), sphere: ballFaces() }; // by `hull` of the header's vehicle
 const HULLS = new WeakMap();
 
-/** The faces of a vehicle, made once. @returns {HullFace[]} */
+/** Return the faces of a vehicle; they are made once. @returns {HullFace[]} */
 function hullOf(vehicle) {
   if (!HULLS.has(vehicle)) HULLS.set(vehicle, [...SHAPES[vehicle.hull], ...thrusterFaces(vehicle)]);
   return HULLS.get(vehicle);

@@ -1,6 +1,6 @@
-// The keyboard: one table that the handler obeys and the help tells.
+// Keyboard: one table for the key handler and for the help.
 
-/** Keys of the page: label, action and events of each; `whatIf` where the page can simulate. */
+/** Return the keys of the page: label, text and actions of each; `whatIf` where the page can simulate. */
 function keysOf(page, whatIf = null) {
   const { player, stage, board } = page;
   const turn = (dx, dy) => () => stage.camera("orbit", dx, dy);
@@ -59,7 +59,7 @@ function keysOf(page, whatIf = null) {
   ];
 }
 
-/** Close the choice of charts, and what else unfolds about the focus; the focus stays with its heading. */
+/** Close the chart menu and open details around the focus; move the focus to their summary. */
 function closeMenu() {
   for (const menu of document.querySelectorAll("#charts-menu[open], details[open]:focus-within")) {
     if (menu.contains(document.activeElement)) menu.querySelector("summary").focus();
@@ -67,16 +67,16 @@ function closeMenu() {
   }
 }
 
-/** A key with its modifiers, as the table names it. */
+/** Return the name of a key with its modifiers, as in the table. */
 function keyName(event) {
   const letter = event.key.length === 1;
   const key = letter ? event.key.toLowerCase() : event.key;
-  // what Shift makes of a sign is a sign of its own
+  // a character that Shift changes has its own name
   const shift = event.shiftKey && (!letter || key !== key.toUpperCase());
   return `${event.altKey ? "Alt+" : ""}${shift ? "Shift+" : ""}${key}`;
 }
 
-/** Whether an element has a use of its own for a key. */
+/** Return true if an element handles a key itself. */
 function wants(target, name) {
   const tag = target.tagName;
   if (name === "Escape") return false;
@@ -84,7 +84,7 @@ function wants(target, name) {
   return name === " " && (["BUTTON", "SUMMARY"].includes(tag) || target.type === "checkbox");
 }
 
-/** Listen to the keyboard for as long as the page lives. */
+/** Listen to the keyboard of the document. */
 function listenToKeys(page) {
   document.addEventListener("keydown", (event) => {
     const does = Object.assign({}, ...page.keys.map((key) => key.does));
@@ -96,7 +96,7 @@ function listenToKeys(page) {
   });
 }
 
-/** Fill the help with the table of keys, and with how the picture is read. */
+/** Fill the help dialog with the table of keys and hints for reading the page. */
 function fillHelp(dialog, keys) {
   const close = element("button", "close", "Close");
   close.type = "button";

@@ -1,45 +1,45 @@
-// Words in the scene that do not lie upon each other: the important ones first, the rest where there is room.
+// Labels of the scene without overlaps: important ones first, the others where space is left.
 
-/** Places words and draws them. */
+/** Placement and drawing of labels. */
 class Labels {
   constructor(context) {
     this.context = context;
     this._widths = new Map();
-    this._sides = new Map(); // where each word stood in the last frame, so that it does not jump
+    this._sides = new Map(); // position of each label in the last frame, which is tried first
     this.begin(0, 0);
   }
 
-  /** Forget the words of the last frame. */
+  /** Remove all labels and set the size of the picture [CSS pixels]. */
   begin(width, height) {
     this.width = width;
     this.height = height;
     this._words = [];
     this._taken = [];
-    this.placed = []; // {of: whose, x, y, width, height} of the words that were drawn
+    this.placed = []; // boxes of drawn labels: {of: {run, region} or null, x, y, width, height} [pixels]
   }
 
-  /** Whose name is at some pixels; null if there is none. */
+  /** Return the run and region whose label is at a pixel; null if there is none. */
   nameAt(x, y) {
     const inside = (box) => x >= box.x && x <= box.x + box.width && y >= box.y && y <= box.y + box.height;
     return this.placed.find((box) => box.of && inside(box))?.of ?? null;
   }
 
-  /** Keep words out of a part of the picture. */
+  /** Keep labels out of a rectangle [pixels]. */
   block(x, y, width, height) {
     this._taken.push([x, y, x + width, y + height]);
   }
 
   /**
-   * Ask for a word.
-   * @param {object} word {key, text, x, y, colour, rank: lower is more important, gap: pixels from the point, bold,
-   * chip: colour behind it or null, pad: pixels that are free beside it, far: whether it may stand farther off, on a
-   * line of the colour edge, sides: of "above below right left here" in the order in which they are tried}
+   * Add a label for the next draw().
+   * @param {object} word {key, text, x, y, colour, rank: lower is more important, gap: pixels from the point, bold, chip:
+   * background color or null, pad: pixels that stay free beside it, far: true if it may stand farther off, with a leader
+   * line in the color `edge`, sides: of "above below right left here" in the order in which they are tried}
    */
   add(word) {
     this._words.push(word);
   }
 
-  /** Draw all words for which there is room. */
+  /** Draw all labels for which there is space. */
   draw() {
     const { context } = this;
     const known = this._sides;
@@ -67,10 +67,10 @@ class Labels {
         break;
       }
     }
-    for (const placed of written) this._write(...placed); // over all lines
+    for (const placed of written) this._write(...placed); // on top of all leader lines
   }
 
-  /** A line from a word that stands far off to what it names. */
+  /** Draw a leader line from a label to its point. */
   _lead(word, x, y, width, height) {
     const { context } = this;
     context.beginPath();

@@ -1,31 +1,31 @@
-// A run that goes on: its rows come over a WebSocket from the page's own host, and commands go back.
+// Live run: rows arrive over a WebSocket from the page's own host, and commands return on it.
 
-const RETRY = [500, 5000]; // ms, after which a lost connection is tried again: at first, and at the most
+const RETRY = [500, 5000]; // ms, delay before a reconnection: at first, and at most
 
-/** The connection of the page to a run that goes on. */
+/** Connection of the page to a live run. */
 class LiveLink {
   /** @param {Page} page */
   constructor(page) {
     this.page = page;
     this.run = null;
-    this.over = false; // whether the run has ended
+    this.over = false; // true once the run has ended
     this.commandPanel = new CommandPanel(this);
     this.dragging = new Dragging(this);
     this._wait = RETRY[0];
     this._next = 0;
   }
 
-  /** Whether commands can be given now. */
+  /** Return true if commands can be sent now. */
   get acceptsCommands() {
     return Boolean(this.run?.header.commands) && !this.over && this._socket?.readyState === WebSocket.OPEN;
   }
 
-  /** When regions are where they are dragged from. */
+  /** Return the time at which regions are dragged [s]: the end of the run. */
   get time() {
     return this.run.end;
   }
 
-  /** Why nothing can be dragged now; empty where it can. */
+  /** Return the reason why nothing can be dragged now; "" if regions can be dragged. */
   get refusal() {
     return this.page.player.live ? "" : "What is in the past cannot be moved: go to the end (End) to drag regions.";
   }
@@ -34,12 +34,12 @@ class LiveLink {
     return canMove(this.run, region);
   }
 
-  /** Move the place of a region from one point to another [m, NED]. */
+  /** Send the command that moves a region from one point to another [m, NED]. */
   move(region, from, to) {
     return this.command(commandToMove(this.run, region, from, to, this.run.end));
   }
 
-  /** Connect; resolves when the first message came, or nobody answered. */
+  /** Connect; the promise resolves at the first message or when the connection closes. */
   connect() {
     return new Promise((settled) => {
       const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws`);
@@ -60,7 +60,7 @@ class LiveLink {
     });
   }
 
-  /** Command the run, in the words of its log of commands; whether it could be sent. */
+  /** Send a command, in the format of the run's log of commands; return true if it was sent. */
   command(command) {
     if (!this.acceptsCommands) {
       this.page.say(this.over ? "The run has ended: nothing can be commanded any more." : "Nothing can be commanded: the connection is lost, or commands are off.", "warning");
@@ -111,7 +111,7 @@ class LiveLink {
     this.page.refresh();
     player.pause();
     player.growing = false;
-    this.page.select(0); // which tells the verdict
+    this.page.select(0); // shows the verdict
     this.page.say(`The run has ended (${status}). This page replays what it has received.`, "good");
     this.commandPanel.update();
   }
@@ -126,7 +126,7 @@ class LiveLink {
     this._wait = Math.min(RETRY[1], 2 * this._wait);
   }
 
-  /** Let the page show what came, once for each picture of the screen. */
+  /** Update page, panel and ghost once with the next frame. */
   _later() {
     this._next ||= requestAnimationFrame(() => {
       this._next = 0;
@@ -137,7 +137,7 @@ class LiveLink {
   }
 }
 
-/** Show the run of the page's own host while it goes on. */
+/** Show the live run of the page's own host. */
 async function startLive(page) {
   page.nothing("Waiting for a run.");
   const link = new LiveLink(page);

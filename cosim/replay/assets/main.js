@@ -1,11 +1,11 @@
-// The beginning: read the runs of the page and show them; without runs, ask the page's own host for a live one.
+// Entry point: show the runs of the page; without runs, connect to a live run on the page's own host.
 
 const NO_RUN =
   "This page holds no run. A run folder has its replay.html; “cosim replay RUN” writes one, of several runs as well.";
 const OLD_BROWSER =
   "This browser cannot unpack the numbers of the run: it has no DecompressionStream. Any browser since 2023 has it.";
 
-/** The runs of the page, or null when that was said in their place. */
+/** Return the runs of the page; show the error and return null if they cannot be read. */
 async function runsOfPage(page) {
   if (JSON.parse(document.getElementById("runs").textContent).length && typeof DecompressionStream === "undefined") {
     page.nothing(OLD_BROWSER);
@@ -22,18 +22,18 @@ async function runsOfPage(page) {
   }
 }
 
-/** Begin. */
+/** Build the page and show its runs. */
 async function main() {
   const page = new Page();
   /**
-   * What scripts and tests have of the page:
-   * - ready: true once the runs are shown, or it is said why there are none
+   * Interface for scripts and tests:
+   * - ready: true once the runs are shown, or the page says why there are none
    * - runs: Run[]; player: Player (t, playing, speed, follow, live, play(), pause(), seek(t), stepRows(n), setSpeed(x))
    * - scene: the first Scene (drawn, camera, pick), null while nothing can be drawn; scenes: all, side by side
    * - charts: Chart[]; each has series() -> [{run (index in runs), name, label, time, values}], the arrays that are
    *   drawn, paint(), setWindow(from, to), spec.key
-   * - show(runs): other runs in place of these; paint(): paint now, not with the next frame of the screen
-   * - whatIf: the WhatIf of a page that flies, else null: set(key, value), move(region, from, to), fail(), reset(), last
+   * - show(runs): replace the runs; paint(): paint now, not with the next frame of the screen
+   * - whatIf: the WhatIf of a page that simulates, else null: set(key, value), move(region, from, to), fail(), reset(), last
    * - page: the Page, as startLive() gets it (theme, setTheme, setSide, showRun, select, refresh, say)
    */
   window.subreach = {

@@ -1,13 +1,13 @@
-// Who is drawn after whom: planes part the scene, bounded surfaces go by distance, thin things by what hides them.
+// Drawing order: planes split the scene, bounded surfaces are sorted by distance, thin things by what hides them.
 
 /**
- * Something that can hide others: a surface or a sheet of a region.
+ * Entry that can hide others: a surface or a sheet of a region.
  * @typedef {object} Entry
  * @property {Solid|null} solid  @property {Sheet|null} sheet  @property {number[]} shift [m, NED]
- * @property {object} style  @property {number[]} middle where it is, for its order
+ * @property {object} style  @property {number[]} middle position for the order [m, NED]
  */
 
-/** The entries from the farthest to the nearest. Sheets part the others: what is beyond a sheet comes before it. */
+/** Return the entries from the farthest to the nearest; a sheet separates entries beyond it from those before it. */
 function farthestFirst(entries, eye) {
   const sheets = entries.filter((entry) => entry.sheet);
   if (!sheets.length) return [...entries].sort((a, b) => remoteness(b, eye) - remoteness(a, eye));
@@ -20,14 +20,18 @@ function farthestFirst(entries, eye) {
   return [...farthestFirst(beyond, eye), sheet, ...farthestFirst(before, eye)];
 }
 
-/** Of balls that do not touch, one with less of this is never behind another: it is their power about the eye. */
+/**
+ * Return the sort key of an entry: the power of the eye about its sphere [m^2]; other surfaces count as points.
+ *
+ * Of two spheres that do not touch, the one with the smaller power is never behind the other.
+ */
 function remoteness({ solid, middle }, eye) {
   const off = Vec.sub(middle, eye);
   const radius = solid.ellipsoid ? solid.radius : 0;
   return Vec.dot(off, off) - radius * radius;
 }
 
-/** What tells of an entry whether it comes between the eye and a point, or holds it; null where it is clear. */
+/** Return a function that is true for points that an entry hides or contains; null for an entry that is clear. */
 function hiderOf({ solid, sheet, shift, style }, eye) {
   if (sheet) return throughSheet(sheet, eye);
   if (!style.filled) return null;
@@ -49,11 +53,7 @@ function throughSheet({ corners, normal }, eye) {
   };
 }
 
-/**
- * Thin things, put before the first entry, in the order of drawing, that hides them; the last list is before all.
- * @param {Entry[]} entries farthest first  @param {{middle: number[]}[]} things
- * @returns {object[][]} farthest first each
- */
+/** Return thin things in lists: list k is drawn before entry k, the first that hides them; the last list is on top. */
 function placedAmong(entries, things, eye) {
   const lists = Array.from({ length: entries.length + 1 }, () => []);
   const hiders = entries.map((entry) => hiderOf(entry, eye));

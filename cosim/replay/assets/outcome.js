@@ -1,6 +1,6 @@
-// What a flight in the page came to: summary, verdict and events, in the words of the recorded run's.
+// Summary, verdict and events of a simulation in the page, worded as for a recorded run.
 
-/** What stands in the header of a run that was recorded, of one that was flown here. */
+/** Return the header fields that a recorded run has, for a simulated one: summary, verdict, events, status. */
 function outcomeOf(data, result, run, failure) {
   const { header } = run;
   const [firstInside, lastEntered, inside] = result.metrics;

@@ -1,6 +1,6 @@
-// The page: the shown runs, and the updates of each of its parts when something changes.
+// The page: the shown runs, and the updates of all parts.
 
-/** Ties player, stage, board, panel and timeline together. startLive() gets this object. */
+/** Page with player, stage, board, panel and timeline. startLive() gets this object. */
 class Page {
   constructor() {
     this.runs = [];
@@ -14,23 +14,23 @@ class Page {
     this.board = new Board(this.player, this.theme);
     this.panel = new Panel(this.player, { select: (index) => this.select(index), show: (index, on) => this.showRun(index, on) });
     this.timeline = new Timeline(this.player);
-    this.canvas = this.stage.canvas; // of the first scene; it stays the same
+    this.canvas = this.stage.canvas; // of the first scene; it is never replaced
     this._next = 0;
     this._slow = 0;
     this._listen();
   }
 
-  /** The scene of the first canvas; null while no run can be drawn. */
+  /** Return the scene of the first canvas; null while no run can be drawn. */
   scene() {
     return this.stage.scene;
   }
 
-  /** The run that panel and scrubber tell of. */
+  /** Return the selected run, which panel and scrubber show. */
   get run() {
     return this.runs[this.selected];
   }
 
-  /** Show some runs in place of those before; of the same scenario, where cursor and camera are to stay. */
+  /** Replace the runs; with `same` (the same scenario), keep cursor and camera. */
   async show(all, same = false) {
     const { t } = this.player;
     const { azimuth, elevation, distance, target, fitted } = this.scene()?.camera ?? {};
@@ -58,7 +58,7 @@ class Page {
     this.paint();
   }
 
-  /** Show other runs of the same scenario in place of these, as many; cursor and camera stay. */
+  /** Replace the runs by as many of the same scenario; keep cursor and camera. */
   replace(runs) {
     this.runs = runs;
     this.player.replaceRuns(runs);
@@ -68,7 +68,7 @@ class Page {
     this.later();
   }
 
-  /** Rows were appended to the runs, or events to their headers. */
+  /** Update after rows were appended to the runs, or events to their headers. */
   refresh() {
     if (!this.stage.scene && this.runs.some(drawable)) this._laid();
     this.player.grown();
@@ -81,21 +81,21 @@ class Page {
     }, 400);
   }
 
-  /** Put a line into the status bar; an empty text takes it away. `kind`: "info", "good", "warning" or "error". */
+  /** Show a line in the status bar; an empty text clears it. `kind`: "info", "good", "warning" or "error". */
   say(text, kind = "info") {
     const status = document.getElementById("status");
     status.className = kind;
     setText(status, text);
   }
 
-  /** Say in place of the scene why there is none. */
+  /** Show a text in place of the scene; an empty text hides it. */
   nothing(text) {
     const empty = document.getElementById("empty");
     empty.hidden = !text;
     setText(empty, text);
   }
 
-  /** Let panel and scrubber tell of another run. */
+  /** Select the run that panel and scrubber show. */
   select(index) {
     if (!this.runs[index]) return;
     this.selected = index;
@@ -104,14 +104,14 @@ class Page {
     this.later();
   }
 
-  /** Show a run, or hide it. */
+  /** Show or hide a run. */
   showRun(index, on) {
     this.shown[index] = on;
     this._laid();
     this.board.setRuns(this.runs, this.shown, this.selected);
   }
 
-  /** Each run in a scene of its own, or all in one. */
+  /** Show each run in a scene of its own, or all in one. */
   setSide(on) {
     if (this.runs.length < 2) return;
     this.stage.setSide(on);
@@ -137,7 +137,7 @@ class Page {
     document.getElementById("help").showModal();
   }
 
-  /** To the next event of the selected run (1), or to the one before (-1). */
+  /** Move the cursor to the next event of the selected run (1) or to the previous one (-1). */
   event(by) {
     const times = this.run ? marksOf(this.run).map(({ time }) => time).sort((a, b) => a - b) : [];
     const { t } = this.player;
@@ -145,7 +145,7 @@ class Page {
     if (to !== undefined) this.player.seek(to);
   }
 
-  /** Paint with the next picture of the screen. */
+  /** Paint with the next frame of the screen. */
   later() {
     this._next ||= requestAnimationFrame(() => this.paint());
   }
@@ -236,13 +236,13 @@ class Page {
     listenToKeys(this);
   }
 
-  /** Answer to these keys, and tell of them in the help. */
+  /** Set the keys of the page and show them in the help. */
   setKeys(keys) {
     this.keys = keys;
     fillHelp(document.getElementById("help"), keys);
   }
 
-  /** Paper is white, and shows all charts. */
+  /** Print in the light theme with all charts. */
   _print() {
     let before = null;
     addEventListener("beforeprint", () => {

@@ -1,16 +1,16 @@
-// Strokes and fills of what the camera sees: surfaces, sheets, balls; each kind of region has its drawer here.
+// Projected drawing: strokes and fills of surfaces, sheets and ellipsoids, for each kind of region.
 
-/** Draws into a 2D context what a camera sees. */
+/** Drawing of world geometry into a 2D context through a camera. */
 class Painter {
   constructor(context, camera) {
     this.context = context;
     this.camera = camera;
-    this.seen = new Float64Array(3072); // pixels and depths of the points of the surface that is looked at
-    this.front = new Uint8Array(1024); // which of its faces look at the eye
-    this.whole = true; // whether all of it is before the camera
+    this.seen = new Float64Array(3072); // pixels and depth of each point of the current surface
+    this.front = new Uint8Array(1024); // 1 for each of its faces towards the eye
+    this.whole = true; // true if all of it is in front of the camera
   }
 
-  /** Look at a surface: where its points are seen, and which faces look at the eye. */
+  /** Set the current surface: project its points and mark the faces towards the eye. */
   look(solid, shift) {
     const { faces, normals, points } = solid;
     const { camera } = this;
@@ -28,7 +28,7 @@ class Painter {
     }
   }
 
-  /** Add a face of the surface that was looked at. */
+  /** Add a face of the current surface to the path. */
   face(solid, shift, i) {
     const face = solid.faces[i];
     if (!this.whole) {
@@ -41,7 +41,7 @@ class Painter {
     context.closePath();
   }
 
-  /** Add an edge of the surface that was looked at. */
+  /** Add an edge of the current surface to the path. */
   edge(solid, shift, a, b) {
     if (!this.whole) {
       this.segment(pointOf(solid, shift, a), pointOf(solid, shift, b));
@@ -52,12 +52,12 @@ class Painter {
     context.lineTo(seen[3 * b], seen[3 * b + 1]);
   }
 
-  /** Begin a path to which segment() and polygon() add. */
+  /** Begin a path for segment() and polygon(). */
   begin() {
     this.context.beginPath();
   }
 
-  /** Add a line between two points of the world, as far as it is in front of the camera. */
+  /** Add a line between two points of the world, clipped at the near plane. */
   segment(a, b) {
     const { near } = this.camera;
     let p = this.camera.project(a);
@@ -74,7 +74,7 @@ class Painter {
     for (let i = 1; i < points.length; i++) this.segment(points[i - 1], points[i]);
   }
 
-  /** Add a closed polygon of the world, cut where it is behind the camera. */
+  /** Add a closed polygon of the world, clipped at the near plane. */
   polygon(corners) {
     const { camera } = this;
     const ahead = (p) => Vec.dot(Vec.sub(p, camera.eye), camera.forward) - camera.near;
@@ -87,7 +87,7 @@ class Painter {
     if (cut.length) this.context.closePath();
   }
 
-  /** Add a line through points of the surface that was looked at, by their indices. */
+  /** Add a line through points of the current surface, by their indices. */
   chain(line) {
     const { seen, context } = this;
     context.moveTo(seen[3 * line[0]], seen[3 * line[0] + 1]);
@@ -113,7 +113,7 @@ class Painter {
   }
 }
 
-/** How a region is drawn: by what it is for, and by whether the arbiter gives way to it. */
+/** Return the style of a region, from its kind (keep in or out) and from being active or not. */
 function styleOf(keep, active, colour) {
   return {
     colour,
@@ -125,13 +125,13 @@ function styleOf(keep, active, colour) {
   };
 }
 
-/** The far side of a surface: what lies in it is drawn over this. */
+/** Draw the far side of a surface; what lies in the surface is drawn over it. */
 function paintBack(painter, solid, shift, style) {
   if (solid.ellipsoid) paintCircles(painter, solid, shift, style, false);
   else paintEdges(painter, solid, shift, style, false);
 }
 
-/** The near side of a surface. */
+/** Draw the near side of a surface. */
 function paintFront(painter, solid, shift, style) {
   if (solid.ellipsoid) {
     const outline = outlineOf(painter.camera, solid.ellipsoid, shift);
@@ -143,20 +143,20 @@ function paintFront(painter, solid, shift, style) {
   paintEdges(painter, solid, shift, style, true);
 }
 
-/** The ellipse that an ellipsoid is seen as: centre and a 2 by 2 matrix from the unit circle; null where it is none. */
+/** Return the ellipse that an ellipsoid projects to: center and matrix from the unit circle; null if it is no ellipse. */
 function outlineOf(camera, { centre, axes }, shift) {
   const c = Vec.sub(Vec.add(centre, shift), camera.eye);
   const rows = [camera.right, Vec.scale(camera.up, -1), camera.forward];
   const C = rows.map((row) => Vec.dot(row, c));
   const A = rows.map((row) => axes.map((axis) => Vec.dot(row, axis)));
-  // lines n through the eye touch it where n' G n = 0
+  // lines n through the eye are tangent where n' G n = 0
   const G = (i, j) => Vec.dot(A[i], A[j]) - C[i] * C[j];
   const scale = -G(2, 2);
   if (C[2] <= 0 || scale <= 0 || C[2] - Vec.norm(A[2]) < camera.near) return null;
   const f = camera.focal;
   const [x, y] = [-G(0, 2) / scale, -G(1, 2) / scale];
   const [xx, xy, yy] = [G(0, 0) / scale + x * x, G(0, 1) / scale + x * y, G(1, 1) / scale + y * y];
-  // the root of a symmetric matrix
+  // square root of a symmetric matrix
   const s = Math.sqrt(Math.max(0, xx * yy - xy * xy));
   const t = Math.sqrt(xx + yy + 2 * s);
   if (!(t > 0)) return null;
@@ -169,7 +169,7 @@ function outlineOf(camera, { centre, axes }, shift) {
   };
 }
 
-/** Fill and outline of an ellipse; the fill is brighter where light from above falls. */
+/** Draw the fill and the outline of an ellipse; the fill is brighter where light from above falls. */
 function paintBall(painter, outline, style) {
   const { context, camera } = painter;
   context.beginPath();
@@ -191,7 +191,7 @@ function paintBall(painter, outline, style) {
   painter.stroke(style.colour, style.width, 1, style.dash);
 }
 
-/** Great circles of an ellipsoid, on the near or on the far side. */
+/** Draw the great circles of an ellipsoid, on the near or on the far side. */
 function paintCircles(painter, solid, shift, style, near) {
   const { context, camera } = painter;
   const { points } = solid;
@@ -219,14 +219,14 @@ function paintCircles(painter, solid, shift, style, near) {
   painter.stroke(style.colour, 0.8, near ? 0.55 : style.hidden * 0.7);
 }
 
-/** A point of a surface that is shifted. */
+/** Return a point of a shifted surface, by its index. */
 function pointOf({ points }, shift, k) {
   return [points[3 * k] + shift[0], points[3 * k + 1] + shift[1], points[3 * k + 2] + shift[2]];
 }
 
-const LIGHT_SIDE = 0.35; // faces whose normal rises more are lit, those whose normal falls more are in shade
+const LIGHT_SIDE = 0.35; // down component of normals beyond which faces are lit (upward) or shaded (downward)
 
-/** The faces that are seen, in one path so that no seam shows; lit from above in three steps. */
+/** Fill the visible faces, in one path so that no seam shows; lit from above in three steps. */
 function paintFaces(painter, solid, shift, style) {
   painter.look(solid, shift);
   const { front } = painter;
@@ -247,9 +247,9 @@ function paintFaces(painter, solid, shift, style) {
   paint(LIGHT_SIDE, 2, "#000000", 0.16);
 }
 
-/** Edges as lines through the points that they share, so that dashes go on from one to the next. */
+/** Join edges to lines through shared points, so that dashes continue from one edge to the next. */
 function linesOf(edges) {
-  const at = new Map(); // of each point, the edges that are not yet in a line
+  const at = new Map(); // for each point, the edges that are not yet in a line
   for (const edge of edges) for (const k of [edge[0], edge[1]]) at.set(k, (at.get(k) ?? new Set()).add(edge));
   const lines = [];
   for (const edge of edges) {
@@ -265,7 +265,7 @@ function linesOf(edges) {
   return lines;
 }
 
-/** Sharp edges, outlines of round surfaces and lines on them, on the near or on the far side. */
+/** Draw the sharp edges of a surface on the near or far side; on the near side also its outline. */
 function paintEdges(painter, solid, shift, style, near) {
   painter.look(solid, shift);
   const { front } = painter;
@@ -279,7 +279,7 @@ function paintEdges(painter, solid, shift, style, near) {
   painter.stroke(style.colour, near ? style.width : 1, near ? 1 : style.hidden, style.dash);
 }
 
-/** Parts of planes: nearly clear, with a rim and hatching on the side that is forbidden. */
+/** Draw a part of a plane: nearly clear, with a rim and hatching on the forbidden side. */
 function paintSheet(painter, sheet, style) {
   painter.begin();
   painter.polygon(sheet.corners);

@@ -1,11 +1,11 @@
-// Colours: of Okabe and Ito, whom colour-blind readers can follow, on paper and in the dark.
+// Colors of Okabe and Ito, which color-blind readers can distinguish, on paper and on a dark screen.
 
 const GOAL_COLOUR = "#009E73";
 
-/** Of the ways of several runs: first those that no criterion has. */
+/** Colors of the paths of several runs; first those that no criterion has. */
 const RUN_COLOURS = ["#0072B2", "#CC79A7", "#9A7B00", "#7C8A94", "#009E73", "#E69F00", "#D55E00", "#56B4E9"];
 
-/** What the scene needs beside the colours of regions. */
+/** Colors of the scene, other than those of regions. */
 const SCENE_THEMES = {
   light: {
     skyTop: "#f7fbfd",
@@ -41,20 +41,20 @@ const SCENE_THEMES = {
   },
 };
 
-/** The three numbers of "#rrggbb". */
+/** Return the red, green and blue channels of "#rrggbb". */
 function channelsOf(colour) {
   const number = parseInt(colour.slice(1), 16);
   return [(number >> 16) & 255, (number >> 8) & 255, number & 255];
 }
 
-/** A colour between two, "#rrggbb" both. */
+/** Return the color at the share `part` from one "#rrggbb" to another. */
 function mixedColour(from, to, part) {
   const [a, b] = [channelsOf(from), channelsOf(to)];
   const hex = a.map((x, i) => Math.round(x + part * (b[i] - x)).toString(16).padStart(2, "0"));
   return `#${hex.join("")}`;
 }
 
-/** A colour, as much nearer to the ink of a theme as a line needs to be seen: 3 to 1 against the ground. */
+/** Return a color mixed with ink until its contrast to the background of a theme is 3 to 1. */
 function legible(colour, theme) {
   const [ground, ink] = theme === "dark" ? ["#121c25", "#ffffff"] : ["#ffffff", "#000000"];
   const light = (hex) => {
@@ -67,13 +67,13 @@ function legible(colour, theme) {
   return mixedColour(colour, ink, part);
 }
 
-/** The full colour of a region: a shade of its criterion's; the goal has its own. */
+/** Return the full color of a region. */
 function fullColour(region) {
   return region.colour;
 }
 
 /**
- * The colour of a region: in full where the arbiter gives way to it, muted in the same hue otherwise.
+ * Return the color of a region: full if it is active, else muted in the same hue.
  * @param {object} region of the header  @param {boolean} active  @param {"light"|"dark"} theme
  */
 function regionColour(region, active, theme) {
@@ -81,7 +81,7 @@ function regionColour(region, active, theme) {
   return active ? full : mixedColour(full, SCENE_THEMES[theme].muted, 0.45);
 }
 
-/** The colour of a run's trail where several are shown. */
+/** Return the color of a run's trail on a page with several runs. */
 function runColour(index) {
   return RUN_COLOURS[index % RUN_COLOURS.length];
 }

@@ -1,18 +1,18 @@
-// The side panel: what matters now, in words and bars.
+// Side panel: state of the selected run at the cursor, as text and bars.
 
-/** A hue for style sheets: one of the page's, or "#rrggbb". */
+/** Return the CSS color of a hue: a variable of the page, or "#rrggbb" itself. */
 function cssHue(hue) {
   return hue.startsWith("#") ? hue : `var(--${hue})`;
 }
 
-/** Give a mark the shape and colour of a region's criterion; none of no region. */
+/** Set the shape and color of a mark to those of a region's criterion; without a region clear them. */
 function setMark(mark, run, region) {
   const place = run.header.criteria.findIndex((one) => one.name === region?.criterion);
   mark.className = `mark ${region ? (place < 0 ? "goal" : `of-${place % 4}`) : "unknown"}`;
   mark.style.background = region ? cssHue(hueOf(region.colour)) : "";
 }
 
-/** A row with a bar: built once, then only given new numbers. */
+/** Row with a bar; it is built once and then updated. */
 class BarRow {
   constructor(label, hue) {
     this.element = element("li", "bar-row");
@@ -27,7 +27,7 @@ class BarRow {
     this.element.append(this.name, this.value, track);
   }
 
-  /** @param {number} part between 0 and 1  @param {?number} mark another part, as a tick */
+  /** @param {number} part between 0 and 1  @param {string} text  @param {?number} mark another part, shown as a tick */
   update(part, text, mark = null) {
     const whole = Number.isFinite(part) ? Math.min(1, Math.max(0, part)) : 0;
     this.fill.style.transform = `scaleX(${whole.toFixed(4)})`;
@@ -38,9 +38,9 @@ class BarRow {
   }
 }
 
-/** The panel of the selected run. */
+/** Panel of the selected run. */
 class Panel {
-  /** @param {Player} player  @param {object} on with select(index) and show(index, whether) */
+  /** @param {Player} player  @param {object} on callbacks: select(index) and show(index, isShown) */
   constructor(player, on) {
     this.player = player;
     this.on = on;
@@ -63,7 +63,7 @@ class Panel {
     this.update(true);
   }
 
-  /** Tell the panel what the cursor is at; some times a second while it moves. */
+  /** Show the values at the cursor, at most 11 times a second while it plays. */
   update(atOnce = false) {
     const now = performance.now();
     if (!this.run || (!atOnce && this.player.playing && now - this._updated < 90)) return;
@@ -177,7 +177,7 @@ class Panel {
   _sort(rows, active) {
     rows.forEach(({ index, region, clearance }, place) => {
       const { item, value } = this.distances[index];
-      item.hidden = !this.run.there(index, this.player.t); // an obstacle that comes and goes
+      item.hidden = !this.run.there(index, this.player.t); // a temporary obstacle
       const against = clearance < 0 && region.criterion;
       item.className = `${against ? "violated" : ""} ${index === active ? "active" : ""}`;
       const mark = against ? "✕ " : clearance >= 0 && !region.criterion ? "✓ " : "";
@@ -224,12 +224,12 @@ class Panel {
   }
 }
 
-/** Change a text only where it is another: a reader that speaks, and the layout, hear of nothing else. */
+/** Set a text only if it differs, so that screen readers and layout see no other change. */
 function setText(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }
 
-/** A list of items. */
+/** Return a list of items. */
 function listOf(items) {
   const list = element("ul");
   list.append(...items);

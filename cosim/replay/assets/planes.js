@@ -1,14 +1,14 @@
-// Regions without an end, depth bands and half spaces, as the parts of their planes that are in the scene's bounds.
+// Unbounded regions (depth bands and half spaces), as the parts of their planes within the scene's bounds.
 
 /**
- * A part of a plane.
+ * Part of a plane.
  * @typedef {object} Sheet
  * @property {number[][]} corners [m, NED]
- * @property {number[]} normal unit, towards the side that is forbidden
+ * @property {number[]} normal unit vector towards the forbidden side
  * @property {number[][][]} hatch pairs of points: strokes along the rim, on the forbidden side
  */
 
-/** The parts of a region's planes within bounds, [lowest corner, highest corner]; none where a plane is outside. */
+/** Return the parts of a region's planes within bounds [lowest corner, highest corner]; a plane outside has none. */
 function sheetsOf(shape, keep, shift, bounds) {
   const sign = keep === "in" ? 1 : -1;
   return shape.drawing.planes.flatMap(({ point, normal }) => {
@@ -19,9 +19,9 @@ function sheetsOf(shape, keep, shift, bounds) {
   });
 }
 
-/** The polygon in which a plane cuts an upright box; empty where it does not. */
+/** Return the polygon in which a plane cuts an axis-aligned box; empty if it does not cut the box. */
 function cutOfBounds(point, normal, [low, high]) {
-  // a square that is larger than the box, cut by the box's six sides
+  // a square that is larger than the box, clipped by the six sides of the box
   const centre = low.map((x, i) => 0.5 * (x + high[i]));
   const size = Vec.norm(Vec.sub(high, low));
   const middle = Vec.along(centre, normal, Vec.dot(Vec.sub(point, centre), normal));
@@ -36,7 +36,7 @@ function cutOfBounds(point, normal, [low, high]) {
   return polygon;
 }
 
-/** What of a polygon is where a linear function is at least 0. */
+/** Clip a polygon to where a linear function is at least 0. */
 function cutPolygon(polygon, inside) {
   const kept = [];
   polygon.forEach((a, i) => {
@@ -48,7 +48,7 @@ function cutPolygon(polygon, inside) {
   return kept;
 }
 
-/** Short strokes from the rim to the forbidden side, aslant, as a drawing marks the side of the material. */
+/** Return short oblique strokes from the rim to the forbidden side, as drawings mark the side of the material. */
 function hatchOf(corners, forbidden) {
   const around = corners.map((a, i) => Vec.norm(Vec.sub(corners[(i + 1) % corners.length], a)));
   const length = around.reduce((sum, x) => sum + x, 0);

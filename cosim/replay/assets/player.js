@@ -1,8 +1,8 @@
-// The clock of the page: where the one cursor is that scene, charts, panel and scrubber share.
+// Playback clock: the one cursor of scene, charts, panel and scrubber.
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 20];
 
-/** Moves a cursor through the time of some runs, from the first start to the last end [s]. */
+/** Cursor through the time of some runs, from the first start to the last end [s]. */
 class Player {
   constructor() {
     this.runs = [];
@@ -10,13 +10,13 @@ class Player {
     this.playing = false;
     this.speed = 1;
     this.follow = false;
-    this.growing = false; // whether rows still come
+    this.growing = false; // true while rows arrive
     this._live = false;
     this._listeners = [];
     this._last = 0;
   }
 
-  /** Take other runs; the cursor goes to their start. */
+  /** Replace the runs and move the cursor to their start. */
   setRuns(runs) {
     this.runs = runs;
     this.playing = false;
@@ -24,7 +24,7 @@ class Player {
     this._tell();
   }
 
-  /** Take other runs of the same time; the cursor stays. */
+  /** Replace the runs by others of the same time; the cursor stays. */
   replaceRuns(runs) {
     this.runs = runs;
     this.t = Math.min(this.t, this.end);
@@ -36,13 +36,13 @@ class Player {
     return filled.length ? Math.min(...filled.map((run) => run.start)) : 0;
   }
 
-  /** Of the longest run. */
+  /** Return the last time of the run that ends last [s]. */
   get end() {
     const filled = this.runs.filter((run) => run.rows);
     return filled.length ? Math.max(...filled.map((run) => run.end)) : 0;
   }
 
-  /** From when on nothing moves in any run [s]; null while rows still come. */
+  /** Return the time after which nothing moves in any run [s]; null while rows arrive. */
   get rest() {
     return this.growing || !this.runs.length ? null : Math.max(...this.runs.map((run) => run.rest));
   }
@@ -51,7 +51,7 @@ class Player {
     return this.end - this.start;
   }
 
-  /** Whether the cursor sticks to the end while rows come. */
+  /** Return true if the cursor stays at the end while rows arrive. */
   get live() {
     return this._live;
   }
@@ -97,7 +97,7 @@ class Player {
     else this.play();
   }
 
-  /** Put the cursor at a time [s]; a live page lets go of the end. */
+  /** Move the cursor to a time [s]; before the end, a live page stops following it. */
   seek(t) {
     if (!Number.isFinite(t)) return;
     this.t = Math.min(this.end, Math.max(this.start, t));
@@ -105,12 +105,12 @@ class Player {
     this._tell();
   }
 
-  /** Go some rows of a run (default: the first one) on or back, and halt there. */
+  /** Move the cursor by some rows of a run (default: the first one with rows), and pause there. */
   stepRows(n, run = this.runs.find((any) => any.rows)) {
     if (!run) return;
     this.playing = false;
     const row = run.row(this.t);
-    const between = n < 0 && run.time[row] < this.t ? 1 : 0; // back from between two rows is to the first of them
+    const between = n < 0 && run.time[row] < this.t ? 1 : 0; // back from between two rows: to the first
     this.seek(run.time[Math.min(run.rows - 1, Math.max(0, row + n + between))]);
   }
 
@@ -119,7 +119,7 @@ class Player {
     this._tell();
   }
 
-  /** One speed up (1) or down (-1). */
+  /** Increase (1) or decrease (-1) the speed by one step. */
   shiftSpeed(by) {
     const at = SPEEDS.findLastIndex((speed) => speed <= this.speed);
     this.setSpeed(SPEEDS[Math.min(SPEEDS.length - 1, Math.max(0, at + by))]);
@@ -130,7 +130,7 @@ class Player {
     this._tell();
   }
 
-  /** Rows were appended to the runs. */
+  /** Notify the listeners after rows were appended; a live cursor moves to the end. */
   grown() {
     if (this.live) this.t = this.end;
     this._tell();
@@ -138,7 +138,7 @@ class Player {
 
   _advance(now) {
     if (!this.playing) return;
-    // a tab that slept does not jump
+    // limit the step, as a hidden tab has no frames
     this.t = Math.min(this.end, this.t + Math.min(0.25, Math.max(0, now - this._last) / 1000) * this.speed);
     this._last = now;
     const over = this.t >= this.end;
@@ -146,7 +146,7 @@ class Player {
       this.playing = false;
       this._live = this.growing;
     }
-    // first the picture of now is asked for, then the next step: the other way round every second frame has no picture
+    // listeners request their frame first: in the other order every second frame would have no picture
     this._tell();
     if (!over) requestAnimationFrame((next) => this._advance(next));
   }

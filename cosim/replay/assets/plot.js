@@ -1,16 +1,16 @@
-// The still part of a chart: grid, axes, the zone of violation, curves. The cursor lies over it as its own element.
+// Static part of a chart: grid, axes, violation zone, curves. The cursor is an element over it.
 
 const MARGIN = { left: 50, right: 10, top: 8, bottom: 20 };
 const FONT = "11px system-ui, sans-serif";
 
-/** Colours of the page as a canvas needs them, of the theme that is on. */
+/** Return the page's colors of the current theme, for a canvas. */
 function pageColours() {
   const style = getComputedStyle(document.documentElement);
   const of = (name) => style.getPropertyValue(name).trim();
   return { ink: of("--ink"), muted: of("--muted"), grid: of("--grid"), zone: of("--zone"), bad: of("--bad"), card: of("--card") };
 }
 
-/** Where the plot is in its canvas [CSS pixels], and what stands where. */
+/** Placement of a plot in its canvas [CSS pixels], and its scales of time and value. */
 class Frame {
   constructor(width, height, window, rest, range, down) {
     Object.assign(this, { width, height, window, range });
@@ -27,7 +27,7 @@ class Frame {
   }
 }
 
-/** Paint all but the cursor. */
+/** Paint a plot without its cursor. */
 function paintPlot(context, frame, spec, curves, theme) {
   const colours = pageColours();
   context.clearRect(0, 0, frame.width, frame.height);
@@ -58,14 +58,14 @@ function paintPlot(context, frame, spec, curves, theme) {
   paintBeyond(context, frame, spec, curves, theme, colours.card);
 }
 
-/** Below zero a region is violated. */
+/** Paint the zone below zero, where a region is violated. */
 function paintZone(context, frame, colours) {
   const zero = Math.min(frame.bottom, Math.max(frame.top, frame.y(0)));
   context.fillStyle = colours.zone;
   context.fillRect(frame.left, zero, frame.right - frame.left, frame.bottom - zero);
 }
 
-/** What the zone is, above the curves, so that it can be read. */
+/** Write the name of the zone over the curves. */
 function nameZone(context, frame, colours) {
   if (frame.bottom - frame.y(0) < 16) return;
   context.textAlign = "right";
@@ -73,7 +73,7 @@ function nameZone(context, frame, colours) {
   paintText(context, "below 0: violated (goal: outside)", frame.right - 4, frame.bottom - 3, colours.bad, colours.card);
 }
 
-/** A text that lies over curves. */
+/** Draw a text with an outline in the background color, so that it is legible over curves. */
 function paintText(context, text, x, y, colour, ground) {
   context.lineWidth = 4;
   context.strokeStyle = ground;
@@ -131,7 +131,7 @@ function paintAxes(context, frame, spec, colours) {
   }
 }
 
-/** Where the axis of time is broken: nothing moves behind it. */
+/** Mark the break of the time axis; nothing moves after it. */
 function paintBreak(context, { axis, x, top, bottom, right }, colours) {
   const at = x(axis.rest);
   context.fillStyle = colours.grid;
@@ -152,7 +152,7 @@ function paintBreak(context, { axis, x, top, bottom, right }, colours) {
   context.lineWidth = 1;
 }
 
-/** What is true may lie far beyond the curves: then a line of text at the edge tells where. */
+/** Write the true values that lie beyond the range of the curves, a line of text each, with an arrow. */
 function paintBeyond(context, frame, spec, curves, theme, ground) {
   let line = 0;
   for (const { signal: of, values } of curves.filter((curve) => curve.signal.context && curve.values.length)) {

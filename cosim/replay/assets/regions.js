@@ -1,8 +1,8 @@
-// The regions of some runs at a time: which surfaces, sheets and sights there are, and how each is dressed.
+// Regions of some runs at a time: their surfaces, sheets and sights, with colors and styles.
 
-const NAMED_IN_SCENE = 6; // regions to be kept out of that have names, the nearest of each scene
+const NAMED_IN_SCENE = 6; // number of keep-out regions with labels, the nearest of each scene
 
-/** Tells what there is to draw of regions; equal ones of several runs are drawn once. */
+/** Regions of some runs as entries to draw; equal regions of several runs are one entry. */
 class Regions {
   /** @param {Run[]} runs */
   constructor(runs) {
@@ -10,16 +10,16 @@ class Regions {
     this._sheets = new Map();
   }
 
-  /** The box that sheets are cut to. */
+  /** Set the box to which sheets are clipped. */
   set bounds(bounds) {
     this._bounds = bounds;
     this._sheets.clear();
   }
 
   /**
-   * One entry for each surface, sheet or sight.
-   * @param {number} t  @param {object[]} poses of the vehicles, null where there is none
-   * @param {number[]} target of the camera  @param {"light"|"dark"} theme
+   * Return one entry for each surface, sheet or sight.
+   * @param {number} t time [s]  @param {object[]} poses of the vehicles, null where there is none
+   * @param {number[]} target of the camera [m, NED]  @param {"light"|"dark"} theme
    */
   at(t, poses, target, theme) {
     const entries = [];
@@ -53,7 +53,7 @@ class Regions {
     if (shape.drawing?.planes) {
       const key = JSON.stringify([shape, region.keep, shift]);
       if (!this._sheets.has(key)) {
-        if (this._sheets.size > 200) this._sheets.clear(); // of regions that move
+        if (this._sheets.size > 200) this._sheets.clear(); // moving regions fill the cache
         this._sheets.set(key, sheetsOf(shape, region.keep, shift, this._bounds));
       }
       return this._sheets.get(key).map((sheet) => ({ sheet, middle: middleOf(sheet.corners) }));
@@ -62,19 +62,19 @@ class Regions {
   }
 }
 
-/** The mean of some points. */
+/** Return the mean of some points. */
 function middleOf(points) {
   return points.reduce((sum, p) => Vec.along(sum, p, 1 / points.length), [0, 0, 0]);
 }
 
-/** Colour and style of an entry, by whether the arbiter gives way to its region. */
+/** Set color and style of an entry; an active region is drawn in full. */
 function dressEntry(entry, active, theme) {
   entry.active = active;
   entry.colour = regionColour(entry.region, active, theme);
   entry.style = styleOf(entry.region.keep, active, entry.colour);
 }
 
-/** Whether an entry of another run shows this region already: of the same name, shape and place. */
+/** Return true if an entry already shows a region of the same name, shape and place. */
 function sameRegion(entry, region, shape, shift) {
   return (
     !entry.sight && entry.region.name === region.name && entry.region.keep === region.keep &&
@@ -82,14 +82,14 @@ function sameRegion(entry, region, shape, shift) {
   );
 }
 
-/** Where the name of an entry stands. */
+/** Return the point at which the label of an entry is placed [m, NED]. */
 function anchorOf({ solid, sheet, sight, shift, middle }, camera) {
   if (sight) return sight.anchor;
   if (sheet) return rightmostSeen(sheet.corners, camera);
   return solid.long ? middle : [middle[0], middle[1], solid.top + shift[2]];
 }
 
-/** The point farthest to the right among the corners of a polygon and points on its edges, of those in the picture. */
+/** Return the rightmost visible point on the edges of a polygon; if none is visible, the rightmost. */
 function rightmostSeen(corners, camera) {
   const between = (a, b) => [0, 0.2, 0.4, 0.6, 0.8].map((part) => Vec.along(a, Vec.sub(b, a), part));
   const points = corners.flatMap((a, i) => between(a, corners[(i + 1) % corners.length]));
@@ -98,7 +98,7 @@ function rightmostSeen(corners, camera) {
   return (inside.length ? inside : seen).reduce((a, b) => (b[1] > a[1] ? b : a))[0];
 }
 
-/** Regions to be kept out of, by entry, the nearest to the vehicle first; those to be kept within are not among them. */
+/** Return the entries of keep-out regions, sorted by clearance, the nearest first. */
 function nearestFirst(entries, runs, t) {
   const gap = ({ of, region }) => {
     const clearance = runs[of.run].held(`${region.name}.clearance`, t);
@@ -111,7 +111,7 @@ function nearestFirst(entries, runs, t) {
     .map(([, entry]) => entry);
 }
 
-/** Ask for the names of regions, the active one marked; of many to be kept out of, those of the nearest. */
+/** Add the labels of regions; the active one is marked, and only the nearest keep-out regions are labeled. */
 function nameRegions(labels, camera, entries, colours, runs, t) {
   const named = new Set();
   const near = new Map(nearestFirst(entries, runs, t).map((entry, place) => [entry, place]));
@@ -134,7 +134,7 @@ function nameRegions(labels, camera, entries, colours, runs, t) {
   }
 }
 
-/** Keep names off a vehicle with its axes and forces, unless it fills the picture. */
+/** Keep labels off a vehicle with its axes and forces, unless it fills the picture. */
 function blockVehicle(labels, camera, { pose, size }) {
   const [x, y, depth] = camera.project(pose.position);
   if (depth < camera.near) return;
@@ -142,7 +142,7 @@ function blockVehicle(labels, camera, { pose, size }) {
   labels.block(x - half, y - half, 2 * half, 2 * half);
 }
 
-/** Ask for the names of vehicles, where there are several. */
+/** Add the labels of vehicles. */
 function nameVehicles(labels, camera, marks, vehicles, colours) {
   vehicles.forEach((vehicle, i) => {
     if (!vehicle) return;

@@ -1,11 +1,11 @@
-// The scenario of the page with its reader's numbers, as the file that `cosim run` repeats.
+// Export of the scenario with the reader's numbers, as a file for `cosim run`.
 
-/** A number as TOML writes those with a point. */
+/** Format a number as a TOML float. */
 function tomlNumber(x) {
   return Number.isInteger(x) ? x.toFixed(1) : String(x);
 }
 
-/** The text of the scenario as it is now. */
+/** Return the TOML text of the scenario with the current numbers. */
 function scenarioText(whatIf) {
   const { toml, title } = whatIf.flight.data;
   const changed = whatIf.words();
@@ -18,7 +18,7 @@ function scenarioText(whatIf) {
   return `${text}\n[[failures]]\nthruster = ${thruster}\ntime = ${tomlNumber(time)}\n`;
 }
 
-/** Let the browser save it. */
+/** Download the scenario file. */
 function saveScenario(whatIf) {
   const link = element("a");
   link.href = URL.createObjectURL(new Blob([scenarioText(whatIf)], { type: "application/toml" }));

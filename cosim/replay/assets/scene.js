@@ -1,8 +1,8 @@
-// The scene: vehicles, their ways and their regions at a time, as a camera sees them.
+// Scene: vehicles, their paths and their regions at a time, projected by a camera.
 
-const LEAST_HULL = 15; // pixels of radius below which the vehicle is drawn larger than it is; less in a small picture
+const LEAST_HULL = 15; // pixels, least radius at which the vehicle is drawn; less in a small picture
 
-/** A 3D scene of some runs on a canvas. */
+/** 3D scene of some runs on a canvas. */
 class Scene {
   /**
    * @param {HTMLCanvasElement} canvas  @param {Run[]} runs  @param {"light"|"dark"} theme
@@ -21,7 +21,7 @@ class Scene {
     this.setRuns(runs, marks);
   }
 
-  /** The camera; scenes that stand side by side may have one together. */
+  /** Return the camera; scenes side by side share one. */
   get camera() {
     return this._camera;
   }
@@ -41,10 +41,10 @@ class Scene {
   }
 
   /**
-   * Show other runs, all of them in the picture.
+   * Show other runs and frame all of them.
    * @param {Run[]} runs
-   * @param {{name: string, colour: string}[]|null} marks of each run, where it is one of several, though not all are
-   * in this scene; without them one run's way has the colours of who was active
+   * @param {{name: string, colour: string}[]|null} marks of the runs; null: default marks for several runs, none for one,
+   * whose path then has the colors of the active regions
    */
   setRuns(runs, marks = null) {
     this.runs = runs;
@@ -59,7 +59,7 @@ class Scene {
     this.camera.look("iso");
   }
 
-  /** Show other runs in place of those, as many, from where the camera is. */
+  /** Replace the runs by as many others; keep the camera. */
   replaceRuns(runs) {
     this.runs = runs;
     this._trails = runs.map((run) => new Trail(run));
@@ -71,7 +71,7 @@ class Scene {
     this._later();
   }
 
-  /** Take the size that the page gives to the canvas. */
+  /** Fit the canvas to its size in the page. */
   resize() {
     const { clientWidth, clientHeight } = this.canvas;
     this._ratio = Math.min(2, window.devicePixelRatio || 1);
@@ -82,18 +82,18 @@ class Scene {
     this._later();
   }
 
-  /** What the last frame showed: time, and of each run pose, active region and the colour of each region. */
+  /** Return what the last frame showed: time, and for each run the pose, active region and color of each region. */
   get drawn() {
     return this._drawn;
   }
 
-  /** Where a position [m, NED] is in the canvas [CSS pixels]. */
+  /** Return the pixel [CSS pixels] of a position [m, NED] in the canvas. */
   project(position) {
     this._fitsPicture();
     return this.camera.project(position).slice(0, 2);
   }
 
-  /** North and east of the point at a depth that is seen at some pixels; null where there is none. */
+  /** Return north and east of the point at a pixel and a depth [m]; null if there is none. */
   placeOnPlane(x, y, depth) {
     this._fitsPicture();
     const { eye } = this.camera;
@@ -102,7 +102,7 @@ class Scene {
     return length > 0 && Number.isFinite(length) ? [eye[0] + length * ray[0], eye[1] + length * ray[1]] : null;
   }
 
-  /** The region at some pixels, its name included: {run, region}, or null. */
+  /** Return the region whose label, feature or surface is at a pixel: {run, region}; null if there is none. */
   pick(x, y) {
     const named = this.labels.nameAt(x, y);
     if (named) return named;
@@ -125,7 +125,7 @@ class Scene {
    */
   draw(t, options = {}) {
     this._last = [t, options];
-    if (this._waiting) cancelAnimationFrame(this._waiting); // this is the frame that was asked for
+    if (this._waiting) cancelAnimationFrame(this._waiting); // this frame replaces the requested one
     this._waiting = 0;
     const { trail = true, labels = true } = options;
     this._fitsPicture();
@@ -134,7 +134,7 @@ class Scene {
     this._follow(options.follow ? poses.find(Boolean) : null);
     const { context, painter, camera } = this;
     const colours = SCENE_THEMES[this.theme];
-    context.lineJoin = "bevel"; // round ones cost as much as the lines
+    context.lineJoin = "bevel"; // round joins cost as much as the lines
     this._paintSky(colours);
     this.labels.begin(camera.width, camera.height);
     for (const box of options.covered ?? []) this.labels.block(...box);
@@ -157,7 +157,7 @@ class Scene {
       });
     }
     for (const vehicle of vehicles) if (vehicle) paintPlumb(painter, vehicle, floor, colours);
-    // a sight begins at the vehicle, and is just behind it
+    // a sight begins at the vehicle and is drawn just behind it
     for (const entry of this._sights) {
       things.push({ ...entry, middle: Vec.along(entry.sight.apex, camera.forward, entry.size) });
     }
@@ -208,7 +208,7 @@ class Scene {
     if (Vec.finite(way)) this.camera.bearing = Math.atan2(way[1], way[0]);
   }
 
-  /** A live run may leave the bounds. */
+  /** Measure the scene again if a live run has left the bounds. */
   _grow() {
     const left = this.runs.some((run, i) => {
       if (run.rows === this._rows[i]) return false;
@@ -229,14 +229,14 @@ class Scene {
     this._followed = pose ? pose.position : null;
   }
 
-  /** Move the camera within a frame, without asking for another. */
+  /** Move the camera within a frame, without a request for another frame. */
   _quiet(move) {
     this.camera.listeners.delete(this._redraw);
     move();
     this.camera.listeners.add(this._redraw);
   }
 
-  /** The background: a gradient that is made once, since to copy it is several times as fast as to make it. */
+  /** Paint the background; the gradient is cached, as copying is several times as fast. */
   _paintSky(colours) {
     const { context, canvas } = this;
     if (!this._sky) {
@@ -270,7 +270,7 @@ class Scene {
     return chunks;
   }
 
-  /** Of one run the way tells who was active; several runs have each their own colour. */
+  /** Return the color of a piece of a path: the run's, if there are several; else the active region's for the past. */
   _wayColour(index, past, active, colours) {
     if (this._runMarks) return this._runMarks[index].colour;
     const { regions } = this.runs[index].header;
@@ -288,13 +288,13 @@ class Scene {
       const onHull = vehicle && Vec.norm(Vec.sub(middle, vehicle.pose.position)) < 1.5 * vehicle.size;
       if (onHull) return [];
       const past = time <= t;
-      const onTop = Vec.along(middle, Vec.sub(camera.eye, middle), 0.02); // of the line that it marks
+      const onTop = Vec.along(middle, Vec.sub(camera.eye, middle), 0.02); // above the line that it marks
       const colour = this._wayColour(index, past, active?.[row], colours);
       return [{ mark: [u, v, (u - x) / length, (v - y) / length], middle: onTop, past, colour }];
     });
   }
 
-  /** Thin things of one list: faces one by one, neighbouring lines of one colour in one stroke. */
+  /** Paint the thin things of one list: faces one by one, consecutive lines of one color in one stroke. */
   _paintThings(things, colours) {
     const { context, painter } = this;
     for (let k = 0; k < things.length; ) {
@@ -337,7 +337,7 @@ class Scene {
   }
 }
 
-/** The pose of a run's vehicle with its radius; null where it is no number, or where there are no rows. */
+/** Return the pose of a run's vehicle with its radius [m]; null if it is not finite or there are no rows. */
 function poseOf(run, t) {
   if (!run.rows) return null;
   const pose = run.pose(t);

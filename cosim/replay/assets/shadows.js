@@ -1,9 +1,9 @@
-// Shadows straight down on the floor, from which depth can be read.
+// Vertical shadows on the floor, as references for the depth.
 
-/** The closed lines, north and east, about the faces of a surface that look up: what is about one of them is hidden. */
+/** Return the closed boundary lines [north, east] of a surface's upward faces, which hide what lies below. */
 function shadowsOf({ points, faces, normals }) {
   const up = faces.map((_, i) => normals[3 * i + 2] < -1e-9);
-  const onward = new Map(); // edges of faces that look up, of which the other face does not
+  const onward = new Map(); // boundary edges: those of upward faces whose other face is not upward
   faces.forEach((face, i) => {
     if (!up[i]) return;
     face.forEach((a, k) => {
@@ -22,13 +22,13 @@ function shadowsOf({ points, faces, normals }) {
         onward.get(a).delete(b);
         a = b;
       }
-      lines.push(line.reverse()); // as an ellipse goes around, so that shadows add up
+      lines.push(line.reverse()); // oriented like an ellipse, so that overlapping shadows add up
     }
   }
   return lines;
 }
 
-/** The outline of an ellipsoid seen from above: the unit circle through a root of its squared half axes. */
+/** Return the outline of an ellipsoid from above: the unit circle times a root of the sum of squared half axes. */
 function ellipseFromAbove(centre, axes) {
   const sum = (i, j) => axes.reduce((total, axis) => total + axis[i] * axis[j], 0);
   const a = Math.sqrt(sum(0, 0));
@@ -40,7 +40,7 @@ function ellipseFromAbove(centre, axes) {
   });
 }
 
-/** An outline, seen from above and shifted, on the floor of bounds, as far as that goes. */
+/** Return a shifted outline on the floor, clipped to the bounds. */
 function onFloor(outline, shift, [low, high]) {
   let polygon = outline.map(([n, e]) => [n + shift[0], e + shift[1], high[2]]);
   for (let axis = 0; axis < 2; axis++) {
@@ -50,7 +50,7 @@ function onFloor(outline, shift, [low, high]) {
   return polygon;
 }
 
-/** Shadows of surfaces, those that are kept in as outlines only. */
+/** Paint the shadows of surfaces; keep-inside regions as outlines only. */
 function paintShadows(painter, entries, bounds, colours) {
   const add = ({ solid, shift }) => {
     for (const outline of solid.shadows) painter.polygon(onFloor(outline, shift, bounds));
@@ -64,7 +64,7 @@ function paintShadows(painter, entries, bounds, colours) {
   painter.stroke(colours.soft, 1, 0.5, [4, 4]);
 }
 
-/** The shadow of a vehicle, and the plumb line to it. */
+/** Paint the shadow of a vehicle, and the plumb line to it. */
 function paintPlumb(painter, { pose, size }, floor, colours) {
   const [n, e] = pose.position;
   const foot = [n, e, floor];
@@ -77,7 +77,7 @@ function paintPlumb(painter, { pose, size }, floor, colours) {
   painter.stroke(colours.soft, 1, 0.6);
 }
 
-/** The shadow of the way so far, through the beginnings of its chunks. */
+/** Paint the shadow of the past path, through the first points of its chunks. */
 function paintWayBelow(painter, chunks, floor, colours) {
   painter.begin();
   for (const { middle, past, next } of chunks) {

@@ -1,8 +1,8 @@
-// Regions of attitude: a sector of headings about the one that is wanted, and the cone in which a camera sees.
+// Regions of attitude: a cone about the wanted heading, and the field of view of a camera.
 
 const SIGHT_RINGS = 36;
 
-/** The circle of directions at an angle from a unit axis, at a distance from an apex. */
+/** Return points on a circle: at an angle [rad] from a unit axis, and at a distance [m] from an apex. */
 function rimOf(apex, axis, angle, length) {
   const [first, second] = Vec.aside(axis);
   const centre = Vec.along(apex, axis, length * Math.cos(angle));
@@ -14,16 +14,16 @@ function rimOf(apex, axis, angle, length) {
 }
 
 /**
- * What is drawn of a region of attitude.
+ * Drawing of a region of attitude.
  * @typedef {object} Sight
- * @property {number[]} apex, {number[]} axis of the cone  @property {number[][]} rim of it, on g = 0
- * @property {number[][][]} lines  @property {number[]|null} feature that is to be seen
- * @property {number[]} anchor of its name
+ * @property {number[]} apex, {number[]} axis of the cone  @property {number[][]} rim of the cone, on g = 0
+ * @property {number[][][]} lines  @property {number[]|null} feature that the camera must see
+ * @property {number[]} anchor of the label
  */
 
-/** How each kind of shape of attitude is drawn at a pose, from its fields, so large [m]. */
+/** Functions from a shape of attitude, a pose, a shift and a size [m] to its sight. */
 const SIGHTS = {
-  /** Where the nose may point: within the tolerance of the wanted heading. The nose's own line tells where it does. */
+  /** Return the cone within the tolerance of the wanted heading, with lines along the wanted and the current heading. */
   orientation(shape, { position, quaternion }, shift, size) {
     const axis = Vec.turned(Vec.matrix(shape.quaternion), [1, 0, 0]);
     const nose = Vec.turned(Vec.matrix(quaternion), [1, 0, 0]);
@@ -34,7 +34,7 @@ const SIGHTS = {
     return { apex: position, axis, rim, lines, feature: null, anchor: wanted };
   },
 
-  /** What the camera sees, as far as the feature is, and the line of sight to it. */
+  /** Return the camera's cone of view as far as the feature, and the line of sight to it. */
   visibility(shape, { position, quaternion }, shift, size) {
     const R = Vec.matrix(quaternion);
     const apex = Vec.add(position, Vec.turned(R, shape.camera_position));
@@ -52,7 +52,7 @@ function paintSight(painter, sight, style) {
   painter.begin();
   painter.polygon(sight.rim);
   painter.fill(style.colour, 0.25 * style.alpha);
-  // the flanks as far as the outline of the cone goes: the triangles of all rim points make it up
+  // the flanks: the triangles between the apex and all rim points cover the outline of the cone
   painter.begin();
   for (let i = 0; i < SIGHT_RINGS; i++) painter.polygon([sight.apex, sight.rim[i], sight.rim[(i + 1) % SIGHT_RINGS]]);
   painter.fill(style.colour, 0.16 * style.alpha);

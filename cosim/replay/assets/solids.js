@@ -1,27 +1,27 @@
-// Regions of space that end somewhere, as surfaces: points on g = 0, faces between them, and where they hide things.
+// Bounded regions as surfaces: points on g = 0, faces between them, and tests of what they hide.
 
 const AROUND = 32; // pieces of half a great circle
-const SHARP = Math.cos((31 * Math.PI) / 180); // faces that turn more from each other are seen as an edge
-const CLUSTER = 32; // faces that are looked at together
-const LONG = 3; // times as far as a ball of its volume and surface goes: what goes farther has no middle of its own
+const SHARP = Math.cos((31 * Math.PI) / 180); // faces that meet at a larger angle form a sharp edge
+const CLUSTER = 32; // number of faces that share a bounding sphere
+const LONG = 3; // times the radius of a sphere of equal volume-to-area ratio; a surface beyond that is long
 
 /**
- * A surface of flat faces. Faces that meet bluntly belong to one round surface.
+ * Surface of flat faces. Faces that meet at a blunt angle belong to one round surface.
  * @typedef {object} Solid
  * @property {Float64Array} points three numbers each [m, NED]
  * @property {number[][]} faces indices of points, anticlockwise as seen from outside
  * @property {Float64Array} normals outward, three numbers for each face
  * @property {number[][]} edges [point, point, face, face, 1 if sharp]
- * @property {number[][]} lines of points on an ellipsoid, drawn to tell its form
- * @property {number[]} centre, {number} radius of a ball about it  @property {number} top its least depth [m]
- * @property {boolean} long whether it is where its nearest point is, not where its centre is
- * @property {object|null} ellipsoid {centre, axes} where it is one: three half axes as vectors
+ * @property {number[][]} lines of points on an ellipsoid, drawn to show its form
+ * @property {number[]} centre, {number} radius of its bounding sphere  @property {number} top its least depth [m]
+ * @property {boolean} long true if its position is its nearest point, not its center
+ * @property {object|null} ellipsoid {centre, axes} of an ellipsoid: three half axes as vectors
  * @property {number[][][]} shadows closed lines, north and east, about what it hides from above
- * @property {function(number[]): function(number, number, number): boolean} from tells of an eye whether the solid is
- * between it and a point, or holds the point; asked for each piece of a way in each frame, so it makes no arrays
+ * @property {function(number[]): function(number, number, number): boolean} from returns a test for an eye; the test is true
+ * for points inside or behind the solid. It runs for each piece of a path in each frame, so it makes few arrays
  */
 
-/** The surface that some points and faces make. */
+/** Return the surface of some points and faces. */
 function solidOf(points, faces, lines = []) {
   const solid = { points: Float64Array.from(points.flat()), faces, lines, long: false, ellipsoid: null };
   solid.normals = new Float64Array(3 * faces.length);
@@ -39,7 +39,7 @@ function solidOf(points, faces, lines = []) {
   return solid;
 }
 
-/** A ball about some points. */
+/** Return a bounding sphere of some points: {centre, radius}. */
 function ballAbout(points) {
   const [low, high] = [Math.min, Math.max].map((most) =>
     [0, 1, 2].map((axis) => points.reduce((x, p) => most(x, p[axis]), points[0][axis])),
@@ -48,7 +48,7 @@ function ballAbout(points) {
   return { centre, radius: points.reduce((most, p) => Math.max(most, Vec.norm(Vec.sub(p, centre))), 0) };
 }
 
-/** Faces in a row with the ball about them: most of a large surface is far from a line of sight. */
+/** Return runs of consecutive faces with bounding spheres, as most of a large surface is far from a line of sight. */
 function clustersOf(points, faces) {
   const clusters = [];
   for (let from = 0; from < faces.length; from += CLUSTER) {
@@ -58,7 +58,7 @@ function clustersOf(points, faces) {
   return clusters;
 }
 
-/** Whether a surface goes much farther than its volume and its area ask for: a pipe, a wall. */
+/** Return true if a surface is long for its volume and area, such as a pipe or a wall. */
 function isLong({ points, faces, radius }) {
   let [volume, area] = [0, 0];
   const corner = (k) => [points[3 * k], points[3 * k + 1], points[3 * k + 2]];
@@ -72,7 +72,7 @@ function isLong({ points, faces, radius }) {
   return radius * area > LONG * 3 * volume;
 }
 
-/** The point of a surface that is nearest to another point. */
+/** Return the point of a surface that is nearest to another point. */
 function nearestOnSurface({ points, faces }, p) {
   let nearest = null;
   let least = Infinity;
@@ -88,7 +88,7 @@ function nearestOnSurface({ points, faces }, p) {
   return nearest;
 }
 
-/** The point of a triangle that is nearest to another point. */
+/** Return the point of a triangle that is nearest to another point. */
 function nearestOnTriangle(a, b, c, p) {
   const normal = Vec.cross(Vec.sub(b, a), Vec.sub(c, a));
   const inside = (u, v) => Vec.dot(Vec.cross(Vec.sub(v, u), Vec.sub(p, u)), normal) >= 0;
@@ -98,7 +98,7 @@ function nearestOnTriangle(a, b, c, p) {
   return nearestOnChain([a, b, c, a], p);
 }
 
-/** The point of a chain of points that is nearest to another point. */
+/** Return the point of a polyline that is nearest to another point. */
 function nearestOnChain(chain, p) {
   let nearest = chain[0];
   let least = Infinity;
@@ -112,7 +112,7 @@ function nearestOnChain(chain, p) {
   return nearest;
 }
 
-/** The unit normal of a polygon, after Newell: it need not be convex. */
+/** Return the unit normal of a polygon, after Newell; the polygon need not be convex. */
 function normalOf(polygon) {
   let normal = [0, 0, 0];
   polygon.forEach((a, i) => {
@@ -141,7 +141,7 @@ function edgesOf(faces, normals) {
   return [...edges.values()];
 }
 
-/** Whether a line from an eye to a point goes through the ball about a solid. */
+/** Return true if the line from an eye to a point crosses the bounding sphere of a solid. */
 function nearSight({ centre, radius }, eye, x, y, z) {
   const [bx, by, bz] = [eye[0] - x, eye[1] - y, eye[2] - z];
   const [px, py, pz] = [x - centre[0], y - centre[1], z - centre[2]];
@@ -150,7 +150,7 @@ function nearSight({ centre, radius }, eye, x, y, z) {
   return (px + part * bx) ** 2 + (py + part * by) ** 2 + (pz + part * bz) ** 2 < radius * radius;
 }
 
-/** Whether a line from an eye to a point goes in through a face: then the point is inside the solid or behind it. */
+/** Return true if the line from an eye to a point enters through a face: the point is inside or behind the solid. */
 function crossesFaces({ points, faces, normals }, { from, to }, eye, p) {
   for (let i = from; i < to; i++) {
     const [nx, ny, nz] = [normals[3 * i], normals[3 * i + 1], normals[3 * i + 2]];
@@ -164,10 +164,10 @@ function crossesFaces({ points, faces, normals }, { from, to }, eye, p) {
   return false;
 }
 
-/** Whether a polygon holds a point of its plane: a ray crosses its edges an odd number of times. */
+/** Return true if a polygon contains a point of its plane: a ray crosses its edges an odd number of times. */
 function holds(points, face, p, normal) {
   const size = normal.map(Math.abs);
-  const drop = size.indexOf(Math.max(...size)); // the axis along which it is seen broadest
+  const drop = size.indexOf(Math.max(...size)); // the axis along which its projection is largest
   const [u, v] = [0, 1, 2].filter((axis) => axis !== drop);
   let inside = false;
   for (let i = 0; i < face.length; i++) {
@@ -179,7 +179,7 @@ function holds(points, face, p, normal) {
   return inside;
 }
 
-/** An ellipsoid: drawn by the conic that it is seen as, so that it needs no faces; its points are on great circles. */
+/** Return an ellipsoid; it is drawn by its projected conic, so it has no faces, only points on great circles. */
 function ellipsoidOf(centre, axes) {
   const points = [];
   const lines = [];
@@ -198,9 +198,9 @@ function ellipsoidOf(centre, axes) {
   solid.top = centre[2] - Math.hypot(...axes.map((axis) => axis[2]));
   solid.ellipsoid = { centre: solid.centre, axes };
   solid.shadows = [ellipseFromAbove(centre, axes)];
-  const inverse = axes.map((axis) => Vec.scale(axis, 1 / Vec.dot(axis, axis))); // rows: into the unit ball
+  const inverse = axes.map((axis) => Vec.scale(axis, 1 / Vec.dot(axis, axis))); // rows map to the unit sphere
   solid.from = (eye) => {
-    // all in the space where it is the unit ball
+    // in coordinates in which the ellipsoid is the unit sphere
     const [[m0, m1, m2], [m3, m4, m5], [m6, m7, m8]] = inverse;
     const [cx, cy, cz] = centre;
     const [ex, ey, ez] = inverse.map((row) => Vec.dot(row, Vec.sub(eye, centre)));
@@ -220,7 +220,7 @@ function ellipsoidOf(centre, axes) {
   return solid;
 }
 
-/** The surface of a shape that ends somewhere, as it stands in the scenario; made once for each object, or null. */
+/** Return the surface of a bounded shape, made once for each object; null if the shape has no surface. */
 function surfaceOf(shape) {
   if (!SURFACES.has(shape)) {
     const { centre, half_axes: axes, points, faces } = shape.drawing ?? {};

@@ -1,8 +1,8 @@
-// The scenes of the page: all runs in one, or side by side with one camera.
+// Scenes of the page: all runs in one, or side by side with one camera.
 
-/** Holds one canvas for each scene; the first canvas stays for as long as the page does. */
+/** Canvases of the scenes; the first canvas is never replaced. */
 class Stage {
-  /** @param {string} theme  @param {function} changed called when a picture is stale */
+  /** @param {string} theme  @param {function} changed called when the picture needs a repaint */
   constructor(theme, changed) {
     this.theme = theme;
     this.changed = changed;
@@ -18,12 +18,12 @@ class Stage {
     for (const group of document.querySelectorAll("#scene-bar .group")) this._covers.observe(group);
   }
 
-  /** Keep names out from behind an element that hangs over the scene. */
+  /** Keep labels out from behind an element that covers a part of the scene. */
   coveredBy(hung) {
     this._covers.observe(hung);
   }
 
-  /** The scene of the first canvas; null while there is nothing to draw. */
+  /** Return the scene of the first canvas; null while there is nothing to draw. */
   get scene() {
     return this.views[0].blank ? null : this.views[0].scene;
   }
@@ -32,7 +32,7 @@ class Stage {
     return this.views.filter((view) => !view.blank).map((view) => view.scene);
   }
 
-  /** @param {Run[]} runs of the page  @param {boolean[]} shown which of them are */
+  /** @param {Run[]} runs all runs  @param {boolean[]} shown visible runs */
   setRuns(runs, shown) {
     const same = runs === this.runs;
     this.runs = runs;
@@ -57,7 +57,7 @@ class Stage {
           view.caption.append(name);
         }
       }
-      // a run that has a scene for itself shows on its way who was active
+      // a run with a scene of its own colors its path by the active region
       const marks = runs.length > 1 && !apart ? group.map(({ index }) => ({ name: names[index], colour: runColour(index) })) : null;
       view.blank = !some.length;
       if (view.blank) return;
@@ -69,11 +69,11 @@ class Stage {
     this.canvas.hidden = !this.scene;
     this.resize();
     if (!this.scene) return;
-    Object.assign(this.scene.camera, { content, ...looks }); // one camera sees what any of the scenes has
+    Object.assign(this.scene.camera, { content, ...looks }); // the shared camera frames the content of all scenes
     this.scene.camera.fit();
   }
 
-  /** Show other runs in place of these, as many, from where the cameras are. */
+  /** Replace the runs by as many others; keep the cameras. */
   replaceRuns(runs) {
     this.runs = runs;
     for (const { blank, scene, indices } of this.views) if (!blank) scene.replaceRuns(indices.map((index) => runs[index]));
@@ -105,7 +105,7 @@ class Stage {
     });
   }
 
-  /** Where buttons and commands hang over each canvas: [x, y, width, height] in its pixels. */
+  /** Measure the overlays on each canvas: [x, y, width, height] [CSS pixels]. */
   _cover() {
     const over = [...document.querySelectorAll("#scene-bar .group, #commands, .caption .run-name")].map((hung) => hung.getBoundingClientRect());
     for (const view of this.views) {
@@ -117,13 +117,13 @@ class Stage {
     this.changed();
   }
 
-  /** Call a method of the one camera. */
+  /** Call a method of the shared camera. */
   camera(method, ...values) {
     if (!this.scene) return;
     this.scene.camera[method](...values);
   }
 
-  /** The run and the region under a point of a canvas: names to show, or null. */
+  /** Return the run and the region at a pixel of a view; null if there is none. */
   under(view, x, y) {
     const found = view.blank ? null : view.scene.pick(x, y);
     return found ? { run: this.runs[view.indices[found.run]], region: found.region } : null;
@@ -147,7 +147,7 @@ class Stage {
   }
 }
 
-/** A pointer that rests on a region shows its name; in the scene itself pointers move the camera. */
+/** Show the name of the region under the pointer while no button is pressed. */
 function showPointed(stage, view) {
   const { canvas } = view;
   const tip = document.getElementById("pointed");

@@ -1,6 +1,6 @@
-// What can be moved in a live run: the target, and regions that are at a place.
+// Movable regions of a run: the target, and regions with a position.
 
-/** The point of a region, or of its plane, by which it is taken, at a time [m, NED]; null for one that is nowhere. */
+/** Return the handle of a region at a time [s]: a point of it or of its plane [m, NED]; null if it has none. */
 function placeOf(run, index, t) {
   if (!run.rows || !run.there(index, t)) return null;
   if (index === 0 && run.has("target.x")) return ["x", "y", "z"].map((axis) => run.held(`target.${axis}`, t));
@@ -11,15 +11,15 @@ function placeOf(run, index, t) {
   return point ? Vec.add(point, shift) : null;
 }
 
-/** Whether a region may be moved by an order. */
+/** Return true if a command may move a region. */
 function canMove(run, index) {
   return index === 0 || run.header.regions[index].moves;
 }
 
-/** Whether only its depth matters. */
+/** Return true if a region has a depth only. */
 const isFlat = (run, index) => run.header.regions[index].shape.kind === "depth_band";
 
-/** The order that moves a region so that its place goes from one point to another. */
+/** Return the command that moves a region from one point to another [m, NED]. */
 function commandToMove(run, index, from, to, t) {
   if (index === 0) {
     const radius = run.held("target.radius", t);

@@ -1,8 +1,8 @@
-// The scrubber: a ribbon that tells who was active when, marks of what happened, and the cursor.
+// Scrubber: a ribbon of the active regions, marks of events, and the cursor.
 
 const REACHED = "goal reached";
 
-/** Events of a run as marks of the scrubber: of its header, else of what the summary tells. */
+/** Return the events of a run as marks; without events in the header, the goal of the summary. */
 function marksOf(run) {
   const { events, summary } = run.header;
   if (events) return events;
@@ -11,7 +11,7 @@ function marksOf(run) {
   return marks;
 }
 
-/** Two cuts aslant through the ribbon: time is drawn short behind them. */
+/** Paint two oblique cuts through the ribbon, after which time is compressed. */
 function paintGap(context, x, height) {
   context.strokeStyle = pageColours().card;
   context.lineWidth = 2.5;
@@ -23,7 +23,7 @@ function paintGap(context, x, height) {
   context.stroke();
 }
 
-/** The scrubber of the selected run. */
+/** Scrubber of the selected run. */
 class Timeline {
   constructor(player) {
     this.player = player;
@@ -42,10 +42,10 @@ class Timeline {
     this.grown();
   }
 
-  /** Rows were appended, or there is another run. */
+  /** Update after rows were appended or the run was replaced. */
   grown() {
     const { start, end, rest } = this.player;
-    this.axis = new TimeAxis([start, Math.max(end, start + 1e-9)], rest, 0, 1); // parts of the scrubber
+    this.axis = new TimeAxis([start, Math.max(end, start + 1e-9)], rest, 0, 1); // positions from 0 to 1
     this._marks();
     this.paint();
     this.point();
@@ -57,12 +57,12 @@ class Timeline {
     const part = this.axis.x(t);
     this.input.value = part;
     setText(this.clock, `${clock(t)} / ${clock(end, 1)}`);
-    // announced to screen readers only when the cursor rests
+    // screen readers announce it only when the cursor rests
     if (!playing && !live) this.input.setAttribute("aria-valuetext", this.run ? `${clock(t)}, ${activeWords(this.run, t).name} active` : clock(t));
     this.input.parentElement.style.setProperty("--part", part.toFixed(5));
   }
 
-  /** The ribbon: the active region's colour, full height; violations as notches below. */
+  /** Paint the ribbon: the color of the active region in full height, violations as notches below. */
   paint() {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (!width || !height) return;
@@ -109,7 +109,7 @@ class Timeline {
         const mark = element("span", `mark-at ${kind}`);
         mark.style.left = `${100 * this.axis.x(time)}%`;
         mark.title = `${clock(time)}: ${text}`;
-        mark.addEventListener("click", () => this.player.seek(time)); // the keyboard has keys and the list for it
+        mark.addEventListener("click", () => this.player.seek(time)); // keyboard users have keys and the list of events
         return mark;
       }),
     );

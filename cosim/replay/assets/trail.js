@@ -1,22 +1,22 @@
-// The way of a vehicle, thinned to what a screen can show, in chunks that can be behind things one by one.
+// Path of a vehicle, reduced to the screen's resolution, in chunks that can be hidden one by one.
 
 const FINEST = 2.2; // pixels between points of the line
-const CHUNK = 26; // pixels of line that are behind a thing or before it together
+const CHUNK = 26; // pixels of line that are hidden or visible together
 
-/** The way of one run. */
+/** Path of one run. */
 class Trail {
   constructor(run) {
     this.run = run;
-    this._way = new Float64Array(0); // m, length of way at each row
+    this._way = new Float64Array(0); // m, path length at each row
     this._known = 0;
     this._marks = null;
   }
 
   /**
-   * The way as it is seen.
-   * @param {Camera} camera  @param {number} t that parts past from future
-   * @returns {{points: number[], middle: number[], next: object, past: boolean, active: number}[]} chunks; points are
-   * pixels, x and y in turn; next is the chunk that goes on from it, if there is one
+   * Return the projected path in chunks.
+   * @param {Camera} camera  @param {number} t time that separates past from future [s]
+   * @returns {{points: number[], middle: number[], next: object, past: boolean, active: number}[]} points are pixels, x and
+   * y in turn; next is the chunk that continues this one, if there is one
    */
   chunks(camera, t) {
     const { run } = this;
@@ -34,7 +34,7 @@ class Trail {
       const [dx, dy, dz] = [x - e[0], y - e[1], z - e[2]];
       const depth = dx * f[0] + dy * f[1] + dz * f[2];
       if (!(depth > near)) {
-        chunk = null; // behind the camera, or no number
+        chunk = null; // behind the camera, or not finite
         return;
       }
       const k = focal / depth;
@@ -68,7 +68,7 @@ class Trail {
     return chunks.filter((c) => c.points.length > 2 && inPicture(c.points, width, height));
   }
 
-  /** The length of way at each row [m], small moves to and fro left out. */
+  /** Return the path length at each row [m]; moves below half the vehicle's radius are ignored. */
   way() {
     const { run } = this;
     if (this._way.length < run.rows) {
@@ -91,7 +91,7 @@ class Trail {
     return this._way;
   }
 
-  /** Where marks of direction stand, so far apart [m]: [{time, from, middle}], two places on the way each. */
+  /** Return the marks of direction at a spacing [m]: [{row, time, from, middle}], two points of the path each. */
   marks(spacing) {
     const { run } = this;
     if (this._marks?.spacing === spacing && this._marks.rows === run.rows) return this._marks.list;
@@ -102,7 +102,7 @@ class Trail {
     for (let i = 1; i < run.rows; i++) {
       if (Math.floor(way[i] / spacing) <= Math.floor(way[i - 1] / spacing)) continue;
       const middle = [xs[i], ys[i], zs[i]];
-      let k = i; // far enough back to have a direction
+      let k = i; // far enough back for a direction
       while (k > 0 && Math.hypot(middle[0] - xs[k], middle[1] - ys[k], middle[2] - zs[k]) < 0.05 * spacing) k--;
       list.push({ row: i, time: time[i], from: [xs[k], ys[k], zs[k]], middle });
     }
@@ -111,7 +111,7 @@ class Trail {
   }
 }
 
-/** Whether the last point of a line is as good as on the way from the one before it to another. */
+/** Return true if the last point of a line is almost on the segment from the point before it to a new point. */
 function straight(points, x, y) {
   const n = points.length;
   if (n < 4) return false;
@@ -120,7 +120,7 @@ function straight(points, x, y) {
   return (u - p) * p + (v - q) * q > 0 && Math.abs(u * q - v * p) < 0.25 * Math.hypot(u, v);
 }
 
-/** Whether a line of pixels may touch the picture. */
+/** Return true if a line of pixels may touch the picture. */
 function inPicture(points, width, height) {
   let [left, right, top, bottom] = [true, true, true, true];
   for (let i = 0; i < points.length; i += 2) {
@@ -132,7 +132,7 @@ function inPicture(points, width, height) {
   return !(left || right || top || bottom);
 }
 
-/** A mark of direction: a small arrow head on the way. */
+/** Draw a mark of direction: a small arrow head on the path. */
 function paintMark(painter, { mark: [x, y, u, v], colour, past }, colours) {
   const { context } = painter;
   const size = past ? 6.5 : 4.5;

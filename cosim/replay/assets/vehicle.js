@@ -1,8 +1,8 @@
-// The vehicle as it is seen: its hull in the light, its axes, its forces.
+// Drawing of the vehicle: shaded hull and body axes.
 
 const SHADES = new Map();
 
-/** A colour of the hull in one of eight steps of light. */
+/** Return a color of the hull in one of eight steps of light. */
 function shaded(colour, light) {
   const step = Math.round(7 * Math.min(1, Math.max(0, light)));
   const key = `${colour} ${step}`;
@@ -14,16 +14,16 @@ function shaded(colour, light) {
   return SHADES.get(key);
 }
 
-/** The hull's faces that look at the eye, in the world: [{corners, middle, colour}]. */
+/** Return the hull's faces towards the eye, in the world frame: [{corners, middle, colour}]. */
 function hullAt(vehicle, { position, R }, size, eye, theme) {
   const seen = [];
   const view = Vec.scale(Vec.sub(eye, position), 1 / size);
-  // the eye, body axes
+  // position of the eye in body axes, for a hull of radius 1
   const [x, y, z] = [0, 1, 2].map((i) => R[i] * view[0] + R[3 + i] * view[1] + R[6 + i] * view[2]);
   for (const { colour, corners, middle, normal } of hullOf(vehicle)) {
     if (normal[0] * (x - middle[0]) + normal[1] * (y - middle[1]) + normal[2] * (z - middle[2]) <= 0) continue;
     const turned = Vec.turned(R, normal);
-    const light = 0.5 - 0.42 * turned[2] + 0.1 * turned[0] - 0.06 * turned[1]; // from above, and aslant
+    const light = 0.5 - 0.42 * turned[2] + 0.1 * turned[0] - 0.06 * turned[1]; // from above and oblique
     seen.push({
       corners: corners.map((p) => Vec.along(position, Vec.turned(R, p), size)),
       middle: Vec.along(position, Vec.turned(R, middle), size),
@@ -33,7 +33,7 @@ function hullAt(vehicle, { position, R }, size, eye, theme) {
   return seen;
 }
 
-/** The body's axes, forward, starboard, down: lines out of the hull, [{line, name, middle, width}]. */
+/** Return the body's axes (forward, starboard, down) as lines out of the hull: [{line, name, middle, width}]. */
 function bodyAxes({ position, R }, size) {
   return [["x", 2.3], ["y", 1.8], ["z", 1.7]].map(([name, length], i) => {
     const axis = [R[i], R[3 + i], R[6 + i]];
@@ -42,7 +42,7 @@ function bodyAxes({ position, R }, size) {
   });
 }
 
-/** Draw one of the body's axes, and its name if it is long enough. */
+/** Draw one of the body's axes, with its name if the line is long enough. */
 function paintBodyAxis(painter, { line, name, width }, colour) {
   const { context, camera } = painter;
   painter.begin();

@@ -1,18 +1,18 @@
-// What if: the page's run flown again with other numbers, beside the run as it was recorded.
+// What-if simulation: the page's run with other numbers, beside the recorded run.
 
-const LATER = 120; // ms, for which a number that is being written waits
+const LATER = 120; // ms, delay after the last change of a number
 
-/** The scenario with the numbers that its reader has changed, and the flight that they make. */
+/** Scenario with the numbers that the reader has changed, and its simulation. */
 class WhatIf {
-  /** @param {Page} page  @param {Run} recorded  @param {Flight} flight that has started */
+  /** @param {Page} page  @param {Run} recorded  @param {Flight} flight after start() */
   constructor(page, recorded, flight) {
     Object.assign(this, { page, recorded, flight, values: new Map(), failure: null, flown: null, repeats: null });
-    this.run = recorded; // with its regions where they are now: what is dragged
+    this.run = recorded; // with its regions at their current positions, for dragging
     this.panel = new WhatIfPanel(this);
     this.dragging = new Dragging(this);
   }
 
-  // ---- what Dragging asks ----
+  // ---- interface for Dragging ----
 
   get acceptsCommands() {
     return true;
@@ -30,13 +30,13 @@ class WhatIf {
     return this.flight.data.moves[region] !== null;
   }
 
-  /** Move the place of a region from one point to another [m, NED]. */
+  /** Move a region from one point to another [m, NED]. */
   move(region, from, to) {
     const axes = this.flight.data.moves[region];
     const by = Vec.sub(to, from);
     axes.forEach((keys, axis) => {
       const values = keys.map((key) => this.value(key));
-      // both ends of a cylinder by the same to the last bit, so that its length stays
+      // move both ends of a cylinder by exactly the same step, so that its length stays
       const along = this.flight.slots.get(keys[0])?.places[0][0] === "middle" && values[0] !== values[1];
       const step = Math.round(1024 * by[axis]) / 1024;
       if (by[axis]) keys.forEach((key, i) => this._put(key, along ? values[i] + step : Number((values[i] + by[axis]).toFixed(4))));
@@ -46,7 +46,7 @@ class WhatIf {
 
   // ---- numbers ----
 
-  /** The number of a key, as it is now. */
+  /** Return the current number of a key. */
   value(key) {
     return this.values.get(key) ?? this.flight.slots.get(key).value;
   }
@@ -56,7 +56,7 @@ class WhatIf {
     this.later();
   }
 
-  /** Fail a thruster, from 1, at a time [s]; null: none beyond those of the scenario. */
+  /** Set the additional failure: thruster (from 1) and time [s]; null for none. */
   fail(failure) {
     this.failure = failure;
     this.later();
@@ -66,7 +66,7 @@ class WhatIf {
     return this.values.size > 0 || this.failure !== null;
   }
 
-  /** Back to the scenario as it was recorded. */
+  /** Restore the recorded scenario. */
   reset() {
     this.values.clear();
     this.failure = null;
@@ -80,7 +80,7 @@ class WhatIf {
 
   // ---- flights ----
 
-  /** Fly soon: once the numbers have rested for a moment, and the flight before has come back. */
+  /** Schedule a simulation after `wait` [ms]; one that runs already is completed first. */
   later(wait = LATER) {
     this.run = this.recorded.withHeader(this._header());
     this.panel.update();
@@ -138,7 +138,7 @@ class WhatIf {
     return this.recorded.withHeader({ ...this.recorded.header, name: "as recorded" });
   }
 
-  /** How far this browser's flight of the same numbers is from the record, at the most [m]. */
+  /** Store the largest position difference [m] to the record, for a simulation of the same numbers. */
   _compare(run) {
     const { recorded } = this;
     let row = 0;
@@ -151,20 +151,20 @@ class WhatIf {
     this.repeats = most;
   }
 
-  /** Show all rows of a flight that repeats the record, which has fewer of them in the file. */
+  /** Replace the recorded run by its simulation, which has more rows, if both are equal. */
   _refine(run) {
     const { recorded } = this;
-    const { step, every } = this.flight.data; // the flight has a row for each decision, the record for each step
+    const { step, every } = this.flight.data; // the simulation has a row for each decision, the record for each step
     const whole = recorded.end - run.end <= step * every;
     if (this.repeats !== 0 || !whole || run.rows <= recorded.rows) return;
-    // what a flight does not leave, such as whether allocation saturates, is held from row to row of the record, as it is drawn
+    // signals that the simulation lacks are held from row to row of the record, as it is drawn
     const columns = recorded.header.signals.map(({ name }) => run.column(name) ?? run.time.map((t) => recorded.held(name, t)));
     this.recorded = new Run(recorded.header, columns);
     this.run = this.recorded;
     if (this.page.runs.length === 1) this.page.replace([this.recorded]);
   }
 
-  /** The header of the recorded run, with the numbers of now. */
+  /** Return the header of the recorded run with the current numbers. */
   _header() {
     const { header } = this.recorded;
     const { moves, restoring } = this.flight.data;
@@ -178,7 +178,7 @@ class WhatIf {
     return { ...header, name: "what if", asked, regions, truth, changes: [], gaps: {} };
   }
 
-  /** What is changed, in words. */
+  /** Return the changes as texts. */
   words() {
     const { slots, data: { moves } } = this.flight;
     const moved = moves.flatMap((axes, i) => (axes?.flat().some((key) => this.values.has(key)) ? [`${this.recorded.header.regions[i].name} moved`] : []));
@@ -189,7 +189,7 @@ class WhatIf {
   }
 }
 
-/** A shape of a header, moved [m, NED]. */
+/** Return a shape of a header, moved by `by` [m, NED]. */
 function movedShape(shape, by) {
   const add = (point) => point.map((x, axis) => x + by[axis]);
   const moved = { ...shape };
@@ -206,7 +206,7 @@ function movedShape(shape, by) {
   return moved;
 }
 
-/** Offer it, where the page holds a flight and the browser can fly. */
+/** Start the what-if simulation if the page has one and the browser can run it; else return null. */
 async function startWhatIf(page) {
   const data = JSON.parse(document.getElementById("flight").textContent);
   if (!data || page.runs.length !== 1) return null;

@@ -1,12 +1,12 @@
-// The numbers that a reader may change, as fields over the scene: for who has no mouse, and for what has no place in it.
+// Fields over the scene for the numbers that a reader may change, also by keyboard or without a position.
 
-/** Fields and buttons of a `WhatIf`. */
+/** Panel of the fields and buttons of a `WhatIf`. */
 class WhatIfPanel {
   /** @param {WhatIf} whatIf */
   constructor(whatIf) {
     this.whatIf = whatIf;
     this.slots = whatIf.flight.slots;
-    this._fields = []; // each with a function that writes what it is now
+    this._fields = []; // each with a function that returns its current text
     this.holder = element("details", "commands");
     this.holder.id = "commands";
     this.holder.open = matchMedia("(min-width: 960px)").matches;
@@ -25,7 +25,7 @@ class WhatIfPanel {
     setText(this.state, text);
   }
 
-  /** Write how things stand, but for what its reader writes. */
+  /** Write the current numbers into all fields except an input field with the focus. */
   update() {
     for (const { field, now } of this._fields) {
       if (field === document.activeElement && field.tagName === "INPUT") continue;
@@ -49,7 +49,7 @@ class WhatIfPanel {
     return group;
   }
 
-  /** A number in a set of fields. */
+  /** Add a number field to a set of fields and return it. */
   _number(set, label, said, step, now, changed) {
     const holder = element("label", "", label);
     const field = element("input");
@@ -171,7 +171,7 @@ class WhatIfPanel {
   }
 }
 
-/** Why some regions cannot be moved here. */
+/** Return a text that explains why some regions cannot be moved here. */
 function wordsOfFixed(regions) {
   const named = (those) => those.map(({ name }) => name).join(", ");
   const isTurned = ({ shape }) => shape.kind in SIGHTS && !shape.feature;
@@ -183,7 +183,7 @@ function wordsOfFixed(regions) {
   ].filter(Boolean).join(" ");
 }
 
-/** A number as a field has it. */
+/** Format a number with at most four decimals. */
 function shortNumber(x) {
   return String(Number(x.toFixed(4)));
 }

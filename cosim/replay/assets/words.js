@@ -1,5 +1,5 @@
-// What the numbers at the cursor say, in words: those of the last row before it, never one that is not in the record.
-// Nothing here touches the page.
+// Values at the cursor as text: those of the last recorded row before it, never interpolated.
+// No function here changes the page.
 
 const NEEDED = ["time", ...["x", "y", "z"].map((a) => `position.${a}`), ...[0, 1, 2, 3].map((e) => `quaternion.e${e}`)];
 const DEGREES = 180 / Math.PI;
@@ -9,7 +9,7 @@ const UNFINISHED = {
   reset: "This run did not complete: it was reset on the way.",
 };
 
-/** A number with three digits that count, at most `digits` after the point, and a true minus sign. */
+/** Format a number with three significant digits, at most `digits` decimals, and a true minus sign. */
 function figure(x, digits = 3) {
   if (!Number.isFinite(x)) return "–";
   const size = Math.abs(x);
@@ -18,7 +18,7 @@ function figure(x, digits = 3) {
   return (x < 0 && Number(text) !== 0 ? "\u2212" : "") + text;
 }
 
-/** A quantity with its unit: kilo where it is large, degrees for radians. */
+/** Format a quantity with its unit: kilo for large forces, degrees for radians. */
 function quantity(x, unit, digits = 3) {
   if (!Number.isFinite(x)) return "no number";
   if (unit === "rad") return `${figure(x * DEGREES, 1)}°`;
@@ -27,19 +27,19 @@ function quantity(x, unit, digits = 3) {
   return unit ? `${figure(x, digits)} ${unit.replace(".", "\u00b7")}` : figure(x, 2);
 }
 
-/** A number in a unit that stands elsewhere: degrees for radians. */
+/** Format a number without its unit: degrees for radians. */
 function reading(x, unit) {
   return unit === "rad" ? figure(x * DEGREES, 1) : figure(x, unit ? 3 : 2);
 }
 
-/** Seconds as a clock reads them: 12.34 s, or 3:07.5 from the second minute on. */
+/** Format a time [s]: 12.34 s below 100 s, else 3:07.5. */
 function clock(t, digits = 2) {
   if (t < 100) return `${t.toFixed(digits)} s`;
   const tenths = Math.round(t * 10);
   return `${Math.floor(tenths / 600)}:${((tenths % 600) / 10).toFixed(1).padStart(4, "0")}`;
 }
 
-/** Names of runs that differ, for a page with several. */
+/** Return distinct names of runs. */
 function runNames(runs) {
   const names = runs.map((run) => run.header.name || run.header.title || "run");
   const all = new Set(names);
@@ -47,17 +47,17 @@ function runNames(runs) {
   return names.map((name, i) => (names.indexOf(name) === names.lastIndexOf(name) ? name : `${name} (${i + 1})`));
 }
 
-/** Whether a run has what it takes to be drawn in the scene. */
+/** Return true if a run has the signals that the scene needs. */
 function drawable(run) {
   return run.rows > 0 && NEEDED.every((name) => run.has(name));
 }
 
-/** Whether a run tells when its rows are: without that nothing of it can be shown. */
+/** Return true if a run has finite times; without them it cannot be shown. */
 function timed(run) {
   return run.has("time") && Number.isFinite(run.start) && Number.isFinite(run.end);
 }
 
-/** What a region asks, and whether it moves at a time: "obstacle · keep out · hard · moves". */
+/** Describe a region at a time [s]: criterion, side, hardness and motion ("obstacle · keep out · hard · moves"). */
 function regionWords(run, index, t) {
   const region = run.header.regions[index];
   const keep = region.keep === "in" ? "keep inside" : "keep out";
@@ -65,7 +65,7 @@ function regionWords(run, index, t) {
   return run.moves(index, t) ? `${criterion} · moves` : criterion;
 }
 
-/** A clearance in words: "1.20 m clear", "violated by 0.03 m"; of the goal "2.00 m to go", "inside by 0.10 m". */
+/** Format a clearance: "1.20 m clear", "violated by 0.03 m"; of the goal "2.00 m to go", "inside by 0.10 m". */
 function clearanceWords(clearance, region) {
   if (!Number.isFinite(clearance)) return "no number";
   const size = quantity(Math.abs(clearance), region.unit);
@@ -73,12 +73,12 @@ function clearanceWords(clearance, region) {
   return clearance < 0 ? `violated by ${size}` : `${size} clear`;
 }
 
-/** Whether a vehicle is slow enough to be shown as at rest, as in cosim/replay/activity.py. */
+/** Return true if the speed at a time is that of a vehicle at rest, as in cosim/replay/activity.py. */
 function slow(run, t) {
   return Math.hypot(...["u", "v", "w"].map((axis) => run.held(`velocity.${axis}`, t))) < 0.02; // m/s
 }
 
-/** Who is active at a time, and why: index, name, and a sentence. */
+/** Return the active region at a time [s] with an explanation: {index, name, region, sentence}. */
 function activeWords(run, t) {
   const index = run.active(t);
   const region = run.header.regions[index];
@@ -101,12 +101,12 @@ function activeWords(run, t) {
   return { index, name: region.name, region, sentence };
 }
 
-/** The rules of the arbiter and how strongly each fires at a time. */
+/** Return the rules of the arbiter with the firing strength of each at a time [s]. */
 function firedRules(run, t) {
   return run.header.rules.map((rule) => ({ ...rule, strength: run.held(`rule.${rule.label}`, t) }));
 }
 
-/** Regions with their clearances at a time, the most pressing first, the goal before all. */
+/** Return the regions with their clearances at a time [s]: the goal first, then by rising clearance. */
 function distancesAt(run, t) {
   const rows = run.header.regions.map((region, index) => ({
     index,
@@ -117,14 +117,14 @@ function distancesAt(run, t) {
   return rows.sort((a, b) => press(a) - press(b) || a.index - b.index);
 }
 
-/** The size of a vector of three signals, one number for each row; null where one is missing. */
+/** Return the norm of three signals, one number for each row; null if one is missing. */
 function sizes(run, names) {
   const [x, y, z] = names.map((name) => run.column(name));
   if (!x || !y || !z) return null;
   return Float64Array.from(x, (_, i) => Math.sqrt(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]));
 }
 
-/** Numbers of the vehicle at a time: [name, text] in the order of the panel. */
+/** Return the values of the vehicle at a time [s]: [name, text] in the order of the panel. */
 function numbersAt(run, t) {
   const of = (name) => run.held(name, t);
   const size = (names) => Math.hypot(...names.map(of));
@@ -141,7 +141,7 @@ function numbersAt(run, t) {
   ];
 }
 
-/** Whether a run did all it was asked: "good", "bad" (a hard region violated, or never settled), or "fair". */
+/** Rate the outcome of a run: "good"; "bad" if a hard region is violated or the goal never settled; else "fair". */
 function outcome(run) {
   const { summary, regions, imported } = run.header;
   if (!summary) return "fair";
@@ -150,7 +150,7 @@ function outcome(run) {
   return broken.length ? "fair" : "good";
 }
 
-/** What a reader must know before trusting a run's page: sentences, none for a run that is whole. */
+/** Return warnings about an incomplete run or record as sentences; none for a complete one. */
 function troubles(run) {
   const { status } = run.header;
   const said = [];
@@ -173,7 +173,7 @@ function troubles(run) {
   return said;
 }
 
-/** Stretches of time in which a signal is below 0: [[from, to], ...]. */
+/** Return the intervals of time in which a signal is below 0: [[from, to], ...]. */
 function below(run, name) {
   const column = run.column(name);
   const stretches = [];
