@@ -1,5 +1,10 @@
 // Strip chart: a legend with the values at the cursor, and a plot that seeks.
 
+/** Return a fixed range of values with room for the lines at its ends. */
+function widened([least, most]) {
+  return [least - 0.03 * (most - least), most + 0.06 * (most - least)];
+}
+
 /** Return a new element with a class and a text. */
 function element(tag, className = "", text = "") {
   const made = document.createElement(tag);
@@ -88,7 +93,7 @@ class Chart {
     const context = this.canvas.getContext("2d");
     context.setTransform(dots, 0, 0, dots, 0, 0);
     const { fixed, zero, down } = this.spec;
-    const range = fixed ? [-0.03, 1.06] : rangeOf(this.curves, this.window, zero);
+    const range = fixed ? widened(fixed) : rangeOf(this.curves, this.window, zero);
     this.frame = new Frame(width, height, this.window, this.rest, range, down);
     paintPlot(context, this.frame, this.spec, this.curves, this.theme);
     context.fillStyle = hueColour("ink", this.theme);

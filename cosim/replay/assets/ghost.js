@@ -51,10 +51,10 @@ class Ghost {
     context.beginPath();
     context.arc(x, y, 3.5, 0, 2 * Math.PI);
     context.fill();
-    this._tell(to, x, y, width, ink, card);
+    this._label(to, x, y, width, ink, card);
   }
 
-  _tell([north, east, down], x, y, width, ink, card) {
+  _label([north, east, down], x, y, width, ink, card) {
     const { context } = this;
     const text = `N ${north.toFixed(2)}  E ${east.toFixed(2)}  D ${down.toFixed(2)} m`;
     context.font = "600 12px system-ui, sans-serif";

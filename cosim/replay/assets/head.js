@@ -1,7 +1,7 @@
 // Head of the page: task, verdict and warnings of the runs; and the splitter between scene and charts.
 
 /** Write the head of the selected run, and the warnings of all runs. */
-function tellHead(runs, selected) {
+function showHead(runs, selected) {
   const title = document.getElementById("title");
   const run = runs[selected];
   const names = runNames(runs);

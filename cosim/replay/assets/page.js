@@ -161,7 +161,7 @@ class Page {
     this.timeline.point();
     this._buttons();
     clearTimeout(this._quiet);
-    if (!player.playing && !player.live) this._quiet = setTimeout(() => this._speak(), 900);
+    if (!player.playing && !player.live) this._quiet = setTimeout(() => this._announce(), 900);
   }
 
   _laid() {
@@ -176,12 +176,12 @@ class Page {
   }
 
   _select() {
-    tellHead(this.runs, this.selected);
+    showHead(this.runs, this.selected);
     this.timeline.setRun(this.run, this.theme);
     this.panel.setRuns(this.runs, this.shown, this.selected);
   }
 
-  _speak() {
+  _announce() {
     if (!this.run?.rows) return;
     const { t } = this.player;
     setText(document.getElementById("spoken"), `${clock(t)}. ${activeWords(this.run, t).sentence}`);

@@ -67,18 +67,12 @@ function legible(colour, theme) {
   return mixedColour(colour, ink, part);
 }
 
-/** Return the full color of a region. */
-function fullColour(region) {
-  return region.colour;
-}
-
 /**
  * Return the color of a region: full if it is active, else muted in the same hue.
  * @param {object} region of the header  @param {boolean} active  @param {"light"|"dark"} theme
  */
 function regionColour(region, active, theme) {
-  const full = fullColour(region);
-  return active ? full : mixedColour(full, SCENE_THEMES[theme].muted, 0.45);
+  return active ? region.colour : mixedColour(region.colour, SCENE_THEMES[theme].muted, 0.45);
 }
 
 /** Return the color of a run's trail on a page with several runs. */

@@ -111,7 +111,7 @@ class Panel {
       const choose = element("button", "choose");
       choose.type = "button";
       choose.setAttribute("aria-pressed", String(index === selected));
-      choose.title = `Tell of ${name} in this panel`;
+      choose.title = `Show ${name} in this panel`;
       choose.append(swatch(runColour(index), runDash(index)), name);
       choose.addEventListener("click", () => this.on.select(index));
       item.append(box, choose);

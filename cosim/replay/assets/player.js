@@ -21,14 +21,14 @@ class Player {
     this.runs = runs;
     this.playing = false;
     this.t = this.start;
-    this._tell();
+    this._notify();
   }
 
   /** Replace the runs by others of the same time; the cursor stays. */
   replaceRuns(runs) {
     this.runs = runs;
     this.t = Math.min(this.t, this.end);
-    this._tell();
+    this._notify();
   }
 
   get start() {
@@ -63,7 +63,7 @@ class Player {
       this.playing = false;
       this.t = this.end;
     }
-    this._tell();
+    this._notify();
   }
 
   /** Call `fn(player)` after every change. */
@@ -83,13 +83,13 @@ class Player {
     this.playing = true;
     this._last = performance.now();
     requestAnimationFrame((now) => this._advance(now));
-    this._tell();
+    this._notify();
   }
 
   pause() {
     this.playing = false;
     this._live = false;
-    this._tell();
+    this._notify();
   }
 
   toggle() {
@@ -102,7 +102,7 @@ class Player {
     if (!Number.isFinite(t)) return;
     this.t = Math.min(this.end, Math.max(this.start, t));
     this._live = this.growing && this.t >= this.end;
-    this._tell();
+    this._notify();
   }
 
   /** Move the cursor by some rows of a run (default: the first one with rows), and pause there. */
@@ -116,7 +116,7 @@ class Player {
 
   setSpeed(x) {
     this.speed = Math.min(SPEEDS.at(-1), Math.max(SPEEDS[0], x));
-    this._tell();
+    this._notify();
   }
 
   /** Increase (1) or decrease (-1) the speed by one step. */
@@ -127,13 +127,13 @@ class Player {
 
   setFollow(on) {
     this.follow = on;
-    this._tell();
+    this._notify();
   }
 
   /** Notify the listeners after rows were appended; a live cursor moves to the end. */
   grown() {
     if (this.live) this.t = this.end;
-    this._tell();
+    this._notify();
   }
 
   _advance(now) {
@@ -147,11 +147,11 @@ class Player {
       this._live = this.growing;
     }
     // listeners request their frame first: in the other order every second frame would have no picture
-    this._tell();
+    this._notify();
     if (!over) requestAnimationFrame((next) => this._advance(next));
   }
 
-  _tell() {
+  _notify() {
     for (const fn of this._listeners) fn(this);
   }
 }

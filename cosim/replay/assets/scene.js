@@ -274,7 +274,7 @@ class Scene {
   _wayColour(index, past, active, colours) {
     if (this._runMarks) return this._runMarks[index].colour;
     const { regions } = this.runs[index].header;
-    return past ? fullColour(regions[Number.isFinite(active) ? active : 0]) : colours.future;
+    return past ? regions[Number.isFinite(active) ? active : 0].colour : colours.future;
   }
 
   _marks(way, index, t, vehicle, colours) {

@@ -82,7 +82,7 @@ class Timeline {
       if (i < rows && active[i] === active[from]) continue;
       const region = header.regions[active[from]];
       if (region) {
-        context.fillStyle = fullColour(region);
+        context.fillStyle = region.colour;
         context.globalAlpha = region.criterion ? 1 : 0.45;
         const left = x(time[from]);
         context.fillRect(left, 0, Math.max(1, x(time[Math.min(i, rows - 1)]) - left), height);

@@ -87,11 +87,11 @@ function activeWords(run, t) {
   if (run.header.imported) {
     return { index: -1, name: "imported", region: null, sentence: `Imported from ${run.header.imported}: no arbiter decided here.` };
   }
-  let sentence = `Nothing presses: the goal region alone steers, ${asked}.`;
+  let sentence = `No region asks: the goal region alone steers, ${asked}.`;
   if (region.criterion) {
     const weight = run.held(`weight.${region.criterion}`, t);
     const share = Number.isFinite(weight) ? ` with weight ${figure(weight, 2)}` : "";
-    sentence = `The criterion ${region.criterion} leads${share}; ${region.name} presses most: ${asked}.`;
+    sentence = `The criterion ${region.criterion} leads${share}; ${region.name} is most critical: ${asked}.`;
   } else if (clearance >= 0) {
     sentence = `${slow(run, t) ? "At rest" : "On the move"} in the goal region, ${asked}.`;
   }
