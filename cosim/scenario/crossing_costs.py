@@ -66,9 +66,9 @@ def _costs(
         shares = []
         for j in places:
             if i in places and i != j:
-                pressing = {criteria[i], criteria[j]}
+                asking = {criteria[i], criteria[j]}
                 asks = [
-                    _input(signal, upper.universe[1], pressing, criteria, of_regions, depth)
+                    _input(signal, upper.universe[1], asking, criteria, of_regions, depth)
                     for signal, upper in zip(inputs, system.inputs, strict=False)
                 ]
                 weights = arbiter(asks)
@@ -82,16 +82,16 @@ def _costs(
 def _input(
     signal: InputSignal,
     far: float,
-    pressing: set[str],
+    asking: set[str],
     criteria: Sequence[str],
     of_regions: Sequence[str],
     depth: float,
 ) -> float:
-    """Return the value of an input while the criteria `pressing` have membership 1; `far` is its upper bound."""
+    """Return the value of an input while the criteria `asking` have membership 1; `far` is its upper bound."""
     if signal.kind == "membership":
-        return float(criteria[signal.of] in pressing)
+        return float(criteria[signal.of] in asking)
     if signal.kind in ("clearance", "approach_time"):  # 0: on the surface
-        return 0.0 if signal.of and of_regions[signal.of - 1] in pressing else far
+        return 0.0 if signal.of and of_regions[signal.of - 1] in asking else far
     if signal.kind == "given":
         return signal.course[0][1]
     return depth if signal.kind == "depth" else 0.0

@@ -159,7 +159,7 @@ class Panel {
   _distances() {
     const { section, heading } = this._section("Distances", "distances");
     section.hidden = this.run.header.imported && this.run.header.regions.length === 1;
-    heading.append(element("span", "note", "most pressing first"));
+    heading.append(element("span", "note", "most critical first"));
     this.distances = this.run.header.regions.map((region, index) => {
       const item = element("li");
       const mark = element("span");
