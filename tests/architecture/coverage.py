@@ -27,8 +27,18 @@ class Part:
     omit: str = ""
 
 
-_MAVLINK_TESTS = ("autopilot", "framing", "ftp", "messages", "mission", "modes", "obstacles", "parameters")
-_MAVLINK_TESTS += ("signing", "targets")
+_MAVLINK_TESTS = (
+    "attitude_targets",
+    "autopilot",
+    "framing",
+    "ftp",
+    "messages",
+    "mission",
+    "modes",
+    "obstacles",
+    "parameters",
+)
+_MAVLINK_TESTS += ("signing", "streams", "targets")
 
 PARTS = (
     Part("fuzzy_arbiter", 98, ("tests/fuzzy_arbiter",), ("fuzzy_arbiter/*",)),
