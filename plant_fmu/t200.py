@@ -1,4 +1,4 @@
-"""The published force of Blue Robotics' T200 thruster by pulse, or by revolutions, and voltage, for C and Python."""
+"""The published forces and revolutions of Blue Robotics' T200 thruster by pulse and voltage, for C and Python."""
 
 from __future__ import annotations
 
@@ -66,48 +66,13 @@ def force_of_pulse(pulses: NDArray[np.float64], voltages: NDArray[np.float64]) -
     >>> force_of_pulse(np.array([1900.0, 1500.0]), np.array([16.0, 16.0])).round(2).tolist()
     [51.48, 0.0]
     """
-    low, high, share = _between(voltages)
-    rows = np.array([np.interp(pulses, PULSES, row) for row in FORCES])
-    at_low, at_high = (np.take_along_axis(rows, row[None], axis=0)[0] for row in (low, high))
-    force: NDArray[np.float64] = at_low + share * (at_high - at_low)
-    return force
-
-
-def force_of_rpm(rpm: NDArray[np.float64], voltages: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the force of a T200 at rest by its revolutions, linear between the published points.
-
-    A pulse's revolutions and its force belong together at voltages between the published ones too.
-
-    Parameters
-    ----------
-    rpm : ndarray
-        [rev/min], above 0 where the force is, whichever way the propeller is handed; cut at those of 1100 and 1900 us.
-    voltages : ndarray of the same shape
-        [V], cut at 10 and 20.
-
-    Returns
-    -------
-    ndarray
-        [N]; NaN where the revolutions or the voltage are.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> force_of_rpm(np.array([3533.0, 0.0, 9999.0]), np.array([16.0, 16.0, 10.0])).round(2).tolist()
-    [51.48, 0.0, 28.73]
-    """
-    low, high, share = _between(voltages)
-    part = share[..., None]
-    at, forces = (rows[low] + part * (rows[high] - rows[low]) for rows in (RPM, FORCES))
-    table = zip(rpm.ravel(), at.reshape(-1, PULSES.size), forces.reshape(-1, PULSES.size), strict=True)
-    return np.array([np.interp(turns, points, row) for turns, points, row in table], float).reshape(rpm.shape)
-
-
-def _between(voltages: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
-    """Return the two rows between which each voltage is, and how much of the second there is."""
     at = np.clip((voltages - VOLTAGES[0]) / 2.0, 0.0, len(VOLTAGES) - 1.0)
-    low = np.minimum(np.nan_to_num(at).astype(np.intp), len(VOLTAGES) - 2)
-    return low, low + 1, at - low
+    whole = np.minimum(np.nan_to_num(at).astype(int), len(VOLTAGES) - 2)
+    part = at - whole
+    rows = np.array([np.interp(pulses, PULSES, row) for row in FORCES])
+    low, high = (np.take_along_axis(rows, (whole + k)[None], axis=0)[0] for k in (0, 1))
+    force: NDArray[np.float64] = low + part * (high - low)
+    return force
 
 
 def t200_header() -> str:

@@ -8,55 +8,57 @@
 #include "t200.h" /* generated: the published points */
 
 typedef struct {
-    double value, by_command, by_voltage;
-} Curve;
+    double force, by_command, by_voltage; /* N; derivatives */
+} Thrust;
 
-static double mix(double low, double high, double share)
+static double interpolate(double low, double high, double share)
 {
     return low + share * (high - low);
 }
 
-/* Force [N] of a T200 at a command and a supply voltage [V], linear between the published points, and its derivatives by
-   the two: at a published point, those from below. `low` and `high` are the commands of those points at the published
-   voltages `row` and `row` + 1. */
-static Curve between(double command, double voltage, int row, const double *low, const double *high)
+/* Returns the force of a T200 at a command and a supply voltage [V], linear between the published points, with its
+   derivatives, at a published point those from below. `low` and `high` are the commands of the points at the published
+   voltages `row` and `row` + 1. Commands beyond the points give the forces of the last ones. */
+static Thrust thrust_between(double command, double voltage, int row, const double *low, const double *high)
 {
     const double share = (voltage - T200_FIRST_VOLTAGE) / T200_VOLTAGE_STEP - row;
     const double *low_force = T200_FORCES[row], *high_force = T200_FORCES[row + 1];
     int i = 0;
 
-    while (i < N_T200_PULSES - 2 && command > mix(low[i + 1], high[i + 1], share))
+    while (i < N_T200_PULSES - 2 && command > interpolate(low[i + 1], high[i + 1], share))
         i++;
-    const double start = mix(low[i], high[i], share), width = mix(low[i + 1], high[i + 1], share) - start;
-    const double force = mix(low_force[i], high_force[i], share);
-    const double rise = mix(low_force[i + 1], high_force[i + 1], share) - force;
-    const double whole = (command - start) / width, part = fmin(fmax(whole, 0.0), 1.0);
-    const double slope = whole == part ? rise / width : 0.0;
-    const double moves = mix(high[i] - low[i], high[i + 1] - low[i + 1], part);
-    const double grows = mix(high_force[i] - low_force[i], high_force[i + 1] - low_force[i + 1], part);
+    const double start = interpolate(low[i], high[i], share), width = interpolate(low[i + 1], high[i + 1], share) - start;
+    const double force = interpolate(low_force[i], high_force[i], share);
+    const double rise = interpolate(low_force[i + 1], high_force[i + 1], share) - force;
+    const double place = (command - start) / width, part = fmin(fmax(place, 0.0), 1.0);
+    const double slope = place == part ? rise / width : 0.0;
+    /* from one published voltage to the next, at the same part between two points */
+    const double command_change = interpolate(high[i] - low[i], high[i + 1] - low[i + 1], part);
+    const double force_change = interpolate(high_force[i] - low_force[i], high_force[i + 1] - low_force[i + 1], part);
 
-    return (Curve){force + part * rise, slope, (grows - slope * moves) / T200_VOLTAGE_STEP};
+    return (Thrust){force + part * rise, slope, (force_change - slope * command_change) / T200_VOLTAGE_STEP};
 }
 
+/* Returns the row of published forces below a voltage; the plant refuses voltages beyond the published ones. */
 static int row_of(double voltage)
 {
     int row = 0;
 
-    while ((voltage - T200_FIRST_VOLTAGE) / T200_VOLTAGE_STEP > row + 1.0) /* no voltage outside the published ones is accepted */
+    while ((voltage - T200_FIRST_VOLTAGE) / T200_VOLTAGE_STEP > row + 1.0)
         row++;
     return row;
 }
 
-static Curve force_of_pulse(double pulse, double voltage)
+static Thrust force_of_pulse(double pulse, double voltage)
 {
-    return between(pulse, voltage, row_of(voltage), T200_PULSES, T200_PULSES);
+    return thrust_between(pulse, voltage, row_of(voltage), T200_PULSES, T200_PULSES);
 }
 
-static Curve force_of_rpm(double rpm, double voltage)
+static Thrust force_of_rpm(double rpm, double voltage)
 {
     const int row = row_of(voltage);
 
-    return between(rpm, voltage, row, T200_RPM[row], T200_RPM[row + 1]);
+    return thrust_between(rpm, voltage, row, T200_RPM[row], T200_RPM[row + 1]);
 }
 
 bool coupling_acts(const Model *m)
@@ -71,7 +73,7 @@ bool coupling_acts(const Model *m)
     return false;
 }
 
-/* Adds what the external wrenches come to: the one in the body frame as it is, the one in the world frame about the origin. */
+/* Writes the external wrenches: the one in the body frame about the origin, the one in the world frame as given. */
 static void add_external(const Coupling *c, External *external)
 {
     double lever[3];
@@ -106,8 +108,8 @@ void coupling_apply(const Model *m, Model *out)
         const double share = c->thrust_normalized[i];
         out->inputs.thrust[i] += share < 0.0 ? -share * p->thrust_min[i] : share * p->thrust_max[i];
         if (c->thrust_pulse[i] > 0.0)
-            out->inputs.thrust[i] += force_of_pulse(c->thrust_pulse[i], c->supply_voltage).value;
-        out->inputs.thrust[i] += force_of_rpm(c->thrust_rpm[i], c->supply_voltage).value;
+            out->inputs.thrust[i] += force_of_pulse(c->thrust_pulse[i], c->supply_voltage).force;
+        out->inputs.thrust[i] += force_of_rpm(c->thrust_rpm[i], c->supply_voltage).force;
         p->thrust_effectiveness[i] *= 1.0 - c->thrust_failure[i];
     }
     for (int i = 0; i < N_SENSORS; i++)
@@ -142,10 +144,10 @@ void coupling_tangent(const Model *m, const Model *seed, Model *out)
         out->inputs.thrust[i] += share < 0.0 ? -dshare * p->thrust_min[i] - share * dp->thrust_min[i]
                                              : dshare * p->thrust_max[i] + share * dp->thrust_max[i];
         if (c->thrust_pulse[i] > 0.0) {
-            const Curve pulse = force_of_pulse(c->thrust_pulse[i], c->supply_voltage);
+            const Thrust pulse = force_of_pulse(c->thrust_pulse[i], c->supply_voltage);
             out->inputs.thrust[i] += pulse.by_command * dc->thrust_pulse[i] + pulse.by_voltage * dc->supply_voltage;
         }
-        const Curve rpm = force_of_rpm(c->thrust_rpm[i], c->supply_voltage);
+        const Thrust rpm = force_of_rpm(c->thrust_rpm[i], c->supply_voltage);
         out->inputs.thrust[i] += rpm.by_command * dc->thrust_rpm[i] + rpm.by_voltage * dc->supply_voltage;
         out->plant.parameters.thrust_effectiveness[i] = dp->thrust_effectiveness[i] * (1.0 - c->thrust_failure[i]) -
                                                         p->thrust_effectiveness[i] * dc->thrust_failure[i];

@@ -1,5 +1,5 @@
-/* What other components do to the vehicle: inputs that are off while they are 0. A plant that is not COUPLED has none of
- * them, and nothing of this in its library. */
+/* Inputs for the effects of other components on the vehicle; 0 turns an input off. A plant that is not COUPLED has none of
+ * them, and none of this code in its library. */
 #ifndef COUPLING_H
 #define COUPLING_H
 
@@ -7,13 +7,13 @@
 
 #include "model.h"
 
-/* Whether any is on. */
+/* Returns true if any of these inputs is on. */
 bool coupling_acts(const Model *model);
 
-/* Writes the model with all that they do in its parameters, inputs and external wrench. */
+/* Writes the model with the effects of these inputs in its parameters, inputs and external wrench. */
 void coupling_apply(const Model *model, Model *out);
 
-/* Writes the direction `seed` of a model with what it is for the model that coupling_apply writes. */
+/* Writes the tangent of coupling_apply along the direction `seed`. */
 void coupling_tangent(const Model *model, const Model *seed, Model *out);
 
 #endif

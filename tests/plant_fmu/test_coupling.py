@@ -5,9 +5,10 @@ import pytest
 
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.build import cached_fmu
-from plant_fmu.t200 import force_of_pulse, force_of_rpm
+from plant_fmu.t200 import force_of_pulse
 from plant_fmu.variables import variables
 from plant_fmu.vehicle_component import of_vehicle
+from tests.plant_fmu.t200_by_rpm import force_of_rpm
 
 MOTION = ("position.x", "position.y", "position.z", "velocity.u", "velocity.v", "velocity.w", "velocity.q")
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from plant_fmu.t200 import PULSES, RPM, VOLTAGES, force_of_pulse, force_of_rpm
+from plant_fmu.t200 import PULSES, RPM, VOLTAGES, force_of_pulse
+from tests.plant_fmu.t200_by_rpm import force_of_rpm
 
 # us, V, rev/min without a sign, kgf; of Blue Robotics' table of September 2019, none of the points kept here
 ROWS = [
