@@ -1,11 +1,11 @@
-/* The plant as a whole: what moves, what is sampled and held, what is put in, what comes out. */
+/* The plant as a whole: motion, sampled and held values, inputs, outputs. */
 #ifndef MODEL_H
 #define MODEL_H
 
 #include "plant.h"
 
 #define NO_SAMPLE -1e12 /* s, stamp before the first sample */
-#define UPRIGHT 1e-12 /* cosine of pitch below which roll and yaw are one */
+#define UPRIGHT 1e-12 /* cosine of pitch below which roll and yaw are not separate */
 
 enum { CURRENT_CLOCK = N_SENSORS, N_CLOCKS }; /* one for each sensor, one for the current's variation */
 
@@ -13,7 +13,7 @@ typedef struct {
     double period;  /* s, 0: does not run */
     double since;   /* s, time of its tick 0 */
     double ticks;   /* since then */
-    double samples; /* in all: the place in the stream of random numbers */
+    double samples; /* since the start: the place in the stream of random numbers */
 } Clock;
 
 enum { MAX_PENDING = 8, MAX_SENSOR_CHANNELS = 6 }; /* samples of a sensor that are not delivered yet; channels of the IMU */
@@ -23,9 +23,9 @@ typedef struct { /* a sample that is not delivered yet */
     double values[MAX_SENSOR_CHANNELS];
 } Pending;
 
-typedef struct { /* what changes at ticks alone */
+typedef struct { /* values that change only at ticks */
     Clock clocks[N_CLOCKS];
-    double next_tick; /* s, of any clock or pending sample; INFINITY if there is none */
+    double next_tick; /* s, of any clock or pending sample; INFINITY: none */
     double samples[N_MEASURED];
     double sample_time[N_SENSORS];         /* s, of the last delivered sample */
     double delivered[N_SENSORS];           /* number of samples */
@@ -35,7 +35,7 @@ typedef struct { /* what changes at ticks alone */
 } Held;
 
 typedef struct {
-    Mask thrust_cut[N_THRUSTERS]; /* a command was beyond its limits */
+    Mask thrust_cut[N_THRUSTERS]; /* the command exceeds its limits */
     Mask wrench_cut;
     int bottom_touched;
 } Flags;
@@ -43,12 +43,12 @@ typedef struct {
 typedef struct {
     State rate;                  /* time derivative of the state */
     double thrust[N_THRUSTERS];  /* present forces, N */
-    double wrench[6];            /* what all actuators put on the body */
+    double wrench[6];            /* of all actuators, body frame */
     double euler[3];             /* roll, pitch, yaw */
     double water[3];             /* m/s, world frame */
     double altitude;             /* m */
     double measured[N_MEASURED];
-    double stamp[N_SENSORS];     /* s, when what is measured was sampled */
+    double stamp[N_SENSORS];     /* s, time of each sensor's sample */
     Flags flags;
 } Outputs;
 
@@ -57,15 +57,15 @@ typedef struct {
     double point[3];            /* m, body frame: where the force acts */
 } Load;
 
-typedef struct { /* what other components do, see coupling.h; real numbers alone */
-    double supply_voltage;                 /* V, of thrusters that are given pulses or revolutions */
-    double current[3], current_rate[3];    /* m/s, m/s2, world frame, beside that of the parameters */
-    Load world, body;                      /* in the frame of that name */
+typedef struct { /* effects of other components, see coupling.h; real numbers only */
+    double supply_voltage;                 /* V, of thrusters commanded by pulses or revolutions */
+    double current[3], current_rate[3];    /* m/s, m/s2, world frame, added to that of the parameters */
+    Load world, body;                      /* in the world and in the body frame */
     double thrust_normalized[N_THRUSTERS]; /* -1 to 1, of the thrusters' limits */
     double thrust_pulse[N_THRUSTERS];      /* us, 0: none */
-    double thrust_rpm[N_THRUSTERS];      /* rev/min, signed as the force */
-    double thrust_failure[N_THRUSTERS];    /* part of the force that is lost */
-    double outage[N_SENSORS];              /* probability that a sample is lost, at least */
+    double thrust_rpm[N_THRUSTERS];        /* rev/min, signed as the force */
+    double thrust_failure[N_THRUSTERS];    /* lost fraction of the force */
+    double outage[N_SENSORS];              /* lower bound of the probability that a sample is lost */
 } Coupling;
 
 typedef struct {
@@ -76,25 +76,25 @@ typedef struct {
     Coupling coupling;
     Outputs outputs;
     double time;
-    double stop_time; /* INFINITY if there is none */
-} Model; /* plain data: all that an FMU state holds */
+    double stop_time; /* INFINITY: none */
+} Model; /* plain data: the whole FMU state */
 
-/* Brings constants and clocks up to the parameters. Returns NULL, or what is wrong with the parameters. */
+/* Updates constants and clocks from the parameters. Returns NULL, or a message on invalid parameters. */
 const char *model_prepare(Model *model);
 
-/* Fills the outputs from all the rest. */
+/* Computes the outputs. */
 void model_evaluate(Model *model);
 
-/* Time of the next tick of any clock, INFINITY if none runs. */
+/* Returns the time of the next tick of any clock; INFINITY: none runs. */
 double model_next_tick(const Model *model);
 
-/* Does all that is due now: samples, and the next piece of the current. Returns whether there was any. */
+/* Takes the samples that are due now, and draws the current's next knot. Returns 1 if any was due. */
 int model_tick(Model *model);
 
-/* Whether a measured channel shows its last sample; else, before the first, or without a rate, what is true now. */
+/* Returns 1 if a measured channel shows its last sample; else, without a rate or before the first, it shows the truth. */
 int model_holds(const Model *model, int channel);
 
-/* Forces without a lag are no states of motion: puts them to where their commands point. Returns whether any changed. */
+/* Sets the forces without lag, which are no states of motion, to their commands. Returns 1 if any changed. */
 int model_settle(Model *model);
 
 /* Integrates up to the time `end` with whole substeps from tick to tick. Returns 0 if that is not possible, with the
