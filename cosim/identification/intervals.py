@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 DISAGREES = 1.2  # chi2 by degrees of freedom, above which the model is called wrong
 RESTS = 0.5  # of the prior's deviation: above it, a number rests on its prior
 _BLOCK = 5.0  # s, of residuals that stay together in the jackknife
-_LONG_BLOCK = 20.0  # s, of windows that stay together that are alike: what a model lacks may last for seconds
+_LONG_BLOCK = 20.0  # s, of a piece where neighboring windows are correlated: a model's error may last for seconds
 _FEWEST_RUNS = 8  # from which on whole runs are left out instead
 _COVERED = 0.95
 NORMAL = 1.96  # standard deviations: half of a 95 % interval
@@ -61,9 +61,9 @@ def estimate_intervals(
     windows : sequence of Window
         The windows.
     eliminated : int
-        Unknowns of each window that are no parameters: its start.
+        Number of unknowns of each window that are not parameters, such as its start.
     random_force : bool
-        Whether one is estimated: those of windows that follow each other are alike.
+        True if one is estimated: forces of neighboring windows are correlated.
 
     Returns
     -------
@@ -81,12 +81,12 @@ def estimate_intervals(
     inverse: Any = np.linalg.inv(information)
     nominal = np.sqrt(np.diag(inverse))
 
-    are_alike = random_force or chi2 > DISAGREES
-    pieces, clusters = _pieces(reduced, windows, are_alike)
+    are_correlated = random_force or chi2 > DISAGREES
+    pieces, clusters = _pieces(reduced, windows, are_correlated)
     half = NORMAL * nominal
     if len(pieces) > 1:
         jackknife, freedom = _jackknife(information, inverse, pieces)
-        if not are_alike:  # nominal ones are right as far as anybody knows: few pieces need no more
+        if not are_correlated:  # nothing contradicts the nominal ones: the number of pieces suffices
             freedom = np.full_like(freedom, len(pieces) - 1.0)
         half = np.maximum(half, jackknife * student.ppf(0.5 + _COVERED / 2.0, freedom))
     scale = half / (NORMAL * nominal)
@@ -119,11 +119,11 @@ def _jackknife(information: Array, inverse: Array, pieces: Sequence[tuple[Array,
 
 
 def _pieces(
-    reduced: Sequence[Reduced], windows: Sequence[Window], are_alike: bool
+    reduced: Sequence[Reduced], windows: Sequence[Window], are_correlated: bool
 ) -> tuple[list[tuple[Array, Array]], str]:
     """Return rows that stay together, and what they are."""
     runs = len({window.run for window in windows})
-    if runs >= _FEWEST_RUNS or are_alike:
+    if runs >= _FEWEST_RUNS or are_correlated:
         whole = runs >= _FEWEST_RUNS
         together: dict[tuple[int, int], list[Reduced]] = {}
         for r, window in zip(reduced, windows, strict=True):

@@ -34,9 +34,8 @@ _FASTEST = 2.0  # rad/s
 _STEEPEST = math.sin(math.radians(55.0))
 _SMALLER = 0.7  # part of the sticks, each time a segment leaves the limits
 _TRIES = 7
-CURRENT = 0.1  # m/s, that the schedule allows for unless the user says otherwise
-_OTHERS = 8  # vehicles for which the schedule is made smaller, and again as many on which it is tried
-_INSIDE = 1.0  # part of half the box that those may use
+CURRENT = 0.1  # m/s, default of the current in which vehicles stay inside the box
+_OTHERS = 8  # vehicles for which the forces are reduced, and as many random ones that show the result
 
 
 @dataclass(frozen=True)
@@ -125,7 +124,7 @@ def _design(
             f"--depth {depth:g}: the box of {box[2]:g} m leaves the water, expected "
             f"{0.5 * box[2] + vehicle.hull_radius:g} m or more"
         )
-    most = _INSIDE * 0.5 * min(box[:2]) / SECONDS
+    most = 0.5 * min(box[:2]) / SECONDS
     if current > most:
         raise IdentificationError(
             f"--current {current:g}: carries the vehicle out of the box within a segment of {SECONDS:g} s, expected "
@@ -173,52 +172,52 @@ def _design(
 def draw_others(
     scenario: Scenario, parameters: Sequence[Parameter], current: float, rng: np.random.Generator
 ) -> list[Scenario]:
-    """Return scenarios of vehicles as they may be, each in a current.
+    """Return scenarios of random vehicles, each in a current of random direction.
 
     Parameters
     ----------
     scenario : Scenario
-        Of the vehicle as it is known.
+        Scenario of the known vehicle.
     parameters : sequence of Parameter
-        What is free. Damping and the diagonal of the added mass are drawn from half to one and a half times.
+        Free numbers; damping and diagonal added mass are drawn from 0.5 to 1.5 times their start values.
     current : float
-        Its size [m/s]; its direction is drawn.
+        Speed of the current [m/s].
     rng : Generator
-        Of the draws.
+        Source of the random numbers.
     """
     found = []
     for _ in range(_OTHERS):
-        parts = {p.plant: p.start * rng.uniform(0.5, 1.5) for p in parameters if _is_uncertain(p)}
-        angle = rng.uniform(0.0, 2.0 * math.pi)
-        flow = [current * math.cos(angle), current * math.sin(angle), 0.0]
-        found.append(scenario.replace({"plant.current": flow, "plant.parameters": parts}))
+        values = {p.plant: p.start * rng.uniform(0.5, 1.5) for p in parameters if _is_uncertain(p)}
+        found.append(_in_current(scenario, values, current, rng.uniform(0.0, 2.0 * math.pi)))
     return found
 
 
 def fastest_others(scenario: Scenario, parameters: Sequence[Parameter], current: float) -> list[Scenario]:
-    """Return scenarios of the vehicle of `draw_others` that moves fastest, in currents of all directions.
+    """Return scenarios of the fastest vehicle of `draw_others`, in currents of evenly spaced directions.
 
     Parameters
     ----------
     scenario : Scenario
-        Of the vehicle as it is known.
+        Scenario of the known vehicle.
     parameters : sequence of Parameter
-        What is free. Damping and the diagonal of the added mass are half.
+        Free numbers; damping and diagonal added mass are half their start values.
     current : float
-        Its size [m/s].
+        Speed of the current [m/s].
     """
-    parts = {p.plant: 0.5 * p.start for p in parameters if _is_uncertain(p)}
-    found = []
-    for angle in 2.0 * math.pi * np.arange(_OTHERS) / _OTHERS:
-        flow = [current * math.cos(angle), current * math.sin(angle), 0.0]
-        found.append(scenario.replace({"plant.current": flow, "plant.parameters": parts}))
-    return found
+    values = {p.plant: 0.5 * p.start for p in parameters if _is_uncertain(p)}
+    return [_in_current(scenario, values, current, 2.0 * math.pi * k / _OTHERS) for k in range(_OTHERS)]
+
+
+def _in_current(scenario: Scenario, values: dict[str, float], current: float, angle: float) -> Scenario:
+    """Return a scenario with other plant parameters, in a current [m/s] towards an angle [rad] from north."""
+    flow = [current * math.cos(angle), current * math.sin(angle), 0.0]
+    return scenario.replace({"plant.current": flow, "plant.parameters": values})
 
 
 def keep_inside(
     segments: Sequence[Segment], scenario: Scenario, box: tuple[float, float, float], others: Sequence[Scenario]
 ) -> tuple[Segment, ...]:
-    """Return segments with smaller forces where other vehicles would come near the sides of the box.
+    """Return segments with reduced forces where other vehicles would leave the box.
 
     Parameters
     ----------
@@ -234,16 +233,16 @@ def keep_inside(
     Returns
     -------
     tuple of Segment
-        Forces are made smaller some times at the most: against a current alone that may not suffice.
+        Forces are reduced a few times at most; against a current alone that may not suffice.
     """
     found = list(segments)
     for _ in range(_TRIES):
         commands = schedule(found)
         parts = np.max([farthest(rehearse(other, commands), scenario, box, len(found)) for other in others], axis=0)
-        if (parts <= _INSIDE).all():
+        if (parts <= 1.0).all():
             break
         found = [
-            Segment(s.title, s.mode, s.sticks * np.repeat([_SMALLER, 1.0], 3)) if part > _INSIDE else s
+            Segment(s.title, s.mode, s.sticks * np.repeat([_SMALLER, 1.0], 3)) if part > 1.0 else s
             for s, part in zip(found, parts, strict=True)
         ]
     return tuple(found)
