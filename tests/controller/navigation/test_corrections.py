@@ -83,6 +83,20 @@ def test_first_covariance_is_that_of_a_start_at_rest_with_constant_errors_of_the
     assert memory.covariance == pytest.approx(np.diag(np.square(deviations)), rel=1e-12)
 
 
+def correct(memory, sensor, sample, time):
+    """Correct a memory by a sample of a sensor, taken at a time [s]."""
+    measurements = empty_measurements()
+    measurements.values[PLACES[sensor]], measurements.times[sensor] = sample, time
+    correct_by_sensor(memory, measurements, sensor, SENSORS)
+
+
+def assert_estimate(memory, expected, covariance):
+    """Assert that a memory has the motion and the constants of another one, and a covariance."""
+    assert memory.covariance == pytest.approx(covariance, rel=1e-5, abs=1e-9)
+    for ours, theirs in zip(memory[:4], expected[:4], strict=True):
+        assert ours == pytest.approx(theirs, abs=2e-6)
+
+
 @pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("sensor", list(PLACES))
 def test_a_sample_corrects_as_by_plain_matrices(sensor):
@@ -92,16 +106,11 @@ def test_a_sample_corrects_as_by_plain_matrices(sensor):
         H, P = rows_by_differences(memory, sensor), memory.covariance.copy()
         S = H @ P @ H.T + NOISE[sensor] ** 2 * np.eye(len(H))
         off = rng.multivariate_normal(np.zeros(len(H)), S) * 0.5
-        measurements = empty_measurements()
-        measurements.values[PLACES[sensor]] = ideal_measurement(memory, sensor) + off
         K = P @ H.T @ np.linalg.inv(S)
-        expected, error = moved(memory, K @ off), np.linalg.inv(S)
-        measurements.times[sensor] = memory.time[0]
-        correct_by_sensor(memory, measurements, sensor, SENSORS)
-        assert memory.covariance == pytest.approx((np.eye(N_ERRORS) - K @ H) @ P, rel=1e-5, abs=1e-9)
-        for ours, theirs in zip(memory[:4], expected[:4], strict=True):
-            assert ours == pytest.approx(theirs, abs=2e-6)
-        assert memory.innovations[sensor, 0] == pytest.approx(off @ error @ off, rel=1e-5)
+        expected = moved(memory, K @ off), (np.eye(N_ERRORS) - K @ H) @ P
+        correct(memory, sensor, ideal_measurement(memory, sensor) + off, memory.time[0])
+        assert_estimate(memory, *expected)
+        assert memory.innovations[sensor, 0] == pytest.approx(off @ np.linalg.inv(S) @ off, rel=1e-5)
         assert memory.innovations[sensor].tolist()[1:] == [len(H), 0.0]
         assert (memory.accepted[sensor], memory.rejected[sensor], memory.resets[sensor]) == (1.0, 0.0, 0.0)
 
@@ -116,12 +125,9 @@ def test_attitude_is_corrected_by_the_measured_velocity_while_the_estimated_one_
     truth, P = moved(memory, error), memory.covariance.copy()
     H, off = rows_by_differences(truth, DVL), ideal_measurement(truth, DVL) - ideal_measurement(memory, DVL)
     K = P @ H.T @ np.linalg.inv(H @ P @ H.T + NOISE[DVL] ** 2 * np.eye(3))
-    expected, measurements = moved(memory, K @ off), empty_measurements()
-    measurements.values[PLACES[DVL]], measurements.times[DVL] = ideal_measurement(truth, DVL), memory.time[0]
-    correct_by_sensor(memory, measurements, DVL, SENSORS)
-    assert memory.covariance == pytest.approx((np.eye(N_ERRORS) - K @ H) @ P, rel=1e-5, abs=1e-9)
-    for ours, theirs in zip(memory[:4], expected[:4], strict=True):
-        assert ours == pytest.approx(theirs, abs=2e-6)
+    expected = moved(memory, K @ off), (np.eye(N_ERRORS) - K @ H) @ P
+    correct(memory, DVL, ideal_measurement(truth, DVL), memory.time[0])
+    assert_estimate(memory, *expected)
 
 
 @pytest.mark.parametrize("sensor", list(PLACES))
@@ -135,13 +141,9 @@ def test_delayed_sample_corrects_as_by_plain_matrices(sensor):
     H, P = rows_by_differences(before, sensor) @ (np.eye(N_ERRORS) - age * F), memory.covariance.copy()
     S = H @ P @ H.T + NOISE[sensor] ** 2 * np.eye(len(H))
     off, K = rng.multivariate_normal(np.zeros(len(H)), S) * 0.5, P @ H.T @ np.linalg.inv(S)
-    expected, measurements = moved(memory, K @ off), empty_measurements()
-    measurements.values[PLACES[sensor]] = ideal_measurement(before, sensor) + off
-    measurements.times[sensor] = before.time[0]
-    correct_by_sensor(memory, measurements, sensor, SENSORS)
-    assert memory.covariance == pytest.approx((np.eye(N_ERRORS) - K @ H) @ P, rel=1e-5, abs=1e-9)
-    for ours, theirs in zip(memory[:4], expected[:4], strict=True):
-        assert ours == pytest.approx(theirs, abs=2e-6)
+    expected = moved(memory, K @ off), (np.eye(N_ERRORS) - K @ H) @ P
+    correct(memory, sensor, ideal_measurement(before, sensor) + off, before.time[0])
+    assert_estimate(memory, *expected)
 
 
 @pytest.mark.parametrize("sensor", list(PLACES))
