@@ -54,7 +54,7 @@ CONDITIONS: tuple[Condition, ...] = (
     Condition("disarmed", 0.0, "", "the vehicle is disarmed", "pilot"),
     Condition("mode taken", 0.0, "", "the mode that is steered in was on, and is not any more", "pilot"),
     Condition("refused mode", 0.8, "s", "since the mode was asked for, without it", "held"),
-    Condition("pilot gain", GAIN_OFF, "", "the autopilot's pilot gain is not the one that the user said", "held"),
+    Condition("pilot gain", GAIN_OFF, "", "the autopilot's pilot gain differs from the user's", "held"),
     Condition("lost link", 0.4, "s", "since anything came from the autopilot", "held"),
     Condition("stale estimate", 0.5, "s", "age of the older one of position and attitude", "held"),
     Condition("late loop", 0.3, "s", "by which a step begins too late", "held"),

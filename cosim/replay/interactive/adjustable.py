@@ -33,11 +33,8 @@ _LISTS = ("points", "corners")  # lists of such
 _DEPTHS = ("top", "bottom", "depth")
 # tried numbers differ from the scenario's by the first, and these differences from each other by the second
 _STEP, _APART = 0.0037291, 1.7e-5
-_TOGETHER = (
-    2.0**-8,
-    2.0**-9,
-    2.0**-10,
-)  # m, by which both ends of a cylinder are tried: its length is rounded to the same
+# m, by which both ends of a cylinder are moved together along each axis: these keep its length to the last bit
+_TOGETHER = (2.0**-8, 2.0**-9, 2.0**-10)
 
 
 @dataclass(frozen=True)
