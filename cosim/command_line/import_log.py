@@ -21,12 +21,12 @@ def add_verb(verbs: Any) -> None:
         Of the command.
     """
     log = verbs.add_parser("import", help="read the log of a vehicle as a run")
-    log.add_argument("log", type=Path, metavar="LOG", help=".bin, .tlog, .ulg, .csv, .parquet or .mcap")
+    log.add_argument(
+        "log", type=Path, metavar="LOG", help=".bin, .tlog, .ulg, .csv, .parquet, .mcap, .db3, .bag or a bag's folder"
+    )
     log.add_argument("--vehicle", required=True, help="a shipped vehicle or a TOML file, whose thrusters are driven")
     log.add_argument("--scenario", help="shipped name or TOML file, whose goal and regions judge it (default: none)")
-    log.add_argument(
-        "--map", type=Path, metavar="FILE", dest="columns", help="column map, for .csv, .parquet and .mcap"
-    )
+    log.add_argument("--map", type=Path, metavar="FILE", dest="columns", help="column map, for tables and bags")
     log.add_argument("--rate", type=number(1e-3, 1e4), metavar="HZ", help="rows a second (default: by the log)")
     log.add_argument(
         "--curve", choices=("linear", "quadratic", "t200"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,6 +56,7 @@ class ColumnMap:
     time: TimeColumn | None = None
     world: World = "NED"
     body: Body = "FRD"
+    messages: str = ""  # folder of .msg files, for types that a bag does not define
     position: MappedQuantity | None = None
     attitude: MappedQuantity | None = None
     velocity_world: MappedQuantity | None = None
@@ -178,6 +180,10 @@ def read_map(path: Path) -> ColumnMap:
         columns = decode(read_toml(path), ColumnMap)
         for name, mapped in columns.quantities.items():
             _check(name, mapped)
+        if columns.messages:
+            columns = dataclasses.replace(columns, messages=str(path.parent / columns.messages))
+            if not Path(columns.messages).is_dir():
+                raise TableError(f"messages is {columns.messages!r}, expected a folder of .msg files")
         if not columns.quantities:
             raise TableError("maps no quantity, expected tables such as [attitude], [depth] and [pulses]")
     except TableError as error:

@@ -26,6 +26,8 @@ class LogFormat:
         ImportLogError if the file is no such log.
     mapped : bool
         True if it needs a column map; otherwise it accepts none.
+    folder : bool
+        True if a log may be a folder of such files.
     needs : tuple of str
         Packages beyond the base installation, as requirements of pip.
     """
@@ -33,4 +35,5 @@ class LogFormat:
     suffixes: tuple[str, ...]
     read: Callable[[Path, ColumnMap | None, LogContents, Moved], None]
     mapped: bool = False
+    folder: bool = False
     needs: tuple[str, ...] = ()

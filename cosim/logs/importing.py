@@ -61,7 +61,7 @@ def import_log(
     Parameters
     ----------
     log : str or Path
-        ``.bin``, ``.tlog``, ``.ulg``, ``.csv``, ``.parquet`` or ``.mcap``.
+        ``.bin``, ``.tlog``, ``.ulg``, ``.csv``, ``.parquet``, or a bag: ``.mcap``, ``.db3``, ``.bag``, or its folder.
     vehicle : str or Path
         A shipped vehicle or a TOML file, with the thrusters that the commands drive.
     out : str or Path, optional
@@ -69,7 +69,7 @@ def import_log(
     scenario : str or Path, optional
         Scenario whose goal and regions are evaluated along the log. Default: none.
     columns : str or Path, optional
-        The column map that ``.csv``, ``.parquet`` and ``.mcap`` need.
+        The column map that tables and bags need.
     rate : float, optional
         Rows per second [Hz]. Default: the least of 5, 10, 20, 25, 50, 100 and 200 that no state or command exceeds.
     curve : str, optional
@@ -137,11 +137,13 @@ def import_log(
 
 def _format_of(path: Path) -> LogFormat:
     known = ", ".join(sorted(FORMATS))
+    if path.is_dir():
+        return next(form for form in FORMATS.values() if form.folder)
     form = FORMATS.get(path.suffix.lower())
     if form is None:
         raise ImportLogError(f"ends in {path.suffix!r}, expected one of {known}")
     if not path.is_file():
-        raise ImportLogError("is a folder or a device, expected a file" if path.exists() else "no such file")
+        raise ImportLogError("is a device, expected a file" if path.exists() else "no such file")
     if not path.stat().st_size:
         raise ImportLogError("is empty, expected a log")
     return form
@@ -268,10 +270,12 @@ def _facts(
 ) -> LogFacts:  # fmt: skip
     """Return the facts about the log that the run records."""
     remarks = list(contents.remarks)
+    files = [file for file in path.iterdir() if file.is_file()] if path.is_dir() else [path]
     if clock.words():
         remarks.append(f"Clocks: {clock.words()}.")
+    size = sum(file.stat().st_size for file in files)
     return LogFacts(
-        printable(path.name), path.stat().st_size, start, hertz, commands.words if commands else "",
+        printable(path.name), size, start, hertz, commands.words if commands else "",
         tuple(_topic_facts(topic, start) for topic in topics.values()),
         {printable(name): count for name, count in contents.unread.most_common()},
         tuple(printable(remark) for remark in remarks),

@@ -35,14 +35,14 @@ ONE_PLACE = {
     "foxglove_schemas_protobuf": {"cosim.export.mcap_writer", "cosim.export.foxglove_scene"},
     "google": {"cosim.export.foxglove_scene", "cosim.export.protobuf_table"},
     "libcosimpy": {"plant_fmu.importers.libcosim"},
-    "mcap": {"cosim.export.mcap_writer", "cosim.logs.formats.mcap"},
-    "mcap_ros2": {"cosim.logs.formats.mcap"},
+    "mcap": {"cosim.export.mcap_writer", "cosim.logs.bag_storage", "cosim.logs.formats.bag"},
     "mcap_protobuf": {"cosim.export.mcap_writer"},
     "numba": {"fuzzy_arbiter.export.compiled"},
     "pandas": {"cosim.results.run_result"},
     "pymavlink": {"cosim.mavlink.wire.dialect", "cosim.logs.formats.dataflash"},
     "pyulog": {"cosim.logs.formats.ulog"},
     "rerun": {"cosim.export.rrd_writer"},
+    "rosbags": {"cosim.logs.bag_storage", "cosim.logs.formats.bag"},
     "rich": {"cosim.command_line.watch", "cosim.live.watching.bars", "cosim.live.watching.picture"},
     "shtab": {"cosim.command_line.completion"},
     "skfuzzy": {"fuzzy_arbiter.engines.scikit"},
@@ -60,7 +60,7 @@ OPTIONAL = {
     "fmu_manipulation_toolbox",
     "foxglove_schemas_protobuf",
 }
-OPTIONAL |= {"google", "libcosimpy", "mcap", "mcap_protobuf", "mcap_ros2", "pandas", "pyulog", "rerun"}
+OPTIONAL |= {"google", "libcosimpy", "mcap", "mcap_protobuf", "pandas", "pyulog", "rerun", "rosbags"}
 WANT_AN_EXTRA = {
     "cosim.export.mcap_writer",
     "cosim.export.rrd_writer",

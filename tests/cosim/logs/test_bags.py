@@ -1,17 +1,25 @@
-"""Bags of ROS 2, written by mcap-ros2-support, and logs of PX4, read beside pyulog."""
+"""Bags of ROS 2, written by mcap-ros2-support and rosbags, one of a recorder of ROS 2, and a bag of ROS 1."""
 
-import struct
+import contextlib
+import shutil
+import sqlite3
 
 import numpy as np
 import pytest
 
 import cosim
 from cosim.errors import ImportLogError
+from cosim.logs.bag_storage import stored_messages
+from cosim.logs.formats.bag import Decoder
 from cosim.results.log_facts import load_log_facts
+from tests.cosim.logs.conftest import LOGS
 from tests.cosim.logs.dive import Dive, errors
 
+zstandard = pytest.importorskip("zstandard")
 writer = pytest.importorskip("mcap_ros2.writer")
-pyulog = pytest.importorskip("pyulog")
+rosbag1 = pytest.importorskip("rosbags.rosbag1")
+rosbag2 = pytest.importorskip("rosbags.rosbag2")
+typesys = pytest.importorskip("rosbags.typesys")
 
 ODOMETRY = """std_msgs/Header header
 string child_frame_id
@@ -78,8 +86,8 @@ columns = ["data[0]", "data[1]", "data[2]", "data[3]", "data[4]", "data[5]", "da
 START = 1_700_000_000
 
 
-def write_bag(path, dive):
-    """Odometry at 20 Hz in ENU and FLU, and forces of thrusters; each message comes 80 ms after its stamp."""
+def messages_of(dive):
+    """Yield topic, message and time [ns]: odometry at 20 Hz in ENU and FLU, and forces; each 80 ms after its stamp."""
     from scipy.spatial.transform import Rotation
 
     swap = Rotation.from_matrix([[0, 1, 0], [1, 0, 0], [0, 0, -1]])
@@ -87,22 +95,88 @@ def write_bag(path, dive):
     R = Rotation.from_quat(np.roll(dive.quaternion, -1, axis=1))
     quaternions = (swap * R * flip).as_quat()
     velocities = R.inv().apply(dive.velocity_world) * [1, -1, -1]
+    for k, t in enumerate(dive.times):
+        stamp = round(1e9 * t)
+        (n, e, d), (x, y, z, w), (u, v, up) = dive.position[k], quaternions[k], velocities[k]
+        odometry = {
+            "header": {"stamp": {"sec": START + stamp // 10**9, "nanosec": stamp % 10**9}, "frame_id": "odom"},
+            "child_frame_id": "base_link",
+            "pose": {"position": {"x": e, "y": n, "z": -d}, "orientation": {"x": x, "y": y, "z": z, "w": w}},
+            "twist": {"linear": {"x": u, "y": v, "z": up}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}},
+        }
+        yield "/odom", odometry, START * 10**9 + stamp + 80_000_000
+        yield "/thrusters", {"data": dive.thrust[k].tolist()}, START * 10**9 + stamp
+        yield "/else", {"data": []}, START * 10**9 + stamp
+
+
+def write_bag(path, dive):
     with path.open("wb") as file:
         bag = writer.Writer(file, chunk_size=20_000)
-        odometry = bag.register_msgdef("nav_msgs/msg/Odometry", ODOMETRY)
-        forces = bag.register_msgdef("std_msgs/msg/Float64MultiArray", FORCES)
-        for k, t in enumerate(dive.times):
-            stamp = round(1e9 * t)
-            (n, e, d), (x, y, z, w), (u, v, up) = dive.position[k], quaternions[k], velocities[k]
-            bag.write_message("/odom", odometry, {
-                "header": {"stamp": {"sec": START + stamp // 10**9, "nanosec": stamp % 10**9}, "frame_id": "odom"},
-                "child_frame_id": "base_link",
-                "pose": {"position": {"x": e, "y": n, "z": -d}, "orientation": {"x": x, "y": y, "z": z, "w": w}},
-                "twist": {"linear": {"x": u, "y": v, "z": up}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}},
-            }, log_time=START * 10**9 + stamp + 80_000_000)  # fmt: skip
-            bag.write_message("/thrusters", forces, {"data": dive.thrust[k].tolist()}, log_time=START * 10**9 + stamp)
-            bag.write_message("/else", forces, {"data": []}, log_time=START * 10**9 + stamp)
+        kinds = {"/odom": bag.register_msgdef("test_msgs/msg/Odometry", ODOMETRY)}
+        kinds["/thrusters"] = kinds["/else"] = bag.register_msgdef("test_msgs/msg/Forces", FORCES)
+        for topic, message, time in messages_of(dive):
+            bag.write_message(topic, kinds[topic], message, log_time=time)
         bag.finish()
+
+
+def typestore(distribution):
+    store = typesys.get_typestore(distribution)
+    types = typesys.get_types_from_msg(FORCES, "test_msgs/msg/Forces")
+    types |= typesys.get_types_from_msg(ODOMETRY, "test_msgs/msg/Odometry")
+    store.register({name: fields for name, fields in types.items() if name not in store.types})
+    return store
+
+
+def made(store, name, values):
+    """Return a message of rosbags from nested dictionaries."""
+    kinds = dict(store.fielddefs[name][1])
+    fields = {}
+    for field, value in values.items():
+        if isinstance(value, dict):
+            fields[field] = made(store, kinds[field][1], value)
+        else:
+            fields[field] = np.array(value, float) if isinstance(value, list) else value
+    if name == "std_msgs/msg/Header" and "seq" in kinds:
+        fields["seq"] = 0
+    return store.types[name](**fields)
+
+
+TYPES = {"/odom": "test_msgs/msg/Odometry", "/thrusters": "test_msgs/msg/Forces", "/else": "test_msgs/msg/Forces"}
+
+
+def write_database(folder, dive):
+    """A bag of SQLite as a folder."""
+    store = typestore(typesys.Stores.ROS2_HUMBLE)
+    with rosbag2.Writer(folder, version=8) as bag:
+        topics = {topic: bag.add_connection(topic, name, typestore=store) for topic, name in TYPES.items()}
+        for topic, message, time in messages_of(dive):
+            name = TYPES[topic]
+            bag.write(topics[topic], time, store.serialize_cdr(made(store, name, message), name))
+    return folder / f"{folder.name}.db3"
+
+
+def write_ros1(path, dive):
+    store = typestore(typesys.Stores.ROS1_NOETIC)
+    with rosbag1.Writer(path) as bag:
+        topics = {topic: bag.add_connection(topic, name, typestore=store) for topic, name in TYPES.items()}
+        for topic, message, time in messages_of(dive):
+            name = TYPES[topic]
+            bag.write(topics[topic], time, store.serialize_ros1(made(store, name, message), name))
+
+
+def change(path, script):
+    """Run a script of SQL on a database."""
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        database.executescript(script)
+
+
+def split(path, folder):
+    """Copy a database as a folder of two, as a recorder writes with a greatest duration; the second has number 10."""
+    folder.mkdir()
+    for number, other in ((9, ">"), (10, "<=")):
+        part = shutil.copyfile(path, folder / f"dive_{number}.db3")
+        change(part, f"DELETE FROM messages WHERE id {other} {3 * 300}")
+    return folder
 
 
 @pytest.fixture(scope="module")
@@ -117,14 +191,43 @@ def bag(tmp_path_factory, dive):
     return path
 
 
+@pytest.fixture(scope="module")
+def bags(tmp_path_factory, dive, bag):
+    """The same dive in every storage."""
+    folder = tmp_path_factory.mktemp("bags")
+    database = write_database(folder / "whole", dive)
+    old = shutil.copyfile(database, folder / "old.db3")
+    change(old, "DROP TABLE message_definitions; UPDATE schema SET schema_version = 3;")
+    early = shutil.copyfile(old, folder / "early.db3")
+    change(early, "UPDATE topics SET type = replace(type, '/msg/', '/')")
+    write_ros1(folder / "dive.bag", dive)
+    return {
+        "MCAP": bag,
+        "SQLite": database,
+        "folder": database.parent,
+        "two files": split(database, folder / "two"),
+        "no definitions": old,
+        "short names of types": early,
+        "ROS 1": folder / "dive.bag",
+    }
+
+
 @pytest.fixture
 def columns(tmp_path):
-    (tmp_path / "map.toml").write_text(MAP)
+    """A column map beside the definitions of its messages."""
+    package = tmp_path / "share" / "test_msgs" / "msg"
+    package.mkdir(parents=True)
+    (package / "Odometry.msg").write_text(ODOMETRY.partition("===")[0])
+    (package / "Forces.msg").write_text(FORCES)
+    (tmp_path / "map.toml").write_text('messages = "share"\n' + MAP)
     return tmp_path / "map.toml"
 
 
-def test_imported_bag_matches_the_dive(bag, columns, dive, tmp_path):
-    run = cosim.import_log(bag, "bluerov2_heavy", tmp_path / "run", columns=columns, report=False)
+@pytest.mark.parametrize(
+    "storage", ["MCAP", "SQLite", "folder", "two files", "no definitions", "short names of types", "ROS 1"]
+)
+def test_imported_bag_matches_the_dive(bags, storage, columns, dive, tmp_path):
+    run = cosim.import_log(bags[storage], "bluerov2_heavy", tmp_path / "run", columns=columns, report=False)
     for names, expected in (
         ([f"position.{a}" for a in "xyz"], dive.position),
         (["attitude.roll", "attitude.pitch", "attitude.yaw"], np.column_stack([dive.roll, dive.pitch, dive.yaw])),
@@ -135,6 +238,78 @@ def test_imported_bag_matches_the_dive(bag, columns, dive, tmp_path):
     facts = load_log_facts(run.folder)
     assert facts.unread == {"/else": len(dive.times)}
     assert facts.start == pytest.approx(START, abs=1e-3)
+
+
+def test_bag_of_a_recorder_is_read():
+    """By ros2 bag record 0.3; values as ``ros2 bag`` of its own tests expects them."""
+    messages = list(stored_messages(LOGS / "cdr_test_0.db3"))
+    assert [message.topic for message in messages].count("/test_topic") == 3
+    assert messages[-1].part == 1.0
+    decoder = Decoder("")
+    basic = [decoder.decode(message) for message in messages if message.topic == "/test_topic"]
+    assert {message.int32_value for message in basic} == {123}
+    arrays = [decoder.decode(message) for message in messages if message.topic == "/array_topic"]
+    assert all(message.bool_values.tolist() == [True, False, True] for message in arrays) and len(arrays) == 4
+
+
+def test_journal_of_a_killed_recorder_is_read(bags, columns, tmp_path):
+    """The messages of a recorder that was killed are in the journal beside its database."""
+    path = shutil.copyfile(bags["SQLite"], tmp_path / "dive.db3")
+    database = sqlite3.connect(path)
+    database.execute("PRAGMA journal_mode = WAL")
+    database.execute("DELETE FROM messages WHERE id > 900")
+    database.commit()
+    try:
+        run = cosim.import_log(path, "bluerov2_heavy", tmp_path / "run", columns=columns, report=False)
+    finally:
+        database.close()
+    assert run.summary["simulated_time"] == pytest.approx(14.95, abs=0.1)
+
+
+def test_messages_that_were_compressed_one_by_one_are_read(bags, columns, tmp_path):
+    path = shutil.copyfile(bags["SQLite"], tmp_path / "dive.db3")
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        for key, data in database.execute("SELECT id, data FROM messages").fetchall():
+            packed = zstandard.ZstdCompressor().compress(data)
+            database.execute("UPDATE messages SET data = ? WHERE id = ?", (packed, key))
+        database.commit()
+    run = cosim.import_log(path, "bluerov2_heavy", tmp_path / "run", columns=columns, report=False)
+    assert run.summary["simulated_time"] == pytest.approx(29.95, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("files", "what"),
+    [
+        ([], "is a folder without a bag, expected files that end in .mcap, .db3, .bag"),
+        (["a_0.db3.zstd"], "holds 'a_0.db3.zstd', which is compressed as a whole"),
+        (["a.db3", "a.mcap"], "is a folder of bags of two kinds"),
+        (["a.db3"], "cannot be read as a bag: file is not a database"),
+        (["a.bag"], "cannot be read as a bag"),
+    ],
+)
+def test_folders_without_a_bag_are_refused(files, what, columns, tmp_path):
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    for name in files:
+        (folder / name).write_bytes(b"no bag at all" * 100)
+    with pytest.raises(ImportLogError, match=what):
+        cosim.import_log(folder, "bluerov2_heavy", tmp_path / "run", columns=columns)
+    assert not (tmp_path / "run").exists()
+
+
+def test_type_without_definition_is_named(bags, columns, tmp_path):
+    columns.write_text(MAP)
+    with pytest.raises(
+        ImportLogError, match=r"of type test_msgs/msg/\w+, of which the bag has no definition; .*messages"
+    ):
+        cosim.import_log(bags["no definitions"], "bluerov2_heavy", tmp_path / "run", columns=columns)
+    columns.write_text('messages = "nowhere"\n' + MAP)
+    with pytest.raises(ImportLogError, match=r"messages is '.*nowhere', expected a folder"):
+        cosim.import_log(bags["no definitions"], "bluerov2_heavy", tmp_path / "run", columns=columns)
+    columns.write_text('messages = "share"\n' + MAP)
+    (tmp_path / "share" / "test_msgs" / "msg" / "Odometry.msg").write_text("float64 x[\n")
+    with pytest.raises(ImportLogError, match=r"messages: .*Odometry\.msg is no message definition"):
+        cosim.import_log(bags["no definitions"], "bluerov2_heavy", tmp_path / "run", columns=columns)
 
 
 def test_truncated_bag_is_read_to_its_end(bag, columns, tmp_path):
@@ -163,68 +338,13 @@ def test_missing_bag_topics_are_named(bag, columns, tmp_path, old, new, what):
     assert not (tmp_path / "run").exists()
 
 
-def write_ulog(path, dive):
-    """A log of PX4, byte by byte as its format is described; pyulog must read it as well."""
-    formats = {
-        "vehicle_attitude": "uint64_t timestamp;float[4] q;",
-        "vehicle_local_position": "uint64_t timestamp;float x;float y;float z;float vx;float vy;float vz;",
-        "actuator_motors": "uint64_t timestamp;float[8] control;",
-        "something_else": "uint64_t timestamp;float a;",
-    }
-
-    def message(kind, body):
-        return struct.pack("<HB", len(body), ord(kind)) + body
-
-    with path.open("wb") as file:
-        file.write(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 5_000_000))
-        file.write(message("B", bytes(40)))
-        for name, fields in formats.items():
-            file.write(message("F", f"{name}:{fields}".encode()))
-        key = b"int32_t MAV_TYPE"
-        file.write(message("P", bytes([len(key)]) + key + struct.pack("<i", 12)))
-        for number, name in enumerate(formats):
-            file.write(message("A", struct.pack("<BH", 0, number) + name.encode()))
-        for k, t in enumerate(dive.times):
-            stamp = struct.pack("<Q", 5_000_000 + round(1e6 * t))
-            rows = (dive.quaternion[k], [*dive.position[k], *dive.velocity_world[k]], dive.thrust[k] / 40.0, [1.0])
-            for number, values in enumerate(rows):
-                data = struct.pack("<H", number) + stamp + struct.pack(f"<{len(values)}f", *values)
-                file.write(message("D", data))
-
-
-def test_imported_px4_log_matches_the_dive(dive, tmp_path):
-    path = tmp_path / "dive.ulg"
-    write_ulog(path, dive)
-    theirs = {data.name: data.data for data in pyulog.ULog(str(path)).data_list}
-    assert len(theirs["vehicle_attitude"]["timestamp"]) == len(dive.times)
-    run = cosim.import_log(path, "bluerov2_heavy", tmp_path / "run", report=False)
-    for names, expected in (
-        ([f"position.{a}" for a in "xyz"], dive.position),
-        (["attitude.roll", "attitude.pitch", "attitude.yaw"], np.column_stack([dive.roll, dive.pitch, dive.yaw])),
-        ([f"thrust[{i}]" for i in range(1, 9)], dive.thrust),
-    ):
-        error, known = errors(run.record, dive, names, expected)
-        assert error < 2e-6 and known == 1.0, names
-    assert run.summary["law"] == "px4"
-    assert "something_else" in load_log_facts(run.folder).unread
-
-
-def test_truncated_px4_log_is_read_to_its_end(dive, tmp_path):
-    path = tmp_path / "dive.ulg"
-    write_ulog(path, dive)
-    data = path.read_bytes()
-    path.write_bytes(data[: int(0.6 * len(data))])
-    run = cosim.import_log(path, "bluerov2_heavy", tmp_path / "run", report=False)
-    assert 15.0 < run.summary["simulated_time"] < 19.0
-
-
 @pytest.mark.parametrize("suffix", [".mcap", ".ulg"])
 def test_missing_library_is_reported(tmp_path, columns, monkeypatch, suffix):
     import sys
 
-    for name in ("mcap_ros2", "mcap_ros2.decoder", "pyulog", "pyulog.core"):
+    for name in ("rosbags", "rosbags.rosbag1", "pyulog", "pyulog.core"):
         monkeypatch.setitem(sys.modules, name, None)
     (tmp_path / f"it{suffix}").write_bytes(b"x" * 100)
     given = {"columns": columns} if suffix == ".mcap" else {}
-    with pytest.raises(ImportLogError, match=r"needs (mcap_ros2|pyulog).*pip install"):
+    with pytest.raises(ImportLogError, match=r"needs (rosbags|pyulog).*pip install"):
         cosim.import_log(tmp_path / f"it{suffix}", "bluerov2_heavy", tmp_path / "run", **given)

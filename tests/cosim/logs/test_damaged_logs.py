@@ -9,11 +9,11 @@ import cosim
 from cosim.errors import CosimError
 from cosim.results.log_facts import load_log_facts
 from plant_fmu import PlantFmuError
-from tests.cosim.logs import test_bags, test_tables
+from tests.cosim.logs import test_bags, test_px4_logs, test_tables
 from tests.cosim.logs.conftest import LOGS
 from tests.cosim.logs.dive import Dive
 
-SUFFIXES = (".BIN", ".tlog", ".ulg", ".mcap", ".csv", ".parquet")
+SUFFIXES = (".BIN", ".tlog", ".ulg", ".mcap", ".db3", ".bag", ".csv", ".parquet")
 HEADERS = {".BIN": 120_000, ".tlog": 60_000}  # bytes of the real logs that are taken
 
 
@@ -27,13 +27,16 @@ def logs(tmp_path_factory, six_thrusters):
         (folder / f"dive{suffix}").write_bytes((LOGS / name).read_bytes()[: HEADERS[suffix]])
     pytest.importorskip("pyulog")
     pytest.importorskip("mcap_ros2")
-    test_bags.write_ulog(folder / "dive.ulg", dive)
+    test_px4_logs.write_ulog(folder / "dive.ulg", dive)
     test_bags.write_bag(folder / "dive.mcap", dive)
+    test_bags.write_database(folder / "bag", dive).rename(folder / "dive.db3")
+    test_bags.write_ros1(folder / "dive.bag", dive)
     test_tables.frame_of(dive).to_csv(folder / "dive.csv", index=False)
     test_tables.frame_of(dive).to_parquet(folder / "dive.parquet")
     (folder / "bag.toml").write_text(test_bags.MAP)
     (folder / "table.toml").write_text(test_tables.MAP)
-    maps = {".mcap": folder / "bag.toml", ".csv": folder / "table.toml", ".parquet": folder / "table.toml"}
+    maps = dict.fromkeys((".mcap", ".db3", ".bag"), folder / "bag.toml")
+    maps |= {".csv": folder / "table.toml", ".parquet": folder / "table.toml"}
     return {s: (folder / f"dive{s}", six_thrusters if s == ".BIN" else "bluerov2_heavy", maps.get(s)) for s in SUFFIXES}
 
 

@@ -215,7 +215,7 @@ def test_junk_in_a_log_loses_only_overwritten_frames(tmp_path):
         ("it.tlog", b"no log at all, but some text that is long enough for a frame", "no heartbeat of an autopilot"),
         ("it.BIN", b"no log at all", "no message, expected a dataflash log"),
         ("it.bin", b"\xa3\x95\x80" + bytes(86), "format"),
-        ("it.txt", b"x", "ends in '.txt', expected one of .bin, .csv"),
+        ("it.txt", b"x", "ends in '.txt', expected one of .bag, .bin, .csv"),
         ("it.ulg", b"ULog but not really", "cannot be read as a ULog file"),
     ],
 )

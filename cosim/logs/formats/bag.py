@@ -1,9 +1,10 @@
-"""Bags of ROS 2 in MCAP files, by mcap-ros2-support; a column map names topics and fields."""
+"""Bags of ROS 2 and ROS 1, decoded by rosbags; a column map names topics and fields."""
 
 from __future__ import annotations
 
 import contextlib
 import re
+import sqlite3
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import ImportLogError
+from cosim.logs.bag_storage import SUFFIXES, StoredMessage, bag_files, stored_messages
 from cosim.logs.clocks import Clock
 from cosim.logs.column_map import ColumnMap, TimeColumn
 from cosim.logs.format import LogFormat, Moved
@@ -19,19 +21,23 @@ from cosim.logs.frames import UNITS
 from cosim.logs.spool import LogContents
 from plant_fmu.toml_tables import hint
 
-_LARGEST = 1 << 28  # bytes of a record
 _WAITING = 4096  # messages of a quantity that are written together
 _PART = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+)\]")
+_IDL_TITLE = re.compile(r"^=+\nIDL: .*\n", re.MULTILINE)  # before each type of a definition
+_TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")  # definitions may leave these out
 _FAILURES = (
     ValueError,
     KeyError,
     IndexError,
+    TypeError,
     struct.error,
     UnicodeDecodeError,
     EOFError,
     OSError,
     AttributeError,
     RuntimeError,
+    AssertionError,
+    sqlite3.Error,
 )
 
 Getter = Callable[[Any], float]
@@ -40,8 +46,8 @@ Getter = Callable[[Any], float]
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
     """Read a bag, as specified by `LogFormat`; raise ImportLogError for another file, or a missing topic or field."""
     from mcap.exceptions import McapError
-    from mcap.reader import NonSeekingReader
-    from mcap_ros2.decoder import DecoderFactory
+    from rosbags.rosbag1 import ReaderError
+    from rosbags.serde import SerdeError
     from zstandard import ZstdError
 
     assert columns is not None
@@ -51,28 +57,24 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
     takers: dict[str, list[_Taker]] = {}
     for name, mapped in columns.quantities.items():
         takers.setdefault(mapped.topic, []).append(_Taker(columns, name, contents))
-    total, clock, factory = max(1, path.stat().st_size), Clock(), DecoderFactory()
+    clock, decoder = Clock(), Decoder(columns.messages)
     topics: set[str] = set()
-    with path.open("rb") as file:
-        # sequentially: the index at its end is missing if the recorder was killed
-        reader = NonSeekingReader(file, record_size_limit=_LARGEST)
+    files = bag_files(path)
+    for k, file in enumerate(files):
         try:
-            for schema, channel, message in reader.iter_messages(log_time_order=False):
-                topics.add(channel.topic)
-                if channel.topic not in takers:
-                    contents.unread[channel.topic] += 1
+            for message in stored_messages(file):
+                topics.add(message.topic)
+                if message.topic not in takers:
+                    contents.unread[message.topic] += 1
                     continue
-                decode = factory.decoder_for(channel.message_encoding, schema)
-                if decode is None:
-                    raise ImportLogError(f"{channel.topic}: encoding {channel.message_encoding!r}, expected 'cdr'")
-                decoded, written = decode(message.data), clock.time(message.log_time * 1e-9)
-                for taker in takers[channel.topic]:
+                decoded, written = decoder.decode(message), clock.time(message.time)
+                for taker in takers[message.topic]:
                     taker.take(decoded, written)
-                moved(file.tell() / total)
-        except (McapError, ZstdError, *_FAILURES) as error:
+                moved((k + message.part) / len(files))
+        except (McapError, ReaderError, SerdeError, ZstdError, *_FAILURES) as error:
             if not topics:
                 raise ImportLogError(f"cannot be read as a bag: {error}") from error
-            contents.remarks.append(f"The bag breaks off: {error or type(error).__name__}"[:200])
+            contents.remarks.append(f"{file.name} breaks off: {error or type(error).__name__}"[:200])
     missing = sorted(set(takers) - topics)
     if missing:
         raise ImportLogError(f"has no topic {missing[0]!r}, which the map names; {hint(missing[0], topics)}")
@@ -80,6 +82,55 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
         taker.flush()
     for _, by in clock.jumps:
         contents.remarks.append(f"The clock of the bag's writer jumps by {by:+.4g} s: it is taken as a pause of 1 s.")
+
+
+class Decoder:
+    """Decode stored messages by their definitions: those of the bag, of a folder, or of ROS 2 Humble."""
+
+    def __init__(self, folder: str) -> None:
+        from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+
+        self._standard = get_typestore(Stores.ROS2_HUMBLE).fielddefs
+        self._own: dict[str, Any] = {}
+        for path in sorted(Path(folder).rglob("*.msg")) if folder else ():
+            package = path.parent.parent if path.parent.name == "msg" else path.parent
+            try:
+                self._own |= get_types_from_msg(path.read_text("utf-8"), f"{package.name}/msg/{path.stem}")
+            except (TypesysError, UnicodeDecodeError) as error:
+                raise ImportLogError(f"messages: {path} is no message definition: {error}") from error
+        self._decoders: dict[str, Callable[[bytes], Any]] = {}
+
+    def decode(self, message: StoredMessage) -> Any:
+        """Return a message with its fields as attributes."""
+        if message.topic not in self._decoders:
+            self._decoders[message.topic] = self._decoder(message)
+        return self._decoders[message.topic](message.data)
+
+    def _decoder(self, message: StoredMessage) -> Callable[[bytes], Any]:
+        from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
+
+        if message.encoding not in ("cdr", "ros1"):
+            raise ImportLogError(f"{message.topic}: encoding {message.encoding!r}, expected 'cdr'")
+        types: dict[str, Any] = {}
+        try:
+            if message.language == "ros2idl":
+                for text in filter(str.strip, _IDL_TITLE.split(message.definition)):
+                    types |= get_types_from_idl(text)
+            elif message.definition:
+                types = get_types_from_msg(message.definition, message.type)
+            else:
+                types = self._standard | self._own
+        except TypesysError as error:
+            raise ImportLogError(f"{message.topic}: its definition cannot be read: {error}") from error
+        if message.type not in types:
+            raise ImportLogError(
+                f"{message.topic} is of type {message.type}, of which the bag has no definition; expected in the map: "
+                'messages = "FOLDER", which holds the .msg files of its package'
+            )
+        store = get_typestore(Stores.EMPTY)
+        store.register({name: self._standard[name] for name in _TIMES} | types)
+        method = store.deserialize_ros1 if message.encoding == "ros1" else store.deserialize_cdr
+        return lambda data: method(data, message.type)
 
 
 class _Taker:
@@ -127,7 +178,7 @@ def _walk(path: str, topic: str) -> Callable[[Any], Any]:
             try:
                 message = message[part] if isinstance(part, int) else getattr(message, part)
             except (AttributeError, IndexError, TypeError) as error:
-                fields = [name for name in getattr(message, "__slots__", ()) if not name.startswith("_")]
+                fields = [name for name in getattr(message, "__dataclass_fields__", ()) if not name.startswith("_")]
                 known = f"; {hint(str(part), fields)}" if fields else ""
                 raise ImportLogError(f"{topic} has no field {path!r}: nothing is at {part!r}{known}") from error
         return message
@@ -160,4 +211,4 @@ def _stamp_getter(time: TimeColumn, topic: str) -> Getter:
     return stamp
 
 
-FORMAT = LogFormat((".mcap",), read, mapped=True, needs=("mcap>=1.2", "mcap-ros2-support>=0.5"))
+FORMAT = LogFormat(SUFFIXES, read, mapped=True, needs=("mcap>=1.2", "rosbags>=0.10"), folder=True)

@@ -1,0 +1,132 @@
+"""Messages of ROS bags as their storage holds them: MCAP, SQLite, and bags of ROS 1."""
+
+from __future__ import annotations
+
+import re
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from cosim.errors import ImportLogError
+
+_LARGEST = 1 << 28  # bytes of a record
+_NUMBER = re.compile(r"_(\d+)$")
+_ZSTANDARD = b"\x28\xb5\x2f\xfd"  # first bytes of compressed data, RFC 8878
+SUFFIXES = (".mcap", ".db3", ".bag")
+
+
+@dataclass(frozen=True, slots=True)
+class StoredMessage:
+    """A message as it is stored."""
+
+    topic: str
+    type: str  # such as nav_msgs/msg/Odometry
+    definition: str  # of the type and those within it; empty where the storage has none
+    language: str  # of the definition: ros2msg or ros2idl
+    encoding: str  # of the data: cdr or ros1
+    data: bytes
+    time: float  # of the recorder [s]
+    part: float  # of the file read so far
+
+
+def bag_files(path: Path) -> list[Path]:
+    """Return the files of a bag: itself, or those in the folder of a recorder, in the order of their numbers.
+
+    Raises
+    ------
+    ImportLogError
+        If the folder holds no bag, or files of two kinds.
+    """
+    if not path.is_dir():
+        return [path]
+    files = [file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file()]
+    packed = next((file.name for file in path.iterdir() if file.suffix.lower() in (".zstd", ".zst")), None)
+    if packed is not None:
+        raise ImportLogError(f"holds {packed!r}, which is compressed as a whole; expected files of zstd -d")
+    if not files:
+        raise ImportLogError(f"is a folder without a bag, expected files that end in {', '.join(SUFFIXES)}")
+    if len({file.suffix.lower() for file in files}) > 1:
+        raise ImportLogError("is a folder of bags of two kinds, expected one bag")
+    return sorted(files, key=_place)
+
+
+def _place(file: Path) -> tuple[int, str]:
+    number = _NUMBER.search(file.stem)
+    return int(number[1]) if number else 0, file.name
+
+
+def stored_messages(path: Path) -> Iterator[StoredMessage]:
+    """Yield the messages of a file in the order of its storage; optional packages raise their own errors."""
+    suffix = path.suffix.lower()
+    return {".mcap": _of_mcap, ".db3": _of_sqlite, ".bag": _of_ros1}[suffix](path)
+
+
+def _of_mcap(path: Path) -> Iterator[StoredMessage]:
+    from mcap.reader import NonSeekingReader
+
+    total = path.stat().st_size
+    with path.open("rb") as file:
+        # sequentially: the index at its end is missing if the recorder was killed
+        reader = NonSeekingReader(file, record_size_limit=_LARGEST)
+        for schema, channel, message in reader.iter_messages(log_time_order=False):
+            name, definition, language = (
+                ("", b"", "") if schema is None else (schema.name, schema.data, schema.encoding)
+            )
+            yield StoredMessage(
+                channel.topic, name, definition.decode(), language, channel.message_encoding,
+                message.data, message.log_time * 1e-9, file.tell() / total,
+            )  # fmt: skip
+
+
+def _of_sqlite(path: Path) -> Iterator[StoredMessage]:
+    # a recorder that was killed leaves a journal, which a file opened as immutable would not show
+    journal = path.with_name(f"{path.name}-wal").exists()
+    address = f"{path.resolve().as_uri()}?mode=ro" + ("" if journal else "&immutable=1")
+    with closing(sqlite3.connect(address, uri=True)) as database:
+        tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master")}
+        if not tables >= {"topics", "messages"}:
+            raise ImportLogError("is a database without topics and messages, expected a bag of ROS 2")
+        texts: dict[str, tuple[str, str]] = {}
+        if "message_definitions" in tables:
+            query = "SELECT topic_type, encoded_message_definition, encoding FROM message_definitions"
+            texts = {name: (text, language) for name, text, language in database.execute(query)}
+        topics = {
+            key: (topic, _three_parts(kind), *texts.get(kind, ("", "")), encoding)
+            for key, topic, kind, encoding in database.execute(
+                "SELECT id, name, type, serialization_format FROM topics"
+            )
+        }
+        (last,) = database.execute("SELECT max(id) FROM messages").fetchone()
+        query = "SELECT id, topic_id, timestamp, data FROM messages ORDER BY id"
+        for key, topic, stamp, data in database.execute(query):
+            if topic not in topics:
+                raise ImportLogError(f"has a message of topic {topic!r}, expected one of {sorted(topics)}")
+            yield StoredMessage(*topics[topic], _unpacked(data), stamp * 1e-9, key / last)
+
+
+def _three_parts(kind: str) -> str:
+    """Return the name of a type with the middle part that early recorders leave out."""
+    return kind.replace("/", "/msg/") if kind.count("/") == 1 else kind
+
+
+def _unpacked(data: bytes) -> bytes:
+    """Return the data of a message, which a recorder may compress one by one."""
+    if not data.startswith(_ZSTANDARD):
+        return data
+    from zstandard import ZstdDecompressor
+
+    return ZstdDecompressor().decompressobj().decompress(data)
+
+
+def _of_ros1(path: Path) -> Iterator[StoredMessage]:
+    from rosbags.rosbag1 import Reader
+
+    with Reader(path) as bag:
+        total = max(1, bag.message_count)
+        for k, (connection, stamp, data) in enumerate(bag.messages()):
+            text = getattr(connection.msgdef, "data", connection.msgdef)
+            yield StoredMessage(
+                connection.topic, connection.msgtype, text, "ros2msg", "ros1", bytes(data), stamp * 1e-9, k / total
+            )
