@@ -98,12 +98,12 @@ def _of_sqlite(path: Path) -> Iterator[StoredMessage]:
                 "SELECT id, name, type, serialization_format FROM topics"
             )
         }
-        (last,) = database.execute("SELECT max(id) FROM messages").fetchone()
-        query = "SELECT id, topic_id, timestamp, data FROM messages ORDER BY id"
-        for key, topic, stamp, data in database.execute(query):
+        total, read = path.stat().st_size, 0
+        for topic, stamp, data in database.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id"):
             if topic not in topics:
-                raise ImportLogError(f"has a message of topic {topic!r}, expected one of {sorted(topics)}")
-            yield StoredMessage(*topics[topic], _unpacked(data), stamp * 1e-9, key / last)
+                raise ValueError(f"a message has topic number {topic!r}, expected one of {sorted(topics)}")
+            read += len(data)
+            yield StoredMessage(*topics[topic], _unpacked(data), stamp * 1e-9, read / total)
 
 
 def _three_parts(kind: str) -> str:

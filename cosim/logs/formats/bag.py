@@ -37,6 +37,7 @@ _FAILURES = (
     AttributeError,
     RuntimeError,
     AssertionError,
+    MemoryError,  # of a damaged length
     sqlite3.Error,
 )
 
@@ -73,8 +74,8 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
                 moved((k + message.part) / len(files))
         except (McapError, ReaderError, SerdeError, ZstdError, *_FAILURES) as error:
             if not topics:
-                raise ImportLogError(f"cannot be read as a bag: {error}") from error
-            contents.remarks.append(f"{file.name} breaks off: {error or type(error).__name__}"[:200])
+                raise ImportLogError(f"cannot be read as a bag: {str(error) or type(error).__name__}") from error
+            contents.remarks.append(f"{file.name} breaks off: {str(error) or type(error).__name__}"[:200])
     missing = sorted(set(takers) - topics)
     if missing:
         raise ImportLogError(f"has no topic {missing[0]!r}, which the map names; {hint(missing[0], topics)}")
