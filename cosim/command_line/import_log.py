@@ -26,7 +26,7 @@ def add_verb(verbs: Any) -> None:
     )
     log.add_argument("--vehicle", required=True, help="a shipped vehicle or a TOML file, whose thrusters are driven")
     log.add_argument("--scenario", help="shipped name or TOML file, whose goal and regions judge it (default: none)")
-    log.add_argument("--map", type=Path, metavar="FILE", dest="columns", help="column map, for tables and bags")
+    log.add_argument("--map", type=Path, metavar="FILE", dest="columns", help="column map, for tables and bags of ROS")
     log.add_argument("--rate", type=number(1e-3, 1e4), metavar="HZ", help="rows a second (default: by the log)")
     log.add_argument(
         "--curve", choices=("linear", "quadratic", "t200"),

@@ -3,7 +3,7 @@
 A reader in `formats` writes the samples of a log to disk; clocks are aligned, held values and bursts undone, gaps
 marked; the result becomes rows of a record. Public: `import_log`.
 
-Imports: controller, io, plant_fmu, results, run, scenario, simulation, simulation.commands.
+Imports: controller, io, mavlink.wire, plant_fmu, results, run, scenario, simulation, simulation.commands.
 """
 
 from cosim.logs.importing import import_log

@@ -4,16 +4,31 @@ from __future__ import annotations
 
 import re
 import sqlite3
+import struct
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from cosim.errors import ImportLogError
+from cosim.logs.format import Moved
 
 _LARGEST = 1 << 28  # bytes of a record
-_NUMBER = re.compile(r"_(\d+)$")
+_NUMBER = re.compile(r"\d+")
 _ZSTANDARD = b"\x28\xb5\x2f\xfd"  # first bytes of compressed data, RFC 8878
+DAMAGE = (
+    ValueError,
+    KeyError,
+    IndexError,
+    TypeError,
+    AttributeError,
+    EOFError,
+    OSError,
+    RuntimeError,
+    AssertionError,
+    MemoryError,
+    struct.error,
+)  # what damaged data raises in libraries
 SUFFIXES = (".mcap", ".db3", ".bag")
 
 
@@ -52,15 +67,46 @@ def bag_files(path: Path) -> list[Path]:
     return sorted(files, key=_place)
 
 
-def _place(file: Path) -> tuple[int, str]:
-    number = _NUMBER.search(file.stem)
-    return int(number[1]) if number else 0, file.name
+def _place(file: Path) -> tuple[list[int], str]:
+    """Return the numbers in a file's name, such as those of a part or a time, and the name."""
+    return [int(number) for number in _NUMBER.findall(file.stem)], file.name
 
 
-def stored_messages(path: Path) -> Iterator[StoredMessage]:
-    """Yield the messages of a file in the order of its storage; optional packages raise their own errors."""
-    suffix = path.suffix.lower()
-    return {".mcap": _of_mcap, ".db3": _of_sqlite, ".bag": _of_ros1}[suffix](path)
+def stored_messages(path: Path, remarks: list[str], moved: Moved) -> Iterator[StoredMessage]:
+    """Yield the messages of a bag in the order of its files and their storage.
+
+    Parameters
+    ----------
+    path : Path
+        A file, or a folder of files.
+    remarks : list of str
+        Receives a remark on each file that breaks off.
+    moved : callable
+        Receives the fraction read so far.
+
+    Raises
+    ------
+    ImportLogError
+        If the first file cannot be read at all.
+    """
+    from mcap.exceptions import McapError
+    from rosbags.rosbag1 import ReaderError
+    from zstandard import ZstdError
+
+    failures = (McapError, ReaderError, ZstdError, sqlite3.Error, *DAMAGE)
+    files, readers = bag_files(path), {".mcap": _of_mcap, ".db3": _of_sqlite, ".bag": _of_ros1}
+    found = False
+    for k, file in enumerate(files):
+        try:
+            for message in readers[file.suffix.lower()](file):
+                yield message
+                found = True
+                moved((k + message.part) / len(files))
+        except failures as error:
+            words = str(error) or type(error).__name__
+            if not found:
+                raise ImportLogError(f"cannot be read as a bag: {words}") from error
+            remarks.append(f"{file.name} breaks off: {words}"[:200])
 
 
 def _of_mcap(path: Path) -> Iterator[StoredMessage]:

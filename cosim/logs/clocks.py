@@ -40,6 +40,10 @@ class Clock:
             self._last = time
         return time
 
+    def remarks(self, owner: str) -> list[str]:
+        """Return a sentence for each jump of an owner's clock."""
+        return [f"The clock of {owner} jumps by {by:+.4g} s: it is taken as a pause of 1 s." for _, by in self.jumps]
+
     def is_behind(self, said: float) -> bool:
         """Return True if a reading [s] would be taken for a jump back."""
         return said + self._shift < self._last - _BACK

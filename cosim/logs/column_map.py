@@ -118,6 +118,13 @@ class ColumnMap:
         return values
 
 
+def require_map(columns: ColumnMap | None) -> ColumnMap:
+    """Return a map; raise ImportLogError if there is none."""
+    if columns is None:
+        raise ImportLogError("needs a column map, expected --map FILE: it says which column is what")
+    return columns
+
+
 def source_name(mapped: MappedQuantity) -> str:
     """Return the name of a quantity's columns in a report."""
     shown = ", ".join(mapped.columns[:3]) + (" ..." if len(mapped.columns) > 3 else "")

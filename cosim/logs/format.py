@@ -25,7 +25,7 @@ class LogFormat:
         messages, and `moved` receives the fraction read so far. It imports optional packages itself, and raises
         ImportLogError if the file is no such log.
     mapped : bool
-        True if it needs a column map; otherwise it accepts none.
+        True if it takes a column map.
     folder : bool
         True if a log may be a folder of such files.
     needs : tuple of str

@@ -69,7 +69,7 @@ def import_log(
     scenario : str or Path, optional
         Scenario whose goal and regions are evaluated along the log. Default: none.
     columns : str or Path, optional
-        The column map that tables and bags need.
+        The column map that tables and bags of ROS need.
     rate : float, optional
         Rows per second [Hz]. Default: the least of 5, 10, 20, 25, 50, 100 and 200 that no state or command exceeds.
     curve : str, optional
@@ -150,8 +150,6 @@ def _format_of(path: Path) -> LogFormat:
 
 
 def _map_of(form: LogFormat, columns: str | Path | None) -> Any:
-    if form.mapped and columns is None:
-        raise ImportLogError("needs a column map, expected --map FILE: it says which column is what")
     if not form.mapped and columns is not None:
         raise ImportLogError("a column map is given, expected none: its messages say what they are")
     return None if columns is None else read_map(Path(columns))

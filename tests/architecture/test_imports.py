@@ -35,7 +35,7 @@ ONE_PLACE = {
     "foxglove_schemas_protobuf": {"cosim.export.mcap_writer", "cosim.export.foxglove_scene"},
     "google": {"cosim.export.foxglove_scene", "cosim.export.protobuf_table"},
     "libcosimpy": {"plant_fmu.importers.libcosim"},
-    "mcap": {"cosim.export.mcap_writer", "cosim.logs.bag_storage", "cosim.logs.formats.bag"},
+    "mcap": {"cosim.export.mcap_writer", "cosim.logs.bag_storage"},
     "mcap_protobuf": {"cosim.export.mcap_writer"},
     "numba": {"fuzzy_arbiter.export.compiled"},
     "pandas": {"cosim.results.run_result"},

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import re
-import sqlite3
-import struct
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import ImportLogError
-from cosim.logs.bag_storage import SUFFIXES, StoredMessage, bag_files, stored_messages
+from cosim.logs.bag_storage import DAMAGE, SUFFIXES, StoredMessage, bag_files, stored_messages
+from cosim.logs.blueos import read_recording
 from cosim.logs.clocks import Clock
-from cosim.logs.column_map import ColumnMap, TimeColumn
+from cosim.logs.column_map import ColumnMap, TimeColumn, require_map
 from cosim.logs.format import LogFormat, Moved
 from cosim.logs.frames import UNITS
 from cosim.logs.spool import LogContents
@@ -25,33 +24,18 @@ _WAITING = 4096  # messages of a quantity that are written together
 _PART = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+)\]")
 _IDL_TITLE = re.compile(r"^=+\nIDL: .*\n", re.MULTILINE)  # before each type of a definition
 _TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")  # definitions may leave these out
-_FAILURES = (
-    ValueError,
-    KeyError,
-    IndexError,
-    TypeError,
-    struct.error,
-    UnicodeDecodeError,
-    EOFError,
-    OSError,
-    AttributeError,
-    RuntimeError,
-    AssertionError,
-    MemoryError,  # of a damaged length
-    sqlite3.Error,
-)
 
 Getter = Callable[[Any], float]
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
     """Read a bag, as specified by `LogFormat`; raise ImportLogError for another file, or a missing topic or field."""
-    from mcap.exceptions import McapError
-    from rosbags.rosbag1 import ReaderError
     from rosbags.serde import SerdeError
-    from zstandard import ZstdError
 
-    assert columns is not None
+    if columns is None and all(file.suffix.lower() == ".mcap" for file in bag_files(path)):
+        read_recording(path, contents, moved)
+        return
+    columns = require_map(columns)
     nameless = next((name for name, mapped in columns.quantities.items() if not mapped.topic), None)
     if nameless is not None:
         raise ImportLogError(f"the map says no topic for [{nameless}], expected topic and columns")
@@ -60,29 +44,25 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
         takers.setdefault(mapped.topic, []).append(_Taker(columns, name, contents))
     clock, decoder = Clock(), Decoder(columns.messages)
     topics: set[str] = set()
-    files = bag_files(path)
-    for k, file in enumerate(files):
+    for message in stored_messages(path, contents.remarks, moved):
+        topics.add(message.topic)
+        if message.topic not in takers:
+            contents.unread[message.topic] += 1
+            continue
+        written = clock.time(message.time)
         try:
-            for message in stored_messages(file):
-                topics.add(message.topic)
-                if message.topic not in takers:
-                    contents.unread[message.topic] += 1
-                    continue
-                decoded, written = decoder.decode(message), clock.time(message.time)
-                for taker in takers[message.topic]:
-                    taker.take(decoded, written)
-                moved((k + message.part) / len(files))
-        except (McapError, ReaderError, SerdeError, ZstdError, *_FAILURES) as error:
-            if not topics:
-                raise ImportLogError(f"cannot be read as a bag: {str(error) or type(error).__name__}") from error
-            contents.remarks.append(f"{file.name} breaks off: {str(error) or type(error).__name__}"[:200])
+            decoded = decoder.decode(message)
+        except (SerdeError, *DAMAGE):
+            contents.unread[f"{message.topic} that cannot be decoded"] += 1
+            continue
+        for taker in takers[message.topic]:
+            taker.take(decoded, written)
     missing = sorted(set(takers) - topics)
     if missing:
         raise ImportLogError(f"has no topic {missing[0]!r}, which the map names; {hint(missing[0], topics)}")
     for taker in (taker for several in takers.values() for taker in several):
         taker.flush()
-    for _, by in clock.jumps:
-        contents.remarks.append(f"The clock of the bag's writer jumps by {by:+.4g} s: it is taken as a pause of 1 s.")
+    contents.remarks += clock.remarks("the bag's writer")
 
 
 class Decoder:

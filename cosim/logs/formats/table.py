@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 
 from cosim.errors import ImportLogError
 from cosim.logs.clocks import Clock
-from cosim.logs.column_map import ColumnMap, TimeColumn
+from cosim.logs.column_map import ColumnMap, TimeColumn, require_map
 from cosim.logs.format import LogFormat, Moved
 from cosim.logs.frames import UNITS
 from cosim.logs.spool import LogContents
@@ -30,7 +30,7 @@ _MISSING = ["", "nan", "NaN", "NAN", "null", "NULL", "None", "N/A", "n/a", "inf"
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
     """Read a table, as specified by `LogFormat`; raise ImportLogError if a column is missing or not numeric."""
-    assert columns is not None
+    columns = require_map(columns)
     times = {name: columns.time_of(name) for name in columns.quantities}
     untimed = next((name for name, time in times.items() if time is None), None)
     if untimed is not None:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from cosim.errors import ImportLogError
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.format import LogFormat, Moved
-from cosim.logs.formats.tlog import kind_of
 from cosim.logs.spool import LogContents
+from cosim.logs.vehicle_messages import kind_of
 from cosim.simulation.signals import Array
 
 # topic: quantities and their fields, in SI units, NED and FRD

@@ -1,0 +1,112 @@
+"""Recordings of BlueOS: MCAP files with each MAVLink message as JSON."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import math
+import operator
+import re
+from pathlib import Path
+from typing import Any
+
+from cosim.errors import ImportLogError
+from cosim.logs.bag_storage import DAMAGE, StoredMessage, stored_messages
+from cosim.logs.clocks import Clock
+from cosim.logs.column_map import require_map
+from cosim.logs.format import Moved
+from cosim.logs.spool import LogContents
+from cosim.logs.vehicle_messages import AUTOPILOT, NO_AUTOPILOT, VehicleMessages
+from cosim.mavlink.wire.dialect import dialect
+
+_ALL = "mavlink/out"  # topic of all messages
+_EACH = re.compile(r"mavlink/\d+/\d+/([A-Z0-9_]+)")  # topics of one message; those of its fields have one more part
+
+
+def read_recording(path: Path, contents: LogContents, moved: Moved) -> None:
+    """Read a recording, or a folder with those of a dive.
+
+    Parameters
+    ----------
+    path : Path
+        An MCAP file, or a folder of them.
+    contents : LogContents
+        Receives the samples.
+    moved : callable
+        Receives the fraction read so far.
+
+    Raises
+    ------
+    ImportLogError
+        If it has no MAVLink messages, or none of a vehicle.
+    """
+    each, vehicle = _find_vehicle(path)
+    clock, messages = Clock(), VehicleMessages(contents, *vehicle)
+    kinds = {kind.msgname: kind for kind in dialect().mavlink_map.values()}
+    for stored in stored_messages(path, contents.remarks, moved):
+        if not stored.topic.startswith("mavlink"):
+            contents.unread[stored.topic] += 1
+        if not (_EACH.fullmatch(stored.topic) if each else stored.topic == _ALL):
+            continue
+        written, name = clock.time(stored.time), "message"
+        try:
+            header, fields = _parts(stored)
+            name = fields["type"]
+            if name in messages.wanted:
+                message = kinds[name](**_values(kinds[name], fields))
+                messages.take(header["system_id"], header["component_id"], message, written)
+            elif name != "HEARTBEAT":
+                contents.unread[name] += 1
+        except DAMAGE:
+            contents.unread[f"{name} that is not as expected"] += 1
+    contents.remarks += clock.remarks("the recorder")
+
+
+def _find_vehicle(path: Path) -> tuple[bool, tuple[int, int, int]]:
+    """Return whether each message has a topic of its own, and system id, MAV_AUTOPILOT, MAV_TYPE of an autopilot."""
+    found, any_mavlink = None, False
+    for stored in stored_messages(path, [], lambda part: None):
+        each = _EACH.fullmatch(stored.topic) is not None
+        any_mavlink |= each or stored.topic == _ALL
+        if not (each or stored.topic == _ALL) or b"HEARTBEAT" not in stored.data:
+            continue
+        with contextlib.suppress(*DAMAGE):
+            header, fields = _parts(stored)
+            autopilot, kind = _value(fields["autopilot"]), _value(fields["mavtype"])
+            if header["component_id"] == AUTOPILOT and autopilot != NO_AUTOPILOT:
+                found = int(header["system_id"]), int(autopilot), int(kind)
+                if each:
+                    return True, found
+    if not any_mavlink:
+        require_map(None)
+    if found is None:
+        raise ImportLogError("holds no heartbeat of an autopilot, expected a recording of a vehicle")
+    return False, found
+
+
+def _parts(stored: StoredMessage) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return header and fields of a message."""
+    whole = json.loads(stored.data)
+    return whole["header"], whole["message"]
+
+
+def _values(kind: Any, fields: dict[str, Any]) -> dict[str, Any]:
+    """Return the values of a kind's fields; those of MAVLink 2 that are not there are 0, as on the wire."""
+    values = {}
+    for name, unit in zip(kind.fieldnames, kind.fieldtypes, strict=True):
+        value = fields.get("mavtype" if name == "type" else name, 0)  # since "type" is the message's own name
+        values[name] = "".join(value).encode() if unit == "char" else _value(value)  # a text, or a list of letters
+    return values
+
+
+def _value(value: Any) -> Any:
+    """Return a number, or a list of numbers, of JSON: enumerations are there by name, flags by names or as bits."""
+    if isinstance(value, list):
+        return [_value(part) for part in value]
+    if isinstance(value, dict):
+        return value["bits"] if "bits" in value else _value(value["type"])
+    if isinstance(value, str):
+        flags = [part.strip() for part in value.split("|") if part.strip()]
+        return functools.reduce(operator.or_, (getattr(dialect(), flag) for flag in flags), 0)
+    return math.nan if value is None else value
