@@ -192,4 +192,4 @@ def _stamp_getter(time: TimeColumn, topic: str) -> Getter:
     return stamp
 
 
-FORMAT = LogFormat(SUFFIXES, read, mapped=True, needs=("mcap>=1.2", "rosbags>=0.10"), folder=True)
+FORMAT = LogFormat(SUFFIXES, read, mapped=True, needs=("mcap>=1.2", "rosbags>=0.10.3"), folder=True)
