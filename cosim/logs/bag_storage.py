@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import sqlite3
 import struct
 from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from cosim.errors import ImportLogError
 from cosim.logs.format import Moved
@@ -98,7 +99,7 @@ def stored_messages(path: Path, remarks: list[str], moved: Moved) -> Iterator[St
     found = False
     for k, file in enumerate(files):
         try:
-            for message in readers[file.suffix.lower()](file):
+            for message in readers[file.suffix.lower()](file, remarks):
                 yield message
                 found = True
                 moved((k + message.part) / len(files))
@@ -109,28 +110,60 @@ def stored_messages(path: Path, remarks: list[str], moved: Moved) -> Iterator[St
             remarks.append(f"{file.name} breaks off: {words}"[:200])
 
 
-def _of_mcap(path: Path) -> Iterator[StoredMessage]:
-    from mcap.reader import NonSeekingReader
+def _of_mcap(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
+    from mcap.exceptions import McapError
+    from mcap.reader import make_reader
+    from mcap.records import Channel, Chunk, Message, Schema
+    from mcap.stream_reader import StreamReader, breakup_chunk
+    from zstandard import ZstdError
 
-    total = path.stat().st_size
+    total, lost, unknown = path.stat().st_size, 0, 0
+    schemas: dict[int, Any] = {}
+    channels: dict[int, Any] = {}
     with path.open("rb") as file:
-        # sequentially: the index at its end is missing if the recorder was killed
-        reader = NonSeekingReader(file, record_size_limit=_LARGEST)
-        for schema, channel, message in reader.iter_messages(log_time_order=False):
-            name, definition, language = (
-                ("", b"", "") if schema is None else (schema.name, schema.data, schema.encoding)
-            )
-            yield StoredMessage(
-                channel.topic, name, definition.decode(), language, channel.message_encoding,
-                message.data, message.log_time * 1e-9, file.tell() / total,
-            )  # fmt: skip
+        with contextlib.suppress(
+            McapError, ZstdError, *DAMAGE
+        ):  # the index at the end, missing if a recorder was killed
+            summary = make_reader(file, record_size_limit=_LARGEST).get_summary()
+            schemas, channels = dict(summary.schemas), dict(summary.channels)
+        file.seek(0)
+        for whole in StreamReader(file, emit_chunks=True, record_size_limit=_LARGEST).records:
+            try:
+                records = breakup_chunk(whole, validate_crc=True) if isinstance(whole, Chunk) else [whole]
+            except (McapError, ZstdError, *DAMAGE):
+                lost += 1
+                continue
+            for record in records:
+                if isinstance(record, Schema):
+                    schemas[record.id] = record
+                elif isinstance(record, Channel):
+                    channels[record.id] = record
+                elif isinstance(record, Message) and record.channel_id not in channels:
+                    unknown += 1
+                elif isinstance(record, Message):
+                    channel = channels[record.channel_id]
+                    schema = schemas.get(channel.schema_id)
+                    yield StoredMessage(
+                        channel.topic,
+                        schema.name if schema else "",
+                        schema.data.decode() if schema else "",
+                        schema.encoding if schema else "",
+                        channel.message_encoding,
+                        record.data,
+                        record.log_time * 1e-9,
+                        file.tell() / total,
+                    )
+    if lost:
+        remarks.append(f"{lost} damaged chunks of {path.name} were passed over.")
+    if unknown:
+        remarks.append(f"{unknown} messages of {path.name} are of no channel, and were passed over.")
 
 
-def _of_sqlite(path: Path) -> Iterator[StoredMessage]:
+def _of_sqlite(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
     # a recorder that was killed leaves a journal, which a file opened as immutable would not show
     journal = path.with_name(f"{path.name}-wal").exists()
     address = f"{path.resolve().as_uri()}?mode=ro" + ("" if journal else "&immutable=1")
-    with closing(sqlite3.connect(address, uri=True)) as database:
+    with contextlib.closing(sqlite3.connect(address, uri=True)) as database:
         tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master")}
         if not tables >= {"topics", "messages"}:
             raise ImportLogError("is a database without topics and messages, expected a bag of ROS 2")
@@ -166,7 +199,7 @@ def _unpacked(data: bytes) -> bytes:
     return ZstdDecompressor().decompressobj().decompress(data)
 
 
-def _of_ros1(path: Path) -> Iterator[StoredMessage]:
+def _of_ros1(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
     from rosbags.rosbag1 import Reader
 
     with Reader(path) as bag:

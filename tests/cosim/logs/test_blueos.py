@@ -38,7 +38,7 @@ def write_recording(path, seconds, style="names", topics=("out", "each", "fields
     log = mavutil.mavlink_connection(str(LOGS / "small.tlog"), dialect="ardupilotmega")
     dialect = mavutil.mavlink
     with path.open("wb") as file, path.with_suffix(".tlog").open("wb") as telemetry:
-        writer = mcap.Writer(file)
+        writer = mcap.Writer(file, chunk_size=1 << 16)
         writer.start(profile="", library="stand-in")
         channels: dict[str, int] = {}
 
@@ -98,6 +98,23 @@ def test_recordings_of_a_dive_are_one_run(tmp_path):
     write_recording(folder / "recorder_20260816_203739.mcap", 10.0, topics=("each",))
     run = cosim.import_log(folder, "bluerov2_heavy", tmp_path / "run", report=False)
     assert any("The clock of the recorder jumps" in remark for remark in load_log_facts(run.folder).remarks)
+
+
+@pytest.mark.medium
+def test_a_damaged_chunk_is_a_gap(tmp_path):
+    write_recording(tmp_path / "whole.mcap", 20.0, topics=("each",))
+    data = bytearray((tmp_path / "whole.mcap").read_bytes())
+    data[len(data) // 2 : len(data) // 2 + 8] = bytes(8)
+    (tmp_path / "damaged.mcap").write_bytes(data)
+    whole, damaged = (
+        load_log_facts(
+            cosim.import_log(tmp_path / f"{name}.mcap", "bluerov2_heavy", tmp_path / name, report=False).folder
+        )
+        for name in ("whole", "damaged")
+    )
+    assert "1 damaged chunks of damaged.mcap were passed over." in damaged.remarks
+    gaps = [{topic.quantity: topic.gaps for topic in facts.topics}["attitude"] for facts in (whole, damaged)]
+    assert gaps[1] == gaps[0] + 1
 
 
 @pytest.mark.parametrize(
