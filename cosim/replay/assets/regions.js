@@ -70,10 +70,9 @@ function middleOf(points) {
 /** Set color and style of an entry; an active region is drawn in full, and the goal is seen through others. */
 function dressEntry(entry, active, theme) {
   entry.active = active;
-  const isGoal = !entry.region.criterion;
-  entry.colour = regionColour(entry.region, active || isGoal, theme);
+  entry.colour = regionColour(entry.region, active, theme);
   entry.style = styleOf(entry.region.keep, active, entry.colour);
-  if (isGoal) Object.assign(entry.style, { filled: true, alpha: 0.1, width: 2.6, hidden: 0.6 });
+  if (!entry.region.criterion) Object.assign(entry.style, { filled: true, alpha: 0.1, width: 2.6, hidden: 0.6 });
 }
 
 /** Return true if an entry already shows a region of the same name, shape and place. */
