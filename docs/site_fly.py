@@ -15,14 +15,16 @@ from mkdocs.structure.pages import Page
 
 FRONT, NAME = "index.md", "fly.html"
 _WORDS = "drag its goal and walls, change the current, fail a thruster"
-_LINK = f'\n\n<a href="{NAME}">Fly a docking run in your browser</a>: {_WORDS}.\n'
+_LINK = f'\n\n<a href="{NAME}"><b>Fly this docking run in your browser</b></a>: {_WORDS}.\n'
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Add the link."""
+    """Add the link below the first picture."""
     del config, files
-    head, rest = markdown.split("\n\n", 1)
-    return f"{head}{_LINK}\n{rest}" if page.file.src_uri == FRONT and _can_build() else markdown
+    if page.file.src_uri != FRONT or not _can_build():
+        return markdown
+    above, picture, below = markdown.partition("](images/replay-docking.png)")
+    return above + picture + _LINK + below
 
 
 def on_post_build(config: MkDocsConfig) -> None:

@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 from plant_fmu.compiling.sources import c_sources, compiled_files, header
 from plant_fmu.component import Component
 from plant_fmu.markup import xml_text
-from plant_fmu.quantities import DISPLAY_UNITS, UNITS
+from plant_fmu.quantities import DISPLAY_UNITS, UNITS, base_unit
 from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle
 
@@ -119,9 +119,9 @@ def model_description(component: Component, fmi: int, token: str) -> str:
 
     units = ET.SubElement(root, "UnitDefinitions")
     used = {v.quantity.unit for v in component.variables}
-    for name, exponents in ((name, exponents) for name, exponents in UNITS.items() if name in used):
+    for name in (name for name in UNITS if name in used):
         unit = ET.SubElement(units, "Unit", name=name)
-        ET.SubElement(unit, "BaseUnit", {key: str(power) for key, power in exponents.items()})
+        ET.SubElement(unit, "BaseUnit", base_unit(name))
         for display, factor in DISPLAY_UNITS.get(name, {}).items():
             ET.SubElement(unit, "DisplayUnit", name=display, factor=_number(factor))
 

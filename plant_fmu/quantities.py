@@ -25,6 +25,8 @@ UNITS: dict[str, dict[str, int]] = {
     "N.m/s": {"kg": 1, "m": 2, "s": -3},
     "N.m/N": {"m": 1},
     "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
+    "us": {"s": 1},
+    "rev/min": {"s": -1, "rad": 1},
     "N.s/m": {"kg": 1, "s": -1},
     "N.m.s/rad": {"kg": 1, "m": 2, "s": -1, "rad": -1},
     "N.s2/m2": {"kg": 1, "m": -1},
@@ -39,6 +41,9 @@ UNITS: dict[str, dict[str, int]] = {
     "1/(m2.s)": {"m": -2, "s": -1},
     "s2/kg": {"kg": -1, "s": 2},
 }
+
+# number of coherent SI units in one of the unit, where it is not 1
+_FACTORS = {"us": 1e-6, "rev/min": 2.0 * math.pi / 60.0}
 
 _G = 9.80665  # m/s2, standard gravity
 
@@ -115,11 +120,33 @@ SCALE = Quantity("", 0.0, 1e6)
 SCALE_ERROR = Quantity("", -0.5, 0.5)
 ACCELERATION = Quantity("m/s2", -100.0, 100.0)
 SHARE = Quantity("", -1.0, 1.0)
-PULSE = Quantity("", 0.0, 1e4)  # us; without a unit, as SI has none for it
-RPM = Quantity("", -1e4, 1e4)  # rev/min, likewise
+PULSE = Quantity("us", 0.0, 1e4)
+RPM = Quantity("rev/min", -1e4, 1e4)
 VOLTAGE = Quantity("V", 10.0, 20.0)
 SUBSTEP = Quantity("s", 1e-6, 1.0)
 FORCE_LIMIT = Quantity("N", 0.0, 1e10)  # its maximum is above the norm of any force: no limit
+
+
+def base_unit(unit: str) -> dict[str, str]:
+    """Return the attributes of a unit's element ``BaseUnit``, which FMI and SSP share.
+
+    Parameters
+    ----------
+    unit : str
+        Key of `UNITS`.
+
+    Returns
+    -------
+    dict of str to str
+        Exponents, and ``factor`` where it is not 1.
+
+    Examples
+    --------
+    >>> base_unit("us")
+    {'s': '1', 'factor': '1e-06'}
+    """
+    factor = {"factor": repr(_FACTORS[unit])} if unit in _FACTORS else {}
+    return {base: str(power) for base, power in UNITS[unit].items()} | factor
 
 
 def unbounded(unit: str, nominal: float = 1.0) -> Quantity:

@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 
 from plant_fmu.component import Component
 from plant_fmu.markup import xml_text
-from plant_fmu.quantities import UNITS
+from plant_fmu.quantities import UNITS, base_unit
 from plant_fmu.variables import Variable
 
 _NAMESPACES = {
@@ -90,10 +90,8 @@ def structure(
     _annotate_for_omsimulator(system, step)
 
     defined = ET.SubElement(root, "ssd:Units")
-    for unit, exponents in UNITS.items():
-        if unit in units:
-            base = {key: str(power) for key, power in exponents.items()}
-            ET.SubElement(ET.SubElement(defined, "ssc:Unit", name=unit), "ssc:BaseUnit", base)
+    for unit in (unit for unit in UNITS if unit in units):
+        ET.SubElement(ET.SubElement(defined, "ssc:Unit", name=unit), "ssc:BaseUnit", base_unit(unit))
     experiment = ET.SubElement(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(float(stop_time)))
     annotation = ET.SubElement(
         ET.SubElement(experiment, "ssd:Annotations"), "ssc:Annotation", type="com.opensimulationplatform"

@@ -7,7 +7,7 @@ from importlib import metadata
 from xml.etree import ElementTree as ET
 
 from plant_fmu.markup import xml_text
-from plant_fmu.quantities import UNITS
+from plant_fmu.quantities import base_unit
 from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle
 
@@ -72,6 +72,5 @@ def parameter_set(name: str, description: str, values: Iterable[tuple[Variable, 
     if used:
         units = ET.SubElement(root, "ssv:Units")
         for unit in used:
-            base = {key: str(power) for key, power in UNITS[unit].items()}
-            ET.SubElement(ET.SubElement(units, "ssc:Unit", name=unit), "ssc:BaseUnit", base)
+            ET.SubElement(ET.SubElement(units, "ssc:Unit", name=unit), "ssc:BaseUnit", base_unit(unit))
     return xml_text(root)

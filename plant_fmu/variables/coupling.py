@@ -33,8 +33,8 @@ def coupling_inputs(vehicle: Vehicle) -> Iterator[Variable]:
                 yield row(f"external.{frame}.{kind}.{axis}", f"{frame}.{kind}[{i}]", quantity, description)
     for name, quantity, what in (
         ("normalized", q.SHARE, "Command of thruster {} as a share of its limits, beside its commanded force"),
-        ("pulse", q.PULSE, "Command of thruster {} as a pulse of a T200 [us], beside its commanded force; 0: none"),
-        ("rpm", q.RPM, "Command of thruster {} as revolutions of a T200 [rev/min], beside its commanded force"),
+        ("pulse", q.PULSE, "Command of thruster {} as a pulse of a T200, beside its commanded force; 0: none"),
+        ("rpm", q.RPM, "Command of thruster {} as revolutions of a T200, beside its commanded force"),
         ("failure", q.FRACTION, "Part of the force of thruster {} that is lost"),
     ):
         for i in range(vehicle.n_thrusters):

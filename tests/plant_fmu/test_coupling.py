@@ -1,7 +1,9 @@
 """Coupling inputs: each has the effect of the equivalent parameters or wrench."""
 
+import fmpy
 import numpy as np
 import pytest
+from scipy import constants
 
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.build import cached_fmu
@@ -37,6 +39,22 @@ def test_without_coupling_inputs_the_variables_are_unchanged():
     kept = {v.name for v in plain}
     assert [v.name for v in coupled if v.name in kept] == [v.name for v in plain]
     assert {v.role for v in coupled if v.name not in kept} == {"input", "parameter"}
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_importers_read_units_of_pulses_and_revolutions(fmi):
+    """FMPy validates the file by the official schema; factors to SI units are SciPy's."""
+    fmu = cached_fmu(of_vehicle(load_vehicle("odin"), coupled=True), fmi)
+    described = fmpy.read_model_description(str(fmu), validate=True)
+    read = {v.name: v.unit for v in described.modelVariables}
+    assert (read["thrust_pulse[1]"], read["thrust_rpm[8]"]) == ("us", "rev/min")
+    base = {unit.name: unit.baseUnit for unit in described.unitDefinitions}
+    pulse, turns = base["us"], base["rev/min"]
+    assert (pulse.s, pulse.rad, pulse.factor) == (1, 0, pytest.approx(constants.micro, rel=1e-15))
+    assert (turns.s, turns.rad) == (-1, 1)
+    assert turns.factor == pytest.approx(2.0 * constants.pi / constants.minute, rel=1e-15)
+    assert base["rad/s"].factor == 1.0
 
 
 @pytest.mark.medium

@@ -9,7 +9,14 @@ from scipy import constants
 from plant_fmu import quantities
 from plant_fmu.quantities import DISPLAY_UNITS, UNITS, Quantity
 
-BASE = {"N": {"kg": 1, "m": 1, "s": -2}, "Hz": {"s": -1}, "V": {"kg": 1, "m": 2, "s": -3, "A": -1}}
+BASE = {
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "Hz": {"s": -1},
+    "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
+    "us": {"s": 1},
+    "rev": {"rad": 1},
+    "min": {"s": 1},
+}
 ALL = {name: value for name, value in vars(quantities).items() if isinstance(value, Quantity)}
 
 

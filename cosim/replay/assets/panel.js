@@ -56,8 +56,8 @@ class Panel {
     if (!this.run) return;
     this._now();
     this._weights();
-    this._rules();
     this._distances();
+    this._rules();
     this._numbers();
     this._events();
     this.update(true);

@@ -55,6 +55,7 @@ function paintPlot(context, frame, spec, curves, theme) {
   }
   context.restore();
   if (spec.zero) nameZone(context, frame, colours);
+  if (frame.axis.broken) nameRest(context, frame, curves, colours);
   paintBeyond(context, frame, spec, curves, theme, colours.card);
 }
 
@@ -146,10 +147,20 @@ function paintBreak(context, { axis, x, top, bottom, right }, colours) {
     context.lineTo(at + aside + 2.5, bottom - 4);
   }
   context.stroke();
-  context.textAlign = "center";
-  context.textBaseline = "top";
-  if (right - at > 40) paintText(context, "at rest", (at + right) / 2, top + 2, colours.muted, colours.card);
   context.lineWidth = 1;
+}
+
+/** Write "at rest" after the break of the time axis: at the top, in the middle or at the bottom, where no curve is. */
+function nameRest(context, frame, curves, colours) {
+  const { axis, top, bottom, right } = frame;
+  const at = frame.x(axis.rest);
+  if (right - at <= 40) return;
+  const lines = curves.filter(({ values }) => values.length).map(({ values }) => frame.y(values[values.length - 1]));
+  const free = [top + 8, (top + bottom) / 2, bottom - 24].find((y) => lines.every((line) => !(Math.abs(line - y) < 10)));
+  if (free === undefined) return;
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  paintText(context, "at rest", (at + right) / 2, free, colours.muted, colours.card);
 }
 
 /** Write the true values that lie beyond the range of the curves, a line of text each, with an arrow. */

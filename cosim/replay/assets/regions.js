@@ -67,11 +67,12 @@ function middleOf(points) {
   return points.reduce((sum, p) => Vec.along(sum, p, 1 / points.length), [0, 0, 0]);
 }
 
-/** Set color and style of an entry; an active region is drawn in full. */
+/** Set color and style of an entry; an active region is drawn in full, and the goal is seen through others. */
 function dressEntry(entry, active, theme) {
   entry.active = active;
   entry.colour = regionColour(entry.region, active, theme);
   entry.style = styleOf(entry.region.keep, active, entry.colour);
+  if (!entry.region.criterion) Object.assign(entry.style, { filled: true, alpha: 0.1, width: 2.6, hidden: 0.6 });
 }
 
 /** Return true if an entry already shows a region of the same name, shape and place. */
@@ -113,6 +114,7 @@ function nearestFirst(entries, runs, t) {
 
 /** Add the labels of regions; the active one is marked, and only the nearest keep-out regions are labeled. */
 function nameRegions(labels, camera, entries, colours, runs, t) {
+  for (const entry of entries) if (!entry.region.criterion && entry.solid) blockGoal(labels, camera, entry);
   const named = new Set();
   const near = new Map(nearestFirst(entries, runs, t).map((entry, place) => [entry, place]));
   for (const entry of entries) {
@@ -132,6 +134,14 @@ function nameRegions(labels, camera, entries, colours, runs, t) {
       sides: ["above", "right", "left", "below"],
     });
   }
+}
+
+/** Keep labels off the goal, unless it fills the picture. */
+function blockGoal(labels, camera, { solid, middle }) {
+  const [x, y, depth] = camera.project(middle);
+  if (depth < camera.near) return;
+  const half = (solid.centre[2] - solid.top) * camera.scaleAt(middle);
+  if (half < 0.2 * Math.min(camera.width, camera.height)) labels.block(x - half, y - half, 2 * half, 2 * half);
 }
 
 /** Keep labels off a vehicle with its axes and forces, unless it fills the picture. */

@@ -14,7 +14,8 @@ class WhatIfPanel {
     const summary = element("summary", "", "What if ");
     summary.append(this.state);
     this.body = element("div", "command-body");
-    this.body.append(this._buttons(), this._water(), this._noise(), this._thruster(), this._gain(), this._places());
+    const hint = "Drag the goal or a region in the scene (Shift: up and down), or change a number: the run is flown again.";
+    this.body.append(this._buttons(), element("p", "hint", hint), this._water(), this._noise(), this._thruster(), this._gain(), this._places());
     this.holder.append(summary, this.body);
     document.getElementById("stage").append(this.holder);
     whatIf.page.stage.coveredBy(this.holder);
@@ -148,7 +149,7 @@ class WhatIfPanel {
   _places() {
     const { whatIf } = this;
     const list = element("div", "command-list");
-    list.append(element("p", "hint", "Drag the goal and regions in the scene (Shift: up and down), or give their places in metres."));
+    list.append(element("p", "hint", "Places in metres:"));
     const { regions } = whatIf.recorded.header;
     regions.forEach(({ name }, region) => {
       const axes = whatIf.flight.data.moves[region];
