@@ -129,7 +129,9 @@ class Failsafes:
             )
         part = self.values.get(_SATURATION, 1.0)
         if part < 1.0:
-            lines.append(f"WARNING: {_SATURATION} is {part:g}, but the law counts on the thrusters' full force; expected 1")
+            lines.append(
+                f"WARNING: {_SATURATION} is {part:g}, but the law counts on the thrusters' full force; expected 1"
+            )
         kept = [(name, self.values[name]) for name in _KEPT if name in self.values]
         if any(not 0.0 <= time <= _LONGEST_KEPT for _, time in kept):
             now = ", ".join(f"{name} is {time:g}" for name, time in kept)
