@@ -15,6 +15,11 @@ _MAV_PARAM_TYPE_INT32 = 6
 
 _ON_SILENCE = {0: "does nothing", 1: "warns", 2: "disarms"}
 _ON_GCS_LOSS = {**_ON_SILENCE, 3: "holds the depth", 4: "surfaces"}
+_ON_LOST_SET_POINTS = {
+    0: "changes to Position", 1: "changes to Altitude", 2: "changes to Stabilized", 3: "returns", 4: "lands",
+    5: "holds", 6: "terminates", 7: "disarms",
+}  # fmt: skip
+_ON_LOST_LINK = {0: "does nothing", 1: "holds", 2: "returns", 3: "lands", 5: "terminates", 6: "disarms"}
 
 
 @dataclass(frozen=True)
@@ -44,21 +49,24 @@ PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
     ),
     "px4": (
         Parameter("COM_OF_LOSS_T", "s until set-points that stop coming count as lost"),
-        Parameter("COM_OBL_RC_ACT", "what follows then, as PX4 numbers it"),
+        Parameter("COM_OBL_RC_ACT", "on lost set-points", _ON_LOST_SET_POINTS),
         Parameter("COM_RC_LOSS_T", "s until sticks that stop coming count as lost"),
-        Parameter("NAV_RCL_ACT", "what follows then, as PX4 numbers it"),
+        Parameter("NAV_RCL_ACT", "on lost sticks", _ON_LOST_LINK),
         Parameter("COM_DL_LOSS_T", "s until a ground station that falls silent counts as lost"),
-        Parameter("NAV_DLL_ACT", "what follows then, as PX4 numbers it"),
+        Parameter("NAV_DLL_ACT", "on a lost ground station", _ON_LOST_LINK),
+        Parameter("UUV_THRUST_SAT", "greatest part of the force along each axis"),
+        Parameter("UUV_TORQUE_SAT", "greatest part of the moment about each axis"),
     ),
     "generic": (),
 }
 _ACTS = {  # of which one at least must not be 0, for anything to follow when the companion dies
     "ardusub": ("FS_PILOT_INPUT", "FS_GCS_ENABLE"),
-    "px4": ("COM_OBL_RC_ACT", "NAV_RCL_ACT", "NAV_DLL_ACT"),
+    "px4": ("COM_OF_LOSS_T",),
 }
 _STICK_SYSTEM = ("SYSID_MYGCS", "MAV_GCS_SYSID")
 _KEPT = ("RC_OVERRIDE_TIME", "FS_PILOT_TIMEOUT")  # how long sticks act with a radio, and without one
 _LONGEST_KEPT = 1.0  # s
+_SATURATION = "UUV_THRUST_SAT"
 
 
 class Failsafes:
@@ -118,6 +126,11 @@ class Failsafes:
         if acts and all(self.values.get(name, 0.0) == 0.0 for name in acts):
             lines.append(
                 f"WARNING: nothing is known to follow if the companion dies: {', '.join(acts)} are 0 or unknown"
+            )
+        part = self.values.get(_SATURATION, 1.0)
+        if part < 1.0:
+            lines.append(
+                f"WARNING: {_SATURATION} is {part:g}, but the law counts on the thrusters' full force; expected 1"
             )
         kept = [(name, self.values[name]) for name in _KEPT if name in self.values]
         if any(not 0.0 <= time <= _LONGEST_KEPT for _, time in kept):

@@ -22,9 +22,9 @@ STEER_BY: tuple[SteerBy, ...] = get_args(SteerBy)
 _STEERED_IN: dict[SteerBy, Mode] = {"sticks": "stabilize", "wrench": "manual", "velocity": "reach", "attitude": "reach"}
 
 _PX4_REFUSES: dict[str, str] = {
-    "wrench": "its sticks have no roll and pitch beside surge and sway; expected sticks or attitude",
-    "velocity": "its uuv_pos_control follows positions alone; expected sticks or attitude",
-    "rc-override": "it gives channels a meaning by its own RC_MAP_*, and none for surge; expected manual-control",
+    "sticks": "its Stabilized takes the forward stick for heave or pitch; expected attitude",
+    "wrench": "its sticks have no roll and pitch beside surge and sway; expected attitude",
+    "velocity": "its uuv_pos_control keeps the depth and pushes nowhere; expected attitude",
 }
 _CENTERED_FOR = 0.2  # s, during which overridden channels are centered before their release
 _NEUTRAL: Array = np.zeros(6)
@@ -38,9 +38,8 @@ def require_taken(profile: ProfileName, steer_by: SteerBy, sticks_by: SticksBy) 
     RunError
         With the reason, and the accepted outputs.
     """
-    for flag, value in (("--steer-by", steer_by), ("--sticks-by", sticks_by)):
-        if profile == "px4" and value in _PX4_REFUSES:
-            raise RunError(f"{flag} {value}: a PX4 does not take it: {_PX4_REFUSES[value]}")
+    if profile == "px4" and steer_by in _PX4_REFUSES:
+        raise RunError(f"--steer-by {steer_by}: a PX4 does not take it: {_PX4_REFUSES[steer_by]}")
     if sticks_by == "rc-override" and not uses_sticks(profile, steer_by):
         raise RunError(f"--sticks-by {sticks_by}: no sticks are sent with --steer-by {steer_by}, expected none")
 
@@ -145,11 +144,11 @@ class Output:
         """Return the messages that release the sticks, `since` [s] after the start of the release.
 
         Overridden channels are centered first, since an ArduSub without a radio keeps their last values; then they are
-        released, once.
+        released, once. A PX4 keeps the last forces until its own failsafe, so none are asked for first.
         """
         self.clear()
         if not self._uses_sticks:
-            return ()
+            return self.still(state) if self._steer_by == "attitude" and since < _CENTERED_FOR else ()
         system = state.system or 0
         if self._sticks_by == "manual-control" or (self._overridden and since < _CENTERED_FOR):
             return (self._sticks(system),)

@@ -14,7 +14,8 @@ from cosim.companion.clock_sync import ClockSync
 from cosim.simulation.signals import Array
 
 RATES = {  # Hz that are asked for, by message id
-    0: 5.0,  # HEARTBEAT, with mode and arming
+    0: 5.0,  # HEARTBEAT, with mode and arming; a PX4 refuses, and sends one a second
+    436: 10.0,  # CURRENT_MODE, PX4's
     31: 50.0,  # ATTITUDE_QUATERNION
     32: 50.0,  # LOCAL_POSITION_NED
     33: 5.0,  # GLOBAL_POSITION_INT
@@ -91,6 +92,7 @@ class ReportedState:
         self._position_at = self._attitude_at = -math.inf  # our time [s]
         self._handlers: dict[str, Callable[[Any, float], None]] = {
             "HEARTBEAT": self._heartbeat,
+            "CURRENT_MODE": self._current_mode,
             "LOCAL_POSITION_NED": self._local_position,
             "ATTITUDE_QUATERNION": self._attitude_quaternion,
             "ODOMETRY": self._odometry,
@@ -146,6 +148,9 @@ class ReportedState:
     def _heartbeat(self, m: Any, now: float) -> None:
         self.beaten_at, self.autopilot, self.mode = now, m.autopilot, m.custom_mode
         self.is_armed, self.in_failsafe = bool(m.base_mode & _ARMED), m.system_status >= _CRITICAL
+
+    def _current_mode(self, m: Any, now: float) -> None:
+        self.mode = m.custom_mode
 
     def _local_position(self, m: Any, now: float) -> None:
         self._place((m.x, m.y, m.z), (m.vx, m.vy, m.vz), m.time_boot_ms * _MILLI, now)

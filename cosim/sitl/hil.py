@@ -13,13 +13,12 @@ from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.options import ORIGIN
 from cosim.sitl.flight import Flight
 from cosim.sitl.flights import Counts, Flights, Outcome
-from cosim.sitl.hil_messages import hil_messages
+from cosim.sitl.hil_messages import RATE, hil_messages
 from cosim.sitl.motion import Motion, at_rest
 
 log = logging.getLogger(__name__)
 
 LEFT = "ended: the autopilot left"
-RATE = 250  # Hz, frames per simulated second
 SYSTEM_ID, COMPONENT_ID = 254, 25  # different from vehicles and ground stations
 
 _GPS_EVERY, _HEARTBEAT_EVERY = RATE // 10, RATE

@@ -11,7 +11,9 @@ from controller.quaternion import rotation_matrix
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.sitl.motion import Motion
 
-FIELD_NED = (0.175, -0.012, 0.466)  # gauss, magnetic field near Edinburgh, at the default origin
+RATE = 250  # Hz, frames per simulated second
+FIELD_NED = (0.1755, -0.0026, 0.470)  # gauss, at the default origin, as PX4's own table has it
+FLICKER = 5e-4  # gauss, of every second frame: PX4 takes a field that never changes for a dead sensor
 TEMPERATURE = 15.0  # degrees Celsius
 
 _ALL_BUT_AIRSPEED = 0x1BFF  # fields of HIL_SENSOR: accelerations, rates, field, pressure, its altitude, temperature
@@ -60,7 +62,8 @@ def hil_messages(mavlink: Any, motion: Motion, time_us: int, origin: tuple[float
             time_us, motion.quaternion, *motion.gyro, latitude, longitude, altitude_mm, *speeds, 0, 0, *milli_g
         )
     )
-    field_body: list[float] = (rotation_matrix(np.array(motion.quaternion)).T @ np.array(FIELD_NED)).tolist()
+    field = rotation_matrix(np.array(motion.quaternion)).T @ np.array(FIELD_NED)
+    field_body: list[float] = (field + FLICKER * (time_us * RATE // 1_000_000 % 2)).tolist()
     messages.append(
         mavlink.MAVLink_hil_sensor_message(
             time_us, *motion.specific_force, *motion.gyro, *field_body,

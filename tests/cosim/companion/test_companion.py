@@ -15,6 +15,7 @@ from cosim.errors import RunError
 from cosim.live.address import parse_live
 from cosim.live.view import LiveView
 from cosim.mavlink.wire.options import ORIGIN
+from cosim.mavlink.wire.thrust_body import thrust_body_of
 from cosim.results.run_result import load_run
 from cosim.run.run_folder import report_again
 from cosim.scenario.scenario import load_scenario
@@ -80,7 +81,6 @@ OUTPUTS = [  # profile, steered by, sticks by, and what carries it
     ("generic", "wrench", "manual-control", {"MANUAL_CONTROL"}),
     ("generic", "velocity", "manual-control", {"SET_POSITION_TARGET_LOCAL_NED"}),
     ("generic", "attitude", "manual-control", {"SET_ATTITUDE_TARGET"}),
-    ("px4", "sticks", "manual-control", {"MANUAL_CONTROL"}),
     ("px4", "attitude", "manual-control", {"SET_ATTITUDE_TARGET"}),
     ("ardusub", "sticks", "rc-override", {"RC_CHANNELS_OVERRIDE"}),
     ("ardusub", "wrench", "rc-override", {"RC_CHANNELS_OVERRIDE"}),
@@ -233,6 +233,23 @@ def test_rejected_mode_holds_within_one_second(tmp_path):
     texts = [(at, m.text) for at, m in link.sent if m.get_type() == "STATUSTEXT"]
     (held,) = [at for at, text in texts if text == "Companion held: refused mode"]
     assert held - first <= 1.0
+
+
+@pytest.mark.medium
+def test_a_px4_that_refuses_hold_gets_no_forces_any_more(tmp_path):
+    """Without a global position it refuses Hold, and keeps the forces of the last set-point for a second."""
+    link = StandIn(profile="px4", shift=SHIFT)
+    late = 6.0  # s: PX4's parameters, which our vehicle has not, are waited for
+    link.events += [
+        (late, lambda: link.refused_commands.add(mavlink.MAV_CMD_DO_SET_MODE)),
+        (late, lambda: link.silent.add("LOCAL_POSITION_NED")),
+    ]
+    flight = Flight(tmp_path, link=link, profile="px4", steer_by="attitude")
+    assert flight.status == "held: stale estimate"
+    since = flight.time_of("held")
+    targets = flight.sent_after(since - 0.01, "SET_ATTITUDE_TARGET")
+    assert targets and all(thrust_body_of(target) == (0.0, 0.0, 0.0) for target in targets)
+    assert any(any(thrust_body_of(m)) for m in flight.sent_after(0.0, "SET_ATTITUDE_TARGET"))
 
 
 @pytest.mark.medium

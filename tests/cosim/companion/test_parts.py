@@ -18,7 +18,7 @@ from cosim.companion.outputs import require_taken
 from cosim.companion.safety import CONDITIONS, Observation, Supervisor
 from cosim.companion.set_points import TurnLead, VelocityLead, attitude_target, velocity_target
 from cosim.companion.sticks import channels_override, channels_released, manual_control, scale_of
-from cosim.companion.vehicle_state import ReportedState
+from cosim.companion.vehicle_state import RATES, ReportedState
 from cosim.errors import RunError
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.vehicle.layout import euler_of
@@ -179,9 +179,10 @@ def test_rc_override_realizes_the_desired_wrench(wrench):
 @pytest.mark.parametrize(
     ("profile", "steer_by", "sticks_by", "word"),
     [
+        ("px4", "sticks", "manual-control", "forward stick"),
         ("px4", "wrench", "manual-control", "no roll and pitch"),
-        ("px4", "velocity", "manual-control", "positions alone"),
-        ("px4", "sticks", "rc-override", "RC_MAP_"),
+        ("px4", "velocity", "manual-control", "pushes nowhere"),
+        ("px4", "attitude", "rc-override", "no sticks are sent"),
         ("ardusub", "velocity", "rc-override", "no sticks are sent"),
         ("generic", "attitude", "rc-override", "no sticks are sent"),
     ],
@@ -313,6 +314,14 @@ def test_deflected_foreign_sticks_count_as_a_pilot(system, component, x, z, coun
     assert (state.pilot_at == 5.0) == counts
 
 
+def test_a_px4_mode_is_known_before_its_next_heartbeat():
+    """It sends a heartbeat a second, and refuses an interval for them; a mode is waited for 0.8 s."""
+    state, offboard = reported((0.0, 0.0, 0.0)), PROFILES["px4"].numbers["reach"]
+    state.take(1, 1, mavlink.MAVLink_current_mode_message(0, offboard, offboard), 5.0)
+    assert state.mode == offboard
+    assert RATES[mavlink.MAVLINK_MSG_ID_CURRENT_MODE] >= 5.0
+
+
 def test_rc_override_counts_as_a_pilot():
     state = reported((0.0, 0.0, 0.0))
     pulses = [0, 0xFFFF, 1500, 1500, 1700, 0, 0, 0]
@@ -374,6 +383,19 @@ def test_px4_integer_parameters_are_decoded_from_bits():
     (bits,) = struct.unpack("<f", struct.pack("<i", 3))
     failsafes.take(decoded(value_of("NAV_RCL_ACT", bits, kind=6)))
     assert failsafes.values == {"NAV_RCL_ACT": 3.0}
+
+
+def test_a_px4_that_does_not_give_the_full_force_is_warned_of():
+    """And no value of COM_OBL_RC_ACT means that nothing follows: PX4's 0 is its mode Position."""
+    failsafes = Failsafes("px4")
+    assert failsafes.text()[-1].startswith("WARNING: nothing is known to follow if the companion dies: COM_OF_LOSS_T")
+    (none,) = struct.unpack("<f", struct.pack("<i", 0))
+    failsafes.take(decoded(value_of("COM_OF_LOSS_T", 1.0)))
+    failsafes.take(decoded(value_of("COM_OBL_RC_ACT", none, kind=6)))
+    assert "COM_OBL_RC_ACT 0: on lost set-points it changes to Position" in failsafes.text()
+    for part, warned in ((0.1, True), (1.0, False)):
+        failsafes.take(decoded(value_of("UUV_THRUST_SAT", part)))
+        assert any("WARNING" in line for line in failsafes.text()) == warned
 
 
 def test_simulated_autopilot_clock_runs_at_the_given_speedup():

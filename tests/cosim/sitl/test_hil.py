@@ -1,5 +1,6 @@
 """PX4's simulator interface, against a stand-in that packs and reads MAVLink 2 by hand."""
 
+import itertools
 import math
 import socket
 import struct
@@ -13,8 +14,8 @@ from cosim.errors import RunError
 from cosim.mavlink.wire.dialect import dialect
 from cosim.results.record import load_record
 from cosim.sitl.flights import FlightOptions, Flights
-from cosim.sitl.hil import LEFT, RATE, HilServer
-from cosim.sitl.hil_messages import FIELD_NED, air_pressure, hil_messages
+from cosim.sitl.hil import LEFT, HilServer
+from cosim.sitl.hil_messages import FIELD_NED, RATE, air_pressure, hil_messages
 from cosim.sitl.law import law_of_controls
 from cosim.sitl.motion import Motion
 from tests.cosim.sitl.conftest import Served
@@ -238,11 +239,21 @@ def test_pressure_round_trips_to_altitude(altitude):
     assert back == pytest.approx(altitude, abs=0.05 + 1e-4 * abs(altitude))
 
 
+def test_the_field_of_a_vehicle_at_rest_never_stays_the_same():
+    """PX4's DataValidator takes a hundred equal values for a dead sensor; then it has no heading."""
+    zero = (0.0,) * 3
+    motion = Motion(0.0, zero, (0.0, 0.0, -9.8), zero, zero, zero, (1.0, 0.0, 0.0, 0.0), 3.0, zero)
+    times = [(frame + 1) * 1_000_000 // RATE for frame in range(5)]
+    fields = [hil_messages(dialect(), motion, time, (55.0, -3.0), False)[-1].xmag for time in times]
+    assert all(a != b for a, b in itertools.pairwise(fields))
+    assert fields == pytest.approx([FIELD_NED[0]] * 5, abs=1e-3)
+
+
 def test_magnetic_field_and_speeds_are_in_their_frames_and_saturated():
     """Facing east the field's north is to the left."""
     zero, east = (0.0,) * 3, (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
     motion = Motion(0.0, zero, (0.0, 0.0, -9.8), zero, (1e4, 0.0, -1e4), zero, east, 3.0, zero)
-    gps, truth, sensor = hil_messages(dialect(), motion, 4000, (55.0, -3.0), True)
+    gps, truth, sensor = hil_messages(dialect(), motion, 8000, (55.0, -3.0), True)
     assert (sensor.xmag, sensor.ymag, sensor.zmag) == pytest.approx((FIELD_NED[1], -FIELD_NED[0], FIELD_NED[2]))
     assert (gps.vn, gps.vd, gps.vel) == (32767, -32767, 65535)
     assert (truth.vx, truth.zacc) == (32767, -999)
