@@ -9,7 +9,14 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from cosim.mavlink.vehicle.profile import Profile
-from cosim.mavlink.vehicle.sticks import CLIMB_DEAD_ZONE, YAW_DEAD_ZONE, MotorMixer, deflection_of
+from cosim.mavlink.vehicle.sticks import (
+    CLIMB_DEAD_ZONE,
+    LEAN,
+    LEAN_DEAD_ZONE,
+    YAW_DEAD_ZONE,
+    MotorMixer,
+    deflection_of,
+)
 from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.commands.stick_stabilizer import YAW_RATE
 from cosim.simulation.signals import Array
@@ -81,6 +88,10 @@ class StickScale:
     def climb_stick(self, rate_down: float) -> float:
         """Return the heave stick that commands a depth rate [m/s]; 0 for one that is not finite."""
         return self._rate_stick(rate_down / PILOT_SPEED, CLIMB_DEAD_ZONE)
+
+    def lean_sticks(self, lean: Array) -> Array:
+        """Return the sticks of roll and pitch, shape (2,), that command these angles [rad] in STABILIZE."""
+        return np.array([deflection_of(min(max(angle / LEAN, -1.0), 1.0), LEAN_DEAD_ZONE) for angle in lean.tolist()])
 
     def _rate_stick(self, part: float, dead_zone: float) -> float:
         if not math.isfinite(part):
