@@ -69,9 +69,9 @@ class TurnLead:
 class LevelLead:
     """Convert the commands of roll and pitch that level a vehicle to lean angles of an ArduSub's attitude loop.
 
-    Surge and sway tilt a vehicle whose horizontal thrusters are eccentric. The loop commands the rate P_a (lean - angle),
-    and the thrusters u = P e + I integral(e) of its error e. So a lean u/(P_a P), which washes out in P/I seconds,
-    gives the command u while the angle is zero. Gains are ArduSub's defaults.
+    Surge and sway tilt a vehicle whose horizontal thrusters are eccentric. The loop commands the rate
+    P_a (lean - angle), and the thrusters u = P e + I integral(e) of its error e. So a lean u/(P_a P), which washes out
+    in P/I seconds, gives the command u while the angle is zero. Gains are ArduSub's defaults.
     """
 
     def __init__(self) -> None:
