@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -27,6 +28,8 @@ STICKS_BY: tuple[SticksBy, ...] = get_args(SticksBy)
 
 PILOT_SPEED = 0.5  # m/s, depth rate of a full vertical stick in ALT_HOLD: ArduSub's PILOT_SPEED_UP
 _FULL = 1000.0
+_NEWTON, _FLAT = 3, 0.05  # steps; least command of a thruster at which its force is linearized
+_HALVINGS = 8  # of the part of a force that leaves its moments whole
 _PITCH, _ROLL = 1, 2  # enabled_extensions
 _CENTER, _SWING, _AXES = 1500, 400, 6  # us of a channel; channels
 _RELEASED, _LEFT_ALONE = 0, 0xFFFF  # values that release a channel, and leave it unchanged
@@ -40,6 +43,8 @@ class StickScale:
     ----------
     efforts : ndarray, shape (n, 6)
         Fraction of each thruster's greatest force, for a unit wrench along or about each body axis [1/N, 1/(N m)].
+    forces : ndarray, shape (6, n)
+        Wrench of each thruster's greatest force [N, N m].
     mixer : ndarray, shape (n, 6)
         Command of each thruster, 1, 0 or -1, by a full stick of each axis at a gain of 1. For an autopilot that
         allocates forces itself, both have a row for each axis in place of each thruster.
@@ -54,6 +59,7 @@ class StickScale:
     """
 
     efforts: Array
+    forces: Array
     mixer: Array
     gain: float
     scales_all: bool
@@ -71,15 +77,49 @@ class StickScale:
         wrench : ndarray, shape (6,)
             [N, N m], body frame; components that are not finite count as 0.
         """
-        share = self.efforts @ np.where(np.isfinite(wrench), wrench, 0.0)
-        if self.quadratic:
-            share = np.copysign(np.sqrt(np.abs(share)), share)
-        asked = np.linalg.lstsq(self.mixer, share, rcond=None)[0]
-        asked[[0, 1, 2, 5]] /= self.gain
-        if self.scales_all:
-            asked[3:5] /= self.gain
-        clipped: Array = np.clip(asked, -1.0, 1.0)
+        asked = np.where(np.isfinite(wrench), wrench, 0.0)
+        sticks = self._sticks_of(asked)
+        if self.quadratic and self._is_beyond(sticks):
+            least, most = 0.0, 1.0
+            for _ in range(_HALVINGS):
+                part = 0.5 * (least + most)
+                sticks = self._sticks_of(np.concatenate([part * asked[:3], asked[3:]]))
+                least, most = (least, part) if self._is_beyond(sticks) else (part, most)
+            sticks = self._sticks_of(np.concatenate([least * asked[:3], asked[3:]]))
+        clipped: Array = np.clip(sticks / self._gains, -1.0, 1.0)
         return clipped
+
+    def _sticks_of(self, wrench: Array) -> Array:
+        """Return the sticks times their gain, shape (6,), that command a wrench without limits.
+
+        Least squares of the thrusters' commands, then for squares Newton's method on the wrench that they make.
+        """
+        share = self.efforts @ wrench
+        if not self.quadratic:
+            linear: Array = self._by_motor @ share
+            return linear
+        result: Array = self._by_motor @ np.copysign(np.sqrt(np.abs(share)), share)
+        for _ in range(_NEWTON):
+            command = self.mixer @ result
+            size = np.abs(command)
+            slope = (self.forces * (2.0 * np.maximum(size, _FLAT))) @ self.mixer
+            lacking = wrench - self.forces @ (command * size)
+            result += np.linalg.lstsq(slope, lacking, rcond=None)[0]
+        return result
+
+    def _is_beyond(self, sticks: Array) -> bool:
+        """Return True if sticks times their gain exceed a thruster's or a stick's limit."""
+        return bool(np.abs(self.mixer @ sticks).max() > 1.0 or np.abs(sticks / self._gains).max() > 1.0)
+
+    @cached_property
+    def _by_motor(self) -> Array:
+        inverse: Array = np.linalg.pinv(self.mixer)
+        return inverse
+
+    @cached_property
+    def _gains(self) -> Array:
+        tilt = self.gain if self.scales_all else 1.0
+        return np.array([self.gain, self.gain, self.gain, tilt, tilt, self.gain])
 
     def yaw_rate_stick(self, rate: float) -> float:
         """Return the yaw stick that commands a yaw rate [rad/s]; 0 for one that is not finite."""
@@ -118,11 +158,11 @@ def scale_of(vehicle: Vehicle, profile: Profile, pilot_gain: float, sticks_by: S
     reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
     if profile.name != "ardusub":  # it brings each axis to the thrusters by itself
         share = np.diag(np.divide(1.0, reach, out=np.zeros(6), where=reach > 0.0))
-        return StickScale(share, np.eye(6), gain, True, False, 0.0)
+        return StickScale(share, np.diag(reach), np.eye(6), gain, True, False, 0.0)
     mixer = MotorMixer(vehicle)
-    made = (vehicle.thruster_matrix * mixer.greatest) @ mixer.asked  # by full sticks, one axis a column
-    efforts = mixer.asked @ np.linalg.pinv(made)
-    return StickScale(efforts, mixer.asked, gain, False, mixer.is_quadratic, pilot_gain)
+    forces = vehicle.thruster_matrix * mixer.greatest
+    efforts = mixer.asked @ np.linalg.pinv(forces @ mixer.asked)
+    return StickScale(efforts, forces, mixer.asked, gain, False, mixer.is_quadratic, pilot_gain)
 
 
 def manual_control(mavlink: Any, system: int, profile: Profile, sticks: Array, all_axes: bool) -> Any:

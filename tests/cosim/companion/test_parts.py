@@ -127,7 +127,19 @@ def test_ardusub_motor_mix_realizes_the_desired_wrench(wrench):
     pilot = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 0.5])  # the gain leaves roll and pitch alone
     motors = VECTORED_6DOF @ (pilot * sticks)
     made = HEAVY.thruster_matrix @ (-40.0 * motors * np.abs(motors))
-    assert made == pytest.approx(0.25 * np.array(wrench), rel=0.1, abs=0.3)
+    assert made == pytest.approx(0.25 * np.array(wrench), rel=0.01, abs=0.05)
+
+
+@pytest.mark.parametrize("force", [(30.0, 60.0, 110.0), (100.0, 0.0, -150.0), (0.0, 90.0, 30.0)])
+def test_a_force_beyond_the_thrusters_leaves_the_moments_whole(force):
+    """AP_Motors6DOF divides all that vertical, and all that horizontal motors are asked for by the greatest above 1."""
+    scale, moment = scale_of(HEAVY, ARDUSUB, 1.0, "manual-control"), np.array([5.0, -3.0, 1.0])
+    motors = VECTORED_6DOF @ scale.sticks(np.concatenate([force, moment]))
+    for group in (slice(0, 4), slice(4, 8)):
+        motors[group] /= max(1.0, np.abs(motors[group]).max())
+    made = HEAVY.thruster_matrix @ (-40.0 * motors * np.abs(motors))
+    assert made[3:] == pytest.approx(moment, abs=0.05)
+    assert np.dot(made[:3], force) / np.linalg.norm(force) > 30.0
 
 
 @pytest.mark.parametrize("profile", ["px4", "generic"])
@@ -173,7 +185,7 @@ def test_rc_override_realizes_the_desired_wrench(wrench):
     sticks = scale_of(HEAVY, ARDUSUB, 0.5, "rc-override").sticks(np.array(wrench, dtype=float))
     motors = VECTORED_6DOF @ sticks
     made = HEAVY.thruster_matrix @ (-40.0 * motors * np.abs(motors))
-    assert made == pytest.approx(np.array(wrench), rel=0.1, abs=0.3)
+    assert made == pytest.approx(np.array(wrench), rel=0.01, abs=0.05)
 
 
 def angle_of(pulse):
