@@ -70,7 +70,9 @@ class StickScale:
         """Return the sticks that command a wrench, shape (6,), X Y Z K M N from -1 to 1.
 
         An autopilot adds the commands of all sticks to a thruster; a quadratic force is that of the sum. So each
-        thruster's force is converted to its command, and the commands to sticks.
+        thruster's force is converted to its command, and the commands to sticks. Where a thruster or a stick lacks the
+        room for all of it, surge, sway and heave are shortened alike until the moments are whole: an ArduSub
+        scales forces and moments down together, and the vehicle would tilt.
 
         Parameters
         ----------
@@ -113,8 +115,7 @@ class StickScale:
 
     @cached_property
     def _by_motor(self) -> Array:
-        inverse: Array = np.linalg.pinv(self.mixer)
-        return inverse
+        return np.asarray(np.linalg.pinv(self.mixer), dtype=np.float64)
 
     @cached_property
     def _gains(self) -> Array:
