@@ -182,7 +182,7 @@ class Output:
         """Return the sticks of roll and pitch, shape (2,), with which the autopilot keeps the vehicle level."""
         if self._profile.name != "ardusub":
             return np.zeros(2)
-        return self._scale.lean_sticks(self._level_lead.lean(self._scale.sticks(wrench)[3:5], period))
+        return self._scale.lean_sticks(self._level_lead.angles(self._scale.sticks(wrench)[3:5], period))
 
     def _sticks(self, system: int) -> Any:
         if self._sticks_by == "manual-control":

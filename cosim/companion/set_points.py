@@ -81,7 +81,7 @@ class LevelLead:
         """Forget the integral, after another controller has steered."""
         self._settled[:] = 0.0
 
-    def lean(self, command: Array, period: float) -> Array:
+    def angles(self, command: Array, period: float) -> Array:
         """Return roll and pitch, shape (2,) [rad], of at most 0.5 rad.
 
         Parameters
@@ -92,8 +92,8 @@ class LevelLead:
             Time since the last call [s].
         """
         self._settled += min(1.0, period * _RATE_I / _RATE_P) * (command - self._settled)
-        lean: Array = np.clip((command - self._settled) / (_ANGLE_P * _RATE_P), -_LEAN, _LEAN)
-        return lean
+        angles: Array = np.clip((command - self._settled) / (_ANGLE_P * _RATE_P), -_LEAN, _LEAN)
+        return angles
 
 
 class VelocityLead:

@@ -130,9 +130,9 @@ class StickScale:
         """Return the heave stick that commands a depth rate [m/s]; 0 for one that is not finite."""
         return self._rate_stick(rate_down / PILOT_SPEED, CLIMB_DEAD_ZONE)
 
-    def lean_sticks(self, lean: Array) -> Array:
+    def lean_sticks(self, angles: Array) -> Array:
         """Return the sticks of roll and pitch, shape (2,), that command these angles [rad] in STABILIZE."""
-        return np.array([deflection_of(min(max(angle / LEAN, -1.0), 1.0), LEAN_DEAD_ZONE) for angle in lean.tolist()])
+        return np.array([deflection_of(min(max(angle / LEAN, -1.0), 1.0), LEAN_DEAD_ZONE) for angle in angles.tolist()])
 
     def _rate_stick(self, part: float, dead_zone: float) -> float:
         if not math.isfinite(part):

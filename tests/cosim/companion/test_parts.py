@@ -193,7 +193,7 @@ def angle_of(pulse):
     return math.radians(45.0) * math.copysign(max(abs(pulse) - 30.0, 0.0) / 370.0, pulse)
 
 
-def greatest_tilt(forces, lean=True):
+def greatest_tilt(forces, leaning=True):
     """Return the greatest tilt [rad] under a sequence of surge, sway, heave [N], in ArduSub's STABILIZE.
 
     As AC_AttitudeControl has it, with its default gains; a body with the published inertia and moments.
@@ -205,7 +205,7 @@ def greatest_tilt(forces, lean=True):
     for force in forces:
         (message,) = output.messages(np.array([*force, 0.0, 0.0, 0.0]), state, period)
         m = decoded(message)
-        asked = np.array([angle_of(m.t), angle_of(m.s)]) if lean else np.zeros(2)
+        asked = np.array([angle_of(m.t), angle_of(m.s)]) if leaning else np.zeros(2)
         for _ in range(4):
             wrong = 6.0 * (asked - angle) - rate
             integral = np.clip(integral + 0.09 * wrong * period / 4, -0.444, 0.444)
@@ -227,7 +227,7 @@ def test_leans_keep_an_ardusub_level_while_it_is_pushed(force):
     turn = [max(1.0 - k / 50, -1.0) for k in range(200)]
     forces = [(part * force[0], part * force[1], force[2]) for part in ramp + turn]
     assert greatest_tilt(forces) < math.radians(6.0)
-    assert greatest_tilt(forces, lean=False) > math.radians(15.0)
+    assert greatest_tilt(forces, leaning=False) > math.radians(15.0)
 
 
 def test_state_is_predicted_over_its_age():
