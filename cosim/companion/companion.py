@@ -35,8 +35,12 @@ if TYPE_CHECKING:  # websockets wait until a flight is shown
 _RELEASE = 2.0  # s at the most, that letting go takes at the end
 _NO_COMMANDS = "a companion's page shows alone: take over at the autopilot's ground station"
 _STEADY = 0.1  # m, of drift between two sources, up to which it is their noise
+_UNSEEN = 0.05  # m, by which an autopilot's position may be off without a sign of it
 
 
+# Errors of an autopilot's estimate are slow: its velocity may be off by some cm/s for a minute, its position has no
+# white noise. A velocity that is trusted more shifts the law's position by what it is off, over the filter's rate.
+_FILTERED = {"law.gains.position_noise": 0.01, "law.gains.velocity_noise": 0.05}
 # the autopilot has the thrusters: what one of them does is not what the law asked of it
 _NOT_ISOLATED = {"law.gains.failure_threshold": 0.0}
 # its attitude loop takes care of moments
@@ -81,7 +85,7 @@ def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks", profile:
     if steer_by == "velocity":
         gains = _NOT_ESTIMATED | {"law.gains.speed": min(getattr(scenario.law.gains, "speed", FASTEST), FASTEST)}
     return scenario.replace(
-        (gains if scenario.law.name == "deployable" else {})
+        (_FILTERED | gains if scenario.law.name == "deployable" else {})
         | {
             "time.step": period,
             "time.arbiter": arbiter,
@@ -251,7 +255,7 @@ class Companion:
         """Return by how much the position may be off [m]: as its sources have come apart, and as it was reckoned."""
         alignment = self.session.alignment
         drift = alignment.drift if alignment.drift > _STEADY else 0.0
-        return drift + self._options.reckoning_error * alignment.reckoned
+        return _UNSEEN + drift + self._options.reckoning_error * alignment.reckoned
 
     def _report(self, on_state: Callable[[State, str], None] | None) -> None:
         """Call `on_state` where the state, or what it waits for, has changed."""

@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from cosim.companion.set_points import TurnLead, VelocityLead, attitude_target, velocity_target
+from cosim.companion.set_points import LevelLead, TurnLead, VelocityLead, attitude_target, velocity_target
 from cosim.companion.sticks import SticksBy, channels_override, channels_released, manual_control, scale_of
 from cosim.companion.vehicle_state import ReportedState
 from cosim.errors import RunError
@@ -98,13 +98,15 @@ class Output:
         self._profile: Profile = PROFILES[profile]
         self._uses_sticks = uses_sticks(profile, steer_by)
         self._scale = scale_of(vehicle, self._profile, pilot_gain, sticks_by)
-        self._turn, self._lead = TurnLead(vehicle), VelocityLead(vehicle, *lags)
+        self._all_axes = steer_by == "wrench" or (steer_by == "sticks" and profile == "ardusub")
+        self._turn, self._lead, self._level_lead = TurnLead(vehicle), VelocityLead(vehicle, *lags), LevelLead()
         self._overridden = False  # True while overridden channels are not released
         self.sticks, self.velocity, self.attitude = np.zeros(6), np.zeros(3), np.zeros(4)
 
     def restart(self) -> None:
         """Reset the estimates of the autopilot's loops, after another controller has steered."""
         self._lead.restart()
+        self._level_lead.restart()
 
     def clear(self) -> None:
         """Set all commands to zero."""
@@ -123,7 +125,7 @@ class Output:
                 return self._attitude(wrench, state, period)
             case "sticks":
                 self.sticks[:] = self._scale.sticks(wrench)
-                self.sticks[3:5] = 0.0  # the autopilot keeps the vehicle level
+                self.sticks[3:5] = self._level(wrench, period)
                 self.sticks[5] = self._scale.yaw_rate_stick(self._turn.yaw_rate(wrench, state))
             case "wrench":
                 self.sticks[:] = self._scale.sticks(wrench)
@@ -175,8 +177,14 @@ class Output:
         self.sticks[2:] = self._scale.climb_stick(rate_down), 0.0, 0.0, 0.0
         return attitude_target(self._mavlink, system, self.attitude, None), self._sticks(system)
 
+    def _level(self, wrench: Array, period: float) -> Array:
+        """Return the sticks of roll and pitch, shape (2,), with which the autopilot keeps the vehicle level."""
+        if self._profile.name != "ardusub":
+            return np.zeros(2)
+        return self._scale.lean_sticks(self._level_lead.angles(self._scale.sticks(wrench)[3:5], period))
+
     def _sticks(self, system: int) -> Any:
         if self._sticks_by == "manual-control":
-            return manual_control(self._mavlink, system, self._profile, self.sticks, self._steer_by == "wrench")
+            return manual_control(self._mavlink, system, self._profile, self.sticks, self._all_axes)
         self._overridden = True
         return channels_override(self._mavlink, system, self.sticks)

@@ -77,6 +77,9 @@ class RemoteVehicle:
         self._channels = () if given is None else given.channels
         signs = () if given is None else np.broadcast_to(given.signs, len(self._channels)).tolist()
         self._efforts = [] if given is None else [effort_of_pulse(given, sign) for sign in signs]
+        self._updates = -1
+        self._place: Array = np.full(3, math.nan)
+        self._quaternion: Array = np.array([1.0, 0.0, 0.0, 0.0])
         self._begun: float | None = None
         self._count = 0
 
@@ -110,18 +113,21 @@ class RemoteVehicle:
 
     def _read(self) -> None:
         session, reported = self._session, self._session.reported
-        position = session.alignment.to_scene(reported.position)
         rates = reported.rates
+        if reported.updates != self._updates:
+            self._updates = reported.updates
+            self._place, self._quaternion = reported.predict(session.clock())
+        position, quaternion = session.alignment.to_scene(self._place), self._quaternion
         self._write("position.x", position)
-        self._write("quaternion.e0", reported.quaternion)
+        self._write("quaternion.e0", quaternion)
         self._write("velocity.u", reported.velocity_body)
-        self._write("attitude.roll", euler_of(reported.quaternion.tolist()))
+        self._write("attitude.roll", euler_of(quaternion.tolist()))
         self._write("altitude", (reported.altitude,))
         self._write("measured.depth", (position[2],))
         self._write("measured.velocity.u", reported.velocity_body[:3])
         self._write("measured.altitude", (reported.altitude,))
         self._write("measured.angular_velocity.p", rates)
-        self._write("measured.heading", (euler_of(reported.quaternion.tolist())[2],))
+        self._write("measured.heading", (euler_of(quaternion.tolist())[2],))
         self._write("measured.position.x", position)
         self._write_forces()
         supervisor = session.supervisor

@@ -19,6 +19,8 @@ _FASTEST_ASKED, _FASTEST_TURN = 0.8, 0.6  # m/s, rad/s, greatest set-points
 _OBSERVED = 1.5  # rad/s, both poles of the observer
 _RATE_LAG, _ANGLE_LAG = 0.3, 0.3  # s, of an autopilot's loops of rate and angle
 _FARTHEST, _TILT = 0.35, 0.1  # rad, greatest lead of set-points of angles; greatest roll and pitch
+_ANGLE_P, _RATE_P, _RATE_I = 6.0, 0.135, 0.09  # ATC_ANG_PIT_P [1/s], ATC_RAT_PIT_P [s], ATC_RAT_PIT_I; of roll alike
+_LEAN = 0.5  # rad, greatest lean
 _NORTH, _EAST, _DOWN = np.eye(3)
 _VELOCITY_ONLY, _YAW_RATE_IGNORED = 0b010111000111, 1 << 11  # type_mask of positions and velocities
 _RATES_IGNORED, _THRUST_IGNORED = 0b111, 1 << 6  # of attitudes
@@ -62,6 +64,36 @@ class TurnLead:
         heading = from_axis_angle(_DOWN, now[2] + yaw)
         result: Array = multiply(heading, multiply(from_axis_angle(_EAST, asked[1]), from_axis_angle(_NORTH, asked[0])))
         return result
+
+
+class LevelLead:
+    """Convert the commands of roll and pitch that level a vehicle to lean angles of an ArduSub's attitude loop.
+
+    Surge and sway tilt a vehicle whose horizontal thrusters are eccentric. The loop commands the rate
+    P_a (lean - angle), and the thrusters u = P e + I integral(e) of its error e. So a lean u/(P_a P), which washes out
+    in P/I seconds, gives the command u while the angle is zero. Gains are ArduSub's defaults.
+    """
+
+    def __init__(self) -> None:
+        self._settled: Array = np.zeros(2)
+
+    def restart(self) -> None:
+        """Forget the integral, after another controller has steered."""
+        self._settled[:] = 0.0
+
+    def angles(self, command: Array, period: float) -> Array:
+        """Return roll and pitch, shape (2,) [rad], of at most 0.5 rad.
+
+        Parameters
+        ----------
+        command : ndarray, shape (2,)
+            Commands of roll and pitch to the thrusters, -1 to 1.
+        period : float
+            Time since the last call [s].
+        """
+        self._settled += min(1.0, period * _RATE_I / _RATE_P) * (command - self._settled)
+        angles: Array = np.clip((command - self._settled) / (_ANGLE_P * _RATE_P), -_LEAN, _LEAN)
+        return angles
 
 
 class VelocityLead:

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
 
 from cosim.mavlink.vehicle.profile import Profile
-from cosim.mavlink.vehicle.sticks import CLIMB_DEAD_ZONE, YAW_DEAD_ZONE, MotorMixer, deflection_of
+from cosim.mavlink.vehicle.sticks import (
+    CLIMB_DEAD_ZONE,
+    LEAN,
+    LEAN_DEAD_ZONE,
+    YAW_DEAD_ZONE,
+    MotorMixer,
+    deflection_of,
+)
 from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.commands.stick_stabilizer import YAW_RATE
 from cosim.simulation.signals import Array
@@ -20,6 +28,8 @@ STICKS_BY: tuple[SticksBy, ...] = get_args(SticksBy)
 
 PILOT_SPEED = 0.5  # m/s, depth rate of a full vertical stick in ALT_HOLD: ArduSub's PILOT_SPEED_UP
 _FULL = 1000.0
+_NEWTON, _FLAT = 3, 0.05  # steps; least command of a thruster at which its force is linearized
+_HALVINGS = 8  # of the part of a force that leaves its moments whole
 _PITCH, _ROLL = 1, 2  # enabled_extensions
 _CENTER, _SWING, _AXES = 1500, 400, 6  # us of a channel; channels
 _RELEASED, _LEFT_ALONE = 0, 0xFFFF  # values that release a channel, and leave it unchanged
@@ -33,6 +43,8 @@ class StickScale:
     ----------
     efforts : ndarray, shape (n, 6)
         Fraction of each thruster's greatest force, for a unit wrench along or about each body axis [1/N, 1/(N m)].
+    forces : ndarray, shape (6, n)
+        Wrench of each thruster's greatest force [N, N m].
     mixer : ndarray, shape (n, 6)
         Command of each thruster, 1, 0 or -1, by a full stick of each axis at a gain of 1. For an autopilot that
         allocates forces itself, both have a row for each axis in place of each thruster.
@@ -47,6 +59,7 @@ class StickScale:
     """
 
     efforts: Array
+    forces: Array
     mixer: Array
     gain: float
     scales_all: bool
@@ -57,22 +70,57 @@ class StickScale:
         """Return the sticks that command a wrench, shape (6,), X Y Z K M N from -1 to 1.
 
         An autopilot adds the commands of all sticks to a thruster; a quadratic force is that of the sum. So each
-        thruster's force is converted to its command, and the commands to sticks.
+        thruster's force is converted to its command, and the commands to sticks. Where a thruster or a stick lacks the
+        room for all of it, surge, sway and heave are shortened alike until the moments are whole: an ArduSub
+        scales forces and moments down together, and the vehicle would tilt.
 
         Parameters
         ----------
         wrench : ndarray, shape (6,)
             [N, N m], body frame; components that are not finite count as 0.
         """
-        share = self.efforts @ np.where(np.isfinite(wrench), wrench, 0.0)
-        if self.quadratic:
-            share = np.copysign(np.sqrt(np.abs(share)), share)
-        asked = np.linalg.lstsq(self.mixer, share, rcond=None)[0]
-        asked[[0, 1, 2, 5]] /= self.gain
-        if self.scales_all:
-            asked[3:5] /= self.gain
-        clipped: Array = np.clip(asked, -1.0, 1.0)
+        asked = np.where(np.isfinite(wrench), wrench, 0.0)
+        sticks = self._sticks_of(asked)
+        if self.quadratic and self._is_beyond(sticks):
+            least, most = 0.0, 1.0
+            for _ in range(_HALVINGS):
+                part = 0.5 * (least + most)
+                sticks = self._sticks_of(np.concatenate([part * asked[:3], asked[3:]]))
+                least, most = (least, part) if self._is_beyond(sticks) else (part, most)
+            sticks = self._sticks_of(np.concatenate([least * asked[:3], asked[3:]]))
+        clipped: Array = np.clip(sticks / self._gains, -1.0, 1.0)
         return clipped
+
+    def _sticks_of(self, wrench: Array) -> Array:
+        """Return the sticks times their gain, shape (6,), that command a wrench without limits.
+
+        Least squares of the thrusters' commands, then for squares Newton's method on the wrench that they make.
+        """
+        share = self.efforts @ wrench
+        if not self.quadratic:
+            linear: Array = self._by_motor @ share
+            return linear
+        result: Array = self._by_motor @ np.copysign(np.sqrt(np.abs(share)), share)
+        for _ in range(_NEWTON):
+            command = self.mixer @ result
+            size = np.abs(command)
+            slope = (self.forces * (2.0 * np.maximum(size, _FLAT))) @ self.mixer
+            lacking = wrench - self.forces @ (command * size)
+            result += np.linalg.lstsq(slope, lacking, rcond=None)[0]
+        return result
+
+    def _is_beyond(self, sticks: Array) -> bool:
+        """Return True if sticks times their gain exceed a thruster's or a stick's limit."""
+        return bool(np.abs(self.mixer @ sticks).max() > 1.0 or np.abs(sticks / self._gains).max() > 1.0)
+
+    @cached_property
+    def _by_motor(self) -> Array:
+        return np.asarray(np.linalg.pinv(self.mixer), dtype=np.float64)
+
+    @cached_property
+    def _gains(self) -> Array:
+        tilt = self.gain if self.scales_all else 1.0
+        return np.array([self.gain, self.gain, self.gain, tilt, tilt, self.gain])
 
     def yaw_rate_stick(self, rate: float) -> float:
         """Return the yaw stick that commands a yaw rate [rad/s]; 0 for one that is not finite."""
@@ -81,6 +129,10 @@ class StickScale:
     def climb_stick(self, rate_down: float) -> float:
         """Return the heave stick that commands a depth rate [m/s]; 0 for one that is not finite."""
         return self._rate_stick(rate_down / PILOT_SPEED, CLIMB_DEAD_ZONE)
+
+    def lean_sticks(self, angles: Array) -> Array:
+        """Return the sticks of roll and pitch, shape (2,), that command these angles [rad] in STABILIZE."""
+        return np.array([deflection_of(min(max(angle / LEAN, -1.0), 1.0), LEAN_DEAD_ZONE) for angle in angles.tolist()])
 
     def _rate_stick(self, part: float, dead_zone: float) -> float:
         if not math.isfinite(part):
@@ -107,11 +159,11 @@ def scale_of(vehicle: Vehicle, profile: Profile, pilot_gain: float, sticks_by: S
     reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
     if profile.name != "ardusub":  # it brings each axis to the thrusters by itself
         share = np.diag(np.divide(1.0, reach, out=np.zeros(6), where=reach > 0.0))
-        return StickScale(share, np.eye(6), gain, True, False, 0.0)
+        return StickScale(share, np.diag(reach), np.eye(6), gain, True, False, 0.0)
     mixer = MotorMixer(vehicle)
-    made = (vehicle.thruster_matrix * mixer.greatest) @ mixer.asked  # by full sticks, one axis a column
-    efforts = mixer.asked @ np.linalg.pinv(made)
-    return StickScale(efforts, mixer.asked, gain, False, mixer.is_quadratic, pilot_gain)
+    forces = vehicle.thruster_matrix * mixer.greatest
+    efforts = mixer.asked @ np.linalg.pinv(forces @ mixer.asked)
+    return StickScale(efforts, forces, mixer.asked, gain, False, mixer.is_quadratic, pilot_gain)
 
 
 def manual_control(mavlink: Any, system: int, profile: Profile, sticks: Array, all_axes: bool) -> Any:

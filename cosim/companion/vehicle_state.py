@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from controller.quaternion import rotation_matrix
+from controller.quaternion import from_axis_angle, multiply, rotation_matrix
 from cosim.companion.clock_sync import ClockSync
 from cosim.simulation.signals import Array
 
@@ -34,6 +34,7 @@ _DOWNWARDS = 25  # MAV_SENSOR_ROTATION_PITCH_270
 _DEFLECTED, _INVALID = 50, 0x7FFF  # of a stick's 1000; of no stick
 _RESTS_IN_THE_MIDDLE = (3, 12)  # MAV_AUTOPILOT: ArduPilot and PX4
 _CENTER, _DEFLECTED_PULSE = 1500, 25  # us
+_PREDICTED = 0.1  # s, of a state's age, over which it is predicted
 _MILLI, _MICRO = 1e-3, 1e-6
 
 
@@ -136,6 +137,24 @@ class ReportedState:
             stamped = now - (boot + self.sync.offset)
             ages.append(max(now - heard, stamped if math.isfinite(stamped) else 0.0))
         return max(ages)
+
+    @property
+    def updates(self) -> int:
+        """Count of positions and attitudes so far."""
+        return sum(self.came[kind] for kind in ("LOCAL_POSITION_NED", "ATTITUDE_QUATERNION", "ODOMETRY"))
+
+    def predict(self, now: float) -> tuple[Array, Array]:
+        """Return position, shape (3,) [m, NED, local frame], and quaternion, shape (4,), predicted over their age.
+
+        Velocity and rates are taken as constant, for at most 0.1 s.
+        """
+        lead = min(self.age(now), _PREDICTED)
+        if not math.isfinite(lead):
+            return self.position.copy(), self.quaternion.copy()
+        turned = lead * self.rates
+        angle = float(np.linalg.norm(turned))
+        turn = from_axis_angle(turned / angle, angle) if angle > 0.0 else np.array([1.0, 0.0, 0.0, 0.0])
+        return self.position + lead * self.velocity, multiply(self.quaternion, turn)
 
     @property
     def velocity_body(self) -> Array:

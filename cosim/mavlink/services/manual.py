@@ -7,11 +7,19 @@ from typing import Any
 import numpy as np
 
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vehicle.sticks import CLIMB_DEAD_ZONE, YAW_DEAD_ZONE, MotorMixer, beyond_dead_zone
+from cosim.mavlink.vehicle.sticks import (
+    CLIMB_DEAD_ZONE,
+    LEAN,
+    LEAN_DEAD_ZONE,
+    YAW_DEAD_ZONE,
+    MotorMixer,
+    beyond_dead_zone,
+)
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector6
 from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.commands.commands import STICK_MODES, ManualControl, Mode
+from cosim.simulation.commands.stick_stabilizer import GREATEST_TILT
 
 _FULL = 1000.0
 _INVALID = 0x7FFF
@@ -108,8 +116,9 @@ class Manual(Service):
         if self._mixer is not None:
             mixed = np.clip(self._mixer.wrench(np.where(pushes, scaled, 0.0)) * self._reciprocal, -1.0, 1.0) / scale
             parts[pushes] = mixed[pushes]
-        if mode != "manual":  # beyond a dead zone, a rate of turn
+        if mode != "manual":  # beyond a dead zone, a rate of turn and angles
             parts[5] = beyond_dead_zone(scaled[5], gain * YAW_DEAD_ZONE) / scale
+            parts[3:5] = [beyond_dead_zone(part, LEAN_DEAD_ZONE) * LEAN / GREATEST_TILT for part in parts[3:5].tolist()]
         if mode == "depth_hold":  # likewise of the depth
             parts[2] = beyond_dead_zone(scaled[2], gain * CLIMB_DEAD_ZONE)
         x, y, z, k, m, n = np.clip(parts, -1.0, 1.0).tolist()

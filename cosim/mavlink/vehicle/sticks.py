@@ -9,8 +9,10 @@ import numpy as np
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
-# deflections of a stick at a pilot gain of 1 up to which the rate is 0
+LEAN = math.radians(45.0)  # of a full stick of roll or pitch: ANGLE_MAX
+# deflections of a stick at a pilot gain of 1 up to which it commands nothing
 YAW_DEAD_ZONE = 0.1  # 40 of 400 us
+LEAN_DEAD_ZONE = 0.075  # 30 of 400 us
 CLIMB_DEAD_ZONE = 0.2  # THR_DZ: 100 of 500
 _MOSTLY = 0.6  # of a thruster's greatest matrix element, above which it is mixed into an axis
 

@@ -13,7 +13,7 @@ from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
 _CENTERED = 0.02  # fraction of full stick below which it counts as released
-_GREATEST_TILT = math.radians(30.0)  # of full roll and pitch sticks
+GREATEST_TILT = math.radians(30.0)  # of full roll and pitch sticks
 YAW_RATE = math.radians(
     202.5
 )  # rad/s of a full stick at a pilot gain of 1, as ArduSub has it: 45 deg/s by ACRO_YAW_P of 4.5
@@ -95,8 +95,8 @@ class StickStabilizer:
                 ahead = math.remainder(self._heading + rate[2] * self._period - self._yaw(), math.tau)
                 self._heading = self._yaw() + min(max(ahead, -_FARTHEST[0]), _FARTHEST[0])
             tilt = multiply(
-                from_axis_angle(_EAST, float(sticks[4]) * _GREATEST_TILT),
-                from_axis_angle(_NORTH, float(sticks[3]) * _GREATEST_TILT),
+                from_axis_angle(_EAST, float(sticks[4]) * GREATEST_TILT),
+                from_axis_angle(_NORTH, float(sticks[3]) * GREATEST_TILT),
             )
             asked = multiply(from_axis_angle(_DOWN, self._heading), tilt)
         else:
