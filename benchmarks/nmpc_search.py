@@ -21,7 +21,7 @@ from benchmarks.nmpc import NmpcGains, NmpcLaw, Planners
 from benchmarks.peer_environment import Environment
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.flyer import SceneFlyer, Score
-from cosim.campaigns.scenes.generator import make_scene
+from cosim.campaigns.scenes.generator import MAKERS
 from cosim.campaigns.scenes.scenario_scene import ScenarioScene
 from cosim.campaigns.scenes.scene import Scene
 
@@ -85,7 +85,7 @@ class Flights:
         NmpcLaw.function.times.clear()
         NmpcLaw.function.failures = 0
         form: Any = Scene if kind in KINDS else ScenarioScene
-        scene = msgspec.convert(make_scene(seed, kind), form)
+        scene = msgspec.convert(MAKERS[kind](seed), form)
         with SceneFlyer("nmpc", Conditions(duration=duration), gains) as flyer:
             score, _ = flyer.fly(scene)
         flight = Flight(score, [round(1e3 * t, 2) for t in NmpcLaw.function.times], NmpcLaw.function.failures)

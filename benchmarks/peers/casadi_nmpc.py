@@ -1,15 +1,15 @@
 """Nonlinear model predictive control by CasADi and its solver fatrop, over a horizon of N stages.
 
-    minimise    sum_k  w_p (sqrt(|p_k - p_d|^2 + 1) - 1) + w_u |u_k|^2 + w_m |B_r u_k - m_k|^2 + the slacks' price,
-                and w_v |v_N|^2 at the end
+    minimise    sum_k  w_p (sqrt(|p_k - p_d|^2 + 1) - 1) + w_u |u_k|^2 + w_m |B_r u_k - m_k|^2 + the slack's price
+                + w_s sum_j depth(d_jk + margin - n_jk . p_k) of soft regions, and w_v |v_N|^2 at the end
     subject to  x_{k+1} = f(x_k, u_k),   u_min <= u_k <= u_max,   s_k >= 0,   of each obstacle and each plane
                 |p_k - c_i(t_k)| >= r_i + margin - s_k,   n_jk . p_k >= d_jk + margin - s_k
 
 The state x is position and velocity; the inputs u are the thrusters' forces, in shares of the greatest. f is the
 nominal model with the measured attitude, drag against still water, and a constant disturbance from an observer outside.
 m_k is the moment that the attitude controller commands. Obstacles and goal keep their velocity. A plane bounds a depth,
-or is the tangent of another region where the plan before comes nearest. Planes of soft regions have a slack of their
-own, whose price is w_s.
+or is the tangent of another region where the plan before comes nearest. Hard regions have planes that constrain, soft
+ones have planes with a price: depth(v) = (v + sqrt(v^2 + e^2)) / 2, smooth within e = 0.05 m.
 
 Vehicle, weights and interval are parameters of the program, so that it is compiled once for a number of stages.
 """
@@ -25,9 +25,10 @@ import casadi as ca
 import numpy as np
 
 _FAR = (0.0, 0.0, -1e3, 0.1, 0.0, 0.0, 0.0)  # parked position of unused obstacles
-_NO_PLANE = (0.0, 0.0, 0.0, -1e3)  # always satisfied
+_NO_PLANE = (0.0, 0.0, 0.0, -1e3)  # always satisfied, and nearly free
 _SLACK = 1e4  # price of a metre, and of its square
 _THRUSTERS = 8
+_SMOOTH = 0.05  # m
 _WEIGHTS = ("interval", "margin", "w_p", "w_u", "w_m", "w_v", "w_s")
 
 
@@ -114,9 +115,8 @@ class _Program:
             part = self._p[first : first + rows * columns]
             self._parts[name] = part.reshape(columns, rows).T
             first += rows * columns
-        self._slacks = 1 + (setup["soft"] > 0)
-        self._width = 6 + _THRUSTERS + self._slacks
-        symbols, bounds = _symbols(known, setup, self._slacks)
+        self._width = 7 + _THRUSTERS
+        symbols, bounds = _symbols(known, setup)
         options = {
             "structure_detection": "auto",
             "equality": [a == b for a, b in zip(*bounds, strict=True)],
@@ -129,12 +129,11 @@ class _Program:
         }
         solver = ca.nlpsol("nmpc", "fatrop", symbols, options)
         self._solver = solver
-        count = self._stages * self._width + 6 + self._slacks
+        count = self._stages * self._width + 7
         self._guess, self._found = np.zeros(count), np.zeros(count)
         self._low, self._high = np.full(count, -np.inf), np.full(count, np.inf)
         for k in range(self._stages + 1):
-            end = k * self._width + (self._width if k < self._stages else 6 + self._slacks)
-            self._low[end - self._slacks : end] = 0.0
+            self._low[k * self._width + (6 + _THRUSTERS if k < self._stages else 6)] = 0.0  # the slack
         self._buffer, self._run = solver.buffer()
         arguments = (self._guess, self._p, self._low, self._high, *(np.array(bound) for bound in bounds))
         for i, argument in enumerate(arguments):
@@ -184,7 +183,7 @@ class _Program:
 
 
 def _symbols(
-    known: dict[str, ca.SX], setup: dict[str, Any], slacks: int
+    known: dict[str, ca.SX], setup: dict[str, Any]
 ) -> tuple[dict[str, ca.SX], tuple[list[float], list[float]]]:
     """Return the program, and the bounds of its constraints."""
     N, n, hard = setup["stages"], setup["obstacles"], setup["hard"]
@@ -194,7 +193,7 @@ def _symbols(
     high: list[float] = []
     constraints: list[ca.SX] = []  # of the stage before
     for k in range(N + 1):
-        x, s = ca.SX.sym(f"x{k}", 6), ca.SX.sym(f"s{k}", slacks)
+        x, s = ca.SX.sym(f"x{k}", 6), ca.SX.sym(f"s{k}")
         # fatrop finds the stages by this order: variables of a stage, its dynamics, its constraints
         if following is not None:
             rows += [x - following, *constraints]
@@ -202,9 +201,7 @@ def _symbols(
             high += [0.0] * 12 if k == 1 else [0.0] * 6 + [ca.inf] * len(constraints)
         after = k * known["interval"]
         error = x[:3] - known["goal"] - after * known["goal_velocity"]
-        cost += known["w_p"] * (ca.sqrt(ca.dot(error, error) + 1.0) - 1.0) + _SLACK * (s[0] + s[0] * s[0])
-        if slacks > 1:
-            cost += known["w_s"] * s[1] + s[1] * s[1]
+        cost += known["w_p"] * (ca.sqrt(ca.dot(error, error) + 1.0) - 1.0) + _SLACK * (s + s * s)
         variables.append(x)
         if k < N:
             u = ca.SX.sym(f"u{k}", _THRUSTERS)
@@ -222,10 +219,14 @@ def _symbols(
         for i in range(n):
             between = x[:3] - known["spheres"][:3, i] - after * known["spheres"][4:, i]
             away = ca.sqrt(ca.dot(between, between) + 1e-6)
-            constraints.append(away - known["spheres"][3, i] - known["margin"] + s[0])
+            constraints.append(away - known["spheres"][3, i] - known["margin"] + s)
         for i in range(count):
             plane = known["planes"][:, (k - 1) * count + i]
-            constraints.append(ca.dot(plane[:3], x[:3]) - plane[3] - known["margin"] + s[int(i >= hard)])
+            clearance = ca.dot(plane[:3], x[:3]) - plane[3] - known["margin"]
+            if i < hard:
+                constraints.append(clearance + s)
+            else:
+                cost += known["w_s"] * 0.5 * (ca.sqrt(clearance * clearance + _SMOOTH**2) - clearance)
     rows += constraints
     low += [0.0] * len(constraints)
     high += [ca.inf] * len(constraints)
