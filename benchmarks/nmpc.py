@@ -38,12 +38,12 @@ class NmpcGains(NamedTuple):
     """Numbers of the controller; all but the last four are what `benchmarks.nmpc_search` found."""
 
     stages: float = 12.0
-    interval: float = 0.3  # s, of a stage
-    margin: float = 0.1  # m
-    w_u: float = 0.729  # of the forces, in shares of the greatest
-    w_m: float = 72.9  # of moments that the attitude's loop asks for and do not get, in shares of the greatest
-    w_v: float = 50.0  # s2/m2, of the last velocity
-    observer: float = 2.0  # rad/s
+    interval: float = 0.3627  # s, of a stage
+    margin: float = 0.05005  # m
+    w_u: float = 0.115  # of the forces, in shares of the greatest
+    w_m: float = 10.58  # of moments that the attitude's loop asks for and do not get, in shares of the greatest
+    w_v: float = 211.6  # s2/m2, of the last velocity
+    observer: float = 6.281  # rad/s
     w_p: float = 10.0  # 1/m, of the distance to the set point
     w_s: float = 100.0  # 1/m, of the depth within soft regions
     k_p2: float = 4.5  # 1/s2, section VII for the inertia of ODIN
