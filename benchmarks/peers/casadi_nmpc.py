@@ -11,12 +11,18 @@ m_k is the moment that the attitude controller commands. Obstacles and goal keep
 or is the tangent of another region where the plan before comes nearest. Hard regions have planes that constrain, soft
 ones have planes with a price: depth(v) = (v + sqrt(v^2 + e^2)) / 2, smooth within e = 0.05 m.
 
+The solver runs in a child process, since in some problems without a solution its iterations do not end: a plan that
+takes too long ends this process, and the plan before goes on. So it needs `os.fork`.
+
 Vehicle, weights and interval are parameters of the program, so that it is compiled once for a number of stages.
 """
 
 from __future__ import annotations
 
+import mmap
+import os
 import shutil
+import signal
 import time
 from collections.abc import Callable
 from typing import Any
@@ -27,6 +33,7 @@ import numpy as np
 _FAR = (0.0, 0.0, -1e3, 0.1, 0.0, 0.0, 0.0)  # parked position of unused obstacles
 _NO_PLANE = (0.0, 0.0, 0.0, -1e3)  # always satisfied, and nearly free
 _SLACK = 1e4  # price of a metre, and of its square
+_LONGEST = 0.3  # s of computation for a plan
 _THRUSTERS = 8
 _SMOOTH = 0.05  # m
 _WEIGHTS = ("interval", "margin", "w_p", "w_u", "w_m", "w_v", "w_s")
@@ -108,7 +115,7 @@ class _Program:
             "moment_scale": (1, 1), "spheres": (7, n), "planes": (4, planes * self._stages),
         } | dict.fromkeys(_WEIGHTS, (1, 1))  # fmt: skip
         known = {name: ca.SX.sym(name, *shape) for name, shape in shapes.items()}
-        self._p = np.zeros(sum(a * b for a, b in shapes.values()))
+        self._p = _shared(sum(a * b for a, b in shapes.values()))
         self._parts: dict[str, Any] = {}
         first = 0
         for name, (rows, columns) in shapes.items():  # column by column, as CasADi does
@@ -130,8 +137,8 @@ class _Program:
         solver = ca.nlpsol("nmpc", "fatrop", symbols, options)
         self._solver = solver
         count = self._stages * self._width + 7
-        self._guess, self._found = np.zeros(count), np.zeros(count)
-        self._low, self._high = np.full(count, -np.inf), np.full(count, np.inf)
+        self._guess, self._found, self._low, self._high = (_shared(count) for _ in range(4))
+        self._low[:], self._high[:] = -np.inf, np.inf
         for k in range(self._stages + 1):
             self._low[k * self._width + (6 + _THRUSTERS if k < self._stages else 6)] = 0.0  # the slack
         self._buffer, self._run = solver.buffer()
@@ -140,6 +147,7 @@ class _Program:
             self._buffer.set_arg(i, memoryview(argument))
         self._kept = arguments
         self._buffer.set_res(0, memoryview(self._found))
+        self._child: tuple[int, int, int] | None = None  # process, pipes to it and from it
 
     def set(self, **values: Any) -> None:
         """Set parameters by name."""
@@ -154,10 +162,37 @@ class _Program:
             self._low[inputs], self._high[inputs] = least, most
 
     def solve(self, guess: np.ndarray) -> tuple[np.ndarray, bool]:
-        """Return the plan found from a guess, and if the solver converged."""
+        """Return the plan found from a guess, and if the solver converged; the guess if it took too long."""
         self._guess[:] = guess
-        self._run()
-        return self._found.copy(), bool(self._solver.stats(1)["success"])  # 1: memory of the buffer
+        self._child = self._child or self._fork()
+        process, asks, answers = self._child
+        os.write(asks, b"?")
+        if answer := os.read(answers, 1):
+            return self._found.copy(), answer == b"1"
+        os.waitpid(process, 0)
+        os.close(asks)
+        os.close(answers)
+        self._child = None
+        return guess.copy(), False
+
+    def _fork(self) -> tuple[int, int, int]:
+        """Start a child that solves whenever it is asked; it ends with the pipe, or by the timer's signal."""
+        (asked, asks), (answers, answered) = os.pipe(), os.pipe()
+        process = os.fork()
+        if process == 0:
+            os.close(asks)
+            os.close(answers)
+            try:
+                while os.read(asked, 1):
+                    signal.setitimer(signal.ITIMER_VIRTUAL, _LONGEST)
+                    self._run()
+                    signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+                    os.write(answered, b"1" if self._solver.stats(1)["success"] else b"0")  # 1: memory of the buffer
+            finally:
+                os._exit(0)
+        os.close(asked)
+        os.close(answered)
+        return process, asks, answers
 
     def rest(self, position: list[float]) -> np.ndarray:
         """Return the plan to stay."""
@@ -180,6 +215,11 @@ class _Program:
     def positions(self, plan: np.ndarray) -> np.ndarray:
         """Return the positions after the first stage, (stages, 3)."""
         return plan[[[k * self._width + axis for axis in range(3)] for k in range(1, self._stages + 1)]]
+
+
+def _shared(count: int) -> np.ndarray:
+    """Return zeros that child processes share."""
+    return np.frombuffer(mmap.mmap(-1, 8 * count))
 
 
 def _symbols(
