@@ -134,19 +134,18 @@ class _Program:
             "error_on_fail": False,
             "fatrop": {"print_level": 0, "max_iter": setup["iterations"], "tol": 1e-4, "mu_init": 0.01},
         }
-        solver = ca.nlpsol("nmpc", "fatrop", symbols, options)
-        self._solver = solver
+        self._solver = ca.nlpsol("nmpc", "fatrop", symbols, options)
         count = self._stages * self._width + 7
         self._guess, self._found, self._low, self._high = (_shared(count) for _ in range(4))
         self._low[:], self._high[:] = -np.inf, np.inf
         for k in range(self._stages + 1):
             self._low[k * self._width + (6 + _THRUSTERS if k < self._stages else 6)] = 0.0  # the slack
-        self._buffer, self._run = solver.buffer()
+        self._buffer, self._run = self._solver.buffer()
         arguments = (self._guess, self._p, self._low, self._high, *(np.array(bound) for bound in bounds))
         for i, argument in enumerate(arguments):
             self._buffer.set_arg(i, memoryview(argument))
-        self._kept = arguments
         self._buffer.set_res(0, memoryview(self._found))
+        self._kept = arguments  # as long as the buffer refers to them
         self._child: tuple[int, int, int] | None = None  # process, pipes to it and from it
 
     def set(self, **values: Any) -> None:
