@@ -15,7 +15,7 @@ from benchmarks import (
     law,
     long_record,
     mavlink,
-    nmpc,
+    nmpc_search,
     page,
     peer_environment,
     scaling,
@@ -70,13 +70,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     verb.add_argument("--seed", type=int, default=0, help="of the draws (default: %(default)s)")
     verb.add_argument("--workers", type=int, default=2, help="processes (default: %(default)s)")
-    verb = verbs.add_parser("nmpc", help=(nmpc.__doc__ or "").splitlines()[0])
-    verb.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(baselines.KINDS)} (default: all)")
-    verb.add_argument("--seed", type=int, default=0, help="of the first scene (default: %(default)s)")
-    verb.add_argument("--count", type=int, default=nmpc.COUNT, help="scenes of a kind (default: %(default)s)")
-    verb.add_argument("--search", action="store_true", help="for horizon and margin first")
+    verb = verbs.add_parser("nmpc", help=(nmpc_search.__doc__ or "").splitlines()[0])
+    verb.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(nmpc_search.FLOWN)} (default: all)")
+    verb.add_argument("--seed", type=int, default=0, help="of the first scene, or draw (default: %(default)s)")
+    verb.add_argument("--count", type=int, default=nmpc_search.COUNT, help="scenes of a kind (default: %(default)s)")
+    verb.add_argument("--draws", type=int, default=0, help="search among these, in the place of flights of KIND")
     verb.add_argument("--peers-python", metavar="PYTHON", help="that has CasADi (default: one of their own)")
-    verb.add_argument("--json", type=Path, metavar="FILE", help="append a line for each flight")
+    verb.add_argument("--json", type=Path, metavar="FILE", help="of flights; those that it has are not repeated")
     verb = verbs.add_parser("long-record", help=(long_record.__doc__ or "").splitlines()[0])
     verb.add_argument("--rows", type=int, nargs="+", default=long_record.ROWS, help="of the runs (default: 1 and 10 M)")
     verb.add_argument(
@@ -108,12 +108,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         case "baselines":
             _baselines(parser, options)
         case "nmpc":
-            if unknown := set(options.kinds) - set(baselines.KINDS):
-                parser.error(f"kind is {sorted(unknown)[0]!r}, expected one of {', '.join(baselines.KINDS)}")
-            if options.count < 1:
-                parser.error("expected 1 or more scenes")
-            kinds = options.kinds or baselines.KINDS
-            nmpc.main(kinds, options.seed, options.count, options.search, options.peers_python, options.json)
+            if unknown := set(options.kinds) - set(nmpc_search.FLOWN):
+                parser.error(f"kind is {sorted(unknown)[0]!r}, expected one of {', '.join(nmpc_search.FLOWN)}")
+            if options.count < 1 or options.draws < 0:
+                parser.error("expected 1 or more scenes, and 0 or more draws")
+            kinds = options.kinds or nmpc_search.FLOWN
+            nmpc_search.main(kinds, options.seed, options.count, options.draws, options.peers_python, options.json)
         case "peers":
             for peer, version in peer_environment.install(again=True).items():
                 print(f"{peer:24} {version}")

@@ -12,7 +12,7 @@ from __future__ import annotations
 import functools
 import math
 import statistics
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any, NamedTuple
 
@@ -145,16 +145,24 @@ def draws(law: str, count: int, rng: np.random.Generator, best: Any = None, near
     list of NamedTuple
         Gains of the law, to four figures.
     """
-    gains_type, found = LAWS[law].gains_type, []
-    for _ in range(count):
-        changes = {}
-        for name, (low, high) in RANGES[law].items():
-            if best is not None:
-                centre = getattr(best, name)
-                low, high = max(low, centre / near), min(high, centre * near)
-            changes[name] = float(f"{np.exp(rng.uniform(np.log(low), np.log(high))):.4g}")
-        found.append(gains_type(**changes))
-    return found
+    return [draw_gains(LAWS[law].gains_type, RANGES[law], rng, best, near) for _ in range(count)]
+
+
+def draw_gains(
+    gains_type: type[Any],
+    ranges: dict[str, tuple[float, float]],
+    rng: np.random.Generator,
+    best: Any = None,
+    near: float = math.inf,
+) -> Any:
+    """Draw gains of a type log-uniformly from ranges, or within a factor of the best; to four figures."""
+    changes = {}
+    for name, (low, high) in ranges.items():
+        if best is not None:
+            centre = getattr(best, name)
+            low, high = max(low, centre / near), min(high, centre * near)
+        changes[name] = float(f"{np.exp(rng.uniform(np.log(low), np.log(high))):.4g}")
+    return gains_type(**changes)
 
 
 def search(law: str, count: int, seed: int, workers: int, pd: PdGains | None = None) -> Candidate:
@@ -207,12 +215,40 @@ def _batches(count: int) -> list[tuple[int, float]]:
 
 def _race(job: tuple[str, Any, Candidate]) -> Candidate:
     law, gains, best = job
+    return race(gains, best, lambda candidate, scenes: _fly_on((law, candidate, scenes, DURATION)), HEATS)
+
+
+def race(
+    gains: Any,
+    best: Candidate,
+    fly_on: Callable[[Candidate, Iterable[int]], Candidate],
+    heats: Sequence[tuple[int, float]],
+) -> Candidate:
+    """Fly gains until they fall behind the best.
+
+    Parameters
+    ----------
+    gains : NamedTuple
+        The gains.
+    best : Candidate
+        The best so far, flown in all scenes.
+    fly_on : callable
+        Flies a candidate in some more scenes.
+    heats : sequence of (int, float)
+        Scenes flown by the end of each heat, all by the end of the last, and by which factor the median reach time
+        may be above that of the best there.
+
+    Returns
+    -------
+    Candidate
+        The gains, flown in all scenes, or in those until they fell behind.
+    """
     failures = best.failures
-    order = failures + [i for i in range(SCENES) if i not in failures]
+    order = failures + [i for i in range(heats[-1][0]) if i not in failures]
     candidate = Candidate(gains, {})
-    for scenes, slack in HEATS:
+    for scenes, slack in heats:
         flown = order[: len(failures) + scenes]
-        candidate = _fly_on((law, candidate, flown, DURATION))
+        candidate = fly_on(candidate, flown)
         *mine, time = candidate.outcome.rank
         *his, his_time = outcome(best.scores[i] for i in flown).rank
         if mine > his or (mine == his and time > slack * his_time):

@@ -2,21 +2,19 @@
 
 It plans every `PERIOD` by `benchmarks.peers.casadi_nmpc`, in the peers' environment, with the observer of `pid_cbf`;
 the forces hold until the next plan. The time that a plan takes is measured, and not part of the simulation.
+
+Spheres and bands of depth are constraints as they are. Of every other region it knows the tangent plane nearest to
+where the plan before is at each stage.
 """
 
 from __future__ import annotations
 
 import contextlib
 import json
-import statistics
-from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-import msgspec
 import numpy as np
 
-from benchmarks.baselines import FIRST_SEED, KINDS, format_outcome, outcome
 from benchmarks.peer_environment import Environment
 from benchmarks.peer_process import PeerProcess, peer
 from controller import LAWS, VehicleModel, VehicleState
@@ -24,42 +22,32 @@ from controller.compiling.function import CompiledFunction
 from controller.law import Array, CompiledLaw, Output, validate_gains
 from controller.laws.pid_cbf import PidCbfGains, PidCbfLaw, observe
 from controller.quaternion import error_parts, write_rotation
-from controller.regions import Sphere
-from controller.regions.region_set import PackedRegions
-from cosim.campaigns.scenes.as_scenario import VEHICLE
-from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.flyer import SceneFlyer, Score
-from cosim.campaigns.scenes.generator import make_scene
-from cosim.campaigns.scenes.scene import Scene
-from cosim.scenario.vehicle_model import vehicle_model
-from plant_fmu import load_vehicle
+from controller.regions import DepthBand, Sphere
+from controller.regions.kinds import FIRST_OF_ATTITUDE
+from controller.regions.region_set import PackedRegions, place_clearance
 
 PERIOD = 0.1  # s between plans
-OBSTACLES = 8  # the nearest, that a plan knows of
 ITERATIONS = 15  # of the solver, at most
-DURATION = 40.0  # s of a flight, of which the last 10 s must be within the goal region
-COUNT = 100  # scenes of a kind
-SEARCHED = 15  # scenes of a kind that each setting flies in the search
-_OBSERVE = CompiledFunction(observe)
+SPHERES = {"obstacles": 8, "hard": 2, "soft": 0}  # the nearest, and the two planes of a band of depth, of a plan
+SHAPES = {"obstacles": 0, "hard": 2, "soft": 3}  # of a plan among regions of other shapes
+_FREE = (0.0, 0.0, 0.0, -1e3)  # a plane that is always satisfied
+_OBSERVE, _ROTATION = CompiledFunction(observe), CompiledFunction(write_rotation)
 
 
 class NmpcGains(NamedTuple):
-    """Numbers of the controller; horizon, margin and price of force are what `search` found best."""
+    """Numbers of the controller; all but the last four are what `benchmarks.nmpc_search` found."""
 
     stages: float = 12.0
-    interval: float = 0.3  # s, of a stage
-    margin: float = 0.1  # m
+    interval: float = 0.3627  # s, of a stage
+    margin: float = 0.05005  # m
+    w_u: float = 0.115  # of the forces, in shares of the greatest
+    w_m: float = 10.58  # of moments that the attitude's loop asks for and do not get, in shares of the greatest
+    w_v: float = 211.6  # s2/m2, of the last velocity
+    observer: float = 6.281  # rad/s
     w_p: float = 10.0  # 1/m, of the distance to the set point
-    w_u: float = 1e-3  # 1/N2, of the forces
-    w_m: float = 0.1  # 1/N2, of moments that the attitude's loop asks for
-    w_v: float = 50.0  # s2/m2, of the last velocity
-    observer: float = 2.0  # rad/s
-    k_p2: float = 36.0  # N m, section VII
-    k_v2: float = 40.0  # N m s/rad, section VII
-
-
-HORIZONS = ((8.0, 0.3), (12.0, 0.3), (12.0, 0.5))  # stages, and their length [s], of the search
-MARGINS = (0.05, 0.1)  # m, of the search
+    w_s: float = 100.0  # 1/m, of the depth within soft regions
+    k_p2: float = 4.5  # 1/s2, section VII for the inertia of ODIN
+    k_v2: float = 5.0  # 1/s, the same
 
 
 class _Step:
@@ -79,61 +67,99 @@ class _Step:
         memory: _Memory,
         forces: Array,
     ) -> None:
-        observer, R = memory.observer, np.zeros((3, 3))
-        write_rotation(state.quaternion, R)
-        _OBSERVE(observer.memory, state, R, observer.gains)
+        observer = memory.observer
+        _ROTATION(state.quaternion, memory.R)
+        _OBSERVE(observer.memory, state, memory.R, observer.gains)
         if memory.steps[0] % memory.plan_every == 0:
-            forces[:] = self._plan(state, goal, regions, gains, observer, R, memory.steps[0] == 0)
+            forces[:] = self._plan(state, goal, regions, gains, memory)
             observer.memory.thrusters.forces[:] = forces
         memory.steps[0] += 1
 
     def _plan(
-        self,
-        state: VehicleState,
-        goal: PackedRegions,
-        regions: PackedRegions,
-        gains: NmpcGains,
-        observer: PidCbfLaw,
-        R: Array,
-        again: bool,
+        self, state: VehicleState, goal: PackedRegions, regions: PackedRegions, gains: NmpcGains, memory: _Memory
     ) -> list[float]:
-        known = observer.memory
+        known, again = memory.observer.memory, memory.steps[0] == 0
+        if again:
+            memory.path[:] = known.position
+        inertia = known.dynamics.mass[3:, 3:]
         error = np.array(error_parts(known.desired_quaternion, state.quaternion)[1:])
-        lost = known.dynamics.mass[3:, 3:] @ known.disturbance[3:]
-        balls, band = [], (-1e3, 1e3)
-        for i in range(regions.kinds.size):
-            first = regions.offsets[i]
-            if regions.kinds[i] == Sphere.kind:
-                center = regions.numbers[first : first + 3] + regions.shifts[i]
-                balls.append([*center, regions.numbers[first + 3], *regions.velocities[i]])
-            else:
-                middle, half = regions.numbers[first : first + 2]
-                band = (middle - half, middle + half)
+        lost = inertia @ known.disturbance[3:]
+        turning = inertia @ (gains.k_p2 * error + gains.k_v2 * known.velocity[3:])
         first = goal.offsets[0]
         given = {
             "position": known.position.tolist(),
             "velocity": known.velocity[:3].tolist(),
-            "R": R.tolist(),
+            "R": memory.R.tolist(),
             "disturbance": known.disturbance[:3].tolist(),
-            "moment": (-gains.k_p2 * error - gains.k_v2 * known.velocity[3:] - lost).tolist(),
+            "moment": (-turning - lost).tolist(),
             "hold": (-lost).tolist(),
             "goal": (goal.numbers[first : first + 3] + goal.shifts[0]).tolist(),
-            "spheres": balls,
-            "band": band,
-            "margin": gains.margin,
+            "goal_velocity": goal.velocities[0].tolist(),
+            "weights": gains._asdict(),
             "again": again,
+            **constraints(regions, memory.path, gains.interval),
         }
+        if again:
+            given["vehicle"] = memory.vehicle
         assert self.process is not None
         answer = self.process.exchange(json.dumps(given))
         self.times.append(answer["seconds"])
         self.failures += not answer["success"]
+        memory.path[:] = answer["path"]
         return list(answer["forces"])
+
+
+def constraints(regions: PackedRegions, path: Array, interval: float) -> dict[str, Any]:
+    """Return the constraints that regions are for a plan.
+
+    Parameters
+    ----------
+    regions : PackedRegions
+        Where they are now.
+    path : ndarray, shape (stages, 3)
+        Where the vehicle is expected at the end of each interval [m, NED].
+    interval : float
+        [s].
+
+    Returns
+    -------
+    dict
+        ``spheres``, each with centre [m], radius [m] and velocity [m/s]; planes of ``hard`` and ``soft`` regions, each
+        with a row for each stage: a normal, and the least coordinate along it [m].
+    """
+    spheres: list[list[float]] = []
+    planes: dict[bool, list[Any]] = {True: [], False: []}
+    slope = np.zeros(3)
+    for i in range(regions.kinds.size):
+        first, hard = regions.offsets[i], bool(regions.hard[i])
+        if regions.kinds[i] == Sphere.kind and regions.signs[i] < 0.0:
+            center = regions.numbers[first : first + 3] + regions.shifts[i]
+            spheres.append([*center, regions.numbers[first + 3], *regions.velocities[i]])
+        elif regions.kinds[i] == DepthBand.kind and regions.signs[i] > 0.0:
+            middle, half = regions.numbers[first : first + 2]
+            middle += regions.shifts[i, 2]
+            planes[hard] += [
+                [(0.0, 0.0, 1.0, middle - half)] * len(path),
+                [(0.0, 0.0, -1.0, -middle - half)] * len(path),
+            ]
+        elif regions.kinds[i] < FIRST_OF_ATTITUDE:
+            rows = []
+            for k, place in enumerate(path):
+                moved = (k + 1) * interval * regions.velocities[i]
+                clearance = place_clearance(regions, i, place - moved, slope)
+                along = float(slope @ place)
+                rows.append((*slope.tolist(), along - clearance) if slope.any() else _FREE)
+            planes[hard].append(rows)
+    return {"spheres": spheres, "hard": planes[True], "soft": planes[False]}
 
 
 class _Memory(NamedTuple):
     estimate: Array
     report: Array
     observer: PidCbfLaw
+    R: Array  # (3, 3), from body to world
+    path: Array  # (stages, 3) m, where the vehicle is expected at each stage of the next plan
+    vehicle: dict[str, Any]  # for the planner
     plan_every: int
     steps: list[int]
 
@@ -156,19 +182,22 @@ class NmpcLaw(CompiledLaw):
         observer = PidCbfLaw(vehicle, observing, desired_quaternion, period, n_regions)
         law.gains, law.n_regions = validate_gains(gains, ("stages", "interval", "observer")), n_regions
         law.n_forces = vehicle.thruster_matrix.shape[1]
-        law.memory = _Memory(np.zeros(4), np.zeros(0), observer, max(round(PERIOD / period), 1), [0])
+        law.memory = _Memory(
+            estimate=np.zeros(4),
+            report=np.zeros(0),
+            observer=observer,
+            R=np.zeros((3, 3)),
+            path=np.zeros((round(gains.stages), 3)),
+            vehicle=_plain(vehicle),
+            plan_every=max(round(PERIOD / period), 1),
+            steps=[0],
+        )
         return law
 
 
-def _setup(gains: NmpcGains, vehicle: VehicleModel) -> dict[str, Any]:
-    """Return the setup of the peer."""
-    weights = {name: value for name, value in gains._asdict().items() if name.startswith("w_")}
-    return weights | {
-        "stages": round(gains.stages),
-        "interval": gains.interval,
-        "period": PERIOD,
-        "obstacles": OBSTACLES,
-        "iterations": ITERATIONS,
+def _plain(vehicle: VehicleModel) -> dict[str, Any]:
+    """Return the vehicle as the planner receives it."""
+    return {
         "mass": (vehicle.rigid_mass + vehicle.added_mass)[:3, :3].tolist(),
         "linear": vehicle.linear_damping[:3].tolist(),
         "quadratic": vehicle.quadratic_damping[:3].tolist(),
@@ -178,83 +207,34 @@ def _setup(gains: NmpcGains, vehicle: VehicleModel) -> dict[str, Any]:
     }
 
 
-@contextlib.contextmanager
-def planner(gains: NmpcGains, environment: Environment) -> Iterator[None]:
-    """Start the peer that plans for `NmpcLaw` by some gains, whose margin may still change.
+class Planners:
+    """Start the peers that plan for `NmpcLaw`, one for each number of stages and kind of constraints.
 
     Parameters
     ----------
-    gains : NmpcGains
-        Of the controller.
     environment : Environment
         That has CasADi.
-
-    Raises
-    ------
-    NotMeasuredError
-        If CasADi is not installed, or cannot begin.
     """
-    LAWS["nmpc"] = NmpcLaw
-    setup = _setup(gains, vehicle_model(load_vehicle(VEHICLE)))
-    with peer(environment, "casadi", "casadi_nmpc", "controller", setup) as NmpcLaw.function.process:
-        yield
 
+    def __init__(self, environment: Environment) -> None:
+        LAWS["nmpc"] = NmpcLaw
+        self._environment, self._started = environment, contextlib.ExitStack()
+        self._peers: dict[tuple[int, bool], PeerProcess] = {}
 
-def fly(gains: NmpcGains, kind: str, seed: int, count: int) -> list[Score]:
-    """Fly scenes of a kind, of some seeds on, with the peer started; `NmpcLaw.function` then has the plans' times."""
-    NmpcLaw.function.times.clear()
-    NmpcLaw.function.failures = 0
-    with SceneFlyer("nmpc", Conditions(duration=DURATION), gains) as flyer:
-        return [flyer.fly(msgspec.convert(make_scene(seed + i, kind), Scene))[0] for i in range(count)]
+    def choose(self, stages: int, spheres: bool) -> None:
+        """Let `NmpcLaw` plan with a number of stages, among spheres, or among shapes.
 
+        Raises
+        ------
+        NotMeasuredError
+            If CasADi is not installed, or cannot begin.
+        """
+        if (stages, spheres) not in self._peers:
+            setup = {"stages": stages, "period": PERIOD, "iterations": ITERATIONS} | (SPHERES if spheres else SHAPES)
+            started = peer(self._environment, "casadi", "casadi_nmpc", "controller", setup)
+            self._peers[stages, spheres] = self._started.enter_context(started)
+        NmpcLaw.function.process = self._peers[stages, spheres]
 
-def search(environment: Environment) -> NmpcGains:
-    """Fly each of `HORIZONS` with each of `MARGINS`; return the best, by the order of `benchmarks.baselines`."""
-    found: list[tuple[tuple[int, int, float], NmpcGains]] = []
-    for stages, interval in HORIZONS:
-        gains = NmpcGains(stages=stages, interval=interval)
-        with planner(gains, environment):
-            for margin in MARGINS:
-                gains = gains._replace(margin=margin)
-                flown = outcome(score for kind in KINDS for score in fly(gains, kind, FIRST_SEED, SEARCHED))
-                print(f"{stages:g} stages of {interval} s, margin {margin} m: {format_outcome(flown)}", flush=True)
-                found.append((flown.rank, gains))
-    return min(found)[1]
-
-
-def main(
-    kinds: Iterable[str], seed: int, count: int, searches: bool, python: str | None = None, out: Path | None = None
-) -> None:
-    """Fly scenes of some kinds, and print the outcome; or search first.
-
-    Parameters
-    ----------
-    kinds : iterable of str
-        Of scenes.
-    seed : int
-        Of the first scene.
-    count : int
-        Scenes of a kind.
-    searches : bool
-        Search the settings, instead of the defaults.
-    python : str, optional
-        That has CasADi; default: the benchmarks' own.
-    out : Path, optional
-        Receives a line of JSON for each flight.
-    """
-    environment = Environment(python)
-    gains = search(environment) if searches else NmpcGains()
-    with planner(gains, environment):
-        for kind in kinds:
-            scores = fly(gains, kind, seed, count)
-            times, failures = sorted(1e3 * t for t in NmpcLaw.function.times), NmpcLaw.function.failures
-            least = min(score.min_clearance for score in scores)
-            print(f"{kind}: {format_outcome(outcome(scores))}; least clearance {least:.3f} m")
-            print(
-                f"  a plan: median {statistics.median(times):.1f} ms, 99 % {times[int(0.99 * len(times))]:.1f} ms, "
-                f"longest {times[-1]:.1f} ms; {failures} of {len(times)} not converged",
-                flush=True,
-            )
-            if out is not None:
-                with out.open("a", encoding="utf-8") as file:
-                    file.writelines(json.dumps({"kind": kind} | score._asdict()) + "\n" for score in scores)
+    def close(self) -> None:
+        """End the peers."""
+        self._started.close()

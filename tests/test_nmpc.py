@@ -1,15 +1,16 @@
 """The predictive controller of the benchmarks with a stub planner: its inputs and their timing."""
 
-import contextlib
 import json
+import math
 
 import msgspec
 import numpy as np
 import pytest
 
-from benchmarks import nmpc
+from benchmarks import nmpc, nmpc_search
 from benchmarks.__main__ import main
 from controller import LAWS
+from controller.regions import Box, DepthBand, HalfSpace, Region, Sphere, pack
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.flyer import SceneFlyer
 from cosim.campaigns.scenes.generator import make_scene
@@ -24,7 +25,12 @@ class Planner:
 
     def exchange(self, line):
         self.given.append(json.loads(line))
-        return {"forces": [0.0] * 4 + [-3.0] * 4, "success": len(self.given) % 2 == 0, "seconds": 0.001}
+        return {
+            "forces": [0.0] * 4 + [-3.0] * 4,
+            "success": len(self.given) % 2 == 0,
+            "path": [[float(len(self.given)), 0.0, 2.0]] * 12,
+            "seconds": 0.001,
+        }
 
 
 @pytest.fixture
@@ -47,7 +53,14 @@ def test_planner_receives_law_inputs_at_10_hz(flown):
     assert len(planner.given) == 20 and len(nmpc.NmpcLaw.function.times) == 20
     assert [given["again"] for given in planner.given] == [True] + [False] * 19
     first, last = planner.given[0], planner.given[-1]
-    assert first["goal"] == pytest.approx(scene.goal.centre) and first["band"] == pytest.approx(scene.depth_band)
+    assert first["goal"] == pytest.approx(scene.goal.centre)
+    shallowest, deepest = scene.depth_band
+    assert first["hard"] == [
+        [pytest.approx([0.0, 0.0, 1.0, shallowest])] * 12,
+        [pytest.approx([0.0, 0.0, -1.0, -deepest])] * 12,
+    ]
+    assert first["soft"] == [] and np.array(first["vehicle"]["thrusters"]).shape == (6, 8)
+    assert not any("vehicle" in given for given in planner.given[1:])
     for given, time in ((first, 0.0), (last, 1.9)):
         for ball, obstacle in zip(given["spheres"], scene.obstacles, strict=True):
             assert ball[:3] == pytest.approx(np.array(obstacle.centre) + time * np.array(obstacle.velocity))
@@ -71,20 +84,82 @@ def test_observer_estimates_the_vertical_force(monkeypatch, flown):
     assert disturbance == pytest.approx(scene.weight_minus_buoyancy, abs=0.25 * abs(scene.weight_minus_buoyancy) + 1.0)
 
 
-def test_the_search_ranks_by_safety_then_reached_then_time(monkeypatch):
-    times = {(8.0, 0.05): (9.0, -0.01), (8.0, 0.1): (12.0, 0.1)}
+def test_spheres_and_depths_constrain_exactly_and_other_regions_by_tangents_along_the_path():
+    regions = pack(
+        [
+            Region("rock", Sphere((1.0, 2.0, 3.0), 0.5), "out", velocity=(0.1, 0.0, 0.0)),
+            Region("band", DepthBand(3.0, 2.0), "in"),
+            Region("face", HalfSpace((0.0, 0.0, 1.0), (0.0, 0.0, 1.0)), "out", velocity=(0.0, 0.0, 0.2)),
+            Region("wall", Box((5.0, 0.0, 3.0), (1.0, 4.0, 4.0)), "out", hard=False),
+        ]
+    )
+    path = np.array([[2.0, 0.1, 3.0], [4.7, 0.1, 3.0]])
+    found = nmpc.constraints(regions, path, 0.5)
+    assert found["spheres"] == [[1.0, 2.0, 3.0, 0.5, 0.1, 0.0, 0.0]]
+    least, most, face = (np.array(rows) for rows in found["hard"])
+    assert least == pytest.approx(np.array([[0.0, 0.0, 1.0, 1.0]] * 2))
+    assert most == pytest.approx(np.array([[0.0, 0.0, -1.0, -5.0]] * 2))
+    # a point must be on the far side of the face, which is at 1.1 m after half a second, then at 1.2 m
+    side = face[0, 2]
+    assert abs(side) == 1.0 and side * face[:, 3] == pytest.approx([1.1, 1.2])
+    # before the wall, and within it: north of 4.5 m is excluded
+    assert np.array(found["soft"][0]) == pytest.approx(np.array([[-1.0, 0.0, 0.0, -4.5]] * 2))
 
-    def fly(gains, kind, seed, count):
-        time, clearance = times.get((gains.stages, gains.margin), (11.0 if gains.interval == 0.3 else 11.5, 0.1))
-        return [nmpc.Score(True, time, clearance, 1.0, 1.0, 0.0, -1)] * count
 
-    monkeypatch.setattr(nmpc, "fly", fly)
-    monkeypatch.setattr(nmpc, "planner", lambda gains, environment: contextlib.nullcontext())
-    found = nmpc.search(None)
-    assert (found.stages, found.interval) == (12.0, 0.3)
+@pytest.mark.medium
+def test_tangents_follow_the_path_of_the_plan_before(monkeypatch):
+    planner = Planner()
+    monkeypatch.setitem(LAWS, "nmpc", nmpc.NmpcLaw)
+    monkeypatch.setattr(nmpc.NmpcLaw.function, "process", planner)
+    paths = []
+    monkeypatch.setattr(nmpc, "constraints", lambda regions, path, interval: paths.append(path.copy()) or {})
+    with SceneFlyer("nmpc", Conditions(duration=0.3)) as flyer:
+        flyer.fly(msgspec.convert(make_scene(7, "plain"), Scene))
+    assert (paths[0] == paths[0][0]).all()
+    assert [path[0, 0] for path in paths[1:]] == [1.0, 2.0]
+
+
+class Flown:
+    """In place of flights: safe where the margin is, fast where the forces are cheap."""
+
+    def __init__(self):
+        self.count = 0
+
+    def fly(self, gains, kind, seed, longer):
+        self.count += 1
+        time = 11.0 + 3.0 * abs(math.log(gains.w_u / 0.3)) + 0.1 * (seed % 3)
+        score = nmpc_search.Score(True, time, gains.margin - 0.08, 1.0, 1.0, 0.0, -1)
+        return nmpc_search.Flight(score, [1.0], 0)
+
+
+def test_the_search_finds_fast_settings_among_safe_ones():
+    flights = Flown()
+    found = nmpc_search.search(flights, 60, 0)
+    assert found.outcome.violations == 0 and found.gains.margin >= 0.08 and found.gains.stages in nmpc_search.STAGES
+    assert found.gains.w_u == pytest.approx(0.3, rel=0.15)
+    assert flights.count < 0.7 * 60 * nmpc_search.SCENES
+    assert nmpc_search.search(Flown(), 60, 0).gains == found.gains
+
+
+@pytest.mark.medium
+def test_flights_in_the_file_are_not_flown_again(monkeypatch, tmp_path):
+    planner, started = Planner(), []
+    monkeypatch.setitem(LAWS, "nmpc", nmpc.NmpcLaw)
+    monkeypatch.setattr(nmpc.NmpcLaw.function, "process", planner)
+    monkeypatch.setattr(nmpc.Planners, "choose", lambda self, *what: started.append(what))
+    monkeypatch.setattr(nmpc_search, "DURATION", 0.2)
+    path = tmp_path / "flights.jsonl"
+    gains = nmpc.NmpcGains()
+    flown = nmpc_search.Flights(None, path).fly(gains, "plain", 3, 0.4)
+    assert started == [(12, True)] * 2  # not settled after 0.2 s
+    again = nmpc_search.Flights(None, path)
+    assert again.fly(gains, "plain", 3, 0.4) == flown and len(flown.times) == 4
+    assert len(started) == 2 and len(path.read_text().splitlines()) == 2
+    again.fly(gains._replace(margin=0.2), "plain", 3, 0.4)
+    assert len(started) == 4
 
 
 def test_unknown_kind_is_rejected(capsys):
     with pytest.raises(SystemExit):
-        main(["nmpc", "conflict"])
-    assert "'conflict'" in capsys.readouterr().err
+        main(["nmpc", "tour"])
+    assert "'tour'" in capsys.readouterr().err

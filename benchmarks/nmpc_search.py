@@ -1,0 +1,194 @@
+"""Flights by the predictive controller, and the search for its numbers: that of the other laws, among fewer scenes.
+
+Draws race the best as in `benchmarks.baselines`, safety first. Every flight is a line of a file; a flight that the file
+has is not flown again, so that an interrupted search or campaign goes on.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import statistics
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from benchmarks.baselines import FIRST_SEED, KINDS, Candidate, draw_gains, format_outcome, outcome, race
+from benchmarks.nmpc import NmpcGains, NmpcLaw, Planners
+from benchmarks.peer_environment import Environment
+from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.flyer import SceneFlyer, Score
+from cosim.campaigns.scenes.generator import MAKERS
+from cosim.campaigns.scenes.scenario_scene import ScenarioScene
+from cosim.campaigns.scenes.scene import Scene
+
+FLOWN = (*KINDS, "conflict")  # kinds of scenes
+COUNT = 100  # scenes of a kind
+DURATION = 30.0  # s of a flight; a scene that is not settled then is flown again, for longer
+LONGER = {"search": 60.0, "campaign": 120.0}  # s
+RANGES = {
+    "interval": (0.15, 0.6),
+    "margin": (0.03, 0.2),
+    "w_u": (0.1, 3.0),
+    "w_m": (10.0, 300.0),
+    "w_v": (5.0, 500.0),
+    "observer": (0.5, 8.0),
+}
+STAGES = (8.0, 12.0)
+SCENES = 30  # plain and hard by turns
+HEATS = ((4, 1.3), (10, 1.15), (SCENES, 1.0))
+PHASES = ((0.5, math.inf), (0.25, 1.5), (0.25, 1.15))  # share of the draws, and within which factor of the best
+DRAWS = 24
+
+
+class Flight(NamedTuple):
+    """A flight, and how long its plans took."""
+
+    score: Score
+    times: list[float]  # ms
+    failures: int  # plans that did not converge
+
+
+class Flights:
+    """Fly scenes by the controller, each once.
+
+    Parameters
+    ----------
+    environment : Environment
+        That has CasADi.
+    path : Path, optional
+        File of flights, a line of JSON each, to which new ones are added.
+    """
+
+    def __init__(self, environment: Environment, path: Path | None = None) -> None:
+        self._planners, self._path = Planners(environment), path
+        self._known: dict[str, Flight] = {}
+        if path is not None and path.exists():
+            for line in path.read_text(encoding="utf-8").splitlines():
+                flown = json.loads(line)
+                self._known[_key(flown)] = Flight(Score(*flown["score"]), flown["times"], flown["failures"])
+
+    def fly(self, gains: NmpcGains, kind: str, seed: int, longer: float) -> Flight:
+        """Fly a scene for `DURATION`, and if it is not settled then, from its start for `longer` [s]."""
+        flown = self._fly(gains, kind, seed, DURATION)
+        settled = flown.score.reached or kind not in KINDS  # other scenes have a duration of their own
+        return flown if settled else self._fly(gains, kind, seed, longer)
+
+    def _fly(self, gains: NmpcGains, kind: str, seed: int, duration: float) -> Flight:
+        what = {"kind": kind, "seed": seed, "duration": duration, "gains": list(gains)}
+        if (key := _key(what)) in self._known:
+            return self._known[key]
+        self._planners.choose(round(gains.stages), kind in KINDS)
+        NmpcLaw.function.times.clear()
+        NmpcLaw.function.failures = 0
+        form: Any = Scene if kind in KINDS else ScenarioScene
+        scene = msgspec.convert(MAKERS[kind](seed), form)
+        with SceneFlyer("nmpc", Conditions(duration=duration), gains) as flyer:
+            score, _ = flyer.fly(scene)
+        flight = Flight(score, [round(1e3 * t, 2) for t in NmpcLaw.function.times], NmpcLaw.function.failures)
+        self._known[key] = flight
+        if self._path is not None:
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(what | flight._asdict()) + "\n")
+        return flight
+
+    def close(self) -> None:
+        """End the planners."""
+        self._planners.close()
+
+
+def _key(what: dict[str, Any]) -> str:
+    return json.dumps([what[name] for name in ("kind", "seed", "duration", "gains")])
+
+
+def search(flights: Flights, count: int, seed: int) -> Candidate:
+    """Return the best numbers of the controller.
+
+    Parameters
+    ----------
+    flights : Flights
+        That fly them.
+    count : int
+        Draws, of which half are from `RANGES` and `STAGES`, a quarter each within 1.5 and 1.15 of the best so far.
+    seed : int
+        Of the draws.
+
+    Returns
+    -------
+    Candidate
+        The numbers, and their scores over `SCENES`.
+    """
+    rng = np.random.default_rng(seed)
+
+    def fly_on(candidate: Candidate, scenes: Iterable[int]) -> Candidate:
+        more = {
+            i: flights.fly(candidate.gains, KINDS[i % 2], FIRST_SEED + i // 2, LONGER["search"]).score
+            for i in scenes
+            if i not in candidate.scores
+        }
+        return Candidate(candidate.gains, candidate.scores | more)
+
+    best = fly_on(Candidate(NmpcGains(), {}), range(SCENES))
+    print(f"nmpc: {best.gains}: {format_outcome(best.outcome)}", flush=True)
+    for share, near in PHASES:
+        for _ in range(math.ceil(share * count)):
+            gains = draw_gains(NmpcGains, RANGES, rng, best.gains if near < math.inf else None, near)
+            stages = float(rng.choice(STAGES)) if near == math.inf else best.gains.stages
+            found = race(gains._replace(stages=stages), best, fly_on, HEATS)
+            if len(found.scores) == SCENES and found.outcome.rank < best.outcome.rank:
+                best = found
+                print(f"nmpc: {best.gains}: {format_outcome(best.outcome)}", flush=True)
+    return best
+
+
+def main(
+    kinds: Iterable[str], seed: int, count: int, draws: int, python: str | None = None, out: Path | None = None
+) -> None:
+    """Fly scenes of some kinds, and print the outcome; or search first.
+
+    Parameters
+    ----------
+    kinds : iterable of str
+        Of scenes.
+    seed : int
+        Of the first scene, or of the draws.
+    count : int
+        Scenes of a kind.
+    draws : int
+        Of the search; 0: fly the scenes.
+    python : str, optional
+        That has CasADi; default: the benchmarks' own.
+    out : Path, optional
+        File of the flights, to which new ones are added.
+    """
+    flights = Flights(Environment(python), out)
+    try:
+        if draws:
+            search(flights, draws, seed)
+            return
+        for kind in kinds:
+            flown = [flights.fly(NmpcGains(), kind, seed + i, LONGER["campaign"]) for i in range(count)]
+            _print_flights(kind, flown)
+    finally:
+        flights.close()
+
+
+def _print_flights(kind: str, flown: list[Flight]) -> None:
+    scores = [flight.score for flight in flown]
+    times = sorted(t for flight in flown for t in flight.times)
+    reached = sorted(score.reach_time for score in scores if score.reached)
+    print(f"{kind}: {format_outcome(outcome(scores))}")
+    print(
+        f"  least clearance {min(score.min_clearance for score in scores):.3f} m; "
+        f"slowest 5 % from {reached[int(0.95 * len(reached))] if reached else math.inf:.1f} s on; "
+        f"variation of the thrust {statistics.median(score.thrust_variation for score in scores):.0f} N; "
+        f"weighted violation {statistics.fmean(score.weighted_violation for score in scores):.1f} m s"
+    )
+    print(
+        f"  a plan: median {statistics.median(times):.1f} ms, 99 % {times[int(0.99 * len(times))]:.1f} ms, longest "
+        f"{times[-1]:.1f} ms; {sum(flight.failures for flight in flown)} of {len(times)} not converged",
+        flush=True,
+    )
