@@ -19,13 +19,7 @@ if TYPE_CHECKING:
 
 
 def add_verbs(verbs: Any) -> None:
-    """Add the verb to the parser.
-
-    Parameters
-    ----------
-    verbs : argparse subparsers
-        Of the command.
-    """
+    """Add the verb to the subparsers of the command."""
     sitl = verbs.add_parser("sitl", help="let a real autopilot fly the plant")
     sitl.add_argument("--vehicle", help="a shipped vehicle, or a TOML file (default: the scenario's)")
     sitl.add_argument("--scenario", default="sitl", help="a shipped name, or a TOML file (default: sitl)")
