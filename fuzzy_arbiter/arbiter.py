@@ -172,7 +172,7 @@ class Arbiter:
         """
         if columns:
             inputs = _one_of(inputs, columns)
-        by_name = self._samples.is_table(inputs)
+        by_name = _is_table(inputs)
         values, masked = self._samples.rows(self._samples.columns(inputs) if by_name else inputs)
         weights = self._engine.weights_of_many(values)
         if masked is not None:
@@ -356,6 +356,13 @@ def _one_of(inputs: Any, named: Mapping[str, Any]) -> Any:
     if inputs is not None:
         raise InputError(f"inputs came by position and {', '.join(named)} by keyword, expected one of the two")
     return named
+
+
+def _is_table(inputs: object) -> bool:
+    """Return True for columns by name: a mapping, a data frame, an array of named fields."""
+    if isinstance(inputs, np.ndarray):
+        return inputs.dtype.names is not None
+    return isinstance(inputs, Mapping) or hasattr(inputs, "columns")
 
 
 def _with_defaults(system: System, default: float | Mapping[str, float] | None) -> System:

@@ -17,11 +17,6 @@ MAX_NAME = 200  # characters
 def finite(value: object) -> float | None:
     """Return a number as a float.
 
-    Parameters
-    ----------
-    value : object
-        Value to check.
-
     Returns
     -------
     float or None

@@ -374,10 +374,5 @@ def variable_names(variables: Sequence[Variable]) -> tuple[str, ...]:
     ----------
     variables : sequence of Variable
         Inputs or outputs.
-
-    Returns
-    -------
-    tuple of str
-        Names.
     """
     return tuple(variable.name for variable in variables)

@@ -69,11 +69,6 @@ def one_line(said: object) -> str:
 def printable(said: object) -> str:
     """Format a message as one line without control characters.
 
-    Parameters
-    ----------
-    said : object
-        Message.
-
     Returns
     -------
     str

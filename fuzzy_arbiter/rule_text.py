@@ -27,11 +27,6 @@ def parse_rules(text: str) -> list[Rule]:
     A hedge in a conclusion bends the strength of that conclusion and of those after it, as one on the whole
     condition does. So conclusions with other hedges become a rule of their own.
 
-    Parameters
-    ----------
-    text : str
-        One rule.
-
     Returns
     -------
     list of Rule
@@ -52,11 +47,6 @@ def parse_rule(text: str) -> Rule:
     before a term. ``&``,
     ``|``, ``~`` are *and*, *or*, *not*; *not* binds before *and*, *and* before *or*. Names that are no
     identifiers stand in double quotes.
-
-    Parameters
-    ----------
-    text : str
-        One rule.
 
     Returns
     -------

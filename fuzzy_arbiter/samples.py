@@ -203,23 +203,6 @@ class Samples:
         masks = np.stack([np.broadcast_to(np.ma.getmaskarray(x), n) for x in columns], axis=1)
         return np.ma.MaskedArray(values, masks)
 
-    def is_table(self, inputs: object) -> bool:
-        """Return True if inputs are columns by name, and not rows.
-
-        Parameters
-        ----------
-        inputs : object
-            Inputs of any type.
-
-        Returns
-        -------
-        bool
-            True for a mapping, a data frame, and an array of named fields.
-        """
-        if isinstance(inputs, np.ndarray):
-            return inputs.dtype.names is not None
-        return isinstance(inputs, Mapping) or hasattr(inputs, "columns")
-
     def _masked(self, inputs: object) -> NDArray[np.bool_] | None:
         return np.ma.getmaskarray(inputs) if isinstance(inputs, np.ma.MaskedArray) else None
 

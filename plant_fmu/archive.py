@@ -18,11 +18,6 @@ _UNIX = 3  # else the byte for the system of origin would differ between systems
 def require_place(out: Path) -> None:
     """Require that a file can be written, before the work that goes into it.
 
-    Parameters
-    ----------
-    out : Path
-        Path of the file.
-
     Raises
     ------
     BuildError
@@ -39,13 +34,6 @@ def require_place(out: Path) -> None:
 
 def write_atomic(out: Path, data: bytes) -> None:
     """Write a file atomically, and replace an older one.
-
-    Parameters
-    ----------
-    out : Path
-        Path of the file.
-    data : bytes
-        Content of the file.
 
     Raises
     ------

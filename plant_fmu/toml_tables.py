@@ -30,16 +30,6 @@ _LISTED = 30  # names that a message lists at most
 def read_toml(path: Path) -> dict[str, Any]:
     """Return the content of a TOML file.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    dict
-        Tables of the file.
-
     Raises
     ------
     TableError
@@ -63,11 +53,6 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def require_modest(table: dict[str, Any]) -> None:
     """Refuse tables and whole numbers beyond the limits, on which Python itself would fail.
-
-    Parameters
-    ----------
-    table : dict
-        Content of a TOML file.
 
     Raises
     ------
@@ -122,13 +107,6 @@ def decode(table: dict[str, Any], kind: type[T], where: str = "") -> T:
 def hint(received: str, known: typing.Iterable[str]) -> str:
     """Format a hint for an unknown name: the nearest known one, else a list of all.
 
-    Parameters
-    ----------
-    received : str
-        The unknown name.
-    known : iterable of str
-        Known names.
-
     Returns
     -------
     str
@@ -149,11 +127,6 @@ def dataclass_of(annotation: Any) -> type | None:
     ----------
     annotation : type
         A resolved annotation.
-
-    Returns
-    -------
-    type or None
-        The dataclass.
     """
     if dataclasses.is_dataclass(annotation):
         return typing.cast(type, annotation)

@@ -48,11 +48,6 @@ class _Source(io.BufferedReader):
 def opened(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open an FMU whose files are safe to extract.
 
-    Parameters
-    ----------
-    path : Path
-        The FMU.
-
     Yields
     ------
     ZipFile

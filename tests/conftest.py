@@ -38,24 +38,29 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     share, shares = map(int, config.getoption("--share").split("/"))
     slow = config.getoption("--slow")
     fast: Counter[str] = Counter()  # cases that run always, by function
-    for item in items:
+
+    def runs(item: pytest.Item) -> bool:
         medium, function = item.get_closest_marker("medium"), item.nodeid.partition("[")[0]
-        if "slow" in item.keywords:
-            if not slow:
-                item.add_marker(pytest.mark.skip(reason="slow; run with --slow"))
-                continue
-        elif medium is None:
-            continue
-        elif fast[function] < medium.kwargs.get("fast", 0):
-            fast[function] += 1
-            continue
-        elif not slow and not config.getoption("--medium"):
-            item.add_marker(pytest.mark.skip(reason="medium; run with --medium"))
-            continue
-        if zlib.crc32(item.nodeid.encode()) % shares != share % shares:
-            item.add_marker(pytest.mark.skip(reason="of another --share"))
+        if "slow" not in item.keywords:
+            if medium is None:
+                return True
+            if fast[function] < medium.kwargs.get("fast", 0):
+                fast[function] += 1
+                return True
+            if not slow and not config.getoption("--medium"):
+                return False
+        elif not slow:
+            return False
+        return zlib.crc32(item.nodeid.encode()) % shares == share % shares
+
+    chosen = [runs(item) for item in items]
+    # to skip them costs as much as a test of no work, and they are a third
+    config.hook.pytest_deselected(items=[item for item, taken in zip(items, chosen, strict=True) if not taken])
     # of two processes one begins with these, and has compiled the laws when the other one comes to them
-    items.sort(key=lambda item: item.nodeid.startswith(("tests/controller/", "tests/cosim/")))
+    items[:] = sorted(
+        (item for item, taken in zip(items, chosen, strict=True) if taken),
+        key=lambda item: item.nodeid.startswith(("tests/controller/", "tests/cosim/")),
+    )
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -77,6 +77,7 @@ def test_planned_forces_are_held_until_the_next_plan(flown):
     assert score.thrust_variation == pytest.approx(4 * 3.0)
 
 
+@pytest.mark.medium
 def test_observer_estimates_the_vertical_force(monkeypatch, flown):
     scene, planner, _ = flown
     mass = 187.5

@@ -54,11 +54,6 @@ TURNED = (  # a centre, and a rotation matrix row by row
 def constraints(numbers: Sequence[Number]) -> Iterator[tuple[str, int, int, str]]:
     """Yield the constraints among the numbers of a shape, beyond their ranges.
 
-    Parameters
-    ----------
-    numbers : sequence of Number
-        Numbers of one shape.
-
     Yields
     ------
     tuple of (str, int, int, str)

@@ -15,13 +15,7 @@ WORKERS = whole(1, 1024)
 
 
 def add_verbs(verbs: Any) -> None:
-    """Add the verbs to the parser.
-
-    Parameters
-    ----------
-    verbs : argparse subparsers
-        Of the command.
-    """
+    """Add the verbs to the subparsers of the command."""
     campaign = verbs.add_parser("campaign", help="fly many scenes by one law")
     _add_scenes(campaign)
     campaign.add_argument("--law", required=True, help="such as ismail_dunnigan")

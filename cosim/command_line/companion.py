@@ -18,13 +18,7 @@ _STEER_BY, _STICKS_BY = ("sticks", "wrench", "velocity", "attitude"), ("manual-c
 
 
 def add_verb(verbs: Any) -> None:
-    """Add the verb to the parser.
-
-    Parameters
-    ----------
-    verbs : argparse subparsers
-        Of the command.
-    """
+    """Add the verb to the subparsers of the command."""
     verb = verbs.add_parser("companion", help="steer a real autopilot by a scenario's regions, arbiter and law")
     verb.add_argument(
         "endpoint",

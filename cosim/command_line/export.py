@@ -10,13 +10,7 @@ from cosim.command_line.numbers import number, whole
 
 
 def add_verbs(verbs: Any) -> None:
-    """Add the verbs to the parser.
-
-    Parameters
-    ----------
-    verbs : argparse subparsers
-        Of the command.
-    """
+    """Add the verbs to the subparsers of the command."""
     export = verbs.add_parser("export", help="write a run in the format of another tool")
     export.add_argument("folder", type=Path, metavar="RUN", help="the run folder")
     export.add_argument(

@@ -20,13 +20,7 @@ _EPILOG = """examples:
 
 
 def add_verb(verbs: Any) -> None:
-    """Add the verb to the parser.
-
-    Parameters
-    ----------
-    verbs : argparse subparsers
-        Of the command.
-    """
+    """Add the verb to the subparsers of the command."""
     falsify = verbs.add_parser(
         "falsify", help="search for what goes worst, or estimate how rare a violation is",
         epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -24,13 +24,7 @@ _EXCITE_EPILOG = """examples:
 
 
 def add_verbs(verbs: Any) -> None:
-    """Add the verbs to the parser.
-
-    Parameters
-    ----------
-    verbs : argparse subparsers
-        Of the command.
-    """
+    """Add the verbs to the subparsers of the command."""
     _add_excite(verbs)
     identify = verbs.add_parser(
         "identify", help="find a vehicle's parameters from recorded runs",

@@ -13,13 +13,7 @@ _BAR = "{desc} {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
 
 
 def add_verb(verbs: Any) -> None:
-    """Add the verb to the parser.
-
-    Parameters
-    ----------
-    verbs : argparse subparsers
-        Of the command.
-    """
+    """Add the verb to the subparsers of the command."""
     log = verbs.add_parser("import", help="read the log of a vehicle as a run")
     log.add_argument(
         "log", type=Path, metavar="LOG", help=".bin, .tlog, .ulg, .csv, .parquet, .mcap, .db3, .bag or a bag's folder"

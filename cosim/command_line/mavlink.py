@@ -24,13 +24,7 @@ _HIDE, _SHOW, _CLEAR, _HOME, _END_OF_LINE, _BELOW = "\x1b[?25l", "\x1b[?25h", "\
 
 
 def add_verbs(verbs: Any) -> None:
-    """Add the verbs to the parser.
-
-    Parameters
-    ----------
-    verbs : argparse subparsers
-        Of the command.
-    """
+    """Add the verbs to the subparsers of the command."""
     listen = verbs.add_parser("listen", help="show any vehicle's MAVLink telemetry as a live table")
     _add_ground(listen, "such as udpin:127.0.0.1:14550 or tcp:127.0.0.1:5760", None)
     listen.add_argument("--once", action="store_true", help=f"print one picture, after {_ONCE:g} s, and end")

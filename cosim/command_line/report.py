@@ -13,13 +13,7 @@ _FORMATS = ("html", "png")
 
 
 def add_verbs(verbs: Any) -> None:
-    """Add the verbs to the parser.
-
-    Parameters
-    ----------
-    verbs : argparse subparsers
-        Of the command.
-    """
+    """Add the verbs to the subparsers of the command."""
     report = verbs.add_parser("report", help="write summary and report of runs again, or of killed ones")
     report.add_argument("folders", type=Path, nargs="+", metavar="RUN", help="a run folder")
     report.add_argument(

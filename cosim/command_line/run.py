@@ -20,13 +20,7 @@ if TYPE_CHECKING:
 
 
 def add_verb(verbs: Any) -> None:
-    """Add the verb to the parser.
-
-    Parameters
-    ----------
-    verbs : argparse subparsers
-        Of the command.
-    """
+    """Add the verb to the subparsers of the command."""
     run = verbs.add_parser("run", help="run a scenario and write its folder")
     run.add_argument("scenario", help="a shipped name (see cosim list), or a TOML file")
     run.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: runs/SCENARIO-TIME)")

@@ -13,13 +13,7 @@ _MOST = 10**7  # scenes, whose flights take more than a month
 
 
 def add_verb(verbs: Any) -> None:
-    """Add the verb to the parser.
-
-    Parameters
-    ----------
-    verbs : argparse subparsers
-        Of the command.
-    """
+    """Add the verb to the subparsers of the command."""
     scenes = verbs.add_parser("scenes", help="generate random scenes for campaigns, one JSON object a line")
     scenes.add_argument("--count", type=whole(1, _MOST), default=100, metavar="N", help="of scenes (default: 100)")
     scenes.add_argument(

@@ -11,21 +11,16 @@ from cosim.command_line.numbers import number, whole
 from cosim.command_line.process import INTERRUPTED, print_status
 from cosim.command_line.results import print_run, say
 from cosim.io.network_address import resolved
-from cosim.sitl.ports import PORTS
 
 if TYPE_CHECKING:
     from cosim.results.run_result import Run
     from cosim.sitl.autopilot_link import AutopilotLink
 
+_PORTS = {"ardupilot": 9002, "px4": 4560}  # by backend, where an autopilot expects its simulator: UDP, TCP
+
 
 def add_verbs(verbs: Any) -> None:
-    """Add the verb to the parser.
-
-    Parameters
-    ----------
-    verbs : argparse subparsers
-        Of the command.
-    """
+    """Add the verb to the subparsers of the command."""
     sitl = verbs.add_parser("sitl", help="let a real autopilot fly the plant")
     sitl.add_argument("--vehicle", help="a shipped vehicle, or a TOML file (default: the scenario's)")
     sitl.add_argument("--scenario", default="sitl", help="a shipped name, or a TOML file (default: sitl)")
@@ -33,11 +28,11 @@ def add_verbs(verbs: Any) -> None:
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run"
     )  # fmt: skip
     sitl.add_argument(
-        "--backend", choices=PORTS, default="ardupilot",
+        "--backend", choices=_PORTS, default="ardupilot",
         help="ardupilot: its JSON backend, by UDP; px4: its simulator interface, by TCP (default: %(default)s)",
     )  # fmt: skip
     sitl.add_argument(
-        "--port", type=whole(1, 65535), metavar="N", help=f"default: {PORTS['ardupilot']}, with px4 {PORTS['px4']}"
+        "--port", type=whole(1, 65535), metavar="N", help=f"default: {_PORTS['ardupilot']}, with px4 {_PORTS['px4']}"
     )
     sitl.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="to listen on (default: %(default)s)")
     sitl.add_argument("--allow-remote", action="store_true", help="let the address be seen from other machines")
@@ -78,7 +73,7 @@ def sitl(options: argparse.Namespace) -> int:
     from cosim.sitl.server import JsonServer
 
     _check(options)
-    address = _address(options.host, options.port or PORTS[options.backend], options.allow_remote)
+    address = _address(options.host, options.port or _PORTS[options.backend], options.allow_remote)
     chosen = FlightOptions(
         options.scenario, tuple(options.overrides), options.vehicle, options.out, options.record_rate,
         not options.no_report,

@@ -23,13 +23,7 @@ _EPILOG = """examples:
 
 
 def add_verbs(verbs: Any) -> None:
-    """Add the verbs to the parser.
-
-    Parameters
-    ----------
-    verbs : argparse subparsers
-        Of the command.
-    """
+    """Add the verbs to the subparsers of the command."""
     sweep = verbs.add_parser(
         "sweep", help="fly a scenario many times, with numbers of it varied",
         epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter,

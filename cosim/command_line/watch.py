@@ -14,13 +14,7 @@ _WIDE = 120  # characters of a line without a terminal
 
 
 def add_verb(verbs: Any) -> None:
-    """Add the verb to the parser.
-
-    Parameters
-    ----------
-    verbs : argparse subparsers
-        Of the command.
-    """
+    """Add the verb to the subparsers of the command."""
     watch = verbs.add_parser("watch", help="show a run in the terminal: live, while it is written, or played back")
     watch.add_argument(
         "run", metavar="RUN|URL",

@@ -8,18 +8,17 @@ from collections.abc import Iterable, Sequence
 from cosim.simulation.signals import Column
 
 _OF_REGIONS = ("value", "clearance", "shift.x", "shift.y", "shift.z")
+_LONGEST = 63  # letters of a name in MATLAB
 _ELEMENT = re.compile(r"(.+)\[(\d+)\]")
 
 
-def legal(names: Iterable[str], longest: int = 63) -> list[str]:
+def legal(names: Iterable[str]) -> list[str]:
     """Convert names to unique ones of ASCII letters, digits and underscores that begin with a letter.
 
     Parameters
     ----------
     names : iterable of str
         Names such as ``thrust[1]``.
-    longest : int
-        Greatest length of a name; MATLAB's is 63.
 
     Returns
     -------
@@ -28,12 +27,12 @@ def legal(names: Iterable[str], longest: int = 63) -> list[str]:
     """
     made: dict[str, None] = {}
     for name in names:
-        plain = re.sub(r"[^0-9A-Za-z]+", "_", name).strip("_")[:longest]
-        stem = plain if plain[:1].isalpha() else f"n{plain}"[:longest]
+        plain = re.sub(r"[^0-9A-Za-z]+", "_", name).strip("_")[:_LONGEST]
+        stem = plain if plain[:1].isalpha() else f"n{plain}"[:_LONGEST]
         candidate, n = stem, 2
         while candidate in made:
             suffix = f"_{n}"
-            candidate, n = f"{stem[: longest - len(suffix)]}{suffix}", n + 1
+            candidate, n = f"{stem[: _LONGEST - len(suffix)]}{suffix}", n + 1
         made[candidate] = None
     return list(made)
 

@@ -9,11 +9,6 @@ import socket
 def resolved(host: str) -> tuple[str, bool]:
     """Resolve a host to its IPv4 address.
 
-    Parameters
-    ----------
-    host : str
-        Name or address.
-
     Returns
     -------
     str

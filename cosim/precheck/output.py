@@ -21,11 +21,6 @@ _WIDTH = 110
 def check_text(check: Check) -> str:
     """Format a check as text: findings by topic, then the verdict.
 
-    Parameters
-    ----------
-    check : Check
-        Of a scenario.
-
     Returns
     -------
     str
@@ -54,11 +49,6 @@ def _verdict(check: Check) -> list[str]:
 
 def check_json(check: Check) -> str:
     """Format a check as JSON, with null for NaN and infinity.
-
-    Parameters
-    ----------
-    check : Check
-        Of a scenario.
 
     Returns
     -------

@@ -74,11 +74,6 @@ def _joined(words: Sequence[str]) -> str:
 def command_words(command: Command) -> str:
     """Format a command as text.
 
-    Parameters
-    ----------
-    command : Command
-        Command to format.
-
     Returns
     -------
     str

@@ -38,13 +38,6 @@ class Event:
 def events_of(run: Run, log: Log) -> list[Event]:
     """Return the events of a run in the order of time, limited in number.
 
-    Parameters
-    ----------
-    run : Run
-        The run.
-    log : sequence of (int, Command)
-        Its log of commands.
-
     Returns
     -------
     list of Event

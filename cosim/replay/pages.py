@@ -96,11 +96,6 @@ def replay(
 def joint_title(titles: Mapping[str, str]) -> str:
     """Return the title of several runs: each title once, before the names of its runs.
 
-    Parameters
-    ----------
-    titles : mapping from str to str
-        Titles of the scenarios, by the name of the run.
-
     Returns
     -------
     str

@@ -41,11 +41,6 @@ _SAME = 1e-6  # m; closer radii of a record are equal up to rounding
 def log_of(run: Run) -> Log:
     """Read the log of commands of a run.
 
-    Parameters
-    ----------
-    run : Run
-        The run.
-
     Returns
     -------
     sequence of (int, Command)

@@ -18,13 +18,6 @@ from cosim.simulation.signals import Array
 def scenario_as_flown(scenario: Scenario, record: Rows) -> Scenario:
     """Return the scenario with the obstacles that were added, at their last size, and with the last target.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario of the run.
-    record : Rows
-        Record of the run.
-
     Returns
     -------
     Scenario

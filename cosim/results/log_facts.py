@@ -47,11 +47,6 @@ class LogFacts:
 def load_log_facts(folder: Path) -> LogFacts:
     """Load the facts about the log of an imported run.
 
-    Parameters
-    ----------
-    folder : Path
-        The run folder.
-
     Returns
     -------
     LogFacts

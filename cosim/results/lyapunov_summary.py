@@ -16,11 +16,6 @@ ROUNDING = 1e-12  # of the greatest |V| of a run: a smaller rise between two ste
 def summarise_lyapunov(record: Rows) -> dict[str, Any] | None:
     """Summarise V over a run.
 
-    Parameters
-    ----------
-    record : Rows
-        Of the run.
-
     Returns
     -------
     dict or None

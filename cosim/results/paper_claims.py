@@ -25,13 +25,6 @@ class Claim:
 def paper_claims(scenario: Scenario, summary: dict[str, Any]) -> list[Claim]:
     """Return the paper's claims beside the results of this run.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario of the run.
-    summary : dict
-        Its summary.
-
     Returns
     -------
     list of Claim

@@ -225,11 +225,6 @@ class Record(Rows):
 def load_record(folder: Path) -> Record:
     """Open the record of a run, whether it was finished or killed.
 
-    Parameters
-    ----------
-    folder : Path
-        The run folder.
-
     Returns
     -------
     Record
@@ -295,11 +290,6 @@ def _opened(file: Path) -> Iterator[Any]:
 
 def require_utf8(path: Path) -> None:
     """Raise a RunError for a path that is not UTF-8, which Parquet's library does not support.
-
-    Parameters
-    ----------
-    path : Path
-        Of a file or folder.
 
     Raises
     ------

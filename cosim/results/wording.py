@@ -31,11 +31,6 @@ def newtons(force: float) -> str:
 def asked(scenario: Scenario) -> str:
     """Describe the task of the vehicle in a sentence.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario of the run.
-
     Returns
     -------
     str
@@ -58,11 +53,6 @@ def asked(scenario: Scenario) -> str:
 
 def kind_of(shape: Shape) -> str:
     """Return the name of a shape, such as ``depth band``.
-
-    Parameters
-    ----------
-    shape : Shape
-        The shape.
 
     Returns
     -------
@@ -96,11 +86,6 @@ def number(value: float, digits: int) -> str:
 
 def verdict(summary: dict[str, Any]) -> str:
     """Describe the outcome of a run in a few sentences.
-
-    Parameters
-    ----------
-    summary : dict
-        Summary of the run.
 
     Returns
     -------

@@ -26,11 +26,6 @@ def colours_of_regions(scenario: Scenario) -> list[str]:
     The first region of a criterion has the criterion's colour. The others have shades of it, nearer to it in hue than
     to any other criterion and to the goal; after six regions they repeat.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario with the regions.
-
     Returns
     -------
     list of str

@@ -187,11 +187,6 @@ def comments(law: str, vehicle: Vehicle) -> dict[str, str]:
         Name of the law; the comments on its gains are read from its source.
     vehicle : Vehicle
         The FMU's vehicle, with the parameters of the plant.
-
-    Returns
-    -------
-    dict of str to str
-        By the path to the key.
     """
     said = {path: _comment(key.unit, _LINK.sub(r"\1", key.meaning).replace("`", "")) for path, key in KEYS.items()}
     said |= {f"law.gains.{gain}": text for gain, text in _gain_comments(law).items()}

@@ -11,11 +11,6 @@ from cosim.scenario.sensor_suite import scenario_sensors
 def start_values(scenario: Scenario) -> dict[str, float]:
     """Return the parameters and start values that the FMU gets before initialisation.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario of the run.
-
     Returns
     -------
     dict of str to float

@@ -11,11 +11,6 @@ from plant_fmu.vehicle import Vehicle
 def vehicle_model(vehicle: Vehicle) -> VehicleModel:
     """Return a vehicle's nominal model for a law, without weight, buoyancy and their centres.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-        The vehicle of its file.
-
     Returns
     -------
     VehicleModel

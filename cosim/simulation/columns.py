@@ -42,11 +42,6 @@ def columns_of(scenario: Scenario, plant: SteppedPlant, law: Law) -> list[Column
 def names_of(scenario: Scenario) -> list[str]:
     """Return the names of the columns of a run, without the diagnostics of a custom law.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario of the run.
-
     Returns
     -------
     list of str
@@ -57,11 +52,6 @@ def names_of(scenario: Scenario) -> list[str]:
 
 def columns_without_plant(scenario: Scenario) -> list[Column]:
     """Return the columns of a run as `columns_of` does, from the vehicle's table of variables and a built-in law.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Of a run.
 
     Returns
     -------

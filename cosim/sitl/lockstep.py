@@ -25,11 +25,6 @@ class Lockstep:
     def judge(self, count: int) -> Frame:
         """Classify a frame, and store its count.
 
-        Parameters
-        ----------
-        count : int
-            Count of the frame.
-
         Returns
         -------
         Frame

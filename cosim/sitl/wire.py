@@ -51,11 +51,6 @@ def decode(data: bytes) -> ServoPacket | None:
 def encode(motion: Motion) -> bytes:
     """Format the plant's state for the autopilot.
 
-    Parameters
-    ----------
-    motion : Motion
-        Motion of the vehicle.
-
     Returns
     -------
     bytes

@@ -8,11 +8,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.command_line.domain import random_samples
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.engines import ENGINES
-from fuzzy_arbiter.engines.firing import Array
+from fuzzy_arbiter.engines.firing import Array, Firing
 from fuzzy_arbiter.errors import ArbiterError, EngineError
 
 REPEATS = 5
@@ -61,7 +62,7 @@ def bench(system: System) -> list[Cost]:
     ArbiterError
         If no sample was found at which all outputs are defined.
     """
-    samples = random_samples(system, _MOST_ROWS)
+    samples = _samples(system)
     if len(samples) == 0:
         raise ArbiterError("bench: at all random samples some output is undefined")
     costs = []
@@ -146,3 +147,14 @@ def table(costs: list[Cost]) -> str:
             f"{cost.row:16.4f} {cost.row / min(rows):9.1f} {cost.rows:8}"
         )
     return "\n".join(lines)
+
+
+def _samples(system: System) -> Array:
+    """Return random samples of the universes at which every output has a default, or a rule that fires."""
+    low, high = np.array([v.universe for v in system.inputs]).T
+    samples: Array = np.random.default_rng(0).uniform(low, high, (_MOST_ROWS, len(system.inputs)))
+    firing, defined = Firing(system), np.ones(_MOST_ROWS, dtype=np.bool_)
+    for output, cuts in zip(system.outputs, firing.cuts_of_many(firing.strengths_of_many(samples)), strict=True):
+        if output.default is None:
+            defined &= cuts.any(axis=0)
+    return samples[defined]

@@ -38,11 +38,6 @@ class Logic(Generic[D]):
             Proposition on terms of the system's inputs.
         of : callable
             Returns the degree of each statement in it.
-
-        Returns
-        -------
-        D
-            Degree of the proposition.
         """
         if isinstance(proposition, Is):
             return of(proposition)

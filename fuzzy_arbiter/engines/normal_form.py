@@ -21,27 +21,6 @@ Clause = frozenset[Literal]
 MAX_CLAUSES = 512  # a form with more is not computed
 
 
-def complementary(variable: Variable) -> bool:
-    """Return True if a variable has two terms whose degrees sum to 1, at the knots to the last bit.
-
-    Parameters
-    ----------
-    variable : Variable
-        An input.
-
-    Returns
-    -------
-    bool
-        True if they are.
-    """
-    if len(variable.terms) != 2:
-        return False
-    first, second = (term.shape for term in variable.terms)
-    if not isinstance(first, Shape) or not isinstance(second, Shape):
-        return False
-    return not first.jumps and second == first.complement() and first == second.complement()
-
-
 def ladder(system: System, clauses: Sequence[Sequence[Clause]]) -> tuple[Literal, ...] | None:
     """Return the literals of prioritised criteria, if the clauses have this form.
 
@@ -105,7 +84,17 @@ def _conditions(system: System, output: Output, term: str) -> list[Proposition]:
 
 
 def _complements(system: System) -> dict[str, tuple[str, str]]:
-    return {v.name: (v.terms[0].name, v.terms[1].name) for v in system.inputs if complementary(v)}
+    return {v.name: (v.terms[0].name, v.terms[1].name) for v in system.inputs if _complementary(v)}
+
+
+def _complementary(variable: Variable) -> bool:
+    """Return True if a variable has two terms whose degrees sum to 1, at the knots to the last bit."""
+    if len(variable.terms) != 2:
+        return False
+    first, second = (term.shape for term in variable.terms)
+    if not isinstance(first, Shape) or not isinstance(second, Shape):
+        return False
+    return not first.jumps and second == first.complement() and first == second.complement()
 
 
 def _opposite(literal: Literal, complements: dict[str, tuple[str, str]]) -> Literal:

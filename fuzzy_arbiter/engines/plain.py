@@ -74,11 +74,6 @@ def curved(variable: Variable) -> str:
 def bent(p: Proposition) -> bool:
     """Return True if a condition has hedges or the term *any*.
 
-    Parameters
-    ----------
-    p : Proposition
-        A condition.
-
     Returns
     -------
     bool

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NoReturn, TypeVar
 
-from fuzzy_arbiter.formats.fcl_terms import COUNTS, read_curve, require_known
+from fuzzy_arbiter.formats.fcl_terms import COUNTS, read_curve
 from fuzzy_arbiter.formats.fcl_words import RESERVED, Token
 from fuzzy_arbiter.formats.fll_terms import TYPES, read_shape
 from fuzzy_arbiter.formats.notation import read_number, refuse
@@ -132,7 +132,11 @@ class Cursor:
                 return read_curve(word, [self.number("a parameter") for _ in range(COUNTS[word])])
             if token.text == "FUNCTION":  # jFuzzyLogic's, whose LOG is that to the base of 10
                 return self.function(), []
-            require_known(token.text, token.line, ("FUNCTION", *COUNTS, *TYPES))
+            if token.text not in (*COUNTS, *TYPES):
+                expected = (
+                    f"points such as (0, 0) (5, 1), a number, or one of {', '.join(('FUNCTION', *COUNTS, *TYPES))}"
+                )
+                refuse(token.line, f"{token.text!r} is no membership function, expected {expected}")
             self.fuzzylite = True
             shape = read_shape(token.text, self.rest(), token.line, inputs)
             return shape, [shape.value] if isinstance(shape, Constant) else []

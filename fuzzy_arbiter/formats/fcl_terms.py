@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fuzzy_arbiter.errors import UnsupportedError
-from fuzzy_arbiter.formats.notation import refuse, say_number, say_numbers
+from fuzzy_arbiter.formats.notation import say_number, say_numbers
 from fuzzy_arbiter.shapes import Membership, Shape, trapezoid, triangle
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.kinds import KINDS
@@ -143,25 +143,3 @@ def universe_of(places: Sequence[float]) -> tuple[float, float] | None:
     """
     low, high = min(places, default=0.0), max(places, default=0.0)
     return (low, high) if low < high else None
-
-
-def require_known(word: str, line: int, known: Sequence[str]) -> None:
-    """Require that a word is a known function.
-
-    Parameters
-    ----------
-    word : str
-        Name of the function.
-    line : int
-        Line number, for the error.
-    known : sequence of str
-        Known names.
-
-    Raises
-    ------
-    FormatError
-        Unless it is known.
-    """
-    if word not in known:
-        expected = f"points such as (0, 0) (5, 1), a number, or one of {', '.join(known)}"
-        refuse(line, f"{word!r} is no membership function, expected {expected}")

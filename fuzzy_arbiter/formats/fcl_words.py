@@ -76,11 +76,6 @@ class Token(NamedTuple):
 def cut(text: str) -> tuple[list[Token], list[tuple[int, str]]]:
     """Split a text into tokens and comments.
 
-    Parameters
-    ----------
-    text : str
-        Content of a file.
-
     Returns
     -------
     list of Token

@@ -70,11 +70,6 @@ def read(text: str) -> System:
     whatever AggMethod says, as MATLAB does it; where a comment names the fuzzy-logic-toolkit, they are joined as
     AggMethod defines, as in Octave.
 
-    Parameters
-    ----------
-    text : str
-        Content of a file.
-
     Returns
     -------
     System

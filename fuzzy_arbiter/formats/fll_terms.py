@@ -134,11 +134,6 @@ def read_value(kind: str, numbers: Sequence[float], line: int, inputs: int | Non
     inputs : int or None
         Number of inputs; None for a term of an input.
 
-    Returns
-    -------
-    Value
-        Value of the term.
-
     Raises
     ------
     FormatError

@@ -53,11 +53,6 @@ def read_json(text: str) -> System:
 def read_toml(text: str) -> System:
     """Parse a TOML text as a system.
 
-    Parameters
-    ----------
-    text : str
-        Content of a file.
-
     Returns
     -------
     System
@@ -93,11 +88,6 @@ def _no_constant(word: str) -> NoReturn:
 def write_json(system: System) -> str:
     """Format a system as JSON.
 
-    Parameters
-    ----------
-    system : System
-        System to write.
-
     Returns
     -------
     str
@@ -124,11 +114,6 @@ def _json_variable(v: Variable) -> str:
 
 def write_toml(system: System) -> str:
     """Format a system as TOML.
-
-    Parameters
-    ----------
-    system : System
-        System to write.
 
     Returns
     -------

@@ -24,11 +24,6 @@ def one_of(variables: Sequence[Variable], name: str, kind: str) -> int:
     kind : str
         Kind of the variables, for the error.
 
-    Returns
-    -------
-    int
-        Index of the variable.
-
     Raises
     ------
     DefinitionError
@@ -49,11 +44,6 @@ def output_place(system: System, name: str) -> int:
         System with the outputs.
     name : str
         Name of the output, or of its criterion as results carry it.
-
-    Returns
-    -------
-    int
-        Index of the output.
 
     Raises
     ------
@@ -131,11 +121,6 @@ def weights_at(arbiter: Arbiter, fixed: Mapping[str, float], over: Mapping[str, 
 
 def said(values: Mapping[str, float]) -> str:
     """Format values as text.
-
-    Parameters
-    ----------
-    values : mapping from str to float
-        Values by name.
 
     Returns
     -------

@@ -185,13 +185,6 @@ def room(ax: Axes) -> int:
 def wrapped(text: str, width: int) -> str:
     """Break a text into lines of at most some letters, between words where that is possible.
 
-    Parameters
-    ----------
-    text : str
-        One line.
-    width : int
-        Letters in a line.
-
     Returns
     -------
     str

@@ -97,11 +97,6 @@ def number_function(node: Node) -> Callable[[Mapping[str, float]], float]:
     ----------
     node : Node
         Tree of an `Expression`.
-
-    Returns
-    -------
-    callable
-        From names to numbers, to a number.
     """
     if isinstance(node, float):
         return lambda values: node

@@ -23,11 +23,6 @@ Node = float | str | tuple[Any, ...]  # a number, a name, or (function, argument
 def parsed(text: str) -> Node:
     """Parse a text as an expression's tree.
 
-    Parameters
-    ----------
-    text : str
-        One expression.
-
     Returns
     -------
     Node

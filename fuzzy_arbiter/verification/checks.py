@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from fuzzy_arbiter.definition import System, variable_names
-from fuzzy_arbiter.engines.firing import array_logic
+from fuzzy_arbiter.engines.firing import Firing, array_logic
 from fuzzy_arbiter.engines.plain import beyond_plain
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.propositions import Is
@@ -26,7 +26,7 @@ from fuzzy_arbiter.verification.questions import (
     rules_on,
     sampled,
 )
-from fuzzy_arbiter.verification.reasons import graded_strengths, reasons, row_strengths
+from fuzzy_arbiter.verification.reasons import reasons, row_strengths
 from fuzzy_arbiter.verification.report import Check, Finding, Row, Severity, Verification
 from fuzzy_arbiter.verification.rules import labels, redundant, unused
 from fuzzy_arbiter.verification.search import Answer, Goal
@@ -152,7 +152,8 @@ class _Checks:
                 verdicts.add(verdict)
                 hows.add(how)
                 if place is not None:
-                    causes = reasons(self.system, graded_strengths(self.system, place), terms, 0.5)
+                    inputs = [float(place.get(v.name, v.universe[0])) for v in self.system.inputs]
+                    causes = reasons(self.system, Firing(self.system).strengths(inputs), terms, 0.5)
                     self._found("warning", name, f"{text.format(output)} where {_said(place)}: {causes}", place)
             holds = False if False in verdicts else None if None in verdicts else True
             how = "by an example" if holds is False else "; ".join(sorted(hows))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from fuzzy_arbiter.definition import System
-from fuzzy_arbiter.engines.firing import Firing, number_logic
+from fuzzy_arbiter.engines.firing import number_logic
 from fuzzy_arbiter.propositions import Is
 
 
@@ -29,24 +29,6 @@ def row_strengths(system: System, place: Mapping[str, float | str]) -> list[floa
     return [
         rule.weight * logic.degree(rule.condition, lambda s: float(row[s.variable] == s.term)) for rule in system.rules
     ]
-
-
-def graded_strengths(system: System, place: Mapping[str, float | str]) -> list[float]:
-    """Return the firing strength of each rule for real inputs.
-
-    Parameters
-    ----------
-    system : System
-        System to verify.
-    place : mapping from str to float
-        Value of each input, or of those that matter.
-
-    Returns
-    -------
-    list of float
-        In the order of the rules.
-    """
-    return Firing(system).strengths([float(place.get(v.name, v.universe[0])) for v in system.inputs])
 
 
 def reasons(system: System, strengths: Sequence[float], statements: Sequence[Is], above: float) -> str:

@@ -20,13 +20,7 @@ _OTHER_WRAPPER = {2: "fmi3", 3: "fmi2"}
 
 
 def plant_sources() -> dict[str, bytes]:
-    """Return the C files of the plant, without the wrappers and the generated ``vehicle.h``.
-
-    Returns
-    -------
-    dict of str to bytes
-        Contents by name.
-    """
+    """Return the C files of the plant, without the wrappers and the generated ``vehicle.h``."""
     return _files("csrc") | {"t200.h": t200_header().encode()}
 
 
@@ -56,19 +50,8 @@ def _files(folder: str) -> dict[str, bytes]:
     return {file.name: file.read_bytes() for file in found.iterdir() if file.name.endswith((".c", ".h"))}
 
 
-def external_names(headers: Iterable[bytes]) -> list[str]:
-    """Return the names that C files share with each other, which the linker resolves.
-
-    Parameters
-    ----------
-    headers : iterable of bytes
-        The headers that declare them.
-
-    Returns
-    -------
-    list of str
-        Functions and data, in alphabetical order.
-    """
+def _external_names(headers: Iterable[bytes]) -> list[str]:
+    """Return the names of functions and data that C files share, which the linker resolves, in alphabetical order."""
     texts = (header.decode() for header in headers)
     return sorted({name for text in texts for groups in _DECLARED.findall(text) for name in groups if name})
 
@@ -108,7 +91,7 @@ def header(component: Component, token: str) -> str:
     """
     rows, name, guard = component.variables, component.name, component.header.upper().replace(".", "_")
     files = _files("csrc/wrapper") | dict(component.sources)
-    shared = external_names(data for file, data in files.items() if file.endswith(".h"))
+    shared = _external_names(data for file, data in files.items() if file.endswith(".h"))
     roles = ("state", "derivative", "input")
     first = {f"FIRST_{role.upper()}": next((i for i, v in enumerate(rows) if v.role == role), 0) for role in roles}
     constants = {**component.constants, **first}
@@ -140,11 +123,6 @@ def header(component: Component, token: str) -> str:
 
 def build_description(component: Component) -> str:
     """Return FMI 3.0's ``sources/buildDescription.xml``.
-
-    Parameters
-    ----------
-    component : Component
-        The component.
 
     Returns
     -------

@@ -71,13 +71,6 @@ def layered_files(vehicle: Vehicle, rows: Sequence[Variable] | None = None) -> d
 def reference_files(vehicle: Vehicle, results: Reference) -> dict[str, str]:
     """Return reference results as files, by name.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-        The vehicle.
-    results : Reference
-        Reference results of the vehicle.
-
     Returns
     -------
     dict of str to str

@@ -61,11 +61,6 @@ class Reference:
 def reference(vehicle: Vehicle) -> Reference:
     """Compute the reference results of a vehicle.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-        The vehicle.
-
     Returns
     -------
     Reference

@@ -47,11 +47,6 @@ class _Terminal:
 def terminals_and_icons(vehicle: Vehicle) -> str:
     """Return ``terminalsAndIcons.xml`` of FMI 3.0.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-        The vehicle.
-
     Returns
     -------
     str

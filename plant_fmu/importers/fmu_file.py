@@ -59,16 +59,6 @@ class FmuFile:
 def read_fmu(path: Path) -> FmuFile:
     """Read the model description of an FMU.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    FmuFile
-        The description.
-
     Raises
     ------
     FmuFileError

@@ -30,16 +30,17 @@ def imported(module: str, *, at_once: bool = False) -> frozenset[str]:
     `at_once` leaves out what stands inside functions and under ``if TYPE_CHECKING``.
     """
     tree = tree_of(FILES[module])
-    return frozenset(name for node in _nodes(tree, at_once) for name in _names(node))
+    nodes = _nodes(tree) if at_once else ast.walk(tree)
+    return frozenset(name for node in nodes for name in _names(node))
 
 
-def _nodes(node: ast.AST, at_once: bool) -> Iterator[ast.AST]:
+def _nodes(node: ast.AST) -> Iterator[ast.AST]:
     for child in ast.iter_child_nodes(node):
         later = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
         for_types = isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)
-        if not (at_once and (later or for_types)):
+        if not (later or for_types):
             yield child
-            yield from _nodes(child, at_once)
+            yield from _nodes(child)
 
 
 def _names(node: ast.AST) -> Iterator[str]:

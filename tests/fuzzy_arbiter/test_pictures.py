@@ -234,6 +234,7 @@ def test_rules_picture_shows_strength_term_and_deciding_rule(arbiter):
     assert any(text.endswith("alpha_2 = 0.784") for text in said)
 
 
+@pytest.mark.medium
 def test_rules_picture_omits_idle_rules_of_large_systems():
     criteria = [Criterion(name) for name in "abcd"]
     complete = Arbiter(criteria, form="complete", engine="exact")

@@ -23,18 +23,23 @@ from tests.plant_fmu.conftest import STATES, CoSimulationInstance
 HERE = native_platform()
 
 
-@pytest.fixture(scope="session")
-def folder(once):
+@pytest.fixture
+def fmi():
+    """FMI's version where a test names none: each is a compilation."""
+    return 3
+
+
+@pytest.fixture
+def folder(once, fmi):
     """A folder as in a wheel, with this machine's libraries alone, of eight thrusters."""
 
     def make(folder):
         general = prebuilt.general_component(of_vehicle(load_vehicle("rexrov")))
-        for fmi in (2, 3):
-            ((_, library),) = compiled_libraries(general, prebuilt.STAND_IN, fmi, [(HERE, find_compiler())])
-            with zipfile.ZipFile(folder / prebuilt.file_name(general, fmi), "w") as archive:
-                archive.writestr(f"{HERE.name}{HERE.suffix}", library)
+        ((_, library),) = compiled_libraries(general, prebuilt.STAND_IN, fmi, [(HERE, find_compiler())])
+        with zipfile.ZipFile(folder / prebuilt.file_name(general, fmi), "w") as archive:
+            archive.writestr(f"{HERE.name}{HERE.suffix}", library)
 
-    return once("prebuilt-here", make)
+    return once(f"prebuilt-here-{fmi}", make)
 
 
 @pytest.fixture

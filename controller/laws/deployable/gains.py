@@ -78,11 +78,6 @@ _MAY_BE_ZERO = {
 def check_gains(gains: DeployableGains) -> DeployableGains:
     """Validate the gains, and return them.
 
-    Parameters
-    ----------
-    gains : DeployableGains
-        Gains to validate.
-
     Returns
     -------
     DeployableGains

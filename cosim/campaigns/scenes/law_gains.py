@@ -77,11 +77,6 @@ def gains_by_law(laws: Sequence[str], settings: Sequence[str] = ()) -> dict[str,
     settings : sequence of str
         ``law.key=value``, numbers.
 
-    Returns
-    -------
-    dict of str to NamedTuple
-        By law.
-
     Raises
     ------
     RunError

@@ -78,11 +78,6 @@ class Scene:
 def scene_regions(scene: Scene) -> list[tuple[Region, str]]:
     """Return the regions of a scene beside its goal, each with its criterion.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-
     Returns
     -------
     list of (Region, str)

@@ -133,11 +133,6 @@ class CampaignFolder:
 def held(path: Path) -> Iterator[None]:
     """Lock the folder of a campaign during a block that writes into it.
 
-    Parameters
-    ----------
-    path : Path
-        The folder.
-
     Raises
     ------
     RunError
@@ -158,16 +153,6 @@ def held(path: Path) -> Iterator[None]:
 
 def read_plan(path: Path) -> dict[str, Any]:
     """Read the plan of the campaign in a folder.
-
-    Parameters
-    ----------
-    path : Path
-        The folder.
-
-    Returns
-    -------
-    dict
-        The plan.
 
     Raises
     ------

@@ -123,11 +123,6 @@ class Parts:
     def join(self, path: Path) -> None:
         """Write all rows to one file in order of key.
 
-        Parameters
-        ----------
-        path : Path
-            The file.
-
         Raises
         ------
         OSError

@@ -12,18 +12,6 @@ from cosim.export.format import Format
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
     """Write the file.
 
-    Parameters
-    ----------
-    excerpt : Excerpt
-        The whole run.
-    path : Path
-        The file.
-
-    Returns
-    -------
-    list of Path
-        The file.
-
     Raises
     ------
     ExportError

@@ -99,12 +99,12 @@ def message_interval(subject: Subject) -> Outcome:
     m, client = subject.mavlink, subject.client
     number, asked = m.MAVLINK_MSG_ID_ATTITUDE, 1e6 / _ASKED
     ack = client.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, [number, asked, 0, 0, 0, 0, 0])
-    rate = _rate_of(subject, "ATTITUDE")
+    rate = _attitude_rate(subject)
     client.forget()
     client.send_command(m.MAV_CMD_GET_MESSAGE_INTERVAL, [number])
     interval = client.wait(lambda x: x.get_type() == "MESSAGE_INTERVAL" and x.message_id == number, 1.0)
     client.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, [number, 0, 0, 0, 0, 0, 0])
-    again = _rate_of(subject, "ATTITUDE")
+    again = _attitude_rate(subject)
     received = (
         f"ack {ack and ack.result}, {rate:.1f} Hz, reported {interval and interval.interval_us} us, then {again:.1f} Hz"
     )
@@ -121,7 +121,7 @@ def greedy_interval(subject: Subject) -> Outcome:
     m, client = subject.mavlink, subject.client
     number = m.MAVLINK_MSG_ID_ATTITUDE
     ack = client.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, [number, 1, 0, 0, 0, 0, 0])
-    rate = _rate_of(subject, "ATTITUDE")
+    rate = _attitude_rate(subject)
     client.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, [number, 0, 0, 0, 0, 0, 0])
     received = f"ack {ack and ack.result}, {rate:.0f} Hz"
     return judged(ack is not None and rate <= _FASTEST, received, f"an ack, and at most {_FASTEST:g} Hz")
@@ -142,18 +142,18 @@ def data_stream(subject: Subject) -> Outcome:
     if not usual:
         return skipped("no ATTITUDE comes")
     client.send(m.MAVLink_request_data_stream_message(*client.target, group, int(_ASKED), 1))
-    rate = _rate_of(subject, "ATTITUDE")
+    rate = _attitude_rate(subject)
     client.send(m.MAVLink_request_data_stream_message(*client.target, group, round(usual), 1))
     client.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, [m.MAVLINK_MSG_ID_ATTITUDE, 0, 0, 0, 0, 0, 0])
     good = _TOLERANCE * _ASKED <= rate <= 1.3 * _ASKED
     return judged(good, f"{usual:.1f} Hz, then {rate:.1f} Hz", f"about {_ASKED:g} Hz once asked for")
 
 
-def _rate_of(subject: Subject, kind: str) -> float:
-    """Return the present rate of a message by the vehicle's clock [Hz]."""
+def _attitude_rate(subject: Subject) -> float:
+    """Return the present rate of ATTITUDE by the vehicle's clock [Hz]."""
     subject.client.collect(0.2)  # messages under way
     heard = tuple(subject.client.collect(_WINDOW))
-    return sum(h.kind == kind for h in heard) / (_WINDOW * speed_of(heard))
+    return sum(h.kind == "ATTITUDE" for h in heard) / (_WINDOW * speed_of(heard))
 
 
 CHECKS = (

@@ -38,7 +38,7 @@ class _Begun:
 
 
 @contextlib.contextmanager
-def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions, rate: float = 1.0) -> Iterator[LinkThread]:
+def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> Iterator[LinkThread]:
     """Run a vehicle in a thread until the context ends.
 
     Parameters
@@ -47,8 +47,6 @@ def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions, rate
         Endpoints of its links.
     options : MavlinkOptions
         Identity and profile.
-    rate : float
-        Simulated seconds per second of the wall clock.
 
     Yields
     ------
@@ -69,7 +67,7 @@ def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions, rate
 
         def step() -> None:
             try:
-                master.run([begun, links], rate, commands)
+                master.run([begun, links], 1.0, commands)
             except PlantError as error:
                 failures.append(error)
 
@@ -91,11 +89,6 @@ def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions, rate
 @contextlib.contextmanager
 def own_vehicle(profile: ProfileName) -> Iterator[GroundLink]:
     """Run a vehicle that accepts commands, and yield a link to it.
-
-    Parameters
-    ----------
-    profile : str
-        Profile of the vehicle.
 
     Yields
     ------

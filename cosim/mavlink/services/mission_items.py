@@ -17,7 +17,6 @@ from cosim.simulation.commands.commands import ChangeSetting, MissionItem, SetHe
 
 _LONGEST_STAY = 1e9  # s
 _LARGEST = 1e5  # m
-_MOST_JUMPS = 32767  # as in ArduPilot
 
 
 class ItemError(Exception):

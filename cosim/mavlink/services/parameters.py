@@ -14,15 +14,17 @@ from cosim.mavlink.services.packed_parameters import hash_check
 from cosim.mavlink.services.parameter_names import parameter_names
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.services.station_parameters import station_parameters
-from cosim.mavlink.vehicle.failsafe_settings import ACTIONS, TIMEOUTS
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.mavlink.wire.encode import float32
 from cosim.mavlink.wire.message_sink import MessageSink
+from cosim.mavlink.wire.options import LossAction
 from cosim.simulation.commands.commands import ChangeSetting
 
 _HASH = "_HASH_CHECK"
 _NO_INDEX = 0xFFFF
 _SLICE = 50  # values in each tick
+_ACTIONS: tuple[LossAction, ...] = ("none", "warn", "disarm", "hold", "surface")  # by ArduSub's FS_GCS_ENABLE
+_TIMEOUTS = (1.0, 120.0)  # s, of FS_GCS_TIMEOUT
 
 
 @dataclass(frozen=True)
@@ -61,20 +63,20 @@ class Parameters(Service):
         return own | {
             "MAV_SYS_ID" if profile == "px4" else "SYSID_THISMAV": _Own(lambda: float(context.options.system_id)),
             "FS_GCS_TIMEOUT": _Own(lambda: context.loss_timeout, self._write_timeout),
-            "FS_GCS_ENABLE": _Own(lambda: float(ACTIONS.index(context.loss_action)), self._write_action),
+            "FS_GCS_ENABLE": _Own(lambda: float(_ACTIONS.index(context.loss_action)), self._write_action),
         }
 
     def _write_timeout(self, value: float) -> str | None:
-        least, greatest = TIMEOUTS
+        least, greatest = _TIMEOUTS
         if not least <= value <= greatest:
             return f"{least:g} to {greatest:g}"
         self.context.loss_timeout = value
         return None
 
     def _write_action(self, value: float) -> str | None:
-        if value not in range(len(ACTIONS)):
-            return ", ".join(f"{i} {action}" for i, action in enumerate(ACTIONS))
-        self.context.loss_action = ACTIONS[int(value)]
+        if value not in range(len(_ACTIONS)):
+            return ", ".join(f"{i} {action}" for i, action in enumerate(_ACTIONS))
+        self.context.loss_action = _ACTIONS[int(value)]
         return None
 
     def restart(self) -> None:

@@ -31,13 +31,7 @@ _ON_LOSS: dict[LossAction, float] = {
 
 
 def station_parameters(context: VehicleContext) -> dict[str, Callable[[], float]]:
-    """Return functions that read the read-only parameters of the vehicle's profile, by name.
-
-    Parameters
-    ----------
-    context : VehicleContext
-        The vehicle, with its profile.
-    """
+    """Return functions that read the read-only parameters of the vehicle's profile, by name."""
     match context.profile.name:
         case "ardusub":
             values = _of_ardusub(context)

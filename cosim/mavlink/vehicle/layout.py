@@ -40,11 +40,6 @@ class Layout:
     def first_row(self, scenario: Scenario) -> Array:
         """Return the row before the first step: the vehicle's initial state, 0 in other columns.
 
-        Parameters
-        ----------
-        scenario : Scenario
-            Scenario of the run.
-
         Returns
         -------
         ndarray, shape (n,)

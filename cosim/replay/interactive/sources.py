@@ -75,11 +75,6 @@ def flight_sources(flight: Flight, memory: Memory, token: str) -> dict[str, byte
     token : str
         Token of the plant's description.
 
-    Returns
-    -------
-    dict of str to bytes
-        Contents by name.
-
     Raises
     ------
     TranslationError

@@ -22,11 +22,6 @@ _TAIL = 0.15  # of the axis
 def rests_from(record: Rows) -> float | None:
     """Return the time from which the vehicle stays at its final pose [s], by the rule of replays.
 
-    Parameters
-    ----------
-    record : Rows
-        Rows of a run.
-
     Returns
     -------
     float or None

@@ -36,11 +36,6 @@ def story_of(run: Run) -> FigureData:
     of the run and of the enlarged spans; rows evenly spaced in time and along the path; and rows at which commands
     changed a signal.
 
-    Parameters
-    ----------
-    run : Run
-        The run.
-
     Returns
     -------
     FigureData

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
-from numpy.typing import NDArray
 
 from controller.regions import Region, Visibility
 from controller.regions.region_set import of_attitude
@@ -103,11 +102,6 @@ def thin(time: Array, signal: Array) -> tuple[Array, Array]:
 def regions_of(scenario: Scenario) -> Iterator[tuple[Region, str]]:
     """Yield the goal and every secondary region with its colour.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario of the run.
-
     Yields
     ------
     (Region, str)
@@ -135,11 +129,6 @@ def places_of(data: FigureData) -> Iterator[Place]:
     Each moving one is preceded by its places at the start and the end, marked as faint. Regions of attitude have no
     place and are skipped.
 
-    Parameters
-    ----------
-    data : FigureData
-        The run.
-
     Yields
     ------
     Place
@@ -162,11 +151,6 @@ def places_of(data: FigureData) -> Iterator[Place]:
 def features_of(data: FigureData) -> Iterator[tuple[str, str, Array]]:
     """Yield name, colour and final position [m, NED], shape (3,), of the feature of every visibility region.
 
-    Parameters
-    ----------
-    data : FigureData
-        The run.
-
     Yields
     ------
     (str, str, ndarray)
@@ -179,13 +163,6 @@ def features_of(data: FigureData) -> Iterator[tuple[str, str, Array]]:
 
 def shifts_of(record: Rows, name: str) -> Array:
     """Return the shift of a region from its place in the scenario at each step, shape (steps, 3) [m, NED].
-
-    Parameters
-    ----------
-    record : Rows
-        Of the run.
-    name : str
-        Of the region.
 
     Returns
     -------
@@ -211,22 +188,3 @@ def legend_columns(labels: Iterable[str]) -> int:
         At least 1.
     """
     return max(1, _LEGEND_WIDTH // (max(map(len, labels)) + _LEGEND_MARK))
-
-
-def overlap_of(data: FigureData) -> NDArray[np.bool_]:
-    """Return a mask of the steps at which the vehicle was in the overlap of regions, shape (steps,).
-
-    Parameters
-    ----------
-    data : FigureData
-        The run.
-
-    Returns
-    -------
-    ndarray of bool
-        True within the windows of the summary.
-    """
-    time, windows = data.record["time"], np.array(data.summary["intersection_windows"]).reshape(-1, 2)
-    begun = np.searchsorted(windows[:, 0], time, "right")  # number of windows begun; they do not overlap
-    inside: NDArray[np.bool_] = (begun > 0) & (time <= np.append(windows[:, 1], 0.0)[begun - 1])
-    return inside

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.replay.activity import RESTS_ON, active_regions, rests
-from cosim.report.figures.style import POINTS, FigureData, overlap_of
+from cosim.report.figures.style import POINTS, FigureData
 from cosim.simulation.signals import Array
 
 _TARGETS = 12  # greatest number of targets that are drawn
@@ -48,16 +48,11 @@ def way_of(data: FigureData) -> SampledPath:
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path[known], axis=0), axis=1))])
     wanted = np.searchsorted(length, np.linspace(0.0, length[-1], POINTS))
     at = known[np.unique(np.minimum(wanted, len(known) - 1))]
-    return SampledPath(path[at], _given_way(data, at), overlap_of(data)[at], targets_of(data))
+    return SampledPath(path[at], _given_way(data, at), _overlap(data)[at], targets_of(data))
 
 
 def targets_of(data: FigureData) -> list[tuple[Array, float]]:
     """Return the targets that were commanded before the last one: centre [m, NED] and radius [m].
-
-    Parameters
-    ----------
-    data : FigureData
-        The run.
 
     Returns
     -------
@@ -71,6 +66,14 @@ def targets_of(data: FigureData) -> list[tuple[Array, float]]:
     changes = np.flatnonzero((np.diff(targets, axis=0) != 0.0).any(axis=1))  # the last row of each
     kept = changes[np.unique(np.linspace(0, len(changes) - 1, min(len(changes), _TARGETS)).round().astype(int))]
     return [(targets[i, :3], float(targets[i, 3])) for i in kept]
+
+
+def _overlap(data: FigureData) -> NDArray[np.bool_]:
+    """Return a mask of the steps within the summary's windows of overlap of regions, shape (steps,)."""
+    time, windows = data.record["time"], np.array(data.summary["intersection_windows"]).reshape(-1, 2)
+    begun = np.searchsorted(windows[:, 0], time, "right")  # number of windows begun; they do not overlap
+    inside: NDArray[np.bool_] = (begun > 0) & (time <= np.append(windows[:, 1], 0.0)[begun - 1])
+    return inside
 
 
 def _given_way(data: FigureData, at: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -167,11 +167,6 @@ Command = (
 def validate_command(command: Command) -> None:
     """Raise a CommandError if a number of a command is out of range.
 
-    Parameters
-    ----------
-    command : Command
-        The command.
-
     Raises
     ------
     CommandError

@@ -103,11 +103,6 @@ def read_log(file: Path) -> list[tuple[int, Command]]:
 
     A last line that is incomplete, after a kill or on a full disk, is skipped: that run did not apply it either.
 
-    Parameters
-    ----------
-    file : Path
-        The log.
-
     Returns
     -------
     list of (int, Command)

@@ -220,6 +220,7 @@ def test_region_uncertainty_widens_its_clearance():
     assert clear[1] > clear[0] + 0.2
 
 
+@pytest.mark.medium
 def test_goal_is_reached_without_regions():
     law, sea = law_for([]), Sea()
     forces = fly(law, sea, regions=[], steps=1200)

@@ -83,6 +83,7 @@ def test_invalid_log_gives_one_line_error(steered, copy_of):
         trace_of(load_run(folder))
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(("first", "end"), [(50, 70), (50, 401)])
 def test_obstacles_added_during_an_unknown_pose_get_their_size_later(steered, copy_of, first, end):
     folder = copy_of(steered)

@@ -24,7 +24,7 @@ ALL_SHAPES = Path(__file__).parent / "all-shapes.toml"
 STEP = 0.01
 
 
-@pytest.fixture(scope="module", params=[pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
+@pytest.fixture(scope="module", params=[2, pytest.param(3, marks=pytest.mark.slow)], ids=["fmi2", "fmi3"])
 def fmi(request):
     return request.param
 
@@ -253,6 +253,7 @@ def test_fmpy_matches_own_stepping(scenario):
     unit.freeInstance()
 
 
+@pytest.mark.medium
 def test_components_offer_co_simulation_only(scenario):
     path = cached_fmu(controller_component(scenario), 3)
     description = fmpy.read_model_description(str(path))

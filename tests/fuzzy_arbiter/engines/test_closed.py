@@ -244,6 +244,7 @@ def test_non_complementary_terms_have_no_closed_form():
     assert Arbiter(system=negated).engine == "closed"
 
 
+@pytest.mark.medium
 @settings(max_examples=examples(80), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(systems(norms=False), st.data())
 def test_closed_form_matches_exact_centroid_for_any_system(system, data):

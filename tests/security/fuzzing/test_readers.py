@@ -14,7 +14,7 @@ from tests.security.fuzzing import files, folders, talkers
 from tests.security.fuzzing.mutations import mutated
 from tests.security.fuzzing.registry import KINDS, READERS, ROOT, Case
 
-FEW = 40  # changes of each reader's examples among the fast tests,
+FEW = 40  # changes of each reader's examples among the medium tests,
 MANY = int(os.environ.get("FUZZ_CHANGES", "120"))  # and among the slow ones; FUZZ_CHANGES=2000 takes an hour
 LONGEST = 300  # characters of a message, beside the path that it names
 MEMORY = 400  # MB that all changes of a reader may take
@@ -51,7 +51,7 @@ def tried(case: Case, kind: str, numbers: range) -> Counter[str]:
     return found
 
 
-@pytest.mark.medium(fast=1)
+@pytest.mark.medium
 @pytest.mark.parametrize("name", READERS)
 def test_readers_survive_a_few_mutations(name, seeds):
     assert not tried(READERS[name].case(seeds), READERS[name].kind, range(FEW))

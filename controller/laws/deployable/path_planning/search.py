@@ -175,11 +175,6 @@ def look_for_path(
         Clearance and margin.
     path : ndarray, shape (k, 3)
         Receives corners and end, if there are at most k.
-
-    Returns
-    -------
-    int
-        Points of the path.
     """
     margin, of_goal, of_vehicle, target = line_margin(limits), search.of_goal, search.of_vehicle, zeros(3)
     if clearance_of_all(end, regions, target) < 0.0:  # no path leads there

@@ -184,6 +184,7 @@ def test_costs_rank_outcomes_by_severity():
     assert costs_of(table, "arrival", 120.0).tolist() == [-20.0, -30.0, -120.0, -120.0, module._REFUSED]
 
 
+@pytest.mark.medium
 def test_similar_rows_are_listed_once(found):
     points = np.tile(np.linspace(0.0, 1.0, 60)[:, None], 3)
     costs = np.linspace(1.0, 0.0, 60)

@@ -63,6 +63,7 @@ def test_kinds_and_vehicles_are_evenly_distributed():
     assert len(trials) == 7 and min(trials.values()) > 65 and max(trials.values()) < 140  # 100 expected
 
 
+@pytest.mark.medium
 def test_tour_has_successive_goals_on_both_sides_of_the_conflict():
     kinds = collections.Counter(make_conflict(seed, "tour")["kind"] for seed in range(300))
     assert len(kinds) == 9 and min(kinds.values()) > 15  # 33 expected
