@@ -27,7 +27,6 @@ _PX4_REFUSES: dict[str, str] = {
     "velocity": "its uuv_pos_control keeps the depth and pushes nowhere; expected attitude",
 }
 _CENTERED_FOR = 0.2  # s, during which overridden channels are centered before their release
-_NEUTRAL: Array = np.zeros(6)
 
 
 def require_taken(profile: ProfileName, steer_by: SteerBy, sticks_by: SticksBy) -> None:
