@@ -103,6 +103,7 @@ def test_regressor_times_parameters_is_weight_and_buoyancy(e, r_G, r_B):
     assert regressor(e) @ parameters(W, B, r_G, r_B) == pytest.approx(-wrench, abs=1e-11)
 
 
+@pytest.mark.medium
 def test_regressor_gives_the_plants_restoring_wrench():
     """At rest, in still water, the plant's acceleration is that of -Z phi: controller and FMU agree."""
     from plant_fmu import load_vehicle

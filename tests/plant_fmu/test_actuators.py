@@ -44,6 +44,7 @@ def test_lagged_thrust_motion_matches_the_analytic_integral(make_slave):
     assert slave.get("position.x")[0] == pytest.approx(f / m * (t**2 / 2 - T * t - T**2 * np.expm1(-t / T)), rel=1e-10)
 
 
+@pytest.mark.medium
 def test_force_limit_keeps_the_direction_and_leaves_the_moment(make_slave, fmi):
     slave = make_slave(fmi=fmi).start(wrench_force_limit=10.0)
     slave.set_values(dict(zip(WRENCH, (30.0, -40.0, 120.0, 50.0, 60.0, 70.0), strict=True)))

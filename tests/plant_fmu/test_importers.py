@@ -117,7 +117,7 @@ def directional_derivatives(fmu, folder):
     return [v.name for v in states], [v.name for v in knowns], np.array(columns, dtype=float).T
 
 
-@pytest.mark.medium(fast=1)
+@pytest.mark.medium
 def test_casadi_reads_the_directional_derivatives(fmu, tmp_path):
     jacobian = answer("CasADi", fmu).jacobian
     states, knowns, expected = directional_derivatives(fmu, tmp_path / "fmu")

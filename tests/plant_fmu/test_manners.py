@@ -101,6 +101,7 @@ def test_step_must_start_at_the_current_time(make_slave, fmi):
     refused(slave, lambda: slave.fmu.doStep(5.0, 0.1), "the plant is at 0")
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -71,6 +71,7 @@ def expected(memory, state, goal, regions, weights):
     return pushed, rows, program, np.clip(forces / thrusters.effectiveness, thrusters.lower, thrusters.upper)
 
 
+@pytest.mark.medium
 def test_step_is_the_sequence_of_its_stages():
     own, sea, weights = law_for(ALL), Sea(noise=(0.02, 0.01)), np.array([1.0, 0.3, 0.7, 0.5])
     fly(own, sea, regions=ALL, steps=4)

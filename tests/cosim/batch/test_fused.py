@@ -56,6 +56,7 @@ def assert_same_flight(scenario):
     assert np.abs(trace[:, 20 : 20 + n]).max() > 1.0
 
 
+@pytest.mark.medium
 def test_short_run_of_the_papers_law_equals_the_master_bit_for_bit():
     assert_same_flight(scenario_of("ismail_dunnigan", *BRISK, "limit.force=150.0", "limit.time_constant=0.1"))
 

@@ -84,7 +84,7 @@ REGIONS = {
 }
 
 
-@pytest.mark.medium(fast=3)
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("name", REGIONS)
 def test_every_shape_equals_the_fused_loop(name):
     region = f'{{name="it", criterion="obstacle", gain=80.0, {REGIONS[name]}}}'

@@ -117,6 +117,7 @@ def test_gradient_matches_the_cost(log, vehicle, found):
         assert gradient[j] == pytest.approx((ahead - back) / (2.0 * bit[j]), rel=0.02)
 
 
+@pytest.mark.medium
 def test_fitted_model_predicts_better_than_constant_velocity(log, vehicle, found):
     for p in validate([log], vehicle, found.parameters, found.values, found.step):
         if p.topic == "velocity":

@@ -90,6 +90,7 @@ def test_recording_is_the_run_of_its_telemetry(style, topics, tmp_path):
     assert unread["services/autopilot/log"] == 1 and not any("not as expected" in name for name in unread)
 
 
+@pytest.mark.medium
 def test_recordings_of_a_dive_are_one_run(tmp_path):
     """BlueOS begins a new file when the vehicle is armed."""
     folder = tmp_path / "dive"

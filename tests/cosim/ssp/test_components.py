@@ -153,6 +153,7 @@ def test_steps_longer_than_a_period_are_refused(controller, arbiter):
         arbiter.step(0.04)
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(
     ("steps", "said"),
     [
@@ -170,6 +171,7 @@ def test_steps_that_do_not_divide_the_period_are_warned_about(controller, steps,
     assert [r.message.removeprefix("FMU: ") for r in caplog.records if "late" in r.message] == said
 
 
+@pytest.mark.medium
 def test_steps_that_do_not_divide_the_arbiter_period_are_warned_about(arbiter, caplog):
     arbiter.initialise()
     with caplog.at_level(logging.DEBUG, "plant_fmu"):
