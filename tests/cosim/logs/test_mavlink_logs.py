@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pymavlink import DFReader, mavutil
 from pymavlink.dialects.v20 import all as mavlink
+from scipy import signal
 
 import cosim
 from cosim.errors import CosimError, ImportLogError
@@ -126,8 +127,9 @@ def test_imported_tlog_has_the_columns_of_a_run(tlog):
 
 
 def test_dataflash_import_matches_pymavlink(dataflash):
-    """Every message is on the one clock of the autopilot, so rows are exact."""
-    read = messages_of(DATAFLASH, "XKF1", "XKQ", "RATE", "RCOU", "BARO", "BAT")
+    """Every message is on the one clock of the autopilot, so rows are exact; rates are behind the gyro's filter."""
+    read = messages_of(DATAFLASH, "XKF1", "XKQ", "RATE", "RCOU", "BARO", "BAT", "PARM")
+    cutoff = next(m.Value for m in read["PARM"] if m.Name == "INS_GYRO_FILTER")
     topics, facts, record = facts_by_quantity(dataflash), load_log_facts(dataflash.folder), dataflash.record
     assert topics["position"].samples == len([m for m in read["XKF1"] if m.C == 0])
     assert topics["pulses"].samples == len(read["RCOU"])
@@ -136,7 +138,8 @@ def test_dataflash_import_matches_pymavlink(dataflash):
     ):  # fmt: skip
         at = np.array([m.TimeUS * 1e-6 for m in read[kind]]) - facts.start
         said = np.array([getattr(m, field) for m in read[kind]])
-        said = np.radians(said) if kind == "RATE" else said
+        if kind == "RATE":
+            said, at = np.radians(said), at - np.sqrt(0.5) / (np.pi * cutoff)
         expected = np.interp(record["time"], at, said)
         known = np.isfinite(record[name])
         assert known.mean() > 0.98
@@ -263,6 +266,21 @@ def test_rates_of_a_controller_that_rests_are_no_samples(contents):
         takers.take("RATE", {"TimeUS": min(at, 11_000_000), "R": 1.0, "P": 0.0, "Y": 0.0})
     assert not takers.clock.jumps
     assert contents.sources["rates", "RATE"].count == 26 and contents.sources["attitude", "ATT"].count == 100
+
+
+def test_rates_are_stamped_where_the_gyro_filter_had_them(contents):
+    """A slow rotation through the Butterworth filter of SciPy comes as late as the stamps are moved back."""
+    cutoff, rate = 20.0, 2000.0
+    numerator, denominator = signal.butter(2, cutoff, fs=rate)
+    _, late = signal.group_delay((numerator, denominator), w=[0.5], fs=rate)
+    takers = _Takers(contents)
+    takers.take("PARM", {"Name": "INS_GYRO_FILTER", "Value": cutoff})
+    zeros = dict.fromkeys(("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ"), 0.0)
+    takers.take("IMU", {"TimeUS": 2e6, "I": 0} | zeros)
+    takers.take("RATE", {"TimeUS": 2e6, "R": 1.0, "P": 0.0, "Y": 0.0})
+    for source in (("gyro", "IMU[0]"), ("rates", "RATE")):
+        assert next(contents.sources[source].blocks())[0, 1] == pytest.approx(2.0 - late[0] / rate, abs=5e-5)
+    assert next(contents.sources["acceleration", "IMU[0]"].blocks())[0, 1] == 2.0
 
 
 def test_visual_odometry_is_the_mean_velocity_of_its_interval(contents):
