@@ -22,8 +22,8 @@ _MOST = 80_000  # greatest number of rows with extremes
 _EVEN = 2_000  # evenly spaced rows
 _CHANGES = 100  # greatest number of changes by commands in a block of rows; in all a hundred times as many
 _DRAWN = (
-    "time", "position.", "attitude.", "membership.", "weight.", "estimate.", "command.", "actuation.",
-    "thruster_force[", "commands.", "target.", "lyapunov.",
+    "time", "position.", "quaternion.", "velocity.", "attitude.", "membership.", "weight.", "estimate.", "command.",
+    "actuation.", "thruster_force[", "commands.", "target.", "lyapunov.",
 )  # fmt: skip
 _DRAWN_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")
 _EXTREME = ("attitude.", "membership.", "weight.", "estimate.", "lyapunov.")

@@ -110,7 +110,7 @@ def test_figures_of_a_long_run_are_thinned_and_keep_extremes(name, run_of, strea
     assert length[0] == pytest.approx(length[1], rel=1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.medium
 @pytest.mark.parametrize("name", RUNS)
 def test_every_figure_of_a_long_run_is_drawn(name, run_of, streamed, monkeypatch):
     from cosim.report.figures.figures import drawings
