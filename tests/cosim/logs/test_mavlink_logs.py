@@ -281,6 +281,9 @@ def test_rates_are_stamped_where_the_gyro_filter_had_them(contents):
     for source in (("gyro", "IMU[0]"), ("rates", "RATE")):
         assert next(contents.sources[source].blocks())[0, 1] == pytest.approx(2.0 - late[0] / rate, abs=5e-5)
     assert next(contents.sources["acceleration", "IMU[0]"].blocks())[0, 1] == 2.0
+    takers.take("PARM", {"Name": "INS_ACCEL_FILTER", "Value": 0.5 * cutoff})
+    takers.take("IMU", {"TimeUS": 3e6, "I": 0} | zeros)
+    assert next(contents.sources["acceleration", "IMU[0]"].blocks())[1, 1] == pytest.approx(3.0 - 0.0225, abs=1e-5)
 
 
 def test_visual_odometry_is_the_mean_velocity_of_its_interval(contents):
