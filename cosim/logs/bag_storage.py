@@ -17,19 +17,11 @@ from cosim.logs.format import Moved
 _LARGEST = 1 << 28  # bytes of a record
 _NUMBER = re.compile(r"\d+")
 _ZSTANDARD = b"\x28\xb5\x2f\xfd"  # first bytes of compressed data, RFC 8878
+# what damaged data raises in libraries
 DAMAGE = (
-    ValueError,
-    KeyError,
-    IndexError,
-    TypeError,
-    AttributeError,
-    EOFError,
-    OSError,
-    RuntimeError,
-    AssertionError,
-    MemoryError,
-    struct.error,
-)  # what damaged data raises in libraries
+    ValueError, KeyError, IndexError, TypeError, AttributeError, EOFError, OSError, RuntimeError, AssertionError,
+    MemoryError, struct.error,
+)  # fmt: skip
 SUFFIXES = (".mcap", ".db3", ".bag")
 
 
@@ -69,7 +61,7 @@ def bag_files(path: Path) -> list[Path]:
 
 
 def _place(file: Path) -> tuple[list[int], str]:
-    """Return the numbers in a file's name, such as those of a part or a time, and the name."""
+    """Return what files of a bag are sorted by: the numbers in the name, such as of a part or a time, and the name."""
     return [int(number) for number in _NUMBER.findall(file.stem)], file.name
 
 
@@ -90,11 +82,7 @@ def stored_messages(path: Path, remarks: list[str], moved: Moved) -> Iterator[St
     ImportLogError
         If the first file cannot be read at all.
     """
-    from mcap.exceptions import McapError
-    from rosbags.rosbag1 import ReaderError
-    from zstandard import ZstdError
-
-    failures = (McapError, ReaderError, ZstdError, sqlite3.Error, *DAMAGE)
+    failures = _failures()
     files, readers = bag_files(path), {".mcap": _of_mcap, ".db3": _of_sqlite, ".bag": _of_ros1}
     found = False
     for k, file in enumerate(files):
@@ -110,27 +98,33 @@ def stored_messages(path: Path, remarks: list[str], moved: Moved) -> Iterator[St
             remarks.append(f"{file.name} breaks off: {words}"[:200])
 
 
-def _of_mcap(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
+def _failures() -> tuple[type[Exception], ...]:
+    """Return what a damaged bag raises in the libraries that read it."""
     from mcap.exceptions import McapError
+    from rosbags.rosbag1 import ReaderError
+    from zstandard import ZstdError
+
+    return (McapError, ReaderError, ZstdError, sqlite3.Error, *DAMAGE)
+
+
+def _of_mcap(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
     from mcap.reader import make_reader
     from mcap.records import Channel, Chunk, Message, Schema
     from mcap.stream_reader import StreamReader, breakup_chunk
-    from zstandard import ZstdError
 
-    total, lost, unknown = path.stat().st_size, 0, 0
+    failures, total, lost, unknown = _failures(), path.stat().st_size, 0, 0
     schemas: dict[int, Any] = {}
     channels: dict[int, Any] = {}
     with path.open("rb") as file:
-        with contextlib.suppress(
-            McapError, ZstdError, *DAMAGE
-        ):  # the index at the end, missing if a recorder was killed
+        # the index at the end, which is missing if the recorder was killed
+        with contextlib.suppress(*failures):
             summary = make_reader(file, record_size_limit=_LARGEST).get_summary()
             schemas, channels = dict(summary.schemas), dict(summary.channels)
         file.seek(0)
         for whole in StreamReader(file, emit_chunks=True, record_size_limit=_LARGEST).records:
             try:
                 records = breakup_chunk(whole, validate_crc=True) if isinstance(whole, Chunk) else [whole]
-            except (McapError, ZstdError, *DAMAGE):
+            except failures:
                 lost += 1
                 continue
             for record in records:

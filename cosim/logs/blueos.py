@@ -20,8 +20,9 @@ from cosim.logs.spool import LogContents
 from cosim.logs.vehicle_messages import AUTOPILOT, NO_AUTOPILOT, VehicleMessages
 from cosim.mavlink.wire.dialect import dialect
 
-_ALL = "mavlink/out"  # topic of all messages
-_EACH = re.compile(r"mavlink/\d+/\d+/([A-Z0-9_]+)")  # topics of one message; those of its fields have one more part
+_ALL_MESSAGES = "mavlink/out"  # a topic; each message comes a second time with the topic of its kind
+# topics such as mavlink/1/1/ATTITUDE; those of its fields are longer
+_ONE_KIND = re.compile(r"mavlink/\d+/\d+/[A-Z0-9_]+")
 
 
 def read_recording(path: Path, contents: LogContents, moved: Moved) -> None:
@@ -41,13 +42,13 @@ def read_recording(path: Path, contents: LogContents, moved: Moved) -> None:
     ImportLogError
         If it has no MAVLink messages, or none of a vehicle.
     """
-    each, vehicle = _find_vehicle(path)
+    by_kind, vehicle = _find_vehicle(path)
     clock, messages = Clock(), VehicleMessages(contents, *vehicle)
     kinds = {kind.msgname: kind for kind in dialect().mavlink_map.values()}
     for stored in stored_messages(path, contents.remarks, moved):
         if not stored.topic.startswith("mavlink"):
             contents.unread[stored.topic] += 1
-        if not (_EACH.fullmatch(stored.topic) if each else stored.topic == _ALL):
+        if not (_ONE_KIND.fullmatch(stored.topic) if by_kind else stored.topic == _ALL_MESSAGES):
             continue
         written, name = clock.time(stored.time), "message"
         try:
@@ -64,19 +65,20 @@ def read_recording(path: Path, contents: LogContents, moved: Moved) -> None:
 
 
 def _find_vehicle(path: Path) -> tuple[bool, tuple[int, int, int]]:
-    """Return whether each message has a topic of its own, and system id, MAV_AUTOPILOT, MAV_TYPE of an autopilot."""
+    """Return whether each kind of message has a topic, and system id, MAV_AUTOPILOT and MAV_TYPE of an autopilot."""
     found, any_mavlink = None, False
     for stored in stored_messages(path, [], lambda part: None):
-        each = _EACH.fullmatch(stored.topic) is not None
-        any_mavlink |= each or stored.topic == _ALL
-        if not (each or stored.topic == _ALL) or b"HEARTBEAT" not in stored.data:
+        by_kind = _ONE_KIND.fullmatch(stored.topic) is not None
+        is_mavlink = by_kind or stored.topic == _ALL_MESSAGES
+        any_mavlink |= is_mavlink
+        if not is_mavlink or b"HEARTBEAT" not in stored.data:
             continue
         with contextlib.suppress(*DAMAGE):
             header, fields = _parts(stored)
             autopilot, kind = _value(fields["autopilot"]), _value(fields["mavtype"])
             if header["component_id"] == AUTOPILOT and autopilot != NO_AUTOPILOT:
                 found = int(header["system_id"]), int(autopilot), int(kind)
-                if each:
+                if by_kind:
                     return True, found
     if not any_mavlink:
         require_map(None)
