@@ -74,7 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(nmpc_search.FLOWN)} (default: all)")
     verb.add_argument("--seed", type=int, default=0, help="of the first scene, or draw (default: %(default)s)")
     verb.add_argument("--count", type=int, default=nmpc_search.COUNT, help="scenes of a kind (default: %(default)s)")
-    verb.add_argument("--draws", type=int, default=0, help="search among these, in the place of flights of KIND")
+    verb.add_argument("--draws", type=int, default=0, help="search among so many draws, instead of flying KIND")
     verb.add_argument("--peers-python", metavar="PYTHON", help="that has CasADi (default: one of their own)")
     verb.add_argument("--json", type=Path, metavar="FILE", help="of flights; those that it has are not repeated")
     verb = verbs.add_parser("long-record", help=(long_record.__doc__ or "").splitlines()[0])

@@ -147,7 +147,7 @@ def search(flights: Flights, count: int, seed: int) -> Candidate:
 def main(
     kinds: Iterable[str], seed: int, count: int, draws: int, python: str | None = None, out: Path | None = None
 ) -> None:
-    """Fly scenes of some kinds, and print the outcome; or search first.
+    """Fly scenes of some kinds, and print the outcome; or search for the numbers instead.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def main(
     count : int
         Scenes of a kind.
     draws : int
-        Of the search; 0: fly the scenes.
+        Of the search; with 0 the scenes are flown.
     python : str, optional
         That has CasADi; default: the benchmarks' own.
     out : Path, optional
