@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
-from cosim.results.log_facts import IMPORT
+from cosim.results.log_facts import COMMAND_TIME, IMPORT, load_log_facts
 from cosim.results.record import Record, load_record
 from cosim.results.run_result import SCENARIO
 from plant_fmu.toml_tables import read_toml
@@ -26,6 +26,8 @@ _MOST_SAMPLES = 50.0  # Hz; faster topics are averaged over blocks
 _FEWEST = 20  # samples of a topic
 _DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # whose variance on white noise is 70 times that of the noise
 _MAD = 1.4826  # standard deviation of a normal distribution, in median absolute deviations
+
+_SAMPLED = ("pulses", "effort")  # commands that an autopilot logs slower than it changes them
 
 # of each topic the columns that may hold it, the first that do are taken; and where the times of their samples stand
 _COLUMNS: dict[str, tuple[tuple[tuple[str, ...], str], ...]] = {
@@ -60,6 +62,7 @@ class Topic:
     values: Array  # (n, m): m/s, rad/s, m, or a quaternion
     noise: Array  # (c,) standard deviation of each component of the residual
     shift: float = 0.0  # s, by which the stamps are moved back
+    spread: float = 0.0  # s, before and after each time: a value is the mean of two there, which averages of many equal
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -72,11 +75,11 @@ class Log:
     """One run."""
 
     name: str
-    times: Array  # (rows,) s, of the commands, each held until the next
+    times: Array  # (rows,) s, of the commands
     thrust: Array  # (rows, thrusters) N, commanded
     wrench: Array  # (rows, 6) N, N m, commanded beside the thrusters
     topics: tuple[Topic, ...]
-    sampled: bool = False  # commands are samples of a log, and may change between its rows
+    sampled: bool = False  # commands are samples, between which they change; else each is held until the next
 
     def topic(self, name: str) -> Topic | None:
         """Return a topic by its name, None where the run has none."""
@@ -111,8 +114,10 @@ def make_topic(name: str, times: Array, values: Array, noise: float | None = Non
         deviations = _MAD * np.median(rough, axis=0) / np.sqrt(np.square(_DIFFERENCE).sum())
     else:
         deviations = np.full(components.shape[1], float(noise))
-    block = max(1, round((1.0 / _MOST_SAMPLES) / float(np.median(np.diff(times)))))
+    period, spread = float(np.median(np.diff(times))), 0.0
+    block = max(1, round((1.0 / _MOST_SAMPLES) / period))
     if block > 1:
+        spread = period * float(np.sqrt((block**2 - 1) / 12.0))  # their standard deviation: exact for cubic motion
         count = len(times) // block
         times = times[: count * block].reshape(count, block).mean(axis=1)
         values = values[: count * block].reshape(count, block, -1).mean(axis=1)
@@ -120,7 +125,7 @@ def make_topic(name: str, times: Array, values: Array, noise: float | None = Non
     if name == "attitude":
         values = values / np.linalg.norm(values, axis=1, keepdims=True)
     least = _LEAST_NOISE[name] if noise is None else 0.0
-    return Topic(name, times, values, np.maximum(deviations, least))
+    return Topic(name, times, values, np.maximum(deviations, least), spread=spread)
 
 
 def command_period(log: Log) -> float:
@@ -174,7 +179,18 @@ def load_log(folder: Path, vehicle: Vehicle) -> Log:
             raise IdentificationError(f"{folder}: has no {said} that changes, expected {_FEWEST} samples at the least")
     n = vehicle.n_thrusters
     _require_steady_actuators(folder, bool(np.any(commands[known, n:])))
-    return Log(folder.name, time[known], commands[known, :n], commands[known, n:], topics, (folder / IMPORT).exists())
+    sampled = _is_sampled(folder)
+    if COMMAND_TIME in record.units:
+        time = record[COMMAND_TIME]
+        known &= np.isfinite(time) & (np.diff(np.maximum.accumulate(np.nan_to_num(time)), prepend=-np.inf) > 0.0)
+    return Log(folder.name, time[known], commands[known, :n], commands[known, n:], topics, sampled)
+
+
+def _is_sampled(folder: Path) -> bool:
+    """Return True for an imported run whose commands are samples of what the thrusters got, and no commands' log."""
+    if not (folder / IMPORT).exists():
+        return False
+    return any(topic.quantity in _SAMPLED for topic in load_log_facts(folder).topics)
 
 
 def _require_steady_actuators(folder: Path, has_wrench: bool) -> None:

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from cosim.errors import IdentificationError
 from cosim.identification import measurements
 from cosim.identification.actuation import Actuation, CommandedForces
+from cosim.identification.command_errors import Whitener, most_likely_size, response, whitener
 from cosim.identification.log import Log, Topic
 from cosim.identification.measurements import Errors
-from cosim.identification.parameters import Parameter
+from cosim.identification.parameters import Parameter, with_values
 from cosim.identification.shooting import STATE_SIZE, Directions, Motion, Shooter
 from cosim.identification.windows import Window
 from plant_fmu.vehicle import Vehicle
@@ -106,6 +107,9 @@ class Residuals:
         self._found: dict[int, _Start] = {}
         self._tried: dict[int, _Start] = {}
         self.weights: list[Array] = [np.ones(rows_of(window)) for window in windows]
+        self._vehicle = vehicle
+        self.command_error: float | None = None  # size of what sampled commands leave open; None: nothing, or not known
+        self.whiteners: list[Whitener | None] = [None] * len(windows)
 
     def settings(self, values: Array) -> list[Setting]:
         """Return the settings of each run by the free numbers."""
@@ -172,7 +176,10 @@ class Residuals:
         setting = settings[window.run]
         inside = slice(window.first, window.first + window.steps)
         moving = [j for j, p in enumerate(self.parameters) if full and self._moves(p, window.run)]
-        times = [topic.times + topic.shift - setting.delays.get(topic.name, topic.shift) for topic in window.topics]
+        times = [
+            topic.times + topic.shift - setting.delays.get(topic.name, topic.shift) + off
+            for topic in window.topics for off in _offsets(topic)
+        ]  # fmt: skip
         order = np.argsort(np.concatenate(times), kind="stable")
         motion = self._shooter.predict(
             setting.plant, start[:13], setting.actuation.wrench[inside], self._step, np.concatenate(times)[order],
@@ -182,18 +189,77 @@ class Residuals:
         back[order] = np.arange(len(order))
         count, residuals, starts, rows = 0, [], [], []
         for topic in window.topics:
-            at = back[count : count + len(topic.times)]
-            count += len(topic.times)
-            residuals.append(measurements.residual(topic, motion.states[at], setting.errors).ravel())
-            along = measurements.derivative(topic, motion.states[at], motion.tangents[at], setting.errors)
+            size, several = len(topic.times), len(_offsets(topic))
+            at = back[count : count + several * size].reshape(several, size)
+            count += several * size
+            sampled = Motion(*(x[at].mean(axis=0) for x in (motion.states, motion.rates, motion.tangents)))
+            residuals.append(measurements.residual(topic, sampled.states, setting.errors).ravel())
+            along = measurements.derivative(topic, sampled.states, sampled.tangents, setting.errors)
             along = along.reshape(len(residuals[-1]), -1)
             starts.append(along[:, : len(self._starts)])
             jacobian = np.zeros((len(along), len(self.parameters)))
             jacobian[:, moving] = along[:, len(self._starts) :]
             if full:
-                self._add_errors(jacobian, topic, motion, at, setting, window.run)
+                self._add_errors(jacobian, topic, sampled, setting, window.run)
             rows.append(jacobian)
-        return np.concatenate(residuals), np.concatenate(starts), np.concatenate(rows)
+        found = np.concatenate(residuals), np.concatenate(starts), np.concatenate(rows)
+        whiten = self.whiteners[i]
+        return found if whiten is None else (whiten(found[0]), whiten(found[1]), whiten(found[2]))
+
+    def update_command_errors(self, values: Array) -> None:
+        """Weigh the residuals from now on by what sampled commands leave open, of the size that explains them best.
+
+        Parameters
+        ----------
+        values : ndarray
+            The free numbers.
+        """
+        if not any(forces.impulses for forces in self._forces):
+            return
+        settings = self.settings(values)
+        inverse: Any = np.linalg.inv(with_values(self._vehicle, self.parameters, values).mass_matrix)  # fmt: skip
+        starts = [self.solve_start(i, settings, values) for i in range(len(self.windows))]
+        self.whiteners = [None] * len(self.windows)
+        by_impulses, left, projected = [], [], []
+        for i, start in enumerate(starts):
+            residual, by_start, _ = self.raw(i, settings, start, full=False)
+            by = self._by_impulse(i, settings, start, by_start, inverse)
+            q, _ = np.linalg.qr(by_start)
+            left.append(residual - q @ (q.T @ residual))
+            projected.append(by - q @ (q.T @ by))
+            by_impulses.append(by)
+        self.command_error = most_likely_size(left, projected)
+        self.whiteners = [whitener(by, self.command_error) for by in by_impulses]
+
+    def _by_impulse(
+        self, i: int, settings: Sequence[Setting], start: Array, by_start: Array, inverse_mass: Array
+    ) -> Array:
+        """Return the residuals of a window by the impulses that sampled commands leave open."""
+        window = self.windows[i]
+        setting, forces = settings[window.run], self._forces[window.run]
+        if forces.impulses is None:
+            return np.zeros((len(by_start), 0))
+        inside = slice(window.first, window.first + window.steps)
+        middle: Array = self._step * np.arange(0.5, window.steps)
+        motion = self._shooter.predict(
+            setting.plant, start[:13], setting.actuation.wrench[inside], self._step, middle,
+            self._directions([], setting, inside, start), setting.force + (start[13:] if len(start) > 13 else 0.0),
+        )  # fmt: skip
+        own = [which for which in self._starts if which not in _FORCES]
+        flow = np.empty((window.steps, len(own), len(own)))  # of the own directions, from the start to each step
+        for row, which in enumerate(own):
+            if 3 <= which < 6:
+                turns = np.array([_turn(q, which - 3) for q in motion.states[:, 3:7]])
+                flow[:, row] = 4.0 * np.einsum("kdq,kq->kd", motion.tangents[:, : len(own), 3:7], turns)
+            else:
+                flow[:, row] = motion.tangents[:, : len(own), which if which < 3 else which + 1]
+        pushed = np.zeros((len(own), 6))
+        pushed[own.index(6) :] = inverse_mass
+        moved: Any = np.linalg.solve(flow, np.broadcast_to(pushed, (window.steps, *pushed.shape)))
+        return response(
+            forces.impulses, setting.actuation.lag, self._step, window.first * self._step, moved,
+            by_start[:, : len(own)], self._row_times(i),
+        )  # fmt: skip
 
     @staticmethod
     def _moves(p: Parameter, run: int) -> bool:
@@ -227,18 +293,16 @@ class Residuals:
         wrench = np.stack(wrenches) if wrenches else np.empty((0, 0, 2, 6))
         return Directions(tangents, names, inputs, force, wrench)
 
-    def _add_errors(
-        self, jacobian: Array, topic: Topic, motion: Motion, at: NDArray[np.intp], setting: Setting, run: int
-    ) -> None:
+    def _add_errors(self, jacobian: Array, topic: Topic, motion: Motion, setting: Setting, run: int) -> None:
         """Write the derivatives by what changes no motion."""
         for j, p in enumerate(self.parameters):
             if p.run not in (None, run):
                 continue
             if p.kind == "delay" and p.plant == topic.name:
-                late = measurements.derivative(topic, motion.states[at], -motion.rates[at][:, None], setting.errors)
+                late = measurements.derivative(topic, motion.states, -motion.rates[:, None], setting.errors)
                 jacobian[:, j] = late.ravel()
             elif p.kind in ("lever", "scale", "bias"):
-                by = measurements.derivative_by_errors(topic, motion.states[at], setting.errors, p.kind, p.index)
+                by = measurements.derivative_by_errors(topic, motion.states, setting.errors, p.kind, p.index)
                 if by is not None:
                     jacobian[:, j] = by.ravel()
 
@@ -356,6 +420,11 @@ class Residuals:
 def rows_of(window: Window) -> int:
     """Return the number of residuals of a window."""
     return sum(len(topic.times) * len(topic.components) for topic in window.topics)
+
+
+def _offsets(topic: Topic) -> tuple[float, ...]:
+    """Return where about the time of a sample the motion is averaged [s]."""
+    return (-topic.spread, topic.spread) if topic.spread else (0.0,)
 
 
 def _turn(quaternion: Array, axis: int) -> Array:

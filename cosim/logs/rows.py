@@ -12,6 +12,7 @@ from cosim.logs.forces import Commands
 from cosim.logs.frames import euler_zyx, rotate_to_body
 from cosim.logs.resampling import TopicReader
 from cosim.logs.topics import Topic
+from cosim.results.log_facts import COMMAND_TIME
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.signals import Array, Column
@@ -121,7 +122,8 @@ class RowMaker:
         if self._commands is None:
             return
         quantity = next(name for name in self._readers if name == self._commands.quantity)
-        values, _ = self._readers[quantity].held(at)
+        values, when = self._readers[quantity].held(at)
+        put([COMMAND_TIME], (when - self._start)[:, None])
         volts = np.full(len(at), self._voltage)
         if "voltage" in self._readers and not np.isfinite(self._voltage):
             volts = self._readers["voltage"].held(at)[0][:, 0]
