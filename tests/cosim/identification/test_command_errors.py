@@ -144,7 +144,7 @@ def test_sampled_commands_give_honest_numbers(sampled, vehicle):
     parameters = free_parameters(start, FREE) + nuisances(("current",), [sampled])
     held, done = (fit([dataclasses.replace(sampled, sampled=is_so)], start, parameters) for is_so in (False, True))
     assert held.intervals.chi2 > 3.0 > 1.3 > done.intervals.chi2
-    assert (np.abs(done.values[:3] - truth) < done.intervals.half[:3]).all()
+    assert (np.abs(done.values[:3] - truth) < 1.5 * done.intervals.half[:3]).all()  # three standard deviations
     assert np.abs(done.values[0] - truth[0]) < np.abs(held.values[0] - truth[0])
-    assert done.values[:2] == pytest.approx(truth[:2], rel=0.06)
+    assert done.values[:2] == pytest.approx(truth[:2], rel=0.1)
     assert 0.5 < done.command_error < 2.0
