@@ -56,7 +56,7 @@ class CommandedForces:
         forces = np.concatenate([steady_forces(log.thrust, vehicle), log.wrench], axis=1)
         self._times = log.times - self.start
         self._sampled = log.sampled
-        self._matrix = vehicle.thruster_matrix
+        self._matrix, self.thrusters = vehicle.thruster_matrix, vehicle.n_thrusters
         self.impulses: Impulses | None = None  # what samples leave open; None where every change is logged
         if log.sampled:
             self.impulses = open_impulses(self._times, forces[:, : vehicle.n_thrusters], self._matrix)

@@ -16,6 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from cosim.identification.measurements import turn_tangent
+from cosim.identification.shooting import Motion
+
 Array = NDArray[np.float64]
 
 _BIN = 0.05  # s; errors of shorter periods are taken together
@@ -85,6 +88,33 @@ def _mean_about(values: Array, count: int) -> Array:
     first = np.clip(np.arange(len(values)) - count // 2, 0, None)
     last = np.minimum(np.arange(len(values)) + count // 2 + 1, len(values))
     result: Array = (sums[last] - sums[first]) / (last - first)[:, None, None]
+    return result
+
+
+def start_by_impulse(motion: Motion, starts: Sequence[int], inverse_mass: Array) -> Array:
+    """Return the change of a start that an impulse at a later time is equal to from then on, shape (times, n, 6).
+
+    Parameters
+    ----------
+    motion : Motion
+        At these times; its first directions are the n starts.
+    starts : sequence of int
+        What a start may change: position 0 to 2, rotation 3 to 5, velocity 6 to 11.
+    inverse_mass : ndarray, shape (6, 6)
+        Of body and added mass.
+    """
+    n = len(starts)
+    flow = np.empty((len(motion.states), n, n))  # from the start to each time, along the starts' directions
+    for row, which in enumerate(starts):
+        if 3 <= which < 6:
+            turns = np.array([turn_tangent(q, which - 3) for q in motion.states[:, 3:7]])
+            flow[:, row] = 4.0 * np.einsum("kdq,kq->kd", motion.tangents[:, :n, 3:7], turns)
+        else:
+            flow[:, row] = motion.tangents[:, :n, which if which < 3 else which + 1]
+    pushed = np.zeros((n, 6))
+    pushed[list(starts).index(6) :] = inverse_mass
+    moved: Any = np.linalg.solve(flow, np.broadcast_to(pushed, (len(flow), n, 6)))
+    result: Array = moved
     return result
 
 

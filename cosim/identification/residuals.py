@@ -16,11 +16,18 @@ from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
 from cosim.identification import measurements
-from cosim.identification.actuation import Actuation, CommandedForces
-from cosim.identification.command_errors import Whitener, most_likely_size, response, whitener
+from cosim.identification.actuation import CommandedForces
+from cosim.identification.command_errors import (
+    Whitener,
+    most_likely_size,
+    response,
+    start_by_impulse,
+    whitener,
+)
 from cosim.identification.log import Log, Topic
-from cosim.identification.measurements import Errors
+from cosim.identification.measurements import turn_tangent
 from cosim.identification.parameters import Parameter, with_values
+from cosim.identification.setting import Setting, setting_of
 from cosim.identification.shooting import STATE_SIZE, Directions, Motion, Shooter
 from cosim.identification.windows import Window
 from plant_fmu.vehicle import Vehicle
@@ -33,17 +40,6 @@ _FORCE = 0.5  # N, standard deviation of a random force before any residual is k
 _LEAST_FORCE = 0.01  # N
 _SOLVED = 0.05  # of a start's standard deviation: what is left is linear
 _MOST_SOLVES = 12
-
-
-@dataclass(frozen=True)
-class Setting:
-    """Settings of one run by the free numbers."""
-
-    plant: dict[str, float]
-    actuation: Actuation
-    force: Array  # (3,) N
-    errors: Errors
-    delays: dict[str, float]  # s, by topic
 
 
 @dataclass(frozen=True)
@@ -93,7 +89,7 @@ class Residuals:
         random_force: bool = False,
     ) -> None:
         self.parameters, self.windows = tuple(parameters), tuple(windows)
-        self._shooter, self._step, self._thrusters = Shooter(vehicle), step, vehicle.n_thrusters
+        self._shooter, self._step = Shooter(vehicle), step
         self._lag = float(vehicle.thrust_time_constant.mean())
         self._forces = [CommandedForces(log, vehicle, step) for log in logs]
         has_position = any(topic.name == "position" for log in logs for topic in log.topics)
@@ -113,36 +109,7 @@ class Residuals:
 
     def settings(self, values: Array) -> list[Setting]:
         """Return the settings of each run by the free numbers."""
-        return [self._setting(run, values) for run in range(len(self._forces))]
-
-    def _setting(self, run: int, values: Array) -> Setting:
-        plant: dict[str, float] = {}
-        scales, lag, delays = np.ones(self._thrusters), self._lag, dict[str, float]()
-        force, lever, bias, scale, losses = np.zeros(3), np.zeros(3), np.zeros(3), 0.0, np.zeros(self._thrusters)
-        for p, x in zip(self.parameters, values, strict=True):
-            if p.run not in (None, run):
-                continue
-            match p.kind:
-                case "plant" | "current":
-                    plant[p.plant] = float(x)
-                case "lag":
-                    lag = float(x)
-                case "thrust":
-                    scales[p.index] = x
-                case "asymmetry":
-                    losses[p.index] = x
-                case "delay":
-                    delays[p.plant] = float(x)
-                case "force":
-                    force[p.index] = x
-                case "lever":
-                    lever[p.index] = x
-                case "bias":
-                    bias[p.index] = x
-                case "scale":
-                    scale = float(x)
-        actuation = self._forces[run].actuation(lag, scales, losses)
-        return Setting(plant, actuation, force, Errors(lever, scale, bias), delays)
+        return [setting_of(self.parameters, values, run, forces, self._lag) for run, forces in enumerate(self._forces)]
 
     def raw(self, i: int, settings: Sequence[Setting], start: Array, full: bool) -> tuple[Array, Array, Array]:
         """Return residuals of a window from a start, with derivatives by the start and, if `full`, the free numbers.
@@ -246,16 +213,7 @@ class Residuals:
             self._directions([], setting, inside, start), setting.force + (start[13:] if len(start) > 13 else 0.0),
         )  # fmt: skip
         own = [which for which in self._starts if which not in _FORCES]
-        flow = np.empty((window.steps, len(own), len(own)))  # of the own directions, from the start to each step
-        for row, which in enumerate(own):
-            if 3 <= which < 6:
-                turns = np.array([_turn(q, which - 3) for q in motion.states[:, 3:7]])
-                flow[:, row] = 4.0 * np.einsum("kdq,kq->kd", motion.tangents[:, : len(own), 3:7], turns)
-            else:
-                flow[:, row] = motion.tangents[:, : len(own), which if which < 3 else which + 1]
-        pushed = np.zeros((len(own), 6))
-        pushed[own.index(6) :] = inverse_mass
-        moved: Any = np.linalg.solve(flow, np.broadcast_to(pushed, (window.steps, *pushed.shape)))
+        moved = start_by_impulse(motion, own, inverse_mass)
         return response(
             forces.impulses, setting.actuation.lag, self._step, window.first * self._step, moved,
             by_start[:, : len(own)], self._row_times(i),
@@ -273,7 +231,7 @@ class Residuals:
             if which in _FORCES:
                 force[row, which - _FORCES.start] = 1.0
             elif 3 <= which < 6:
-                tangents[row, 3:7] = _turn(start[3:7], which - 3)
+                tangents[row, 3:7] = turn_tangent(start[3:7], which - 3)
             else:
                 tangents[row, which if which < 3 else which + 1] = 1.0
         names: list[str | None] = [None] * count
@@ -410,7 +368,7 @@ class Residuals:
         moved = state.copy()
         for which, by in zip(self._starts, step, strict=True):
             if 3 <= which < 6:
-                moved[3:7] += by * _turn(state[3:7], which - 3)
+                moved[3:7] += by * turn_tangent(state[3:7], which - 3)
             else:
                 moved[which if which < 3 else which + 1] += by
         moved[3:7] /= np.linalg.norm(moved[3:7])
@@ -425,10 +383,3 @@ def rows_of(window: Window) -> int:
 def _offsets(topic: Topic) -> tuple[float, ...]:
     """Return where about the time of a sample the motion is averaged [s]."""
     return (-topic.spread, topic.spread) if topic.spread else (0.0,)
-
-
-def _turn(quaternion: Array, axis: int) -> Array:
-    """Return the tangent of q exp(angle axis / 2) at angle 0, body axes."""
-    e0, e1, e2, e3 = quaternion
-    columns = ((-e1, e0, e3, -e2), (-e2, -e3, e0, e1), (-e3, e2, -e1, e0))
-    return 0.5 * np.array(columns[axis])
