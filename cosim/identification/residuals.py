@@ -26,8 +26,7 @@ from cosim.identification.command_errors import (
 )
 from cosim.identification.log import Log, Topic
 from cosim.identification.measurements import turn_tangent
-from cosim.identification.parameters import Parameter, with_values
-from cosim.identification.setting import Setting, setting_of
+from cosim.identification.parameters import Parameter, Setting, setting_of, with_values
 from cosim.identification.shooting import STATE_SIZE, Directions, Motion, Shooter
 from cosim.identification.windows import Window
 from plant_fmu.vehicle import Vehicle
