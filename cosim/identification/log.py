@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
-from cosim.results.log_facts import COMMAND_TIME, IMPORT, load_log_facts
+from cosim.results.log_facts import COMMAND_TIME, IMPORT, TopicFacts, load_log_facts
 from cosim.results.record import Record, load_record
 from cosim.results.run_result import SCENARIO
 from plant_fmu.toml_tables import read_toml
@@ -28,6 +28,8 @@ _DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # whose variance on white n
 _MAD = 1.4826  # standard deviation of a normal distribution, in median absolute deviations
 
 _SAMPLED = ("pulses", "effort")  # commands that an autopilot logs slower than it changes them
+
+_MEANS = ("VISO", "VISION_POSITION_DELTA")  # DVL messages that have how far it went since the last one
 
 # of each topic the columns that may hold it, the first that do are taken; and where the times of their samples stand
 _COLUMNS: dict[str, tuple[tuple[tuple[str, ...], str], ...]] = {
@@ -172,25 +174,27 @@ def load_log(folder: Path, vehicle: Vehicle) -> Log:
     known = np.isfinite(commands).all(axis=1)
     if known.sum() < _FEWEST or not np.any(commands[known]):
         raise IdentificationError(f"{folder}: the thrusters rest, expected commands")
-    topics = tuple(_topics(record, time))
+    facts = load_log_facts(folder).topics if (folder / IMPORT).exists() else ()
+    topics = tuple(_with_mean(topic, facts) for topic in _topics(record, time))
     names = {topic.name for topic in topics}
     for needed, said in (({"attitude"}, "attitude"), ({"velocity", "position"}, "velocity or position")):
         if not names & needed:
             raise IdentificationError(f"{folder}: has no {said} that changes, expected {_FEWEST} samples at the least")
     n = vehicle.n_thrusters
     _require_steady_actuators(folder, bool(np.any(commands[known, n:])))
-    sampled = _is_sampled(folder)
+    sampled = any(fact.quantity in _SAMPLED for fact in facts)
     if COMMAND_TIME in record.units:
         time = record[COMMAND_TIME]
         known &= np.isfinite(time) & (np.diff(np.maximum.accumulate(np.nan_to_num(time)), prepend=-np.inf) > 0.0)
     return Log(folder.name, time[known], commands[known, :n], commands[known, n:], topics, sampled)
 
 
-def _is_sampled(folder: Path) -> bool:
-    """Return True for an imported run whose commands are samples of what the thrusters got, and no commands' log."""
-    if not (folder / IMPORT).exists():
-        return False
-    return any(topic.quantity in _SAMPLED for topic in load_log_facts(folder).topics)
+def _with_mean(topic: Topic, facts: Sequence[TopicFacts]) -> Topic:
+    """Return a topic that knows of its values whether each is the mean of the time since the last."""
+    if topic.name != "velocity" or not any(f.quantity == "dvl" and f.source in _MEANS for f in facts):
+        return topic
+    period = float(np.median(np.diff(topic.times)))
+    return replace(topic, spread=float(np.hypot(topic.spread, period / np.sqrt(12.0))))
 
 
 def _require_steady_actuators(folder: Path, has_wrench: bool) -> None:
