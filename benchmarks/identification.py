@@ -1,6 +1,7 @@
 """Identification of vehicles whose numbers are known: errors, coverage of the 95 % intervals, and times.
 
-``python -m benchmarks.identification N [--seed K] [--duration S] [--noise F] [--nuisance NAME [--unknown]] [--dive]``.
+``python -m benchmarks.identification N [--seed K] [--duration S] [--noise F] [--nuisance NAME ... [--unknown]] [--dive]
+[--out FILE]``. With a file each vehicle is a line of it, and those that it has are not flown again.
 Each is a BlueROV2 Heavy with other damping, added mass (all 21 elements), buoyancy, its center and thruster lag, in a
 current. It gets the sticks of ``cosim excite`` in a box of 10 m, which know the shipped numbers alone. Sensors are
 white: DVL 5 mm/s at 6.7 Hz, gyro 2 mrad/s with biases, attitude 5 mrad and depth 3 mm at 20 Hz. The search starts from
@@ -16,6 +17,7 @@ import dataclasses
 import json
 import time
 from collections import Counter
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -203,61 +205,72 @@ def jacobian_times(log: Log, vehicle: Vehicle, parameters: list[Parameter], done
 
 
 def measure(
-    nuisance: str, estimated: bool, seeds: range, text: str, commands: Any, noise: float
+    nuisance: str, estimated: bool, seed: int, text: str, commands: Any, noise: float
 ) -> tuple[dict[str, Any], tuple[Log, list[Parameter], Fit]]:
-    """Print a line for each vehicle; return one of all, and what came of the last vehicle."""
+    """Fly one vehicle and identify it; return its line, and what came of it."""
     vehicle = load_vehicle(VEHICLE)
     free, beside = ESTIMATED[nuisance if estimated else "none"]
     truths = free_parameters(vehicle, DEFAULT_FREE)
+    rng = np.random.default_rng([seed, 27])
+    truth = draw_truth(truths, vehicle, rng)
+    current = [*rng.uniform(-0.15, 0.15, 2).tolist(), 0.0]
+    over = {p.plant: float(x) for p, x in zip(truths, truth, strict=True) if p.plant}
+    lag = float(truth[[p.kind for p in truths].index("lag")])
+    over |= {f"thrust_time_constant[{i + 1}]": lag for i in range(vehicle.n_thrusters)}
+    scenario = load(text, VEHICLE).replace({"plant.current": current, "plant.parameters": over})
+    log, gone = fly(scenario, commands, nuisance, noise, rng)
+    parameters = [*truths, *free_parameters(vehicle, free), *nuisances(beside, [log])]
+    wall, process = time.perf_counter(), time.process_time()
+    done = fit([log], vehicle, parameters, random_force=RANDOM_FORCE in beside)
+    wall, process = time.perf_counter() - wall, time.process_time() - process
+    n = len(truths)
+    off = np.abs(done.values[:n] - truth)
+    halves = done.intervals.half[:n]
+    cause = done.causes[0].flag if done.causes and done.causes[0].share > NAMED else "none"
+    line = {
+        "nuisance": nuisance, "estimated": estimated, "seed": seed, "chi2": round(done.intervals.chi2, 3),
+        "covered": (off <= halves).tolist(), "nominal": (off <= 1.96 * done.intervals.nominal[:n]).tolist(),
+        "half": (halves / np.array([p.deviation for p in truths])).tolist(),
+        "errors": relative_errors(truths, truth, done.values[:n]),
+        "cause": cause if done.intervals.chi2 > DISAGREES else None, "farthest [m]": gone,
+        "window [s]": round(done.windows[0].steps * done.step, 3), "rejected": done.rejected.total(),
+        "wall": round(wall, 1), "process": round(process, 1),
+    }  # fmt: skip
+    return line, (log, parameters, done)
+
+
+def shorten(line: dict[str, Any]) -> dict[str, Any]:
+    """Return the line of a vehicle with medians and counts in the place of lists."""
+    return {name: x for name, x in line.items() if name not in ("nominal", "half", "errors", "cause")} | {
+        "covered": f"{sum(line['covered'])} of {len(line['covered'])}", "median errors": _medians(line["errors"]),
+    }  # fmt: skip
+
+
+def summarize(lines: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the line of all vehicles with one nuisance."""
     groups: dict[str, list[float]] = {}
-    covered: list[bool] = []
-    nominal: list[bool] = []
-    half: list[float] = []
-    farthest: list[float] = []
-    named: Counter[str] = Counter()
-    last: Any = None
-    for seed in seeds:
-        rng = np.random.default_rng([seed, 27])
-        truth = draw_truth(truths, vehicle, rng)
-        current = [*rng.uniform(-0.15, 0.15, 2).tolist(), 0.0]
-        over = {p.plant: float(x) for p, x in zip(truths, truth, strict=True) if p.plant}
-        lag = float(truth[[p.kind for p in truths].index("lag")])
-        over |= {f"thrust_time_constant[{i + 1}]": lag for i in range(vehicle.n_thrusters)}
-        scenario = load(text, VEHICLE).replace({"plant.current": current, "plant.parameters": over})
-        log, gone = fly(scenario, commands, nuisance, noise, rng)
-        parameters = [*truths, *free_parameters(vehicle, free), *nuisances(beside, [log])]
-        wall, process = time.perf_counter(), time.process_time()
-        done = fit([log], vehicle, parameters, random_force=RANDOM_FORCE in beside)
-        wall, process = time.perf_counter() - wall, time.process_time() - process
-        n = len(truths)
-        off = np.abs(done.values[:n] - truth)
-        halves = done.intervals.half[:n]
-        inside = off <= halves
-        covered += inside.tolist()
-        nominal += (off <= 1.96 * done.intervals.nominal[:n]).tolist()
-        half += (halves / np.array([p.deviation for p in truths])).tolist()
-        farthest.append(gone)
-        errors = relative_errors(truths, truth, done.values[:n])
-        for name, values in errors.items():
+    for line in lines:
+        for name, values in line["errors"].items():
             groups.setdefault(name, []).extend(values)
-        line = {
-            "nuisance": nuisance, "estimated": estimated, "seed": seed, "chi2": round(done.intervals.chi2, 3),
-            "covered": f"{inside.sum()} of {inside.size}", "window [s]": round(done.windows[0].steps * done.step, 3),
-            "rejected": done.rejected.total(), "farthest [m]": round(gone, 2), "wall": round(wall, 1),
-            "process": round(process, 1), "median errors": _medians(errors),
-        }  # fmt: skip
-        print(json.dumps(line), flush=True)
-        if done.intervals.chi2 > DISAGREES:
-            named[done.causes[0].flag if done.causes and done.causes[0].share > NAMED else "none"] += 1
-        last = log, parameters, done
+    pooled = {name: np.concatenate([line[name] for line in lines]) for name in ("covered", "nominal", "half")}
+    named = Counter(line["cause"] for line in lines if line["cause"])
     return {
-        "nuisance": nuisance, "estimated": estimated, "vehicles": len(farthest), "median errors": _medians(groups),
+        "nuisance": lines[0]["nuisance"], "estimated": lines[0]["estimated"], "vehicles": len(lines),
+        "median errors": _medians(groups),
         "errors of nine in ten": {name: float(f"{np.quantile(x, 0.9):.2g}") for name, x in groups.items()},
-        "coverage": round(float(np.mean(covered)), 3), "nominal coverage": round(float(np.mean(nominal)), 3),
-        "median half interval, in deviations of the prior": float(f"{np.median(half):.2g}"),
-        "farthest from the center [m]": round(max(farthest), 2),
+        "greatest errors": {name: float(f"{np.max(x):.2g}") for name, x in groups.items()},
+        "coverage": round(float(np.mean(pooled["covered"])), 3),
+        "nominal coverage": round(float(np.mean(pooled["nominal"])), 3),
+        "median half interval, in deviations of the prior": float(f"{np.median(pooled['half']):.2g}"),
+        "chi2, median and greatest": [float(f(line["chi2"] for line in lines)) for f in (_median, max)],
+        "process time of a fit, median [s]": _median(line["process"] for line in lines),
+        "farthest from the center [m]": round(max(line["farthest [m]"] for line in lines), 2),
         "cause named where the model disagrees": dict(named),
-    }, last  # fmt: skip
+    }  # fmt: skip
+
+
+def _median(values: Any) -> float:
+    return float(np.median(list(values)))
 
 
 def _medians(groups: dict[str, list[float]]) -> dict[str, float]:
@@ -274,6 +287,7 @@ def main() -> None:
     parser.add_argument("--nuisance", choices=tuple(ESTIMATED), nargs="+", default=["none"])
     parser.add_argument("--unknown", action="store_true", help="nuisances are not estimated")
     parser.add_argument("--dive", action="store_true", help="an ordinary dive in the place of cosim excite")
+    parser.add_argument("--out", type=Path, help="file of lines, by which an interrupted measurement goes on")
     options = parser.parse_args()
     started = time.perf_counter()
     plan = None if options.dive else design(VEHICLE, BOX, DEPTH, options.duration)
@@ -281,14 +295,27 @@ def main() -> None:
     duration = options.duration if plan is None else plan.duration
     print(json.dumps({"design [s]": round(time.perf_counter() - started, 1), "duration [s]": duration}), flush=True)
     text = scenario_text(VEHICLE, DEPTH, duration, VEHICLE)
-    seeds = range(options.seed, options.seed + options.vehicles)
+    known = options.out.read_text().splitlines() if options.out and options.out.exists() else []
+    flown = {(line["nuisance"], line["estimated"], line["seed"]): line for line in map(json.loads, known)}
+    asked = [
+        (nuisance, not options.unknown, seed)
+        for seed in range(options.seed, options.seed + options.vehicles)
+        for nuisance in options.nuisance
+    ]
+    last = None
+    for case in asked:
+        if case not in flown:
+            flown[case], last = measure(*case, text, commands, options.noise)
+            if options.out:
+                with options.out.open("a") as file:
+                    file.write(json.dumps(flown[case]) + "\n")
+            print(json.dumps(shorten(flown[case])), flush=True)
     for nuisance in options.nuisance:
-        total, (log, parameters, done) = measure(
-            nuisance, not options.unknown, seeds, text, commands, options.noise
-        )  # fmt: skip
-        print(json.dumps(total), flush=True)
-    exact, differences = jacobian_times(log, load_vehicle(VEHICLE), parameters, done)
-    print(json.dumps({"exact Jacobian [s]": round(exact, 2), "by differences [s]": round(differences, 2)}))
+        print(json.dumps(summarize([flown[case] for case in asked if case[0] == nuisance])), flush=True)
+    if last:
+        log, parameters, done = last
+        exact, differences = jacobian_times(log, load_vehicle(VEHICLE), parameters, done)
+        print(json.dumps({"exact Jacobian [s]": round(exact, 2), "by differences [s]": round(differences, 2)}))
 
 
 if __name__ == "__main__":

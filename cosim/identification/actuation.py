@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from cosim.errors import IdentificationError
+from cosim.identification.command_errors import Impulses, open_impulses
 from cosim.identification.log import Log
 from plant_fmu.vehicle import Vehicle
 
@@ -26,6 +27,7 @@ class Actuation:
     by_lag: Array  # (steps, 2, 6) N/s, N m/s, by the time constant of all thrusters
     by_scale: Array  # (thrusters, steps, 2, 6) N, N m, by a factor of each thruster
     by_loss: Array  # (thrusters, steps, 2, 6) N, N m, by the part that each thruster lacks backward
+    lag: float  # s, time constant of all thrusters
 
 
 class CommandedForces:
@@ -53,18 +55,26 @@ class CommandedForces:
         self.steps = max(1, math.floor((log.times[-1] - self.start) / step))
         forces = np.concatenate([steady_forces(log.thrust, vehicle), log.wrench], axis=1)
         self._times = log.times - self.start
-        self._forces = forces
-        self._matrix = vehicle.thruster_matrix
+        self._sampled = log.sampled
+        self._matrix, self.thrusters = vehicle.thruster_matrix, vehicle.n_thrusters
+        self.impulses: Impulses | None = None  # what samples leave open; None where every change is logged
+        if log.sampled:
+            self.impulses = open_impulses(self._times, forces[:, : vehicle.n_thrusters], self._matrix)
 
         self._mean = self._means(forces)
         self._mean_backward = self._means(np.minimum(forces[:, : vehicle.n_thrusters], 0.0))
 
     def _means(self, forces: Array) -> Array:
-        """Return the mean of held values over each step of the grid."""
-        held = forces * np.diff(self._times, append=self._times[-1])[:, None]
+        """Return the mean over each step of the grid: of held values, or of samples with straight lines between."""
+        spans = np.diff(self._times, append=self._times[-1])[:, None]
+        slopes = np.zeros_like(forces)
+        if self._sampled:
+            slopes[:-1] = np.diff(forces, axis=0) / spans[:-1]
+        pieces = forces * spans + 0.5 * slopes * spans**2
         edges = np.arange(self.steps + 1) * self.step
         at = np.clip(np.searchsorted(self._times, edges, side="right") - 1, 0, len(self._times) - 1)
-        impulse = (np.cumsum(held, axis=0) - held)[at] + forces[at] * (edges - self._times[at])[:, None]
+        since = (edges - self._times[at])[:, None]
+        impulse = (np.cumsum(pieces, axis=0) - pieces)[at] + forces[at] * since + 0.5 * slopes[at] * since**2
         means: Array = np.diff(impulse, axis=0) / self.step
         return means
 
@@ -94,7 +104,7 @@ class CommandedForces:
         wrench[:, 0] += self._mean[:, n:]
         by_scale = self._matrix.T[:, None, None, :] * np.moveaxis(force, 2, 0)[..., None]
         by_loss = -matrix[:, None, None, :] * np.moveaxis(backward, 2, 0)[..., None]
-        return Actuation(wrench, by_lag @ matrix, by_scale, by_loss)
+        return Actuation(wrench, by_lag @ matrix, by_scale, by_loss, lag)
 
 
 def steady_forces(commands: Array, vehicle: Vehicle) -> Array:

@@ -17,7 +17,7 @@ _LISTED = 6
 NAMED = 0.1  # part of what is not explained, above which a cause is named
 _LATE = 0.15  # s, of samples behind the commands: a lag of the thrusters seldom looks like more
 _SLOW = 0.2  # s between changes of the commands, from which on added mass and lag are not to be trusted
-_SLOW_SAMPLES = 0.05  # s, of the samples in a log: between them an autopilot that stabilizes changes its outputs
+_SLOW_SAMPLES = 0.03  # s between samples of servo outputs, from which on their rate is named
 _APART = 0.9  # correlation of a delay and the lag, beyond which runs do not separate them
 _NEEDS = {  # motions that tell the numbers of a key apart
     "hydrodynamics.added_mass": "quick changes of speed along and about the axis: steps of full stick, a second each",
@@ -75,7 +75,7 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
             "north, east and down (root mean square). Its mean over the runs looks like weight less buoyancy or a "
             "current; longer runs make that smaller."
         )
-    elif fit.windows[0].steps * fit.step < 0.5 * STAGES[-1]:
+    elif fit.command_error is None and fit.windows[0].steps * fit.step < 0.5 * STAGES[-1]:
         yield (
             f"Predictions over {STAGES[-1]:g} s fail, as they do where a motion is unstable without its control: the "
             f"numbers are those of windows of {STAGES[0]:g} s."
@@ -116,8 +116,19 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
 
 def slow_commands(log: Log) -> str:
     """Return what a run's slow servo data can and cannot say; empty where its commands change quickly."""
+    if log.sampled:
+        period = float(np.median(np.diff(log.times)))
+        if period < _SLOW_SAMPLES:
+            return ""
+        wanting = " At this rate they determine damping and weight less buoyancy, not added mass, lag or delays."
+        return (
+            f"Servo outputs of {log.name} are logged at {1.0 / period:.2g} Hz. They are joined by straight lines, and "
+            f"what thrust did within {period:.2g} s counts as noise, which makes the intervals as wide as they are. "
+            "Telemetry with SERVO_OUTPUT_RAW at 50 Hz makes them smaller: an ArduSub's .BIN has 10 Hz, which no "
+            f"parameter changes.{wanting if period > _SLOW else ''}"
+        )
     period = command_period(log)
-    if period < (_SLOW_SAMPLES if log.sampled else _SLOW):
+    if period < _SLOW:
         return ""
     return (
         f"Commands of {log.name}, sampled at {1.0 / period:.2g} Hz, show changes of thrust up to {period:.1g} s late: "

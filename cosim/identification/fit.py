@@ -51,6 +51,7 @@ class Fit:
     step: float  # s, of the integration
     delays: dict[str, float]  # s, of the topics, as found before the fit
     causes: tuple[Cause, ...] = ()  # of a fit that disagrees with the runs, the greatest first
+    command_error: float | None = None  # size of what sampled commands leave open, in that of steps at any time
     forces: Array | None = None  # (windows, 3) N, north, east, down, where a random force is estimated
 
     def vehicle_part(self) -> list[int]:
@@ -138,7 +139,9 @@ def _fit(
             delays.get(p.plant, 0.0) if p.kind == "delay" else x for p, x in zip(parameters, values, strict=True)
         ])  # fmt: skip
     found: list[Fit] = []
-    stages = tuple(zip(STAGES, _ROUNDS, strict=True))[: 1 if random_force else None]
+    stages = tuple(zip(STAGES, _ROUNDS, strict=True))
+    if random_force or any(log.sampled for log in logs):  # what long windows would tell more, noise has covered
+        stages = ((STAGES[0], _ROUNDS[0] + 1),)
     done, total = 0, sum(rounds for _, rounds in stages) * _EVALUATIONS
     for length, rounds in stages:
         windows, rejected = cut_windows(logs, vehicle, step, length, margins)
@@ -169,6 +172,7 @@ def _fit(
                 problem.reweigh()
                 if not problem.residuals.holds_starts:
                     problem.residuals.update_force_deviation()
+                    problem.residuals.update_command_errors(values)
         result = _result(problem, values, rejected, step, delays)
         if result.intervals.chi2 > DISAGREES:
             result = replace(result, causes=tuple(find_causes(logs, vehicle, problem.residuals, values, step)))
@@ -186,7 +190,7 @@ def _result(problem: Problem, values: Array, rejected: Counter[str], step: float
     return Fit(
         parameters, values, intervals, tuple(windows), rejected, tuple(reduced),
         sum(int((np.abs(r) > _OUTLIER).sum()) for r in plain), sum(map(len, plain)), step, delays,
-        forces=problem.residuals.forces() if forced else None,
+        command_error=problem.residuals.command_error, forces=problem.residuals.forces() if forced else None,
     )  # fmt: skip
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
-from cosim.results.log_facts import IMPORT
+from cosim.results.log_facts import COMMAND_TIME, IMPORT, TopicFacts, load_log_facts
 from cosim.results.record import Record, load_record
 from cosim.results.run_result import SCENARIO
 from plant_fmu.toml_tables import read_toml
@@ -26,6 +26,10 @@ _MOST_SAMPLES = 50.0  # Hz; faster topics are averaged over blocks
 _FEWEST = 20  # samples of a topic
 _DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # whose variance on white noise is 70 times that of the noise
 _MAD = 1.4826  # standard deviation of a normal distribution, in median absolute deviations
+
+_SAMPLED = ("pulses", "effort")  # commands that an autopilot logs slower than it changes them
+
+_MEANS = ("VISO", "VISION_POSITION_DELTA")  # DVL messages that have how far it went since the last one
 
 # of each topic the columns that may hold it, the first that do are taken; and where the times of their samples stand
 _COLUMNS: dict[str, tuple[tuple[tuple[str, ...], str], ...]] = {
@@ -60,6 +64,7 @@ class Topic:
     values: Array  # (n, m): m/s, rad/s, m, or a quaternion
     noise: Array  # (c,) standard deviation of each component of the residual
     shift: float = 0.0  # s, by which the stamps are moved back
+    spread: float = 0.0  # s, before and after each time: a value is the mean of two there, which averages of many equal
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -72,11 +77,11 @@ class Log:
     """One run."""
 
     name: str
-    times: Array  # (rows,) s, of the commands, each held until the next
+    times: Array  # (rows,) s, of the commands
     thrust: Array  # (rows, thrusters) N, commanded
     wrench: Array  # (rows, 6) N, N m, commanded beside the thrusters
     topics: tuple[Topic, ...]
-    sampled: bool = False  # commands are samples of a log, and may change between its rows
+    sampled: bool = False  # commands are samples, between which they change; else each is held until the next
 
     def topic(self, name: str) -> Topic | None:
         """Return a topic by its name, None where the run has none."""
@@ -111,8 +116,10 @@ def make_topic(name: str, times: Array, values: Array, noise: float | None = Non
         deviations = _MAD * np.median(rough, axis=0) / np.sqrt(np.square(_DIFFERENCE).sum())
     else:
         deviations = np.full(components.shape[1], float(noise))
-    block = max(1, round((1.0 / _MOST_SAMPLES) / float(np.median(np.diff(times)))))
+    period, spread = float(np.median(np.diff(times))), 0.0
+    block = max(1, round((1.0 / _MOST_SAMPLES) / period))
     if block > 1:
+        spread = period * float(np.sqrt((block**2 - 1) / 12.0))  # their standard deviation: exact for cubic motion
         count = len(times) // block
         times = times[: count * block].reshape(count, block).mean(axis=1)
         values = values[: count * block].reshape(count, block, -1).mean(axis=1)
@@ -120,7 +127,7 @@ def make_topic(name: str, times: Array, values: Array, noise: float | None = Non
     if name == "attitude":
         values = values / np.linalg.norm(values, axis=1, keepdims=True)
     least = _LEAST_NOISE[name] if noise is None else 0.0
-    return Topic(name, times, values, np.maximum(deviations, least))
+    return Topic(name, times, values, np.maximum(deviations, least), spread=spread)
 
 
 def command_period(log: Log) -> float:
@@ -167,14 +174,27 @@ def load_log(folder: Path, vehicle: Vehicle) -> Log:
     known = np.isfinite(commands).all(axis=1)
     if known.sum() < _FEWEST or not np.any(commands[known]):
         raise IdentificationError(f"{folder}: the thrusters rest, expected commands")
-    topics = tuple(_topics(record, time))
+    facts = load_log_facts(folder).topics if (folder / IMPORT).exists() else ()
+    topics = tuple(_with_mean(topic, facts) for topic in _topics(record, time))
     names = {topic.name for topic in topics}
     for needed, said in (({"attitude"}, "attitude"), ({"velocity", "position"}, "velocity or position")):
         if not names & needed:
             raise IdentificationError(f"{folder}: has no {said} that changes, expected {_FEWEST} samples at the least")
     n = vehicle.n_thrusters
     _require_steady_actuators(folder, bool(np.any(commands[known, n:])))
-    return Log(folder.name, time[known], commands[known, :n], commands[known, n:], topics, (folder / IMPORT).exists())
+    sampled = any(fact.quantity in _SAMPLED for fact in facts)
+    if COMMAND_TIME in record.units:
+        time = record[COMMAND_TIME]
+        known &= np.isfinite(time) & (np.diff(np.maximum.accumulate(np.nan_to_num(time)), prepend=-np.inf) > 0.0)
+    return Log(folder.name, time[known], commands[known, :n], commands[known, n:], topics, sampled)
+
+
+def _with_mean(topic: Topic, facts: Sequence[TopicFacts]) -> Topic:
+    """Return a topic that knows of its values whether each is the mean of the time since the last."""
+    if topic.name != "velocity" or not any(f.quantity == "dvl" and f.source in _MEANS for f in facts):
+        return topic
+    period = float(np.median(np.diff(topic.times)))
+    return replace(topic, spread=float(np.hypot(topic.spread, period / np.sqrt(12.0))))
 
 
 def _require_steady_actuators(folder: Path, has_wrench: bool) -> None:

@@ -122,3 +122,10 @@ def _attitude_matrix(measured: Array, states: Array) -> tuple[Array, Array]:
     ], axis=1)  # fmt: skip
     scalar = np.sum(measured * states[:, _ATTITUDE], axis=1, keepdims=True)
     return matrix, np.where(scalar < 0.0, -1.0, 1.0)
+
+
+def turn_tangent(quaternion: Array, axis: int) -> Array:
+    """Return the tangent of q exp(angle axis / 2) at angle 0, body axes."""
+    e0, e1, e2, e3 = quaternion
+    columns = ((-e1, e0, e3, -e2), (-e2, -e3, e0, e1), (-e3, e2, -e1, e0))
+    return 0.5 * np.array(columns[axis])

@@ -16,10 +16,17 @@ from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
 from cosim.identification import measurements
-from cosim.identification.actuation import Actuation, CommandedForces
+from cosim.identification.actuation import CommandedForces
+from cosim.identification.command_errors import (
+    Whitener,
+    most_likely_size,
+    response,
+    start_by_impulse,
+    whitener,
+)
 from cosim.identification.log import Log, Topic
-from cosim.identification.measurements import Errors
-from cosim.identification.parameters import Parameter
+from cosim.identification.measurements import turn_tangent
+from cosim.identification.parameters import Parameter, Setting, setting_of, with_values
 from cosim.identification.shooting import STATE_SIZE, Directions, Motion, Shooter
 from cosim.identification.windows import Window
 from plant_fmu.vehicle import Vehicle
@@ -32,17 +39,6 @@ _FORCE = 0.5  # N, standard deviation of a random force before any residual is k
 _LEAST_FORCE = 0.01  # N
 _SOLVED = 0.05  # of a start's standard deviation: what is left is linear
 _MOST_SOLVES = 12
-
-
-@dataclass(frozen=True)
-class Setting:
-    """Settings of one run by the free numbers."""
-
-    plant: dict[str, float]
-    actuation: Actuation
-    force: Array  # (3,) N
-    errors: Errors
-    delays: dict[str, float]  # s, by topic
 
 
 @dataclass(frozen=True)
@@ -92,7 +88,7 @@ class Residuals:
         random_force: bool = False,
     ) -> None:
         self.parameters, self.windows = tuple(parameters), tuple(windows)
-        self._shooter, self._step, self._thrusters = Shooter(vehicle), step, vehicle.n_thrusters
+        self._shooter, self._step = Shooter(vehicle), step
         self._lag = float(vehicle.thrust_time_constant.mean())
         self._forces = [CommandedForces(log, vehicle, step) for log in logs]
         has_position = any(topic.name == "position" for log in logs for topic in log.topics)
@@ -106,39 +102,13 @@ class Residuals:
         self._found: dict[int, _Start] = {}
         self._tried: dict[int, _Start] = {}
         self.weights: list[Array] = [np.ones(rows_of(window)) for window in windows]
+        self._vehicle = vehicle
+        self.command_error: float | None = None  # size of what sampled commands leave open; None: nothing, or not known
+        self.whiteners: list[Whitener | None] = [None] * len(windows)
 
     def settings(self, values: Array) -> list[Setting]:
         """Return the settings of each run by the free numbers."""
-        return [self._setting(run, values) for run in range(len(self._forces))]
-
-    def _setting(self, run: int, values: Array) -> Setting:
-        plant: dict[str, float] = {}
-        scales, lag, delays = np.ones(self._thrusters), self._lag, dict[str, float]()
-        force, lever, bias, scale, losses = np.zeros(3), np.zeros(3), np.zeros(3), 0.0, np.zeros(self._thrusters)
-        for p, x in zip(self.parameters, values, strict=True):
-            if p.run not in (None, run):
-                continue
-            match p.kind:
-                case "plant" | "current":
-                    plant[p.plant] = float(x)
-                case "lag":
-                    lag = float(x)
-                case "thrust":
-                    scales[p.index] = x
-                case "asymmetry":
-                    losses[p.index] = x
-                case "delay":
-                    delays[p.plant] = float(x)
-                case "force":
-                    force[p.index] = x
-                case "lever":
-                    lever[p.index] = x
-                case "bias":
-                    bias[p.index] = x
-                case "scale":
-                    scale = float(x)
-        actuation = self._forces[run].actuation(lag, scales, losses)
-        return Setting(plant, actuation, force, Errors(lever, scale, bias), delays)
+        return [setting_of(self.parameters, values, run, forces, self._lag) for run, forces in enumerate(self._forces)]
 
     def raw(self, i: int, settings: Sequence[Setting], start: Array, full: bool) -> tuple[Array, Array, Array]:
         """Return residuals of a window from a start, with derivatives by the start and, if `full`, the free numbers.
@@ -172,7 +142,10 @@ class Residuals:
         setting = settings[window.run]
         inside = slice(window.first, window.first + window.steps)
         moving = [j for j, p in enumerate(self.parameters) if full and self._moves(p, window.run)]
-        times = [topic.times + topic.shift - setting.delays.get(topic.name, topic.shift) for topic in window.topics]
+        times = [
+            topic.times + topic.shift - setting.delays.get(topic.name, topic.shift) + off
+            for topic in window.topics for off in _offsets(topic)
+        ]  # fmt: skip
         order = np.argsort(np.concatenate(times), kind="stable")
         motion = self._shooter.predict(
             setting.plant, start[:13], setting.actuation.wrench[inside], self._step, np.concatenate(times)[order],
@@ -182,18 +155,68 @@ class Residuals:
         back[order] = np.arange(len(order))
         count, residuals, starts, rows = 0, [], [], []
         for topic in window.topics:
-            at = back[count : count + len(topic.times)]
-            count += len(topic.times)
-            residuals.append(measurements.residual(topic, motion.states[at], setting.errors).ravel())
-            along = measurements.derivative(topic, motion.states[at], motion.tangents[at], setting.errors)
+            size, several = len(topic.times), len(_offsets(topic))
+            at = back[count : count + several * size].reshape(several, size)
+            count += several * size
+            sampled = Motion(*(x[at].mean(axis=0) for x in (motion.states, motion.rates, motion.tangents)))
+            residuals.append(measurements.residual(topic, sampled.states, setting.errors).ravel())
+            along = measurements.derivative(topic, sampled.states, sampled.tangents, setting.errors)
             along = along.reshape(len(residuals[-1]), -1)
             starts.append(along[:, : len(self._starts)])
             jacobian = np.zeros((len(along), len(self.parameters)))
             jacobian[:, moving] = along[:, len(self._starts) :]
             if full:
-                self._add_errors(jacobian, topic, motion, at, setting, window.run)
+                self._add_errors(jacobian, topic, sampled, setting, window.run)
             rows.append(jacobian)
-        return np.concatenate(residuals), np.concatenate(starts), np.concatenate(rows)
+        found = np.concatenate(residuals), np.concatenate(starts), np.concatenate(rows)
+        whiten = self.whiteners[i]
+        return found if whiten is None else (whiten(found[0]), whiten(found[1]), whiten(found[2]))
+
+    def update_command_errors(self, values: Array) -> None:
+        """Weigh the residuals from now on by what sampled commands leave open, of the size that explains them best.
+
+        Parameters
+        ----------
+        values : ndarray
+            The free numbers.
+        """
+        if not any(forces.impulses for forces in self._forces):
+            return
+        settings = self.settings(values)
+        inverse: Any = np.linalg.inv(with_values(self._vehicle, self.parameters, values).mass_matrix)  # fmt: skip
+        starts = [self.solve_start(i, settings, values) for i in range(len(self.windows))]
+        self.whiteners = [None] * len(self.windows)
+        by_impulses, left, projected = [], [], []
+        for i, start in enumerate(starts):
+            residual, by_start, _ = self.raw(i, settings, start, full=False)
+            by = self._by_impulse(i, settings, start, by_start, inverse)
+            q, _ = np.linalg.qr(by_start)
+            left.append(residual - q @ (q.T @ residual))
+            projected.append(by - q @ (q.T @ by))
+            by_impulses.append(by)
+        self.command_error = most_likely_size(left, projected)
+        self.whiteners = [whitener(by, self.command_error) for by in by_impulses]
+
+    def _by_impulse(
+        self, i: int, settings: Sequence[Setting], start: Array, by_start: Array, inverse_mass: Array
+    ) -> Array:
+        """Return the residuals of a window by the impulses that sampled commands leave open."""
+        window = self.windows[i]
+        setting, forces = settings[window.run], self._forces[window.run]
+        if forces.impulses is None:
+            return np.zeros((len(by_start), 0))
+        inside = slice(window.first, window.first + window.steps)
+        middle: Array = self._step * np.arange(0.5, window.steps)
+        motion = self._shooter.predict(
+            setting.plant, start[:13], setting.actuation.wrench[inside], self._step, middle,
+            self._directions([], setting, inside, start), setting.force + (start[13:] if len(start) > 13 else 0.0),
+        )  # fmt: skip
+        own = [which for which in self._starts if which not in _FORCES]
+        moved = start_by_impulse(motion, own, inverse_mass)
+        return response(
+            forces.impulses, setting.actuation.lag, self._step, window.first * self._step, moved,
+            by_start[:, : len(own)], self._row_times(i),
+        )  # fmt: skip
 
     @staticmethod
     def _moves(p: Parameter, run: int) -> bool:
@@ -207,7 +230,7 @@ class Residuals:
             if which in _FORCES:
                 force[row, which - _FORCES.start] = 1.0
             elif 3 <= which < 6:
-                tangents[row, 3:7] = _turn(start[3:7], which - 3)
+                tangents[row, 3:7] = turn_tangent(start[3:7], which - 3)
             else:
                 tangents[row, which if which < 3 else which + 1] = 1.0
         names: list[str | None] = [None] * count
@@ -227,18 +250,16 @@ class Residuals:
         wrench = np.stack(wrenches) if wrenches else np.empty((0, 0, 2, 6))
         return Directions(tangents, names, inputs, force, wrench)
 
-    def _add_errors(
-        self, jacobian: Array, topic: Topic, motion: Motion, at: NDArray[np.intp], setting: Setting, run: int
-    ) -> None:
+    def _add_errors(self, jacobian: Array, topic: Topic, motion: Motion, setting: Setting, run: int) -> None:
         """Write the derivatives by what changes no motion."""
         for j, p in enumerate(self.parameters):
             if p.run not in (None, run):
                 continue
             if p.kind == "delay" and p.plant == topic.name:
-                late = measurements.derivative(topic, motion.states[at], -motion.rates[at][:, None], setting.errors)
+                late = measurements.derivative(topic, motion.states, -motion.rates[:, None], setting.errors)
                 jacobian[:, j] = late.ravel()
             elif p.kind in ("lever", "scale", "bias"):
-                by = measurements.derivative_by_errors(topic, motion.states[at], setting.errors, p.kind, p.index)
+                by = measurements.derivative_by_errors(topic, motion.states, setting.errors, p.kind, p.index)
                 if by is not None:
                     jacobian[:, j] = by.ravel()
 
@@ -346,7 +367,7 @@ class Residuals:
         moved = state.copy()
         for which, by in zip(self._starts, step, strict=True):
             if 3 <= which < 6:
-                moved[3:7] += by * _turn(state[3:7], which - 3)
+                moved[3:7] += by * turn_tangent(state[3:7], which - 3)
             else:
                 moved[which if which < 3 else which + 1] += by
         moved[3:7] /= np.linalg.norm(moved[3:7])
@@ -358,8 +379,6 @@ def rows_of(window: Window) -> int:
     return sum(len(topic.times) * len(topic.components) for topic in window.topics)
 
 
-def _turn(quaternion: Array, axis: int) -> Array:
-    """Return the tangent of q exp(angle axis / 2) at angle 0, body axes."""
-    e0, e1, e2, e3 = quaternion
-    columns = ((-e1, e0, e3, -e2), (-e2, -e3, e0, e1), (-e3, e2, -e1, e0))
-    return 0.5 * np.array(columns[axis])
+def _offsets(topic: Topic) -> tuple[float, ...]:
+    """Return where about the time of a sample the motion is averaged [s]."""
+    return (-topic.spread, topic.spread) if topic.spread else (0.0,)

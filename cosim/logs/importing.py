@@ -25,7 +25,7 @@ from cosim.logs.rows import RowMaker
 from cosim.logs.selection import rate_of, select_topics, span_of
 from cosim.logs.spool import LogContents
 from cosim.logs.topics import Topic
-from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts
+from cosim.results.log_facts import COMMAND_TIME, IMPORT, LogFacts, TopicFacts
 from cosim.results.record import MAX_ROWS
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import Run
@@ -33,7 +33,7 @@ from cosim.results.wording import IMPORTED
 from cosim.run.run_folder import claim, conclude
 from cosim.scenario.scenario import Scenario, load_scenario, validate_scenario
 from cosim.simulation.columns import columns_without_plant
-from cosim.simulation.signals import Array
+from cosim.simulation.signals import Array, Column
 from plant_fmu import Vehicle, load_vehicle
 from plant_fmu.errors import printable
 from plant_fmu.installing import install_hint
@@ -201,6 +201,8 @@ def _write(path: Path, contents: LogContents, scratch: Path, vehicle: Vehicle, w
     draft = _scenario(path, vehicle, wanted, through, steps, 1.0 / hertz)
     volts = math.nan if wanted.voltage is None else wanted.voltage
     columns = columns_without_plant(draft)
+    if commands:
+        columns.append(Column(COMMAND_TIME, "s", "When the commands were sampled"))
     with RowMaker(draft, columns, topics, commands, volts, start) as maker:
         first = next(maker.blocks())
     flown = _from_first(draft, first, [column.name for column in columns])

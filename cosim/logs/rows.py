@@ -12,11 +12,13 @@ from cosim.logs.forces import Commands
 from cosim.logs.frames import euler_zyx, rotate_to_body
 from cosim.logs.resampling import TopicReader
 from cosim.logs.topics import Topic
+from cosim.results.log_facts import COMMAND_TIME
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.signals import Array, Column
 
 BLOCK = 4096  # rows that are made at once
+_SPAN = 60.0  # s, of rows that are made at once: samples between rows of a low rate are in memory too
 _POSITION, _QUATERNION = [f"position.{a}" for a in "xyz"], [f"quaternion.e{i}" for i in range(4)]
 _WRENCH = "XYZKMN"
 _SENSORS = {  # quantity: columns, and name of the sensor's time column
@@ -74,8 +76,9 @@ class RowMaker:
     def blocks(self) -> Iterator[Array]:
         """Yield the rows of the whole run in order, each block of shape (n, columns)."""
         step, rows = self._scenario.time.step, self._scenario.steps + 1
-        for first in range(0, rows, BLOCK):
-            yield self._block(np.arange(first, min(first + BLOCK, rows)) * np.float64(step))
+        count = max(1, min(BLOCK, int(_SPAN / step)))
+        for first in range(0, rows, count):
+            yield self._block(np.arange(first, min(first + count, rows)) * np.float64(step))
 
     def _block(self, time: Array) -> Array:
         rows = np.full((len(time), len(self._at)), np.nan)
@@ -121,7 +124,8 @@ class RowMaker:
         if self._commands is None:
             return
         quantity = next(name for name in self._readers if name == self._commands.quantity)
-        values, _ = self._readers[quantity].held(at)
+        values, when = self._readers[quantity].held(at)
+        put([COMMAND_TIME], (when - self._start)[:, None])
         volts = np.full(len(at), self._voltage)
         if "voltage" in self._readers and not np.isfinite(self._voltage):
             volts = self._readers["voltage"].held(at)[0][:, 0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from cosim.simulation.signals import Array
 RATES = (5, 10, 20, 25, 50, 100, 200)  # Hz, default rates of rows
 _MOTION = ("attitude", "position", "depth")  # a log must have at least one
 _SEA_LEVEL, _SPECIFIC = 101325.0, 9800.0  # Pa, Pa/m: ArduPilot's conversion of pressure to depth
+_FILTERS = {"rates": "INS_GYRO_FILTER", "gyro": "INS_GYRO_FILTER", "acceleration": "INS_ACCEL_FILTER"}
 _EDGE = 5.0  # s, at start and end, that may be cut where part of the motion is unknown
 
 
@@ -50,7 +51,7 @@ def select_topics(contents: LogContents, scratch: Path) -> tuple[dict[str, Topic
             if of == quantity and other is not source and other.count:
                 contents.unread[f"{name} ({quantity})"] += other.count
         if source is not None:
-            topics[quantity] = clean(source, clock.times, None, scratch)
+            topics[quantity] = clean(source, _without(_filter_delay(contents, quantity), clock), None, scratch)
     _depth_of_pressure(contents, topics, clock, scratch)
     if not any(name in topics for name in _MOTION):
         what = ", ".join(f"{name} ({QUANTITIES[name].what})" for name in _MOTION)
@@ -60,9 +61,22 @@ def select_topics(contents: LogContents, scratch: Path) -> tuple[dict[str, Topic
             "The log has no commands of thrusters: servo outputs, forces, a wrench or sticks. "
             "Nothing can be identified from it."
         )
+    if contents.autopilot == "ardupilot" and not set(_FILTERS.values()) & set(contents.parameters):
+        contents.remarks.append("The log has no INS_GYRO_FILTER: rates are as late as that filter made them.")
     for when in clock.restarts:
         contents.remarks.append(f"The vehicle's clock began anew {when - span_of(topics)[0]:.1f} s after the start")
     return topics, clock
+
+
+def _filter_delay(contents: LogContents, quantity: str) -> float:
+    """Return by how much an ArduPilot's low-pass filter, a Butterworth of second order, delays a quantity [s]."""
+    cutoff = contents.parameters.get(_FILTERS.get(quantity, ""), 0.0)  # Hz
+    return math.sqrt(2.0) / (2.0 * math.pi * cutoff) if contents.autopilot == "ardupilot" and cutoff > 0.0 else 0.0
+
+
+def _without(delay: float, clock: VehicleClock) -> Callable[[Array, Array], Array]:
+    """Return a function from stamps and times of writing to times [s] before a delay."""
+    return lambda stamps, written: clock.times(stamps, written) - delay
 
 
 def span_of(topics: Mapping[str, Topic]) -> tuple[float, float]:

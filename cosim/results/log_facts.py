@@ -11,6 +11,7 @@ from plant_fmu.errors import TableError
 from plant_fmu.toml_tables import decode
 
 IMPORT = "import.json"
+COMMAND_TIME = "measured.time.commands"  # column of an imported run: when its commands were sampled [s]
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,6 @@ ONE_PLACE = {
     "numba": {"fuzzy_arbiter.export.compiled"},
     "pandas": {"cosim.results.run_result"},
     "pymavlink": {"cosim.mavlink.wire.dialect", "cosim.logs.formats.dataflash"},
-    "pyulog": {"cosim.logs.formats.ulog"},
     "rerun": {"cosim.export.rrd_writer"},
     "rosbags": {"cosim.logs.bag_storage", "cosim.logs.formats.bag"},
     "rich": {"cosim.command_line.watch", "cosim.live.watching.bars", "cosim.live.watching.picture"},
@@ -60,7 +59,7 @@ OPTIONAL = {
     "fmu_manipulation_toolbox",
     "foxglove_schemas_protobuf",
 }
-OPTIONAL |= {"google", "libcosimpy", "mcap", "mcap_protobuf", "pandas", "pyulog", "rerun", "rosbags"}
+OPTIONAL |= {"google", "libcosimpy", "mcap", "mcap_protobuf", "pandas", "rerun", "rosbags"}
 WANT_AN_EXTRA = {
     "cosim.export.mcap_writer",
     "cosim.export.rrd_writer",

@@ -23,7 +23,6 @@ _CHUNK = 1 << 20  # bytes
 _HEAD = b"\xa3\x95"
 _FMT, _FMT_SIZE = 0x80, 89
 _NOTHING = math.nan
-_FILTERS = (_GYRO_FILTER, _ACCEL_FILTER) = ("INS_GYRO_FILTER", "INS_ACCEL_FILTER")
 _FRAMES = (
     "bluerov1", "vectored", "vectored_6dof", "vectored_6dof_90deg", "simplerov_3", "simplerov_4", "simplerov_5",
 )  # fmt: skip
@@ -63,7 +62,6 @@ class _Takers:
         self._contents = contents
         self.clock = Clock()
         self._rate_stamp = _NOTHING
-        self._delays = dict.fromkeys(_FILTERS, 0.0)  # s, by the parameter of the low-pass filter
         self._takers: dict[str, Callable[[Fields, float], None]] = {
             name.removeprefix("_on_").upper(): getattr(self, name) for name in dir(self) if name.startswith("_on_")
         }
@@ -109,8 +107,6 @@ class _Takers:
         self._contents.parameters[str(m["Name"])] = float(m["Value"])
         if m["Name"] == "FRAME_CONFIG" and 0 <= m["Value"] < len(_FRAMES):
             self._contents.frame = _FRAMES[int(m["Value"])]
-        elif m["Name"] in _FILTERS and m["Value"] > 0.0:  # Hz, a Butterworth of second order
-            self._delays[m["Name"]] = math.sqrt(2.0) / (2.0 * math.pi * m["Value"])
 
     def _on_msg(self, m: Fields, at: float) -> None:
         firmware = str(m["Message"]).split(" ")[0]
@@ -132,12 +128,12 @@ class _Takers:
         self._put("velocity_world", name, at, m["VN"], m["VE"], m["VD"])
 
     def _on_rate(self, m: Fields, at: float) -> None:
-        self._put("rates", "RATE", at - self._delays[_GYRO_FILTER], *(math.radians(m[name]) for name in "RPY"))
+        self._put("rates", "RATE", at, *(math.radians(m[name]) for name in "RPY"))
 
     def _on_imu(self, m: Fields, at: float) -> None:
         name = f"IMU[{m['I']}]" if "I" in m else "IMU"
-        self._put("gyro", name, at - self._delays[_GYRO_FILTER], m["GyrX"], m["GyrY"], m["GyrZ"])
-        self._put("acceleration", name, at - self._delays[_ACCEL_FILTER], m["AccX"], m["AccY"], m["AccZ"])
+        self._put("gyro", name, at, m["GyrX"], m["GyrY"], m["GyrZ"])
+        self._put("acceleration", name, at, m["AccX"], m["AccY"], m["AccZ"])
 
     def _on_baro(self, m: Fields, at: float) -> None:
         self._put("depth", f"BARO[{m['I']}]" if "I" in m else "BARO", at, -m["Alt"])

@@ -1,22 +1,18 @@
-"""ULog files of PX4, by pyulog."""
+"""ULog files of PX4."""
 
 from __future__ import annotations
 
-import contextlib
-import io
-import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.errors import ImportLogError
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.format import LogFormat, Moved
 from cosim.logs.spool import LogContents
+from cosim.logs.ulog_messages import ULogMessages
 from cosim.logs.vehicle_messages import kind_of
-from cosim.simulation.signals import Array
 
 # topic: quantities and their fields, in SI units, NED and FRD
 _TOPICS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
@@ -36,58 +32,49 @@ _TOPICS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
     "distance_sensor": (("altitude", ("current_distance",)),),
 }
 _DOWNWARDS = 25
-_FAILURES = (TypeError, ValueError, KeyError, IndexError, struct.error, UnicodeDecodeError, OverflowError, EOFError)
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
     """Read a log of PX4, as specified by `LogFormat`; raise ImportLogError for another file."""
-    from pyulog import ULog
-    from pyulog.core import ULogException
-
-    try:
-        with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):  # it prints what is damaged
-            log = ULog(file, list(_TOPICS), True)
-    except (ULogException, *_FAILURES) as error:
-        raise ImportLogError(f"cannot be read as a ULog file: {error}") from error
-    contents.autopilot = "px4"
-    contents.parameters |= {name: float(value) for name, value in log.initial_parameters.items()}
-    contents.kind = kind_of(int(contents.parameters.get("MAV_TYPE", 0)))
-    names = {f"{data.name}[{data.multi_id}]" for data in log.data_list}
+    log = ULogMessages(path, frozenset(_TOPICS))
+    used: dict[tuple[str, str], list[str]] = {}
+    names = set()
     with np.errstate(invalid="ignore"):  # by signalling NaN of damaged samples
-        for data in log.data_list:
-            _take(data, contents, f"{data.name}[{data.multi_id}]")
-            moved(1.0)
-    for name in log.message_formats:
-        if name not in _TOPICS and not any(known.startswith(f"{name}[") for known in names):
-            contents.unread[name] += 1
+        for name, samples in log.blocks(moved):
+            names.add(name.split("[")[0])
+            _take(samples, contents, name, used)
+    contents.autopilot = "px4"
+    contents.parameters |= log.parameters
+    contents.kind = kind_of(int(contents.parameters.get("MAV_TYPE", 0)))
+    for name in log.formats - names - set(_TOPICS):
+        contents.unread[name] += 1
     if log.dropouts:
-        lost = sum(dropout.duration for dropout in log.dropouts) * 1e-3
-        contents.remarks.append(f"The log says that it lost data {len(log.dropouts)} times, {lost:.3g} s in all.")
-    if log.file_corruption:
+        contents.remarks.append(
+            f"The log says that it lost data {len(log.dropouts)} times, {sum(log.dropouts):.3g} s in all."
+        )
+    if log.is_damaged:
         contents.remarks.append("The file is damaged; what could be read of it is here.")
     contents.preferences |= {"rates": ("vehicle_angular_velocity[0]", "vehicle_attitude[0]")}
 
 
-def _take(data: Any, contents: LogContents, name: str) -> None:
-    """Add the samples of a topic to the contents."""
-    fields: dict[str, Array] = data.data
-    times = np.asarray(fields["timestamp"], float) * 1e-6
-    valid: NDArray[np.bool_] = np.ones(len(times), bool)
-    if data.name == "distance_sensor" and "orientation" in fields:
-        valid &= fields["orientation"] == _DOWNWARDS
-    for quantity, columns in _TOPICS[data.name]:
+def _take(samples: NDArray[Any], contents: LogContents, name: str, used: dict[tuple[str, str], list[str]]) -> None:
+    """Add samples of a topic to the contents; of outputs those that had a number first."""
+    fields = set(samples.dtype.names or ())
+    if "timestamp" not in fields:
+        return
+    if "orientation" in fields and name.startswith("distance_sensor"):
+        samples = samples[samples["orientation"] == _DOWNWARDS]
+    times = samples["timestamp"] * 1e-6
+    for quantity, columns in _TOPICS[name.split("[")[0]]:
         here = [column for column in columns if column in fields]
         if quantity in ("pulses", "effort"):
-            values = np.column_stack([np.asarray(fields[c], float) for c in here]) if here else np.empty((0, 0))
-            used = np.asarray(np.isfinite(values).any(axis=0)).tolist()
-            here = [column for column, is_used in zip(here, used, strict=True) if is_used]
+            here = used.get((name, quantity)) or [c for c in here if np.isfinite(samples[c].astype(float)).any()]
+            used[name, quantity] = here
         elif len(here) < len(columns):
             continue
-        if not here or not valid.any():
-            continue
-        values = np.column_stack([np.asarray(fields[column], float) for column in here])[valid]
-        source = contents.source(quantity, name, len(here))
-        source.put_many(times[valid], values)
+        if here and len(samples):
+            values = np.column_stack([samples[column].astype(float) for column in here])
+            contents.source(quantity, name, len(here)).put_many(times, values)
 
 
-FORMAT = LogFormat((".ulg",), read, needs=("pyulog>=1.0",))
+FORMAT = LogFormat((".ulg",), read)

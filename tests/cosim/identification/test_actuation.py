@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cosim.errors import IdentificationError
-from cosim.identification.actuation import CommandedForces
+from cosim.identification.actuation import CommandedForces, steady_forces
 from cosim.identification.log import Log
 from plant_fmu import Plant, load_vehicle
 
@@ -39,7 +39,7 @@ def test_wrench_matches_the_plant(vehicle):
         plant.set({"position.z": 5.0})
         plant.set({f"thrust[{i + 1}]": x for i, x in enumerate(log.thrust[0])})
         plant.set({f"wrench.{name}": x for name, x in zip("XYZKMN", log.wrench[0], strict=True)})
-        plant.set({f"actuator.thrust[{i + 1}]": x for i, x in enumerate(forces._forces[0, :8])})
+        plant.set({f"actuator.thrust[{i + 1}]": x for i, x in enumerate(steady_forces(log.thrust[:1], bent)[0])})
         plant.initialise()
         for k in range(10 * 20):
             row = int(k * STEP / 4 / 0.05 + 1e-9)

@@ -70,7 +70,7 @@ def test_slow_servo_data_are_named_where_no_window_is_left(tmp_path, capsys):
     log = import_log(LOGS / "small.tlog", "bluerov2_heavy", tmp_path / "small", report=False)
     assert main(["identify", str(log.folder), "--vehicle", "bluerov2_heavy", "--out", str(tmp_path / "a.toml")]) == 2
     said = capsys.readouterr().err
-    assert "the hull is at the surface" in said and "Commands of small, sampled at 2 Hz" in said
+    assert "the hull is at the surface" in said and "Servo outputs of small are logged at 2 Hz" in said
     assert "not added mass, lag or delays" in said
     assert not (tmp_path / "a.toml").exists()
 

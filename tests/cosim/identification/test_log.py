@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from cosim.errors import IdentificationError
-from cosim.identification.log import load_log
+from cosim.identification.log import _with_mean, load_log, make_topic
+from cosim.results.log_facts import TopicFacts
 from cosim.results.recorder import Recorder
 from cosim.simulation.signals import Column
 from plant_fmu import load_vehicle
@@ -102,3 +103,15 @@ def test_scenario_settings_that_alter_commands_are_rejected(tmp_path, scenario, 
     (folder / "scenario.toml").write_text(scenario)
     with pytest.raises(IdentificationError, match=message):
         load_log(folder, VEHICLE)
+
+
+@pytest.mark.parametrize(("source", "is_mean"), [("VISO", True), ("VISION_POSITION_DELTA", True), ("dvl.csv", False)])
+def test_displacements_of_a_dvl_are_means_of_their_interval(source, is_mean):
+    """The mean of a cubic velocity over the interval is that of two moments."""
+    times = 0.14 * np.arange(30)
+    topic = make_topic("velocity", times, np.zeros((30, 3)), 0.01)
+    fact = TopicFacts("dvl", source, 30, 7.0, 0.4, 0, (), 0, 0, 0, 0)
+    spread = _with_mean(topic, (fact,)).spread
+    cubic = np.polynomial.Polynomial([1.0, -2.0, 3.0, 4.0])
+    mean = (cubic.integ()(0.57) - cubic.integ()(0.43)) / 0.14
+    assert 0.5 * (cubic(0.5 - spread) + cubic(0.5 + spread)) == pytest.approx(mean if is_mean else cubic(0.5))

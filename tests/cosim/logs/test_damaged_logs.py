@@ -25,7 +25,6 @@ def logs(tmp_path_factory, six_thrusters):
     for name in ("small.BIN", "small.tlog"):
         suffix = "." + name.partition(".")[2]
         (folder / f"dive{suffix}").write_bytes((LOGS / name).read_bytes()[: HEADERS[suffix]])
-    pytest.importorskip("pyulog")
     pytest.importorskip("mcap_ros2")
     test_px4_logs.write_ulog(folder / "dive.ulg", dive)
     test_bags.write_bag(folder / "dive.mcap", dive)

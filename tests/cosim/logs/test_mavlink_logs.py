@@ -15,10 +15,13 @@ import cosim
 from cosim.errors import CosimError, ImportLogError
 from cosim.io.strict_json import json_text
 from cosim.logs.formats.dataflash import _Takers
+from cosim.logs.selection import select_topics
 from cosim.results.log_facts import load_log_facts
 from tests.cosim.logs.conftest import LOGS
 
 TLOG, DATAFLASH = LOGS / "small.tlog", LOGS / "small.BIN"
+
+FILTERED = {"rates": 1.0, "gyro": 1.0, "acceleration": 2.0}  # times the delay of the gyro's filter
 
 
 def messages_of(path, *kinds):
@@ -268,22 +271,30 @@ def test_rates_of_a_controller_that_rests_are_no_samples(contents):
     assert contents.sources["rates", "RATE"].count == 26 and contents.sources["attitude", "ATT"].count == 100
 
 
-def test_rates_are_stamped_where_the_gyro_filter_had_them(contents):
-    """A slow rotation through the Butterworth filter of SciPy comes as late as the stamps are moved back."""
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+def test_rates_are_stamped_where_the_gyro_filter_had_them(contents, tmp_path, autopilot):
+    """A slow rotation through the Butterworth filter of SciPy comes as late as the stamps are moved back.
+
+    Of a dataflash log as of telemetry, where the parameters may come after the samples.
+    """
     cutoff, rate = 20.0, 2000.0
     numerator, denominator = signal.butter(2, cutoff, fs=rate)
     _, late = signal.group_delay((numerator, denominator), w=[0.5], fs=rate)
-    takers = _Takers(contents)
-    takers.take("PARM", {"Name": "INS_GYRO_FILTER", "Value": cutoff})
-    zeros = dict.fromkeys(("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ"), 0.0)
-    takers.take("IMU", {"TimeUS": 2e6, "I": 0} | zeros)
-    takers.take("RATE", {"TimeUS": 2e6, "R": 1.0, "P": 0.0, "Y": 0.0})
-    for source in (("gyro", "IMU[0]"), ("rates", "RATE")):
-        assert next(contents.sources[source].blocks())[0, 1] == pytest.approx(2.0 - late[0] / rate, abs=5e-5)
-    assert next(contents.sources["acceleration", "IMU[0]"].blocks())[0, 1] == 2.0
-    takers.take("PARM", {"Name": "INS_ACCEL_FILTER", "Value": 0.5 * cutoff})
-    takers.take("IMU", {"TimeUS": 3e6, "I": 0} | zeros)
-    assert next(contents.sources["acceleration", "IMU[0]"].blocks())[1, 1] == pytest.approx(3.0 - 0.0225, abs=1e-5)
+    contents.autopilot = autopilot
+    for k in range(50):
+        for quantity, values in (("attitude", (1.0, 0.0, 0.0, 0.0)), *((q, (k, 0.0, 0.0)) for q in FILTERED)):
+            contents.put(quantity, "IMU", math.nan, 2.0 + 0.1 * k, [1e-2 * x for x in values])
+    contents.parameters |= {"INS_GYRO_FILTER": cutoff, "INS_ACCEL_FILTER": 0.5 * cutoff}
+    topics, _ = select_topics(contents, tmp_path)
+    is_filtered = autopilot == "ardupilot"
+    for quantity, size in FILTERED.items():
+        expected = 2.0 - (size * late[0] / rate if is_filtered else 0.0)
+        assert topics[quantity].start == pytest.approx(expected, abs=1e-4)
+    assert topics["attitude"].start == 2.0
+    assert not any("INS_GYRO_FILTER" in remark for remark in contents.remarks)
+    contents.parameters.clear()
+    select_topics(contents, tmp_path)
+    assert any("INS_GYRO_FILTER" in remark for remark in contents.remarks) == is_filtered
 
 
 def test_visual_odometry_is_the_mean_velocity_of_its_interval(contents):

@@ -1,15 +1,23 @@
 """Logs of PX4, read beside pyulog."""
 
+import contextlib
+import io
 import struct
+import tracemalloc
 
 import numpy as np
 import pytest
 
 import cosim
+from cosim.logs import ulog_messages
+from cosim.logs.ulog_messages import ULogMessages
 from cosim.results.log_facts import load_log_facts
 from tests.cosim.logs.dive import Dive, errors
 
 pyulog = pytest.importorskip("pyulog")
+
+SYNC = bytes.fromhex("2f731320250cbb12")
+TOPICS = frozenset({"vehicle_attitude", "vehicle_local_position", "actuator_motors", "battery_status"})
 
 
 @pytest.fixture(scope="module")
@@ -24,6 +32,8 @@ def write_ulog(path, dive):
         "vehicle_local_position": "uint64_t timestamp;float x;float y;float z;float vx;float vy;float vz;",
         "actuator_motors": "uint64_t timestamp;float[8] control;",
         "something_else": "uint64_t timestamp;float a;",
+        "battery_status": "uint64_t timestamp;cell[2] cells;float voltage_v;uint8_t warning;uint8_t[3] _padding0;",
+        "cell": "uint16_t charge;int32_t[2] raw;",
     }
 
     def message(kind, body):
@@ -36,7 +46,7 @@ def write_ulog(path, dive):
             file.write(message("F", f"{name}:{fields}".encode()))
         key = b"int32_t MAV_TYPE"
         file.write(message("P", bytes([len(key)]) + key + struct.pack("<i", 12)))
-        for number, name in enumerate(formats):
+        for number, name in enumerate(list(formats)[:-1]):
             file.write(message("A", struct.pack("<BH", 0, number) + name.encode()))
         for k, t in enumerate(dive.times):
             stamp = struct.pack("<Q", 5_000_000 + round(1e6 * t))
@@ -44,6 +54,10 @@ def write_ulog(path, dive):
             for number, values in enumerate(rows):
                 data = struct.pack("<H", number) + stamp + struct.pack(f"<{len(values)}f", *values)
                 file.write(message("D", data))
+            cells = struct.pack("<HiiHii", 1, 2, 3, 4, 5, k)
+            file.write(message("D", struct.pack("<H", 4) + stamp + cells + struct.pack("<fB", 15.0 + 0.01 * k, 1)))
+            if k % 50 == 0:
+                file.write(message("S", SYNC))
 
 
 def test_imported_px4_log_matches_the_dive(dive, tmp_path):
@@ -70,3 +84,83 @@ def test_truncated_px4_log_is_read_to_its_end(dive, tmp_path):
     path.write_bytes(data[: int(0.6 * len(data))])
     run = cosim.import_log(path, "bluerov2_heavy", tmp_path / "run", report=False)
     assert 15.0 < run.summary["simulated_time"] < 19.0
+
+
+def samples_of(path):
+    """All samples of the file's topics, as the reader and as pyulog have them."""
+    ours = {}
+    log = ULogMessages(path, TOPICS)
+    for name, block in log.blocks(lambda part: None):
+        ours.setdefault(name, []).append(block)
+    with contextlib.redirect_stdout(io.StringIO()):
+        read = pyulog.ULog(str(path), list(TOPICS))
+    return log, {name: np.concatenate(blocks) for name, blocks in ours.items()}, read
+
+
+def assert_equal_samples(ours, theirs):
+    assert set(ours) == {f"{data.name}[{data.multi_id}]" for data in theirs.data_list}
+    for data in theirs.data_list:
+        for field, values in data.data.items():
+            np.testing.assert_array_equal(ours[f"{data.name}[{data.multi_id}]"][field], values)
+
+
+def test_samples_are_those_of_pyulog(dive, tmp_path):
+    """Types in types, arrays, and padding at the end, block by block."""
+    write_ulog(tmp_path / "dive.ulg", dive)
+    log, ours, theirs = samples_of(tmp_path / "dive.ulg")
+    assert_equal_samples(ours, theirs)
+    assert log.parameters == {"MAV_TYPE": 12.0} == theirs.initial_parameters
+    assert not log.is_damaged and ours["battery_status[0]"]["cells[1].raw[1]"][-1] == len(dive.times) - 1
+
+
+def test_data_appended_after_a_crash_are_read(dive, tmp_path):
+    """The message that the crash cut ends where the appended data begin."""
+    path = tmp_path / "dive.ulg"
+    write_ulog(path, dive)
+    _, _, theirs = samples_of(path)
+    whole = path.read_bytes()
+    middle = whole.index(struct.pack("<HB", 8, ord("S")) + SYNC, len(whole) // 2)
+    data = bytearray(whole[:middle] + struct.pack("<HB", 100, ord("D")) + bytes(20) + whole[middle:])
+    data[16 + 3 + 8] = 1  # the flag of appended data
+    data[16 + 3 + 16 : 16 + 3 + 24] = struct.pack("<Q", middle + 23)
+    path.write_bytes(data)
+    log, ours, _ = samples_of(path)
+    assert_equal_samples(ours, theirs)
+    assert not log.is_damaged
+
+
+def test_reading_goes_on_behind_damage(dive, tmp_path):
+    path = tmp_path / "dive.ulg"
+    write_ulog(path, dive)
+    data = bytearray(path.read_bytes())
+    at = len(data) // 2
+    data[at : at + 300] = bytes(300)
+    path.write_bytes(data)
+    log, ours, theirs = samples_of(path)
+    assert log.is_damaged and theirs.file_corruption
+    for data in theirs.data_list:
+        found = ours[f"{data.name}[{data.multi_id}]"]
+        assert found["timestamp"][-1] == data.data["timestamp"][-1]
+        assert abs(len(found) - len(data.data["timestamp"])) < 60
+
+
+@pytest.mark.medium
+def test_memory_does_not_grow_with_the_log(dive, tmp_path, monkeypatch):
+    """Samples are given in blocks: a log of four times the length needs the same memory."""
+    monkeypatch.setattr(ulog_messages, "_CHUNK", 1 << 15)
+    monkeypatch.setattr(ulog_messages, "_BLOCK", 1 << 10)
+    path = tmp_path / "dive.ulg"
+    write_ulog(path, dive)
+    whole = path.read_bytes()
+    section = whole[whole.index(struct.pack("<HB", 8, ord("S")) + SYNC) :]
+
+    def peak(times):
+        path.write_bytes(whole + times * section)
+        tracemalloc.start()
+        for _ in ULogMessages(path, TOPICS).blocks(lambda part: None):
+            pass
+        found = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return found
+
+    assert peak(4) < 1.2 * peak(1)

@@ -1,0 +1,204 @@
+"""What sampled commands leave open: impulses between samples, as process noise that residuals are weighed by.
+
+A log that samples servo outputs does not say when within a period a thrust changed. The error of the impulse is of mean
+zero, independent between periods, and as large as the change times the period by the square root of 12, where a step
+may be at any time. It moves the vehicle through its lag and its equations, so that residuals of neighboring samples
+are correlated: they are weighed by the inverse root of that covariance (generalized least squares).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from cosim.identification.measurements import turn_tangent
+from cosim.identification.shooting import Motion
+
+Array = NDArray[np.float64]
+
+_BIN = 0.05  # s; errors of shorter periods are taken together
+_SHIFTED = 0.25, 0.5  # part of an error that goes from the first half to the second: of one period, of several
+_AROUND = 0.5  # s, to either side, over which squared changes are averaged
+_TAIL = 3.0  # time constants, after which an impulse has passed the lag
+_SIZES = np.concatenate([[0.0], np.geomspace(0.02, 10.0, 80)])  # of the errors, in those of steps at any time
+_LEAST = 1e-2  # of the noise's variance: smaller ones hardly change a weight
+
+
+@dataclass(frozen=True)
+class Impulses:
+    """Independent errors of the impulse that sampled commands leave open."""
+
+    begins: Array  # (bins,) s, since the first command
+    ends: Array  # (bins,) s
+    roots: Array  # (bins, 6, 6) N s, N m s: a root of each covariance
+    shifted: Array  # (bins,) part of each that goes from the first half to the second, independent of the whole
+
+
+@dataclass(frozen=True)
+class Whitener:
+    """Inverse root of a covariance: that of the noise, 1, with that of a few directions beside."""
+
+    directions: Array  # (rows, n) orthonormal
+    variances: Array  # (n,) beside that of the noise
+
+    def __call__(self, values: Array) -> Array:
+        """Return values, shape (rows,) or (rows, m), multiplied by the inverse root."""
+        less = 1.0 - 1.0 / np.sqrt(1.0 + self.variances)
+        result: Array = values - self.directions @ (
+            less[:, None] * (self.directions.T @ values.reshape(len(values), -1))
+        ).reshape(len(less), *values.shape[1:])
+        return result
+
+
+def open_impulses(times: Array, forces: Array, matrix: Array) -> Impulses:
+    """Return the errors of the impulse between samples of forces.
+
+    Parameters
+    ----------
+    times : ndarray, shape (n,)
+        Of the samples [s].
+    forces : ndarray, shape (n, m)
+        [N, N m].
+    matrix : ndarray, shape (6, m)
+        Their wrench.
+    """
+    periods = np.diff(times)
+    changes = np.diff(forces @ matrix.T, axis=0)
+    squares = changes[:, :, None] * changes[:, None, :]
+    near = 0.5 * (_mean_about(squares, 3) + _mean_about(squares, round(2.0 * _AROUND / float(np.median(periods)))))
+    covariances = near * np.square(periods)[:, None, None] / 12.0
+    group = np.floor((times[:-1] - times[0]) / _BIN + 1e-6).astype(int)
+    starts = np.flatnonzero(np.diff(group, prepend=-1))
+    sizes, axes = np.linalg.eigh(np.add.reduceat(covariances, starts, axis=0))
+    return Impulses(
+        times[starts], times[np.append(starts[1:], len(times) - 1)],
+        axes * np.sqrt(np.maximum(sizes, 0.0))[:, None, :],
+        np.where(np.diff(np.append(starts, len(group))) > 1, _SHIFTED[1], _SHIFTED[0]),
+    )  # fmt: skip
+
+
+def _mean_about(values: Array, count: int) -> Array:
+    """Return the mean of values about each, of `count` as far as there are."""
+    sums = np.cumsum(np.concatenate([np.zeros_like(values[:1]), values]), axis=0)
+    first = np.clip(np.arange(len(values)) - count // 2, 0, None)
+    last = np.minimum(np.arange(len(values)) + count // 2 + 1, len(values))
+    result: Array = (sums[last] - sums[first]) / (last - first)[:, None, None]
+    return result
+
+
+def start_by_impulse(motion: Motion, starts: Sequence[int], inverse_mass: Array) -> Array:
+    """Return the change of a start that an impulse at a later time is equal to from then on, shape (times, n, 6).
+
+    Parameters
+    ----------
+    motion : Motion
+        At these times; its first directions are the n starts.
+    starts : sequence of int
+        What a start may change: position 0 to 2, rotation 3 to 5, velocity 6 to 11.
+    inverse_mass : ndarray, shape (6, 6)
+        Of body and added mass.
+    """
+    n = len(starts)
+    flow = np.empty((len(motion.states), n, n))  # from the start to each time, along the starts' directions
+    for row, which in enumerate(starts):
+        if 3 <= which < 6:
+            turns = np.array([turn_tangent(q, which - 3) for q in motion.states[:, 3:7]])
+            flow[:, row] = 4.0 * np.einsum("kdq,kq->kd", motion.tangents[:, :n, 3:7], turns)
+        else:
+            flow[:, row] = motion.tangents[:, :n, which if which < 3 else which + 1]
+    pushed = np.zeros((n, 6))
+    pushed[list(starts).index(6) :] = inverse_mass
+    moved: Any = np.linalg.solve(flow, np.broadcast_to(pushed, (len(flow), n, 6)))
+    result: Array = moved
+    return result
+
+
+def response(impulses: Impulses, lag: float, step: float, begin: float, moved: Array, rows: Array, at: Array) -> Array:
+    """Return the residuals by each impulse, shape (rows, 6 bins).
+
+    Parameters
+    ----------
+    impulses : Impulses
+        Of the run.
+    lag : float
+        Time constant of the thrusters [s].
+    step : float
+        Of the window's grid [s].
+    begin : float
+        Of the window, since the first command [s].
+    moved : ndarray, shape (steps, n, 6)
+        Change of the window's start that an impulse in each step of the grid is equal to, from then on.
+    rows : ndarray, shape (rows, n)
+        Residuals by the start.
+    at : ndarray, shape (rows,)
+        Times of the residuals, since the window's begin [s].
+    """
+    steps = len(moved)
+    edges = begin + step * np.arange(steps + 1)
+    used = (impulses.ends > begin - _TAIL * lag - _BIN) & (impulses.begins < edges[-1])
+    before = int(np.ceil((_TAIL * lag + 2.0 * _BIN) / step))  # steps before the window
+    grid = begin + step * np.arange(-before, steps + 1)
+    k = np.clip(np.floor(at / step).astype(int), 0, steps - 1)
+    part = np.clip(at / step - k, 0.0, 1.0)
+    pole = float(np.exp(-step / lag)) if lag > 0.0 else 0.0
+    found = []
+    for b, e, root, shifted in zip(
+        *(x[used] for x in (impulses.begins, impulses.ends, impulses.roots, impulses.shifted)), strict=True
+    ):
+        halves = [_shares(grid, x, x + 0.5 * (e - b)) for x in (b, 0.5 * (b + e))]
+        for share in (0.5 * (halves[0] + halves[1]), shifted * (halves[0] - halves[1])):
+            lagged = np.asarray(lfilter([1.0 - pole], [1.0, -pole], share))[before:]
+            added = np.einsum("k,kni,ij->knj", lagged, moved, root)
+            total = np.cumsum(added, axis=0)
+            reached = total[k] - (1.0 - part)[:, None, None] * added[k]
+            found.append(np.einsum("rn,rnj->rj", rows, reached))
+    result: Array = np.concatenate(found, axis=1) if found else np.zeros((len(rows), 0))
+    return result
+
+
+def _shares(grid: Any, begin: float, end: float) -> Array:
+    """Return the part of a span that lies in each step of a grid."""
+    inside = np.minimum(grid[1:], end) - np.maximum(grid[:-1], begin)
+    result: Array = np.clip(inside, 0.0, None) / max(end - begin, 1e-9)
+    return result
+
+
+def whitener(by_impulse: Array, size: float) -> Whitener:
+    """Return the inverse root of the covariance of residuals under impulses of a size.
+
+    Parameters
+    ----------
+    by_impulse : ndarray, shape (rows, n)
+        Residuals by each impulse, as `response` has them.
+    size : float
+        Factor of all impulses.
+    """
+    variances, axes = np.linalg.eigh(size**2 * (by_impulse.T @ by_impulse))
+    kept = variances > _LEAST
+    directions = size * (by_impulse @ axes[:, kept]) / np.sqrt(variances[kept])
+    return Whitener(directions, variances[kept])
+
+
+def most_likely_size(residuals: Sequence[Array], by_impulses: Sequence[Array]) -> float:
+    """Return the factor of all impulses that explains residuals best; both without what the starts explain.
+
+    Parameters
+    ----------
+    residuals : sequence of ndarray, shape (rows,)
+        Of each window, in standard deviations.
+    by_impulses : sequence of ndarray, shape (rows, n)
+        Their derivatives by the impulses.
+    """
+    lost = np.zeros(len(_SIZES))
+    for residual, by in zip(residuals, by_impulses, strict=True):
+        variances, axes = np.linalg.eigh(by.T @ by)
+        kept = variances > _LEAST
+        squares = np.square((by @ axes[:, kept]).T @ residual) / variances[kept]
+        total = 1.0 + np.square(_SIZES)[:, None] * variances[kept]
+        lost += np.sum(np.log(total) + squares / total, axis=1)
+    return float(_SIZES[int(np.argmin(lost))])
