@@ -18,7 +18,9 @@ for (let y = 60; y < scene.canvas.clientHeight; y += 3) {
     if (scene.labels.nameAt(x, y)?.region === arguments[0]) return [x, y];
   }
 }"""
-VIEW = "const { azimuth, elevation, distance, target } = subreach.scene.camera; return [azimuth, elevation, distance, ...target]"
+VIEW = """
+const { azimuth, elevation, distance, target } = subreach.scene.camera;
+return [azimuth, elevation, distance, ...target]"""
 ALL_SEEN = """
 const { scene, runs } = subreach, { width, height, covered } = scene.camera;
 return runs.every((run) => [...run.time].every((t) => {
