@@ -1,4 +1,4 @@
-"""Add an interactive replay to the site if its WebAssembly can be built, and a link to it on the front page.
+"""Add an interactive replay to the site if its WebAssembly can be built, and show it on the front page.
 
 A hook of MkDocs (`hooks` in mkdocs.yml).
 """
@@ -15,16 +15,22 @@ from mkdocs.structure.pages import Page
 
 FRONT, NAME = "index.md", "fly.html"
 _WORDS = "drag its goal and walls, change the current, fail a thruster"
-_LINK = f'\n\n<a href="{NAME}"><b>Fly this docking run in your browser</b></a>: {_WORDS}.\n'
+# opened by the reader, as its scene takes the wheel
+_PAGE = f"""
+
+<details class="fly"><summary><b>Fly this docking run here</b>: {_WORDS}</summary>
+<iframe src="{NAME}" title="Docking, flown in this page" loading="lazy"></iframe>
+<a href="{NAME}">Open it as a page of its own</a></details>
+"""
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Add the link below the first picture."""
+    """Add the page below the first picture."""
     del config, files
     if page.file.src_uri != FRONT or not _can_build():
         return markdown
     above, picture, below = markdown.partition("](images/replay-docking.png)")
-    return above + picture + _LINK + below
+    return above + picture + _PAGE + below
 
 
 def on_post_build(config: MkDocsConfig) -> None:

@@ -126,7 +126,7 @@ class Vehicle:
     (8, 125.0)
     """
 
-    name: str  # a C identifier
+    name: str  # a C identifier, once its hyphens are underscores
     title: str  # one line for people
     source: str  # where the numbers come from
     mass: float  # kg
@@ -244,8 +244,8 @@ def _check(file: _File, where: str) -> Vehicle:
         return np.diag(np.array(value)) if widths == {0} else np.array(value, dtype=float)
 
     body, statics, dynamics, thrusters = file.rigid_body, file.hydrostatics, file.hydrodynamics, file.thrusters
-    good_name = file.name.isidentifier() and file.name.isascii() and len(file.name) <= 64
-    require(good_name, "name", repr(file.name[:80]), "at most 64 letters, digits and _, the first no digit")
+    good_name = re.fullmatch("[A-Za-z_][A-Za-z0-9_-]{0,63}", file.name) is not None
+    require(good_name, "name", repr(file.name[:80]), "at most 64 letters, digits, _ and -, the first a letter or _")
     require(not _RESERVED.fullmatch(file.name), "name", repr(file.name), "a word that neither C nor Windows reserves")
     require(file.title.isprintable(), "title", repr(file.title), "one line of printable characters")
     odd = next((c for c in " ".join(file.source.split()) if not c.isprintable()), "")

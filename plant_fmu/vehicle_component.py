@@ -51,7 +51,7 @@ def of_vehicle(
     if start is not None:
         rows = _started(rows, start)
     return Component(
-        name=vehicle.name,
+        name=vehicle.name.replace("-", "_"),  # as FMI's model identifier begins names in C
         description=f"Underwater vehicle, six degrees of freedom: {vehicle.title}",
         variables=rows,
         sources=plant_sources(),

@@ -11,6 +11,7 @@ from cosim.simulation.signals import Array
 
 RESTS_ON = ("goal.clearance", "velocity.u", "velocity.v", "velocity.w")  # signals that `rests` needs
 _SLOW = 0.02  # m/s over ground
+_ASKS = 0.005  # weight below which a criterion is not active: it is shown as 0.00
 _LEADS = 0.5  # weight from which a criterion is active even if the vehicle rests in the goal
 
 
@@ -39,8 +40,8 @@ def active_regions(
     """Return the active region of each row.
 
     It is the most critical region, that of the least clearance, of the criterion with the greatest weight. It is the
-    goal if the membership of that criterion is 0; also if the vehicle rests in the goal region, the criterion weighs
-    less than 0.5, and its region is satisfied.
+    goal if the membership of that criterion is 0, or its weight below 0.005; also if the vehicle rests in the goal
+    region, the criterion weighs less than 0.5, and its region is satisfied.
 
     Parameters
     ----------
@@ -65,6 +66,7 @@ def active_regions(
         return np.zeros(len(rows))
     belongs = of[None, :] == criterion[:, None]
     critical = np.where(belongs & ~np.isnan(clearances), clearances, np.inf)
-    asked = (memberships[rows, criterion] > 0.0) & np.isfinite(critical).any(axis=1)
+    asked = (memberships[rows, criterion] > 0.0) & (weights[rows, criterion] >= _ASKS)
+    asked &= np.isfinite(critical).any(axis=1)
     asked &= ~resting | (weights[rows, criterion] >= _LEADS) | (critical.min(axis=1) < 0.0)
     return np.where(asked, np.argmin(critical, axis=1) + 1, 0).astype(float)

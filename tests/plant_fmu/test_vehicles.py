@@ -3,11 +3,12 @@
 import dataclasses
 from importlib import resources
 
+import fmpy.validation
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from plant_fmu import load_vehicle, shipped_vehicles
+from plant_fmu import build_fmu, load_vehicle, shipped_vehicles
 from plant_fmu.build import neutral_members
 from plant_fmu.errors import TableError, VehicleError
 from tests.plant_fmu.test_build import written
@@ -143,7 +144,19 @@ def test_rexrov_thrusters_match_uuv_simulator():
     np.testing.assert_allclose(vehicle.thruster_matrix[:, 0] * [1, -1, -1, 1, -1, -1], manager, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["3odin", "", "a" * 65, "int", "Con", "my boat", "bötchen", "../x"])
+@pytest.mark.medium
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_vehicle_names_may_have_hyphens(tmp_path, fmi):
+    fmu = build_fmu(
+        load_vehicle(written(tmp_path, ('name = "odin"', 'name = "my-rov-2"'))), fmi, tmp_path / "my-rov-2.fmu"
+    )
+    assert fmpy.read_model_description(fmu).coSimulation.modelIdentifier == "my_rov_2"  # as FMI wants it
+    assert fmpy.validation.validate_fmu(fmu) == []
+    result = fmpy.simulate_fmu(fmu, stop_time=0.1, start_values={"wrench.X": 20.0}, output=["velocity.u"])
+    assert result["velocity.u"][-1] > 0.005
+
+
+@pytest.mark.parametrize("name", ["3odin", "-odin", "", "a" * 65, "int", "Con", "my boat", "bötchen", "../x"])
 def test_invalid_vehicle_names_are_rejected(tmp_path, name):
     with pytest.raises(VehicleError, match=r"^\S+boat.toml: name is '.*', expected ") as caught:
         load_vehicle(written(tmp_path, ('name = "odin"', f'name = "{name}"')))

@@ -2,6 +2,7 @@
 
 const HALF_VIEW = (24 * Math.PI) / 180; // rad, half of the angle of view across the picture's diagonal
 const STEEPEST = Math.PI / 2;
+const NEARER = 0.8; // share of the distance at which refit() comes nearer to content that has shrunk
 
 /** Perspective camera that orbits a target. Several scenes may share one. */
 class Camera {
@@ -103,11 +104,37 @@ class Camera {
     this.fitted = true;
   }
 
+  /** Frame content that has changed, if the view is as fit() left it; a view that shows it well stays as it is. */
+  refit() {
+    if (!this.fitted) return;
+    const { target, distance } = this;
+    const shown = this._showsAll();
+    this._fit();
+    if (shown && this.distance > NEARER * distance) Object.assign(this, { target, distance });
+    this._changed();
+    this.fitted = true;
+  }
+
+  /** Return true if all content is in the picture, and not behind an overlay. */
+  _showsAll() {
+    const { side, top, bottom } = this._margins();
+    const [left, right] = [0.5 * side, this.width - this.covered - 0.5 * side];
+    const [high, low] = [0.5 * top, this.height - 0.5 * bottom];
+    return this.content.every((p) => {
+      const [x, y, depth] = this.project(p);
+      return depth > this.near && x > left && x < right && y > high && y < low;
+    });
+  }
+
+  /** Return the widths of the picture's edges that fit() leaves empty [CSS pixels]; buttons are at the top. */
+  _margins() {
+    return { side: Math.min(36, 0.08 * this.width), top: Math.min(50, 0.16 * this.height), bottom: Math.min(28, 0.1 * this.height) };
+  }
+
   _fit() {
     this._update();
     if (!this.content.length) return;
-    const side = Math.min(36, 0.08 * this.width);
-    const [top, bottom] = [Math.min(50, 0.16 * this.height), Math.min(28, 0.1 * this.height)]; // buttons are at the top
+    const { side, top, bottom } = this._margins();
     const tangent = (size, margin) => (0.5 * size - margin) / this.focal;
     const across = this._bounded(this.right, tangent(this.width, side), tangent(this.width, side + this.covered));
     const upright = this._bounded(this.up, tangent(this.height, bottom), tangent(this.height, top));

@@ -126,6 +126,7 @@ function signalOf(data, [kind, ...rest], number, header) {
   return kind === "active" ? () => 0 : number(kind, rest[0]);
 }
 
+const ASKS = 0.005; // least weight of an active criterion: less is shown as 0.00
 const LEADS = 0.5; // least weight with which a criterion leads while the vehicle rests in the goal
 
 /** Return the active region of each row, as in cosim/replay/activity.py. */
@@ -143,7 +144,7 @@ function activeRegions(run, criteria) {
       const gap = clearances[i + 1][row];
       if (of === leads && !Number.isNaN(gap) && !(region && gap >= clearances[region][row])) region = i + 1;
     });
-    if (!region || !(memberships[leads][row] > 0)) return 0;
+    if (!region || !(memberships[leads][row] > 0 && weights[leads][row] >= ASKS)) return 0;
     const rests = clearances[0][row] >= 0 && Math.hypot(...speeds.map((speed) => speed[row])) < 0.02;
     return rests && weights[leads][row] < LEADS && clearances[region][row] >= 0 ? 0 : region;
   });

@@ -30,10 +30,8 @@ class Page {
     return this.runs[this.selected];
   }
 
-  /** Replace the runs; with `same` (the same scenario), keep cursor and camera. */
+  /** Replace the runs; with `same` (the same scenario), keep cursor, window of time and view. */
   async show(all, same = false) {
-    const { t } = this.player;
-    const { azimuth, elevation, distance, target, fitted } = this.scene()?.camera ?? {};
     const runs = all.filter(timed);
     if (runs.length < all.length) {
       const names = runNames(all).filter((_, i) => !timed(all[i]));
@@ -42,27 +40,21 @@ class Page {
     this.runs = runs;
     this.shown = runs.map(() => true);
     this.selected = 0;
-    this.player.setRuns(runs);
+    if (same) this.player.replaceRuns(runs);
+    else this.player.setRuns(runs);
     this.stage.side &&= runs.length > 1;
     document.getElementById("side").hidden = runs.length < 2;
-    this._laid();
-    this.board.window = null;
+    this._laid(same);
+    if (!same) this.board.window = null;
     this.board.setRuns(runs, this.shown, this.selected);
-    if (same) {
-      this.player.seek(t);
-      if (this.scene() && !fitted) {
-        Object.assign(this.scene().camera, { azimuth, elevation, distance });
-        this.scene().camera.aim(target);
-      }
-    }
     this.paint();
   }
 
-  /** Replace the runs by as many of the same scenario; keep cursor and camera. */
+  /** Replace the runs by as many of the same scenario: also keep which are shown, and which is selected. */
   replace(runs) {
     this.runs = runs;
     this.player.replaceRuns(runs);
-    this.stage.replaceRuns(runs);
+    this.stage.setRuns(runs, this.shown, true);
     this._select();
     this.board.setRuns(runs, this.shown, this.selected);
     this.later();
@@ -164,9 +156,10 @@ class Page {
     if (!player.playing && !player.live) this._quiet = setTimeout(() => this._announce(), 900);
   }
 
-  _laid() {
+  /** Lay out the scenes; `same` as for show(). */
+  _laid(same) {
     document.body.classList.toggle("bare", !this.runs.length);
-    this.stage.setRuns(this.runs, this.shown);
+    this.stage.setRuns(this.runs, this.shown, same);
     let reason = "There is nothing to draw: no run has a row with a pose.";
     if (this.stage.scene) reason = "";
     else if (this.runs.some((run, i) => drawable(run) && !this.shown[i])) reason = "Every run is hidden.";

@@ -1,8 +1,8 @@
 // Side panel: state of the selected run at the cursor, as text and bars.
 
-/** Return the CSS color of a hue: a variable of the page, or "#rrggbb" itself. */
+/** Return the CSS color of a hue: a variable of the page, or "#rrggbb" as it is legible in the page's theme. */
 function cssHue(hue) {
-  return hue.startsWith("#") ? hue : `var(--${hue})`;
+  return hue.startsWith("#") ? legible(hue, document.documentElement.dataset.theme) : `var(--${hue})`;
 }
 
 /** Set the shape and color of a mark to those of a region's criterion; without a region clear them. */

@@ -112,10 +112,16 @@ function nearestFirst(entries, runs, t) {
     .map(([, entry]) => entry);
 }
 
-/** Add the labels of regions; the active one is marked, and only the nearest keep-out regions are labeled. */
+/**
+ * Add the labels of regions; the active one is marked, and only the nearest keep-out regions are labeled.
+ * A region that has another place in each run is labeled with the run too.
+ */
 function nameRegions(labels, camera, entries, colours, runs, t) {
   for (const entry of entries) if (!entry.region.criterion && entry.solid) blockGoal(labels, camera, entry);
   const named = new Set();
+  const names = runNames(runs);
+  const isTwice = ({ of, region }) => entries.some((other) => other.of.run !== of.run && other.region.name === region.name);
+  const nameOf = (entry) => (entry.solid && isTwice(entry) ? `${entry.region.name}, ${names[entry.of.run]}` : entry.region.name);
   const near = new Map(nearestFirst(entries, runs, t).map((entry, place) => [entry, place]));
   for (const entry of entries) {
     const key = `${entry.of.run}:${entry.of.region}`;
@@ -128,7 +134,7 @@ function nameRegions(labels, camera, entries, colours, runs, t) {
     if (place >= NAMED_IN_SCENE && !active) continue;
     labels.add({
       key, x, y, gap: 6, of: entry.of, size: camera.width < 480 && !active ? 10 : 12,
-      text: active ? `▶ ${entry.region.name}` : entry.region.name,
+      text: active ? `▶ ${nameOf(entry)}` : nameOf(entry),
       colour: active ? colours.ink : colours.soft, edge: entry.colour, bold: active, chip: colours.chip,
       rank: active ? 0 : entry.of.region === 0 ? 1 : 10 + place, far: active || entry.of.region === 0,
       sides: ["above", "right", "left", "below"],

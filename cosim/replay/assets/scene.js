@@ -14,11 +14,13 @@ class Scene {
     this.labels = new Labels(this.context);
     this.theme = theme;
     this._last = null; // time and options of the last frame
+    this._followed = null; // where the followed vehicle was in it [m, NED]
     this._redraw = () => this._later();
     this.camera = new Camera();
     controlCamera(canvas, () => this.camera);
     this.resize();
     this.setRuns(runs, marks);
+    this.camera.look("iso");
   }
 
   /** Return the camera; scenes side by side share one. */
@@ -41,7 +43,7 @@ class Scene {
   }
 
   /**
-   * Show other runs and frame all of them.
+   * Show other runs; the camera stays.
    * @param {Run[]} runs
    * @param {{name: string, colour: string}[]|null} marks of the runs; null: default marks for several runs, none for one,
    * whose path then has the colors of the active regions
@@ -54,20 +56,7 @@ class Scene {
     this._forces = runs.map((run) => new Forces(run));
     this._regions = new Regions(runs);
     this._drawn = { time: 0, runs: [] };
-    this._followed = null;
     this._measure();
-    this.camera.look("iso");
-  }
-
-  /** Replace the runs by as many others; keep the camera. */
-  replaceRuns(runs) {
-    this.runs = runs;
-    this._trails = runs.map((run) => new Trail(run));
-    this._forces = runs.map((run) => new Forces(run));
-    this._regions = new Regions(runs);
-    const { target, distance, fitted } = this.camera;
-    this._measure();
-    Object.assign(this.camera, { target, distance, fitted });
     this._later();
   }
 

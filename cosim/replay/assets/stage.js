@@ -32,9 +32,13 @@ class Stage {
     return this.views.filter((view) => !view.blank).map((view) => view.scene);
   }
 
-  /** @param {Run[]} runs all runs  @param {boolean[]} shown visible runs */
-  setRuns(runs, shown) {
-    const same = runs === this.runs;
+  /**
+   * Show runs.
+   * @param {Run[]} runs all runs  @param {boolean[]} shown visible runs
+   * @param {boolean} same true for runs of the scenario that is shown: the view stays, as far as they are in the picture
+   */
+  setRuns(runs, shown, same = runs === this.runs) {
+    const kept = same && this.scene;
     this.runs = runs;
     this.shown = shown;
     const names = runNames(runs);
@@ -44,7 +48,6 @@ class Stage {
     while (this.views.length > groups.length) this.views.pop().element.remove();
     while (this.views.length < groups.length) this.views.push(this._view(this._another()));
     const content = [];
-    const looks = this.scene && same ? { azimuth: this.scene.camera.azimuth, elevation: this.scene.camera.elevation } : {};
     groups.forEach((group, i) => {
       const view = this.views[i];
       view.indices = group.map(({ index }) => index);
@@ -69,14 +72,9 @@ class Stage {
     this.canvas.hidden = !this.scene;
     this.resize();
     if (!this.scene) return;
-    Object.assign(this.scene.camera, { content, ...looks }); // the shared camera frames the content of all scenes
-    this.scene.camera.fit();
-  }
-
-  /** Replace the runs by as many others; keep the cameras. */
-  replaceRuns(runs) {
-    this.runs = runs;
-    for (const { blank, scene, indices } of this.views) if (!blank) scene.replaceRuns(indices.map((index) => runs[index]));
+    this.scene.camera.content = content; // the shared camera frames the content of all scenes
+    if (kept) this.camera("refit");
+    else this.camera("look", "iso");
     this.changed();
   }
 

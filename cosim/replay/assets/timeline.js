@@ -54,7 +54,7 @@ class Timeline {
   /** Move the cursor. */
   point() {
     const { t, end, playing, live } = this.player;
-    const part = this.axis.x(t);
+    const part = Math.min(1, Math.max(0, this.axis.x(t))); // the axis of a live run is a little behind its cursor
     this.input.value = part;
     setText(this.clock, `${clock(t)} / ${clock(end, 1)}`);
     // screen readers announce it only when the cursor rests

@@ -64,7 +64,7 @@ def active_of(header, columns, row):
             clearance = columns[f"{region['name']}.clearance"][row]
             if pressing is None or clearance < pressing[0]:
                 pressing = (clearance, i)
-    if not pressing or not columns[f"membership.{strongest}"][row] > 0:
+    if not pressing or not columns[f"membership.{strongest}"][row] > 0 or max(weights) < 0.005:
         return 0
     speed = math.hypot(*(columns[f"velocity.{axis}"][row] for axis in "uvw"))
     rests = columns["goal.clearance"][row] >= 0 and speed < 0.02 and max(weights) < 0.5 and pressing[0] >= 0

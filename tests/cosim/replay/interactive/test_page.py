@@ -18,6 +18,15 @@ for (let y = 60; y < scene.canvas.clientHeight; y += 3) {
     if (scene.labels.nameAt(x, y)?.region === arguments[0]) return [x, y];
   }
 }"""
+VIEW = """
+const { azimuth, elevation, distance, target } = subreach.scene.camera;
+return [azimuth, elevation, distance, ...target]"""
+ALL_SEEN = """
+const { scene, runs } = subreach, { width, height, covered } = scene.camera;
+return runs.every((run) => [...run.time].every((t) => {
+  const [x, y] = scene.project(run.pose(t).position);
+  return x > 0 && x < width - covered && y > 0 && y < height;
+}))"""
 OVERLAP = """
 const groups = document.querySelectorAll("#scene-bar .group");
 const boxes = [...groups, document.getElementById("commands")].map((e) => e.getBoundingClientRect());
@@ -93,6 +102,29 @@ def test_dragged_goal_is_simulated_and_r_resets(browser, page):
     browser.press("r")
     wait_until(browser, "subreach.runs.length === 1")
     assert not browser.js("return subreach.whatIf.changed")
+
+
+def test_view_follows_the_flight_until_the_reader_turns_it(browser, page):
+    opened(browser, page)
+    browser.press("2")
+    above = browser.js(VIEW)
+
+    def fly(key, value):
+        browser.js("subreach.whatIf.took = null; subreach.whatIf.set(...arguments)", key, value)
+        wait_until(browser, FLOWN)
+        return browser.js(VIEW)
+
+    near = fly("plant.current.1", 0.102)
+    assert fly("plant.current.1", 0.104) == near  # which shows all
+    for key, value in (("goal.centre.0", 20.0), ("goal.centre.1", -15.0)):
+        far = fly(key, value)
+        assert far[:2] == above[:2] and far[2] > 1.2 * near[2] and browser.js(ALL_SEEN)
+    browser.press("r")
+    wait_until(browser, "subreach.runs.length === 1")
+    assert browser.js(VIEW) == pytest.approx(above)
+    browser.js("subreach.scene.camera.orbit(30, 20)")
+    turned = browser.js(VIEW)
+    assert fly("goal.centre.0", 20.0) == fly("goal.centre.0", 25.0) == turned
 
 
 def test_page_is_operable_by_keyboard(browser, page):
