@@ -3,6 +3,9 @@
 It plans every `PERIOD` by `benchmarks.peers.casadi_nmpc`, in the peers' environment, with the observer of `pid_cbf`;
 the forces hold until the next plan. The time that a plan takes is measured, and not part of the simulation.
 
+It is given the lag of the thrusters, which the laws are not: the observer gets the forces behind it, and a plan begins
+at the state that they lead to.
+
 Spheres and bands of depth are constraints as they are. Of every other region it knows the tangent plane nearest to
 where the plan before is at each stage.
 """
@@ -11,6 +14,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -35,7 +39,7 @@ _OBSERVE, _ROTATION = CompiledFunction(observe), CompiledFunction(write_rotation
 
 
 class NmpcGains(NamedTuple):
-    """Numbers of the controller; all but the last four are what `benchmarks.nmpc_search` found."""
+    """Numbers of the controller; all but the last five are what `benchmarks.nmpc_search` found."""
 
     stages: float = 12.0
     interval: float = 0.3627  # s, of a stage
@@ -48,6 +52,7 @@ class NmpcGains(NamedTuple):
     w_s: float = 100.0  # 1/m, of the depth within soft regions
     k_p2: float = 4.5  # 1/s2, section VII for the inertia of ODIN
     k_v2: float = 5.0  # 1/s, the same
+    lag: float = 0.0  # s, of the thrusters
 
 
 class _Step:
@@ -72,7 +77,8 @@ class _Step:
         _OBSERVE(observer.memory, state, memory.R, observer.gains)
         if memory.steps[0] % memory.plan_every == 0:
             forces[:] = self._plan(state, goal, regions, gains, memory)
-            observer.memory.thrusters.forces[:] = forces
+        given = observer.memory.thrusters.forces  # by the thrusters, behind their lag
+        given += (1.0 - memory.left) * (forces - given)
         memory.steps[0] += 1
 
     def _plan(
@@ -81,19 +87,26 @@ class _Step:
         known, again = memory.observer.memory, memory.steps[0] == 0
         if again:
             memory.path[:] = known.position
-        inertia = known.dynamics.mass[3:, 3:]
-        error = np.array(error_parts(known.desired_quaternion, state.quaternion)[1:])
-        lost = inertia @ known.disturbance[3:]
-        turning = inertia @ (gains.k_p2 * error + gains.k_v2 * known.velocity[3:])
+        mass, R, lag, velocity = known.dynamics.mass, memory.R, gains.lag, known.velocity
+        inertia, body = mass[3:, 3:], R.T @ velocity[:3]
+        lost = inertia @ known.disturbance[3:] - np.cross(body, mass[:3, :3] @ body)  # Munk moment
+        # the state a lag later, by the forces that the thrusters give
+        wrench = np.array(memory.vehicle["thrusters"]) @ known.thrusters.forces
+        drag = (memory.vehicle["linear"] + memory.vehicle["quadratic"] * np.abs(body)) * body
+        later = velocity + lag * known.disturbance
+        later[:3] += lag * R @ np.linalg.solve(mass[:3, :3], wrench[:3] - drag)
+        later[3:] += lag * np.linalg.solve(inertia, wrench[3:] + lost - inertia @ known.disturbance[3:])
+        error = np.array(error_parts(known.desired_quaternion, state.quaternion)[1:]) + 0.5 * lag * velocity[3:]
+        turning = inertia @ (gains.k_p2 * error + gains.k_v2 * later[3:])
         first = goal.offsets[0]
         given = {
-            "position": known.position.tolist(),
-            "velocity": known.velocity[:3].tolist(),
-            "R": memory.R.tolist(),
+            "position": (known.position + lag * velocity[:3]).tolist(),
+            "velocity": later[:3].tolist(),
+            "R": R.tolist(),
             "disturbance": known.disturbance[:3].tolist(),
             "moment": (-turning - lost).tolist(),
             "hold": (-lost).tolist(),
-            "goal": (goal.numbers[first : first + 3] + goal.shifts[0]).tolist(),
+            "goal": (goal.numbers[first : first + 3] + goal.shifts[0] + lag * goal.velocities[0]).tolist(),
             "goal_velocity": goal.velocities[0].tolist(),
             "weights": gains._asdict(),
             "again": again,
@@ -161,6 +174,7 @@ class _Memory(NamedTuple):
     path: Array  # (stages, 3) m, where the vehicle is expected at each stage of the next plan
     vehicle: dict[str, Any]  # for the planner
     plan_every: int
+    left: float  # share of a step of the commands that the thrusters do not follow within a period
     steps: list[int]
 
 
@@ -190,6 +204,7 @@ class NmpcLaw(CompiledLaw):
             path=np.zeros((round(gains.stages), 3)),
             vehicle=_plain(vehicle),
             plan_every=max(round(PERIOD / period), 1),
+            left=math.exp(-period / gains.lag) if gains.lag > 0.0 else 0.0,
             steps=[0],
         )
         return law
@@ -199,6 +214,7 @@ def _plain(vehicle: VehicleModel) -> dict[str, Any]:
     """Return the vehicle as the planner receives it."""
     return {
         "mass": (vehicle.rigid_mass + vehicle.added_mass)[:3, :3].tolist(),
+        "inertia": np.diag(vehicle.rigid_mass + vehicle.added_mass)[3:].tolist(),
         "linear": vehicle.linear_damping[:3].tolist(),
         "quadratic": vehicle.quadratic_damping[:3].tolist(),
         "thrusters": vehicle.thruster_matrix.tolist(),

@@ -24,6 +24,7 @@ from cosim.campaigns.scenes.flyer import SceneFlyer, Score
 from cosim.campaigns.scenes.generator import MAKERS
 from cosim.campaigns.scenes.scenario_scene import ScenarioScene
 from cosim.campaigns.scenes.scene import Scene
+from plant_fmu.vehicle import load_vehicle
 
 FLOWN = (*KINDS, "conflict")  # kinds of scenes
 COUNT = 100  # scenes of a kind
@@ -86,7 +87,8 @@ class Flights:
         NmpcLaw.function.failures = 0
         form: Any = Scene if kind in KINDS else ScenarioScene
         scene = msgspec.convert(MAKERS[kind](seed), form)
-        with SceneFlyer("nmpc", Conditions(duration=duration), gains) as flyer:
+        lag = _lag(scene) if isinstance(scene, ScenarioScene) else 0.0
+        with SceneFlyer("nmpc", Conditions(duration=duration), gains._replace(lag=lag)) as flyer:
             score, _ = flyer.fly(scene)
         flight = Flight(score, [round(1e3 * t, 2) for t in NmpcLaw.function.times], NmpcLaw.function.failures)
         self._known[key] = flight
@@ -98,6 +100,13 @@ class Flights:
     def close(self) -> None:
         """End the planners."""
         self._planners.close()
+
+
+def _lag(scene: ScenarioScene) -> float:
+    """Return the lag of the first thruster [s]."""
+    parameters = scene.scenario["plant"]["parameters"]
+    file = load_vehicle(scene.scenario["vehicle"]).thrust_time_constant
+    return float(parameters.get("thrust_time_constant[1]", file[0]))
 
 
 def _key(what: dict[str, Any]) -> str:

@@ -6,15 +6,19 @@ import math
 import msgspec
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from benchmarks import nmpc, nmpc_search
 from benchmarks.__main__ import main
 from controller import LAWS
 from controller.regions import Box, DepthBand, HalfSpace, Region, Sphere, pack
 from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.conflicts import make_conflict
 from cosim.campaigns.scenes.flyer import SceneFlyer
 from cosim.campaigns.scenes.generator import make_scene
+from cosim.campaigns.scenes.scenario_scene import ScenarioScene
 from cosim.campaigns.scenes.scene import Scene
+from plant_fmu.vehicle import load_vehicle
 
 
 class Planner:
@@ -83,6 +87,72 @@ def test_observer_estimates_the_vertical_force(monkeypatch, flown):
     mass = 187.5
     disturbance = planner.given[-1]["disturbance"][2] * mass
     assert disturbance == pytest.approx(scene.weight_minus_buoyancy, abs=0.25 * abs(scene.weight_minus_buoyancy) + 1.0)
+
+
+class Diver:
+    """Commands the same forces in every plan, forward and down, and keeps what it was given."""
+
+    def __init__(self, forces):
+        self.forces, self.given = forces, []
+
+    def exchange(self, line):
+        self.given.append(json.loads(line))
+        return {"forces": self.forces, "success": True, "path": [[0.0, 0.0, 4.0]] * 12, "seconds": 0.001}
+
+
+@pytest.mark.medium
+def test_lag_and_munk_moment_are_compensated_as_the_plant_has_them(monkeypatch):
+    lag, vehicle = 0.15, load_vehicle("bluerov2_heavy")
+    planner = Diver([10.0, 10.0, -10.0, -10.0, -11.0, -11.0, -1.0, -1.0])  # without a moment
+    monkeypatch.setitem(LAWS, "nmpc", nmpc.NmpcLaw)
+    monkeypatch.setattr(nmpc.NmpcLaw.function, "process", planner)
+    table = make_conflict(630005)["scenario"]
+    assert table["vehicle"] == vehicle.name and table["plant"]["parameters"]["thrust_time_constant[1]"] == lag
+    table |= {"sensing": {}, "regions": table["regions"][:1], "time": table["time"] | {"duration": 1.5}}
+    table["plant"] |= {"current": [0.0, 0.0, 0.0]}
+    table["plant"]["parameters"]["buoyancy"] = vehicle.buoyancy
+    scene = ScenarioScene(1, "mine", table)
+    with SceneFlyer("nmpc", Conditions(), nmpc.NmpcGains(lag=lag)) as flyer:
+        _, trace = flyer.fly(scene, trace=True)
+    assert len(planner.given) == 15
+    early = int(lag / 0.02)  # control steps
+    for i in (6, 9, 12):
+        given, later = planner.given[i], (trace[5 * i + early] + trace[5 * i + early + 1]) / 2.0
+
+        assert given["position"] == pytest.approx(later[1:4], abs=0.02)
+        R = np.array(given["R"])
+        assert given["velocity"] == pytest.approx(R @ later[8:11], abs=0.06)
+    now, given = trace[60], planner.given[12]
+    surge, heave, pitch_rate = now[8], now[10], now[12]
+    assert surge > 0.3 and heave > 0.15 and abs(pitch_rate) > 0.05  # no one controls the attitude here
+    munk = (vehicle.mass_matrix[0, 0] - vehicle.mass_matrix[2, 2]) * surge * heave  # Fossen (2011), section 6.3
+    assert given["hold"][1] == pytest.approx(munk, rel=0.3)  # the observer comes late
+
+
+@pytest.mark.parametrize(("vehicle", "error", "at_last"), [("odin", 0.02, 0.02), ("bluerov2_heavy", 0.9, 0.01)])
+def test_plans_predict_drag_as_an_integrator_does(vehicle, error, at_last):
+    ca = pytest.importorskip("casadi")
+    from benchmarks.peers import casadi_nmpc
+
+    file, interval = load_vehicle(vehicle), nmpc.NmpcGains().interval
+    mass, linear, quadratic = np.diag(file.mass_matrix)[:3], file.linear_damping[:3], file.quadratic_damping[:3]
+    push, disturbance = np.array([100.0, 20.0, -30.0]), np.array([0.1, -0.2, 0.3])
+    u = np.linalg.pinv(file.thruster_matrix) @ [*push, 0.0, 0.0, 0.0]
+    known = {
+        "R": np.eye(3), "interval": interval, "B": file.thruster_matrix, "inverse": np.diag(1.0 / mass),
+        "linear": linear, "quadratic": quadratic, "disturbance": disturbance,
+    }  # fmt: skip
+    known = {name: ca.DM(np.asarray(value)) for name, value in known.items()}
+
+    def rates(_, x):
+        return [*x[3:], *((push - (linear + quadratic * np.abs(x[3:])) * x[3:]) / mass + disturbance)]
+
+    x = exact = np.array([0.0, 0.0, 4.0, 0.0, 0.3, 1.0])
+    for _ in range(12):  # from rest, the first stage of a BlueROV2 comes out too fast
+        x = np.array(casadi_nmpc._next(ca.DM(x), ca.DM(u), known)).ravel()
+        exact = solve_ivp(rates, (0.0, interval), exact, rtol=1e-9).y[:, -1]
+        assert x[3:] == pytest.approx(exact[3:], abs=error)
+    assert x[3:] == pytest.approx(exact[3:], abs=at_last)
 
 
 def test_spheres_and_depths_constrain_exactly_and_other_regions_by_tangents_along_the_path():

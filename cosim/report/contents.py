@@ -154,10 +154,12 @@ class _Violation:
 
 
 def _criteria(run: Run) -> Table | None:
-    """Return a table with the membership functions of each criterion and the spans in which it was active."""
+    """Return a table with the memberships of each criterion, the path's costs, and the spans in which it was active."""
     scenario = run.scenario
     if not scenario.regions or scenario.log:
         return None
+    plans = bool(getattr(scenario.law.gains, "path_planning", 0.0))
+    costs = {r.criterion: number(r.region.crossing_cost, 3) for r in scenario.regions if plans and not r.region.hard}
     turns, end = turns_of(run), run.record.value("time", -1)
     rows = []
     for i, criterion in enumerate(scenario.criteria):
@@ -170,10 +172,13 @@ def _criteria(run: Run) -> Table | None:
         more = f", and {len(spans) - _TURNS} more" if len(spans) > _TURNS else ""
         why = "; ".join(reason.words(scenario.arbiter.ramp) for reason in criterion.reasons)
         lasting = sum(stop - start for start, stop, _ in spans)
-        rows.append((f"{i + 1} {criterion.name}", why, f"{lasting:.2f}" if spans else "never", f"{shown}{more}" or "–"))
-    return Table(
-        "Criteria", ("By priority", "Asks", "Led for [s]", "From and to [s]"), tuple(rows), (0.9, 1.6, 0.7, 2.2)
-    )
+        row = (f"{i + 1} {criterion.name}", why, f"{lasting:.2f}" if spans else "never", f"{shown}{more}" or "–")
+        rows.append((*row, *([costs.get(criterion.name, "–")] if costs else [])))
+    head = ["By priority", "Asks", "Led for [s]", "From and to [s]"]
+    widths = [0.9, 1.6, 0.7, 2.2]
+    if costs:  # of a metre in its soft regions, half a metre deep: they decide the side of the path
+        head, widths = [*head, "Path's cost of a metre [m]"], [*widths, 0.8]
+    return Table("Criteria", tuple(head), tuple(rows), tuple(widths))
 
 
 def _goal(run: Run) -> Table:

@@ -61,6 +61,8 @@ def test_events_and_report_name_the_active_criterion(four):
     assert visibility[1] == "clearance: 1 at -0.4 m, 0 at 0.1 m"
     assert visibility[3].startswith(f"{turns[0][0]:.2f} to {turns[1][0]:.2f} (view), {turns[4][0]:.2f} to ")
     weights = np.column_stack([four.record[f"weight.{name}"] for name, _ in CRITERIA])
+    costs = {row[0].split()[-1]: row[-1] for row in table.rows}  # 5^(2 share - 1) times 2 m, of three with soft regions
+    assert costs == {"obstacle": "–", "shape": "10", "depth": "2", "visibility": "0.4"}
     led = (weights.argmax(axis=1) == 0) & (four.record["membership.obstacle"] > 0.0)
     assert float(obstacle[2]) == pytest.approx(led.sum() * 0.01, abs=0.2)  # turns that are back at once do not count
 
