@@ -46,6 +46,9 @@ PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
         Parameter("SYSID_MYGCS", "system that sticks are taken from"),
         Parameter("MAV_GCS_SYSID", "system that sticks are taken from, from 4.7 on"),
         Parameter("JS_GAIN_DEFAULT", "pilot gain"),
+        Parameter("ACRO_YAW_P", "1/s of a full yaw stick's 45 deg"),
+        Parameter("PILOT_SPEED_UP", "cm/s up of a full vertical stick"),
+        Parameter("PILOT_SPEED_DN", "cm/s down, 0 for as much as up"),
     ),
     "px4": (
         Parameter("COM_OF_LOSS_T", "s until set-points that stop coming count as lost"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -107,6 +107,10 @@ class Output:
         self._lead.restart()
         self._level_lead.restart()
 
+    def scale_rates(self, parameters: Mapping[str, float]) -> None:
+        """Scale rate sticks by the autopilot's own parameters, by name."""
+        self._scale = self._scale.with_rates(parameters)
+
     def clear(self) -> None:
         """Set all commands to zero."""
         self.sticks[:], self.velocity[:], self.attitude[:] = 0.0, 0.0, 0.0
@@ -140,6 +144,15 @@ class Output:
             return (attitude_target(self._mavlink, system, state.quaternion, np.zeros(3)),)
         turn = 0.0 if self._profile.name == "ardusub" else None
         return (velocity_target(self._mavlink, system, self.velocity, turn),)
+
+    def descend(self, state: ReportedState, speed: float) -> Sequence[Any]:
+        """Return the messages that command a speed down [m/s], level and on the spot, in hold mode or by velocity."""
+        self.clear()
+        if self._steer_by == "velocity":
+            self.velocity[2] = speed
+            return (velocity_target(self._mavlink, state.system or 0, self.velocity, 0.0),)
+        self.sticks[2] = self._scale.climb_stick(speed)
+        return (self._sticks(state.system or 0),)
 
     def released(self, state: ReportedState, since: float) -> Sequence[Any]:
         """Return the messages that release the sticks, `since` [s] after the start of the release.
