@@ -39,11 +39,12 @@ from cosim.sitl.flights import FlightOptions, Flights
 from cosim.sitl.law import law_of_pwm
 from cosim.sitl.server import JsonServer
 
+RATE = 400  # Hz, frames of the autopilot: as many as its main loop has
 PARAMETERS = Path(__file__).with_name("ardusub.parm")
 FAULT_AFTER = 5.0  # s of steering, before something fails on purpose
 OF_A_FAULT = 12.0  # s of such a flight
 DURATION = {"docking": 30.0, "harbour": 30.0, "pipe-inspection": 16.0}  # s
-RANDOM_DURATION = 50.0  # s
+RANDOM_DURATION = 45.0  # s
 _STAYED = 2.0  # s at the end, in which the goal is not left
 _DOWN, _UP = 0.010, 0.020  # s, of messages from the autopilot and to it
 _READ_EVERY = 0.004  # s
@@ -251,18 +252,15 @@ def _running(ardusub: Path, instance: int, port: int, folder: Path, task: Task, 
     (folder / "own.parm").write_text(PARAMETERS.read_text(encoding="utf-8") + given, encoding="utf-8")
     command = [
         str(ardusub.resolve()), "--model", "JSON:127.0.0.1", "--home", "{},{},0,0".format(*ORIGIN), "--speedup", "100",
-        "--instance", str(instance), "--sim-port-out", str(port), "--defaults", "own.parm", "--serial0", "tcp:0",
+        "--instance", str(instance), "--sim-port-out", str(port), "--defaults", "own.parm", "--serial0", "tcp:0", "--rate", str(RATE),
     ]  # fmt: skip
     with (folder / "ardusub.log").open("wb") as log:
         process = subprocess.Popen(command, cwd=folder, stdout=log, stderr=log)
         try:
             yield
         finally:
-            process.terminate()
-            try:
-                process.wait(10.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
+            process.kill()  # it heeds no signal while it waits for the plant
+            process.wait()
 
 
 def _steer(task: Task, scenario: Scenario, link: SimulatedLink, flown: Flown, folder: Path, no_gps: bool) -> str:

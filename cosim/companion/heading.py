@@ -19,6 +19,7 @@ _ALIGNED = "yaw alignment complete"  # of an ArduSub's text, with "in-flight" be
 _IN_WATER = "in-flight"
 _RATE, _FASTEST = 0.5, 0.25  # 1/s of what is left of the way; m/s, greatest speed of the dive
 _NEAR, _STILL = 0.05, 0.05  # m, m/s, at which the vehicle has arrived
+_FLYING, _QUIET = 6.0, 1.0  # s, since arming and since the last alignment, after which none follows
 _PATIENCE = 3.0  # s at the depth without the text, or above it without a way down
 _ROOM, _STRIDE = 0.3, 0.1  # m, least clearance on the way down; between two places where it is computed
 
@@ -58,9 +59,10 @@ class HeadingWatch:
 class LevelDive:
     """The dive of an ArduSub that has just been armed.
 
-    An ArduSub aligns its heading anew, from one sample of its magnetometer, as soon as it is 0.5 m deeper than where it
-    was armed. Where it moves or tilts meanwhile, the heading is off by some degrees from then on. So it first dives,
-    level and slowly, where it stands. A vehicle that was armed before it was first heard is left alone.
+    An ArduSub aligns its heading anew with each sample of its magnetometer, from 0.5 m below where it was armed, until
+    it takes itself for flying, 5 s after arming. Where it moves or tilts with the last one, the heading is off by some
+    degrees from then on. So it first dives, level and slowly, where it stands, and waits for the end of that. A vehicle
+    that was armed before it was first heard is left alone.
 
     Parameters
     ----------
@@ -81,9 +83,10 @@ class LevelDive:
         self.outside = 0.0
         self._was_disarmed = False
         self._armed_at: float | None = None  # m, down
+        self._since = self._aligned = math.inf  # our time [s] of arming, and of the last alignment
         self._begun: tuple[float, float] | None = None  # our time [s]; clearance there [m]
         self._arrived: float | None = None
-        self._is_done = self._is_aligned = False
+        self._is_done = False
         self._texts = 0  # of the autopilot, that were read
 
     def update(self, state: ReportedState, now: float) -> None:
@@ -92,19 +95,19 @@ class LevelDive:
         if not state.is_armed:
             self._was_disarmed = state.system is not None
             self._armed_at = self._begun = self._arrived = None
-            self._is_done = self._is_aligned = False
+            self._is_done, self._aligned = False, math.inf
         elif self._armed_at is None and self._was_disarmed and math.isfinite(state.position[2]):
-            self._armed_at = float(state.position[2])
+            self._armed_at, self._since = float(state.position[2]), now
         if self._armed_at is None:
             return
         is_near = self._left(state) < _NEAR and abs(state.velocity[2]) < _STILL
         if self._arrived is None and is_near:
             self._arrived = now
-        self._is_aligned |= any(_IN_WATER in text and _ALIGNED in text for text in texts)
-        if self._begun is None:
-            self._is_done |= self._is_aligned  # its pilot has dived
-        elif self._arrived is not None:
-            self._is_done |= self._is_aligned or now - self._arrived > _PATIENCE
+        if any(_IN_WATER in text and _ALIGNED in text for text in texts):
+            self._aligned = now
+        if self._arrived is not None and now - self._since > _FLYING:
+            quiet = now - self._aligned > _QUIET  # False where there was no alignment
+            self._is_done |= quiet or (math.isinf(self._aligned) and now - self._arrived > _PATIENCE)
 
     def is_needed(self, state: ReportedState, now: float) -> bool:
         """Return True while the vehicle is to dive; a dive without room is left out, with a warning."""
@@ -130,8 +133,8 @@ class LevelDive:
         return self.seconds(now) > _PATIENCE and self._left(state) > self._depth - _NEAR
 
     def speed(self, state: ReportedState) -> float:
-        """Return the speed down to be asked for now [m/s]."""
-        return min(max(_RATE * self._left(state), -_FASTEST), _FASTEST)
+        """Return the speed down to be asked for now [m/s]; one that is too deep already stays there."""
+        return min(max(_RATE * self._left(state), 0.0), _FASTEST)
 
     def _left(self, state: ReportedState) -> float:
         assert self._armed_at is not None
