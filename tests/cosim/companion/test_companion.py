@@ -281,6 +281,21 @@ def test_a_dive_that_does_not_end_holds_the_vehicle(tmp_path):
 
 
 @pytest.mark.medium
+@pytest.mark.parametrize(("reason", "event"), [("mode taken", 19.0), ("disarmed", None)])
+def test_a_pilot_takes_over_while_it_dives(tmp_path, reason, event):
+    link, dived = StandIn(profile="ardusub", shift=SHIFT, armed=False), 6.0
+    link.events = [(dived, lambda: command(link, 400, 0.0) if event is None else command(link, 176, 1.0, event))]
+    with pytest.raises(RunError, match=f"somebody to resume after: {reason}"):
+        Flight(tmp_path, link=link, profile="ardusub", arm=True, timeout=8.0)
+    texts = [(at - 100.0, m.text) for at, m in link.sent if m.get_type() == "STATUSTEXT"]
+    (begun,) = [at for at, text in texts if text == "Companion diving"]
+    (ended,) = [at for at, text in texts if text == f"Companion pilot: {reason}"]
+    assert begun < dived < ended < dived + 0.5
+    modes = [m for at, m in link.sent if m.get_type() == "COMMAND_LONG" and m.command == 176 and at - 100.0 > ended]
+    assert not modes
+
+
+@pytest.mark.medium
 def test_a_px4_that_refuses_hold_gets_no_forces_any_more(tmp_path):
     """Without a global position it refuses Hold, and keeps the forces of the last set-point for a second."""
     link = StandIn(profile="px4", shift=SHIFT)
