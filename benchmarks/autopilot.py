@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -145,6 +146,8 @@ class SimulatedLink:
         if now - self._read_at < _READ_EVERY:
             return
         self._read_at = now
+        if self.others is not None:
+            self.others.receive(0.0)  # which connects it, too
         for one in self._link.receive(0.0):
             if not self.cut and one.kind not in self.lost:
                 self._down.append(one._replace(time=now + _DOWN))
@@ -209,14 +212,15 @@ def fly(task: Task, ardusub: Path, instance: int, folder: Path) -> dict[str, Any
     instance : int
         Of ArduSub: its ports are 5760 + 10 × instance and two above.
     folder : Path
-        For its files; new or empty.
+        For its files; what it has is removed.
 
     Returns
     -------
     dict
         For JSON.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
     begun = time.monotonic()
     scenario = task.load()
     file = folder / "scenario.toml"
@@ -252,7 +256,8 @@ def _running(ardusub: Path, instance: int, port: int, folder: Path, task: Task, 
     (folder / "own.parm").write_text(PARAMETERS.read_text(encoding="utf-8") + given, encoding="utf-8")
     command = [
         str(ardusub.resolve()), "--model", "JSON:127.0.0.1", "--home", "{},{},0,0".format(*ORIGIN), "--speedup", "100",
-        "--instance", str(instance), "--sim-port-out", str(port), "--defaults", "own.parm", "--serial0", "tcp:0", "--rate", str(RATE),
+        "--instance", str(instance), "--sim-port-out", str(port), "--defaults", "own.parm", "--serial0", "tcp:0",
+        "--rate", str(RATE),
     ]  # fmt: skip
     with (folder / "ardusub.log").open("wb") as log:
         process = subprocess.Popen(command, cwd=folder, stdout=log, stderr=log)

@@ -46,6 +46,7 @@ PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
         Parameter("SYSID_MYGCS", "system that sticks are taken from"),
         Parameter("MAV_GCS_SYSID", "system that sticks are taken from, from 4.7 on"),
         Parameter("JS_GAIN_DEFAULT", "pilot gain"),
+        Parameter("EK3_MAG_CAL", "when it learns the magnetic field, 2 for never"),
         Parameter("ACRO_YAW_P", "1/s of a full yaw stick's 45 deg"),
         Parameter("PILOT_SPEED_UP", "cm/s up of a full vertical stick"),
         Parameter("PILOT_SPEED_DN", "cm/s down, 0 for as much as up"),
@@ -69,6 +70,7 @@ _ACTS = {  # of which one at least must not be 0, for anything to follow when th
 _STICK_SYSTEM = ("SYSID_MYGCS", "MAV_GCS_SYSID")
 _KEPT = ("RC_OVERRIDE_TIME", "FS_PILOT_TIMEOUT")  # how long sticks act with a radio, and without one
 _LONGEST_KEPT = 1.0  # s
+_NEVER = 2.0  # of EK3_MAG_CAL
 _SATURATION = "UUV_THRUST_SAT"
 
 
@@ -150,6 +152,10 @@ class Failsafes:
             if heard is not None and heard != system:
                 return f"{name} is {heard:g}, and the companion's system id {system}: its sticks would not be taken"
         return ""
+
+    def learns_the_field(self) -> bool:
+        """Return True if an ArduSub learns the magnetic field in flight, by which its heading drifts without a fix."""
+        return self.values.get("EK3_MAG_CAL", _NEVER) != _NEVER
 
     def _line(self, parameter: Parameter) -> str:
         value = self.values[parameter.name]

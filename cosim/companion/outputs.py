@@ -26,6 +26,8 @@ _PX4_REFUSES: dict[str, str] = {
     "wrench": "its sticks have no roll and pitch beside surge and sway; expected attitude",
     "velocity": "its uuv_pos_control keeps the depth and pushes nowhere; expected attitude",
 }
+# An ArduSub integrates the stick's rate of yaw to a heading, to which it turns beside: with all of the rate it swings.
+_YAW_PART = 0.75
 _CENTERED_FOR = 0.2  # s, during which overridden channels are centered before their release
 
 
@@ -97,6 +99,7 @@ class Output:
         self._profile: Profile = PROFILES[profile]
         self._uses_sticks = uses_sticks(profile, steer_by)
         self._scale = scale_of(vehicle, self._profile, pilot_gain, sticks_by)
+        self._yaw_part = _YAW_PART if profile == "ardusub" else 1.0
         self._all_axes = steer_by == "wrench" or (steer_by == "sticks" and profile == "ardusub")
         self._turn, self._lead, self._level_lead = TurnLead(vehicle), VelocityLead(vehicle, *lags), LevelLead()
         self._overridden = False  # True while overridden channels are not released
@@ -129,7 +132,7 @@ class Output:
             case "sticks":
                 self.sticks[:] = self._scale.sticks(wrench)
                 self.sticks[3:5] = self._level(wrench, period)
-                self.sticks[5] = self._scale.yaw_rate_stick(self._turn.yaw_rate(wrench, state))
+                self.sticks[5] = self._scale.yaw_rate_stick(self._yaw_part * self._turn.yaw_rate(wrench, state))
             case "wrench":
                 self.sticks[:] = self._scale.sticks(wrench)
         return (self._sticks(system),)

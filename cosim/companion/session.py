@@ -138,6 +138,8 @@ class AutopilotSession:
                 self.output.scale_rates(self.failsafes.values)
             if state == "engaging":
                 self.heading.restart()
+                if self.reported.is_reckoned and self.failsafes.learns_the_field():
+                    log.warning("no fix of the position, and EK3_MAG_CAL is not 2: the heading may drift by degrees")
             if before in ("diving", "engaging", "steering") and state == "pilot":
                 self._lets_go_until = now + self.output.releases_for
         self._ask(now)

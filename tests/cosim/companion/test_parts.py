@@ -494,7 +494,7 @@ def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
     failsafes = Failsafes("ardusub")
     assert not failsafes.is_read(0.0)
     asked = [len(failsafes.wanted(0.25 * k)) for k in range(9)]
-    assert asked == [16, 0, 16, 0, 16, 0, 16, 0, 16]
+    assert asked == [17, 0, 17, 0, 17, 0, 17, 0, 17]
     values = {"FS_GCS_ENABLE": 2.0, "FS_GCS_TIMEOUT": 5.0, "SOMETHING_ELSE": 1.0, "FS_EKF_ACTION": float("nan")}
     for name, value in values.items():
         failsafes.take(decoded(value_of(name, value)))
@@ -525,6 +525,14 @@ def test_sticks_that_outlast_a_cut_link_by_more_than_a_second_are_warned_of(over
         failsafes.take(decoded(value_of(name, value)))
     said = f"RC_OVERRIDE_TIME is {override:g}, FS_PILOT_TIMEOUT is {pilot:g}; expected 1 s or less"
     assert any(line.startswith("WARNING") and line.endswith(said) for line in failsafes.text()) == warns
+
+
+def test_an_ardusub_that_learns_the_magnetic_field_is_known():
+    failsafes = Failsafes("ardusub")
+    assert not failsafes.learns_the_field()  # nobody knows
+    for value, learns in ((3.0, True), (2.0, False)):
+        failsafes.take(decoded(value_of("EK3_MAG_CAL", value)))
+        assert failsafes.learns_the_field() == learns
 
 
 def test_px4_integer_parameters_are_decoded_from_bits():
