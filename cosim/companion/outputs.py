@@ -111,8 +111,9 @@ class Output:
         self._level_lead.restart()
 
     def scale_rates(self, parameters: Mapping[str, float]) -> None:
-        """Scale rate sticks by the autopilot's own parameters, by name."""
+        """Scale sticks of rates and leans by the autopilot's own parameters, by name."""
         self._scale = self._scale.with_rates(parameters)
+        self._level_lead.set_gains(parameters)
 
     def clear(self) -> None:
         """Set all commands to zero."""

@@ -185,6 +185,9 @@ def test_rate_sticks_follow_the_parameters_of_the_autopilot():
         assert math.radians(3.375 * angle) == pytest.approx(rate)
     assert scale.with_rates({"PILOT_SPEED_DN": 0.0, "PILOT_SPEED_UP": 150.0}).climb_rates == (1.5, 1.5)
     assert scale.with_rates({}) == scale
+    for most in ({"ATC_ANGLE_MAX": 30.0}, {"ANGLE_MAX": 3000.0}):
+        stick = scale.with_rates(most).lean_sticks(np.array([math.radians(15.0), math.radians(40.0)]))
+        assert (400.0 * stick[0] - 30.0) / 370.0 * 30.0 == pytest.approx(15.0) and stick[1] == 1.0
 
 
 def test_rc_override_follows_the_ardusub_order_and_zero_releases():
@@ -494,7 +497,7 @@ def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
     failsafes = Failsafes("ardusub")
     assert not failsafes.is_read(0.0)
     asked = [len(failsafes.wanted(0.25 * k)) for k in range(9)]
-    assert asked == [17, 0, 17, 0, 17, 0, 17, 0, 17]
+    assert asked == [22, 0, 22, 0, 22, 0, 22, 0, 22]
     values = {"FS_GCS_ENABLE": 2.0, "FS_GCS_TIMEOUT": 5.0, "SOMETHING_ELSE": 1.0, "FS_EKF_ACTION": float("nan")}
     for name, value in values.items():
         failsafes.take(decoded(value_of(name, value)))
