@@ -264,7 +264,7 @@ def _running(ardusub: Path, instance: int, port: int, folder: Path, task: Task, 
         try:
             yield
         finally:
-            process.kill()  # it heeds no signal while it waits for the plant
+            process.kill()  # no signal ends it while it waits for the plant
             process.wait()
 
 

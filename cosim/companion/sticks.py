@@ -61,7 +61,7 @@ class StickScale:
         Factor of the dead zones of rate sticks: the pilot gain; 0 without dead zones.
     yaw_rate, climb_rates : float, (float, float)
         Rates of full sticks: of yaw [rad/s], up and down [m/s].
-    lean : float
+    greatest_lean : float
         Angle of a full stick of roll or pitch [rad].
     """
 
@@ -74,7 +74,7 @@ class StickScale:
     dead_zones: float
     yaw_rate: float = YAW_RATE
     climb_rates: tuple[float, float] = (PILOT_SPEED, PILOT_SPEED)
-    lean: float = LEAN
+    greatest_lean: float = LEAN
 
     def sticks(self, wrench: Array) -> Array:
         """Return the sticks that command a wrench, shape (6,), X Y Z K M N from -1 to 1.
@@ -142,17 +142,17 @@ class StickScale:
 
     def with_rates(self, parameters: Mapping[str, float]) -> StickScale:
         """Return this scale with the rates and leans of an ArduSub's parameters; missing ones and 0 change nothing."""
-        lean = parameters.get("ATC_ANGLE_MAX", 0.0) or _CENTI * parameters.get("ANGLE_MAX", 0.0)
+        degrees = parameters.get("ATC_ANGLE_MAX", 0.0) or _CENTI * parameters.get("ANGLE_MAX", 0.0)
         yaw, up = parameters.get("ACRO_YAW_P", 0.0), abs(parameters.get("PILOT_SPEED_UP", 0.0))
         down = abs(parameters.get("PILOT_SPEED_DN", 0.0)) or up
         climb = _CENTI * up or self.climb_rates[0], _CENTI * down or self.climb_rates[1]
         yaw_rate = _FULL_YAW * yaw or self.yaw_rate
-        return replace(self, yaw_rate=yaw_rate, climb_rates=climb, lean=math.radians(lean) or self.lean)
+        return replace(self, yaw_rate=yaw_rate, climb_rates=climb, greatest_lean=math.radians(degrees) or self.greatest_lean)
 
     def lean_sticks(self, angles: Array) -> Array:
         """Return the sticks of roll and pitch, shape (2,), that command these angles [rad] in STABILIZE."""
         return np.array(
-            [deflection_of(min(max(angle / self.lean, -1.0), 1.0), LEAN_DEAD_ZONE) for angle in angles.tolist()]
+            [deflection_of(min(max(angle / self.greatest_lean, -1.0), 1.0), LEAN_DEAD_ZONE) for angle in angles.tolist()]
         )
 
     def _rate_stick(self, part: float, dead_zone: float) -> float:
