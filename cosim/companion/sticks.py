@@ -147,12 +147,17 @@ class StickScale:
         down = abs(parameters.get("PILOT_SPEED_DN", 0.0)) or up
         climb = _CENTI * up or self.climb_rates[0], _CENTI * down or self.climb_rates[1]
         yaw_rate = _FULL_YAW * yaw or self.yaw_rate
-        return replace(self, yaw_rate=yaw_rate, climb_rates=climb, greatest_lean=math.radians(degrees) or self.greatest_lean)
+        return replace(
+            self, yaw_rate=yaw_rate, climb_rates=climb, greatest_lean=math.radians(degrees) or self.greatest_lean
+        )
 
     def lean_sticks(self, angles: Array) -> Array:
         """Return the sticks of roll and pitch, shape (2,), that command these angles [rad] in STABILIZE."""
         return np.array(
-            [deflection_of(min(max(angle / self.greatest_lean, -1.0), 1.0), LEAN_DEAD_ZONE) for angle in angles.tolist()]
+            [
+                deflection_of(min(max(angle / self.greatest_lean, -1.0), 1.0), LEAN_DEAD_ZONE)
+                for angle in angles.tolist()
+            ]
         )
 
     def _rate_stick(self, part: float, dead_zone: float) -> float:
