@@ -18,7 +18,10 @@ def test_random_scenes_leave_start_dive_and_goal_free_and_are_repeatable():
         rocks = [s.region.shape for s in scene.regions if s.region.name.startswith("rock")]
         counts.add(len(rocks))
         for rock in rocks:
-            assert min(np.linalg.norm(start + (0.0, 0.0, d) - rock.centre) for d in (0.0, 0.6)) > rock.radius + 0.6
+            assert (
+                min(np.linalg.norm(start + np.array([0.0, 0.0, d]) - rock.centre) for d in (0.0, 0.6))
+                > rock.radius + 0.6
+            )
             assert np.linalg.norm(goal - rock.centre) > rock.radius + 1.1
         assert 8.0 <= goal[0] - start[0] <= 12.0 and np.hypot(*scene.plant.current[:2]) <= 0.4
         assert random_scene(seed).toml() == scene.toml()
