@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import (
+    autopilot,
     baselines,
     everything,
     fmu,
@@ -26,6 +27,8 @@ from benchmarks import (
 from benchmarks.machine import description
 from benchmarks.peer_environment import Environment
 from benchmarks.table import Table, as_json, print_tables, write_json
+from cosim.companion.outputs import STEER_BY
+from cosim.companion.sticks import STICKS_BY
 
 BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy, "mavlink": mavlink, "sitl": sitl, "view": view}
 TABLES = {"all": everything, "scaling": scaling}
@@ -77,6 +80,7 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("--draws", type=int, default=0, help="search among so many draws, instead of flying KIND")
     verb.add_argument("--peers-python", metavar="PYTHON", help="that has CasADi (default: one of their own)")
     verb.add_argument("--json", type=Path, metavar="FILE", help="of flights; those that it has are not repeated")
+    _add_autopilot(verbs)
     verb = verbs.add_parser("long-record", help=(long_record.__doc__ or "").splitlines()[0])
     verb.add_argument("--rows", type=int, nargs="+", default=long_record.ROWS, help="of the runs (default: 1 and 10 M)")
     verb.add_argument(
@@ -90,6 +94,35 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("--scenario", default=long_record.SCENARIO, help="whose rows are repeated (default: %(default)s)")
     verb.add_argument("--folder", type=Path, help="for the files, some GB (default: that of temporary files)")
     return parser
+
+
+def _add_autopilot(verbs: Any) -> None:
+    verb = verbs.add_parser("autopilot", help=(autopilot.__doc__ or "").splitlines()[0])
+    verb.add_argument("--ardusub", type=Path, required=True, metavar="FILE", help="ArduSub's program for SITL")
+    verb.add_argument("--scenario", nargs="+", default=[], metavar="NAME", help="shipped ones, or random-SEED")
+    verb.add_argument("--random", type=int, default=0, metavar="N", help="so many random scenes, from random-SEED on")
+    verb.add_argument("--seed", type=int, default=0, help="of the first random scene (default: %(default)s)")
+    verb.add_argument("--steer-by", nargs="+", choices=STEER_BY, default=["sticks"], help="default: sticks")
+    verb.add_argument("--sticks-by", choices=STICKS_BY, default="manual-control", help="default: %(default)s")
+    verb.add_argument(
+        "--fault", nargs="+", choices=autopilot.FAULTS, default=[""], help="what fails after 5 s", metavar="WHAT"
+    )  # fmt: skip
+    verb.add_argument("--level-dive", type=float, default=0.6, metavar="M", help="as for cosim companion")
+    verb.add_argument("--parameter", nargs="+", default=[], metavar="NAME=VALUE", help="of ArduSub, beside the file's")
+    verb.add_argument("--instance", type=int, default=0, help="of ArduSub, for its ports (default: %(default)s)")
+    verb.add_argument("--json", type=Path, metavar="FILE", help="of flights; those that it has are not repeated")
+    verb.add_argument("--keep", type=Path, metavar="DIR", help="keep each flight's files there")
+
+
+def _autopilot(options: argparse.Namespace) -> None:
+    names = [*options.scenario, *(f"random-{options.seed + i}" for i in range(options.random))]
+    tasks = [
+        autopilot.Task(name, by, options.sticks_by, fault, options.level_dive, tuple(options.parameter))
+        for name in names
+        for by in options.steer_by
+        for fault in options.fault
+    ]
+    autopilot.main(tasks, options.ardusub, options.instance, options.json, options.keep)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -114,6 +147,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 parser.error("expected 1 or more scenes, and 0 or more draws")
             kinds = options.kinds or nmpc_search.FLOWN
             nmpc_search.main(kinds, options.seed, options.count, options.draws, options.peers_python, options.json)
+        case "autopilot":
+            _autopilot(options)
         case "peers":
             for peer, version in peer_environment.install(again=True).items():
                 print(f"{peer:24} {version}")

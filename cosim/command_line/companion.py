@@ -76,6 +76,10 @@ def add_verb(verbs: Any) -> None:
         help="part of the way by which the autopilot's position may be off while it has no fix (default: 0.03)",
     )  # fmt: skip
     verb.add_argument(
+        "--level-dive", type=number(0.0, 10.0), default=0.6, metavar="M",
+        help="that an ArduSub dives after it was armed, until its heading is aligned; 0 for none (default: 0.6)",
+    )  # fmt: skip
+    verb.add_argument(
         "--least-battery", type=number(0.0, 100.0), default=0.0, metavar="PERCENT",
         help="hold the vehicle below it (default: 0, never)",
     )  # fmt: skip
@@ -114,7 +118,8 @@ def companion(options: argparse.Namespace) -> int:
     scene = SceneOrigin(options.scene_origin, options.surveyed_origin, options.surface_pressure, options.water_density)
     chosen = CompanionOptions(
         options.profile, options.steer_by, options.sticks_by, scene, options.dry_run, options.arm, options.pilot_gain,
-        options.velocity_lag, options.vertical_lag, options.reckoning_error, options.least_battery, options.timeout,
+        options.velocity_lag, options.vertical_lag, options.reckoning_error, options.level_dive, options.least_battery,
+        options.timeout,
     )  # fmt: skip
     scenario = load_scenario(options.scenario, options.overrides)
     key = read_key(options.signing_key) if options.signing_key else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from controller import VehicleState
 from controller.laws.deployable.gains import SPREADS
 from controller.regions.region_set import of_attitude
 from cosim.companion.link import AutopilotLink
@@ -27,7 +29,9 @@ from cosim.results.wording import verdict
 from cosim.run.run_folder import claim, conclude
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import SecondaryRegion
+from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.master import Master, Observer
+from cosim.simulation.signals import Array
 
 if TYPE_CHECKING:  # websockets wait until a flight is shown
     from cosim.live.view import LiveView
@@ -145,6 +149,8 @@ class Companion:
         self._reported = ("", "")
         hard = [i for i, secondary in enumerate(self.scenario.regions, 1) if _is_fence(secondary)]
         self._hard = np.array(hard, dtype=int)
+        self._environment = RegionEnvironment(self.scenario)  # of the dive, before the master's begins
+        self.session.dive.clearance = self._clearance
 
     def run(
         self,
@@ -250,6 +256,18 @@ class Companion:
             return "interrupted"
         state, reason = session.supervisor.state, session.supervisor.reason
         return "completed" if session.supervisor.is_steering else f"{state}: {reason}"
+
+    def _clearance(self, position: Array) -> float:
+        """Return the least clearance of hard regions [m] at a position of the autopilot's local frame."""
+        if not len(self._hard):
+            return math.inf
+        n, session = len(self.scenario.regions) + 1, self.session
+        found = self._environment.empty_evaluation(np.zeros(n), np.zeros(n))
+        place = session.alignment.to_scene(position)
+        working = np.ones(self.scenario.vehicle.n_thrusters)
+        state = VehicleState(place, session.reported.quaternion, np.zeros(6), working)
+        self._environment.evaluate(state, found)
+        return float(np.min(found.clearances[self._hard]))
 
     def _doubt(self) -> float:
         """Return by how much the position may be off [m]: as its sources have come apart, and as it was reckoned."""

@@ -46,6 +46,15 @@ PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
         Parameter("SYSID_MYGCS", "system that sticks are taken from"),
         Parameter("MAV_GCS_SYSID", "system that sticks are taken from, from 4.7 on"),
         Parameter("JS_GAIN_DEFAULT", "pilot gain"),
+        Parameter("EK3_MAG_CAL", "when it learns the magnetic field, 2 for never"),
+        Parameter("ACRO_YAW_P", "1/s of a full yaw stick's 45 deg"),
+        Parameter("ATC_ANGLE_MAX", "degrees of a full stick of roll or pitch"),
+        Parameter("ANGLE_MAX", "hundredths of a degree of it, before 4.7"),
+        Parameter("ATC_ANG_PIT_P", "gain of its pitch angle"),
+        Parameter("ATC_RAT_PIT_P", "gain of its pitch rate"),
+        Parameter("ATC_RAT_PIT_I", "integral gain of its pitch rate"),
+        Parameter("PILOT_SPEED_UP", "cm/s up of a full vertical stick"),
+        Parameter("PILOT_SPEED_DN", "cm/s down, 0 for as much as up"),
     ),
     "px4": (
         Parameter("COM_OF_LOSS_T", "s until set-points that stop coming count as lost"),
@@ -64,8 +73,10 @@ _ACTS = {  # of which one at least must not be 0, for anything to follow when th
     "px4": ("COM_OF_LOSS_T",),
 }
 _STICK_SYSTEM = ("SYSID_MYGCS", "MAV_GCS_SYSID")
+_OF_SOME_VERSIONS = (*_STICK_SYSTEM, "ATC_ANGLE_MAX", "ANGLE_MAX")
 _KEPT = ("RC_OVERRIDE_TIME", "FS_PILOT_TIMEOUT")  # how long sticks act with a radio, and without one
 _LONGEST_KEPT = 1.0  # s
+_NEVER = 2.0  # of EK3_MAG_CAL
 _SATURATION = "UUV_THRUST_SAT"
 
 
@@ -119,7 +130,7 @@ class Failsafes:
     def text(self) -> list[str]:
         """Return the received parameters as lines of text; the last ones are warnings."""
         lines = [self._line(parameter) for parameter in PARAMETERS[self._profile] if parameter.name in self.values]
-        silent = [name for name in self._missing() if name not in _STICK_SYSTEM]
+        silent = [name for name in self._missing() if name not in _OF_SOME_VERSIONS]
         if silent:
             lines.append(f"not answered by the autopilot: {', '.join(silent)}")
         acts = _ACTS.get(self._profile, ())
@@ -147,6 +158,10 @@ class Failsafes:
             if heard is not None and heard != system:
                 return f"{name} is {heard:g}, and the companion's system id {system}: its sticks would not be taken"
         return ""
+
+    def learns_the_field(self) -> bool:
+        """Return True if an ArduSub learns the magnetic field in flight, by which its heading drifts without a fix."""
+        return self.values.get("EK3_MAG_CAL", _NEVER) != _NEVER
 
     def _line(self, parameter: Parameter) -> str:
         value = self.values[parameter.name]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -26,6 +26,8 @@ _PX4_REFUSES: dict[str, str] = {
     "wrench": "its sticks have no roll and pitch beside surge and sway; expected attitude",
     "velocity": "its uuv_pos_control keeps the depth and pushes nowhere; expected attitude",
 }
+# An ArduSub integrates the stick's rate of yaw to a heading, to which it turns beside: with all of the rate it swings.
+_YAW_PART = 0.75
 _CENTERED_FOR = 0.2  # s, during which overridden channels are centered before their release
 
 
@@ -97,6 +99,7 @@ class Output:
         self._profile: Profile = PROFILES[profile]
         self._uses_sticks = uses_sticks(profile, steer_by)
         self._scale = scale_of(vehicle, self._profile, pilot_gain, sticks_by)
+        self._yaw_part = _YAW_PART if profile == "ardusub" else 1.0
         self._all_axes = steer_by == "wrench" or (steer_by == "sticks" and profile == "ardusub")
         self._turn, self._lead, self._level_lead = TurnLead(vehicle), VelocityLead(vehicle, *lags), LevelLead()
         self._overridden = False  # True while overridden channels are not released
@@ -106,6 +109,11 @@ class Output:
         """Reset the estimates of the autopilot's loops, after another controller has steered."""
         self._lead.restart()
         self._level_lead.restart()
+
+    def scale_rates(self, parameters: Mapping[str, float]) -> None:
+        """Scale sticks of rates and leans by the autopilot's own parameters, by name."""
+        self._scale = self._scale.with_rates(parameters)
+        self._level_lead.set_gains(parameters)
 
     def clear(self) -> None:
         """Set all commands to zero."""
@@ -125,7 +133,7 @@ class Output:
             case "sticks":
                 self.sticks[:] = self._scale.sticks(wrench)
                 self.sticks[3:5] = self._level(wrench, period)
-                self.sticks[5] = self._scale.yaw_rate_stick(self._turn.yaw_rate(wrench, state))
+                self.sticks[5] = self._scale.yaw_rate_stick(self._yaw_part * self._turn.yaw_rate(wrench, state))
             case "wrench":
                 self.sticks[:] = self._scale.sticks(wrench)
         return (self._sticks(system),)
@@ -140,6 +148,15 @@ class Output:
             return (attitude_target(self._mavlink, system, state.quaternion, np.zeros(3)),)
         turn = 0.0 if self._profile.name == "ardusub" else None
         return (velocity_target(self._mavlink, system, self.velocity, turn),)
+
+    def descend(self, state: ReportedState, speed: float) -> Sequence[Any]:
+        """Return the messages that command a speed down [m/s], level and on the spot, in hold mode or by velocity."""
+        self.clear()
+        if self._steer_by == "velocity":
+            self.velocity[2] = speed
+            return (velocity_target(self._mavlink, state.system or 0, self.velocity, 0.0),)
+        self.sticks[2] = self._scale.climb_stick(speed)
+        return (self._sticks(state.system or 0),)
 
     def released(self, state: ReportedState, since: float) -> Sequence[Any]:
         """Return the messages that release the sticks, `since` [s] after the start of the release.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, get_args
 
-State = Literal["waiting", "aligning", "disarmed", "engaging", "dry_run", "steering", "held", "pilot"]
+State = Literal["waiting", "aligning", "disarmed", "engaging", "dry_run", "steering", "held", "pilot", "diving"]
 
 STATES: tuple[State, ...] = get_args(State)  # a state's index is its number in the record
 
@@ -18,6 +18,7 @@ MEANINGS: dict[State, str] = {
     "steering": "sticks or velocities are sent at each step",
     "held": "sticks are released and the hold mode is asked for, until somebody resumes",
     "pilot": "somebody else steers; sticks are released once, and nothing is sent until somebody resumes",
+    "diving": "an ArduSub was armed, and dives level until its heading is aligned; the mode for that is asked for",
 }
 
 
@@ -55,11 +56,13 @@ CONDITIONS: tuple[Condition, ...] = (
     Condition("mode taken", 0.0, "", "the mode that is steered in was on, and is not any more", "pilot"),
     Condition("refused mode", 0.8, "s", "since the mode was asked for, without it", "held"),
     Condition("pilot gain", GAIN_OFF, "", "the autopilot's pilot gain differs from the user's", "held"),
+    Condition("no dive", 20.0, "s", "since the dive began, without its end", "held"),
     Condition("lost link", 0.4, "s", "since anything came from the autopilot", "held"),
     Condition("stale estimate", 0.5, "s", "age of the older one of position and attitude", "held"),
     Condition("late loop", 0.3, "s", "by which a step begins too late", "held"),
     Condition("autopilot failsafe", 0.0, "", "the heartbeat says CRITICAL or EMERGENCY", "held"),
     Condition("frame jump", 0.5, "m", "leap of the position that the velocity does not explain", "held"),
+    Condition("heading leap", 0.05, "rad", "leap of the heading that the rates do not explain", "held"),
     Condition("frame drift", 0.5, "m", "by which local position and globe or pressure have come apart", "held"),
     Condition(
         "geofence", 0.1, "m", "inside a hard region that is to be kept out of, or outside one to stay in", "held"
@@ -76,8 +79,9 @@ class Observation(NamedTuple):
     has_state: bool
     frame_known: bool
     is_armed: bool
-    in_mode: bool  # the one that is steered in
+    in_mode: bool  # the one that is dived or steered in
     values: dict[str, float]  # by a condition's name; above its limit, it ends steering
+    has_to_dive: bool = False
 
 
 class Supervisor:
@@ -129,7 +133,7 @@ class Supervisor:
         seen : Observation
             At its beginning.
         """
-        if self.state in ("engaging", "steering", "dry_run"):
+        if self.state in ("diving", "engaging", "steering", "dry_run"):
             self._judge(seen)
         if self.state in ("held", "pilot"):
             return self.state
@@ -152,6 +156,12 @@ class Supervisor:
             return "dry_run"
         if not seen.is_armed:
             return "disarmed"
+        if seen.has_to_dive:
+            self._asked_at = None if seen.in_mode else self._asked_at
+            return "diving"
+        if self.state == "diving":
+            self._asked_at = None
+            return "engaging"
         if not seen.in_mode:
             return "engaging"
         self._asked_at = None

@@ -12,6 +12,7 @@ import numpy as np
 from cosim.companion.clock_sync import timesync
 from cosim.companion.failsafes import Failsafes
 from cosim.companion.frame_alignment import FrameAlignment
+from cosim.companion.heading import HeadingWatch, LevelDive
 from cosim.companion.link import AutopilotLink
 from cosim.companion.options import CompanionOptions
 from cosim.companion.outputs import Output, steered_in, uses_sticks
@@ -50,6 +51,10 @@ class AutopilotSession:
         What the autopilot says.
     alignment : FrameAlignment
         Of its frame with the scene.
+    heading : HeadingWatch
+        Its leaps.
+    dive : LevelDive
+        Before an ArduSub is steered.
     supervisor : Supervisor
         Who decides whether the law steers.
     profile : Profile
@@ -78,13 +83,16 @@ class AutopilotSession:
             (options.velocity_lag, options.vertical_lag),
         )  # fmt: skip
         self._steered_in = steered_in(options.profile, options.steer_by)
+        self._dived_in: Mode = self._steered_in if options.steer_by == "velocity" else "hold"
         self._mode = self.profile.numbers[self._steered_in]
         self.reported = ReportedState(link.identity)
         self.alignment = FrameAlignment(options.origin)
+        self.heading = HeadingWatch()
+        self.dive = LevelDive(options.level_dive if options.profile == "ardusub" and not options.dry_run else 0.0)
         self.failsafes = Failsafes(options.profile)
         self.supervisor = Supervisor(options.dry_run)
         self.lateness = self.outside = 0.0  # s; m, by which hard regions are violated
-        self._taken_over = False
+        self._taken_over = self._was_in_mode = False
         self._law_works = False  # as the master was commanded last
         self._sent_at: dict[str, float] = {}
         self._held_at, self._lets_go_until = 0.0, -math.inf
@@ -125,7 +133,14 @@ class AutopilotSession:
             self._held_at = now
             self._announce(state)
             self.output.restart()
-            if before in ("engaging", "steering") and state == "pilot":
+            self._was_in_mode = False
+            if state in ("diving", "engaging"):
+                self.output.scale_rates(self.failsafes.values)
+            if state == "engaging":
+                self.heading.restart()
+                if self.reported.is_reckoned and self.failsafes.learns_the_field():
+                    log.warning("no fix of the position, and EK3_MAG_CAL is not 2: the heading may drift by degrees")
+            if before in ("diving", "engaging", "steering") and state == "pilot":
                 self._lets_go_until = now + self.output.releases_for
         self._ask(now)
         self._act(state, now, wrench, until - due)
@@ -141,7 +156,7 @@ class AutopilotSession:
     def release(self, seconds: float) -> None:
         """Let go: hold the place and release the sticks, for so many seconds or until the mode is on."""
         state, begun = self.supervisor.state, self._link.clock()
-        if state in ("engaging", "steering", "held"):
+        if state in ("diving", "engaging", "steering", "held"):
             self.supervisor.state, self.supervisor.reason = "held", self.supervisor.reason or "end"
             self._held_at = begun
             until, waits = begun + self.output.releases_for, begun + seconds
@@ -167,6 +182,7 @@ class AutopilotSession:
         return self.alignment.missing(reported) or {
             "disarmed": "arming", "held": f"somebody to resume after: {self.supervisor.reason}",
             "pilot": f"somebody to resume after: {self.supervisor.reason}", "engaging": f"mode {self._mode}",
+            "diving": "the heading to be aligned",
         }.get(self.supervisor.state, "nothing")  # fmt: skip
 
     def stick_refusal(self) -> str:
@@ -203,21 +219,29 @@ class AutopilotSession:
             "autopilot failsafe": float(reported.in_failsafe),
             "frame jump": alignment.jump,
             "frame drift": alignment.drift,
-            "geofence": self.outside,
+            "geofence": self.dive.outside if self.supervisor.state == "diving" else self.outside,
+            "heading leap": 0.0 if self.supervisor.state == "diving" else self.heading.leap,
+            "no dive": self.dive.seconds(now),
             "battery": float(reported.battery < self._options.least_battery),
             "leak": float(reported.is_leaking),
             "takeover": float(self._taken_over),
         }
-        in_mode = reported.mode == self._mode
+        if self._dived_in == "hold" and self.supervisor.state == "diving" and self.dive.is_stuck(reported, now):
+            self._dived_in, self._was_in_mode = "depth_hold", False
+        has_to_dive = alignment.offset is not None and has_state and self.dive.is_needed(reported, now)
+        in_mode = reported.mode == (self.profile.numbers[self._dived_in] if has_to_dive else self._mode)
+        self._was_in_mode |= in_mode and self.supervisor.state == "diving"
+        is_ours = self.supervisor.state == "steering" or (has_to_dive and self._was_in_mode)
         if not self._options.dry_run:
             values |= {
                 "pilot's sticks": float(now - reported.pilot_at < _PILOT_LASTS),
                 "disarmed": float(not reported.is_armed),
-                "mode taken": float(self.supervisor.state == "steering" and not in_mode),
+                "mode taken": float(not in_mode and is_ours),
                 "refused mode": self.supervisor.waited_for_mode(now),
                 "pilot gain": self._gain_off() if uses_sticks(self._options.profile, self._options.steer_by) else 0.0,
             }
-        return Observation(now, has_state, alignment.offset is not None, reported.is_armed, in_mode, values)
+        is_known = alignment.offset is not None
+        return Observation(now, has_state, is_known, reported.is_armed, in_mode, values, has_to_dive)
 
     # ---- what is sent ----
 
@@ -257,6 +281,13 @@ class AutopilotSession:
             output.clear()
         if state == "disarmed" and self._options.arm and self._due("arm", 1.0, now):
             self._command(self._mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+        elif state == "diving":
+            self.supervisor.asked_for_mode(now)
+            if self.reported.mode != self.profile.numbers[self._dived_in]:
+                self._send_mode(self._dived_in, now)
+                messages = output.still(self.reported)
+            else:
+                messages = output.descend(self.reported, self.dive.speed(self.reported))
         elif state == "engaging":
             self.supervisor.asked_for_mode(now)
             self._send_mode(self._steered_in, now)
@@ -309,6 +340,8 @@ class AutopilotSession:
             self.failsafes.take(message)
         self.reported.take(system, component, message, at)
         self.alignment.update(self.reported, at)
+        self.heading.update(self.reported)
+        self.dive.update(self.reported, at)
 
     def _warn_of_rival(self, component: int) -> None:
         """Warn once of another station that shares our system id: an ArduSub takes its sticks as it takes ours."""

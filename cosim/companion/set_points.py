@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -71,11 +72,18 @@ class LevelLead:
 
     Surge and sway tilt a vehicle whose horizontal thrusters are eccentric. The loop commands the rate
     P_a (lean - angle), and the thrusters u = P e + I integral(e) of its error e. So a lean u/(P_a P), which washes out
-    in P/I seconds, gives the command u while the angle is zero. Gains are ArduSub's defaults.
+    in P/I seconds, gives the command u while the angle is zero. Gains are ArduSub's defaults until `set_gains`.
     """
 
     def __init__(self) -> None:
         self._settled: Array = np.zeros(2)
+        self.set_gains({})
+
+    def set_gains(self, parameters: Mapping[str, float]) -> None:
+        """Take the gains of pitch from an ArduSub's parameters, for roll too; missing ones are the defaults."""
+        self._rate_p = parameters.get("ATC_RAT_PIT_P", 0.0) or _RATE_P
+        self._gain = self._rate_p * (parameters.get("ATC_ANG_PIT_P", 0.0) or _ANGLE_P)
+        self._washout = parameters.get("ATC_RAT_PIT_I", _RATE_I) / self._rate_p  # 1/s
 
     def restart(self) -> None:
         """Forget the integral, after another controller has steered."""
@@ -91,8 +99,8 @@ class LevelLead:
         period : float
             Time since the last call [s].
         """
-        self._settled += min(1.0, period * _RATE_I / _RATE_P) * (command - self._settled)
-        angles: Array = np.clip((command - self._settled) / (_ANGLE_P * _RATE_P), -_LEAN, _LEAN)
+        self._settled += min(1.0, period * self._washout) * (command - self._settled)
+        angles: Array = np.clip((command - self._settled) / self._gain, -_LEAN, _LEAN)
         return angles
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, get_args
 
@@ -26,7 +27,9 @@ from plant_fmu import Vehicle
 SticksBy = Literal["manual-control", "rc-override"]
 STICKS_BY: tuple[SticksBy, ...] = get_args(SticksBy)
 
-PILOT_SPEED = 0.5  # m/s, depth rate of a full vertical stick in ALT_HOLD: ArduSub's PILOT_SPEED_UP
+PILOT_SPEED = 0.5  # m/s, depth rate of a full vertical stick in ALT_HOLD, where the autopilot does not say its own
+_FULL_YAW = math.radians(45.0)  # of a full stick, before ACRO_YAW_P
+_CENTI = 0.01
 _FULL = 1000.0
 _NEWTON, _FLAT = 3, 0.05  # steps; least command of a thruster at which its force is linearized
 _HALVINGS = 8  # of the part of a force that leaves its moments whole
@@ -56,6 +59,10 @@ class StickScale:
         True if a thruster's force is proportional to the square of its command.
     dead_zones : float
         Factor of the dead zones of rate sticks: the pilot gain; 0 without dead zones.
+    yaw_rate, climb_rates : float, (float, float)
+        Rates of full sticks: of yaw [rad/s], up and down [m/s].
+    greatest_lean : float
+        Angle of a full stick of roll or pitch [rad].
     """
 
     efforts: Array
@@ -65,6 +72,9 @@ class StickScale:
     scales_all: bool
     quadratic: bool
     dead_zones: float
+    yaw_rate: float = YAW_RATE
+    climb_rates: tuple[float, float] = (PILOT_SPEED, PILOT_SPEED)
+    greatest_lean: float = LEAN
 
     def sticks(self, wrench: Array) -> Array:
         """Return the sticks that command a wrench, shape (6,), X Y Z K M N from -1 to 1.
@@ -124,15 +134,31 @@ class StickScale:
 
     def yaw_rate_stick(self, rate: float) -> float:
         """Return the yaw stick that commands a yaw rate [rad/s]; 0 for one that is not finite."""
-        return self._rate_stick(rate / YAW_RATE, YAW_DEAD_ZONE)
+        return self._rate_stick(rate / self.yaw_rate, YAW_DEAD_ZONE)
 
     def climb_stick(self, rate_down: float) -> float:
         """Return the heave stick that commands a depth rate [m/s]; 0 for one that is not finite."""
-        return self._rate_stick(rate_down / PILOT_SPEED, CLIMB_DEAD_ZONE)
+        return self._rate_stick(rate_down / self.climb_rates[rate_down > 0.0], CLIMB_DEAD_ZONE)
+
+    def with_rates(self, parameters: Mapping[str, float]) -> StickScale:
+        """Return this scale with the rates and leans of an ArduSub's parameters; missing ones and 0 change nothing."""
+        degrees = parameters.get("ATC_ANGLE_MAX", 0.0) or _CENTI * parameters.get("ANGLE_MAX", 0.0)
+        yaw, up = parameters.get("ACRO_YAW_P", 0.0), abs(parameters.get("PILOT_SPEED_UP", 0.0))
+        down = abs(parameters.get("PILOT_SPEED_DN", 0.0)) or up
+        climb = _CENTI * up or self.climb_rates[0], _CENTI * down or self.climb_rates[1]
+        yaw_rate = _FULL_YAW * yaw or self.yaw_rate
+        return replace(
+            self, yaw_rate=yaw_rate, climb_rates=climb, greatest_lean=math.radians(degrees) or self.greatest_lean
+        )
 
     def lean_sticks(self, angles: Array) -> Array:
         """Return the sticks of roll and pitch, shape (2,), that command these angles [rad] in STABILIZE."""
-        return np.array([deflection_of(min(max(angle / LEAN, -1.0), 1.0), LEAN_DEAD_ZONE) for angle in angles.tolist()])
+        return np.array(
+            [
+                deflection_of(min(max(angle / self.greatest_lean, -1.0), 1.0), LEAN_DEAD_ZONE)
+                for angle in angles.tolist()
+            ]
+        )
 
     def _rate_stick(self, part: float, dead_zone: float) -> float:
         if not math.isfinite(part):

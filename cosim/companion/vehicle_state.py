@@ -54,6 +54,8 @@ class ReportedState:
         [m, m/s], NED, in the autopilot's own local frame.
     quaternion, rates : ndarray, shape (4,), (3,)
         From body to world, scalar first; body rates [rad/s].
+    attitude_boot : float
+        Time of these since the autopilot's boot [s]; NaN before there are any.
     mode, is_armed, in_failsafe : int, bool, bool
         Of its heartbeat.
     global_position : tuple of float or None
@@ -89,7 +91,7 @@ class ReportedState:
         self.results: dict[int, int] = {}  # of commands, by number
         self.texts: list[str] = []
         self.sync = ClockSync()
-        self._position_boot = self._attitude_boot = math.nan  # s since the autopilot's boot
+        self._position_boot = self.attitude_boot = math.nan
         self._position_at = self._attitude_at = -math.inf  # our time [s]
         self._handlers: dict[str, Callable[[Any, float], None]] = {
             "HEARTBEAT": self._heartbeat,
@@ -133,7 +135,7 @@ class ReportedState:
         By the autopilot's own stamps where clocks are aligned, and never less than the time since it came.
         """
         ages = []
-        for boot, heard in ((self._position_boot, self._position_at), (self._attitude_boot, self._attitude_at)):
+        for boot, heard in ((self._position_boot, self._position_at), (self.attitude_boot, self._attitude_at)):
             stamped = now - (boot + self.sync.offset)
             ages.append(max(now - heard, stamped if math.isfinite(stamped) else 0.0))
         return max(ages)
@@ -185,7 +187,7 @@ class ReportedState:
         length = math.hypot(*quaternion)
         if length > 0.0:
             self.quaternion[:], self.rates[:] = np.divide(quaternion, length), rates
-            self._attitude_boot, self._attitude_at = boot, now
+            self.attitude_boot, self._attitude_at = boot, now
 
     def _odometry(self, m: Any, now: float) -> None:
         if (m.frame_id, m.child_frame_id) != (_LOCAL_NED, _BODY_FRD):

@@ -39,8 +39,8 @@ class _SilentError(Exception):
 class HilServer:
     """Fly the plant in lockstep with a PX4.
 
-    PX4 starts up by the wall clock; meanwhile the vehicle is held at its start. The run begins with the first actuator
-    controls, and each of these makes one step.
+    PX4 starts up by the wall clock; meanwhile the vehicle is held at its start, and then until it is armed. The run
+    begins with the first actuator controls of an armed vehicle, and each one from then on makes one step.
 
     Parameters
     ----------
@@ -134,19 +134,25 @@ class HilServer:
         codec.robust_parsing = True
         motion = at_rest(flight.motion())
         frame = 0  # of PX4's clock, which is never reset
-        controls: Iterator[list[float]] = iter(())
+        controls: Iterator[tuple[bool, list[float]]] = iter(())
         while not flight.done:
             self._send(connection, codec, motion, frame)
             frame += 1
             while (answer := next(controls, None)) is None:
-                data = self._receive(connection, waits=flight.steps > 0)
+                data = self._receive(connection, waits=flight.steps + flight.waited > 0)
                 if data is None:  # PX4 is still starting: its clock must advance
                     break
                 controls = iter(self._controls(codec, data))
-            if answer is not None:
-                self._flights.law.take(answer)
+            if answer is None:
+                continue
+            is_armed, outputs = answer
+            if flight.steps or is_armed:
+                self._flights.law.take(outputs)
                 motion = flight.step()
                 self.counts.steps += 1
+            else:
+                flight.waited += 1
+                self.counts.waited += 1
 
     def _send(self, connection: socket.socket, codec: Any, motion: Motion, frame: int) -> None:
         m = self._mavlink
@@ -182,15 +188,16 @@ class HilServer:
                 self._heard = time.monotonic()
                 return data
 
-    def _controls(self, codec: Any, data: bytes) -> list[list[float]]:
-        """Parse the actuator controls in received bytes; those of a disarmed vehicle are zeros."""
+    def _controls(self, codec: Any, data: bytes) -> list[tuple[bool, list[float]]]:
+        """Parse the actuator controls in received bytes, each with whether it is armed; else they are zeros."""
         found = []
         for message in codec.parse_buffer(data) or ():
             kind = message.get_type()
             if kind == "BAD_DATA":
                 self.counts.malformed += 1
             elif kind == "HIL_ACTUATOR_CONTROLS":
-                found.append(list(message.controls) if message.mode & _ARMED else [0.0] * _CHANNELS)
+                is_armed = bool(message.mode & _ARMED)
+                found.append((is_armed, list(message.controls) if is_armed else [0.0] * _CHANNELS))
         return found
 
     def _check_timeout(self) -> None:

@@ -14,6 +14,7 @@ from cosim.sitl.motion import Motion
 RATE = 250  # Hz, frames per simulated second
 FIELD_NED = (0.1755, -0.0026, 0.470)  # gauss, at the default origin, as PX4's own table has it
 FLICKER = 5e-4  # gauss, of every second frame: PX4 takes a field that never changes for a dead sensor
+SURFACE_PRESSURE, WATER, AIR = 1013.25, 1000.0, 1.225  # hPa; kg/m3
 TEMPERATURE = 15.0  # degrees Celsius
 
 _ALL_BUT_AIRSPEED = 0x1BFF  # fields of HIL_SENSOR: accelerations, rates, field, pressure, its altitude, temperature
@@ -67,26 +68,15 @@ def hil_messages(mavlink: Any, motion: Motion, time_us: int, origin: tuple[float
     messages.append(
         mavlink.MAVLink_hil_sensor_message(
             time_us, *motion.specific_force, *motion.gyro, *field_body,
-            air_pressure(up), 0.0, up, TEMPERATURE, _ALL_BUT_AIRSPEED,
+            pressure_at(-up), 0.0, up, TEMPERATURE, _ALL_BUT_AIRSPEED,
         )
     )  # fmt: skip
     return messages
 
 
-def air_pressure(altitude: float) -> float:
-    """Return the air pressure [hPa] from which PX4, whose model has no water, computes an altitude [m].
-
-    Parameters
-    ----------
-    altitude : float
-        Altitude above the surface [m]; a depth is negative.
-
-    Returns
-    -------
-    float
-        By the standard atmosphere, extrapolated below sea level.
-    """
-    return float(1013.25 * max(0.0, 1.0 - 0.0065 * altitude / 288.15) ** (_GRAVITY * 0.0289644 / (8.31446 * 0.0065)))
+def pressure_at(depth: float) -> float:
+    """Return the absolute pressure [hPa] at a depth [m], of fresh water below the surface and of air above it."""
+    return SURFACE_PRESSURE + 0.01 * depth * _GRAVITY * (WATER if depth > 0.0 else AIR)
 
 
 def _cut(value: float, most: int) -> int:

@@ -64,6 +64,7 @@ class JsonServer:
         except OSError as error:
             self._socket.close()
             raise RunError(f"UDP {address[0]}:{address[1]}: {error.strerror or error}") from error
+        self._receive = self._socket.recvfrom
         self._socket.settimeout(_POLL if timeout is None else min(_POLL, timeout))
         self.address: tuple[str, int] = self._socket.getsockname()
         self._lockstep = Lockstep()
@@ -92,23 +93,32 @@ class JsonServer:
         try:
             return self._flights.fly(self._answer_frames, self.counts)
         finally:
-            self._socket.close()
+            self.close()
 
     def _answer_frames(self) -> str:
         """Answer frame by frame; return the status of the last run."""
-        receive = self._socket.recvfrom
-        while True:
-            try:
-                data, sender = receive(wire.LARGEST + 1)
-            except OSError:  # timeout; or the report of an earlier answer that was refused
-                data, sender = b"", None
-            now = time.monotonic()
-            if sender is not None and self._accept(data, sender, now):
-                self._heard = now
-                if self._flights.flight is not None and self._flights.flight.done:
-                    return "completed"
-            elif self._timeout is not None and now - self._heard > self._timeout:
-                return f"ended: silence for {self._timeout:g} s"
+        while not (status := self.poll()):
+            pass
+        return status
+
+    def poll(self) -> str:
+        """Answer the next frame, or wait for one for at most 0.25 s; return the run's status once it has ended."""
+        try:
+            data, sender = self._receive(wire.LARGEST + 1)
+        except OSError:  # timeout; or the report of an earlier answer that was refused
+            data, sender = b"", None
+        now = time.monotonic()
+        if sender is not None and self._accept(data, sender, now):
+            self._heard = now
+            if self._flights.flight is not None and self._flights.flight.done:
+                return "completed"
+        elif self._timeout is not None and now - self._heard > self._timeout:
+            return f"ended: silence for {self._timeout:g} s"
+        return ""
+
+    def close(self) -> None:
+        """Close the socket. May be called twice."""
+        self._socket.close()
 
     def _accept(self, data: bytes, sender: Sender, now: float) -> bool:
         """Process a datagram; return True if it is a valid one of the autopilot."""

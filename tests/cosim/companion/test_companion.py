@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
+from scipy.spatial.transform import Rotation
 
 from controller.laws.deployable.gains import SPREADS
 from cosim.companion.companion import Companion, scenario_to_steer
@@ -155,6 +156,19 @@ def test_companion_waits_for_arming_by_default(tmp_path):
 
 
 @pytest.mark.medium
+def test_an_ardusub_that_was_armed_here_dives_level_before_it_is_steered(tmp_path):
+    link = StandIn(profile="ardusub", shift=SHIFT, armed=False)
+    flight = Flight(tmp_path, 2.0, link=link, profile="ardusub", arm=True, timeout=40.0)
+    names = [state for _, state in flight.states]
+    assert names[-3:] == ["diving", "engaging", "steering"] and flight.status == "completed"
+    depth = link.column("position.z")
+    at = [round((flight.time_of(state)) / link.step) for state in ("diving", "engaging")]
+    assert depth[at[1]] - depth[at[0]] == pytest.approx(0.6, abs=0.06)
+    assert np.abs(link.column("attitude.pitch")[at[0] : at[1]]).max() < np.radians(3.0)
+    assert link.column("sea bed.clearance").min() > 0.3
+
+
+@pytest.mark.medium
 def test_dry_run_sends_no_setpoints_and_only_message_requests(tmp_path):
     flight = Flight(tmp_path, 3.0, dry_run=True)
     assert flight.status == "completed" and flight.states[-1][1] == "dry_run"
@@ -179,6 +193,16 @@ def position_off(link, by):
         message.x += by
 
     link.tamper["LOCAL_POSITION_NED"] = leap
+
+
+def heading_off(link, degrees):
+    turn = Rotation.from_euler("z", degrees, degrees=True)
+
+    def leap(message):
+        q = (turn * Rotation.from_quat([message.q2, message.q3, message.q4, message.q1])).as_quat()
+        message.q2, message.q3, message.q4, message.q1 = q.tolist()
+
+    link.tamper["ATTITUDE_QUATERNION"] = leap
 
 
 def changed(link, kind, **fields):
@@ -219,6 +243,7 @@ FAULTS = {
     "late loop": lambda link: setattr(link, "stall", 0.35),
     "autopilot failsafe": lambda link: changed(link, "HEARTBEAT", system_status=5),
     "frame jump": lambda link: position_off(link, 1.0),
+    "heading leap": lambda link: heading_off(link, 8.0),
     "battery": lambda link: changed(link, "SYS_STATUS", battery_remaining=12),
     "leak": lambda link: link.autopilot._context.say("Leak Detected"),
     "pilot gain": lambda link: says_the_pilot_gain(link, 1.0),
@@ -246,6 +271,28 @@ def test_rejected_mode_holds_within_one_second(tmp_path):
     texts = [(at, m.text) for at, m in link.sent if m.get_type() == "STATUSTEXT"]
     (held,) = [at for at, text in texts if text == "Companion held: refused mode"]
     assert held - first <= 1.0
+
+
+@pytest.mark.medium
+def test_a_dive_that_does_not_end_holds_the_vehicle(tmp_path):
+    link = StandIn(profile="ardusub", shift=SHIFT, armed=False, overrides=["commands.pilot_gain=0.01"])
+    with pytest.raises(RunError, match="somebody to resume after: no dive"):
+        Flight(tmp_path, link=link, profile="ardusub", arm=True, timeout=40.0)
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize(("reason", "event"), [("mode taken", 19.0), ("disarmed", None)])
+def test_a_pilot_takes_over_while_it_dives(tmp_path, reason, event):
+    link, dived = StandIn(profile="ardusub", shift=SHIFT, armed=False), 6.0
+    link.events = [(dived, lambda: command(link, 400, 0.0) if event is None else command(link, 176, 1.0, event))]
+    with pytest.raises(RunError, match=f"somebody to resume after: {reason}"):
+        Flight(tmp_path, link=link, profile="ardusub", arm=True, timeout=8.0)
+    texts = [(at - 100.0, m.text) for at, m in link.sent if m.get_type() == "STATUSTEXT"]
+    (begun,) = [at for at, text in texts if text == "Companion diving"]
+    (ended,) = [at for at, text in texts if text == f"Companion pilot: {reason}"]
+    assert begun < dived < ended < dived + 0.5
+    modes = [m for at, m in link.sent if m.get_type() == "COMMAND_LONG" and m.command == 176 and at - 100.0 > ended]
+    assert not modes
 
 
 @pytest.mark.medium
@@ -417,7 +464,7 @@ def test_control_can_be_resumed_after_a_takeover(tmp_path):
 
 
 def test_every_condition_has_a_test():
-    tested = {*FAULTS, *PILOTS, "refused mode", "frame drift", "geofence"}
+    tested = {*FAULTS, *PILOTS, "refused mode", "frame drift", "geofence", "no dive"}
     assert tested == {condition.name for condition in CONDITIONS}
 
 

@@ -12,6 +12,7 @@ from cosim.companion.clock_sync import ClockSync
 from cosim.companion.companion import Companion
 from cosim.companion.failsafes import Failsafes
 from cosim.companion.frame_alignment import FrameAlignment, SceneOrigin
+from cosim.companion.heading import HeadingWatch, LevelDive
 from cosim.companion.link import NetworkLink
 from cosim.companion.options import CompanionOptions
 from cosim.companion.outputs import Output, require_taken
@@ -169,6 +170,24 @@ def test_rate_sticks_realize_the_desired_rates_in_ardusub(sticks_by):
         angle = 45.0 * math.copysign(abs(pulse) - dead, pulse) / (400.0 - dead)
         assert math.radians(4.5 * angle) == pytest.approx(rate)
     assert scale.climb_stick(0.0) == scale.yaw_rate_stick(0.0) == scale.yaw_rate_stick(math.nan) == 0.0
+
+
+def test_rate_sticks_follow_the_parameters_of_the_autopilot():
+    """As the same functions of ArduSub have it: by ACRO_YAW_P of 4.7, and by speeds of 2 m/s up and 1 m/s down."""
+    scale = scale_of(HEAVY, ARDUSUB, 1.0, "manual-control")
+    scale = scale.with_rates({"ACRO_YAW_P": 3.375, "PILOT_SPEED_UP": 200.0, "PILOT_SPEED_DN": 100.0})
+    for rate, most in ((0.3, 1.0), (-0.3, 2.0)):
+        throttle = 500.0 - 500.0 * scale.climb_stick(rate)
+        climb = (throttle - 600.0) / 400.0 if throttle > 600.0 else (throttle - 400.0) / 400.0
+        assert -most * climb == pytest.approx(rate)
+        pulse = 400.0 * scale.yaw_rate_stick(rate)
+        angle = 45.0 * math.copysign(abs(pulse) - 40.0, pulse) / 360.0
+        assert math.radians(3.375 * angle) == pytest.approx(rate)
+    assert scale.with_rates({"PILOT_SPEED_DN": 0.0, "PILOT_SPEED_UP": 150.0}).climb_rates == (1.5, 1.5)
+    assert scale.with_rates({}) == scale
+    for most in ({"ATC_ANGLE_MAX": 30.0}, {"ANGLE_MAX": 3000.0}):
+        stick = scale.with_rates(most).lean_sticks(np.array([math.radians(15.0), math.radians(40.0)]))
+        assert (400.0 * stick[0] - 30.0) / 370.0 * 30.0 == pytest.approx(15.0) and stick[1] == 1.0
 
 
 def test_rc_override_follows_the_ardusub_order_and_zero_releases():
@@ -333,6 +352,68 @@ def test_distance_without_a_fix_is_accumulated():
     assert state.is_reckoned
 
 
+# ---- heading ----
+
+
+def attitude(state, at, yaw, rate):
+    """Report a yaw and its rate at a time since boot [s]."""
+    turn = [math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0)]
+    state.take(1, 1, mavlink.MAVLink_attitude_quaternion_message(round(1000.0 * at), *turn, 0.0, 0.0, rate), at)
+
+
+def test_a_heading_leaps_where_the_rates_do_not_explain_its_turn():
+    state, watch = ReportedState((255, 191)), HeadingWatch()
+    state.take(1, 1, mavlink.MAVLink_heartbeat_message(12, 3, 0, 0, 4, 3), 0.0)
+    for k in range(100):  # a turn of 50 deg/s across 180 deg
+        attitude(state, 0.02 * k, 3.0 + math.radians(k), math.radians(50.0))
+        watch.update(state)
+    assert watch.leap < 1e-5
+    attitude(state, 2.0, 3.0 + math.radians(108.0), math.radians(50.0))
+    watch.update(state)
+    assert math.degrees(watch.leap) == pytest.approx(8.0, abs=0.01)
+    watch.restart()
+    attitude(state, 4.0, 0.0, 0.0)  # two seconds later nobody knows
+    watch.update(state)
+    assert watch.leap == 0.0
+
+
+def dived(texts=(), clearance=None, armed_first=False):
+    """Let a vehicle be armed and follow the dive, and return it, the state, and for how long it dived [s]."""
+    state, dive = ReportedState((255, 191)), LevelDive(0.6)
+    dive.clearance = clearance
+    state.system, state.is_armed = 1, armed_first
+    state.position[:], state.velocity[:] = (0.0, 0.0, 1.0), 0.0
+    dive.update(state, 0.0)
+    state.is_armed = True
+    for k in range(1000):
+        now = 0.02 * k
+        dive.update(state, now)
+        if not dive.is_needed(state, now):
+            return dive, state, now
+        state.velocity[2] = dive.speed(state)
+        state.position[2] += 0.02 * state.velocity[2]
+        if state.position[2] > 1.5 and now < 5.0:
+            state.texts.extend(texts)
+    raise AssertionError("it dives on")
+
+
+def test_an_ardusub_dives_until_its_heading_is_aligned():
+    _, state, since = dived(["EKF3 IMU0 MAG0 in-flight yaw alignment complete"])
+    assert state.position[2] == pytest.approx(1.6, abs=0.06) and 6.0 < since < 8.0
+    _, state, without = dived()  # an older one says nothing
+    assert state.position[2] == pytest.approx(1.6, abs=0.06) and without > since
+
+
+def test_a_vehicle_that_was_armed_before_is_not_dived():
+    assert dived(armed_first=True)[2] == 0.0
+
+
+def test_there_is_no_dive_without_room(caplog):
+    assert dived(clearance=lambda position: 1.5 - position[2])[2] == 0.0
+    assert "no room to dive by 0.6 m" in caplog.text
+    assert dived(clearance=lambda position: 2.0 - position[2])[1].position[2] > 1.5
+
+
 # ---- who may steer ----
 
 
@@ -363,6 +444,10 @@ def test_supervisor_states_advance_in_order():
     ]  # fmt: skip
     for changes, state in expected:
         assert supervisor.update(nothing._replace(**changes)) == state
+    all_known = nothing._replace(has_state=True, frame_known=True, is_armed=True)
+    dives = [all_known._replace(has_to_dive=True), all_known, all_known._replace(in_mode=True)]
+    supervisor = Supervisor()
+    assert [supervisor.update(seen) for seen in dives] == ["diving", "engaging", "steering"]
 
 
 @pytest.mark.parametrize(
@@ -412,7 +497,7 @@ def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
     failsafes = Failsafes("ardusub")
     assert not failsafes.is_read(0.0)
     asked = [len(failsafes.wanted(0.25 * k)) for k in range(9)]
-    assert asked == [13, 0, 13, 0, 13, 0, 13, 0, 13]
+    assert asked == [22, 0, 22, 0, 22, 0, 22, 0, 22]
     values = {"FS_GCS_ENABLE": 2.0, "FS_GCS_TIMEOUT": 5.0, "SOMETHING_ELSE": 1.0, "FS_EKF_ACTION": float("nan")}
     for name, value in values.items():
         failsafes.take(decoded(value_of(name, value)))
@@ -443,6 +528,14 @@ def test_sticks_that_outlast_a_cut_link_by_more_than_a_second_are_warned_of(over
         failsafes.take(decoded(value_of(name, value)))
     said = f"RC_OVERRIDE_TIME is {override:g}, FS_PILOT_TIMEOUT is {pilot:g}; expected 1 s or less"
     assert any(line.startswith("WARNING") and line.endswith(said) for line in failsafes.text()) == warns
+
+
+def test_an_ardusub_that_learns_the_magnetic_field_is_known():
+    failsafes = Failsafes("ardusub")
+    assert not failsafes.learns_the_field()  # nobody knows
+    for value, learns in ((3.0, True), (2.0, False)):
+        failsafes.take(decoded(value_of("EK3_MAG_CAL", value)))
+        assert failsafes.learns_the_field() == learns
 
 
 def test_px4_integer_parameters_are_decoded_from_bits():

@@ -1,0 +1,70 @@
+"""Random scenes for flights with a real autopilot: spheres between start and goal, a current, and a wrong weight."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cosim.scenario.scenario import Scenario, load_scenario, validate_scenario
+from plant_fmu import load_vehicle
+
+GOAL_RADIUS = 0.5  # m
+VEHICLE = "bluerov2_heavy"
+_FREE = 0.6  # m, least distance of an obstacle from the start, from the dive below it, and from the goal
+_DIVE = 0.6  # m
+_OFTEN = 1000  # draws of an obstacle that finds no place
+
+
+def random_scene(seed: int) -> Scenario:
+    """Make the scene of a seed.
+
+    Parameters
+    ----------
+    seed : int
+        0 or above.
+
+    Returns
+    -------
+    Scenario
+        6 to 30 spheres of 0.3 m to 0.9 m, a goal 8 m to 12 m ahead, a current of up to 0.4 m/s, and a vehicle that is
+        up to 15 N too light or too heavy. Its DVL measures with a noise of 0.01 m/s, 8 times a second.
+    """
+    rng = np.random.default_rng([20261125, seed])
+    start = np.array([0.0, 0.0, rng.uniform(1.5, 4.0)])
+    goal = np.array([rng.uniform(8.0, 12.0), rng.uniform(-3.0, 3.0), rng.uniform(1.5, 4.5)])
+    places = [start, start + np.array([0.0, 0.0, _DIVE])]
+    heading, speed = rng.uniform(-np.pi, np.pi), rng.uniform(0.0, 0.4)
+    vehicle = load_vehicle(VEHICLE)
+    regions: list[dict[str, Any]] = [
+        {"name": "depth", "criterion": "depth", "keep": "in", "gain": 100.0,
+         "shape": {"type": "depth_band", "depth": 3.65, "tolerance": 3.35}}
+    ]  # fmt: skip
+    for i in range(int(rng.integers(6, 31))):
+        for _ in range(_OFTEN):
+            radius = rng.uniform(0.3, 0.9)
+            center = start + rng.uniform(0.1, 0.9) * (goal - start) + rng.normal(0.0, [0.5, 1.5, 1.0])
+            room = min(*(np.linalg.norm(center - p) for p in places), np.linalg.norm(center - goal) - GOAL_RADIUS)
+            if room - radius > _FREE:
+                shape = {"type": "sphere", "centre": center.tolist(), "radius": float(radius)}
+                regions.append(
+                    {"name": f"rock {i + 1}", "criterion": "obstacle", "keep": "out", "gain": 100.0, "shape": shape}
+                )
+                break
+    table = load_scenario("docking").table
+    table = {name: table[name] for name in ("vehicle", "time", "law", "arbiter", "actuation", "sensing")} | {
+        "title": f"Random scene {seed}",
+        "plant": {
+            "current": [float(speed * np.cos(heading)), float(speed * np.sin(heading)), 0.0],
+            "parameters": {
+                "buoyancy": vehicle.weight + float(rng.uniform(-15.0, 15.0)),
+                "dvl.rate": 8.0,
+                "dvl.velocity_noise": 0.01,
+            },
+        },
+        "initial": {"position": start.tolist()},
+        "goal": {"type": "sphere", "centre": goal.tolist(), "radius": GOAL_RADIUS},
+        "law": {"name": "deployable"},
+        "regions": regions,
+    }
+    return validate_scenario(table, f"random-{seed}", vehicle)

@@ -1,0 +1,47 @@
+"""The benchmark that flies a real ArduSub, as far as it goes without one."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks import autopilot
+from benchmarks.autopilot import Task
+from benchmarks.autopilot_scenes import random_scene
+
+
+def test_random_scenes_leave_start_dive_and_goal_free_and_are_repeatable():
+    counts = set()
+    for seed in range(20):
+        scene = random_scene(seed)
+        start, goal = np.array(scene.initial.position), np.array(scene.goal.centre)
+        rocks = [s.region.shape for s in scene.regions if s.region.name.startswith("rock")]
+        counts.add(len(rocks))
+        for rock in rocks:
+            assert (
+                min(np.linalg.norm(start + np.array([0.0, 0.0, d]) - rock.centre) for d in (0.0, 0.6))
+                > rock.radius + 0.6
+            )
+            assert np.linalg.norm(goal - rock.centre) > rock.radius + 1.1
+        assert 8.0 <= goal[0] - start[0] <= 12.0 and np.hypot(*scene.plant.current[:2]) <= 0.4
+        assert random_scene(seed).toml() == scene.toml()
+    assert min(counts) >= 6 and max(counts) <= 30 and len(counts) > 5
+
+
+def test_flights_that_the_file_has_are_not_flown_again(tmp_path, monkeypatch, capsys):
+    tasks, flown = [Task("random-1", "wrench"), Task("docking"), Task("docking", level_dive=0.0)], []
+    monkeypatch.setattr(
+        autopilot, "fly", lambda task, *rest: flown.append(task) or {"key": task.key, "reached": True, "violated": []}
+    )
+    out = tmp_path / "flights.jsonl"
+    autopilot.main(tasks[:2], Path("ardusub"), 0, out)
+    autopilot.main(tasks, Path("ardusub"), 0, out)
+    assert flown == tasks
+    assert [json.loads(line)["key"] for line in out.read_text().splitlines()] == [task.key for task in tasks]
+    assert "3 flights: 3 reached" in capsys.readouterr().err
+
+
+def test_parameters_of_the_autopilot_are_numbers():
+    lines = [line.split() for line in autopilot.PARAMETERS.read_text().splitlines() if line and line[0] != "#"]
+    assert len({name for name, _ in lines}) == len(lines) > 40
+    assert all(np.isfinite(float(value)) for _, value in lines)
