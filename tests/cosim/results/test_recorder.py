@@ -268,7 +268,9 @@ def test_signal_storm_neither_loses_nor_duplicates_rows(tmp_path):
             except KeyboardInterrupt:
                 caught += 1
     finally:
-        signal.signal(signal.SIGALRM, lambda *_: None)  # one under way neither sets the timer again nor reaches `before`
+        signal.signal(
+            signal.SIGALRM, lambda *_: None
+        )  # one under way neither sets the timer again nor reaches `before`
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
     recorder.close()
