@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -27,6 +28,7 @@ _TYPES = {
     "int8_t": "i1", "uint8_t": "u1", "int16_t": "<i2", "uint16_t": "<u2", "int32_t": "<i4", "uint32_t": "<u4",
     "int64_t": "<i8", "uint64_t": "<u8", "float": "<f4", "double": "<f8", "bool": "i1", "char": "i1",
 }  # fmt: skip
+_POSSIBLE = re.compile(rb"[\x00-\xff][\x00-\x27][" + bytes(sorted(_KNOWN)) + rb"]", re.DOTALL)  # heads of messages
 _FAULTS = (ValueError, KeyError, IndexError, struct.error, UnicodeDecodeError)
 
 
@@ -75,6 +77,7 @@ class ULogMessages:
         self.is_damaged = False
         self._formats: dict[str, list[tuple[str, int, str]]] = {}
         self._topics: dict[int, _Topic | None] = {}  # by their number; None: not wanted
+        self._has_begun = False
         self._appended: list[int] = []  # bytes from the begin, where data were appended after a crash
 
     @property
@@ -109,6 +112,7 @@ class ULogMessages:
 
     def _take(self, kind: int, body: bytes) -> _Topic | None:
         """Take a message; return the topic of a sample."""
+        is_first, self._has_begun = not self._has_begun, True
         match chr(kind):
             case "D":
                 number = int.from_bytes(body[:2], "little")
@@ -134,7 +138,7 @@ class ULogMessages:
                 self.parameters[said[1]] = float(struct.unpack({"int32_t": "<i", "float": "<f"}[said[0]], value)[0])
             case "O":
                 self.dropouts.append(1e-3 * int.from_bytes(body[:2], "little"))
-            case "B":
+            case "B" if is_first:
                 if body[8] & ~1 or any(body[9:16]):
                     raise ImportLogError("cannot be read as a ULog file: it has flags of a newer format")
                 self._appended = [x for x in struct.unpack_from("<3Q", body, 16) if x]
@@ -165,6 +169,7 @@ class ULogMessages:
             if file.read(_FILE_HEAD)[:7] != _MAGIC:
                 raise ImportLogError("cannot be read as a ULog file: it does not begin as one")
             data, at, before = b"", 0, _FILE_HEAD  # bytes of the file before `data`
+            searched = 0  # bytes of the file in which there is no mark from the present message on
             while True:
                 if len(data) - at < _LONGEST + _HEAD.size:
                     more = file.read(_CHUNK)
@@ -176,8 +181,13 @@ class ULogMessages:
                 end = at + _HEAD.size + size
                 if kind not in _KNOWN or not 0 < size <= _LONGEST:
                     self.is_damaged = True
-                    found = data.find(_SYNC, at + 1)
-                    at = found + len(_SYNC) if found >= 0 else at + 1
+                    found = data.find(_SYNC, max(at + 1, searched - before))
+                    if found >= 0:
+                        at = found + len(_SYNC)
+                    else:
+                        searched = before + max(0, len(data) - len(_SYNC) + 1)
+                        possible = _POSSIBLE.search(data, at + 1)
+                        at = possible.start() if possible else max(at + 1, len(data) - _HEAD.size + 1)
                     continue
                 if self._appended and before + end > self._appended[0] >= before + at:
                     offset = self._appended.pop(0) - before  # a message that a crash cut

@@ -144,6 +144,19 @@ def test_reading_goes_on_behind_damage(dive, tmp_path):
         assert abs(len(found) - len(data.data["timestamp"])) < 60
 
 
+@pytest.mark.parametrize("junk", [bytes(300_000), np.random.default_rng(3).bytes(300_000)], ids=["zeros", "random"])
+def test_junk_behind_a_log_leaves_what_came_before(dive, tmp_path, junk):
+    path = tmp_path / "dive.ulg"
+    write_ulog(path, dive)
+    _, _, theirs = samples_of(path)
+    path.write_bytes(path.read_bytes() + junk)
+    log, ours = ULogMessages(path, TOPICS), {}
+    for name, block in log.blocks(lambda part: None):
+        ours.setdefault(name, []).append(block)
+    assert log.is_damaged
+    assert_equal_samples({name: np.concatenate(blocks) for name, blocks in ours.items()}, theirs)
+
+
 @pytest.mark.medium
 def test_memory_does_not_grow_with_the_log(dive, tmp_path, monkeypatch):
     """Samples are given in blocks: a log of four times the length needs the same memory."""
