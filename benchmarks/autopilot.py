@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.autopilot_scenes import random_scene
+from controller import VehicleState
 from controller.regions.region_set import of_attitude
 from cosim.companion.companion import Companion
 from cosim.companion.frame_alignment import SceneOrigin
@@ -33,8 +34,10 @@ from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GROUND_STATION, GroundLink, Heard
 from cosim.mavlink.wire.options import ORIGIN
-from cosim.results.record import load_record
+from cosim.results.record import Record, load_record
 from cosim.scenario.scenario import Scenario, load_scenario
+from cosim.simulation.environment import RegionEnvironment
+from cosim.simulation.signals import Array
 from cosim.sitl.autopilot_link import AutopilotLink, DvlOptions
 from cosim.sitl.flights import FlightOptions, Flights
 from cosim.sitl.law import law_of_pwm
@@ -313,15 +316,16 @@ def _judge(scenario: Scenario, flown: Flown, folder: Path, task: Task) -> dict[s
     rows = (at >= since) & (at <= end)
     if task.fault:
         return {"states": flown.states} | _after_fault(record, at, flown, scenario)
+    found = _clearances(scenario, record, at - steered)
     place: dict[str, float] = {}
     attitude: dict[str, float] = {}
-    for secondary in scenario.regions:
+    for i, secondary in enumerate(scenario.regions, 1):
         region = secondary.region
         if region.hard:
             kept = at >= (steered if of_attitude(region.shape) else since)
-            least = float(record[f"{region.name}.clearance"][rows & kept].min())
+            least = float(found[rows & kept, i].min())
             (attitude if of_attitude(region.shape) else place)[region.name] = round(least, 4)
-    goal = record["goal.clearance"]
+    goal = found[:, 0]
     inside = (goal >= 0.0) & rows & (at >= steered)
     entered = float(at[np.argmax(inside)] - steered) if inside.any() else None
     angles = [record[f"attitude.{name}"][rows] for name in ("roll", "pitch", "yaw")]
@@ -345,6 +349,28 @@ def _judge(scenario: Scenario, flown: Flown, folder: Path, task: Task) -> dict[s
         "heading_error": round(float(np.degrees(np.nanmax(turned[at[rows] >= steered]))), 2),
         "states": [(round(t, 2), state) for t, state in flown.states],
     }
+
+
+def _clearances(scenario: Scenario, record: Record, time: Array) -> Array:
+    """Return the true clearances of goal and regions, shape (rows, n + 1); their motion begins at time 0.
+
+    The plant's record has them in motion since the plant began.
+    """
+    n = len(scenario.regions) + 1
+    environment, shifts, found = (
+        RegionEnvironment(scenario),
+        np.zeros((len(scenario.moving), 3)),
+        np.zeros((len(time), n)),
+    )
+    evaluation = environment.empty_evaluation(np.zeros(n), np.zeros(n))
+    working = np.ones(scenario.vehicle.n_thrusters)
+    positions = np.stack([record[f"position.{axis}"] for axis in "xyz"], axis=1)
+    quaternions = np.stack([record[f"quaternion.e{i}"] for i in range(4)], axis=1)
+    for row, (t, position, quaternion) in enumerate(zip(time.tolist(), positions, quaternions, strict=True)):
+        environment.update_positions(max(t, 0.0), shifts)
+        environment.evaluate(VehicleState(position, quaternion, np.zeros(6), working), evaluation)
+        found[row] = evaluation.clearances
+    return found
 
 
 def _after_fault(record: Any, at: Any, flown: Flown, scenario: Scenario) -> dict[str, Any]:

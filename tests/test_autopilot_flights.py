@@ -8,6 +8,7 @@ import numpy as np
 from benchmarks import autopilot
 from benchmarks.autopilot import Task
 from benchmarks.autopilot_scenes import random_scene
+from cosim.scenario.scenario import load_scenario
 
 
 def test_random_scenes_leave_start_dive_and_goal_free_and_are_repeatable():
@@ -45,3 +46,13 @@ def test_parameters_of_the_autopilot_are_numbers():
     lines = [line.split() for line in autopilot.PARAMETERS.read_text().splitlines() if line and line[0] != "#"]
     assert len({name for name, _ in lines}) == len(lines) > 40
     assert all(np.isfinite(float(value)) for _, value in lines)
+
+
+def test_regions_move_from_the_begin_of_steering_on():
+    scenario = load_scenario("pipe-inspection")
+    assert scenario.goal.radius == 0.4 and scenario.goal.centre == (0.2, 1.9, 4.0)
+    time = np.array([-5.0, 0.0, 2.0, 10.0])
+    record = {f"position.{axis}": np.full(4, value) for axis, value in zip("xyz", (0.5, 1.9, 4.0), strict=True)}
+    record |= {f"quaternion.e{i}": np.full(4, float(i == 0)) for i in range(4)}
+    goal = 0.4 - np.abs(0.5 - (0.2 + 0.1 * np.maximum(time, 0.0)))
+    np.testing.assert_allclose(autopilot._clearances(scenario, record, time)[:, 0], goal, atol=1e-12)
