@@ -114,7 +114,9 @@ def _jackknife(information: Array, inverse: Array, pieces: Sequence[tuple[Array,
     alone = np.einsum("gkj,gkj->gj", np.stack(left_out), reached)
     across[:, range(n), range(n)] += alone.T
     trace = np.trace(across, axis1=1, axis2=2)
-    freedom: Array = np.square(trace) / np.sum(np.square(across), axis=(1, 2))
+    squares = np.sum(np.square(across), axis=(1, 2))
+    freedom: Array = np.full(len(trace), n - 1.0)  # of numbers that no piece moves
+    np.divide(np.square(trace), squares, out=freedom, where=squares > 0.0)
     return deviations, np.maximum(1.0, freedom)
 
 
