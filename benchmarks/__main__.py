@@ -29,6 +29,7 @@ from benchmarks.peer_environment import Environment
 from benchmarks.table import Table, as_json, print_tables, write_json
 from cosim.companion.outputs import STEER_BY
 from cosim.companion.sticks import STICKS_BY
+from cosim.errors import ScenarioError
 
 BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy, "mavlink": mavlink, "sitl": sitl, "view": view}
 TABLES = {"all": everything, "scaling": scaling}
@@ -114,7 +115,9 @@ def _add_autopilot(verbs: Any) -> None:
     verb.add_argument("--keep", type=Path, metavar="DIR", help="keep each flight's files there")
 
 
-def _autopilot(options: argparse.Namespace) -> None:
+def _autopilot(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    if not options.ardusub.is_file():
+        parser.error(f"--ardusub: {options.ardusub} is no file, expected ArduSub's program for SITL")
     names = [*options.scenario, *(f"random-{options.seed + i}" for i in range(options.random))]
     tasks = [
         autopilot.Task(name, by, options.sticks_by, fault, options.level_dive, tuple(options.parameter))
@@ -122,6 +125,11 @@ def _autopilot(options: argparse.Namespace) -> None:
         for by in options.steer_by
         for fault in options.fault
     ]
+    try:
+        for task in tasks:
+            task.load()
+    except ScenarioError as error:
+        parser.error(str(error))
     autopilot.main(tasks, options.ardusub, options.instance, options.json, options.keep)
 
 
@@ -148,7 +156,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             kinds = options.kinds or nmpc_search.FLOWN
             nmpc_search.main(kinds, options.seed, options.count, options.draws, options.peers_python, options.json)
         case "autopilot":
-            _autopilot(options)
+            _autopilot(parser, options)
         case "peers":
             for peer, version in peer_environment.install(again=True).items():
                 print(f"{peer:24} {version}")

@@ -77,8 +77,9 @@ class Task:
 
     def load(self) -> Scenario:
         """Return the scenario with the flight's duration."""
-        if self.scenario.startswith("random-"):
-            scenario, duration = random_scene(int(self.scenario.removeprefix("random-"))), RANDOM_DURATION
+        seed = self.scenario.removeprefix("random-")
+        if seed.isdecimal():
+            scenario, duration = random_scene(int(seed)), RANDOM_DURATION
         else:
             scenario = load_scenario(self.scenario)
             duration = DURATION.get(self.scenario, scenario.time.duration)
