@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from controller import VehicleState
 from controller.laws.deployable.gains import SPREADS
 from controller.regions.region_set import of_attitude
 from cosim.companion.link import AutopilotLink
@@ -261,13 +260,9 @@ class Companion:
         """Return the least clearance of hard regions [m] at a position of the autopilot's local frame."""
         if not len(self._hard):
             return math.inf
-        n, session = len(self.scenario.regions) + 1, self.session
-        found = self._environment.empty_evaluation(np.zeros(n), np.zeros(n))
-        place = session.alignment.to_scene(position)
-        working = np.ones(self.scenario.vehicle.n_thrusters)
-        state = VehicleState(place, session.reported.quaternion, np.zeros(6), working)
-        self._environment.evaluate(state, found)
-        return float(np.min(found.clearances[self._hard]))
+        place = self.session.alignment.to_scene(position)
+        found = self._environment.clearances(place, self.session.reported.quaternion)
+        return float(np.min(found[self._hard]))
 
     def _doubt(self) -> float:
         """Return by how much the position may be off [m]: as its sources have come apart, and as it was reckoned."""

@@ -138,6 +138,21 @@ class RegionEnvironment:
         """
         self._evaluate_places(self._places, state, evaluation)
 
+    def clearances(self, position: Array, quaternion: Array) -> Array:
+        """Return the clearances of goal and regions at a pose, shape (n + 1,) [m, rad of attitude].
+
+        Parameters
+        ----------
+        position : ndarray, shape (3,)
+            [m, NED].
+        quaternion : ndarray, shape (4,)
+            From body to world.
+        """
+        n = len(self._names)
+        found = self.empty_evaluation(np.zeros(n), np.zeros(n))
+        self.evaluate(VehicleState(position, quaternion, np.zeros(6), np.zeros(0)), found)
+        return found.clearances
+
     def advance_goal(self, clearance: float, place: Array) -> None:
         """Move the goal to its next place, from the next step on, once the vehicle has stayed in it long enough.
 
