@@ -24,6 +24,8 @@ from benchmarks import (
     step,
     view,
 )
+from benchmarks.autopilot.flights import Task, make_flights
+from benchmarks.autopilot.simulated_link import FAULTS
 from benchmarks.machine import description
 from benchmarks.peer_environment import Environment
 from benchmarks.table import Table, as_json, print_tables, write_json
@@ -106,7 +108,7 @@ def _add_autopilot(verbs: Any) -> None:
     verb.add_argument("--steer-by", nargs="+", choices=STEER_BY, default=["sticks"], help="default: sticks")
     verb.add_argument("--sticks-by", choices=STICKS_BY, default="manual-control", help="default: %(default)s")
     verb.add_argument(
-        "--fault", nargs="+", choices=autopilot.FAULTS, default=[""], help="what fails after 5 s", metavar="WHAT"
+        "--fault", nargs="+", choices=FAULTS, default=[""], help="what fails after 5 s", metavar="WHAT"
     )  # fmt: skip
     verb.add_argument("--level-dive", type=float, default=0.6, metavar="M", help="as for cosim companion")
     verb.add_argument("--parameter", nargs="+", default=[], metavar="NAME=VALUE", help="of ArduSub, beside the file's")
@@ -120,7 +122,7 @@ def _autopilot(parser: argparse.ArgumentParser, options: argparse.Namespace) -> 
         parser.error(f"--ardusub: {options.ardusub} is no file, expected ArduSub's program for SITL")
     names = [*options.scenario, *(f"random-{options.seed + i}" for i in range(options.random))]
     tasks = [
-        autopilot.Task(name, by, options.sticks_by, fault, options.level_dive, tuple(options.parameter))
+        Task(name, by, options.sticks_by, fault, options.level_dive, tuple(options.parameter))
         for name in names
         for by in options.steer_by
         for fault in options.fault
@@ -130,7 +132,7 @@ def _autopilot(parser: argparse.ArgumentParser, options: argparse.Namespace) -> 
             task.load()
     except ScenarioError as error:
         parser.error(str(error))
-    autopilot.main(tasks, options.ardusub, options.instance, options.json, options.keep)
+    make_flights(tasks, options.ardusub, options.instance, options.json, options.keep)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import autopilot
-from benchmarks.autopilot import Task
-from benchmarks.autopilot_scenes import random_scene
+from benchmarks.autopilot import flights
+from benchmarks.autopilot.flights import Task
+from benchmarks.autopilot.judgement import clearances_at
+from benchmarks.autopilot.scenes import random_scene
 from cosim.scenario.scenario import load_scenario
 
 
@@ -32,18 +33,18 @@ def test_random_scenes_leave_start_dive_and_goal_free_and_are_repeatable():
 def test_flights_that_the_file_has_are_not_flown_again(tmp_path, monkeypatch, capsys):
     tasks, flown = [Task("random-1", "wrench"), Task("docking"), Task("docking", level_dive=0.0)], []
     monkeypatch.setattr(
-        autopilot, "fly", lambda task, *rest: flown.append(task) or {"key": task.key, "reached": True, "violated": []}
+        flights, "fly", lambda task, *rest: flown.append(task) or {"key": task.key, "reached": True, "violated": []}
     )
     out = tmp_path / "flights.jsonl"
-    autopilot.main(tasks[:2], Path("ardusub"), 0, out)
-    autopilot.main(tasks, Path("ardusub"), 0, out)
+    flights.make_flights(tasks[:2], Path("ardusub"), 0, out)
+    flights.make_flights(tasks, Path("ardusub"), 0, out)
     assert flown == tasks
     assert [json.loads(line)["key"] for line in out.read_text().splitlines()] == [task.key for task in tasks]
     assert "3 flights: 3 reached" in capsys.readouterr().err
 
 
 def test_parameters_of_the_autopilot_are_numbers():
-    lines = [line.split() for line in autopilot.PARAMETERS.read_text().splitlines() if line and line[0] != "#"]
+    lines = [line.split() for line in flights.PARAMETERS.read_text().splitlines() if line and line[0] != "#"]
     assert len({name for name, _ in lines}) == len(lines) > 40
     assert all(np.isfinite(float(value)) for _, value in lines)
 
@@ -55,4 +56,4 @@ def test_regions_move_from_the_begin_of_steering_on():
     record = {f"position.{axis}": np.full(4, value) for axis, value in zip("xyz", (0.5, 1.9, 4.0), strict=True)}
     record |= {f"quaternion.e{i}": np.full(4, float(i == 0)) for i in range(4)}
     goal = 0.4 - np.abs(0.5 - (0.2 + 0.1 * np.maximum(time, 0.0)))
-    np.testing.assert_allclose(autopilot._clearances(scenario, record, time)[:, 0], goal, atol=1e-12)
+    np.testing.assert_allclose(clearances_at(scenario, record, time)[:, 0], goal, atol=1e-12)

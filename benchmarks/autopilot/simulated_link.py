@@ -1,0 +1,122 @@
+"""The companion's link in simulated time, and what fails on it on purpose."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from cosim.companion.link import COMPANION
+from cosim.errors import RunError
+from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.endpoint import parse_endpoint
+from cosim.mavlink.wire.ground_end import GROUND_STATION, GroundLink, Heard
+from cosim.sitl.flights import Flights
+from cosim.sitl.server import JsonServer
+
+_DOWN, _UP = 0.010, 0.020  # s, of messages from the autopilot and to it
+_READ_EVERY = 0.004  # s
+
+
+class SimulatedLink:
+    """The companion's link, whose time is the plant's: waiting for a message lets plant and autopilot go on.
+
+    Parameters
+    ----------
+    flights : Flights
+        Whose plant flies.
+    server : JsonServer
+        Answers the autopilot's frames.
+    endpoint : str
+        Port of the autopilot.
+
+    Attributes
+    ----------
+    cut : bool
+        Whether no message passes in either direction.
+    lost : set of str
+        Names of messages of the autopilot, and of the companion, that do not pass.
+    """
+
+    def __init__(self, flights: Flights, server: JsonServer, endpoint: str) -> None:
+        self._flights, self._server = flights, server
+        self._link = GroundLink(parse_endpoint(endpoint), identity=COMPANION)
+        self.name, self.identity = endpoint, COMPANION
+        self.cut, self.lost = False, set[str]()
+        self.others: GroundLink | None = None  # a pilot's station
+        self._up: deque[tuple[float, Any]] = deque()
+        self._down: deque[Heard] = deque()
+        self._read_at = -math.inf
+        self.events: list[tuple[float, Callable[[], None]]] = []
+
+    def clock(self) -> float:
+        """Return the plant's time since the autopilot's first frame [s]."""
+        flight = self._flights.flight
+        return 0.0 if flight is None else self.waited() + flight.steps * flight.scenario.time.step
+
+    def waited(self) -> float:
+        """Return how long the plant was held before its record began [s]."""
+        flight = self._flights.flight
+        return 0.0 if flight is None else flight.waited * flight.scenario.time.step
+
+    def receive(self, timeout: float) -> Sequence[Heard]:
+        """Let time go by, and return the messages that have come meanwhile."""
+        until = self.clock() + timeout
+        while self.clock() < until - 1e-9:
+            self.advance()
+        heard = []
+        while self._down and self._down[0].time <= self.clock():
+            heard.append(self._down.popleft())
+        return heard
+
+    def send(self, message: Any) -> bool:
+        """Send a message, which arrives 20 ms later."""
+        if not self.cut and message.get_type() not in self.lost:
+            self._up.append((self.clock() + _UP, message))
+        return True
+
+    def advance(self) -> None:
+        """Answer one frame of the autopilot."""
+        if status := self._server.poll():
+            raise RunError(f"the autopilot's run: {status}")
+        now = self.clock()
+        while self.events and self.events[0][0] <= now:
+            self.events.pop(0)[1]()
+        while self._up and self._up[0][0] <= now:
+            self._link.send(self._up.popleft()[1])
+        if now - self._read_at < _READ_EVERY:
+            return
+        self._read_at = now
+        if self.others is not None:
+            self.others.receive(0.0)  # which connects it, too
+        for one in self._link.receive(0.0):
+            if not self.cut and one.kind not in self.lost:
+                self._down.append(one._replace(time=now + _DOWN))
+
+    def close(self) -> None:
+        """Close it."""
+        self._link.close()
+
+
+def _pilot_takes(mode: int) -> Callable[[SimulatedLink], None]:
+    def take(link: SimulatedLink) -> None:
+        assert link.others is not None
+        link.others.send(dialect().MAVLink_command_long_message(1, 1, 176, 0, 1, mode, 0, 0, 0, 0, 0))
+
+    return take
+
+
+def _pause(link: SimulatedLink) -> None:
+    system, component = COMPANION
+    m = dialect().MAVLink_command_long_message(system, component, 193, 0, 0, 0, 0, 0, 0, 0, 0)
+    link._down.append(Heard(link.clock() + _DOWN, *GROUND_STATION, 0, m.get_type(), m))
+
+
+FAULTS: dict[str, Callable[[SimulatedLink], None]] = {
+    "pilot takes ALT_HOLD": _pilot_takes(2),
+    "pilot takes MANUAL": _pilot_takes(19),
+    "estimate stops": lambda link: link.lost.update({"LOCAL_POSITION_NED", "ODOMETRY"}),
+    "link cut": lambda link: setattr(link, "cut", True),
+    "DO_PAUSE_CONTINUE": _pause,
+}
