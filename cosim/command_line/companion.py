@@ -77,7 +77,7 @@ def add_verb(verbs: Any) -> None:
     )  # fmt: skip
     verb.add_argument(
         "--level-dive", type=number(0.0, 10.0), default=0.6, metavar="M",
-        help="that an ArduSub dives after it was armed, until its heading is aligned; 0 for none (default: 0.6)",
+        help="depth by which an ArduSub dives after arming, to align its heading; 0 for none (default: 0.6)",
     )  # fmt: skip
     verb.add_argument(
         "--least-battery", type=number(0.0, 100.0), default=0.0, metavar="PERCENT",
