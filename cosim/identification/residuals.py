@@ -183,7 +183,7 @@ class Residuals:
         if not any(forces.impulses for forces in self._forces):
             return
         settings = self.settings(values)
-        inverse: Any = np.linalg.inv(with_values(self._vehicle, self.parameters, values).mass_matrix)  # fmt: skip
+        inverse: Any = np.linalg.inv(with_values(self._vehicle, self.parameters, values).mass_matrix)
         starts = [self.solve_start(i, settings, values) for i in range(len(self.windows))]
         self.whiteners = [None] * len(self.windows)
         by_impulses, left, projected = [], [], []
