@@ -86,15 +86,20 @@ def test_truncated_px4_log_is_read_to_its_end(dive, tmp_path):
     assert 15.0 < run.summary["simulated_time"] < 19.0
 
 
-def samples_of(path):
-    """All samples of the file's topics, as the reader and as pyulog have them."""
+def read_samples(path):
+    """The reader, and all samples of the file's topics."""
     ours = {}
     log = ULogMessages(path, TOPICS)
     for name, block in log.blocks(lambda part: None):
         ours.setdefault(name, []).append(block)
+    return log, {name: np.concatenate(blocks) for name, blocks in ours.items()}
+
+
+def samples_of(path):
+    """As the reader and as pyulog have them."""
     with contextlib.redirect_stdout(io.StringIO()):
-        read = pyulog.ULog(str(path), list(TOPICS))
-    return log, {name: np.concatenate(blocks) for name, blocks in ours.items()}, read
+        theirs = pyulog.ULog(str(path), list(TOPICS))
+    return *read_samples(path), theirs
 
 
 def assert_equal_samples(ours, theirs):
@@ -150,11 +155,9 @@ def test_junk_behind_a_log_leaves_what_came_before(dive, tmp_path, junk):
     write_ulog(path, dive)
     _, _, theirs = samples_of(path)
     path.write_bytes(path.read_bytes() + junk)
-    log, ours = ULogMessages(path, TOPICS), {}
-    for name, block in log.blocks(lambda part: None):
-        ours.setdefault(name, []).append(block)
+    log, ours = read_samples(path)
     assert log.is_damaged
-    assert_equal_samples({name: np.concatenate(blocks) for name, blocks in ours.items()}, theirs)
+    assert_equal_samples(ours, theirs)
 
 
 @pytest.mark.medium
