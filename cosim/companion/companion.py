@@ -148,7 +148,7 @@ class Companion:
         self._reported = ("", "")
         hard = [i for i, secondary in enumerate(self.scenario.regions, 1) if _is_fence(secondary)]
         self._hard = np.array(hard, dtype=int)
-        self._environment = RegionEnvironment(self.scenario)  # of the dive, before the master's begins
+        self._environment = RegionEnvironment(self.scenario)  # for the dive, before the master's environment exists
         self.session.dive.clearance = self._clearance
 
     def run(

@@ -46,15 +46,15 @@ PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
         Parameter("SYSID_MYGCS", "system that sticks are taken from"),
         Parameter("MAV_GCS_SYSID", "system that sticks are taken from, from 4.7 on"),
         Parameter("JS_GAIN_DEFAULT", "pilot gain"),
-        Parameter("EK3_MAG_CAL", "when it learns the magnetic field, 2 for never"),
-        Parameter("ACRO_YAW_P", "1/s of a full yaw stick's 45 deg"),
-        Parameter("ATC_ANGLE_MAX", "degrees of a full stick of roll or pitch"),
-        Parameter("ANGLE_MAX", "hundredths of a degree of it, before 4.7"),
-        Parameter("ATC_ANG_PIT_P", "gain of its pitch angle"),
-        Parameter("ATC_RAT_PIT_P", "gain of its pitch rate"),
-        Parameter("ATC_RAT_PIT_I", "integral gain of its pitch rate"),
-        Parameter("PILOT_SPEED_UP", "cm/s up of a full vertical stick"),
-        Parameter("PILOT_SPEED_DN", "cm/s down, 0 for as much as up"),
+        Parameter("EK3_MAG_CAL", "when it learns the magnetic field, 2: never"),
+        Parameter("ACRO_YAW_P", "yaw rate of a full stick, in 45 deg/s"),
+        Parameter("ATC_ANGLE_MAX", "angle of a full stick of roll or pitch, in degrees"),
+        Parameter("ANGLE_MAX", "the same before 4.7, in hundredths of a degree"),
+        Parameter("ATC_ANG_PIT_P", "gain from pitch angle to pitch rate"),
+        Parameter("ATC_RAT_PIT_P", "proportional gain of the pitch rate loop"),
+        Parameter("ATC_RAT_PIT_I", "integral gain of the pitch rate loop"),
+        Parameter("PILOT_SPEED_UP", "climb rate of a full vertical stick, in cm/s"),
+        Parameter("PILOT_SPEED_DN", "its descent rate, in cm/s, 0 for the climb rate"),
     ),
     "px4": (
         Parameter("COM_OF_LOSS_T", "s until set-points that stop coming count as lost"),
@@ -159,8 +159,8 @@ class Failsafes:
                 return f"{name} is {heard:g}, and the companion's system id {system}: its sticks would not be taken"
         return ""
 
-    def learns_the_field(self) -> bool:
-        """Return True if an ArduSub learns the magnetic field in flight, by which its heading drifts without a fix."""
+    def learns_magnetic_field(self) -> bool:
+        """Return True if an ArduSub learns the magnetic field in flight; without a fix its heading then drifts."""
         return self.values.get("EK3_MAG_CAL", _NEVER) != _NEVER
 
     def _line(self, parameter: Parameter) -> str:

@@ -1,4 +1,4 @@
-"""The heading of an autopilot's estimate: its leaps, and the dive on which an ArduSub aligns it."""
+"""The heading that an autopilot estimates: its leaps, and the dive during which an ArduSub aligns it."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from cosim.simulation.signals import Array
 
 log = logging.getLogger(__name__)
 
-_GAP = 0.2  # s, between two attitudes, beyond which their rates do not explain the turn
-_ALIGNED = "yaw alignment complete"  # of an ArduSub's text, with "in-flight" before it
-_IN_WATER = "in-flight"
-_RATE, _FASTEST = 0.5, 0.25  # 1/s of what is left of the way; m/s, greatest speed of the dive
-_NEAR, _STILL = 0.05, 0.05  # m, m/s, at which the vehicle has arrived
-_FLYING, _QUIET = 6.0, 1.0  # s, since arming and since the last alignment, after which none follows
-_PATIENCE = 3.0  # s at the depth without the text, or above it without a way down
-_ROOM, _STRIDE = 0.3, 0.1  # m, least clearance on the way down; between two places where it is computed
+_LONGEST_GAP = 0.2  # s, between two attitudes; over longer ones their rates do not predict the turn
+_ALIGNED = "in-flight", "yaw alignment complete"  # parts of an ArduSub's text
+_GAIN, _FASTEST = 0.5, 0.25  # 1/s, from depth left to speed; m/s, greatest speed of the dive
+_NEAR, _SLOW = 0.05, 0.05  # m, m/s, within which the vehicle has reached the depth
+_ALIGNS_FOR = 6.0  # s since arming, before which the dive does not end
+_SETTLES_FOR = 1.0  # s since the last alignment, after which it ends
+_PATIENCE = 3.0  # s to wait at the depth for the text, or for the descent to begin
+_LEAST_CLEARANCE, _SPACING = 0.3, 0.1  # m, on the way down; m, between the points where it is computed
 
 
 class HeadingWatch:
@@ -42,12 +42,12 @@ class HeadingWatch:
         self.leap = 0.0
 
     def update(self, state: ReportedState) -> None:
-        """Take the attitude that was reported last; one that was taken before changes nothing."""
+        """Compare the last reported attitude with the one before; nothing changes without a new one."""
         at, before = state.attitude_boot, self._before
         if not math.isfinite(at) or (before is not None and at == before[0]):
             return
         self._before = at, state.quaternion.copy(), state.rates.copy()
-        if before is None or not 0.0 < at - before[0] <= _GAP:
+        if before is None or not 0.0 < at - before[0] <= _LONGEST_GAP:
             return
         turned = 0.5 * (at - before[0]) * (before[2] + state.rates)
         angle = float(np.linalg.norm(turned))
@@ -59,22 +59,22 @@ class HeadingWatch:
 class LevelDive:
     """The dive of an ArduSub that has just been armed.
 
-    An ArduSub aligns its heading anew with each sample of its magnetometer, from 0.5 m below where it was armed, until
-    it takes itself for flying, 5 s after arming. Where it moves or tilts with the last one, the heading is off by some
-    degrees from then on. So it first dives, level and slowly, where it stands, and waits for the end of that. A vehicle
-    that was armed before it was first heard is left alone.
+    Once it is 0.5 m deeper than where it was armed, an ArduSub aligns its heading with each sample of its magnetometer,
+    until 5 s after arming. If it moves or tilts during the last alignment, its heading is off by some degrees from then
+    on. So it first dives level, slowly and on the spot, until no alignment follows. A vehicle that was armed before its
+    first message does not dive.
 
     Parameters
     ----------
     depth : float
-        Of the dive [m], below where it was armed; 0 for none.
+        Depth of the dive [m], below where the vehicle was armed; 0 for no dive.
 
     Attributes
     ----------
     clearance : callable, optional
-        Returns the least clearance of hard regions [m] at a position of the autopilot's local frame.
+        Returns the least clearance of hard regions [m] at a position in the autopilot's local frame.
     outside : float
-        By which hard regions are violated now, beyond what they were where the dive began [m].
+        Depth by which hard regions are violated now, less that where the dive began [m].
     """
 
     def __init__(self, depth: float) -> None:
@@ -82,41 +82,44 @@ class LevelDive:
         self.clearance: Callable[[Array], float] | None = None
         self.outside = 0.0
         self._was_disarmed = False
-        self._armed_at: float | None = None  # m, down
-        self._since = self._aligned = math.inf  # our time [s] of arming, and of the last alignment
-        self._begun: tuple[float, float] | None = None  # our time [s]; clearance there [m]
-        self._arrived: float | None = None
+        self._armed_depth: float | None = None  # m, of where it was armed
+        self._armed_at = self._aligned_at = math.inf  # our time [s] of arming, and of the last alignment
+        self._begun: tuple[float, float] | None = None  # our time [s]; clearance then [m]
+        self._arrived_at: float | None = None
         self._is_done = False
-        self._texts = 0  # of the autopilot, that were read
+        self._texts_read = 0  # of the autopilot's texts
 
     def update(self, state: ReportedState, now: float) -> None:
-        """Take what the autopilot reports."""
-        texts, self._texts = state.texts[self._texts :], len(state.texts)
+        """Update the progress of the dive from what the autopilot reports."""
+        texts, self._texts_read = state.texts[self._texts_read :], len(state.texts)
         if not state.is_armed:
             self._was_disarmed = state.system is not None
-            self._armed_at = self._begun = self._arrived = None
-            self._is_done, self._aligned = False, math.inf
-        elif self._armed_at is None and self._was_disarmed and math.isfinite(state.position[2]):
-            self._armed_at, self._since = float(state.position[2]), now
-        if self._armed_at is None:
+            self._armed_depth = self._begun = self._arrived_at = None
+            self._is_done, self._aligned_at = False, math.inf
+        elif self._armed_depth is None and self._was_disarmed and math.isfinite(state.position[2]):
+            self._armed_depth, self._armed_at = float(state.position[2]), now
+        if self._armed_depth is None:
             return
-        is_near = self._left(state) < _NEAR and abs(state.velocity[2]) < _STILL
-        if self._arrived is None and is_near:
-            self._arrived = now
-        if any(_IN_WATER in text and _ALIGNED in text for text in texts):
-            self._aligned = now
-        if self._arrived is not None and now - self._since > _FLYING:
-            quiet = now - self._aligned > _QUIET  # False where there was no alignment
-            self._is_done |= quiet or (math.isinf(self._aligned) and now - self._arrived > _PATIENCE)
+        is_near = self._depth_left(state) < _NEAR and abs(state.velocity[2]) < _SLOW
+        if self._arrived_at is None and is_near:
+            self._arrived_at = now
+        if any(all(part in text for part in _ALIGNED) for text in texts):
+            self._aligned_at = now
+        if self._arrived_at is not None and now - self._armed_at > _ALIGNS_FOR:
+            is_settled = now - self._aligned_at > _SETTLES_FOR  # False where there was no alignment
+            self._is_done |= is_settled or (math.isinf(self._aligned_at) and now - self._arrived_at > _PATIENCE)
 
     def is_needed(self, state: ReportedState, now: float) -> bool:
-        """Return True while the vehicle is to dive; a dive without room is left out, with a warning."""
-        if self._depth <= 0.0 or self._armed_at is None or self._is_done:
+        """Return True while the vehicle is to dive. Warn, and leave the dive out, if hard regions are too near."""
+        if self._depth <= 0.0 or self._armed_depth is None or self._is_done:
             return False
         if self._begun is None:
             here = math.inf if self.clearance is None else self.clearance(state.position)
-            if not self._has_room(state, min(here, _ROOM)):
-                log.warning("no room to dive by %g m: the heading is not aligned before steering", self._left(state))
+            if not self._is_way_clear(state, min(here, _LEAST_CLEARANCE)):
+                log.warning(
+                    "no dive: a hard region is too near within %g m below; the heading may be off",
+                    self._depth_left(state),
+                )
                 self._is_done = True
                 return False
             self._begun = now, here
@@ -124,24 +127,24 @@ class LevelDive:
             self.outside = max(0.0, min(0.0, self._begun[1]) - self.clearance(state.position))
         return True
 
-    def seconds(self, now: float) -> float:
-        """Return for how long it dives [s]; 0 where it does not."""
+    def time_diving(self, now: float) -> float:
+        """Return the time since the dive began [s]; 0 while there is none."""
         return 0.0 if self._begun is None or self._is_done else now - self._begun[0]
 
     def is_stuck(self, state: ReportedState, now: float) -> bool:
-        """Return True if it has not come down by 5 cm in 3 s: the autopilot's mode does not follow the stick."""
-        return self.seconds(now) > _PATIENCE and self._left(state) > self._depth - _NEAR
+        """Return True if the vehicle is less than 5 cm deeper after 3 s: the mode does not follow the stick."""
+        return self.time_diving(now) > _PATIENCE and self._depth_left(state) > self._depth - _NEAR
 
-    def speed(self, state: ReportedState) -> float:
-        """Return the speed down to be asked for now [m/s]; one that is too deep already stays there."""
-        return min(max(_RATE * self._left(state), 0.0), _FASTEST)
+    def speed_down(self, state: ReportedState) -> float:
+        """Return the downward speed to command now [m/s]; 0 for a vehicle that is too deep."""
+        return min(max(_GAIN * self._depth_left(state), 0.0), _FASTEST)
 
-    def _left(self, state: ReportedState) -> float:
-        assert self._armed_at is not None
-        return self._armed_at + self._depth - float(state.position[2])
+    def _depth_left(self, state: ReportedState) -> float:
+        assert self._armed_depth is not None
+        return self._armed_depth + self._depth - float(state.position[2])
 
-    def _has_room(self, state: ReportedState, least: float) -> bool:
+    def _is_way_clear(self, state: ReportedState, least: float) -> bool:
         if self.clearance is None:
             return True
-        way = np.arange(0.0, max(0.0, self._left(state)) + _STRIDE, _STRIDE)
+        way = np.arange(0.0, max(0.0, self._depth_left(state)) + _SPACING, _SPACING)
         return all(self.clearance(state.position + np.array([0.0, 0.0, down])) >= least for down in way.tolist())

@@ -32,6 +32,6 @@ class CompanionOptions:
     velocity_lag: float = 2.0  # s, of the autopilot's velocity loop, horizontally
     vertical_lag: float = 0.5  # s, likewise
     reckoning_error: float = 0.03  # part of the way by which a position without a fix may be off
-    level_dive: float = 0.6  # m, by which an ArduSub dives after arming, before it is steered; 0 for none
+    level_dive: float = 0.6  # m, depth of an ArduSub's dive after arming, before it is steered; 0 for none
     least_battery: float = 0.0  # percent, below which it is held
     timeout: float | None = None  # s, within which steering must begin

@@ -26,7 +26,7 @@ _PX4_REFUSES: dict[str, str] = {
     "wrench": "its sticks have no roll and pitch beside surge and sway; expected attitude",
     "velocity": "its uuv_pos_control keeps the depth and pushes nowhere; expected attitude",
 }
-# An ArduSub integrates the stick's rate of yaw to a heading, to which it turns beside: with all of the rate it swings.
+# An ArduSub integrates the rate of the yaw stick to a heading, and controls that too. With the full rate it swings.
 _YAW_PART = 0.75
 _CENTERED_FOR = 0.2  # s, during which overridden channels are centered before their release
 
@@ -111,7 +111,7 @@ class Output:
         self._level_lead.restart()
 
     def scale_rates(self, parameters: Mapping[str, float]) -> None:
-        """Scale sticks of rates and leans by the autopilot's own parameters, by name."""
+        """Scale the sticks of rates and lean angles by the autopilot's parameters (a value for each name)."""
         self._scale = self._scale.with_rates(parameters)
         self._level_lead.set_gains(parameters)
 
@@ -150,7 +150,7 @@ class Output:
         return (velocity_target(self._mavlink, system, self.velocity, turn),)
 
     def descend(self, state: ReportedState, speed: float) -> Sequence[Any]:
-        """Return the messages that command a speed down [m/s], level and on the spot, in hold mode or by velocity."""
+        """Return the messages of a level descent at a speed [m/s] on the spot, by velocity or by stick."""
         self.clear()
         if self._steer_by == "velocity":
             self.velocity[2] = speed

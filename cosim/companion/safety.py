@@ -56,7 +56,7 @@ CONDITIONS: tuple[Condition, ...] = (
     Condition("mode taken", 0.0, "", "the mode that is steered in was on, and is not any more", "pilot"),
     Condition("refused mode", 0.8, "s", "since the mode was asked for, without it", "held"),
     Condition("pilot gain", GAIN_OFF, "", "the autopilot's pilot gain differs from the user's", "held"),
-    Condition("no dive", 20.0, "s", "since the dive began, without its end", "held"),
+    Condition("unfinished dive", 20.0, "s", "since the dive began, without its end", "held"),
     Condition("lost link", 0.4, "s", "since anything came from the autopilot", "held"),
     Condition("stale estimate", 0.5, "s", "age of the older one of position and attitude", "held"),
     Condition("late loop", 0.3, "s", "by which a step begins too late", "held"),
@@ -79,7 +79,7 @@ class Observation(NamedTuple):
     has_state: bool
     frame_known: bool
     is_armed: bool
-    in_mode: bool  # the one that is dived or steered in
+    in_mode: bool  # the mode for the dive, or else for steering
     values: dict[str, float]  # by a condition's name; above its limit, it ends steering
     has_to_dive: bool = False
 

@@ -52,9 +52,9 @@ class AutopilotSession:
     alignment : FrameAlignment
         Of its frame with the scene.
     heading : HeadingWatch
-        Its leaps.
+        Leaps of the heading.
     dive : LevelDive
-        Before an ArduSub is steered.
+        Dive of an ArduSub before it is steered.
     supervisor : Supervisor
         Who decides whether the law steers.
     profile : Profile
@@ -83,7 +83,7 @@ class AutopilotSession:
             (options.velocity_lag, options.vertical_lag),
         )  # fmt: skip
         self._steered_in = steered_in(options.profile, options.steer_by)
-        self._dived_in: Mode = self._steered_in if options.steer_by == "velocity" else "hold"
+        self._dive_mode: Mode = self._steered_in if options.steer_by == "velocity" else "hold"
         self._mode = self.profile.numbers[self._steered_in]
         self.reported = ReportedState(link.identity)
         self.alignment = FrameAlignment(options.origin)
@@ -138,8 +138,10 @@ class AutopilotSession:
                 self.output.scale_rates(self.failsafes.values)
             if state == "engaging":
                 self.heading.restart()
-                if self.reported.is_reckoned and self.failsafes.learns_the_field():
-                    log.warning("no fix of the position, and EK3_MAG_CAL is not 2: the heading may drift by degrees")
+                if self.reported.is_reckoned and self.failsafes.learns_magnetic_field():
+                    log.warning(
+                        "no position fix, and EK3_MAG_CAL is not 2: the heading may drift by degrees; set it to 2"
+                    )
             if before in ("diving", "engaging", "steering") and state == "pilot":
                 self._lets_go_until = now + self.output.releases_for
         self._ask(now)
@@ -221,15 +223,15 @@ class AutopilotSession:
             "frame drift": alignment.drift,
             "geofence": self.dive.outside if self.supervisor.state == "diving" else self.outside,
             "heading leap": 0.0 if self.supervisor.state == "diving" else self.heading.leap,
-            "no dive": self.dive.seconds(now),
+            "unfinished dive": self.dive.time_diving(now),
             "battery": float(reported.battery < self._options.least_battery),
             "leak": float(reported.is_leaking),
             "takeover": float(self._taken_over),
         }
-        if self._dived_in == "hold" and self.supervisor.state == "diving" and self.dive.is_stuck(reported, now):
-            self._dived_in, self._was_in_mode = "depth_hold", False
+        if self._dive_mode == "hold" and self.supervisor.state == "diving" and self.dive.is_stuck(reported, now):
+            self._dive_mode, self._was_in_mode = "depth_hold", False
         has_to_dive = alignment.offset is not None and has_state and self.dive.is_needed(reported, now)
-        in_mode = reported.mode == (self.profile.numbers[self._dived_in] if has_to_dive else self._mode)
+        in_mode = reported.mode == (self.profile.numbers[self._dive_mode] if has_to_dive else self._mode)
         self._was_in_mode |= in_mode and self.supervisor.state == "diving"
         is_ours = self.supervisor.state == "steering" or (has_to_dive and self._was_in_mode)
         if not self._options.dry_run:
@@ -283,11 +285,11 @@ class AutopilotSession:
             self._command(self._mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         elif state == "diving":
             self.supervisor.asked_for_mode(now)
-            if self.reported.mode != self.profile.numbers[self._dived_in]:
-                self._send_mode(self._dived_in, now)
+            if self.reported.mode != self.profile.numbers[self._dive_mode]:
+                self._send_mode(self._dive_mode, now)
                 messages = output.still(self.reported)
             else:
-                messages = output.descend(self.reported, self.dive.speed(self.reported))
+                messages = output.descend(self.reported, self.dive.speed_down(self.reported))
         elif state == "engaging":
             self.supervisor.asked_for_mode(now)
             self._send_mode(self._steered_in, now)

@@ -80,7 +80,7 @@ class LevelLead:
         self.set_gains({})
 
     def set_gains(self, parameters: Mapping[str, float]) -> None:
-        """Take the gains of pitch from an ArduSub's parameters, for roll too; missing ones are the defaults."""
+        """Set the gains of both axes to those of pitch in an ArduSub's parameters; missing ones are its defaults."""
         self._rate_p = parameters.get("ATC_RAT_PIT_P", 0.0) or _RATE_P
         self._gain = self._rate_p * (parameters.get("ATC_ANG_PIT_P", 0.0) or _ANGLE_P)
         self._washout = parameters.get("ATC_RAT_PIT_I", _RATE_I) / self._rate_p  # 1/s

@@ -28,8 +28,8 @@ SticksBy = Literal["manual-control", "rc-override"]
 STICKS_BY: tuple[SticksBy, ...] = get_args(SticksBy)
 
 PILOT_SPEED = 0.5  # m/s, depth rate of a full vertical stick in ALT_HOLD, where the autopilot does not say its own
-_FULL_YAW = math.radians(45.0)  # of a full stick, before ACRO_YAW_P
-_CENTI = 0.01
+_FULL_YAW = math.radians(45.0)  # yaw rate of a full stick at ACRO_YAW_P 1
+_CENTI = 0.01  # m in a cm, deg in a hundredth of one
 _FULL = 1000.0
 _NEWTON, _FLAT = 3, 0.05  # steps; least command of a thruster at which its force is linearized
 _HALVINGS = 8  # of the part of a force that leaves its moments whole
@@ -60,7 +60,7 @@ class StickScale:
     dead_zones : float
         Factor of the dead zones of rate sticks: the pilot gain; 0 without dead zones.
     yaw_rate, climb_rates : float, (float, float)
-        Rates of full sticks: of yaw [rad/s], up and down [m/s].
+        Rates of full sticks: yaw [rad/s]; up, down [m/s].
     greatest_lean : float
         Angle of a full stick of roll or pitch [rad].
     """
@@ -141,7 +141,7 @@ class StickScale:
         return self._rate_stick(rate_down / self.climb_rates[rate_down > 0.0], CLIMB_DEAD_ZONE)
 
     def with_rates(self, parameters: Mapping[str, float]) -> StickScale:
-        """Return this scale with the rates and leans of an ArduSub's parameters; missing ones and 0 change nothing."""
+        """Return this scale with the rates and angles of an ArduSub's parameters, without missing ones and 0."""
         degrees = parameters.get("ATC_ANGLE_MAX", 0.0) or _CENTI * parameters.get("ANGLE_MAX", 0.0)
         yaw, up = parameters.get("ACRO_YAW_P", 0.0), abs(parameters.get("PILOT_SPEED_UP", 0.0))
         down = abs(parameters.get("PILOT_SPEED_DN", 0.0)) or up

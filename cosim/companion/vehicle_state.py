@@ -55,7 +55,7 @@ class ReportedState:
     quaternion, rates : ndarray, shape (4,), (3,)
         From body to world, scalar first; body rates [rad/s].
     attitude_boot : float
-        Time of these since the autopilot's boot [s]; NaN before there are any.
+        Time of this attitude since the autopilot's boot [s]; NaN before the first.
     mode, is_armed, in_failsafe : int, bool, bool
         Of its heartbeat.
     global_position : tuple of float or None

@@ -276,7 +276,7 @@ def test_rejected_mode_holds_within_one_second(tmp_path):
 @pytest.mark.medium
 def test_a_dive_that_does_not_end_holds_the_vehicle(tmp_path):
     link = StandIn(profile="ardusub", shift=SHIFT, armed=False, overrides=["commands.pilot_gain=0.01"])
-    with pytest.raises(RunError, match="somebody to resume after: no dive"):
+    with pytest.raises(RunError, match="somebody to resume after: unfinished dive"):
         Flight(tmp_path, link=link, profile="ardusub", arm=True, timeout=40.0)
 
 
@@ -464,7 +464,7 @@ def test_control_can_be_resumed_after_a_takeover(tmp_path):
 
 
 def test_every_condition_has_a_test():
-    tested = {*FAULTS, *PILOTS, "refused mode", "frame drift", "geofence", "no dive"}
+    tested = {*FAULTS, *PILOTS, "refused mode", "frame drift", "geofence", "unfinished dive"}
     assert tested == {condition.name for condition in CONDITIONS}
 
 

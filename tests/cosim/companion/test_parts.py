@@ -390,7 +390,7 @@ def dived(texts=(), clearance=None, armed_first=False):
         dive.update(state, now)
         if not dive.is_needed(state, now):
             return dive, state, now
-        state.velocity[2] = dive.speed(state)
+        state.velocity[2] = dive.speed_down(state)
         state.position[2] += 0.02 * state.velocity[2]
         if state.position[2] > 1.5 and now < 5.0:
             state.texts.extend(texts)
@@ -410,7 +410,7 @@ def test_a_vehicle_that_was_armed_before_is_not_dived():
 
 def test_there_is_no_dive_without_room(caplog):
     assert dived(clearance=lambda position: 1.5 - position[2])[2] == 0.0
-    assert "no room to dive by 0.6 m" in caplog.text
+    assert "too near within 0.6 m below" in caplog.text
     assert dived(clearance=lambda position: 2.0 - position[2])[1].position[2] > 1.5
 
 
@@ -532,10 +532,10 @@ def test_sticks_that_outlast_a_cut_link_by_more_than_a_second_are_warned_of(over
 
 def test_an_ardusub_that_learns_the_magnetic_field_is_known():
     failsafes = Failsafes("ardusub")
-    assert not failsafes.learns_the_field()  # nobody knows
+    assert not failsafes.learns_magnetic_field()  # nobody knows
     for value, learns in ((3.0, True), (2.0, False)):
         failsafes.take(decoded(value_of("EK3_MAG_CAL", value)))
-        assert failsafes.learns_the_field() == learns
+        assert failsafes.learns_magnetic_field() == learns
 
 
 def test_px4_integer_parameters_are_decoded_from_bits():
