@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from cosim.command_line.numbers import number, whole
 from cosim.command_line.process import INTERRUPTED, print_status
 from cosim.command_line.results import print_run, say
-from cosim.io.network_address import resolved
+from cosim.io.network_address import resolve_host
 
 if TYPE_CHECKING:
     from cosim.results.run_result import Run
@@ -128,7 +128,7 @@ def _address(host: str, port: int, allow_remote: bool) -> tuple[str, int]:
     from cosim.errors import RunError
 
     try:
-        found, here = resolved(host)
+        found, here = resolve_host(host)
     except OSError as error:
         raise RunError(f"--host {host!r}: is not known: {error}") from error
     if not (allow_remote or here):

@@ -68,7 +68,7 @@ def _write_messages(writer: Writer, excerpt: Excerpt) -> None:
     drawing = _Drawing(writer, excerpt.run, scene)
     drawing.begin()
     for rows in excerpt.blocks():
-        block = rows.numbers()
+        block = rows.to_array()
         times = np.rint(block[:, 0] * 1e9).astype(np.int64).tolist()
         messages = zip(*(numbers_messages(block[:, picked]) for _, picked in tables), strict=True)
         draw = drawing.of(block)

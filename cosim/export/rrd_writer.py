@@ -157,7 +157,7 @@ class _Sender:
             began = time[0] if began is None else began
             ticks = np.floor((time - began) * _ARROWS)
             self._send_thrusts(block, np.flatnonzero(np.diff(ticks, prepend=tick) > 0.0))
-            active = np.array(self._scene.active(block.numbers()))
+            active = np.array(self._scene.active(block.to_array()))
             self._send_activity(time, active, before)
             tick, before = ticks[-1], active[-1]
             self._recording.flush()  # bounds the memory of data that is not written yet

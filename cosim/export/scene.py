@@ -120,7 +120,7 @@ class Scene:
     def trail(self) -> Array:
         """Return the path of the vehicle, thinned to at most 2000 points, shape (n, 3) [m, NED]."""
         n = self._excerpt.count
-        way = self._excerpt.take(np.unique(np.linspace(0, n - 1, min(n, _TRAIL)).astype(int)), POSITION).numbers()
+        way = self._excerpt.take(np.unique(np.linspace(0, n - 1, min(n, _TRAIL)).astype(int)), POSITION).to_array()
         return way[np.isfinite(way).all(axis=1)]
 
     def _solid(self, index: int, shape: Shape, limits: Bounds) -> Solid:

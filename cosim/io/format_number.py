@@ -10,12 +10,12 @@ FORMAT = 2  # in format 1, columns, commands and the paper's law had other names
 
 
 def require_format(where: Path, found: object) -> None:
-    """Raise a RunError for a file of another format.
+    """Raise a RunError if a file has another format number than `FORMAT`.
 
     Parameters
     ----------
     where : Path
-        The file.
+        Path of the file, which the message names.
     found : object
         Its format number; None for a file without one, which is format 1.
 

@@ -6,7 +6,7 @@ import ipaddress
 import socket
 
 
-def resolved(host: str) -> tuple[str, bool]:
+def resolve_host(host: str) -> tuple[str, bool]:
     """Resolve a host to its IPv4 address.
 
     Returns

@@ -38,24 +38,24 @@ def json_text(value: Any) -> str:
     Parameters
     ----------
     value : Any
-        As for `nan_to_none`.
+        Text, number, boolean, None, or list, tuple or dict of these.
 
     Returns
     -------
     str
-        With null for NaN and infinity, and a newline at its end.
+        JSON text with null for NaN and infinity, and a newline at its end.
     """
     return json.dumps(nan_to_none(value), indent=2, allow_nan=False) + "\n"
 
 
 @contextlib.contextmanager
 def understood(file: Path) -> Iterator[None]:
-    """Convert errors of the block by missing keys or wrong types in a JSON file to a RunError.
+    """Convert errors of the block that missing keys or wrong types in a JSON file cause to a RunError.
 
     Parameters
     ----------
     file : Path
-        For the message.
+        Path of the JSON file, which the message names.
 
     Raises
     ------

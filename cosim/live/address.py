@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from urllib.parse import urlsplit
 
 from cosim.errors import TelemetryError
-from cosim.io.network_address import resolved
+from cosim.io.network_address import resolve_host
 
 HOST, PORT = "127.0.0.1", 8765
 _LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
@@ -54,7 +54,7 @@ def parse_live(text: str, allow_remote: bool = False) -> LiveAddress:
     if not (number.isascii() and number.isdecimal() and int(number[:6]) <= 65535) or (colon and not text[0].isalnum()):
         raise TelemetryError(f"--live {text!r}: {_EXPECTED}")
     try:
-        ip, loopback = resolved(host)
+        ip, loopback = resolve_host(host)
     except OSError as error:
         raise TelemetryError(f"--live {text!r}: {host!r} is not known; {_EXPECTED}") from error
     if not (loopback or allow_remote):

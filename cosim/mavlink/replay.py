@@ -93,7 +93,7 @@ def _rows(record: Record, every: int, names: Sequence[str]) -> Iterator[tuple[in
     """Yield the step and row of every `every`-th step."""
     first = 0
     for rows in record.blocks(names):
-        block = rows.numbers()
+        block = rows.to_array()
         for i in range(-first % every, len(block), every):
             yield first + i, block[i]
         first += len(block)

@@ -14,7 +14,7 @@ from controller.quaternion import error_parts, rotation_rows
 from cosim.precheck.finding import Finding, status
 from cosim.precheck.region_values import evaluated
 from cosim.precheck.thrust_margin import Margin, ThrustMargin, greatest_force, least_left, thrust_margin
-from cosim.results.wording import newtons
+from cosim.results.wording import format_force
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_vehicle
 
@@ -122,9 +122,12 @@ def asked_finding(scenario: Scenario, weights: Array) -> Finding:
         return Finding("thrust", "asked at t = 0", "holds", text, numbers={"asked": 0.0})
     alive = np.ones(vehicle.n_thrusters, dtype=bool)
     given = greatest_force(vehicle, force / asked, np.zeros(6), alive) or 0.0
-    text = f"The law asks for {newtons(asked)} at the start; the thrusters give at most {newtons(given)} that way."
+    text = (
+        f"The law asks for {format_force(asked)} at the start; "
+        f"the thrusters give at most {format_force(given)} that way."
+    )
     if scenario.actuation.through == "wrench":
-        limit = f"at most {newtons(scenario.limit.force)}" if scenario.limit.force < np.inf else "no limit"
+        limit = f"at most {format_force(scenario.limit.force)}" if scenario.limit.force < np.inf else "no limit"
         text += f" In this scenario the wrench acts on the body directly, with {limit}."
     advice = ""
     if asked > given:

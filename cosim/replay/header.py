@@ -10,7 +10,7 @@ import numpy as np
 
 from controller.regions.region_set import name_of, of_attitude, shape_entry, surface_of
 from controller.regions.shape import Bounds, Shape
-from cosim.results.wording import asked
+from cosim.results.wording import describe_task
 from cosim.scenario.colours import colours_of_regions
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Column
@@ -47,7 +47,7 @@ def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = Fa
         "version": VERSION,
         "name": scenario.name,
         "title": scenario.title,
-        "asked": asked(scenario),
+        "asked": describe_task(scenario),
         "law": scenario.law.name,
         "imported": scenario.log,
         "step": scenario.time.step,

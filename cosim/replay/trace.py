@@ -110,7 +110,7 @@ def _read(record: Rows, names: Sequence[str], steps: NDArray[np.intp]) -> tuple[
     rows, missing, first = [], np.zeros(len(names), np.intp), 0
     for block in record.blocks(names):
         within = steps[(steps >= first) & (steps < first + len(block))] - first
-        rows.append(block.take(within).numbers())
+        rows.append(block.take(within).to_array())
         missing += [np.count_nonzero(np.isnan(block[name])) for name in names]
         first += len(block)
     return np.concatenate(rows), missing

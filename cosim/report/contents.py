@@ -17,7 +17,7 @@ from cosim.results.paper_claims import paper_claims
 from cosim.results.record import PARTS, RECORD
 from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY, Run
 from cosim.results.spans import Spans
-from cosim.results.wording import asked, kind_of, number, verdict
+from cosim.results.wording import describe_task, format_number, shape_name, verdict
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import Sensing
 from cosim.simulation.signals import Array
@@ -59,7 +59,7 @@ def contents_of(run: Run) -> Contents:
     commands, repeats = _repeating(run)
     return Contents(
         title=run.scenario.title,
-        asked=asked(run.scenario),
+        asked=describe_task(run.scenario),
         verdict=verdict(run.summary),
         remarks=_remarks(run),
         claims=_claims(run),
@@ -112,12 +112,12 @@ def _regions(run: Run) -> Table | None:
         violation, least = violations[region.name], run.summary["min_clearance"][region.name]
         when = f"{violation.worst_at:.2f}" if math.isfinite(least) else "–"
         degrees = run.summary["clearance_unit"][region.name] == "rad"
-        shown = f"{number(math.degrees(least), 4)}°" if degrees else f"{number(least, 4)} m"
+        shown = f"{format_number(math.degrees(least), 4)}°" if degrees else f"{format_number(least, 4)} m"
         lasting = violation.lasting()
         rows.append(
             (
                 region.name,
-                kind_of(region.shape),
+                shape_name(region.shape),
                 secondary.criterion,
                 "within" if region.keep == "in" else "out of",
                 "hard" if region.hard else "soft",
@@ -159,7 +159,9 @@ def _criteria(run: Run) -> Table | None:
     if not scenario.regions or scenario.log:
         return None
     plans = bool(getattr(scenario.law.gains, "path_planning", 0.0))
-    costs = {r.criterion: number(r.region.crossing_cost, 3) for r in scenario.regions if plans and not r.region.hard}
+    costs = {
+        r.criterion: format_number(r.region.crossing_cost, 3) for r in scenario.regions if plans and not r.region.hard
+    }
     turns, end = turns_of(run), run.record.value("time", -1)
     rows = []
     for i, criterion in enumerate(scenario.criteria):
@@ -184,17 +186,17 @@ def _criteria(run: Run) -> Table | None:
 def _goal(run: Run) -> Table:
     s = run.summary
     outside = s["closest_to_goal"]
-    nearest = f"{number(outside, 4)} m outside" if outside > 0.0 else f"{number(-outside, 4)} m inside"
+    nearest = f"{format_number(outside, 4)} m outside" if outside > 0.0 else f"{format_number(-outside, 4)} m inside"
     windows = ", ".join(f"{start:.3f} to {end:.3f}" for start, end in s["intersection_windows"])
     rows = [
-        ("first within the goal [s]", number(s["reach_time"], 5) if s["reached"] else "never"),
-        ("within it for good from [s]", number(s["settle_time"], 5) if s["settled"] else "never"),
+        ("first within the goal [s]", format_number(s["reach_time"], 5) if s["reached"] else "never"),
+        ("within it for good from [s]", format_number(s["settle_time"], 5) if s["settled"] else "never"),
         ("deepest in the goal, or nearest to its surface", nearest if math.isfinite(outside) else "no number"),
     ]
     rows = [
         *(rows if run.scenario.has_goal else []),
-        ("position at the end: north, east, down [m]", ", ".join(number(x, 4) for x in s["final_position"])),
-        ("greatest speed through the ground [m/s]", number(s["max_speed"], 4)),
+        ("position at the end: north, east, down [m]", ", ".join(format_number(x, 4) for x in s["final_position"])),
+        ("greatest speed through the ground [m/s]", format_number(s["max_speed"], 4)),
     ]
     if s["intersection"]:
         rows.append(("within the overlap of regions [s]", windows or "never"))
@@ -207,18 +209,19 @@ def _effort(run: Run) -> Table:
         return effort_of_log(s)
     factor = s["real_time_factor"]
     rows = (
-        ("greatest force that the law asked for, norm [N]", number(s["max_force_asked"], 4)),
-        ("greatest force that acted, norm [N]", number(s["max_force"], 4)),
-        ("effort: time integral of the acting force's norm [N s]", number(s["effort"], 4)),
-        ("actuators asked for more than they give, for [s]", number(s["saturated_time"], 4)),
+        ("greatest force that the law asked for, norm [N]", format_number(s["max_force_asked"], 4)),
+        ("greatest force that acted, norm [N]", format_number(s["max_force"], 4)),
+        ("effort: time integral of the acting force's norm [N s]", format_number(s["effort"], 4)),
+        ("actuators asked for more than they give, for [s]", format_number(s["saturated_time"], 4)),
         ("weights above ½ at once, at the most [–]", str(s["weights_above_half"])),
-        ("sum of the weights, at the most [–]", number(s["weights_sum_max"], 4)),
+        ("sum of the weights, at the most [–]", format_number(s["weights_sum_max"], 4)),
         ("how the run ended", s["status"]),
-        ("simulated time [s]", f"{number(s['simulated_time'], 6)} in {s['steps']} steps"),
+        ("simulated time [s]", f"{format_number(s['simulated_time'], 6)} in {s['steps']} steps"),
         (
             "stepping took [s]",
             "not known" if s["wall_time"] is None
-            else number(s["wall_time"], 3) + (f", {number(factor, 3)} times as fast as the clock" if factor else ""),
+            else format_number(s["wall_time"], 3)
+            + (f", {format_number(factor, 3)} times as fast as the clock" if factor else ""),
         ),
     )  # fmt: skip
     return Table("Effort and course", (), rows, (1.0, 1.0))
@@ -235,7 +238,9 @@ def _estimates(run: Run) -> Table | None:
         "z_G W − z_B B [N m]",
     )
     columns = (s[f"estimate_{which}"] for which in ("final", "true", "lowest", "highest"))
-    rows = tuple((name, *(number(value, 4) for value in values)) for name, *values in zip(names, *columns, strict=True))
+    rows = tuple(
+        (name, *(format_number(value, 4) for value in values)) for name, *values in zip(names, *columns, strict=True)
+    )
     return Table("Estimates", ("Restoring parameter, body frame", "at the end", "true", "lowest", "highest"), rows,
                  (2.0, 1.0, 1.0, 1.0, 1.0))  # fmt: skip
 
@@ -246,10 +251,10 @@ def _lyapunov(run: Run) -> Table | None:
     rows = tuple(
         (
             form,
-            *(number(course[which], 4) for which in ("start", "end", "least")),
+            *(format_number(course[which], 4) for which in ("start", "end", "least")),
             str(course["increases"]),
             *(
-                "never" if course[which] is None else number(course[which], 5)
+                "never" if course[which] is None else format_number(course[which], 5)
                 for which in ("first_rise", "first_negative")
             ),
         )
@@ -272,8 +277,8 @@ def _setting(run: Run) -> Table:
         ("law, and what it acts through", f"{s.law.name}; {through}"),
         ("arbiter", f"{s.arbiter.engine}; {_weighed(s)}"),
         ("planned for [s], in steps of [s]", f"{s.time.duration:g}, {s.time.step:g}"),
-        ("start: north, east, down [m]", ", ".join(number(x, 6) for x in s.initial.position)),
-        ("current: north, east, down [m/s]", ", ".join(number(x, 6) for x in s.plant.current)),
+        ("start: north, east, down [m]", ", ".join(format_number(x, 6) for x in s.initial.position)),
+        ("current: north, east, down [m/s]", ", ".join(format_number(x, 6) for x in s.plant.current)),
         ("state for the law", _state_for_law(s.sensing)),
     ]
     if math.isfinite(s.limit.force) or s.limit.time_constant > 0.0:

@@ -7,7 +7,7 @@ from typing import Any
 from cosim.report.table import Table
 from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts, load_log_facts
 from cosim.results.run_result import Run
-from cosim.results.wording import number
+from cosim.results.wording import format_number
 
 _NAMED = 12  # greatest number of unused kinds of messages, and of gaps, that a table lists
 
@@ -25,8 +25,8 @@ def log_tables(run: Run) -> tuple[Table, ...]:
         return ()
     rows = tuple(
         (
-            t.quantity, t.source, str(t.samples), number(t.rate, 3), str(t.gaps),
-            number(max((end - begin for begin, end in t.longest_gaps), default=0.0), 3), _repairs(t),
+            t.quantity, t.source, str(t.samples), format_number(t.rate, 3), str(t.gaps),
+            format_number(max((end - begin for begin, end in t.longest_gaps), default=0.0), 3), _repairs(t),
         )
         for t in facts.topics
     )  # fmt: skip
@@ -43,10 +43,10 @@ def log_tables(run: Run) -> tuple[Table, ...]:
 def effort_of_log(summary: dict[str, Any]) -> Table:
     """Return a table of the forces that the commands of a log ask for."""
     rows = (
-        ("greatest force that the commands ask for, norm [N]", number(summary["max_force_asked"], 4)),
-        ("greatest force within the thrusters' limits, norm [N]", number(summary["max_force"], 4)),
-        ("beyond the thrusters' limits for [s]", number(summary["saturated_time"], 4)),
-        ("time of the log [s]", f"{number(summary['simulated_time'], 6)} in {summary['steps']} rows"),
+        ("greatest force that the commands ask for, norm [N]", format_number(summary["max_force_asked"], 4)),
+        ("greatest force within the thrusters' limits, norm [N]", format_number(summary["max_force"], 4)),
+        ("beyond the thrusters' limits for [s]", format_number(summary["saturated_time"], 4)),
+        ("time of the log [s]", f"{format_number(summary['simulated_time'], 6)} in {summary['steps']} rows"),
     )
     return Table("Commands", (), rows, (1.0, 1.0))
 
@@ -62,7 +62,7 @@ def setting_of_log(run: Run) -> Table:
         ("vehicle", f"{s.vehicle.title}. {s.vehicle.source}".strip()),
         ("commands", (facts.commands if facts else "") or "none"),
         ("rows a second [Hz]", f"{1.0 / s.time.step:g}"),
-        ("start: north, east, down [m]", ", ".join(number(x, 6) for x in s.initial.position)),
+        ("start: north, east, down [m]", ", ".join(format_number(x, 6) for x in s.initial.position)),
         ("not read", f"{shown}{more}" or "nothing"),
     )
     return Table("Import", (), rows, (1.0, 2.4))

@@ -21,7 +21,7 @@ def scenario_as_flown(scenario: Scenario, record: Rows) -> Scenario:
     Returns
     -------
     Scenario
-        The same scenario if commands were not enabled.
+        The changed scenario, or the same one if commands were not enabled.
     """
     if not scenario.commands.enabled:
         return scenario
@@ -35,24 +35,24 @@ def scenario_as_flown(scenario: Scenario, record: Rows) -> Scenario:
 
 
 def radii_of(record: Rows, name: str) -> Iterator[tuple[Array, Array]]:
-    """Yield times [s] and radii [m] of an obstacle at the rows from which its radius follows, block by block.
+    """Yield times and radii of an obstacle, block by block, from the vehicle's position and the recorded clearance.
 
     Parameters
     ----------
     record : Rows
-        Of the run.
+        Record of the run.
     name : str
-        Of a dynamic region.
+        Name of a dynamic region.
 
     Yields
     ------
-    (ndarray, ndarray)
-        Of the same shape; without rows before the obstacle was added, or with a NaN pose.
+    times, radii : ndarray, shape (rows,)
+        Times [s] and radii [m], without rows before the obstacle was added or with a NaN pose.
     """
-    place, shift = ([f"{of}.{axis}" for axis in "xyz"] for of in ("position", f"{name}.shift"))
-    for block in record.blocks(["time", *place, *shift, f"{name}.clearance"]):
+    position, shift = ([f"{of}.{axis}" for axis in "xyz"] for of in ("position", f"{name}.shift"))
+    for block in record.blocks(["time", *position, *shift, f"{name}.clearance"]):
         shifts = block.stack(shift)
-        radii = np.linalg.norm(block.stack(place) - shifts - PARKED_POSITION, axis=1) - block[f"{name}.clearance"]
+        radii = np.linalg.norm(block.stack(position) - shifts - PARKED_POSITION, axis=1) - block[f"{name}.clearance"]
         known = shifts.any(axis=1) & np.isfinite(radii)
         yield block["time"][known], radii[known]
 

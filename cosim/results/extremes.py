@@ -12,7 +12,7 @@ from cosim.simulation.signals import Array
 
 
 def extreme_rows(blocks: Iterable[Sequence[Array]], signals: int, edges: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the first rows at which signals are least and greatest in each part of a run.
+    """Return the rows at which each signal is first least and first greatest in each part of a run.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def extreme_rows(blocks: Iterable[Sequence[Array]], signals: int, edges: NDArray
     Returns
     -------
     ndarray of int
-        Rising. A signal without a finite value in a part contributes no row there.
+        Row indices in rising order. A signal without a finite value in a part contributes no row there.
     """
     found = _Extremes(len(edges) - 1, signals)
     first = 0
@@ -50,15 +50,15 @@ class _Extremes:
         self.rows = np.full((2, parts, signals), -1, np.intp)
         self.finite = np.zeros((parts, signals), dtype=bool)
 
-    def add(self, of: tuple[int, int], signal: Array, first: int) -> None:
-        """Update the extremes of one signal in one part by its next rows."""
+    def add(self, key: tuple[int, int], signal: Array, first: int) -> None:
+        """Update the extremes of a (part, signal) by its next rows, the first of which has index `first`."""
         missing = np.isnan(signal)
-        self.finite[of] |= np.isfinite(signal).any()
+        self.finite[key] |= np.isfinite(signal).any()
         for which, signed in enumerate((signal, -signal)):
             known = np.where(missing, np.inf, signed)  # NaN is neither the least nor the greatest
-            at = int(np.argmin(known))
-            if known[at] < self._bounds[which, *of] or self.rows[which, *of] < 0:
-                self._bounds[which, *of], self.rows[which, *of] = known[at], first + at
+            i = int(np.argmin(known))
+            if known[i] < self._bounds[which, *key] or self.rows[which, *key] < 0:
+                self._bounds[which, *key], self.rows[which, *key] = known[i], first + i
 
 
 def even_edges(rows: int, parts: int) -> NDArray[np.intp]:
@@ -74,11 +74,11 @@ def even_edges(rows: int, parts: int) -> NDArray[np.intp]:
     Returns
     -------
     ndarray of int, shape (parts + 1,)
-        As `numpy.array_split` has them.
+        First row of each part and the number of rows, as `numpy.array_split` divides them.
     """
     size, longer = divmod(rows, parts)
-    at = np.arange(parts + 1)
-    edges: NDArray[np.intp] = at * size + np.minimum(at, longer)
+    part = np.arange(parts + 1)
+    edges: NDArray[np.intp] = part * size + np.minimum(part, longer)
     return edges
 
 
@@ -88,14 +88,14 @@ def rows_at(rows: Rows, times: Sequence[float]) -> NDArray[np.intp]:
     Parameters
     ----------
     rows : Rows
-        With their ``time``, rising.
+        Rows of a run with a rising ``time`` [s].
     times : sequence of float
-        [s].
+        Times to look up [s].
 
     Returns
     -------
     ndarray of int, shape (len(times),)
-        From 0.
+        Row indices, from 0.
     """
     found = np.zeros(len(times), np.intp)
     for block in rows.blocks(["time"]):

@@ -21,10 +21,10 @@ class TopicFacts:
     quantity: str
     source: str  # message, topic or columns
     samples: int
-    rate: float  # Hz, by the median time between samples
-    longest: float  # s, between samples: a longer pause is a gap
+    rate: float  # Hz, from the median time between samples
+    longest: float  # s, longest time between samples that is no gap
     gaps: int
-    longest_gaps: tuple[tuple[float, float], ...]  # s of the run, begin and end of some
+    longest_gaps: tuple[tuple[float, float], ...]  # s, begin and end of some gaps, in time of the run
     held: int  # repeats of a held value that were dropped
     bursts: int  # samples that arrived in bursts, and whose times were spread
     late: int  # samples that were dropped because they arrived after a later one
@@ -37,9 +37,9 @@ class LogFacts:
 
     log: str  # name of the file
     bytes: int
-    start: float  # s, of the first row on the log's clock
-    rate: float  # Hz, of the rows
-    commands: str  # how they were converted to forces, in words; empty without commands
+    start: float  # s, time of the first row on the log's clock
+    rate: float  # Hz, rate of the rows
+    commands: str  # how commands were converted to forces, as a sentence; empty without commands
     topics: tuple[TopicFacts, ...]
     unread: dict[str, int]  # number of samples by message, topic or column that was not used
     remarks: tuple[str, ...]
@@ -51,7 +51,7 @@ def load_log_facts(folder: Path) -> LogFacts:
     Returns
     -------
     LogFacts
-        As `cosim.import_log` wrote them.
+        The facts that `cosim.import_log` wrote.
 
     Raises
     ------

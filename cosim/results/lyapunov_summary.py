@@ -10,7 +10,7 @@ from cosim.results.record import Rows
 from cosim.simulation.lyapunov_signals import FORMS
 from cosim.simulation.signals import Array
 
-ROUNDING = 1e-12  # of the greatest |V| of a run: a smaller rise between two steps does not count
+ROUNDING = 1e-12  # part of the greatest |V| of a run: a smaller rise between two steps is not counted
 
 
 def summarise_lyapunov(record: Rows) -> dict[str, Any] | None:
@@ -19,16 +19,16 @@ def summarise_lyapunov(record: Rows) -> dict[str, Any] | None:
     Returns
     -------
     dict or None
-        For each form of V: value at the start, the end and the least [N m]; number of steps in which it rose, by more
-        than `threshold` [N m]; when it first rose and was first negative [s], None for never. None if V is not
-        recorded.
+        For each form of V: its first, last and least value [N m]; the number of steps in which it rose by more than
+        ``threshold`` [N m]; the times at which it first rose and was first negative [s], None for never. None if V is
+        not recorded.
     """
     if "lyapunov.rate" not in record.units:
         return None
-    return {form: _mission(record, f"lyapunov.{form}") for form in FORMS}
+    return {form: _summarise_form(record, f"lyapunov.{form}") for form in FORMS}
 
 
-def _mission(record: Rows, name: str) -> dict[str, Any]:
+def _summarise_form(record: Rows, name: str) -> dict[str, Any]:
     least, size = np.inf, 0.0
     for block in record.blocks([name]):
         least, size = np.minimum(least, block[name].min()), np.maximum(size, np.abs(block[name]).max())

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from controller.regions import Sphere
-from cosim.results.wording import newtons
+from cosim.results.wording import format_force
 from cosim.scenario.scenario import Scenario
 
 PAPER_WINDOW = (2.65, 2.95)  # s, "An intersection of the secondary sub-regions occurs at 2.65 s to 2.95 s"
@@ -15,11 +15,11 @@ PAPER_WINDOW = (2.65, 2.95)  # s, "An intersection of the secondary sub-regions 
 
 @dataclass(frozen=True)
 class Claim:
-    """One row of the table."""
+    """A statement of the paper beside the result of a run."""
 
     stated: str
     measured: str
-    why: str
+    why: str  # reason why both differ or agree
 
 
 def paper_claims(scenario: Scenario, summary: dict[str, Any]) -> list[Claim]:
@@ -28,7 +28,7 @@ def paper_claims(scenario: Scenario, summary: dict[str, Any]) -> list[Claim]:
     Returns
     -------
     list of Claim
-        Statements about this run are generated from its summary.
+        The claims in the order of the paper; their results and reasons follow from the run's summary.
     """
     return [
         _reaching(summary),
@@ -67,7 +67,9 @@ def _window(scenario: Scenario, summary: dict[str, Any]) -> Claim:
     if not windows:
         return Claim(stated, measured, f"In {summary['simulated_time']:g} s the path did not meet the overlap.")
     first = windows[0]
-    limits = [f"a body force of at most {newtons(scenario.limit.force)}"] if scenario.limit.force < math.inf else []
+    limits = (
+        [f"a body force of at most {format_force(scenario.limit.force)}"] if scenario.limit.force < math.inf else []
+    )
     limits += [f"a lag of {scenario.limit.time_constant:g} s"] if scenario.limit.time_constant > 0.0 else []
     limits += ["the thrusters' limits"] if scenario.actuation.through == "thrusters" else []
     if limits:
@@ -77,8 +79,8 @@ def _window(scenario: Scenario, summary: dict[str, Any]) -> Claim:
         )
     else:
         why = (
-            f"Without a limit the law starts with {newtons(summary['max_force_asked'])} and the vehicle runs at up to "
-            f"{summary['max_speed']:.1f} m/s. The paper's times need a limit on the actuators that it does not state."
+            f"Without a limit the law starts with {format_force(summary['max_force_asked'])} and the vehicle runs at up "
+            f"to {summary['max_speed']:.1f} m/s. The paper's times need a limit on the actuators that it does not state."
         )
     if abs(first[0] - PAPER_WINDOW[0]) < 0.05 and abs(first[1] - PAPER_WINDOW[1]) < 0.05:
         why = "Agrees. " + why
@@ -96,7 +98,7 @@ def _avoiding(scenario: Scenario, summary: dict[str, Any]) -> Claim:
     if push is not None:
         why = (
             f"A sphere pushes with at most gain × r² = {push:.0f} N; the law asked for up to "
-            f"{newtons(summary['max_force_asked'])} in all. "
+            f"{format_force(summary['max_force_asked'])} in all. "
             "The paper's own Fig. 8 shows the vehicle inside the intersection."
         )
     elif later:
@@ -122,7 +124,8 @@ def _effort(scenario: Scenario, summary: dict[str, Any]) -> Claim:
     limit = float(max(vehicle.thrust_max.max(), -vehicle.thrust_min.min()))
     return Claim(
         "Excessive control effort is avoided.",
-        f"Asked for up to {newtons(summary['max_force_asked'])}; acting up to {newtons(summary['max_force'])}.",
+        f"Asked for up to {format_force(summary['max_force_asked'])}; "
+        f"acting up to {format_force(summary['max_force'])}.",
         f"One thruster of this vehicle gives {limit:g} N; f is a square: k_p1 f ∇f grows as the cube of the distance.",
     )
 

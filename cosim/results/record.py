@@ -17,7 +17,7 @@ from cosim.errors import RunError
 from cosim.io.format_number import require_format
 from cosim.simulation.signals import Array, Column
 
-MAX_ROWS = 100_000_001  # of a run with the greatest number of steps of a scenario
+MAX_ROWS = 100_000_001  # rows of a run with the greatest number of steps that a scenario may have
 RECORD = "record.parquet"
 PARTS = "record.parts"  # folder of the parts of a run that is under way or was killed
 _DIGITS = 9  # greatest number of digits of a format number
@@ -39,7 +39,7 @@ class Rows:
     Attributes
     ----------
     columns : tuple of Column
-        In the order of the row.
+        Columns in the order of the row.
     units : dict
         Unit of each signal, by name, in the order of the columns.
     """
@@ -61,7 +61,7 @@ class Rows:
         """Return several signals side by side, shape (rows, len(names))."""
         return np.column_stack([self[name] for name in names])
 
-    def numbers(self) -> Array:
+    def to_array(self) -> Array:
         """Return all signals side by side, shape (rows, columns)."""
         return self.stack(list(self.units))
 
@@ -90,7 +90,7 @@ class Rows:
         Parameters
         ----------
         rows : sequence of int
-            Rising, from 0.
+            Row indices in rising order, from 0.
         names : sequence of str, optional
             Names of the signals; default: all.
 
@@ -132,7 +132,7 @@ class Record(Rows):
     Attributes
     ----------
     columns : tuple of Column
-        In the order of the row.
+        Columns in the order of the row.
     units : dict
         Unit of each signal, by name, in the order of the columns.
     file : Path
@@ -161,8 +161,8 @@ class Record(Rows):
                 schema = parquet.schema_arrow
                 rows += parquet.metadata.num_rows
                 _require_numbers(file, schema, rows)
-                if (said := _format_of(schema)) is not None:
-                    require_format(file, said)
+                if (format_number := _format_of(schema)) is not None:
+                    require_format(file, format_number)
                 columns.append(tuple(map(_column_of, schema)))
             if columns[-1] != columns[0]:
                 raise RunError(f"{file}: has other columns than {self._files[0].name}, expected parts of one record")
@@ -294,17 +294,17 @@ def require_utf8(path: Path) -> None:
     Raises
     ------
     RunError
-        If its name is not UTF-8.
+        If the path is not UTF-8.
     """
     try:
         str(path).encode()
     except UnicodeEncodeError as error:
         shown = str(path).encode(errors="surrogateescape").decode(errors="backslashreplace")
-        raise RunError(f"{shown}: is no UTF-8, expected such a name, which Parquet files need") from error
+        raise RunError(f"{shown}: is not UTF-8, expected a UTF-8 path, which Parquet files need") from error
 
 
 def _require_numbers(file: Path, schema: pa.Schema, rows: int) -> None:
-    """Raise a RunError if a schema is not a record's, or `rows` exceeds the bound, since a small file can claim any."""
+    """Raise a RunError if a schema is not a record's, or `rows` exceeds the bound, which a small file can claim."""
     odd = next((field.name for field in schema if field.type != pa.float64()), None)
     if odd is not None:
         raise RunError(f"{file}: column {odd[:80]!r} is no number, expected the record of a run")
@@ -316,10 +316,10 @@ def _require_numbers(file: Path, schema: pa.Schema, rows: int) -> None:
 
 def _format_of(schema: pa.Schema) -> int | str | None:
     """Return the format number in a schema; without one, 1 if it has columns of format 1, else None."""
-    said = (schema.metadata or {}).get(b"format", b"").decode("utf-8", "replace")
-    if not said:
+    number = (schema.metadata or {}).get(b"format", b"").decode("utf-8", "replace")
+    if not number:
         return 1 if any(name.startswith("helm.") for name in schema.names) else None
-    return int(said) if said.isdecimal() and len(said) < _DIGITS else said
+    return int(number) if number.isdecimal() and len(number) < _DIGITS else number
 
 
 def part_files(folder: Path) -> list[Path]:

@@ -17,7 +17,7 @@ from cosim.results.record import PARTS, RECORD, part_files
 from cosim.simulation.signals import Array, Column
 
 _WHOLE = "whole"  # name of the complete record while it is written in the folder of the parts
-_PART_SECONDS = 1.0  # of the wall clock, after which a part is written even if it is small
+_PART_SECONDS = 1.0  # s of wall-clock time, after which a part is written even if it is small
 _PART_NUMBERS = 2**23  # greatest number of values in a part, 64 MiB, unless `rows_per_part` is given
 _GROUP = 10_000  # greatest number of rows in the first row groups
 _DOUBLED = 100  # groups after which their size doubles, since a reader needs a kilobyte per group and signal
@@ -59,14 +59,14 @@ class Recorder:
         self._largest = max(self._group, (self._rows_per_part - block) // 2 // block * block)  # bound of `_group`
         self._groups = 0  # number of complete groups
         self._columns: Array = np.empty((len(columns), self._group))
-        self._turned = 0  # rows of the present group, in `_columns`
-        self._saved = 0  # how many of these are in a part already
+        self._transposed = 0  # number of rows of the present group, in `_columns`
+        self._saved = 0  # number of these rows that are in a part already
         self._unsaved: list[pa.Table] = []  # rows of earlier groups that are in no part
         self._parts = 0
         (folder / PARTS).mkdir()
         self._whole: pq.ParquetWriter | None = None  # writer of the complete record, opened with the first group
-        self._sound = True  # True: `_whole` has all earlier groups; False after an interrupted write
-        self._whole_is_there = False  # True once the complete record is at its final path
+        self._intact = True  # True: `_whole` has all earlier groups; False after an interrupted write
+        self._is_complete = False  # True once the complete record is at its final path
         self._due = time.monotonic() + _PART_SECONDS
         self.rows = 0
 
@@ -79,7 +79,7 @@ class Recorder:
             If earlier rows cannot be written. They are kept, and written again with the next row.
         """
         if self._filled == len(self._rows) or time.monotonic() > self._due:
-            self._turn()
+            self._transpose()
         self._rows[self._filled][:] = row.data
         self._filled += 1
         self.rows += 1
@@ -89,7 +89,7 @@ class Recorder:
 
         After an error the parts hold all rows, and it may be called again.
         """
-        if not self._whole_is_there:
+        if not self._is_complete:
             try:
                 self._conclude()
             except BaseException:
@@ -99,40 +99,40 @@ class Recorder:
 
     # ---- from rows to columns ----
 
-    def _turn(self) -> None:
+    def _transpose(self) -> None:
         """Transpose the rows of the block to columns, and write the group or part that is due."""
-        self._turn_block()
-        if self._turned == self._group:
+        self._transpose_block()
+        if self._transposed == self._group:
             self._end_group()
         if time.monotonic() > self._due or _rows(self._unsaved) + self._group > self._rows_per_part:
             self._save()
 
-    def _turn_block(self) -> None:
-        if self._turned + self._filled > self._group:
+    def _transpose_block(self) -> None:
+        if self._transposed + self._filled > self._group:
             self._end_group()
-        n = self._turned + self._filled
-        self._columns[:, self._turned : n] = self._block[: self._filled].T
-        self._turned, self._filled = n, 0
+        n = self._transposed + self._filled
+        self._columns[:, self._transposed : n] = self._block[: self._filled].T
+        self._transposed, self._filled = n, 0
 
     def _table(self, first: int) -> pa.Table:
         """Return the rows of the present group from `first` on, as a table that shares the memory of the columns."""
         # not pa.array, which imports pandas where it is installed
         arrays = [
-            pa.Array.from_buffers(pa.float64(), self._turned - first, [None, pa.py_buffer(column)])
-            for column in self._columns[:, first : self._turned]
+            pa.Array.from_buffers(pa.float64(), self._transposed - first, [None, pa.py_buffer(column)])
+            for column in self._columns[:, first : self._transposed]
         ]
         return pa.Table.from_arrays(arrays, schema=self._schema)
 
     def _end_group(self) -> None:
         """Write the present group into the complete record, and begin the next one."""
-        group, groups, sound = self._table(0), self._groups + 1, self._sound
+        group, groups, intact = self._table(0), self._groups + 1, self._intact
         rows = min(2 * self._group, self._largest) if groups % _DOUBLED == 0 else self._group
-        unsaved, room = [*self._unsaved, group.slice(self._saved)], np.empty((len(self._columns), rows))
-        self._sound, self._unsaved, self._columns, self._turned, self._saved = False, unsaved, room, 0, 0
+        unsaved, columns = [*self._unsaved, group.slice(self._saved)], np.empty((len(self._columns), rows))
+        self._intact, self._unsaved, self._columns, self._transposed, self._saved = False, unsaved, columns, 0, 0
         self._group, self._groups = rows, groups
-        if sound:
+        if intact:
             self._append(group)
-            self._sound = True
+            self._intact = True
 
     # ---- from columns to files ----
 
@@ -141,13 +141,13 @@ class Recorder:
         tables = [*self._unsaved, self._table(self._saved)]
         if _rows(tables):
             self._write_part(tables)
-            self._parts, self._unsaved, self._saved = self._parts + 1, [], self._turned
+            self._parts, self._unsaved, self._saved = self._parts + 1, [], self._transposed
         self._due = time.monotonic() + _PART_SECONDS
 
     def _rescue(self) -> None:
         """Discard the complete record, and write the unsaved rows as parts, as far as the disk has room."""
         self._drop_whole()
-        self._turn_block()
+        self._transpose_block()
         while self._unsaved:
             self._write_part(self._unsaved[:1])
             self._parts, self._unsaved = self._parts + 1, self._unsaved[1:]
@@ -171,16 +171,16 @@ class Recorder:
 
     def _conclude(self) -> None:
         """Finish the complete record, and move it to its final path."""
-        self._turn_block()
-        sound, self._sound = self._sound, False  # after an error here the record is written from the parts
-        if not sound:
+        self._transpose_block()
+        intact, self._intact = self._intact, False  # after an error here the record is written from the parts
+        if not intact:
             self._append_parts()
-        elif self._turned:
+        elif self._transposed:
             self._append(self._table(0))
         if self._whole is not None:
             self._whole.close()
         (self._folder / PARTS / _WHOLE).replace(self._folder / RECORD)
-        self._whole_is_there = True
+        self._is_complete = True
 
     def _append_parts(self) -> None:
         """Write the complete record again from all parts, after Ctrl-C or a full disk interrupted it."""
@@ -198,7 +198,7 @@ class Recorder:
             self._append(pa.concat_tables(tables).combine_chunks())
 
     def _drop_whole(self) -> None:
-        self._sound = False
+        self._intact = False
         if self._whole is not None:
             with contextlib.suppress(OSError, pa.ArrowException):
                 self._whole.close()

@@ -18,7 +18,7 @@ _NAMED = 3  # greatest number of columns named in a message
 
 
 def require_columns(scenario: Scenario, record: Record) -> None:
-    """Raise a RunError if a record lacks columns of its scenario; warn if it lacks optional ones.
+    """Raise a RunError if a record lacks columns of its scenario; log a warning if it lacks optional ones.
 
     Parameters
     ----------
@@ -30,13 +30,13 @@ def require_columns(scenario: Scenario, record: Record) -> None:
     Raises
     ------
     RunError
-        With the names of some columns that are missing, or in another order.
+        If columns are missing or in another order; the message names some of them.
     """
     expected, found = names_of(scenario), list(record.units)
     missing = [name for name in expected if name not in record.units]
     needed = [name for name in missing if not _is_optional(name)]
     if needed:
-        raise RunError(f"{record.file}: has no {_listed(needed)}, which its scenario calls for")
+        raise RunError(f"{record.file}: has no {_list_names(needed)}, which its scenario calls for")
     # code that reads neighbouring columns, or the first one, relies on the order
     here = [found[0], *(name for name in found if name in expected)]
     there = [expected[0], *(name for name in expected if name in record.units)]
@@ -44,13 +44,13 @@ def require_columns(scenario: Scenario, record: Record) -> None:
     if odd is not None:
         raise RunError(f"{record.file}: column {odd!r} stands elsewhere, expected the order that its scenario has")
     if missing:
-        log.warning("%s: has no %s: what is made of it does without", record.file, _listed(missing))
+        log.warning("%s: has no %s: reports, pages and exports leave them out", record.file, _list_names(missing))
 
 
 def _is_optional(name: str) -> bool:
     return name.endswith(".value") or (name.startswith(_OPTIONAL) and not name.endswith(_OF_REGIONS))
 
 
-def _listed(names: Sequence[str]) -> str:
+def _list_names(names: Sequence[str]) -> str:
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return f"column{'s' * (len(names) > 1)} {', '.join(map(repr, names[:_NAMED]))}{more}"

@@ -30,7 +30,7 @@ COMMANDS_LOG = "commands.jsonl"
 REPORT = "report.html"
 REPLAY = "replay.html"
 
-_LONGEST = 1e12  # s, bound of a plausible wall-clock time
+_MAX_WALL_TIME = 1e12  # s, bound of a plausible wall-clock time
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class Run:
     """
 
     folder: Path
-    planned: Scenario  # from its file, with the law that flew it
+    planned: Scenario  # scenario of its file, with the law that flew it
     scenario: Scenario  # as flown: with the obstacles that were added, and with the last target
     record: Record  # signals over time, read at their first use
     summary: dict[str, Any]
@@ -107,7 +107,7 @@ class Run:
         Returns
         -------
         matplotlib.axes.Axes
-            With a line for each signal.
+            Axes with a line for each signal.
 
         Raises
         ------
@@ -168,7 +168,7 @@ def load_run(path: Path) -> Run:
     Returns
     -------
     Run
-        With a summary that is computed from its record.
+        The run with a summary that is computed from its record.
 
     Raises
     ------
@@ -189,11 +189,11 @@ def load_run(path: Path) -> Run:
     scenario = load_scenario(path / SCENARIO, imported=True)
     status, wall_time = "killed", None
     if (path / SUMMARY).exists():
-        scenario, status, wall_time = _concluded(path / SUMMARY, scenario)
+        scenario, status, wall_time = _read_summary(path / SUMMARY, scenario)
     return open_run(path, scenario, status, wall_time)
 
 
-def _concluded(file: Path, scenario: Scenario) -> tuple[Scenario, str, float | None]:
+def _read_summary(file: Path, scenario: Scenario) -> tuple[Scenario, str, float | None]:
     """Return the scenario with the law in the summary, the run's status, and its wall time [s]."""
     before = read_json(file)
     name, law, status = (_text(file, before, key) for key in ("scenario", "law", "status"))
@@ -201,7 +201,7 @@ def _concluded(file: Path, scenario: Scenario) -> tuple[Scenario, str, float | N
     if law != scenario.law.name and (law in LAWS or scenario.commands.enabled):
         raise RunError(f"{file}: law is {law!r}, expected {scenario.law.name!r} as in {SCENARIO}")
     took = before.get("wall_time")
-    if not (took is None or (type(took) in (int, float) and 0.0 <= took < _LONGEST)):
+    if not (took is None or (type(took) in (int, float) and 0.0 <= took < _MAX_WALL_TIME)):
         raise RunError(f"{file}: wall_time is {took!r}, expected seconds, or null")
     flown = dataclasses.replace(scenario, name=name, law=dataclasses.replace(scenario.law, name=law))
     return flown, status, None if took is None else float(took)
@@ -226,14 +226,14 @@ def open_run(path: Path, scenario: Scenario, status: str, wall_time: float | Non
     scenario : Scenario
         The scenario of the run.
     status : str
-        As for `summarise`.
+        ``"completed"``, ``"interrupted"``, ``"reset"``, ``"killed"``, ``"imported"``, or ``"failed: ..."``.
     wall_time : float or None
         Wall-clock time of the stepping [s].
 
     Returns
     -------
     Run
-        With its summary.
+        The run with its summary.
 
     Raises
     ------

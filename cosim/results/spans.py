@@ -41,9 +41,14 @@ class Spans:
         flags : ndarray of bool, shape (rows,)
             The condition at each row.
         time : ndarray, shape (rows,)
-            [s].
+            Time of each row [s].
         signal : ndarray, shape (rows,), optional
-            Signal whose least value each span gets.
+            Signal whose least value in the span is stored in `Span.least`.
+
+        Returns
+        -------
+        list of Span
+            The ended spans in the order of time.
         """
         ended = []
         edges = np.flatnonzero(np.diff(flags, prepend=self.open is not None)).tolist()
@@ -63,19 +68,19 @@ class Spans:
 
 
 def spans(flags: Flags, time: Array) -> list[tuple[float, float]]:
-    """Return the spans in which a condition holds, from the first instant in to the first one out.
+    """Return the spans in which a condition holds, each up to the first instant at which it no longer holds.
 
     Parameters
     ----------
     flags : ndarray of bool, shape (steps,)
         The condition at each step.
     time : ndarray, shape (steps,)
-        [s].
+        Time of each step [s].
 
     Returns
     -------
     list of (float, float)
-        [s]; a condition that still holds at the end ends at the last instant.
+        Start and end of each span [s]; a span that has not ended ends at the last instant.
     """
     found = Spans()
     ended = found.add(flags, time)

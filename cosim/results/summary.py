@@ -17,12 +17,12 @@ from cosim.simulation.signals import Array
 
 SETTLED_FOR = 10.0  # s, least time in the goal at the end of a run that counts as settled
 
-_ADDED = 2**18  # numbers that are summed at once
+_SUM_SIZE = 2**18  # numbers that are summed at once
 
 _FORCE = [f"actuation.{axis}" for axis in "XYZ"]
 _ASKED = [f"command.{axis}" for axis in "XYZ"]
 _SPEED = [f"velocity.{axis}" for axis in "uvw"]
-_PLACE = [f"position.{axis}" for axis in "xyz"]
+_POSITION = [f"position.{axis}" for axis in "xyz"]
 _ESTIMATE = [f"estimate.phi{i}" for i in range(1, 5)]
 
 
@@ -43,9 +43,9 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
     Returns
     -------
     dict
-        For JSON; times in s, lengths in m, forces in N. Clearances are distances to the surface of a region at its
-        position at that time, or angles [rad] for regions of attitude; positive where it is respected, negative where
-        it is violated (inside a region to keep out of).
+        Values for JSON; times in s, lengths in m, forces in N. Clearances are distances to the surface of a region at
+        its position at that time, or angles [rad] for regions of attitude; positive where it is respected, negative
+        where it is violated (inside a region to keep out of).
 
     Raises
     ------
@@ -55,17 +55,17 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
         If it lacks a signal.
     """
     names = [secondary.region.name for secondary in scenario.regions]
-    begun = record.take(range(min(2, len(record))), ["time", *(f"{name}.clearance" for name in names)])
-    # of the record, which may have fewer rows than the run had steps
-    period = float(begun["time"][1] - begun["time"][0]) if len(begun) > 1 else scenario.time.step
-    course = _Course(names, scenario, record, period)
+    first_rows = record.take(range(min(2, len(record))), ["time", *(f"{name}.clearance" for name in names)])
+    # period of the record's rows, which may be fewer than the run's steps
+    period = float(np.diff(first_rows["time"])[0]) if len(first_rows) > 1 else scenario.time.step
+    data = _SummaryData(names, scenario, record, period)
     with np.errstate(over="ignore", invalid="ignore"):  # a damaged record: norms that overflow are infinite
-        for block in record.blocks(course.signals):
-            course.add(block)
-    visits, last = course.visits, course.last
+        for block in record.blocks(data.signals):
+            data.add(block)
+    visits, last = data.visits, data.last
     simulated = float(last["time"])
-    settled = bool(visits and course.inside.open and simulated - visits[-1].start >= SETTLED_FOR)
-    least = {name: course.least[f"{name}.clearance"] for name in names}
+    settled = bool(visits and data.inside.open and simulated - visits[-1].start >= SETTLED_FOR)
+    least = {name: data.least[f"{name}.clearance"] for name in names}
     return {
         "scenario": scenario.name,
         "law": scenario.law.name,
@@ -78,27 +78,27 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
         "reach_time": visits[0].start if visits else None,
         "settled": settled,
         "settle_time": visits[-1].start if visits else None,
-        "final_position": [last[name] for name in _PLACE],
-        "closest_to_goal": -course.greatest["goal.clearance"],
-        "weighted_violation": course.violation.total() * period,
+        "final_position": [last[name] for name in _POSITION],
+        "closest_to_goal": -data.greatest["goal.clearance"],
+        "weighted_violation": data.violation.total() * period,
         "intersection": [names[i] for i in scenario.intersection],
-        "intersection_windows": [(span.start, span.end) for span in course.windows],
+        "intersection_windows": [(span.start, span.end) for span in data.windows],
         "min_clearance": least,
         "clearance_unit": {r.region.name: "rad" if of_attitude(r.region.shape) else "m" for r in scenario.regions},
         "hard": [r.region.name for r in scenario.regions if r.region.hard],
         "hard_violated": [r.region.name for r in scenario.regions if r.region.hard and least[r.region.name] < 0.0],
-        "violated_at_start": [name for name in names if begun[f"{name}.clearance"][0] < 0.0],
-        "max_force": course.greatest.get("force", 0.0),
-        "max_force_asked": course.greatest["asked"],
-        "max_speed": course.greatest["speed"],
-        "weights_above_half": int(course.greatest["above half"]),
-        "weights_sum_max": course.greatest["sum of weights"],
-        "effort": course.force.total() * period,
-        "saturated_time": course.saturated * period,
+        "violated_at_start": [name for name in names if first_rows[f"{name}.clearance"][0] < 0.0],
+        "max_force": data.greatest.get("force", 0.0),
+        "max_force_asked": data.greatest["asked"],
+        "max_speed": data.greatest["speed"],
+        "weights_above_half": int(data.greatest["above half"]),
+        "weights_sum_max": data.greatest["sum of weights"],
+        "effort": data.force.total() * period,
+        "saturated_time": data.saturated * period,
         "estimate_final": [last[name] for name in _ESTIMATE],
         "estimate_true": scenario.true_restoring_parameters.tolist(),
-        "estimate_lowest": [course.least[name] for name in _ESTIMATE],
-        "estimate_highest": [course.greatest[name] for name in _ESTIMATE],
+        "estimate_lowest": [data.least[name] for name in _ESTIMATE],
+        "estimate_highest": [data.greatest[name] for name in _ESTIMATE],
         "lyapunov": summarise_lyapunov(record),
         "steps": round(simulated / scenario.time.step),
         "wall_time": wall_time,
@@ -106,17 +106,17 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
     }
 
 
-class _Course:
+class _SummaryData:
     """Data for a summary, collected from a record block by block."""
 
     def __init__(self, names: Sequence[str], scenario: Scenario, record: Rows, period: float) -> None:
         self._clearances = [f"{name}.clearance" for name in names]
         self._together = [self._clearances[i] for i in scenario.intersection]
-        of_all = ("wrench_saturated", "allocation_saturated")
-        self._flags = [name for name in record.units if name.startswith("thrust_saturated[") or name in of_all]
+        flags = ("wrench_saturated", "allocation_saturated")
+        self._flags = [name for name in record.units if name.startswith("thrust_saturated[") or name in flags]
         self._weights = [f"weight.{name}" for name in scenario.criterion_names]
         self.signals = [
-            "time", "goal.clearance", *self._clearances, *_FORCE, *_ASKED, *_SPEED, *_PLACE, *_ESTIMATE,
+            "time", "goal.clearance", *self._clearances, *_FORCE, *_ASKED, *_SPEED, *_POSITION, *_ESTIMATE,
             *self._weights, *self._flags, *(["goal.place"] if scenario.goal_then else []),
         ]  # fmt: skip
         self._last_place = len(scenario.goal_then)
@@ -160,7 +160,7 @@ class _Course:
             self.violation.add((np.maximum(-block.stack(self._clearances), 0.0) * self._priorities).sum(axis=1)[acted])
         self.saturated += int(np.count_nonzero(np.logical_or.reduce([block[n][acted] > 0.0 for n in self._flags])))
         weights = block.stack(self._weights)
-        self._stretch(self.greatest, np.fmax, {
+        self._update_extremes(self.greatest, np.fmax, {
             "goal.clearance": goal,
             "force": force,
             "asked": np.linalg.norm(block.stack(_ASKED), axis=1),
@@ -169,11 +169,11 @@ class _Course:
             "sum of weights": weights.sum(axis=1),
             **{name: block[name] for name in _ESTIMATE},
         })  # fmt: skip
-        self._stretch(self.least, np.fmin, {name: block[name] for name in (*self._clearances, *_ESTIMATE)})
-        self.last = {name: float(block[name][-1]) for name in ("time", *_PLACE, *_ESTIMATE)}
+        self._update_extremes(self.least, np.fmin, {name: block[name] for name in (*self._clearances, *_ESTIMATE)})
+        self.last = {name: float(block[name][-1]) for name in ("time", *_POSITION, *_ESTIMATE)}
 
     @staticmethod
-    def _stretch(known: dict[str, float], extreme: np.ufunc, signals: dict[str, Array]) -> None:
+    def _update_extremes(known: dict[str, float], extreme: np.ufunc, signals: dict[str, Array]) -> None:
         for name, signal in signals.items():
             if signal.size:
                 known[name] = float(extreme(known.get(name, np.nan), extreme.reduce(signal)))
@@ -183,16 +183,16 @@ class _Sum:
     """A sum that does not depend on block sizes: NumPy sums a fixed count of numbers at once."""
 
     def __init__(self) -> None:
-        self._waiting: Array = np.empty(_ADDED)
+        self._waiting: Array = np.empty(_SUM_SIZE)
         self._filled, self._total = 0, 0.0
 
     def add(self, numbers: Array) -> None:
         """Add numbers, shape (n,)."""
         while numbers.size:
-            taken = numbers[: _ADDED - self._filled]
+            taken = numbers[: _SUM_SIZE - self._filled]
             self._waiting[self._filled : self._filled + len(taken)] = taken
             self._filled, numbers = self._filled + len(taken), numbers[len(taken) :]
-            if self._filled == _ADDED:
+            if self._filled == _SUM_SIZE:
                 self._total, self._filled = self.total(), 0
 
     def total(self) -> float:

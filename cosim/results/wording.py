@@ -9,32 +9,32 @@ from controller.regions.region_set import SHAPES
 from controller.regions.shape import Shape
 from cosim.scenario.scenario import Scenario
 
-IMPORTED = "imported"  # the status of a log's run
+IMPORTED = "imported"  # status of a run that was imported from a log
 
 
-def newtons(force: float) -> str:
+def format_force(force: float) -> str:
     """Format a force [N] with four digits, such as ``26.82 kN``.
 
     Parameters
     ----------
     force : float
-        [N].
+        Force [N].
 
     Returns
     -------
     str
-        With its unit.
+        Number and unit.
     """
     return f"{force / 1e3:.4g} kN" if force >= 1e3 else f"{force:.4g} N"
 
 
-def asked(scenario: Scenario) -> str:
+def describe_task(scenario: Scenario) -> str:
     """Describe the task of the vehicle in a sentence.
 
     Returns
     -------
     str
-        Plain text.
+        A sentence with start, goal region, other regions and law.
     """
     if not scenario.has_goal:
         return f"Imported from {scenario.log}, which has no goal and no regions to judge it by."
@@ -43,7 +43,7 @@ def asked(scenario: Scenario) -> str:
         f"{'within' if r.region.keep == 'in' else 'out of'} {r.region.name} ({r.criterion})" for r in scenario.regions
     ]
     respecting = f", keeping {', '.join(regions)}" if regions else ""
-    kind = kind_of(scenario.goal)
+    kind = shape_name(scenario.goal)
     centre = [sum(pair) / 2.0 for pair in zip(*scenario.goal.bounds(), strict=True)]
     at = f" about ({', '.join(f'{x:g}' for x in centre)}) m" if all(map(math.isfinite, centre)) else ""
     then = f", then to {len(scenario.goal_then)} more places in turn" if scenario.goal_then else ""
@@ -51,18 +51,18 @@ def asked(scenario: Scenario) -> str:
     return f"From ({start}) m into the goal region, a {kind}{at}{then}{respecting}; {by}."
 
 
-def kind_of(shape: Shape) -> str:
+def shape_name(shape: Shape) -> str:
     """Return the name of a shape, such as ``depth band``.
 
     Returns
     -------
     str
-        In lower case.
+        Name in lower case.
     """
     return next(name for name, of in SHAPES.items() if isinstance(shape, of)).replace("_", " ")
 
 
-def number(value: float, digits: int) -> str:
+def format_number(value: float, digits: int) -> str:
     """Format a number for readers.
 
     Parameters
@@ -70,12 +70,12 @@ def number(value: float, digits: int) -> str:
     value : float
         The number.
     digits : int
-        Significant digits.
+        Number of significant digits.
 
     Returns
     -------
     str
-        With the sign U+2212 for minus; ``no number`` for NaN and infinity.
+        Text with the sign U+2212 for minus; ``no number`` for NaN and infinity.
     """
     if not math.isfinite(value):
         return "no number"
@@ -90,10 +90,10 @@ def verdict(summary: dict[str, Any]) -> str:
     Returns
     -------
     str
-        Plain text.
+        Sentences with the arrival, violated regions, forces and how the run ended.
     """
     if not summary["has_goal"]:
-        return f"A log of {summary['simulated_time']:.1f} s, without goal and regions.{_of_commands(summary)}"
+        return f"A log of {summary['simulated_time']:.1f} s, without goal and regions.{_commanded_force(summary)}"
     if summary["settled"]:
         entered, settled = summary["reach_time"], summary["settle_time"]
         stayed = "and stayed" if settled == entered else f"and was in for good from {settled:.2f} s"
@@ -104,14 +104,14 @@ def verdict(summary: dict[str, Any]) -> str:
         near = summary["closest_to_goal"]
         how_near = f"it came within {near:.2f} m of it" if math.isfinite(near) else "how near it came is not recorded"
         goal = f"The vehicle never entered the goal region; {how_near}"
-    broken = [_broken(summary, name) for name, c in summary["min_clearance"].items() if c < 0.0]
+    violated = [_violation(summary, name) for name, c in summary["min_clearance"].items() if c < 0.0]
     kept = "; it kept every region."
-    if broken:
+    if violated:
         but = "" if summary["hard_violated"] or not summary["hard"] else "kept every hard region but "
-        kept = f"; it {but}violated {', '.join(broken)}."
+        kept = f"; it {but}violated {', '.join(violated)}."
     if summary["status"] == IMPORTED:
-        return f"{goal}{kept}{_of_commands(summary)}"
-    wanted, acted = newtons(summary["max_force_asked"]), newtons(summary["max_force"])
+        return f"{goal}{kept}{_commanded_force(summary)}"
+    wanted, acted = format_force(summary["max_force_asked"]), format_force(summary["max_force"])
     force = f" The law asked for up to {wanted}" + ("." if wanted == acted else f"; up to {acted} acted.")
     if not math.isfinite(summary["max_force"]):
         force = f" The law asked for up to {wanted}; what acted was not measured."
@@ -126,15 +126,15 @@ def verdict(summary: dict[str, Any]) -> str:
     return goal + kept + force + steered + ended
 
 
-def _of_commands(summary: dict[str, Any]) -> str:
+def _commanded_force(summary: dict[str, Any]) -> str:
     """Describe the forces that the commands of a log ask for."""
     force = summary["max_force_asked"]
     if not math.isfinite(force):
         return " It has no commands."
-    return f" Its commands ask for forces of up to {newtons(force)}."
+    return f" Its commands ask for forces of up to {format_force(force)}."
 
 
-def _broken(summary: dict[str, Any], name: str) -> str:
+def _violation(summary: dict[str, Any], name: str) -> str:
     """Describe how deep a region was violated."""
     remarks = ["soft"] if name not in summary["hard"] else []
     remarks += ["where it starts"] if name in summary["violated_at_start"] else []

@@ -10,7 +10,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-WORDS = "compiling the law and what it needs (first use)"
+COMPILING_NOTICE = "compiling the law and what it needs (first use)"
 
 
 class ProgressBar:
@@ -21,9 +21,9 @@ class ProgressBar:
     shown : bool
         False: never show it.
     bar_format : str
-        As for tqdm.
+        Format of the bar, as ``bar_format`` of `tqdm.tqdm`.
     **options
-        As for tqdm.
+        Further arguments of `tqdm.tqdm`.
     """
 
     def __init__(self, shown: bool, bar_format: str, **options: Any) -> None:
@@ -60,7 +60,7 @@ class _Notice(logging.Handler):
         if not self._announced:
             self._announced = True
             with tqdm.external_write_mode(file=sys.stderr):
-                self._show(WORDS)
+                self._show(COMPILING_NOTICE)
 
 
 @contextlib.contextmanager

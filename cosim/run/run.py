@@ -32,7 +32,7 @@ _PROGRESS_STEPS = 200  # updates of the bar
 
 
 @dataclass(frozen=True)
-class _Together:
+class _ObserverGroup:
     """Observer that passes each row to several observers."""
 
     observers: Sequence[Observer]
@@ -132,24 +132,24 @@ def run_scenario(
     out = None if out is None else Path(out)
     if law is not None:
         scenario = with_custom_law(law, scenario)
-    recorded = _recorded(scenario, commands_log)
+    replayed = _replayed_commands(scenario, commands_log)
     queue = CommandQueue()
     link: LinkThread | None = None
     try:
         for attempt in itertools.count(1):
             with Master(scenario, law) as master:
                 if mavlink is not None and link is None:
-                    link = mavlink.open(scenario, master.signals.columns, None if recorded else queue, rate)
+                    link = mavlink.open(scenario, master.signals.columns, None if replayed else queue, rate)
                 folder = claim(
                     out.with_name(f"{out.name}-{attempt}") if out and attempt > 1 else out, scenario, overwrite
                 )
                 if link is not None and attempt == 1:
                     link.start()
                 if live is not None:
-                    live.begin(scenario, master.signals.columns, _desk(scenario, recorded, queue))
+                    live.begin(scenario, master.signals.columns, _viewer_queue(scenario, replayed, queue))
                 try:
                     source = LoggedCommands(
-                        recorded or queue, folder.path / COMMANDS_LOG, live.show_commands if live else None
+                        replayed or queue, folder.path / COMMANDS_LOG, live.show_commands if live else None
                     )
                     status, wall_time, failure = _step(master, folder, source, link, live, rate, progress)
                     queue.end_run()
@@ -162,7 +162,7 @@ def run_scenario(
                     raise RunError(f"{folder.path}: {error.strerror or error}") from error
             if failure:
                 raise failure
-            if status != "reset" or recorded:
+            if status != "reset" or replayed:
                 return run
     finally:
         if link:
@@ -170,14 +170,14 @@ def run_scenario(
     raise AssertionError("unreachable")
 
 
-def _desk(scenario: Scenario, recorded: ReplayedCommands | None, queue: CommandQueue) -> CommandQueue | str:
+def _viewer_queue(scenario: Scenario, replayed: ReplayedCommands | None, queue: CommandQueue) -> CommandQueue | str:
     """Return the queue for viewers' commands, or the reason why they are refused."""
-    if recorded:
+    if replayed:
         return "this run repeats the commands of a log and takes no others"
     return queue if scenario.commands.enabled else "commands are off: start with --commands"
 
 
-def _recorded(scenario: Scenario, commands_log: Path | None) -> ReplayedCommands | None:
+def _replayed_commands(scenario: Scenario, commands_log: Path | None) -> ReplayedCommands | None:
     if commands_log is None:
         return None
     if not scenario.commands.enabled:
@@ -203,10 +203,10 @@ def _step(
     try:
         recorder = Recorder(folder.path, master.signals.columns)
         bar = _Progress(master.scenario) if progress else None
-        watching = [o for o in (link, live) if o is not None]
-        observers: list[Observer] = [recorder, *watching, *([bar] if bar else [])]
+        viewers = [o for o in (link, live) if o is not None]
+        observers: list[Observer] = [recorder, *viewers, *([bar] if bar else [])]
         started = time.perf_counter()
-        master.run(observers, rate, commands_log, awaiting=_Together(watching))
+        master.run(observers, rate, commands_log, awaiting=_ObserverGroup(viewers))
         if master.command_handler is not None and master.command_handler.reset:
             status = "reset"
     except KeyboardInterrupt:

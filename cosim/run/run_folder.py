@@ -37,7 +37,7 @@ class RunFolder:
         Parameters
         ----------
         recorder : Recorder or None
-            Of the run; None if it failed before recording.
+            Recorder of the run; None if the run failed before recording.
 
         Returns
         -------
@@ -85,7 +85,7 @@ def claim(out: Path | None, scenario: Scenario, overwrite: bool = False) -> RunF
     Returns
     -------
     RunFolder
-        Claimed: other runs refuse it.
+        The claimed folder, which other runs refuse.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | Non
     Returns
     -------
     Run
-        With its summary.
+        The run with its summary.
 
     Raises
     ------

@@ -18,7 +18,7 @@ import benchmarks.__main__
 import cosim.command_line.cli
 import fuzzy_arbiter.__main__
 import plant_fmu.__main__
-from cosim.run.progress import WORDS
+from cosim.run.progress import COMPILING_NOTICE
 from tests.docs.directives import PageError
 from tests.docs.pages import ROOT
 
@@ -65,7 +65,7 @@ def _captured(call: Callable[[], int | None]) -> tuple[int, str, str]:
                 errors.write(ended.code)
         finally:
             plt.close("all")
-    compiled = f"cosim: {WORDS}\n"  # whether it is depends on what earlier runs kept
+    compiled = f"cosim: {COMPILING_NOTICE}\n"  # whether it is depends on what earlier runs kept
     return status, output.buffer.getvalue().decode(), errors.getvalue().replace(compiled, "")
 
 

@@ -31,7 +31,7 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
         csv.writer(file, lineterminator="\n").writerow(names)
         for block in excerpt.blocks(names):
             # repr is the shortest text that reads back to the same bits, and keeps the point of 1.0
-            file.writelines(f"{','.join(map(repr, row))}\n" for row in block.numbers().tolist())
+            file.writelines(f"{','.join(map(repr, row))}\n" for row in block.to_array().tolist())
     units = path.with_suffix(".units.csv")
     with units.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")

@@ -138,7 +138,7 @@ def _finished(path: Path, rate: float | None, once: bool) -> Iterator[Look]:
     record, steps = run.record, len(run.record)
     # a picture needs no more rows than these, and all rows of a long run would not fit into memory
     rows = np.arange(steps - 1, -1, -max(1, steps // _ROWS))[::-1] if not once else np.array([steps - 1])
-    picked = record.take(rows, [record.columns[i].name for i in viewing.picked]).numbers()
+    picked = record.take(rows, [record.columns[i].name for i in viewing.picked]).to_array()
     times, ended = picked[:, 0], (str(run.summary["status"]), verdict(run.summary))
     header = header_of(run.scenario, viewing.columns)
 
@@ -184,7 +184,7 @@ def _growing(path: Path) -> Iterator[Look]:
                 header = header_of(scenario, viewing.columns)
                 if not len(record):
                     raise ValueError("it is empty")
-                last = record.take([len(record) - 1]).numbers()
+                last = record.take([len(record) - 1]).to_array()
             except RunError:
                 if (path / PARTS / newest).exists():
                     raise

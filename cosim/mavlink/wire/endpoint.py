@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from cosim.errors import TelemetryError
-from cosim.io.network_address import resolved
+from cosim.io.network_address import resolve_host
 
 Kind = Literal["udpout", "udpin", "tcpin", "tcp", "serial", "tlog"]
 
@@ -49,7 +49,7 @@ def parse_endpoint(text: str, allow_remote: bool = False) -> Endpoint:
     Returns
     -------
     Endpoint
-        The endpoint, with a resolved host.
+        The endpoint, with its host resolved to an address.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def parse_endpoint(text: str, allow_remote: bool = False) -> Endpoint:
 def _address(text: str, host: str, allow_remote: bool) -> str:
     """Return the IPv4 address of a host; raise for other machines unless they are allowed."""
     try:
-        address, here = resolved(host)
+        address, here = resolve_host(host)
     except OSError as error:
         raise TelemetryError(f"endpoint {text!r}: host {host!r} is not known: {error}") from error
     if not (allow_remote or here):

@@ -102,7 +102,7 @@ def _ordered(record: Rows) -> NDArray[np.intp]:
     names = [name for name in record.units if name.startswith(("commands.", "target."))]
     found, first, before = [np.empty(0, np.intp)], 0, np.full((1, len(names)), np.nan)
     for block in record.blocks(names) if names else ():
-        block_rows = block.numbers()
+        block_rows = block.to_array()
         changed = np.flatnonzero((np.diff(block_rows, axis=0, prepend=before) != 0.0).any(axis=1))
         found.append(first + changed[:: max(1, len(changed) // _CHANGES)])
         first, before = first + len(block_rows), block_rows[-1:]

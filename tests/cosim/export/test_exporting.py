@@ -23,7 +23,7 @@ def test_export_defaults_to_all_steps_and_signals(run):
     excerpt, record = excerpt_of(run), load_record(run)
     assert excerpt.columns == record.columns
     assert excerpt.count == len(record) == len(record["time"])
-    taken = np.concatenate([block.numbers() for block in excerpt.blocks()])
+    taken = np.concatenate([block.to_array() for block in excerpt.blocks()])
     assert np.array_equal(taken, record.stack([*record.units]), equal_nan=True)
 
 

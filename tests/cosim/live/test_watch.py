@@ -97,7 +97,7 @@ def test_a_run_that_is_being_written_is_followed_to_its_end(paper, tmp_path):
     folder.mkdir()
     shutil.copy(paper.folder / SCENARIO, folder)
     record = load_record(paper.folder)
-    rows = record.numbers()
+    rows = record.to_array()
     recorder = Recorder(folder, record.columns, rows_per_part=1000)
     frames = looks(str(folder))
     assert next(frames).row is None

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from cosim.command_line import cli
-from cosim.run.progress import WORDS, ProgressBar, announce_compilation
+from cosim.run.progress import COMPILING_NOTICE, ProgressBar, announce_compilation
 
 
 @pytest.fixture(autouse=True)
@@ -33,9 +33,9 @@ def test_compilation_is_announced_once_if_it_happens():
         assert notices == []
         compiles()
         compiles()
-    assert notices == [WORDS]
+    assert notices == [COMPILING_NOTICE]
     compiles()
-    assert notices == [WORDS]
+    assert notices == [COMPILING_NOTICE]
 
 
 def test_cached_function_announces_no_compilation(monkeypatch, tmp_path):
@@ -44,7 +44,7 @@ def test_cached_function_announces_no_compilation(monkeypatch, tmp_path):
     monkeypatch.setattr("platformdirs.user_cache_dir", lambda name: str(tmp_path / name))
     text = "void entry(const void *words);\nvoid entry(const void *words) { (void)words; }\n"
     notices = []
-    for expected in ([WORDS], [WORDS, WORDS][:1]):
+    for expected in ([COMPILING_NOTICE], [COMPILING_NOTICE, COMPILING_NOTICE][:1]):
         library.library_of.cache_clear()
         with announce_compilation(notices.append):
             library.library_of(text)
@@ -60,7 +60,7 @@ def test_compilation_notice_does_not_break_the_progress_bar(monkeypatch):
             compiles()
             bar.update_to(12.0)
     lines = [line.split("\r")[-1].strip() for line in terminal.getvalue().split("\n")]
-    assert lines == [WORDS, "paper 10/10", ""]
+    assert lines == [COMPILING_NOTICE, "paper 10/10", ""]
 
 
 def test_no_progress_bar_without_a_terminal(capsys):
@@ -69,7 +69,7 @@ def test_no_progress_bar_without_a_terminal(capsys):
     assert capsys.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize(("flags", "said"), [([], f"cosim: {WORDS}\n"), (["-q"], "")])
+@pytest.mark.parametrize(("flags", "said"), [([], f"cosim: {COMPILING_NOTICE}\n"), (["-q"], "")])
 def test_every_verb_announces_compilation_unless_quiet(flags, said, capsys, monkeypatch):
     monkeypatch.setitem(cli._VERBS, "show", lambda options: compiles() or 0)
     assert cli.main([*flags, "show", "paper"]) == 0

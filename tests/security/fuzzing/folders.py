@@ -31,7 +31,7 @@ from cosim.replay.trace import trace_of
 from cosim.report.web_page import Html
 from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts, load_log_facts
 from cosim.results.record import PARTS, RECORD, load_record
-from cosim.results.run_result import _concluded, load_run, open_run
+from cosim.results.run_result import _read_summary, load_run, open_run
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.columns import names_of
 from cosim.simulation.commands.sources import read_log
@@ -43,7 +43,9 @@ from tests.security.fuzzing.registry import SCENES, Case, Seeds, reader
 @reader("summary of a run", "json", "cosim.io.strict_json:read_json")
 def summary(seeds: Seeds) -> Case:
     planned = load_run(seeds.run).planned
-    return seeds.file("summary.json", lambda path: _concluded(path, planned), (seeds.run / "summary.json").read_bytes())
+    return seeds.file(
+        "summary.json", lambda path: _read_summary(path, planned), (seeds.run / "summary.json").read_bytes()
+    )
 
 
 @reader("facts of an imported run", "json", "cosim.io.strict_json:read_json", "cosim.results.log_facts:load_log_facts")

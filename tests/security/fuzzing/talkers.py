@@ -231,13 +231,13 @@ def gain(seeds: Seeds) -> Case:
 def endpoint(seeds: Seeds) -> Case:
     known = {"127.0.0.1": ("127.0.0.1", True)}
 
-    def resolved(host: str) -> tuple[str, bool]:
+    def resolve_host(host: str) -> tuple[str, bool]:
         with contextlib.suppress(KeyError):
             return known[host]
         raise OSError("not asked")
 
-    seeds.patch.setattr("cosim.mavlink.wire.endpoint.resolved", resolved)
-    seeds.patch.setattr("cosim.live.address.resolved", resolved)
+    seeds.patch.setattr("cosim.mavlink.wire.endpoint.resolve_host", resolve_host)
+    seeds.patch.setattr("cosim.live.address.resolve_host", resolve_host)
     sound = "udpout:127.0.0.1:14550", "tcpin:127.0.0.1:5760", "serial:/dev/ttyUSB0:57600", "dive.tlog"
     return _argument(parse_endpoint, *sound)
 
