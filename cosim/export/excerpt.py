@@ -18,7 +18,7 @@ from cosim.results.record import Rows
 from cosim.results.run_result import SCENARIO, Run, load_run
 from cosim.simulation.signals import Array, Column
 
-_ROUNDING = 1e-6  # of a period, tolerance of the comparison of times and ticks
+_ROUNDING = 1e-6  # periods, tolerance of the comparison of times and ticks
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Excerpt:
 
     run: Run
     picked: tuple[int, ...]  # indices of the signals in a row of the record, rising, `time` included
-    every: int  # every how many steps one is exported, from the first one on
+    every: int  # export every n-th step, from the first one on
     rate: float | None = None  # Hz, steps per simulated second instead of `every`
 
     @property
@@ -51,7 +51,7 @@ class Excerpt:
         return sum(len(block) for block in self.blocks(["time"]))
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Rows]:
-        """Yield the exported steps, in blocks that fit into memory; by default with all signals of the record."""
+        """Yield the exported steps with the signals `names`, default all, in blocks that fit into memory."""
         first, began, tick = 0, None, -1.0
         for block in self.run.record.blocks(names if names is None or self.rate is None else ["time", *names]):
             if self.rate is None:
@@ -85,18 +85,18 @@ def excerpt_of(folder: Path, signals: Sequence[str] = (), every: int = 1, rate: 
     Parameters
     ----------
     folder : Path
-        The run folder, of a run that was finished, interrupted or killed.
+        Folder of a run that was completed, interrupted or killed.
     signals : sequence of str
         Names or patterns such as ``*.clearance``; none for all.
     every : int
-        Export one of every so many steps.
+        Export every n-th step.
     rate : float, optional
         Steps per simulated second [Hz] instead of `every`; all steps if the record has fewer.
 
     Returns
     -------
     Excerpt
-        Includes the time with any patterns.
+        The selection, which includes the time in any case.
 
     Raises
     ------
@@ -107,14 +107,14 @@ def excerpt_of(folder: Path, signals: Sequence[str] = (), every: int = 1, rate: 
     """
     run = load_run(folder)
     names = [column.name for column in run.record.columns]
-    wanted = {name for pattern in signals for name in _fitting(pattern, names)} | {"time"} if signals else {*names}
+    wanted = {name for pattern in signals for name in _match_names(pattern, names)} | {"time"} if signals else {*names}
     return Excerpt(run, tuple(i for i, name in enumerate(names) if name in wanted), every, rate)
 
 
-def _fitting(pattern: str, names: Sequence[str]) -> list[str]:
+def _match_names(pattern: str, names: Sequence[str]) -> list[str]:
     # exact names first: in a pattern, the brackets of thrust[1] would be a character class
-    fitting = [name for name in names if name == pattern] or [name for name in names if fnmatchcase(name, pattern)]
-    if not fitting:
+    matching = [name for name in names if name == pattern] or [name for name in names if fnmatchcase(name, pattern)]
+    if not matching:
         near = difflib.get_close_matches(pattern, names, n=3, cutoff=0.0)
         raise ExportError(f"--signals {pattern}: fits no signal of the run; expected such as {', '.join(near)}")
-    return fitting
+    return matching

@@ -13,7 +13,7 @@ from cosim.results.record import RECORD
 from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY
 from plant_fmu.installing import install_hint
 
-_OF_RUNS = frozenset({RECORD, SCENARIO, SUMMARY, COMMANDS_LOG})
+_RUN_FILES = frozenset({RECORD, SCENARIO, SUMMARY, COMMANDS_LOG})
 
 
 def export_run(
@@ -31,15 +31,15 @@ def export_run(
     Parameters
     ----------
     folder : Path
-        The run folder, of a run that was finished, interrupted or killed.
+        Folder of a run that was completed, interrupted or killed.
     to : str
-        A format's name: csv, mat, mcap, npz, rrd or tlog.
+        Name of the format: csv, mat, mcap, npz, rrd or tlog.
     out : Path, optional
-        The file; by default the folder's name with the format as suffix, in the present folder.
+        File to write; default: the folder's name with the format as suffix, in the current folder.
     signals : sequence of str
         Names or patterns of signals; none for all.
     every : int
-        Export one of every so many steps.
+        Export every n-th step.
     rate : float, optional
         Steps per simulated second [Hz] instead of `every`.
     force : bool
@@ -75,8 +75,8 @@ def export_run(
     for file in files:
         if file.exists() and not (force and file.is_file()):
             raise ExportError(f"{file}: exists; expected a new file, or --force to replace it")
-        if file.name in _OF_RUNS and file.parent.resolve() == folder.resolve():
-            raise ExportError(f"{file}: is of the run itself, expected another file")
+        if file.name in _RUN_FILES and file.parent.resolve() == folder.resolve():
+            raise ExportError(f"{file}: belongs to the run itself, expected another file")
     excerpt = excerpt_of(folder, signals, every, rate)
     try:
         with tempfile.TemporaryDirectory(prefix=f".{path.name}-", dir=path.parent) as scratch:

@@ -11,15 +11,15 @@ from cosim.export.excerpt import Excerpt
 
 @dataclass(frozen=True)
 class Format:
-    """Description of a format, which each module of `cosim.export.formats` has as ``FORMAT``.
+    """An export format; each module of `cosim.export.formats` defines one as ``FORMAT``.
 
     Parameters
     ----------
     write : callable
-        Writes an excerpt of a run into a file, and returns the paths of the written files, that file first. It imports
-        packages that are not in the base installation.
+        Function that writes an excerpt of a run into a file, and returns the paths of the written files, that file
+        first. It may import the packages of `needs`.
     needs : tuple of str
-        These packages, as pip requirements.
+        Packages beyond the base installation, as pip requirements.
     beside : str
         Suffix of a second file; empty for none.
     whole : bool

@@ -21,22 +21,22 @@ from cosim.export.scene import BODY, HULL_COLOUR, NED, OPAQUE, PLACE, THRUST_COL
 from cosim.replay.events import Event
 from cosim.simulation.signals import Array
 
-MAP = "map"  # z upwards, as in Foxglove
+MAP = "map"  # frame with z upwards, as in Foxglove
 _HALF_TURN = (0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0)  # about north-east: (north, east, down) to (east, north, up)
-_LETTERS = 14.0  # pixels
-_LINE = 2.0  # pixels
+_LETTERS = 14.0  # pixels, font size
+_LINE = 2.0  # pixels, width
 _ARROW = 2.0  # hull radii, length of the arrow of the greatest thrust
 
 
-def moment(nanoseconds: int) -> Timestamp:
+def timestamp(nanoseconds: int) -> Timestamp:
     """Convert a time [ns] to a Foxglove timestamp."""
     return Timestamp(seconds=nanoseconds // 10**9, nanos=nanoseconds % 10**9)
 
 
-def upright() -> FrameTransforms:
+def map_transform() -> FrameTransforms:
     """Return the transform from NED to the map frame, at time 0."""
     message = FrameTransforms()
-    _add_transform(message, moment(0), MAP, NED, (0.0, 0.0, 0.0), _HALF_TURN)
+    _add_transform(message, timestamp(0), MAP, NED, (0.0, 0.0, 0.0), _HALF_TURN)
     return message
 
 
@@ -45,7 +45,7 @@ def frame_of(solid: Solid) -> str:
     return f"region {solid.name}" if solid.moves else solid.frame
 
 
-def frames(
+def frame_transforms(
     time: Timestamp, position: Sequence[float], quaternion: Sequence[float], moved: dict[str, Sequence[float]]
 ) -> FrameTransforms:
     """Return the transforms of the vehicle and of the moving regions.
@@ -53,16 +53,16 @@ def frames(
     Parameters
     ----------
     time : Timestamp
-        Simulated.
+        Simulated time.
     position, quaternion : sequence of float
-        Of the vehicle [m, NED].
+        Position [m, NED] and attitude, body to NED, of the vehicle.
     moved : dict
-        Shift of each moving frame [m, NED].
+        Shift of each moving region [m, NED], by the name of its frame.
 
     Returns
     -------
     FrameTransforms
-        All of them, since after a jump in time a viewer reads the last message only.
+        Transforms of all frames, since after a jump in time a viewer reads the last message only.
     """
     message = FrameTransforms()
     _add_transform(message, time, NED, PLACE, position, (1.0, 0.0, 0.0, 0.0))
@@ -73,7 +73,7 @@ def frames(
 
 
 def pose(time: Timestamp, position: Sequence[float], quaternion: Sequence[float]) -> PoseInFrame:
-    """Return the pose of the vehicle [m, NED]."""
+    """Return the pose of the vehicle: position [m, NED] and attitude, body to NED."""
     message = PoseInFrame(timestamp=time, frame_id=NED)
     _set_pose(message.pose, position, quaternion)
     return message
@@ -85,16 +85,16 @@ def regions(solids: Sequence[Solid], time: Timestamp, active: int) -> SceneUpdat
     Parameters
     ----------
     solids : sequence of Solid
-        The regions at that time.
+        Regions at that time.
     time : Timestamp
-        Simulated.
+        Simulated time.
     active : int
         Index of the active region, to which the arbiter gives priority.
 
     Returns
     -------
     SceneUpdate
-        All of them, since after a jump in time a viewer reads the last message only.
+        Entities of all regions, since after a jump in time a viewer reads the last message only.
     """
     message = SceneUpdate()
     for i, solid in enumerate(solids):
@@ -116,9 +116,9 @@ def vehicle(scene: Scene) -> SceneUpdate:
     _set_pose(ball.pose, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
     _set_vector(ball.size, [2.0 * scene.hull_radius] * 3)
     _set_colour(ball.color, HULL_COLOUR, 0.6)
-    greatest = max((thruster.most for thruster in scene.thrusters), default=1.0) or 1.0
+    greatest = max((thruster.max_force for thruster in scene.thrusters), default=1.0) or 1.0
     for thruster in scene.thrusters:
-        length = _ARROW * scene.hull_radius * thruster.most / greatest
+        length = _ARROW * scene.hull_radius * thruster.max_force / greatest
         if length > 0.0 and np.linalg.norm(thruster.direction) > 0.0:
             arrow = entity.arrows.add(shaft_length=0.7 * length, head_length=0.3 * length)
             arrow.shaft_diameter, arrow.head_diameter = 0.05 * length, 0.15 * length
@@ -133,7 +133,7 @@ def vehicle(scene: Scene) -> SceneUpdate:
     return message
 
 
-def said(time: Timestamp, event: Event) -> Log:
+def log_message(time: Timestamp, event: Event) -> Log:
     """Return a log message for an event."""
     level = Log.WARNING if event.kind in ("violation", "failure", "saturation") else Log.INFO
     return Log(timestamp=time, level=level, message=event.text, name=event.kind)

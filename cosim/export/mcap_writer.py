@@ -20,14 +20,14 @@ from mcap_protobuf.schema import register_schema
 
 from cosim.export import foxglove_scene as foxglove
 from cosim.export.excerpt import Excerpt
-from cosim.export.names import grouped, legal
+from cosim.export.names import group_columns, valid_names
 from cosim.export.protobuf_table import numbers_messages, numbers_schema
 from cosim.export.scene import POSITION, QUATERNION, Scene
 from cosim.replay.events import events_of
 from cosim.results.run_result import Run
 from cosim.simulation.signals import Array
 
-PACKAGE = "subreach"  # of the schemas of signals
+PACKAGE = "subreach"  # Protobuf package of the signals' schemas
 _CHUNK = 4 * 2**20  # bytes
 
 
@@ -71,7 +71,7 @@ def _write_messages(writer: Writer, excerpt: Excerpt) -> None:
         block = rows.to_array()
         times = np.rint(block[:, 0] * 1e9).astype(np.int64).tolist()
         messages = zip(*(numbers_messages(block[:, picked]) for _, picked in tables), strict=True)
-        draw = drawing.of(block)
+        draw = drawing.row_writer(block)
         for i, (time, row) in enumerate(zip(times, messages, strict=True)):
             for (channel, _), message in zip(tables, row, strict=True):
                 writer.add_message(channel, time, message, time)
@@ -82,13 +82,13 @@ def _write_messages(writer: Writer, excerpt: Excerpt) -> None:
 def _tables(writer: Writer, excerpt: Excerpt) -> list[tuple[int, list[int]]]:
     """Register a channel for each group of signals; return channels and indices in a row of the record."""
     tables = []
-    groups = grouped(excerpt.columns)
-    for name, members in zip(legal(groups), groups.values(), strict=True):
+    groups = group_columns(excerpt.columns)
+    for name, members in zip(valid_names(groups), groups.values(), strict=True):
         columns = [excerpt.columns[i] for i in members.values()]
-        fields = legal(members)
+        fields = valid_names(members)
         schema = writer.register_schema(f"{PACKAGE}.{name}", "protobuf", numbers_schema(PACKAGE, name, fields))
-        said = {f: f"{c.name} [{c.unit or '-'}]: {c.description}" for f, c in zip(fields, columns, strict=True)}
-        channel = writer.register_channel(f"/signals/{name}", "protobuf", schema, metadata=said)
+        descriptions = {f: f"{c.name} [{c.unit or '-'}]: {c.description}" for f, c in zip(fields, columns, strict=True)}
+        channel = writer.register_channel(f"/signals/{name}", "protobuf", schema, metadata=descriptions)
         tables.append((channel, [excerpt.picked[i] for i in members.values()]))
     return tables
 
@@ -114,46 +114,46 @@ class _Drawing:
 
     def begin(self) -> None:
         """Write the static messages."""
-        self._send("/tf_static", 0, foxglove.upright())
+        self._send("/tf_static", 0, foxglove.map_transform())
         self._send("/vehicle/model", 0, foxglove.vehicle(self._scene))
 
-    def of(self, block: Array) -> Callable[[int, int], None]:
+    def row_writer(self, block: Array) -> Callable[[int, int], None]:
         """Return a function that writes the scene of a row of a block, given its index and time [ns]."""
         scene = self._scene
-        known = [bool(np.isfinite(row).all()) for row in block[:, scene.places(POSITION + QUATERNION)]]
-        positions = block[:, scene.places(POSITION)].tolist()
-        quaternions = block[:, scene.places(QUATERNION)].tolist()
+        known = [bool(np.isfinite(row).all()) for row in block[:, scene.indices(POSITION + QUATERNION)]]
+        positions = block[:, scene.indices(POSITION)].tolist()
+        quaternions = block[:, scene.indices(QUATERNION)].tolist()
         moved = {foxglove.frame_of(s): block[:, scene.shifts(s)].tolist() for s in scene.solids if s.moves}
         active = scene.active(block)
 
         def draw(i: int, time: int) -> None:
-            at = foxglove.moment(time)
+            at = foxglove.timestamp(time)
             if known[i]:  # otherwise the vehicle keeps its last pose
                 shifts = {frame: rows[i] for frame, rows in moved.items()}
-                self._send("/tf", time, foxglove.frames(at, positions[i], quaternions[i], shifts))
+                self._send("/tf", time, foxglove.frame_transforms(at, positions[i], quaternions[i], shifts))
                 self._send("/vehicle/pose", time, foxglove.pose(at, positions[i], quaternions[i]))
             if self._changed(time) or active[i] != self._drawn:
                 self._drawn = active[i]
                 self._send("/scene", time, foxglove.regions(self._solids, at, active[i]))
             while self._events and self._events[0].time * 1e9 <= time:
                 event = self._events.popleft()
-                self._send("/log", time, foxglove.said(at, event))
+                self._send("/log", time, foxglove.log_message(at, event))
 
         return draw
 
     def _changed(self, time: int) -> bool:
         """Apply the changes that are due; return True if there was one."""
-        due = False
+        changed = False
         while self._changes and self._changes[0][0] * 1e9 <= time:
             _, i, self._solids[i] = self._changes.popleft()
-            due = True
-        return due
+            changed = True
+        return changed
 
     def end(self) -> None:
         """Write the events after the last exported step."""
         for event in self._events:
             time = round(event.time * 1e9)
-            self._send("/log", time, foxglove.said(foxglove.moment(time), event))
+            self._send("/log", time, foxglove.log_message(foxglove.timestamp(time), event))
 
     def _send(self, topic: str, time: int, message: Any) -> None:
         self._writer.add_message(self._channels[topic], time, message.SerializeToString(), time)

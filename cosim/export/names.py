@@ -8,11 +8,11 @@ from collections.abc import Iterable, Sequence
 from cosim.simulation.signals import Column
 
 _OF_REGIONS = ("value", "clearance", "shift.x", "shift.y", "shift.z")
-_LONGEST = 63  # letters of a name in MATLAB
+_MAX_LENGTH = 63  # characters of a name in MATLAB
 _ELEMENT = re.compile(r"(.+)\[(\d+)\]")
 
 
-def legal(names: Iterable[str]) -> list[str]:
+def valid_names(names: Iterable[str]) -> list[str]:
     """Convert names to unique ones of ASCII letters, digits and underscores that begin with a letter.
 
     Parameters
@@ -23,21 +23,21 @@ def legal(names: Iterable[str]) -> list[str]:
     Returns
     -------
     list of str
-        Similar names, such as ``thrust_1``.
+        Converted names in the same order, such as ``thrust_1``.
     """
     made: dict[str, None] = {}
     for name in names:
-        plain = re.sub(r"[^0-9A-Za-z]+", "_", name).strip("_")[:_LONGEST]
-        stem = plain if plain[:1].isalpha() else f"n{plain}"[:_LONGEST]
+        plain = re.sub(r"[^0-9A-Za-z]+", "_", name).strip("_")[:_MAX_LENGTH]
+        stem = plain if plain[:1].isalpha() else f"n{plain}"[:_MAX_LENGTH]
         candidate, n = stem, 2
         while candidate in made:
             suffix = f"_{n}"
-            candidate, n = f"{stem[: _LONGEST - len(suffix)]}{suffix}", n + 1
+            candidate, n = f"{stem[: _MAX_LENGTH - len(suffix)]}{suffix}", n + 1
         made[candidate] = None
     return list(made)
 
 
-def grouped(columns: Sequence[Column]) -> dict[str, dict[str, int]]:
+def group_columns(columns: Sequence[Column]) -> dict[str, dict[str, int]]:
     """Group signals that belong together.
 
     ``position.x`` is ``x`` of the group ``position``, ``thrust[1]`` is ``1`` of ``thrust``, and the clearance of the
@@ -46,12 +46,12 @@ def grouped(columns: Sequence[Column]) -> dict[str, dict[str, int]]:
     Parameters
     ----------
     columns : sequence of Column
-        In any order.
+        Columns of the signals, in any order.
 
     Returns
     -------
     dict
-        Index of the column by group and name in the group.
+        Index of each column, by group and by name in the group.
     """
     groups: dict[str, dict[str, int]] = {}
     for i, column in enumerate(columns):

@@ -18,14 +18,14 @@ def numbers_schema(package: str, message: str, fields: Sequence[str]) -> bytes:
     Parameters
     ----------
     package, message : str
-        Parts of the message's full name.
+        Package and name of the message.
     fields : sequence of str
-        Numbered from 1.
+        Names of the fields, which are numbered from 1 in this order.
 
     Returns
     -------
     bytes
-        In the form that MCAP requires for Protobuf.
+        Schema in the form that MCAP requires for Protobuf.
     """
     file = FileDescriptorProto(name=f"{package}/{message}.proto", package=package, syntax="proto3")
     described = file.message_type.add(name=message)
@@ -53,11 +53,11 @@ def numbers_messages(rows: Array) -> Iterator[bytes]:
     keys = [_varint((i + 1) << 3 | _FIXED_64) for i in range(rows.shape[1])]
     for i, key in enumerate(keys):
         parts += [(f"key{i}", f"V{len(key)}"), (f"value{i}", "<f8")]
-    laid = np.empty(len(rows), dtype=parts)
+    table = np.empty(len(rows), dtype=parts)
     for i, key in enumerate(keys):
-        laid[f"key{i}"] = np.void(key)
-        laid[f"value{i}"] = rows[:, i]
-    size, whole = laid.itemsize, laid.tobytes()
+        table[f"key{i}"] = np.void(key)
+        table[f"value{i}"] = rows[:, i]
+    size, whole = table.itemsize, table.tobytes()
     for first in range(0, size * len(rows), size) if size else ():
         yield whole[first : first + size]
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from controller.regions import Box, Ellipsoid, Sphere
 from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
-from cosim.export.names import grouped
+from cosim.export.names import group_columns
 from cosim.export.scene import (
     BODY,
     HULL_COLOUR,
@@ -34,13 +34,13 @@ from cosim.replay.events import events_of
 from cosim.results.record import Rows
 from cosim.simulation.signals import Array
 
-TIMELINE = "sim_time"  # s
+TIMELINE = "sim_time"  # name of the time line, in s
 SIGNALS, WORLD, EVENTS = "signals", "world", "events"
 _FRAMES = {NED: f"{WORLD}/regions", PLACE: f"{WORLD}/place", BODY: f"{WORLD}/place/body"}
 _CHARTS = ("clearance", "weight", "command", "thruster_force", "estimate")  # groups in the default layout
 _FAINT, _BRIGHT = 110, 255  # opacity of the lines of inactive and active regions
 _THIN, _THICK = 1.0, 2.5  # pixels, width of these lines; Rerun reads negative radii as pixels
-_ARROWS = 20.0  # Hz
+_ARROWS = 20.0  # Hz, rate of the thrusters' arrows
 _ARROW = 4.0  # hull radii, length of the arrow of the greatest thrust
 
 
@@ -62,7 +62,7 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
     Raises
     ------
     ExportError
-        If it cannot be written.
+        If the file cannot be written.
     """
     recording = rr.RecordingStream("subreach")
     try:
@@ -85,7 +85,7 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
 
 def _layout(excerpt: Excerpt) -> rrb.Blueprint:
     """Return the default layout: the scene, and charts beside it."""
-    there = [name for name in _CHARTS if name in grouped(excerpt.columns)]
+    there = [name for name in _CHARTS if name in group_columns(excerpt.columns)]
     charts = [rrb.TimeSeriesView(origin=rr.new_entity_path([SIGNALS, name]), name=name) for name in there]
     texts = rrb.Tabs(
         rrb.TextLogView(origin=EVENTS, name=EVENTS),
@@ -104,7 +104,7 @@ class _Sender:
         self._recording, self._excerpt, self._scene = recording, excerpt, Scene(excerpt)
         scene, names = self._scene, [column.name for column in excerpt.run.record.columns]
         self._forces = [f"thruster_force[{i + 1}]" for i in range(len(scene.thrusters))]
-        self._greatest = max((thruster.most for thruster in scene.thrusters), default=0.0)
+        self._greatest = max((thruster.max_force for thruster in scene.thrusters), default=0.0)
         if not self._greatest > 0.0 or not set(self._forces) <= set(names):
             self._forces = []
         self._series: dict[str, str] = {}  # signals by their paths
@@ -120,7 +120,7 @@ class _Sender:
 
     def send_names(self) -> None:
         """Send name and unit of every signal."""
-        for group, members in grouped(self._excerpt.columns).items():
+        for group, members in group_columns(self._excerpt.columns).items():
             for name, i in members.items():
                 column = self._excerpt.columns[i]
                 path = rr.new_entity_path([SIGNALS, group, name])
@@ -190,14 +190,14 @@ class _Sender:
             now = active == i
             changes = np.flatnonzero(np.diff(now, prepend=not now[0] if before is None else before == i))
             for path, kind in kinds.items():
-                self._send(time[changes], path, kind.columns(**_look(kind, solid.colour, now[changes])))
+                self._send(time[changes], path, kind.columns(**_activity_attributes(kind, solid.colour, now[changes])))
 
     def _send_shapes(self, place: str, shapes: list[tuple[float, Solid]]) -> dict[str, Any]:
         """Send the shapes of a region over time; return the types of its drawings by path."""
         kinds: dict[str, Any] = {}
         before = None
         for time, solid in shapes:
-            drawn = _drawn(solid)
+            drawn = _archetype(solid)
             path = f"{place}/{type(drawn).__name__}"
             kinds[path] = type(drawn)
             self._recording.set_time(TIMELINE, duration=time)
@@ -223,7 +223,7 @@ class _Sender:
         self._recording.log(path, what, static=True, strict=True)
 
 
-def _drawn(solid: Solid) -> Any:
+def _archetype(solid: Solid) -> Any:
     """Return the Rerun archetype of a region; attributes that depend on activity are sent over time."""
     shape, label = solid.shape, {"labels": [solid.label]}
     if isinstance(shape, Sphere):
@@ -240,7 +240,7 @@ def _drawn(solid: Solid) -> Any:
     return rr.Mesh3D(vertex_positions=solid.mesh.vertices, triangle_indices=solid.mesh.triangles)
 
 
-def _look(kind: Any, colour: tuple[int, int, int], active: NDArray[np.bool_]) -> dict[str, Any]:
+def _activity_attributes(kind: Any, colour: tuple[int, int, int], active: NDArray[np.bool_]) -> dict[str, Any]:
     """Return the attributes that show whether a region is active, for each change of activity."""
     if kind is rr.Mesh3D:
         return {"albedo_factor": [(*colour, round(255 * OPAQUE[bool(now)])) for now in active]}

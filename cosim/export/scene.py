@@ -15,9 +15,9 @@ from controller.regions.region_set import SHAPES, name_of, of_attitude, surface_
 from controller.regions.shape import Bounds, Shape
 from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
-from cosim.replay.activity import RESTS_ON, active_regions, rests
+from cosim.replay.activity import RESTING_SIGNALS, active_regions, is_resting
 from cosim.replay.header import header_of
-from cosim.replay.steering import changes_of, log_of
+from cosim.replay.region_changes import changes_of, log_of
 from cosim.scenario.colours import colours_of_regions
 from cosim.simulation.signals import Array
 
@@ -28,7 +28,7 @@ HULL_COLOUR, TRAIL_COLOUR, THRUST_COLOUR = (240, 228, 66), (140, 140, 140), (204
 OPAQUE = {False: 0.25, True: 0.75}  # opacity by activity of the region
 _MARGIN = 1.0  # m, around path and bounded regions
 _SIGHT = 5.0  # hull radii, length of the drawing of an attitude region
-_TRAIL = 2000  # points
+_TRAIL = 2000  # greatest number of points of the path
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +40,8 @@ class Solid:
     colour: tuple[int, int, int]
     shape: Shape
     mesh: Mesh
-    frame: str  # of its coordinates
-    moves: bool  # True if the record has its shift
+    frame: str  # frame of the coordinates: `NED`, `PLACE` or `BODY`
+    moves: bool  # True if the record has the region's shift
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +49,8 @@ class Thruster:
     """A thruster in the body frame."""
 
     position: Array  # (3,) m
-    direction: Array  # (3,) of positive force
-    most: float  # N, greatest force
+    direction: Array  # (3,) unit vector of positive force
+    max_force: float  # N, greatest magnitude of the force
 
 
 class Scene:
@@ -59,20 +59,20 @@ class Scene:
     Parameters
     ----------
     excerpt : Excerpt
-        Of the run.
+        Excerpt of the run.
 
     Attributes
     ----------
     solids : tuple of Solid
-        The goal, then the regions in their order, at the start.
+        The goal and the regions in the order of the scenario, as they are at the start.
     changes : tuple of (float, int, Solid)
-        Changes of them: time [s], index, and new solid.
+        Changes of these solids: time [s], index, and new solid.
     log : sequence of (int, Command)
-        The run's log of commands, by step.
+        The run's log of commands: each with the step at which it was applied.
     hull_radius : float
-        [m].
+        Radius of the drawn hull [m].
     thrusters : tuple of Thruster
-        In their order.
+        Thrusters in the order of the vehicle's file.
     """
 
     def __init__(self, excerpt: Excerpt) -> None:
@@ -87,41 +87,41 @@ class Scene:
             for t in vehicle["thrusters"]
         )
         self.log = log_of(excerpt.run)
-        begun = [excerpt.run.planned.goal, *(r.region.shape for r in scenario.regions)]
+        at_start = [excerpt.run.planned.goal, *(r.region.shape for r in scenario.regions)]
         later = [(c["time"], c["region"], _shape(c["shape"])) for c in changes_of(excerpt.run, self.log)]
         # the shapes of free obstacle slots are at the parked position, far away
         waiting = {i + 1 for i, secondary in enumerate(scenario.regions) if secondary.is_dynamic}
         waiting |= set() if scenario.has_goal else {0}
-        all_shapes = [*enumerate(begun), *((i, shape) for _, i, shape in later)]
+        all_shapes = [*enumerate(at_start), *((i, shape) for _, i, shape in later)]
         limits = self._limits([shape for i, shape in all_shapes if i not in waiting])
-        self.solids = tuple(self._solid(i, shape, limits) for i, shape in enumerate(begun))
+        self.solids = tuple(self._solid(i, shape, limits) for i, shape in enumerate(at_start))
         self.changes = tuple((time, i, self._solid(i, shape, limits)) for time, i, shape in later)
         self._criteria, criteria = scenario.criterion_places, scenario.criterion_names
-        self._memberships = self.places([f"membership.{name}" for name in criteria])
-        self._weights = self.places([f"weight.{name}" for name in criteria])
-        self._clearances = self.places([f"{solid.name}.clearance" for solid in self.solids[1:]])
+        self._memberships = self.indices([f"membership.{name}" for name in criteria])
+        self._weights = self.indices([f"weight.{name}" for name in criteria])
+        self._clearances = self.indices([f"{solid.name}.clearance" for solid in self.solids[1:]])
 
-    def places(self, names: Sequence[str]) -> list[int]:
+    def indices(self, names: Sequence[str]) -> list[int]:
         """Return the indices of signals in a row of the record."""
         return [self._at[name] for name in names]
 
     def active(self, rows: Array) -> list[int]:
         """Return the index of the active solid at each row of the record, 0 for the goal."""
         weights, clearances = rows[:, self._weights], rows[:, self._clearances]
-        goal, *velocity = self.places(RESTS_ON)
-        resting = rests(rows[:, goal], rows[:, velocity])
+        goal, *velocity = self.indices(RESTING_SIGNALS)
+        resting = is_resting(rows[:, goal], rows[:, velocity])
         active = active_regions(self._criteria, rows[:, self._memberships], weights, clearances, resting)
         return [int(i) for i in active]
 
     def shifts(self, solid: Solid) -> list[int]:
         """Return the indices of the shift of a moving solid in a row of the record."""
-        return self.places([f"{solid.name}.shift.{axis}" for axis in "xyz"])
+        return self.indices([f"{solid.name}.shift.{axis}" for axis in "xyz"])
 
     def trail(self) -> Array:
         """Return the path of the vehicle, thinned to at most 2000 points, shape (n, 3) [m, NED]."""
         n = self._excerpt.count
-        way = self._excerpt.take(np.unique(np.linspace(0, n - 1, min(n, _TRAIL)).astype(int)), POSITION).to_array()
-        return way[np.isfinite(way).all(axis=1)]
+        path = self._excerpt.take(np.unique(np.linspace(0, n - 1, min(n, _TRAIL)).astype(int)), POSITION).to_array()
+        return path[np.isfinite(path).all(axis=1)]
 
     def _solid(self, index: int, shape: Shape, limits: Bounds) -> Solid:
         scenario = self._excerpt.run.scenario
@@ -139,8 +139,8 @@ class Scene:
 
     def _limits(self, shapes: list[Shape]) -> Bounds:
         """Return the corners of a bounding box of the path and the bounded regions, with a margin."""
-        way = self.trail()
-        points = [way.min(axis=0), way.max(axis=0)] if len(way) else [np.zeros(3)]
+        path = self.trail()
+        points = [path.min(axis=0), path.max(axis=0)] if len(path) else [np.zeros(3)]
         bounds = [corner for shape in shapes for corner in shape.bounds()]
         points += [np.array(corner) for corner in bounds if np.isfinite(corner).all()]
         low, high = np.min(points, axis=0) - _MARGIN, np.max(points, axis=0) + _MARGIN

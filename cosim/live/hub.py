@@ -16,7 +16,7 @@ from cosim.live.history import History
 from cosim.live.messages import bytes_of, text_of
 from cosim.replay.command_words import command_words
 from cosim.replay.header import header_of, limits_of, shape_of
-from cosim.replay.viewing import Viewing
+from cosim.replay.view_columns import ViewColumns
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import PARKED_POSITION
 from cosim.simulation.commands.commands import AddObstacle, ChangeSetting, Command, ManualControl, RemoveObstacle
@@ -74,9 +74,9 @@ class Hub:
             Queue for commands, or the reason why they are rejected.
         """
         self.run = run
-        self._viewing = Viewing(scenario, columns)
-        self._names = {column.name: i for i, column in enumerate(self._viewing.columns)}
-        self._header = header_of(scenario, self._viewing.columns, isinstance(queue, CommandQueue))
+        self._view_columns = ViewColumns(scenario, columns)
+        self._names = {column.name: i for i, column in enumerate(self._view_columns.columns)}
+        self._header = header_of(scenario, self._view_columns.columns, isinstance(queue, CommandQueue))
         self._header["changes"] = []
         self._limits = limits_of(scenario)
         self._step = scenario.time.step
@@ -84,14 +84,14 @@ class Hub:
         self._regions = ["goal", *(secondary.region.name for secondary in scenario.regions)]
         self._slots = ObstacleSlots(scenario.commands.obstacles)
         self._slot_names = [secondary.region.name for secondary in scenario.regions if secondary.is_dynamic]  # by slot
-        self._history = History(len(self._viewing.columns))
+        self._history = History(len(self._view_columns.columns))
         self._texts, self._dropped, self._last = [], 0, None
         self.desk = CommandDesk(scenario, queue, self._has_come)
 
     @property
     def picked(self) -> list[int]:
         """Indices of the columns of the run's rows that are shown."""
-        return self._viewing.picked
+        return self._view_columns.picked
 
     def _has_come(self, region: str) -> bool:
         if self._last is None:
@@ -102,7 +102,7 @@ class Hub:
 
     def show(self, picked: Sequence[Array]) -> None:
         """Add rows of the run, each of the columns `picked`; a row equal to the one before it is skipped."""
-        for row in self._viewing.extended(np.array(picked)):
+        for row in self._view_columns.compute_rows(np.array(picked)):
             if self._last is None or not np.array_equal(row, self._last, equal_nan=True):
                 self._history.add(row)
                 self._last = row

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from cosim.simulation.signals import Array
 
-RESTS_ON = ("goal.clearance", "velocity.u", "velocity.v", "velocity.w")  # signals that `rests` needs
-_SLOW = 0.02  # m/s over ground
-_ASKS = 0.005  # weight below which a criterion is not active: it is shown as 0.00
-_LEADS = 0.5  # weight from which a criterion is active even if the vehicle rests in the goal
+RESTING_SIGNALS = ("goal.clearance", "velocity.u", "velocity.v", "velocity.w")  # signals that `is_resting` needs
+_SLOW = 0.02  # m/s over ground, below which the vehicle rests
+_MIN_ACTIVE_WEIGHT = 0.005  # weight below which a criterion is not active: it is shown as 0.00
+_DOMINANT_WEIGHT = 0.5  # weight from which a criterion is active even if the vehicle rests in the goal
 
 
-def rests(goal: Array, velocity: Array) -> NDArray[np.bool_]:
+def is_resting(goal: Array, velocity: Array) -> NDArray[np.bool_]:
     """Return a mask of the rows in which the vehicle rests in the goal region: slower than 0.02 m/s.
 
     Parameters
@@ -52,7 +52,7 @@ def active_regions(
     clearances : ndarray, shape (rows, n)
         Clearances of the secondary regions [m or rad].
     resting : ndarray of bool, shape (rows,)
-        Mask of `rests`.
+        Mask of `is_resting`.
 
     Returns
     -------
@@ -61,12 +61,12 @@ def active_regions(
     """
     rows = np.arange(len(weights))
     criterion = np.argmax(np.where(np.isnan(weights), -np.inf, weights), axis=1)
-    of = np.array(criteria, dtype=int)
-    if not of.size:
+    criterion_of_region = np.array(criteria, dtype=int)
+    if not criterion_of_region.size:
         return np.zeros(len(rows))
-    belongs = of[None, :] == criterion[:, None]
+    belongs = criterion_of_region[None, :] == criterion[:, None]
     critical = np.where(belongs & ~np.isnan(clearances), clearances, np.inf)
-    asked = (memberships[rows, criterion] > 0.0) & (weights[rows, criterion] >= _ASKS)
-    asked &= np.isfinite(critical).any(axis=1)
-    asked &= ~resting | (weights[rows, criterion] >= _LEADS) | (critical.min(axis=1) < 0.0)
-    return np.where(asked, np.argmin(critical, axis=1) + 1, 0).astype(float)
+    is_secondary = (memberships[rows, criterion] > 0.0) & (weights[rows, criterion] >= _MIN_ACTIVE_WEIGHT)
+    is_secondary &= np.isfinite(critical).any(axis=1)
+    is_secondary &= ~resting | (weights[rows, criterion] >= _DOMINANT_WEIGHT) | (critical.min(axis=1) < 0.0)
+    return np.where(is_secondary, np.argmin(critical, axis=1) + 1, 0).astype(float)

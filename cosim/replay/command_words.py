@@ -1,4 +1,4 @@
-"""Texts of commands, limited in number."""
+"""Texts of commands for a time line, with a limited number of entries."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ _MODES = {
 }
 
 
-def command_events(log: Sequence[tuple[int, Command]], step: float, most: int) -> list[tuple[float, str]]:
-    """Return times and texts of the commands, grouped by moments.
+def command_events(log: Sequence[tuple[int, Command]], step: float, max_moments: int) -> list[tuple[float, str]]:
+    """List times and texts of the commands, grouped by moments.
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ def command_events(log: Sequence[tuple[int, Command]], step: float, most: int) -
         Steps, and the commands applied at them.
     step : float
         Step of the run [s].
-    most : int
-        Moments at most; beyond that, commands close in time share a moment.
+    max_moments : int
+        Greatest number of moments; of more, those closest in time are joined.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def command_events(log: Sequence[tuple[int, Command]], step: float, most: int) -
     steps = sorted({k for k, _ in log})
     gaps = [later - earlier for earlier, later in zip(steps, steps[1:], strict=False)]
     # commands at most this many steps apart share a moment
-    apart = sorted(gaps)[len(steps) - most - 1] if len(steps) > most else 0
+    apart = sorted(gaps)[len(steps) - max_moments - 1] if len(steps) > max_moments else 0
     begins = [k for k, gap in zip(steps, [apart + 1, *gaps], strict=False) if gap > apart]
     words: dict[int, list[str]] = {k: [] for k in begins}
     for k, command in log:

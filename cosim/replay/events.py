@@ -11,18 +11,18 @@ from itertools import chain, pairwise
 import numpy as np
 
 from controller.regions.region_set import of_attitude
-from cosim.replay.activity import RESTS_ON, active_regions, rests
+from cosim.replay.activity import RESTING_SIGNALS, active_regions, is_resting
 from cosim.replay.command_words import command_events
-from cosim.replay.steering import Log
+from cosim.replay.region_changes import Log
 from cosim.results.run_result import Run
 from cosim.results.spans import Flags, Span, Spans
 from cosim.results.wording import IMPORTED
 from cosim.scenario.sensor_suite import SENSOR_NAMES
 from cosim.simulation.signals import Array
 
-_MOST = 12  # events of a kind at most; beyond that, the closest ones are joined
+_MAX_EVENTS = 12  # greatest number of events of a kind; of more, the closest ones are joined
 
-_BACK = 0.1  # s; a shorter absence of the active region is ignored
+_MIN_ABSENCE = 0.1  # s; a shorter absence of the active region is ignored
 
 
 @dataclass(frozen=True)
@@ -36,17 +36,17 @@ class Event:
 
 
 def events_of(run: Run, log: Log) -> list[Event]:
-    """Return the events of a run in the order of time, limited in number.
+    """List the events of a run in the order of time, at most `_MAX_EVENTS` of a kind.
 
     Returns
     -------
     list of Event
-        Events; the last one is the end of the run.
+        The events; the last one is the end of the run.
     """
     step, rows = run.scenario.time.step, len(run.record)
     # a killed run has logged commands of rows that it did not save; a reset comes after the last row
     log = [(min(k, rows - 1), command) for k, command in log if k <= rows]
-    commands = [Event(time, "command", text) for time, text in command_events(log, step, _MOST)]
+    commands = [Event(time, "command", text) for time, text in command_events(log, step, _MAX_EVENTS)]
     found = [
         *commands,
         *_goal(run),
@@ -60,7 +60,7 @@ def events_of(run: Run, log: Log) -> list[Event]:
 
 
 def _goal(run: Run) -> Iterator[Event]:
-    inside, first = _Few(_MOST // 2), math.inf
+    inside, first = _JoinedSpans(_MAX_EVENTS // 2), math.inf
     for block in run.record.blocks(["time", "goal.clearance"]):
         known = np.isfinite(block["goal.clearance"])
         time = block["time"][known]
@@ -75,22 +75,22 @@ def _goal(run: Run) -> Iterator[Event]:
 
 def _violations(run: Run) -> Iterator[Event]:
     regions = run.scenario.regions
-    most = max(1, _MOST // max(1, len(regions)))
-    violated = {f"{secondary.region.name}.clearance": _Few(most) for secondary in regions}
+    max_spans = max(1, _MAX_EVENTS // max(1, len(regions)))
+    violated = {f"{secondary.region.name}.clearance": _JoinedSpans(max_spans) for secondary in regions}
     for block in run.record.blocks(["time", *violated]):
-        for name, few in violated.items():
-            few.add(block[name] < 0.0, block["time"], block[name])
-    for secondary, few in zip(regions, violated.values(), strict=True):
-        for span in few.found():
+        for name, spans in violated.items():
+            spans.add(block[name] < 0.0, block["time"], block[name])
+    for secondary, spans in zip(regions, violated.values(), strict=True):
+        for span in spans.found():
             depth = -span.least
             by = f"{math.degrees(depth):.1f}°" if of_attitude(secondary.region.shape) else f"{depth:.3f} m"
             soft = "" if secondary.region.hard else " (soft)"
-            text = f"Violates {secondary.region.name}{soft} {few.lasting(span)}, by up to {by}"
+            text = f"Violates {secondary.region.name}{soft} {spans.lasting(span)}, by up to {by}"
             yield Event(span.start, "violation", text, span.end)
 
 
-def turns_of(run: Run) -> list[tuple[float, int]]:
-    """Return times and indices of the active region's changes, 0 for the goal; of many changes the longest.
+def active_region_changes(run: Run) -> list[tuple[float, int]]:
+    """List the changes of the active region; of more than 12 those after which it stays longest.
 
     Parameters
     ----------
@@ -100,14 +100,14 @@ def turns_of(run: Run) -> list[tuple[float, int]]:
     Returns
     -------
     list of (float, int)
-        Time [s] and region; the first entry is the region at the start.
+        Time [s] and index of the new active region, 0 for the goal; the first entry is the region at the start.
     """
-    return _turns(_takeovers(run))
+    return _longest_changes(_all_changes(run))
 
 
 def _active(run: Run) -> Iterator[Event]:
     regions = run.scenario.regions
-    for i, (time, index) in enumerate(turns_of(run)):
+    for i, (time, index) in enumerate(active_region_changes(run)):
         if index:
             secondary = regions[index - 1]
             yield Event(time, "active", f"Gives way to {secondary.region.name} ({secondary.criterion})")
@@ -115,16 +115,16 @@ def _active(run: Run) -> Iterator[Event]:
             yield Event(time, "active", "Goes for the goal again")
 
 
-def _takeovers(run: Run) -> Iterator[tuple[float, int]]:
+def _all_changes(run: Run) -> Iterator[tuple[float, int]]:
     """Yield time and index of the active region's changes, 0 for the goal; first those of the first row."""
-    regions, before = run.scenario.regions, -1
+    regions, places, before = run.scenario.regions, run.scenario.criterion_places, -1
     memberships, weights = (
         [f"{of}.{name}" for name in run.scenario.criterion_names] for of in ("membership", "weight")
     )
     clearances = [f"{secondary.region.name}.clearance" for secondary in regions]
-    for block in run.record.blocks(["time", *RESTS_ON, *memberships, *weights, *clearances]):
+    for block in run.record.blocks(["time", *RESTING_SIGNALS, *memberships, *weights, *clearances]):
         by_region = block.stack(clearances) if clearances else np.empty((len(block), 0))
-        places, resting = run.scenario.criterion_places, rests(block[RESTS_ON[0]], block.stack(RESTS_ON[1:]))
+        resting = is_resting(block[RESTING_SIGNALS[0]], block.stack(RESTING_SIGNALS[1:]))
         active = active_regions(places, block.stack(memberships), block.stack(weights), by_region, resting).astype(int)
         for row in np.flatnonzero(np.diff(active, prepend=before)).tolist():
             yield float(block["time"][row]), int(active[row])
@@ -150,11 +150,12 @@ def _outages(run: Run) -> Iterator[Event]:
 
 
 def _saturation(run: Run) -> Iterator[Event]:
-    cut, flags = _Few(_MOST // 2), ("wrench_saturated", "allocation_saturated")
+    saturated, flags = _JoinedSpans(_MAX_EVENTS // 2), ("wrench_saturated", "allocation_saturated")
     for block in run.record.blocks(["time", *flags]):
-        cut.add(np.logical_or.reduce([block[name] > 0.0 for name in flags]), block["time"])
-    for span in cut.found():
-        yield Event(span.start, "saturation", f"More force is asked for than there is, {cut.lasting(span)}", span.end)
+        saturated.add(np.logical_or.reduce([block[name] > 0.0 for name in flags]), block["time"])
+    for span in saturated.found():
+        text = f"More force is asked for than there is, {saturated.lasting(span)}"
+        yield Event(span.start, "saturation", text, span.end)
 
 
 def _end(run: Run) -> Event:
@@ -169,11 +170,11 @@ def _end(run: Run) -> Event:
     return Event(run.record.value("time", -1), "end", words.get(status, f"The run {status}"))
 
 
-class _Few:
-    """Find the spans in which a condition holds, and join the closest ones until there are few enough."""
+class _JoinedSpans:
+    """Finds the spans in which a condition holds, and joins the closest ones while there are more than `max_spans`."""
 
-    def __init__(self, most: int) -> None:
-        self._most, self._apart = most, -math.inf  # s, spans at most this far apart are joined
+    def __init__(self, max_spans: int) -> None:
+        self._max_spans, self._apart = max_spans, -math.inf  # s, spans at most this far apart are joined
         self._all, self._joined = Spans(), list[Span]()
 
     def add(self, flags: Flags, time: Array, signal: Array | None = None) -> None:
@@ -195,9 +196,9 @@ class _Few:
 
     def _join(self, more: list[Span]) -> None:
         spans = [*self._joined, *more]
-        if len(spans) > self._most:
+        if len(spans) > self._max_spans:
             gaps = sorted(b.start - a.end for a, b in pairwise(spans))
-            self._apart = max(self._apart, gaps[len(spans) - self._most - 1])
+            self._apart = max(self._apart, gaps[len(spans) - self._max_spans - 1])
         self._joined = spans[:1]
         for span in spans[1:]:
             last = self._joined[-1]
@@ -209,22 +210,22 @@ class _Few:
             self._joined[-1] = span
 
 
-def _turns(takeovers: Iterator[tuple[float, int]]) -> list[tuple[float, int]]:
-    """Return the changes that last long enough; of many only those that last longest."""
-    longest = heapq.nsmallest(_MOST, _lasting(takeovers))
+def _longest_changes(changes: Iterator[tuple[float, int]]) -> list[tuple[float, int]]:
+    """Return at most `_MAX_EVENTS` changes, those after which the region stays active longest."""
+    longest = heapq.nsmallest(_MAX_EVENTS, _changes_with_duration(changes))
     found: list[tuple[float, int]] = []
-    for _, time, active in sorted(longest, key=lambda of: of[1]):
+    for _, time, active in sorted(longest, key=lambda change: change[1]):
         if not found or active != found[-1][1]:
             found.append((time, active))
     return found
 
 
-def _lasting(takeovers: Iterator[tuple[float, int]]) -> Iterator[tuple[float, float, int]]:
-    """Yield negative duration [s], time [s] and region of each change; absences shorter than `_BACK` are ignored."""
+def _changes_with_duration(changes: Iterator[tuple[float, int]]) -> Iterator[tuple[float, float, int]]:
+    """Yield negative duration [s], time [s] and region of each change; ignore absences below `_MIN_ABSENCE`."""
     kept: tuple[float, int] | None = None
     first = True
-    for (time, active), (then, back) in pairwise(chain(takeovers, [(math.inf, -1)])):
-        if kept is not None and (active == kept[1] or (then - time < _BACK and back == kept[1])):
+    for (time, active), (then, back) in pairwise(chain(changes, [(math.inf, -1)])):
+        if kept is not None and (active == kept[1] or (then - time < _MIN_ABSENCE and back == kept[1])):
             continue
         if kept is not None:
             yield -math.inf if first else kept[0] - time, *kept

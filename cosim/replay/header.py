@@ -18,9 +18,9 @@ from fuzzy_arbiter import System
 from plant_fmu import Vehicle
 from plant_fmu.thruster_lines import thruster_lines
 
-VERSION = 1  # of the format
-OF_ATTITUDE = ("orientation", "visibility")  # shapes that the page draws at the vehicle
-_LEAST_ROOM = 5.0  # m
+VERSION = 1  # version of the header's format
+ATTITUDE_SHAPES = ("orientation", "visibility")  # shapes that the page draws at the vehicle
+_MIN_MARGIN = 5.0  # m, around start and bounded regions
 _DIGITS = 6  # decimals of coordinates in m
 _SEA_WATER = 1026.0 * 9.81  # N/m3; for the size of a hull without a radius in the vehicle's file
 
@@ -40,7 +40,7 @@ def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = Fa
     Returns
     -------
     dict
-        Texts, numbers, booleans, lists and dicts.
+        Values for JSON: texts, numbers, booleans, lists and dicts.
     """
     limits, colours = limits_of(scenario), colours_of_regions(scenario)
     return {
@@ -91,7 +91,7 @@ def shape_of(shape: Shape, limits: Bounds) -> dict[str, Any]:
     """
     kind = name_of(shape)
     known = {"kind": kind, **dataclasses.asdict(shape)}  # type: ignore[call-overload]
-    return known if kind in OF_ATTITUDE else known | {"drawing": _drawing(shape, limits)}
+    return known if kind in ATTITUDE_SHAPES else known | {"drawing": _drawing(shape, limits)}
 
 
 def limits_of(scenario: Scenario) -> Bounds:
@@ -101,8 +101,8 @@ def limits_of(scenario: Scenario) -> Bounds:
     corners = [np.array(corner) for region in regions for corner in region.shape.bounds()]
     points = np.array([scenario.initial.position, *(corner for corner in corners if np.isfinite(corner).all())])
     low, high = points.min(axis=0), points.max(axis=0)
-    room = max(_LEAST_ROOM, float((high - low).max()))
-    return tuple((low - room).tolist()), tuple((high + room).tolist())
+    margin = max(_MIN_MARGIN, float((high - low).max()))
+    return tuple((low - margin).tolist()), tuple((high + margin).tolist())
 
 
 def _drawing(shape: Shape, limits: Bounds) -> dict[str, Any]:

@@ -41,11 +41,11 @@ def replay_page(runs: Sequence[dict[str, Any]], title: str, flight: dict[str, An
     Parameters
     ----------
     runs : sequence of dict
-        Traces as plain values; none for a live page, which receives its run over its connection.
+        Traces of the runs, from `Trace.as_json`; none for a live page, which receives its run over its connection.
     title : str
-        Of the page.
+        Title of the page.
     flight : dict, optional
-        What the page needs to fly its one run again, from `cosim.replay.interactive.data.flight_data`.
+        Data with which an interactive page simulates its run again, from `cosim.replay.interactive.data.flight_data`.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def replay_page(runs: Sequence[dict[str, Any]], title: str, flight: dict[str, An
 
 
 def _embedded(data: Any) -> str:
-    """Return data as JSON in an element: "</script" would end that, and "<!--" with "<script" keep it from ending."""
+    """Format data as JSON for a script element, with every "<" escaped: "</script" or "<!--" would change its end."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
     return text.replace("<", "\\u003c")
 
@@ -82,11 +82,11 @@ def write_page(path: Path, runs: Sequence[dict[str, Any]], title: str, flight: d
     path : Path
         The file, which is written atomically.
     runs : sequence of dict
-        As for `replay_page`.
+        Traces of the runs, from `Trace.as_json`.
     title : str
-        Of the page.
+        Title of the page.
     flight : dict, optional
-        As for `replay_page`.
+        Data of an interactive page, from `cosim.replay.interactive.data.flight_data`.
 
     Returns
     -------

@@ -8,9 +8,9 @@ from pathlib import Path
 from cosim.errors import RunError
 from cosim.replay.interactive.data import flight_data
 from cosim.replay.page import is_page, write_page
-from cosim.replay.sampling import FLYING_BYTES, MOST_BYTES
+from cosim.replay.sampling import MAX_BYTES, MAX_BYTES_INTERACTIVE
 from cosim.replay.trace import trace_of
-from cosim.replay.viewing import Viewing
+from cosim.replay.view_columns import ViewColumns
 from cosim.results.run_result import REPLAY, Run, load_run
 
 
@@ -24,9 +24,9 @@ def write_replay(run: Run, out: Path | None = None, title: str | None = None, in
     out : Path, optional
         The file; default: ``replay.html`` in the run folder.
     title : str, optional
-        Of the page; default: the scenario's.
+        Title of the page; default: the scenario's.
     interactive : bool
-        Whether the page can fly the run again, with other numbers.
+        True if the page can simulate the run again, with other numbers.
 
     Returns
     -------
@@ -36,19 +36,20 @@ def write_replay(run: Run, out: Path | None = None, title: str | None = None, in
     Raises
     ------
     RunError
-        If its log of commands cannot be read, or the page is to fly what it cannot.
+        If its log of commands cannot be read, or an interactive page cannot simulate the scenario.
     BuildError, TranslationError, UnsupportedError
-        If it is to fly, and there is no compiler for WebAssembly, or a law or the arbiter's rules have no C.
+        If the page is interactive, and there is no compiler for WebAssembly, or a law or the arbiter's rules have no
+        translation to C.
     """
-    flight = flight_data(run, Viewing(run.scenario, run.record.columns).columns) if interactive else None
-    trace = trace_of(run, FLYING_BYTES if interactive else MOST_BYTES)
+    flight = flight_data(run, ViewColumns(run.scenario, run.record.columns).columns) if interactive else None
+    trace = trace_of(run, MAX_BYTES_INTERACTIVE if interactive else MAX_BYTES)
     return write_page(out or run.folder / REPLAY, [trace.as_json()], title or run.scenario.title, flight)
 
 
 def replay(
     folders: Sequence[Path], out: Path | None = None, title: str | None = None, interactive: bool = False
 ) -> Path:
-    """Write the page of runs that are done, were interrupted, or were killed.
+    """Write the page of one or several runs that were completed, interrupted or killed.
 
     Parameters
     ----------
@@ -57,9 +58,9 @@ def replay(
     out : Path, optional
         The file; default: ``replay.html``, in the folder of a single run, or in the current one.
     title : str, optional
-        Of the page; default: that of the scenario; of several runs `joint_title`.
+        Title of the page; default: that of the scenario; of several runs `joint_title`.
     interactive : bool
-        Whether the page can fly its one run again, with other numbers.
+        True if the page can simulate its one run again, with other numbers.
 
     Returns
     -------
@@ -69,8 +70,8 @@ def replay(
     Raises
     ------
     RunError
-        If a folder holds no run that can be read, or is named twice, or the file is something else, or cannot be
-        written; or if the page is to fly what it cannot.
+        If a folder holds no run that can be read, or is named twice; if the file exists and is no replay, or cannot be
+        written; or if an interactive page cannot simulate the scenario.
     ScenarioError
         If the scenario of a run is invalid.
     """
@@ -94,7 +95,12 @@ def replay(
 
 
 def joint_title(titles: Mapping[str, str]) -> str:
-    """Return the title of several runs: each title once, before the names of its runs.
+    """Join the titles of several runs: each title once, before the names of its runs.
+
+    Parameters
+    ----------
+    titles : mapping of str to str
+        Title of each run, by the run's name.
 
     Returns
     -------

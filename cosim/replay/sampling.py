@@ -11,23 +11,24 @@ from cosim.results.extremes import even_edges, extreme_rows
 from cosim.results.record import Rows
 from cosim.simulation.signals import Array
 
-_BYTES = 400_000  # of numbers, for the first minute
-_BYTES_A_MINUTE = 150_000  # for each further one
-MOST_BYTES = 6_000_000
-FLYING_BYTES = 650_000  # most of a page that flies, whose own flight has more rows
-_PARTS = 100  # most parts of the run, from each of which the extremes are kept
-_OF_EXTREMES = 0.5  # most of the rows for extremes
+# bytes of numbers in a page
+_BYTES = 400_000  # for the first minute
+_BYTES_A_MINUTE = 150_000  # for each further minute
+MAX_BYTES = 6_000_000
+MAX_BYTES_INTERACTIVE = 650_000  # less, since the flight that the page itself simulates has more rows
+_PARTS = 100  # greatest number of parts of the run, from each of which the extremes are kept
+_EXTREME_ROWS = 0.5  # greatest part of the rows that are extremes
 
 
 def sampled_rows(
     record: Rows,
     columns: int,
-    telling: Iterable[Sequence[Array]],
+    extreme_signals: Iterable[Sequence[Array]],
     signals: int,
     moments: NDArray[np.intp],
-    most_bytes: int = MOST_BYTES,
+    max_bytes: int = MAX_BYTES,
 ) -> NDArray[np.intp]:
-    """Return the rows of a page: evenly spaced ones, extremes of the main signals, and events.
+    """Select the rows of a page: evenly spaced ones, extremes of the main signals, and events.
 
     Parameters
     ----------
@@ -35,28 +36,28 @@ def sampled_rows(
         Record of the run, with its ``time`` [s].
     columns : int
         Number of columns of the page.
-    telling : iterable of sequence of ndarray
+    extreme_signals : iterable of sequence of ndarray
         Signals whose extremes are kept, block by block of the record.
     signals : int
         Number of these signals.
     moments : ndarray of int
-        Steps of events, which are kept with the steps before them.
-    most_bytes : int
-        Most bytes of numbers, however long the run.
+        Row indices of events, which are kept with the rows before them.
+    max_bytes : int
+        Greatest number of bytes of the page's numbers.
 
     Returns
     -------
     ndarray of int
-        Rising steps, including the first and the last.
+        Row indices in rising order, including the first and the last.
     """
     n = len(record)
     minutes = (record.value("time", -1) - record.value("time", 0)) / 60.0
-    budget = min(_BYTES + _BYTES_A_MINUTE * max(0.0, minutes - 1.0), most_bytes)
-    most = max(2, int(budget / (8 * columns)))
-    if n <= most:
+    budget = min(_BYTES + _BYTES_A_MINUTE * max(0.0, minutes - 1.0), max_bytes)
+    max_rows = max(2, int(budget / (8 * columns)))
+    if n <= max_rows:
         return np.arange(n)
     keep = {int(i) for i in np.concatenate([moments, moments - 1]) if 0 <= i < n}
-    parts = int(np.clip(_OF_EXTREMES * most / (2 * max(1, signals)), 1, _PARTS))
-    keep |= set(extreme_rows(telling, signals, even_edges(n, parts)).tolist())
-    keep |= {int(i) for i in np.linspace(0, n - 1, max(2, most - len(keep)))}
+    parts = int(np.clip(_EXTREME_ROWS * max_rows / (2 * max(1, signals)), 1, _PARTS))
+    keep |= set(extreme_rows(extreme_signals, signals, even_edges(n, parts)).tolist())
+    keep |= {int(i) for i in np.linspace(0, n - 1, max(2, max_rows - len(keep)))}
     return np.array(sorted(keep), dtype=np.intp)

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from cosim.io.strict_json import nan_to_none
 from cosim.replay.events import events_of
 from cosim.replay.header import header_of
-from cosim.replay.sampling import MOST_BYTES, sampled_rows
-from cosim.replay.steering import changes_of, log_of
-from cosim.replay.viewing import Viewing
+from cosim.replay.region_changes import changes_of, log_of
+from cosim.replay.sampling import MAX_BYTES, sampled_rows
+from cosim.replay.view_columns import ViewColumns
 from cosim.results.extremes import rows_at
 from cosim.results.record import Rows
 from cosim.results.run_result import Run
@@ -44,7 +44,7 @@ class Trace:
         Returns
         -------
         dict
-            Plain values for JSON.
+            Texts, numbers, lists and dicts for JSON; the rows as text in ``data``.
         """
         numbers = np.ascontiguousarray(self.rows.T, dtype="<f8")
         planes = np.ascontiguousarray(numbers.view(np.uint8).reshape(-1, 8).T).tobytes()
@@ -53,15 +53,15 @@ class Trace:
         return {**self.header, "rows": len(self.rows), "data": base64.b64encode(packed).decode()}
 
 
-def trace_of(run: Run, most_bytes: int = MOST_BYTES) -> Trace:
-    """Return the trace of a run.
+def trace_of(run: Run, max_bytes: int = MAX_BYTES) -> Trace:
+    """Make the trace of a run.
 
     Parameters
     ----------
     run : Run
         The run.
-    most_bytes : int
-        Most bytes of numbers, however long the run.
+    max_bytes : int
+        Greatest number of bytes of the trace's numbers.
 
     Returns
     -------
@@ -74,23 +74,23 @@ def trace_of(run: Run, most_bytes: int = MOST_BYTES) -> Trace:
         If its log of commands cannot be read.
     """
     scenario, record, summary = run.scenario, run.record, run.summary
-    viewing = Viewing(scenario, record.columns)
+    view_columns = ViewColumns(scenario, record.columns)
     log = log_of(run)
     changes, events = changes_of(run, log), events_of(run, log)
     times = [t for event in events for t in (event.time, event.until) if t is not None]
-    moments = rows_at(record, [*(change["time"] for change in changes), *times])
+    event_rows = rows_at(record, [*(change["time"] for change in changes), *times])
     clearances = ["goal.clearance", *(f"{secondary.region.name}.clearance" for secondary in scenario.regions)]
-    telling = (_telling(block, clearances) for block in record.blocks([*_FORCE, *clearances]))
-    steps = sampled_rows(record, len(viewing.columns), telling, 1 + len(clearances), moments, most_bytes)
-    names = [record.columns[i].name for i in viewing.picked]
+    extreme_signals = (_extreme_signals(block, clearances) for block in record.blocks([*_FORCE, *clearances]))
+    steps = sampled_rows(record, len(view_columns.columns), extreme_signals, 1 + len(clearances), event_rows, max_bytes)
+    names = [record.columns[i].name for i in view_columns.picked]
     picked, missing = _read(record, names, steps)
-    rows, columns = viewing.extended(picked), viewing.columns
+    rows, columns = view_columns.compute_rows(picked), view_columns.columns
     if scenario.log:  # signals that a log never has, such as weights, are not shown as gaps
         kept = [i for i in range(len(columns)) if i >= len(names) or missing[i] < len(record)]
         rows, columns = rows[:, kept], tuple(columns[i] for i in kept)
     # the goal's shape at the start; later ones are in the changes
-    begun = dataclasses.replace(scenario, goal=run.planned.goal)
-    header = header_of(begun, columns) | {
+    at_start = dataclasses.replace(scenario, goal=run.planned.goal)
+    header = header_of(at_start, columns) | {
         "verdict": verdict(summary),
         "status": summary["status"],
         "summary": {key: summary[key] for key in ("min_clearance", "reach_time", "settle_time")},
@@ -116,6 +116,6 @@ def _read(record: Rows, names: Sequence[str], steps: NDArray[np.intp]) -> tuple[
     return np.concatenate(rows), missing
 
 
-def _telling(rows: Rows, clearances: Sequence[str]) -> list[Array]:
+def _extreme_signals(rows: Rows, clearances: Sequence[str]) -> list[Array]:
     """Return the signals whose extremes a page keeps: the length of the commanded force, and clearances."""
     return [np.linalg.norm(rows.stack(_FORCE), axis=1), *(rows[name] for name in clearances)]

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from controller.laws import LAWS
-from cosim.replay.events import turns_of
+from cosim.replay.events import active_region_changes
 from cosim.report.log_contents import effort_of_log, log_remarks, log_tables, setting_of_log
 from cosim.report.table import Table
 from cosim.results.log_facts import IMPORT
@@ -162,7 +162,7 @@ def _criteria(run: Run) -> Table | None:
     costs = {
         r.criterion: format_number(r.region.crossing_cost, 3) for r in scenario.regions if plans and not r.region.hard
     }
-    turns, end = turns_of(run), run.record.value("time", -1)
+    turns, end = active_region_changes(run), run.record.value("time", -1)
     rows = []
     for i, criterion in enumerate(scenario.criteria):
         spans = [

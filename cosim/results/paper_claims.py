@@ -79,8 +79,9 @@ def _window(scenario: Scenario, summary: dict[str, Any]) -> Claim:
         )
     else:
         why = (
-            f"Without a limit the law starts with {format_force(summary['max_force_asked'])} and the vehicle runs at up "
-            f"to {summary['max_speed']:.1f} m/s. The paper's times need a limit on the actuators that it does not state."
+            f"Without a limit the law starts with {format_force(summary['max_force_asked'])} and the vehicle runs at "
+            f"up to {summary['max_speed']:.1f} m/s. "
+            "The paper's times need a limit on the actuators that it does not state."
         )
     if abs(first[0] - PAPER_WINDOW[0]) < 0.05 and abs(first[1] - PAPER_WINDOW[1]) < 0.05:
         why = "Agrees. " + why

@@ -30,8 +30,8 @@ ESTIMATE = (
 )
 
 _RATES = {0: 5.0, 31: 50.0, 32: 50.0}  # Hz, by message id: HEARTBEAT, ATTITUDE_QUATERNION, LOCAL_POSITION_NED
-_LISTENING = 0.005  # s of simulated time between two readings of the link
-_ASKING, _HEARTBEAT = 10.0, 1.0  # s of the link's clock
+_RECEIVE_PERIOD = 0.005  # s of simulated time between two readings of the link
+_REQUEST_PERIOD, _HEARTBEAT_PERIOD = 10.0, 1.0  # s of the link's clock
 _MICRO = 1e6
 
 
@@ -42,7 +42,7 @@ class DvlOptions:
     rate: float = 8.0  # Hz
     latency: float = 0.1  # s, between the end of an interval and its message
     dropout: float = 0.0  # fraction of lost messages, 0 to 1
-    seed: int = 1  # of the losses
+    seed: int = 1  # seed of the random losses
 
 
 class Dvl:
@@ -55,40 +55,40 @@ class Dvl:
 
     Examples
     --------
-    The autopilot's time and the interval in microseconds, and the turn and the displacement in it:
+    Each delta has the autopilot's time [us], the interval [us], the rotation [rad] and the displacement [m] in it:
 
     >>> from cosim.sitl.autopilot_link import Dvl, DvlOptions
     >>> from cosim.sitl.motion import Motion
     >>> still, ahead = (0.0, 0.0, 0.0), (0.25, 0.0, 0.0)
     >>> motion = Motion(0.0, still, still, still, ahead, still, (1.0, 0.0, 0.0, 0.0), None, ahead)
     >>> dvl = Dvl(DvlOptions(rate=8.0, latency=0.0))
-    >>> [told for k in range(9) for told in dvl.take(motion._replace(time=k / 64))]
+    >>> [delta for k in range(9) for delta in dvl.integrate(motion._replace(time=k / 64))]
     [(125000, 125000, (0.0, 0.0, 0.0), (0.03125, 0.0, 0.0))]
     """
 
     def __init__(self, options: DvlOptions) -> None:
         self._options = options
         self._random = np.random.default_rng(options.seed)
-        self._turned: Array = np.zeros(3)
-        self._moved: Array = np.zeros(3)
+        self._rotation: Array = np.zeros(3)
+        self._displacement: Array = np.zeros(3)
         self._begun = self._last = math.nan
         self._due: deque[tuple[float, Any]] = deque()
 
-    def take(self, motion: Motion) -> list[Any]:
+    def integrate(self, motion: Motion) -> list[Any]:
         """Integrate the motion; return the deltas due now: time and interval [us], rotation [rad], displacement [m]."""
         now = motion.time
         if not self._last <= now:
             self._begun = self._last = now
-        self._turned += (now - self._last) * np.array(motion.gyro)
-        self._moved += (now - self._last) * np.array(motion.dvl)
+        self._rotation += (now - self._last) * np.array(motion.gyro)
+        self._displacement += (now - self._last) * np.array(motion.dvl)
         self._last = now
         interval = now - self._begun
         if interval >= 1.0 / self._options.rate - 1e-9:
-            turned, moved = tuple(self._turned.tolist()), tuple(self._moved.tolist())
+            rotation, displacement = tuple(self._rotation.tolist()), tuple(self._displacement.tolist())
             if self._random.random() >= self._options.dropout:
-                delta = round(now * _MICRO), round(interval * _MICRO), turned, moved
+                delta = round(now * _MICRO), round(interval * _MICRO), rotation, displacement
                 self._due.append((now + self._options.latency, delta))
-            self._turned[:] = self._moved[:] = 0.0
+            self._rotation[:] = self._displacement[:] = 0.0
             self._begun = now
         return [self._due.popleft()[1] for _ in range(sum(at <= now for at, _ in self._due))]
 
@@ -121,11 +121,11 @@ class AutopilotLink:
         self._reported = ReportedState(IDENTITY)
         self._dvl = None if dvl is None else Dvl(dvl)
         self.estimate: Array = np.full(len(ESTIMATE), math.nan)
-        self._listened = self._asked = self._beat = -math.inf
+        self._received = self._requested = self._beat = -math.inf
 
     @property
     def is_armed(self) -> bool:
-        """Whether the autopilot was armed in its last heartbeat."""
+        """True if the autopilot was armed in its last heartbeat."""
         return self._reported.is_armed
 
     def close(self) -> None:
@@ -136,27 +136,27 @@ class AutopilotLink:
         """Send the DVL's measurements at an instant, and receive messages at intervals."""
         m = self._mavlink
         if self._dvl is not None:
-            for stamp, interval, turned, moved in self._dvl.take(motion):
-                self._link.send(m.MAVLink_vision_position_delta_message(stamp, interval, turned, moved, 100.0))
-        if 0.0 <= motion.time - self._listened < _LISTENING:
+            for stamp, interval, rotation, displacement in self._dvl.integrate(motion):
+                self._link.send(m.MAVLink_vision_position_delta_message(stamp, interval, rotation, displacement, 100.0))
+        if 0.0 <= motion.time - self._received < _RECEIVE_PERIOD:
             return
-        self._listened = motion.time
+        self._received = motion.time
         now, reported = time.monotonic(), self._reported
         for one in self._link.receive(0.0):
             reported.take(one.system, one.component, one.message, now)
-        self._ask(now)
+        self._request_streams(now)
         self.estimate[:3], self.estimate[3:6] = reported.position, reported.velocity
         if math.isfinite(reported.age(now)):
             self.estimate[6:9] = euler_of(reported.quaternion.tolist())
         self.estimate[9:] = reported.mode, reported.is_armed
 
-    def _ask(self, now: float) -> None:
+    def _request_streams(self, now: float) -> None:
         m, system = self._mavlink, self._reported.system
-        if now - self._beat >= _HEARTBEAT:
+        if now - self._beat >= _HEARTBEAT_PERIOD:
             self._beat = now
             self._link.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_ONBOARD_CONTROLLER, 8, 0, 0, m.MAV_STATE_ACTIVE, 3))
-        if system is not None and now - self._asked >= _ASKING:
-            self._asked = now
+        if system is not None and now - self._requested >= _REQUEST_PERIOD:
+            self._requested = now
             for message_id, rate in _RATES.items():
                 self._link.send(
                     m.MAVLink_command_long_message(

@@ -14,7 +14,7 @@ from cosim.run.run_folder import claim, conclude
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.master import Master
 from cosim.sitl.law import AutopilotLaw
-from cosim.sitl.motion import Lowering, Motion, MotionReader, carried
+from cosim.sitl.motion import Lowering, Motion, MotionReader, with_vertical_motion
 from cosim.sitl.rangefinder import Rangefinder
 
 
@@ -26,9 +26,9 @@ class Flight:
     scenario : Scenario
         The scenario of the run.
     law : AutopilotLaw
-        The autopilot; not shared with other flights.
+        Law with the autopilot's outputs; not shared with other flights.
     out : Path or None
-        The run folder, as for `claim`.
+        The run folder, which must not exist or be empty; None for a new one below ``runs``.
     record_rate : float
         Greatest number of rows per simulated second [Hz].
 
@@ -39,14 +39,14 @@ class Flight:
     steps : int
         Number of steps made.
     waited : int
-        Frames of the autopilot before the first step, in which the vehicle is lowered to its start and held there.
+        Number of frames before the first step, in which the vehicle is lowered to its start and held there.
 
     Raises
     ------
     RunError
         If the folder cannot be written.
     PlantError, BuildError, DefinitionError
-        As `Master`.
+        If plant or arbiter cannot be set up, as for `Master`.
     """
 
     def __init__(self, scenario: Scenario, law: AutopilotLaw, out: Path | None, record_rate: float) -> None:
@@ -97,13 +97,13 @@ class Flight:
 
     @property
     def can_start(self) -> bool:
-        """Whether the vehicle is at the start of the scenario: lowering is over, or no frame has been waited."""
+        """True if the vehicle is at the start of the scenario: lowering is over, or has not begun."""
         return self.waited == 0 or self._lowering.is_over(self.waited * self.scenario.time.step)
 
     def wait(self) -> Motion:
-        """Pass one frame of lowering the vehicle from the surface to its start, and holding it there."""
+        """Return the motion in the next frame of lowering the vehicle to its start and holding it there."""
         self.waited += 1
-        return carried(self.motion(), *self._lowering.at(self.waited * self.scenario.time.step))
+        return with_vertical_motion(self.motion(), *self._lowering.at(self.waited * self.scenario.time.step))
 
     def motion(self) -> Motion:
         """Return the present motion of the vehicle, at the autopilot's time."""

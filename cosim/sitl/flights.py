@@ -16,7 +16,7 @@ from plant_fmu.build import cached_fmu
 
 RESTARTED = "ended: the autopilot started again"
 
-_SOME_RATE = 1000  # Hz, frame rate for the validation of a scenario before an autopilot connects
+_CHECKED_RATE = 1000  # Hz, frame rate for the validation of a scenario before an autopilot connects
 
 
 @dataclass
@@ -28,7 +28,7 @@ class Counts:
     resent: int = 0  # answered again, without a step
     lost: int = 0  # never received
     malformed: int = 0
-    refused: int = 0  # of a second sender
+    refused: int = 0  # frames of a second sender
     unsent: int = 0  # answers that could not be sent
 
 
@@ -53,7 +53,7 @@ class FlightOptions:
 
 
 class Flights:
-    """The present run and those before it.
+    """The runs of one SITL session: the present one and those before it.
 
     Parameters
     ----------
@@ -62,14 +62,14 @@ class Flights:
     autopilot : str
         Name of the autopilot, used as the law's name in summary and report.
     law_of : callable
-        Makes the law for a vehicle.
+        Function that makes the law for a vehicle.
 
     Attributes
     ----------
     flight : Flight or None
         The present run.
     law : AutopilotLaw
-        Law of the present one.
+        Law of the present run.
 
     Raises
     ------
@@ -82,7 +82,7 @@ class Flights:
         out = options.out
         if out and out.exists() and not (out.is_dir() and not any(out.iterdir())):
             raise RunError(f"{out}: exists and is not empty; expected a new folder")
-        scenario = scenario_to_fly(options.scenario, options.overrides, options.vehicle, _SOME_RATE, autopilot)
+        scenario = scenario_to_fly(options.scenario, options.overrides, options.vehicle, _CHECKED_RATE, autopilot)
         self._vehicle = scenario.vehicle
         self.law = law_of(self._vehicle)
         cached_fmu(self._vehicle, scenario.plant.fmi)
@@ -95,7 +95,7 @@ class Flights:
         Raises
         ------
         RunError, ScenarioError, PlantError, BuildError, DefinitionError
-            As `scenario_to_fly` and `Flight`.
+            If the scenario cannot be flown at this rate, or the run cannot begin; as `scenario_to_fly` and `Flight`.
         """
         o = self._options
         scenario = scenario_to_fly(o.scenario, o.overrides, o.vehicle, frame_rate, self._autopilot)
@@ -105,7 +105,7 @@ class Flights:
         return self.flight
 
     def end(self, status: str) -> None:
-        """End the present run, if there is one, with its status in a summary; the session's end writes its report."""
+        """End the present run, if there is one, and write its summary; `fly` writes its report at the session's end."""
         flight, self.flight = self.flight, None
         if flight is not None:
             flight.end()
@@ -113,13 +113,13 @@ class Flights:
                 self._ended.append((flight, status))
                 flight.conclude(status, report=False)
 
-    def fly(self, work: Callable[[], str], counts: Counts) -> Outcome:
+    def fly(self, serve: Callable[[], str], counts: Counts) -> Outcome:
         """Run a server until it ends, and conclude its runs.
 
         Parameters
         ----------
-        work : callable
-            The server: it begins and steps flights, and returns the status of the last one.
+        serve : callable
+            The server's loop, which begins and steps flights, and returns the status of the last one.
         counts : Counts
             Counts of the server.
 
@@ -140,7 +140,7 @@ class Flights:
         failure: Exception | None = None
         interrupted = False
         try:
-            status = work()
+            status = serve()
         except KeyboardInterrupt:
             status, interrupted = "interrupted", True
         except (PlantFmuError, CosimError) as error:
@@ -150,7 +150,7 @@ class Flights:
         if failure:
             raise failure
         if not runs:
-            raise KeyboardInterrupt if interrupted else RunError(f"no autopilot came: {status}")
+            raise KeyboardInterrupt if interrupted else RunError(f"no autopilot connected: {status}")
         return Outcome(runs, counts)
 
     def _conclude(self) -> list[Run]:

@@ -19,16 +19,16 @@ from cosim.sitl.motion import Motion, at_rest
 log = logging.getLogger(__name__)
 
 LEFT = "ended: the autopilot left"
-SYSTEM_ID, COMPONENT_ID = 254, 25  # different from vehicles and ground stations
+SYSTEM_ID, COMPONENT_ID = 254, 25  # identity of the simulator, unlike those of vehicles and ground stations
 
 _GPS_EVERY, _HEARTBEAT_EVERY = RATE // 10, RATE
 _POLL = 0.25  # s of the wall clock
 _ARMED = 128  # bit of HIL_ACTUATOR_CONTROLS.mode
-_SENT_AT_ONCE = 5.0  # s of the wall clock, timeout of sending a frame
+_SEND_TIMEOUT = 5.0  # s of the wall clock, timeout of sending a frame
 _CHANNELS = 16
 
 
-class _GoneError(Exception):
+class _DisconnectedError(Exception):
     """The autopilot has closed the connection."""
 
 
@@ -51,9 +51,9 @@ class HilServer:
     timeout : float, optional
         Seconds of the wall clock without data, after which the session ends; default: no limit.
     report : callable, optional
-        Shows a line of progress to the user.
+        Function that shows a line of progress to the user.
     origin : (float, float)
-        Latitude and longitude [deg] of position 0.
+        Latitude and longitude of position 0 [deg].
 
     Attributes
     ----------
@@ -89,16 +89,16 @@ class HilServer:
             raise RunError(f"TCP {address[0]}:{address[1]}: {error.strerror or error}") from error
         self._listener.settimeout(_POLL if timeout is None else min(_POLL, timeout))
         self.address: tuple[str, int] = self._listener.getsockname()
-        self._heard = time.monotonic()
+        self._received = time.monotonic()
 
     def serve(self) -> Outcome:
         """Fly until the scenario's end, a timeout, or Ctrl-C, as `Flights.fly`."""
         try:
-            return self._flights.fly(self._answer, self.counts)
+            return self._flights.fly(self._serve_connections, self.counts)
         finally:
             self._listener.close()
 
-    def _answer(self) -> str:
+    def _serve_connections(self) -> str:
         """Serve one connection after the other; return the status of the last run."""
         while True:
             try:
@@ -111,7 +111,7 @@ class HilServer:
                 self._report(f"{flight.folder}: {peer[0]}:{peer[1]} flies, {RATE} frames a simulated second")
                 try:
                     self._fly(flight, connection)
-                except _GoneError:
+                except _DisconnectedError:
                     self._flights.end(LEFT)
                 except _SilentError:
                     return f"ended: silence for {self._timeout:g} s"
@@ -125,7 +125,7 @@ class HilServer:
             except TimeoutError:
                 self._check_timeout()
             else:
-                self._heard = time.monotonic()
+                self._received = time.monotonic()
                 return found
 
     def _fly(self, flight: Flight, connection: socket.socket) -> None:
@@ -133,7 +133,7 @@ class HilServer:
         codec = self._mavlink.MAVLink(None, srcSystem=SYSTEM_ID, srcComponent=COMPONENT_ID)
         codec.robust_parsing = True
         motion = at_rest(flight.motion())
-        frame = 0  # of PX4's clock, which is never reset
+        frame = 0  # number of frames on PX4's clock, which is never reset
         controls: Iterator[tuple[bool, list[float]]] = iter(())
         while not flight.done:
             self._send(connection, codec, motion, frame)
@@ -147,7 +147,7 @@ class HilServer:
                 continue
             is_armed, outputs = answer
             if flight.steps or is_armed:
-                self._flights.law.take(outputs)
+                self._flights.law.set_outputs(outputs)
                 motion = flight.step()
                 self.counts.steps += 1
             else:
@@ -164,11 +164,11 @@ class HilServer:
         for message in messages:
             data += message.pack(codec)
             codec.seq = (codec.seq + 1) % 256
-        connection.settimeout(_SENT_AT_ONCE)
+        connection.settimeout(_SEND_TIMEOUT)
         try:
             connection.sendall(data)
         except OSError as error:  # the stream may end within a message
-            raise _GoneError from error
+            raise _DisconnectedError from error
 
     def _receive(self, connection: socket.socket, *, waits: bool) -> bytes | None:
         """Receive bytes; return None if `waits` is False and none arrive within a frame's time of the wall clock."""
@@ -181,15 +181,15 @@ class HilServer:
                 if not waits:
                     return None
             except OSError as error:
-                raise _GoneError from error
+                raise _DisconnectedError from error
             else:
                 if not data:
-                    raise _GoneError
-                self._heard = time.monotonic()
+                    raise _DisconnectedError
+                self._received = time.monotonic()
                 return data
 
     def _controls(self, codec: Any, data: bytes) -> list[tuple[bool, list[float]]]:
-        """Parse the actuator controls in received bytes, each with whether it is armed; else they are zeros."""
+        """Parse the actuator controls in received bytes: whether armed, and outputs, which are 0 while disarmed."""
         found = []
         for message in codec.parse_buffer(data) or ():
             kind = message.get_type()
@@ -201,5 +201,5 @@ class HilServer:
         return found
 
     def _check_timeout(self) -> None:
-        if self._timeout is not None and time.monotonic() - self._heard > self._timeout:
+        if self._timeout is not None and time.monotonic() - self._received > self._timeout:
             raise _SilentError

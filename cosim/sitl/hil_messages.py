@@ -13,7 +13,7 @@ from cosim.sitl.motion import Motion
 
 RATE = 250  # Hz, frames per simulated second
 FIELD_NED = (0.1755, -0.0026, 0.470)  # gauss, at the default origin, as PX4's own table has it
-FLICKER = 5e-4  # gauss, of every second frame: PX4 takes a field that never changes for a dead sensor
+FLICKER = 5e-4  # gauss, added in every second frame: PX4 takes a field that never changes for a dead sensor
 SURFACE_PRESSURE, WATER, AIR = 1013.25, 1000.0, 1.225  # hPa; kg/m3
 TEMPERATURE = 15.0  # degrees Celsius
 
@@ -28,7 +28,7 @@ def hil_messages(mavlink: Any, motion: Motion, time_us: int, origin: tuple[float
     Parameters
     ----------
     mavlink : module
-        The dialect.
+        The MAVLink dialect.
     motion : Motion
         Motion of the vehicle.
     time_us : int
@@ -41,23 +41,23 @@ def hil_messages(mavlink: Any, motion: Motion, time_us: int, origin: tuple[float
     Returns
     -------
     list of messages
-        HIL_GPS if `gps`, HIL_STATE_QUATERNION, HIL_SENSOR.
+        HIL_GPS if `gps` is True, HIL_STATE_QUATERNION, HIL_SENSOR.
     """
     latitude, longitude = (round(1e7 * angle) for angle in LocalFrame(*origin).to_global(motion.position_ned)[:2])
     up = -motion.position_ned[2]
     altitude_mm = round(1e3 * up)
-    speeds = [_cut(100.0 * v, _INT16) for v in motion.velocity_ned]  # cm/s
+    speeds = [_saturate(100.0 * v, _INT16) for v in motion.velocity_ned]  # cm/s
     messages = []
     if gps:
         north, east, _ = motion.velocity_ned
         course = round(math.degrees(math.atan2(east, north)) * 100.0) % 36000
-        ground_speed = _cut(100.0 * math.hypot(north, east), _UINT16)
+        ground_speed = _saturate(100.0 * math.hypot(north, east), _UINT16)
         messages.append(
             mavlink.MAVLink_hil_gps_message(
                 time_us, 3, latitude, longitude, altitude_mm, 30, 40, ground_speed, *speeds, course, 12
             )
         )
-    milli_g = [_cut(1e3 * f / _GRAVITY, _INT16) for f in motion.specific_force]
+    milli_g = [_saturate(1e3 * f / _GRAVITY, _INT16) for f in motion.specific_force]
     messages.append(
         mavlink.MAVLink_hil_state_quaternion_message(
             time_us, motion.quaternion, *motion.gyro, latitude, longitude, altitude_mm, *speeds, 0, 0, *milli_g
@@ -79,5 +79,5 @@ def pressure_at(depth: float) -> float:
     return SURFACE_PRESSURE + 0.01 * depth * _GRAVITY * (WATER if depth > 0.0 else AIR)
 
 
-def _cut(value: float, most: int) -> int:
-    return round(min(max(value, -float(most)), float(most)))
+def _saturate(value: float, limit: int) -> int:
+    return round(min(max(value, -float(limit)), float(limit)))

@@ -27,15 +27,15 @@ class AutopilotLaw:
     efforts : sequence of callable
         For each thruster, the map from its output to the fraction of its greatest force, -1 to 1.
     vehicle : Vehicle
-        Its thrusters' limits are the greatest forces.
-    what : str
+        Vehicle whose thrust limits are the greatest forces.
+    output_name : str
         Name of an output in the record, such as ``pwm``.
     unit : str
         Unit of an output.
     idle : float
-        Value of the outputs of a disarmed autopilot, beside 0.
+        Value, beside 0, of the outputs of a disarmed autopilot.
     link : AutopilotLink, optional
-        Receives the autopilot's estimate, which is reported too.
+        Link that receives the autopilot's estimate, which is reported too.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class AutopilotLaw:
         channels: Sequence[int],
         efforts: Sequence[Curve],
         vehicle: Vehicle,
-        what: str,
+        output_name: str,
         unit: str,
         idle: float = 0.0,
         link: AutopilotLink | None = None,
@@ -66,7 +66,7 @@ class AutopilotLaw:
         ]
         self.diagnostics = (
             *(
-                Diagnostic(f"{what}{at + 1}", unit, f"Output {at + 1} of the autopilot, of thruster {i + 1}")
+                Diagnostic(f"{output_name}{at + 1}", unit, f"Output {at + 1} of the autopilot, of thruster {i + 1}")
                 for i, at, *_ in self._driven
             ),
             Diagnostic("lost", "", "Frames of the autopilot that have not come, so far"),
@@ -74,25 +74,25 @@ class AutopilotLaw:
         )
         self.lost = 0
         self.link, self._idle = link, idle
-        self._drives = False
+        self._has_output = False
         self._estimate: Array = np.zeros(4)
         self._report: Array = np.zeros(len(self.diagnostics))
         self._forces: Array = np.zeros(vehicle.n_thrusters)
 
-    def take(self, outputs: Sequence[float]) -> None:
-        """Take the autopilot's outputs, shape (channels,); those beyond the end are 0."""
+    def set_outputs(self, outputs: Sequence[float]) -> None:
+        """Set the thruster forces by the autopilot's outputs, shape (channels,); missing channels count as 0."""
         n = len(outputs)
         for place, (i, at, effort, least, most) in enumerate(self._driven):
-            said = outputs[at] if at < n else 0.0
-            part = effort(said)
+            value = outputs[at] if at < n else 0.0
+            part = effort(value)
             self._forces[i] = part * most if part >= 0.0 else -part * least
-            self._report[place] = said
-        self._drives = any(said not in (0.0, self._idle) for said in self._report[: len(self._driven)].tolist())
+            self._report[place] = value
+        self._has_output = any(value not in (0.0, self._idle) for value in self._report[: len(self._driven)].tolist())
 
     @property
     def is_driving(self) -> bool:
-        """Whether it is armed, or one of its thruster outputs is not idle."""
-        return self._drives or (self.link is not None and self.link.is_armed)
+        """True if the autopilot is armed, or one of its thruster outputs is not idle."""
+        return self._has_output or (self.link is not None and self.link.is_armed)
 
     @property
     def estimate(self) -> Array:
@@ -121,14 +121,14 @@ def law_of_pwm(vehicle: Vehicle, link: AutopilotLink | None = None) -> Autopilot
     Parameters
     ----------
     vehicle : Vehicle
-        Its table ``autopilot`` maps pulses to forces.
+        Vehicle whose table ``autopilot`` maps pulses to forces.
     link : AutopilotLink, optional
         Link to the autopilot.
 
     Returns
     -------
     AutopilotLaw
-        With zero forces until pulses arrive.
+        Law with zero forces until pulses arrive.
 
     Raises
     ------
@@ -149,12 +149,12 @@ def law_of_controls(vehicle: Vehicle) -> AutopilotLaw:
     Parameters
     ----------
     vehicle : Vehicle
-        Its thrusters' limits are the forces at the controls -1 and 1; the map is linear on each side of 0.
+        Vehicle whose thrust limits are the forces at the controls -1 and 1; the map is linear on each side of 0.
 
     Returns
     -------
     AutopilotLaw
-        With zero forces until controls arrive.
+        Law with zero forces until controls arrive.
     """
     n = vehicle.n_thrusters
     return AutopilotLaw(range(1, n + 1), [_clipped] * n, vehicle, "control", "")

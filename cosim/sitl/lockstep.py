@@ -22,7 +22,7 @@ class Lockstep:
         self.count: int | None = None
         self.missed = 0
 
-    def judge(self, count: int) -> Frame:
+    def classify(self, count: int) -> Frame:
         """Classify a frame, and store its count.
 
         Returns

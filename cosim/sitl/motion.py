@@ -24,7 +24,7 @@ _NAMES = (
 )
 _GRAVITY = 9.81  # m/s2, close to ArduPilot's and PX4's
 _AT_THE_SURFACE = 4.0  # s, in which an autopilot calibrates its sensors
-_LOWERING, _LONGEST = 1.0, 6.0  # m/s, greatest speed, unless lowering would take longer than that many seconds
+_MAX_SPEED, _MAX_DURATION = 1.0, 6.0  # m/s, s: greatest speed of lowering, unless it would take longer
 
 
 class Motion(NamedTuple):
@@ -37,7 +37,7 @@ class Motion(NamedTuple):
     velocity_ned: Three  # m/s, over ground
     attitude: Three  # rad, roll, pitch, yaw
     quaternion: tuple[float, float, float, float]  # from body to world, scalar first
-    altitude: float | None  # m, to what is below along the body's vertical axis; None where there is nothing to meet
+    altitude: float | None  # m, distance along the body's vertical axis to bottom or region; None without either
     dvl: Three  # m/s, over ground, body frame, as the DVL measures it
 
 
@@ -47,9 +47,9 @@ class MotionReader:
     Parameters
     ----------
     plant : SteppedPlant
-        Initialised.
+        The initialised plant.
     rangefinder : Rangefinder
-        Rangefinder that looks down.
+        Rangefinder along the body's vertical axis.
     """
 
     def __init__(self, plant: SteppedPlant, rangefinder: Rangefinder) -> None:
@@ -76,23 +76,23 @@ class MotionReader:
 
 def at_rest(motion: Motion) -> Motion:
     """Return the motion of a vehicle that is held in place: the IMU measures gravity alone."""
-    return carried(motion, motion.position_ned[2], 0.0, 0.0)
+    return with_vertical_motion(motion, motion.position_ned[2], 0.0, 0.0)
 
 
-def carried(motion: Motion, depth: float, speed: float, acceleration: float) -> Motion:
+def with_vertical_motion(motion: Motion, depth: float, speed: float, acceleration: float) -> Motion:
     """Return the motion of a vehicle that is moved down at the horizontal position and attitude of another motion.
 
     Parameters
     ----------
     motion : Motion
-        Its horizontal position and attitude are used.
+        Motion with the horizontal position and the attitude.
     depth, speed, acceleration : float
         Vertical motion of the vehicle [m, m/s, m/s2], positive down.
 
     Returns
     -------
     Motion
-        The IMU measures gravity and the acceleration, the DVL the speed.
+        Motion in which the IMU measures gravity and the acceleration, and the DVL the speed.
     """
     to_body = rotation_matrix(np.array(motion.quaternion)).T
     fx, fy, fz = (to_body @ np.array([0.0, 0.0, acceleration - _GRAVITY])).tolist()
@@ -124,7 +124,7 @@ class Lowering:
 
     def __init__(self, depth: float) -> None:
         self._depth = max(0.0, depth)
-        self._duration = min(0.5 * math.pi * self._depth / _LOWERING, _LONGEST)
+        self._duration = min(0.5 * math.pi * self._depth / _MAX_SPEED, _MAX_DURATION)
 
     def at(self, time: float) -> Three:
         """Return depth, speed and acceleration [m, m/s, m/s2] at a time [s] after the vehicle was switched on."""

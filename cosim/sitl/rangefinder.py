@@ -14,7 +14,7 @@ from controller.regions.region_set import of_attitude
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
-FARTHEST = 100.0  # m, output when the beam meets nothing
+MAX_RANGE = 100.0  # m, also the output when the beam meets nothing
 _LEVEL = 0.1  # cosine of the tilt, below which the beam does not meet a flat bottom
 
 
@@ -24,8 +24,8 @@ class Rangefinder:
     Parameters
     ----------
     scenario : Scenario
-        Scenario, for its plant's ``bottom_depth``. Without one the beam meets static hard regions: their surfaces,
-        which include the vehicle's size where the scenario adds it.
+        Scenario, whose plant may have a ``bottom_depth``. Without one the beam meets the surfaces of static hard
+        regions, which include the vehicle's size where the scenario adds it.
 
     Attributes
     ----------
@@ -54,12 +54,12 @@ class Rangefinder:
         self._ray_distances = CompiledFunction(ray_distances)
 
     def measure(self, position_ned: Array, quaternion: Array, altitude: float) -> float:
-        """Return the distance along the body's vertical axis [m], `FARTHEST` at the most; 0 inside a region.
+        """Return the distance along the body's vertical axis [m], `MAX_RANGE` at the most; 0 inside a region.
 
         Parameters
         ----------
         position_ned : ndarray, shape (3,)
-            [m].
+            Position of the body origin [m, NED].
         quaternion : ndarray, shape (4,)
             Quaternion from body to world, scalar first.
         altitude : float
@@ -68,6 +68,6 @@ class Rangefinder:
         self._beam[0] = rotation_matrix(quaternion)[:, 2]
         if self._has_bottom:
             down = float(self._beam[0, 2])
-            return min(altitude / down, FARTHEST) if down > _LEVEL or math.isnan(down) else FARTHEST
-        self._ray_distances(self._regions, position_ned, self._beam, FARTHEST, self._distances)
-        return min(float(self._distances[0]), FARTHEST)
+            return min(altitude / down, MAX_RANGE) if down > _LEVEL or math.isnan(down) else MAX_RANGE
+        self._ray_distances(self._regions, position_ned, self._beam, MAX_RANGE, self._distances)
+        return min(float(self._distances[0]), MAX_RANGE)

@@ -22,11 +22,11 @@ def scenario_to_fly(
     Parameters
     ----------
     name_or_file : str or Path
-        As for `load_scenario`.
+        Name of a shipped scenario, or a TOML file.
     overrides : sequence of str
-        As for `load_scenario`.
+        Changes such as ``plant.current.0=0.2``, as for `load_scenario`.
     vehicle : str or None
-        A shipped vehicle or a TOML file; None for the scenario's.
+        Name of a shipped vehicle, or a TOML file; None for the scenario's.
     frame_rate : int
         Frame rate of the autopilot [Hz], `LOWEST_RATE` to `HIGHEST_RATE`.
     autopilot : str
@@ -35,15 +35,15 @@ def scenario_to_fly(
     Returns
     -------
     Scenario
-        With thrusters; step and control period are the autopilot's frame. Duration and the arbiter's period are rounded
-        to multiples of it, the duration to at most the longest run.
+        Scenario with thrusters, whose step and control period are the autopilot's frame. Duration and the arbiter's
+        period are rounded to multiples of it; the number of steps is limited to `MAX_STEPS`.
 
     Raises
     ------
     ScenarioError
-        As `load_scenario`.
+        If the scenario is invalid, as for `load_scenario`.
     RunError
-        If the scenario needs a law of this package.
+        If the scenario accepts commands or records V, which needs a law of this package.
     """
     changes = [*overrides, "actuation.through=thrusters"]
     if vehicle is not None:

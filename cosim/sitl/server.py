@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 Sender = tuple[str, int]
 
 _POLL = 0.25  # s of the wall clock, timeout of the socket, after which the silence is checked
-_PRESENT = 1.0  # s of the wall clock without frames, before another sender is accepted
+_SENDER_TIMEOUT = 1.0  # s of the wall clock without frames, after which another sender is accepted
 _WARNING_PERIOD = 10.0  # s of the wall clock, between two warnings of one kind
 
 
@@ -34,7 +34,7 @@ class JsonServer:
     timeout : float, optional
         Seconds of the wall clock without a frame, after which the session ends; default: no limit.
     report : callable, optional
-        Shows a line of progress to the user.
+        Function that shows a line of progress to the user.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class JsonServer:
         self.address: tuple[str, int] = self._socket.getsockname()
         self._lockstep = Lockstep()
         self._sender: Sender | None = None
-        self._heard = time.monotonic()
+        self._received = time.monotonic()
         self._answer = b""
         self._warned: dict[str, float] = {}
 
@@ -109,10 +109,10 @@ class JsonServer:
             data, sender = b"", None
         now = time.monotonic()
         if sender is not None and self._accept(data, sender, now):
-            self._heard = now
+            self._received = now
             if self._flights.flight is not None and self._flights.flight.done:
                 return "completed"
-        elif self._timeout is not None and now - self._heard > self._timeout:
+        elif self._timeout is not None and now - self._received > self._timeout:
             return f"ended: silence for {self._timeout:g} s"
         return ""
 
@@ -130,12 +130,12 @@ class JsonServer:
             return False
         if sender != self._sender and not self._admit(packet, sender, now):
             return False
-        frame = self._lockstep.judge(packet.frame_count)
+        frame = self._lockstep.classify(packet.frame_count)
         if frame == "resent":
             self.counts.resent += 1
         else:
             if frame == "gap":
-                self._lose(self._lockstep.missed)
+                self._count_lost(self._lockstep.missed)
             elif frame != "next":
                 self._begin(packet.frame_rate)
             self._step(packet)
@@ -149,10 +149,10 @@ class JsonServer:
     def _admit(self, packet: wire.ServoPacket, sender: Sender, now: float) -> bool:
         """Accept a new sender unless the one before is still active; return True if accepted."""
         if self._sender is not None:
-            there = f"{self._sender[0]}:{self._sender[1]}"
-            if now - self._heard < _PRESENT:
+            present = f"{self._sender[0]}:{self._sender[1]}"
+            if now - self._received < _SENDER_TIMEOUT:
                 self.counts.refused += 1
-                self._warn("refused", f"{sender[0]}:{sender[1]} sends too, beside {there}: refused")
+                self._warn("refused", f"{sender[0]}:{sender[1]} sends too, beside {present}: refused")
                 return False
             if self._lockstep.count is None or packet.frame_count != self._lockstep.count + 1:
                 self._lockstep = Lockstep()  # another autopilot, not the same from another port: restart for any count
@@ -166,7 +166,7 @@ class JsonServer:
         sender = f"{self._sender[0]}:{self._sender[1]}" if self._sender else "no sender"
         self._report(f"{flight.folder}: {sender} flies, {frame_rate} frames a simulated second")
 
-    def _lose(self, missed: int) -> None:
+    def _count_lost(self, missed: int) -> None:
         self.counts.lost += missed
         self._flights.law.lost += missed
         self._warn("lost", f"{missed} frames of the autopilot have not come: one step is made for all")
@@ -175,7 +175,7 @@ class JsonServer:
         flight = self._flights.flight
         assert flight is not None
         law = self._flights.law
-        law.take(packet.pwm)
+        law.set_outputs(packet.pwm)
         if flight.steps or (law.is_driving and flight.can_start):
             motion = flight.step()
             self.counts.steps += 1

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
 from cosim.export.format import Format
-from cosim.export.names import legal
+from cosim.export.names import valid_names
 
 _GREATEST = 2**31 - 2**20  # bytes of a variable in a file of version 5, less a margin for names and headers
 
@@ -46,7 +46,7 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
             f"--to mat: the signals have {size / 1e9:.1f} GB, expected {_GREATEST / 1e9:.1f} at most; "
             "take fewer by --signals, --every or --rate"
         )
-    fields = legal(column.name for column in columns)
+    fields = valid_names(column.name for column in columns)
     signals = {field: excerpt.signal(column.name)[:, None] for field, column in zip(fields, columns, strict=True)}
     savemat(
         path,

@@ -18,7 +18,7 @@ import numpy as np
 from cosim.errors import RunError, TelemetryError
 from cosim.live.messages import rows_of
 from cosim.replay.header import header_of
-from cosim.replay.viewing import Viewing
+from cosim.replay.view_columns import ViewColumns
 from cosim.results.record import PARTS, RECORD, Record
 from cosim.results.required_columns import require_columns
 from cosim.results.run_result import SCENARIO, SUMMARY, load_run
@@ -134,16 +134,16 @@ def _newest(found: Iterator[Look]) -> Iterator[Look]:
 
 def _finished(path: Path, rate: float | None, once: bool) -> Iterator[Look]:
     run = load_run(path)
-    viewing = Viewing(run.scenario, run.record.columns)
+    view_columns = ViewColumns(run.scenario, run.record.columns)
     record, steps = run.record, len(run.record)
     # a picture needs no more rows than these, and all rows of a long run would not fit into memory
     rows = np.arange(steps - 1, -1, -max(1, steps // _ROWS))[::-1] if not once else np.array([steps - 1])
-    picked = record.take(rows, [record.columns[i].name for i in viewing.picked]).to_array()
+    picked = record.take(rows, [record.columns[i].name for i in view_columns.picked]).to_array()
     times, ended = picked[:, 0], (str(run.summary["status"]), verdict(run.summary))
-    header = header_of(run.scenario, viewing.columns)
+    header = header_of(run.scenario, view_columns.columns)
 
     def at(k: int, note: str, end: tuple[str, str] | None = None) -> Look:
-        return Look(header, viewing.extended(picked[k : k + 1])[0], note, end)
+        return Look(header, view_columns.compute_rows(picked[k : k + 1])[0], note, end)
 
     began, k = time.monotonic(), 0
     note = "replay" if rate is None else f"replay, {rate:g} times real time"
@@ -180,8 +180,8 @@ def _growing(path: Path) -> Iterator[Look]:
             try:
                 record = Record([path / PARTS / newest])
                 require_columns(scenario, record)
-                viewing = Viewing(scenario, record.columns)
-                header = header_of(scenario, viewing.columns)
+                view_columns = ViewColumns(scenario, record.columns)
+                header = header_of(scenario, view_columns.columns)
                 if not len(record):
                     raise ValueError("it is empty")
                 last = record.take([len(record) - 1]).to_array()
@@ -190,7 +190,7 @@ def _growing(path: Path) -> Iterator[Look]:
                     raise
                 continue  # the run has just merged its parts
             known, since = newest, time.monotonic()
-            row = viewing.extended(last[:, viewing.picked])[0]
+            row = view_columns.compute_rows(last[:, view_columns.picked])[0]
         silent = time.monotonic() - since
         wait = f"no new rows for {silent:.0f} s: waiting, writing its report, or killed"
         fresh = silent < _FRESH

@@ -28,8 +28,9 @@ from plant_fmu.variables import variables
 CURRENT = tuple(f"plant.current.{axis}" for axis in range(3))
 BUOYANCY = f"{PARAMETERS}buoyancy"
 NOISE = ("sensing.position_noise", "sensing.velocity_noise")
-_POINTS = ("centre", "feature", "point", "start", "end")  # of shapes: vectors that say where they are
-_LISTS = ("points", "corners")  # lists of such
+# keys of shapes that hold a position, a list of positions, or a depth
+_POINTS = ("centre", "feature", "point", "start", "end")
+_LISTS = ("points", "corners")
 _DEPTHS = ("top", "bottom", "depth")
 # tried numbers differ from the scenario's by the first, and these differences from each other by the second
 _STEP, _APART = 0.0037291, 1.7e-5
@@ -44,7 +45,7 @@ class Slot:
     Attributes
     ----------
     key : str
-        As ``--set`` takes it.
+        Key of the scenario, as in ``--set``.
     words, unit : str
         Description and unit for the page.
     value : float
@@ -69,23 +70,23 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[tuple[t
     flight : Flight
         Flight of the scenario.
     memory : Memory
-        Memory, for the places of its arrays.
+        Memory with the places of the flight's arrays.
 
     Returns
     -------
     list of Slot
-        Numbers.
+        The numbers, in the order in which the page shows them.
     list of three tuples of str, or None
-        Of each region, the goal first: the keys that change when it moves north, east and down; None where it cannot be
-        moved.
+        Keys of each region, the goal first, that change when it moves north, east and down; None for a region that
+        cannot be moved.
     """
     scenario, table = flight.scenario, flight.scenario.table
     noise = NOISE if flight.exact or (flight.noisy and not scenario.sensing.exact) else ()
     numbers = [*CURRENT, BUOYANCY, *noise, *(f"law.gains.{name}" for name in scenario.law.gains._fields)]
     shapes = [("goal", table["goal"]), *((f"regions.{i}.shape", r["shape"]) for i, r in enumerate(table["regions"]))]
     moving = [_moving_keys(path, shape) for path, shape in shapes]
-    of_moves = [key for axes in moving for keys in axes for key in keys]
-    places = dict(_search(flight, memory, [*numbers, *of_moves]))
+    moving_keys = [key for axes in moving for keys in axes for key in keys]
+    places = dict(_search(flight, memory, [*numbers, *moving_keys]))
     for path, shape in shapes:
         if shape["type"] == "cylinder":
             places |= _ends_of_cylinder(flight, memory, path)
@@ -104,9 +105,9 @@ def changed_scenario(scenario: Scenario, changes: Mapping[str, float]) -> Scenar
     Raises
     ------
     ScenarioError
-        If it cannot be.
+        If the changed scenario is invalid.
     """
-    table = copied_table(scenario.table)
+    table = copy_table(scenario.table)
     for key, value in changes.items():
         if key.startswith(PARAMETERS):
             table["plant"]["parameters"][key.removeprefix(PARAMETERS)] = value
@@ -179,7 +180,7 @@ def _places(
 ) -> dict[str, list[tuple[str, int]]] | None:
     """Return the places of numbers in the flight, by comparison with another one that has the numbers of `keys` there.
 
-    None if anything else differs: then some number is not copied unchanged.
+    None if anything else differs: then a changed number also enters a computation.
     """
     found: dict[str, list[tuple[str, int]]] = {}
 
@@ -212,7 +213,7 @@ def _places(
 
 
 def _numbers(value: Any) -> Iterator[Any]:
-    """Yield the loop's arguments that are no arrays."""
+    """Yield the arguments of the loop that are not arrays."""
     if isinstance(value, tuple):
         for item in value:
             yield from _numbers(item)
@@ -225,8 +226,8 @@ def _equal(one: np.ndarray, other: np.ndarray) -> NDArray[np.bool_]:
     return np.asarray(same | (np.isnan(one) & np.isnan(other))) if one.dtype == np.float64 else same
 
 
-def copied_table(value: Any) -> Any:
+def copy_table(value: Any) -> Any:
     """Return a deep copy of a scenario's table, with lists in place of tuples."""
     if isinstance(value, dict):
-        return {key: copied_table(item) for key, item in value.items()}
-    return [copied_table(item) for item in value] if isinstance(value, list | tuple) else copy.copy(value)
+        return {key: copy_table(item) for key, item in value.items()}
+    return [copy_table(item) for item in value] if isinstance(value, list | tuple) else copy.copy(value)

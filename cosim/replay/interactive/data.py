@@ -16,9 +16,10 @@ from cosim.replay.interactive.adjustable import BUOYANCY, changed_scenario, find
 from cosim.replay.interactive.flight import Flight
 from cosim.replay.interactive.module import flight_module
 from cosim.replay.interactive.scenario_template import scenario_template
-from cosim.replay.interactive.signals import sources_of
+from cosim.replay.interactive.signals import signal_sources
 from cosim.results.run_result import Run
 from cosim.results.summary import SETTLED_FOR
+from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array, Column
 from cosim.ssp.memory import Memory
 
@@ -41,9 +42,9 @@ def flight_data(run: Run, columns: Sequence[Column]) -> dict[str, Any]:
     Raises
     ------
     RunError
-        If the run cannot be flown in a page; it names the key.
+        If the page cannot simulate the scenario; the message names the key.
     TranslationError, UnsupportedError
-        If a law or the arbiter's rules have no C.
+        If a law or the arbiter's rules have no translation to C.
     BuildError
         If the WebAssembly must be compiled, and the ziglang package is not installed.
     """
@@ -76,7 +77,7 @@ def flight_data(run: Run, columns: Sequence[Column]) -> dict[str, Any]:
         "slots": [dataclasses.asdict(slot) for slot in slots],
         "moves": moves,
         "noise": [scenario.sensing.position_noise, scenario.sensing.velocity_noise],
-        "signals": sources_of(flight, columns),
+        "signals": signal_sources(flight, columns),
         "velocities": [list(velocity) for velocity in regions],
         "goal_places": flight.setup.goal_places.tolist(),
         "criteria": list(scenario.criterion_places),
@@ -90,15 +91,15 @@ def flight_data(run: Run, columns: Sequence[Column]) -> dict[str, Any]:
 def _restoring(flight: Flight) -> dict[str, Any]:
     """Return the true restoring parameters (12) as a linear function of the buoyancy."""
     scenario = flight.scenario
-    begun, more = (
+    truth, truth_above = (
         s.true_restoring_parameters
         for s in (scenario, changed_scenario(scenario, {BUOYANCY: _buoyancy(scenario) + 1.0}))
     )
     weight = scenario.plant.parameters.get("weight", scenario.vehicle.weight)
-    return {"key": BUOYANCY, "weight": weight, "truth": begun.tolist(), "slopes": (more - begun).tolist()}
+    return {"key": BUOYANCY, "weight": weight, "truth": truth.tolist(), "slopes": (truth_above - truth).tolist()}
 
 
-def _buoyancy(scenario: Any) -> float:
+def _buoyancy(scenario: Scenario) -> float:
     return float(scenario.plant.parameters.get("buoyancy", scenario.vehicle.buoyancy))
 
 

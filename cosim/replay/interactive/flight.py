@@ -43,16 +43,16 @@ class Flight:
     decide : tuple
         Arguments of the law's function.
     fly : tuple
-        Arguments of the loop.
+        Arguments of the fused loop.
     start : dict of str to float
         Start values of the plant, set before initialisation.
     exact : bool
-        Whether nothing but noise could keep the law from the true state.
+        True if the law measures the true state when the noise is zero.
 
     Raises
     ------
     RunError
-        If the scenario has what the fused loop does not fly; with the key.
+        If the fused loop does not support a key of the scenario; the message names it.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -65,7 +65,7 @@ class Flight:
         self.noisy = scenario.sensing.through == "state"
         self.exact = self.noisy and not scenario.sensing.dead_for > 0.0
         self.noise = np.zeros((decisions if self.noisy else 0, 6))
-        stages = failure_stages(scenario, self.setup) if through else _no_stages()
+        stages = failure_stages(scenario, self.setup) if through else _empty_allocator()
         self.setup = self.setup._replace(
             noise=self.noise,
             exact=Expression("m->exact") if self.exact else self.setup.exact,  # type: ignore[arg-type]
@@ -87,7 +87,7 @@ class Flight:
         self.trace = np.zeros((decisions, 17 + criteria + len(inputs) + self.law.report.size))
         self.reasons = np.zeros((decisions, 12 + n + criteria + rule_inputs + forces))
         self.metrics, self.estimate = np.zeros(len(FlightMetrics._fields)), np.zeros(4)
-        self.expected = np.zeros(6)  # stands for what the law expects, or for nothing where sensing is exact
+        self.expected = np.zeros(6)  # placeholder for the law's expected state, or for NaN where sensing is exact
 
     @property
     def decide(self) -> tuple[Any, ...]:
@@ -114,7 +114,7 @@ class Flight:
         yield from _arrays((self.fly, self.decide))
 
     def _plant(self, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Native:
-        """Return the plant's C functions with buffers for some variables, which begin as the plant has them."""
+        """Return the plant's C functions with buffers for some variables, at their start values."""
         table = {v.name: (i, v) for i, v in enumerate(variables(self.scenario.vehicle))}
         starts = [self.start.get(name, table[name][1].start) for name in inputs]
         return Native(
@@ -130,7 +130,7 @@ class Flight:
         )
 
 
-def _no_stages() -> Allocator:
+def _empty_allocator() -> Allocator:
     return Allocator(np.zeros((1, 0, 6)), np.zeros((1, 0)), np.zeros((1, 0)), False)
 
 

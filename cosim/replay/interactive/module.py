@@ -46,9 +46,9 @@ def flight_module(scenario: Scenario) -> FlightModule:
     Raises
     ------
     RunError
-        If the fused loop does not support a key of the scenario; with the key.
+        If the fused loop does not support a key of the scenario; the message names it.
     TranslationError, UnsupportedError
-        If a law or the arbiter's rules have no C.
+        If a law or the arbiter's rules have no translation to C.
     BuildError
         If the ziglang package is not installed, or its compiler fails.
     """

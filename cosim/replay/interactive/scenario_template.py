@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cosim.replay.interactive.adjustable import Slot, copied_table
+from cosim.replay.interactive.adjustable import Slot, copy_table
 from cosim.scenario.key_names import PARAMETERS
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario
 from cosim.scenario.toml_file import place_of
@@ -34,7 +34,7 @@ def scenario_template(scenario: Scenario, slots: Sequence[Slot]) -> ScenarioTemp
     slots : sequence of Slot
         Numbers that the page may change.
     """
-    table = copied_table(scenario.table)
+    table = copy_table(scenario.table)
     if not table["failures"]:
         del table["failures"]
     if scenario.vehicle_file:

@@ -1,4 +1,4 @@
-"""Where each signal of a view stands in what a flight leaves, or what it is made of."""
+"""Places of a view's signals in the arrays that a page's flight writes."""
 
 from __future__ import annotations
 
@@ -11,22 +11,23 @@ from cosim.simulation.signals import Column
 _AXES = ("X", "Y", "Z", "K", "M", "N")
 
 
-def sources_of(flight: Flight, columns: Sequence[Column]) -> dict[str, list[Any]]:
-    """Return of each signal where a page finds it.
+def signal_sources(flight: Flight, columns: Sequence[Column]) -> dict[str, list[Any]]:
+    """Return the place of each signal in a flight's arrays, or the numbers from which the page computes it.
 
     Parameters
     ----------
     flight : Flight
-        Of the scenario.
+        Flight of the scenario.
     columns : sequence of Column
-        Of a view's rows, as `cosim.replay.viewing.Viewing` has them.
+        Columns of a view's rows, from `cosim.replay.view_columns.ViewColumns`.
 
     Returns
     -------
     dict of str to list
-        By name: ``["trace", place]``, ``["reasons", place]`` or ``["rules", place]`` in a row; ``["sum", array, first,
-        coefficients]`` of numbers one behind the other; ``["shift", region, axis]``, ``["attitude", axis]`` or
-        ``["active"]`` for what the page works out. What a flight does not leave is left out.
+        Sources by name of the signal: ``["trace", place]``, ``["reasons", place]`` or ``["rules", place]`` for an index
+        in a row of that array; ``["sum", array, first, coefficients]`` for a weighted sum of neighbouring numbers;
+        ``["shift", region, axis]``, ``["attitude", axis]`` or ``["active"]`` for signals that the page computes.
+        Signals that a flight does not write are missing.
     """
     known = dict(_known(flight))
     return {column.name: known[column.name] for column in columns if column.name in known}

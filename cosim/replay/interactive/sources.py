@@ -1,4 +1,4 @@
-"""The C of a flight: translated functions, where their arrays stand, and what the plant is given before it starts."""
+"""The C of a flight: translated functions, the places of their arrays, and the start values of the plant."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def flight_sources(flight: Flight, memory: Memory, token: str) -> dict[str, byte
     flight : Flight
         Flight to compile.
     memory : Memory
-        An empty one: arrays get their places.
+        An empty memory, in which the arrays get their places.
     token : str
         Token of the plant's description.
 
@@ -80,7 +80,7 @@ def flight_sources(flight: Flight, memory: Memory, token: str) -> dict[str, byte
     TranslationError
         If the translator does not support a function.
     UnsupportedError
-        If the arbiter's rules have no C.
+        If the arbiter's rules have no translation to C.
     """
     program, calls, law = Program(), [], flight.law
     _name_arrays(flight, memory)
@@ -110,14 +110,14 @@ def flight_sources(flight: Flight, memory: Memory, token: str) -> dict[str, byte
         *_scene(flight, token),
         _CALLS,
     ])  # fmt: skip
-    normal = c_files("cosim.ssp", "csrc/controller")
+    ssp_files = c_files("cosim.ssp", "csrc/controller")
     return {
         **c_files("cosim.replay.interactive", "csrc"),
         "loop.h": text.encode(),
         "rules.c": to_c(dataclasses.replace(system, name="rules")).encode(),
         "strengths.c": to_c(_strengths(system)).encode(),
         "ziggurat.h": ziggurat().encode(),
-        **{name: normal[name] for name in ("normal.c", "normal.h")},
+        **{name: ssp_files[name] for name in ("normal.c", "normal.h")},
     }
 
 
@@ -149,7 +149,7 @@ def _strengths(system: System) -> System:
 
 
 def _scene(flight: Flight, token: str) -> Iterator[str]:
-    """Yield the start values of the plant, and the seed and tail draws of the noise, as C."""
+    """Yield the plant's start values, and the state and tail draws of the noise generator, as C."""
     scenario = flight.scenario
     table = {v.name: (i, v.type) for i, v in enumerate(variables(scenario.vehicle))}
     yield f'#define PLANT_TOKEN "{token}"'
@@ -178,9 +178,14 @@ def tail_draws(scenario: Scenario, rows: int) -> list[tuple[int, float]]:
     Parameters
     ----------
     scenario : Scenario
-        Scenario, for its seed.
+        Scenario with the seed of the noise.
     rows : int
-        Control steps, of six numbers each.
+        Number of control steps, each of which draws six numbers.
+
+    Returns
+    -------
+    list of (int, float)
+        Index of each tail draw among all draws, and its value in standard deviations.
     """
     drawn = np.random.default_rng([scenario.sensing.seed, STREAM]).standard_normal(6 * rows)
     return [(int(i), float(drawn[i])) for i in np.flatnonzero(np.abs(drawn) >= OUTERMOST)]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.replay.activity import RESTS_ON, active_regions, rests
+from cosim.replay.activity import RESTING_SIGNALS, active_regions, is_resting
 from cosim.report.figures.style import POINTS, FigureData
 from cosim.simulation.signals import Array
 
@@ -90,8 +90,8 @@ def _given_way(data: FigureData, at: NDArray[np.intp]) -> NDArray[np.intp]:
             [f"{secondary.region.name}.clearance" for secondary in regions],
         )
     )
-    goal, *velocity = (data.record[name][at] for name in RESTS_ON)
-    resting = rests(goal, np.column_stack(velocity))
+    goal, *velocity = (data.record[name][at] for name in RESTING_SIGNALS)
+    resting = is_resting(goal, np.column_stack(velocity))
     active = active_regions(criteria, memberships, weights, clearances, resting).astype(int)
     given_way: NDArray[np.intp] = np.array([-1, *criteria])[active]
     return given_way

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cosim.export import export_run
-from cosim.export.names import legal
+from cosim.export.names import valid_names
 from cosim.results.record import load_record
 from cosim.results.run_result import load_run
 from cosim.run.run import run_scenario
@@ -208,7 +208,7 @@ def test_signal_selection_keeps_the_scene_complete(run, tmp_path):
     read = Read(path)
     assert [t for t in read.messages if t.startswith("/signals/")] == ["/signals/step", "/signals/clearance"]
     assert (
-        read.signal("clearance", legal(["port wall"])[0]).tolist()
+        read.signal("clearance", valid_names(["port wall"])[0]).tolist()
         == load_record(run)["port wall.clearance"][::10].tolist()
     )
     assert WELL_KNOWN.keys() <= read.messages.keys()

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.io import loadmat
 
 from cosim.export import export_run
-from cosim.export.names import grouped, legal
+from cosim.export.names import group_columns, valid_names
 from cosim.results.record import load_record
 from cosim.scenario.scenario import load_scenario
 
@@ -92,21 +92,21 @@ def test_more_than_a_mat_file_holds_is_refused(run, tmp_path, monkeypatch):
 @pytest.mark.medium
 @given(st.lists(st.text(min_size=1), unique=True))
 def test_sanitized_names_are_unique_identifiers(names):
-    made = legal(names)
+    made = valid_names(names)
     assert len(set(made)) == len(names)
     assert all(re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,62}", name, re.ASCII) for name in made)
 
 
 def test_sanitized_names_resemble_the_originals():
-    assert legal(["position.x", "thrust[1]", "port wall.clearance", "position_x", "1"]) == [
+    assert valid_names(["position.x", "thrust[1]", "port wall.clearance", "position_x", "1"]) == [
         "position_x", "thrust_1", "port_wall_clearance", "position_x_2", "n1",
     ]  # fmt: skip
-    assert not any(map(iskeyword, legal(["goal.value"])))
+    assert not any(map(iskeyword, valid_names(["goal.value"])))
 
 
 def test_groups_hold_each_signal_once(run):
     columns = load_record(run).columns
-    groups = grouped(columns)
+    groups = group_columns(columns)
     assert sorted(i for members in groups.values() for i in members.values()) == list(range(len(columns)))
     assert groups["clearance"].keys() >= {"goal", "port wall", "back wall"}
     assert list(groups["position"]) == ["x", "y", "z"]

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from benchmarks.long_record import write_long_run
 from cosim.export.excerpt import excerpt_of
 from cosim.io.strict_json import json_text
-from cosim.replay.events import _Few
+from cosim.replay.events import _JoinedSpans
 from cosim.replay.trace import trace_of
 from cosim.report.contents import contents_of
 from cosim.report.figures.sampled_rows import story_of
@@ -118,7 +118,7 @@ def test_every_figure_of_a_long_run_is_drawn(name, run_of, streamed, monkeypatch
     monkeypatch.setattr("cosim.report.figures.sampled_rows._MOST", 2000)
     run = run_of(name)
     stories = FigureData(run.scenario, run.record, run.summary), story_of(streamed(run))
-    whole, few = ([drawing.name for drawing in drawings(story)] for story in stories)
+    whole, joined = ([drawing.name for drawing in drawings(story)] for story in stories)
     assert whole == few
 
 
@@ -151,7 +151,7 @@ def test_spans_do_not_depend_on_blocks(signal, data):
 def test_widest_gaps_do_not_depend_on_blocks(lengths, most, data):
     flags = np.array([i % 2 == 0 for i, length in enumerate(lengths) for _ in range(length)], bool)
     time = np.arange(len(flags)) * 1.0
-    few = _Few(most)
+    joined = _JoinedSpans(most)
     at = sorted(data.draw(st.lists(st.integers(0, len(flags)), max_size=6)))
     for t, f in zip(np.split(time, at), np.split(flags, at), strict=True):
         few.add(f, t)

@@ -11,7 +11,7 @@ from cosim.export.scene import Scene
 from cosim.live.watching import looks, picture
 from cosim.replay.events import events_of
 from cosim.replay.header import header_of
-from cosim.replay.viewing import Viewing
+from cosim.replay.view_columns import ViewColumns
 from cosim.report.contents import contents_of
 from cosim.results.run_result import load_run
 from cosim.run.run import run_scenario
@@ -86,9 +86,9 @@ def test_exported_solids_use_criterion_colors(four):
 
 
 def test_rules_of_an_arbiter_file_match_its_explanation(ruled):
-    viewing = Viewing(ruled.scenario, ruled.record.columns)
+    viewing = ViewColumns(ruled.scenario, ruled.record.columns)
     names = [column.name for column in viewing.columns]
-    rows = viewing.extended(ruled.record.stack([ruled.record.columns[i].name for i in viewing.picked]))
+    rows = viewing.compute_rows(ruled.record.stack([ruled.record.columns[i].name for i in viewing.picked]))
     arbiter = Arbiter(system=ruled.scenario.rules.system)
     inputs = [names.index(f"arbiter.{signal.name}") for signal in ruled.scenario.rules.inputs]
     fired = [names.index(f"rule.R{i}") for i in range(1, 5)]

@@ -27,7 +27,7 @@ from controller.regions import (
 from controller.regions.region_set import attitude_clearance, clearances_at
 from controller.regions.shapes import ENTRIES
 from cosim.replay import header
-from cosim.replay.header import OF_ATTITUDE
+from cosim.replay.header import ATTITUDE_SHAPES
 from cosim.replay.page import SCENE_SCRIPTS
 from cosim.scenario.colours import GOAL_COLOUR
 
@@ -89,7 +89,7 @@ def outside(shape, points):
 
 def test_page_draws_exactly_the_attitude_shapes():
     of_attitude = {name for name, entry in ENTRIES.items() if entry.of_attitude}
-    assert set(run("return Object.keys(SIGHTS);")) == set(OF_ATTITUDE) == of_attitude
+    assert set(run("return Object.keys(SIGHTS);")) == set(ATTITUDE_SHAPES) == of_attitude
     scripts = "".join(path.read_text(encoding="utf-8") for path in ASSETS.glob("*.js"))
     assert {name for name in ENTRIES if f'"{name}"' in scripts} == {"depth_band"}  # which is dragged up and down alone
 

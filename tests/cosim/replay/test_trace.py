@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from cosim.replay.activity import active_regions, rests
 from cosim.replay.sampling import sampled_rows
 from cosim.replay.trace import nan_to_none, trace_of
-from cosim.replay.viewing import Viewing
+from cosim.replay.view_columns import ViewColumns
 from cosim.results.record import Rows
 from cosim.results.run_result import load_run
 from cosim.simulation.signals import Column
@@ -94,13 +94,13 @@ def test_at_rest_a_region_is_active_at_half_weight_or_violation(weight, clearanc
 
 
 def test_rule_strengths_are_minima_and_maxima_of_degrees(docking):
-    viewing = Viewing(docking.scenario, docking.record.columns)
-    names = [docking.record.columns[i].name for i in viewing.picked]
+    view_columns = ViewColumns(docking.scenario, docking.record.columns)
+    names = [docking.record.columns[i].name for i in view_columns.picked]
     samples = np.random.default_rng(7).uniform(size=(50, 3))
     samples[:4] = [[0, 0, 0], [1, 1, 1], [0, 1, 1], [0, 0, 1]]
     rows = np.zeros((50, len(names)))
     rows[:, [names.index(f"membership.{name}") for name in docking.scenario.criterion_names]] = samples
-    strengths = viewing.extended(rows)[:, -8:]
+    strengths = view_columns.compute_rows(rows)[:, -8:]
     arbiter = Arbiter(engine="closed")
     for (o, s, d), got in zip(samples.tolist(), strengths.tolist(), strict=True):
         by_hand = [o, 1 - o, o, 1 - s, min(1 - o, s), max(o, s), 1 - d, min(1 - o, 1 - s, d)]
@@ -109,18 +109,18 @@ def test_rule_strengths_are_minima_and_maxima_of_degrees(docking):
 
 
 def test_a_row_without_memberships_has_no_strengths(docking):
-    viewing = Viewing(docking.scenario, docking.record.columns)
-    rows = np.zeros((2, len(viewing.picked)))
+    view_columns = ViewColumns(docking.scenario, docking.record.columns)
+    rows = np.zeros((2, len(view_columns.picked)))
     rows[0] = np.nan
-    extended = viewing.extended(rows)
+    extended = view_columns.compute_rows(rows)
     assert np.isnan(extended[0, -8:]).all() and np.isfinite(extended[1]).all()
 
 
 def test_rows_are_extended_independently(docking):
     trace = trace_of(docking)
-    viewing = Viewing(docking.scenario, docking.record.columns)
-    n = len(viewing.picked)
-    alone = np.concatenate([viewing.extended(row[None, :n]) for row in trace.rows[::97]])
+    view_columns = ViewColumns(docking.scenario, docking.record.columns)
+    n = len(view_columns.picked)
+    alone = np.concatenate([view_columns.compute_rows(row[None, :n]) for row in trace.rows[::97]])
     assert alone.tobytes() == trace.rows[::97].tobytes()
 
 

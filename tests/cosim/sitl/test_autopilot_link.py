@@ -32,7 +32,7 @@ def dvl_messages(options, seconds=10.0, rate=400):
     found = []
     for k in range(round(seconds * rate) + 1):
         time = k / rate
-        found += [(time, *one) for one in dvl.take(motion(time, (0.5, 0.0, 0.0), (0.0, 0.0, 0.1)))]
+        found += [(time, *one) for one in dvl.integrate(motion(time, (0.5, 0.0, 0.0), (0.0, 0.0, 0.1)))]
     return found
 
 

@@ -30,7 +30,7 @@ BLUEROVS = ["bluerov2_heavy", "bluerov2_heavy_wu"]
 
 def forces(law, outputs):
     given = np.full(8, math.nan)
-    law.take(outputs)
+    law.set_outputs(outputs)
     law.step(None, None, None, None, given)
     return given
 
@@ -125,7 +125,7 @@ def test_controls_map_linearly_to_force_limits():
     vehicle = load_vehicle("rexrov")
     n = vehicle.n_thrusters
     given = np.zeros(n)
-    law.take([1.0, -1.0, 0.5, math.nan, 3.0, 0.0, 0.0, 0.0])
+    law.set_outputs([1.0, -1.0, 0.5, math.nan, 3.0, 0.0, 0.0, 0.0])
     law.step(None, None, None, None, given)
     expected = [1.0, 1.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0][:n]
     limits = [vehicle.thrust_max[0], vehicle.thrust_min[1], *vehicle.thrust_max[2:]]

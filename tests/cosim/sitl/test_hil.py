@@ -229,7 +229,7 @@ def test_silence_ends_the_run(serve_px4):
         fly(px4, down(0.1), 5)
         (run,) = served.outcome().runs
     assert run.summary["status"] == "ended: silence for 0.3 s"
-    with pytest.raises(RunError, match="no autopilot came"):
+    with pytest.raises(RunError, match="no autopilot connected"):
         serve_px4(timeout=0.1).outcome()
 
 

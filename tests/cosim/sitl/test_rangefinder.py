@@ -7,7 +7,7 @@ import pytest
 
 from controller.quaternion import from_axis_angle
 from cosim.scenario.scenario import load_scenario
-from cosim.sitl.rangefinder import FARTHEST, Rangefinder
+from cosim.sitl.rangefinder import MAX_RANGE, Rangefinder
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 ROLLED = from_axis_angle(np.array([1.0, 0.0, 0.0]), math.radians(30.0))
@@ -30,11 +30,11 @@ def test_beam_measures_the_plants_bottom_as_in_ardupilot():
     below = Rangefinder(load_scenario("sitl"))
     assert below.measure(np.zeros(3), LEVEL, 27.0) == 27.0
     assert below.measure(np.zeros(3), ROLLED, 27.0) == pytest.approx(27.0 / math.cos(math.radians(30.0)))
-    assert below.measure(np.zeros(3), UPSIDE_DOWN, 27.0) == FARTHEST
+    assert below.measure(np.zeros(3), UPSIDE_DOWN, 27.0) == MAX_RANGE
 
 
 def test_empty_beam_reports_maximum_range_and_no_obstacle_no_rangefinder():
     """An ArduPilot keeps the last distance that it heard, so there must be another one."""
     below = Rangefinder(load_scenario("pipe-inspection"))
-    assert below.measure(np.array([0.0, 0.0, 3.0]), UPSIDE_DOWN, math.nan) == FARTHEST
+    assert below.measure(np.array([0.0, 0.0, 3.0]), UPSIDE_DOWN, math.nan) == MAX_RANGE
     assert not Rangefinder(load_scenario("pipe-inspection", ["regions=[]"])).is_fitted

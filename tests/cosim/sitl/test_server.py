@@ -45,7 +45,7 @@ def pulses(k):
 )
 def test_frame_counts_are_classified(counts, frames):
     lockstep = Lockstep()
-    assert [lockstep.judge(count) for count in counts] == frames
+    assert [lockstep.classify(count) for count in counts] == frames
 
 
 def test_each_frame_is_a_step_of_the_plant(serve):
@@ -120,7 +120,7 @@ def test_lowering_motion_is_consistent_with_its_depths():
         )
     half, zero = 0.5**0.5, (0.0, 0.0, 0.0)
     on_its_side = motion.Motion(0.0, zero, zero, (1.0, 2.0, 4.0), zero, zero, (half, half, 0.0, 0.0), 6.0, zero)
-    carried = motion.carried(on_its_side, 3.0, 0.5, 0.2)
+    carried = motion.with_vertical_motion(on_its_side, 3.0, 0.5, 0.2)
     assert carried.specific_force == pytest.approx((0.0, 0.2 - 9.81, 0.0)) and carried.dvl == pytest.approx(
         (0.0, 0.5, 0.0)
     )
@@ -169,7 +169,7 @@ def test_run_equals_a_master_with_the_autopilot_as_law(serve):
     with Master(scenario_to_fly("sitl", overrides, None, 1200, "ardupilot"), law) as master:
         expected = []
         for k in range(601):
-            law.take(pulses(min(k, 599)))
+            law.set_outputs(pulses(min(k, 599)))
             master.step(k)
             expected.append(master.signals.row.copy())
     assert np.array_equal(rows(run), np.array(expected))
@@ -347,7 +347,7 @@ def test_silence_ends_the_run_after_the_timeout(serve):
 
 def test_without_an_autopilot_there_is_no_run(serve):
     served = serve(timeout=0.2)
-    with pytest.raises(RunError, match=r"no autopilot came: ended: silence for 0.2 s"):
+    with pytest.raises(RunError, match=r"no autopilot connected: ended: silence for 0.2 s"):
         served.outcome()
 
 

@@ -26,7 +26,7 @@ from cosim.campaigns.store.results import Results
 from cosim.io.strict_json import json_text
 from cosim.replay.events import events_of
 from cosim.replay.page import is_page, write_page
-from cosim.replay.steering import changes_of
+from cosim.replay.region_changes import changes_of
 from cosim.replay.trace import trace_of
 from cosim.report.web_page import Html
 from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts, load_log_facts

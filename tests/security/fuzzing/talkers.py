@@ -24,7 +24,7 @@ from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.framing import Counts, Gate, StreamReader
 from cosim.mavlink.wire.ground_end import Heard
 from cosim.replay.header import header_of
-from cosim.replay.viewing import Viewing
+from cosim.replay.view_columns import ViewColumns
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands import CommandQueue
 from cosim.sitl import wire
@@ -77,7 +77,7 @@ class _Connection:
 def live_view(seeds: Seeds) -> Case:
     scenario = load_scenario("paper", ["commands.enabled=true", "commands.obstacles=2"])
     columns = load_columns(seeds)
-    viewing = Viewing(scenario, columns)
+    viewing = ViewColumns(scenario, columns)
     header = header_of(scenario, viewing.columns, commands=True)
     rows = bytes_of(np.zeros((2, len(viewing.columns))))
     texts = [

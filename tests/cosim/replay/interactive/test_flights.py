@@ -9,7 +9,7 @@ from controller.laws.deployable.gains import DeployableGains
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.scene_file import read_scenes
-from cosim.replay.viewing import Viewing
+from cosim.replay.view_columns import ViewColumns
 from cosim.results.run_result import load_run
 from cosim.results.wording import verdict
 from cosim.run.run import run_scenario
@@ -52,9 +52,9 @@ def flown_run(scenario, folder):
 
 def assert_same(flown, run):
     """Hold every signal of a flight against the record, to the last bit but for what the page works out itself."""
-    viewing = Viewing(run.scenario, run.record.columns)
+    viewing = ViewColumns(run.scenario, run.record.columns)
     names = [run.record.columns[i].name for i in viewing.picked]
-    picked = viewing.extended(np.column_stack([run.record[name] for name in names]))
+    picked = viewing.compute_rows(np.column_stack([run.record[name] for name in names]))
     recorded = dict(zip((column.name for column in viewing.columns), picked.T, strict=True))
     every = run.scenario.control_every
     assert len(flown.columns) > 30 and {"active", "rule.R1", "position.x", "estimate.phi1"} <= set(flown.columns)

@@ -1,4 +1,4 @@
-"""Convert the rows of a run to those of a view: drawn columns, active region, and firing strengths of rules."""
+"""Converts rows of a run to rows of a view: drawn columns, active region, and firing strengths of rules."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cosim.replay.activity import RESTS_ON, active_regions, rests
+from cosim.replay.activity import RESTING_SIGNALS, active_regions, is_resting
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array, Column
 from fuzzy_arbiter.engines.firing import Firing
@@ -19,7 +19,7 @@ _DRAWN = (  # prefixes of the columns that a view draws
 _DRAWN_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")
 
 
-class Viewing:
+class ViewColumns:
     """Select the columns that a view draws, and add the active region and the firing strength of each rule.
 
     Parameters
@@ -27,12 +27,14 @@ class Viewing:
     scenario : Scenario
         Scenario of the run.
     columns : sequence of Column
-        Columns of its rows.
+        Columns of the run's rows.
 
     Attributes
     ----------
+    picked : list of int
+        Indices of the drawn columns in a row of the run.
     columns : tuple of Column
-        Columns of a view's rows: picked ones in their order, then ``active``, then ``rule.R1`` and so on.
+        Columns of a view's rows: the picked ones in their order, then ``active``, then ``rule.R1`` and so on.
     """
 
     def __init__(self, scenario: Scenario, columns: Sequence[Column]) -> None:
@@ -42,7 +44,7 @@ class Viewing:
         drawn = [names[i] for i in self.picked]
         self._memberships = [drawn.index(f"membership.{name}") for name in names_of_criteria]
         self._weights = [drawn.index(f"weight.{name}") for name in names_of_criteria]
-        self._goal, *self._velocity = (drawn.index(name) for name in RESTS_ON)
+        self._goal, *self._velocity = (drawn.index(name) for name in RESTING_SIGNALS)
         self._clearances = [drawn.index(f"{secondary.region.name}.clearance") for secondary in scenario.regions]
         system = scenario.rules.system
         self._inputs = self._memberships  # inputs of the rules
@@ -56,22 +58,22 @@ class Viewing:
             *(Column(f"rule.R{i + 1}", "", f"Strength of: {rule}") for i, rule in enumerate(rules)),
         )
 
-    def extended(self, picked: Array) -> Array:
-        """Return the rows of a view.
+    def compute_rows(self, picked: Array) -> Array:
+        """Compute the rows of a view.
 
         Parameters
         ----------
         picked : ndarray, shape (rows, picked columns)
-            Rows with the columns `picked`.
+            Rows of the run, of the columns `picked` alone.
 
         Returns
         -------
         ndarray, shape (rows, columns)
-            Rows with active region and strengths; NaN where an input of the rules is not finite.
+            The same rows with active region and firing strengths; NaN where an input of the rules is not finite.
         """
         memberships = picked[:, self._memberships]
         weights, clearances = picked[:, self._weights], picked[:, self._clearances]
-        resting = rests(picked[:, self._goal], picked[:, self._velocity])
+        resting = is_resting(picked[:, self._goal], picked[:, self._velocity])
         active = active_regions(self._criteria, memberships, weights, clearances, resting)
         inputs = picked[:, self._inputs]
         numbers = np.isfinite(inputs).all(axis=1)

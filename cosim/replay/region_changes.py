@@ -33,7 +33,7 @@ from cosim.simulation.commands.sources import read_log
 from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array
 
-Log = Sequence[tuple[int, Command]]  # steps, and the commands applied at them
+Log = Sequence[tuple[int, Command]]  # each command with the step at which it was applied
 
 _SAME = 1e-6  # m; closer radii of a record are equal up to rounding
 
@@ -44,7 +44,7 @@ def log_of(run: Run) -> Log:
     Returns
     -------
     sequence of (int, Command)
-        Steps, and the commands applied at them; empty for a run without commands.
+        Each command with the step at which it was applied; empty for a run without commands.
 
     Raises
     ------
@@ -56,14 +56,14 @@ def log_of(run: Run) -> Log:
 
 
 def changes_of(run: Run, log: Log) -> list[dict[str, Any]]:
-    """Return the changes of regions during a run, except their motion.
+    """List the changes of regions during a run, except their motion.
 
     Parameters
     ----------
     run : Run
         The run.
     log : sequence of (int, Command)
-        Log of `log_of`.
+        Log of commands, from `log_of`.
 
     Returns
     -------
@@ -93,14 +93,14 @@ class _Changes:
         self._index = {"goal": 0, **{r.region.name: i + 1 for i, r in enumerate(run.scenario.regions)}}
         self._gains = [run.scenario.goal_region.gain, *(r.region.gain for r in run.scenario.regions)]
         self._last_row = len(run.record) - 1
-        self._changed, self._was = _steps_of(run.record)
+        self._changed_rows, self._values = _steps_of(run.record)
         self._items: tuple[MissionItem, ...] = ()
-        self._at = -1  # item of the mission whose commands were applied last
+        self._item = -1  # item of the mission whose commands were applied last
 
     def of(self, log: Log) -> Iterator[dict[str, Any]]:
         """Yield the changes, step by step."""
         commanded = {k: [command for _, command in group] for k, group in groupby(log, key=lambda entry: entry[0])}
-        for k in sorted({*commanded, *self._changed.tolist()}):
+        for k in sorted({*commanded, *self._changed_rows.tolist()}):
             commands = commanded.get(k, [])
             # the last command, such as a reset, may be after the last row
             row = min(k, self._last_row)
@@ -114,7 +114,7 @@ class _Changes:
 
     def _at_row(self, row: int) -> Array:
         """Return the target's radius, 1 or 0 for a mission, and its item, shape (3,)."""
-        found: Array = self._was[np.searchsorted(self._changed, row, "right") - 1]
+        found: Array = self._values[np.searchsorted(self._changed_rows, row, "right") - 1]
         return found
 
     def _by_mission(self, commands: Iterable[Command], now: int | None) -> Iterator[Command]:
@@ -122,16 +122,16 @@ class _Changes:
         begun = False
         for command in commands:
             if isinstance(command, SetMission):
-                self._items, self._at = command.items, -1
+                self._items, self._item = command.items, -1
             elif isinstance(command, SetCurrentItem):
-                self._at, begun = command.item - 1, True
+                self._item, begun = command.item - 1, True
             elif isinstance(command, SetMode) and command.mode == "mission":
-                self._at, begun = max(self._at, 0) - 1, True
-        if now is None or not 0 <= now < len(self._items) or (now == self._at and not begun):
+                self._item, begun = max(self._item, 0) - 1, True
+        if now is None or not 0 <= now < len(self._items) or (now == self._item and not begun):
             return
-        for item in way(self._items, self._at, now) or [now]:
+        for item in way(self._items, self._item, now) or [now]:
             yield from self._items[item].commands
-        self._at = now
+        self._item = now
 
     def _apply(self, command: Command) -> str | None:
         """Apply a change, and return the name of its region; None if it has none, or the change is refused."""
