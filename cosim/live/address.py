@@ -20,11 +20,11 @@ _EXPECTED = "expected HOST:PORT or PORT, such as 8765"
 class LiveAddress:
     """Address at which a live view is served."""
 
-    host: str = HOST  # as the user named it
+    host: str = HOST  # host as the user named it
     ip: str = HOST
     port: int = PORT  # 0 for any free one
     insisted: bool = False  # True: only this port; False: any free port if it is in use
-    loopback: bool = True  # not reached by other machines
+    loopback: bool = True  # True: other machines do not reach it
 
 
 def parse_live(text: str, allow_remote: bool = False) -> LiveAddress:
@@ -40,7 +40,7 @@ def parse_live(text: str, allow_remote: bool = False) -> LiveAddress:
     Returns
     -------
     LiveAddress
-        The socket is not opened yet.
+        The address; its socket is not opened yet.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def foreign_origin(address: LiveAddress, host: str | None, origin: str | None) -
     Returns
     -------
     str or None
-        One line for the response.
+        The reason, one line for the response.
     """
     name = _name(host or "")
     known = name in _LOOPBACK_NAMES or name == address.host.lower()
@@ -106,7 +106,7 @@ def _is_ip(name: str) -> bool:
     return False
 
 
-def bound(address: LiveAddress) -> socket.socket:
+def open_socket(address: LiveAddress) -> socket.socket:
     """Open a socket at an address; at a free port if the default one is in use.
 
     Raises

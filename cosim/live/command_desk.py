@@ -14,7 +14,7 @@ from cosim.simulation.commands.settings import LiveSettings
 from cosim.simulation.commands.sources import CommandQueue
 from plant_fmu.errors import one_line
 
-LONGEST = 16_384  # bytes of a message
+MAX_LENGTH = 16_384  # bytes of a message
 
 _decoder = msgspec.json.Decoder(Command)
 
@@ -28,23 +28,23 @@ class CommandDesk:
         The scenario of the run.
     queue : CommandQueue or str
         Queue of the run, or the reason why commands are rejected.
-    has_come : callable
-        Returns True if the obstacle slot of that name holds an obstacle.
+    is_occupied : callable
+        Function that returns True if the obstacle slot of that name holds an obstacle.
 
     Attributes
     ----------
     settings : LiveSettings
-        The settings once all queued commands are applied.
+        Settings with all queued commands applied.
     """
 
-    def __init__(self, scenario: Scenario, queue: CommandQueue | str, has_come: Callable[[str], bool]) -> None:
+    def __init__(self, scenario: Scenario, queue: CommandQueue | str, is_occupied: Callable[[str], bool]) -> None:
         self.settings = LiveSettings(scenario)
-        self._queue, self._has_come = queue, has_come
+        self._queue, self._is_occupied = queue, is_occupied
         self._run = queue.run if isinstance(queue, CommandQueue) else 0
         self._movable = [name for name in scenario.moving if name != "goal"]
-        self._comes = {secondary.region.name for secondary in scenario.regions if secondary.is_dynamic}
+        self._slots = {secondary.region.name for secondary in scenario.regions if secondary.is_dynamic}
 
-    def take(self, message: str | bytes) -> str | None:
+    def submit(self, message: str | bytes) -> str | None:
         """Submit a viewer's message to the run.
 
         Parameters
@@ -55,7 +55,7 @@ class CommandDesk:
         Returns
         -------
         str or None
-            Reason for rejecting it; None if the next step applies it.
+            Reason for rejecting the command; None if the next step applies it.
         """
         if isinstance(self._queue, str):
             return self._queue
@@ -70,10 +70,10 @@ class CommandDesk:
             return one_line(f"no command: {error}")
         except CommandError as error:
             return str(error)
-        self.follow(command)
+        self.update_settings(command)
         return None
 
-    def follow(self, command: Command) -> None:
+    def update_settings(self, command: Command) -> None:
         """Update the settings by a command that the run applies, from any source.
 
         Raises
@@ -92,7 +92,7 @@ class CommandDesk:
                 raise CommandError(
                     f"region is {command.region!r}, expected one of {', '.join(self._movable) or 'none'}"
                 )
-            case ShiftRegion() if command.region in self._comes and not self._has_come(command.region):
+            case ShiftRegion() if command.region in self._slots and not self._is_occupied(command.region):
                 raise CommandError(f"region is {command.region!r}: no such obstacle has come")
             case SetMission():
                 for item in command.items:

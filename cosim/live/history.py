@@ -8,8 +8,8 @@ import numpy as np
 
 from cosim.simulation.signals import Array
 
-_BYTES = 8_000_000  # of old rows
-_NEW = 256  # recent rows, which are all kept
+_BYTES = 8_000_000  # bound of the memory of old rows
+_NEW = 256  # number of recent rows, which are all kept
 
 
 class History:
@@ -19,7 +19,7 @@ class History:
     ----------
     columns : int
         Number of columns of a row.
-    most : int, optional
+    max_old : int, optional
         Bound of the number of old rows; default: as many as fit into 8 MB.
 
     Attributes
@@ -28,14 +28,14 @@ class History:
         Number of rows added so far; a row's number is the count after adding it.
     """
 
-    def __init__(self, columns: int, most: int | None = None) -> None:
-        most = most or max(2, _BYTES // (8 * columns))
+    def __init__(self, columns: int, max_old: int | None = None) -> None:
+        max_old = max_old or max(2, _BYTES // (8 * columns))
         self.count = 0
         self._columns = columns
-        self._old: Array = np.empty((most, columns))
-        self._numbers = np.zeros(most, dtype=np.int64)
+        self._old: Array = np.empty((max_old, columns))
+        self._numbers = np.zeros(max_old, dtype=np.int64)
         self._kept = 0
-        self._stride = 1  # every how many of the old rows one is kept
+        self._stride = 1  # of the old rows every n-th is kept
         self._new: deque[Array] = deque()
 
     def add(self, row: Array) -> None:
@@ -58,29 +58,29 @@ class History:
         self._old[self._kept], self._numbers[self._kept] = row, number
         self._kept += 1
 
-    def since(self, number: int, most: int) -> tuple[Array, int]:
-        """Return the rows after a row.
+    def since(self, number: int, max_rows: int) -> tuple[Array, int]:
+        """Return the rows after that of a number.
 
         Parameters
         ----------
         number : int
-            Number of that row; 0 for all.
-        most : int
-            Greatest number of rows to return; further calls return those behind.
+            Number of the last row that is left out; 0 for all rows.
+        max_rows : int
+            Greatest number of rows to return; further calls return the following ones.
 
         Returns
         -------
         ndarray, shape (rows, columns)
-            In the order of adding.
+            Rows in the order in which they were added.
         int
             Number of the last returned row, or `number` if there is none.
         """
         first_new = self.count - len(self._new)  # rows up to this number are old
         if number < first_new:
-            at = int(np.searchsorted(self._numbers[: self._kept], number, side="right"))
-            end = min(self._kept, at + most)
-            if end > at:
-                return self._old[at:end].copy(), int(self._numbers[end - 1])
+            first = int(np.searchsorted(self._numbers[: self._kept], number, side="right"))
+            end = min(self._kept, first + max_rows)
+            if end > first:
+                return self._old[first:end].copy(), int(self._numbers[end - 1])
             number = first_new
-        rows = [self._new[i] for i in range(number - first_new, min(len(self._new), number - first_new + most))]
+        rows = [self._new[i] for i in range(number - first_new, min(len(self._new), number - first_new + max_rows))]
         return np.array(rows).reshape(len(rows), self._columns), number + len(rows)

@@ -27,8 +27,8 @@ from cosim.simulation.signals import Array, Column
 
 log = logging.getLogger(__name__)
 
-_ROWS = 512  # of a message
-_SAID = 50  # newest texts, which are kept for viewers that connect late
+_ROWS = 512  # greatest number of rows in a message
+_TEXTS = 50  # number of newest texts that are kept for viewers that connect late
 
 
 @dataclass
@@ -42,14 +42,14 @@ class Cursor:
 
 
 class Hub:
-    """The run that is shown.
+    """State of the run that is shown, and messages about it for viewers.
 
     Attributes
     ----------
     run : int
         Number of the run, from 0; -1 before the first.
     desk : CommandDesk
-        Takes the commands of viewers.
+        Desk that submits the commands of viewers to the run.
     """
 
     def __init__(self) -> None:
@@ -69,7 +69,7 @@ class Hub:
         scenario : Scenario
             The scenario of the run.
         columns : sequence of Column
-            Columns of its rows.
+            Columns of the run's rows.
         queue : CommandQueue or str
             Queue for commands, or the reason why they are rejected.
         """
@@ -80,20 +80,20 @@ class Hub:
         self._header["changes"] = []
         self._limits = limits_of(scenario)
         self._step = scenario.time.step
-        self._middle, self._target_radius = shape_center(scenario.goal), 0.0
+        self._goal_center, self._target_radius = shape_center(scenario.goal), 0.0
         self._regions = ["goal", *(secondary.region.name for secondary in scenario.regions)]
         self._slots = ObstacleSlots(scenario.commands.obstacles)
         self._slot_names = [secondary.region.name for secondary in scenario.regions if secondary.is_dynamic]  # by slot
         self._history = History(len(self._view_columns.columns))
         self._texts, self._dropped, self._last = [], 0, None
-        self.desk = CommandDesk(scenario, queue, self._has_come)
+        self.desk = CommandDesk(scenario, queue, self._is_occupied)
 
     @property
     def picked(self) -> list[int]:
         """Indices of the columns of the run's rows that are shown."""
         return self._view_columns.picked
 
-    def _has_come(self, region: str) -> bool:
+    def _is_occupied(self, region: str) -> bool:
         if self._last is None:
             return False
         return any(self._last[self._names[f"{region}.shift.{axis}"]] for axis in "xyz")
@@ -117,13 +117,13 @@ class Hub:
             if not isinstance(command, ManualControl):  # these arrive continually
                 self.say(command_words(command), "command", time)
             try:
-                self._follow(command, time)
+                self._apply(command, time)
             except CommandError as error:
                 log.debug("%s", error)  # the command handler warns of it
 
-    def _follow(self, command: Command, time: float) -> None:
+    def _apply(self, command: Command, time: float) -> None:
         assert self.desk is not None
-        self.desk.follow(command)
+        self.desk.update_settings(command)
         match command:
             case ChangeSetting():
                 region = self.desk.settings.region_of(command.key)
@@ -141,7 +141,7 @@ class Hub:
         assert self.desk is not None
         settings, index = self.desk.settings, self._regions.index(name)
         if name == "goal" and self._target_radius > 0.0:
-            shape = Sphere(self._middle, self._target_radius)
+            shape = Sphere(self._goal_center, self._target_radius)
         gain = self._header["regions"][index]["gain"] if shape or not index else settings[f"regions.{name}.gain"]
         drawn = shape_of(shape or settings.shapes[name], self._limits)
         self._header["changes"].append({"time": time, "region": index, "shape": drawn, "gain": gain})
@@ -157,7 +157,7 @@ class Hub:
 
     def _add_text(self, text: str) -> None:
         self._texts.append(text)
-        if len(self._texts) > _SAID:
+        if len(self._texts) > _TEXTS:
             self._texts.pop(0)
             self._dropped += 1
 

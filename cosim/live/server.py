@@ -18,7 +18,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from cosim.live.address import LiveAddress, foreign_origin
-from cosim.live.command_desk import LONGEST
+from cosim.live.command_desk import MAX_LENGTH
 from cosim.live.hub import Cursor, Hub
 from cosim.live.messages import text_of
 from cosim.replay.page import replay_page
@@ -56,23 +56,23 @@ async def serve(
     Parameters
     ----------
     listening : socket
-        Bound and listening.
+        Bound and listening socket.
     address : LiveAddress
         Address of the socket.
     hub : Hub
         State of the run that is shown.
     take_rows : callable
-        Passes new rows to the hub.
+        Function that passes new rows to the hub.
     closing : threading.Event
-        Set to end the server.
+        Event that ends the server.
     """
     viewers = _Viewers(address, hub, replay_page([], "Live run").encode())
     quiet = logging.getLogger(f"{__name__}.connections")
     quiet.setLevel(logging.CRITICAL + 1)  # invalid requests to the port are not logged
     async with serve_websockets(
-        viewers.show, sock=listening, process_request=viewers.answer, compression=None, max_size=LONGEST, max_queue=4,
-        open_timeout=5.0, ping_interval=_PING_PERIOD, ping_timeout=_PING_PERIOD, close_timeout=1.0, server_header=None,
-        logger=quiet, create_connection=_limited_connections(CONNECTIONS),
+        viewers.show, sock=listening, process_request=viewers.answer, compression=None, max_size=MAX_LENGTH,
+        max_queue=4, open_timeout=5.0, ping_interval=_PING_PERIOD, ping_timeout=_PING_PERIOD, close_timeout=1.0,
+        server_header=None, logger=quiet, create_connection=_limited_connections(CONNECTIONS),
     ):  # fmt: skip
         while not closing.is_set():
             take_rows()
@@ -85,19 +85,19 @@ async def serve(
             await asyncio.sleep(_PERIOD)
 
 
-def _limited_connections(most: int) -> type[ServerConnection]:
-    """Return a class of connections that aborts new ones while `most` are open."""
-    made: set[ServerConnection] = set()
+def _limited_connections(max_open: int) -> type[ServerConnection]:
+    """Return a class of connections that aborts new ones while `max_open` are open."""
+    opened: set[ServerConnection] = set()
 
     class Connection(ServerConnection):
         def connection_made(self, transport: asyncio.BaseTransport) -> None:
             super().connection_made(transport)
-            made.add(self)
-            if len(made) > most:
+            opened.add(self)
+            if len(opened) > max_open:
                 self.transport.abort()
 
         def connection_lost(self, exc: Exception | None) -> None:
-            made.discard(self)
+            opened.discard(self)
             super().connection_lost(exc)
 
     return Connection
@@ -119,7 +119,7 @@ class _Viewers:
 
     @property
     def behind(self) -> bool:
-        """Whether messages for some viewer are not sent yet."""
+        """True if messages for some viewer are not sent yet."""
         return any(not self._hub.is_up_to_date(cursor) for cursor in self.cursors)
 
     def answer(self, connection: ServerConnection, request: Request) -> Response | None:
@@ -184,7 +184,7 @@ class _Viewers:
                     return
                 await asyncio.sleep(1.0 / _COMMAND_RATE)  # further messages wait at the sender
             allowance -= 1.0
-            reason = "the run has not begun" if self._hub.desk is None else self._hub.desk.take(message)
+            reason = "the run has not begun" if self._hub.desk is None else self._hub.desk.submit(message)
             if reason is not None:
                 await connection.send(text_of("said", kind="refused", text=reason, time=None))
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.live.address import LiveAddress, bound
+from cosim.live.address import LiveAddress, open_socket
 from cosim.live.hub import Hub
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.commands import Command
@@ -22,15 +22,15 @@ from cosim.simulation.signals import Array, Column
 
 log = logging.getLogger(__name__)
 
-PERIOD = 1.0 / 30.0  # s of the wall clock, between rows that are shown
-_WAITING = 256  # greatest number of rows in the queue to the thread; beyond it the oldest are dropped
-_CLOSING = 3.0  # s
+PERIOD = 1.0 / 30.0  # s of the wall clock, between rows that are copied
+_QUEUE_LENGTH = 256  # greatest number of rows in the queue to the thread; beyond it the oldest are dropped
+_CLOSE_TIMEOUT = 3.0  # s, for which closing or a new run waits for the thread
 
 
 class LiveView:
     """Observer that copies some rows for viewers, which another thread serves.
 
-    The run receives nothing from here but commands, through the queue. Errors here do not affect it.
+    The view passes only commands to the run, through its queue. Errors of the view do not affect the run.
 
     Parameters
     ----------
@@ -51,17 +51,17 @@ class LiveView:
     def __init__(self, address: LiveAddress) -> None:
         from cosim.live.server import serve
 
-        self._socket = bound(address)
+        self._socket = open_socket(address)
         port = self._socket.getsockname()[1]
         self.url = f"http://{address.host}:{port}/"
         self._hub = Hub()
-        self._rows: deque[tuple[int, Array]] = deque(maxlen=_WAITING)
-        self._run, self._picked, self._due, self._last = -1, np.zeros(0, dtype=np.intp), 0.0, 0
+        self._rows: deque[tuple[int, Array]] = deque(maxlen=_QUEUE_LENGTH)
+        self._run, self._picked, self._due, self._last_step = -1, np.zeros(0, dtype=np.intp), 0.0, 0
         self._loop = asyncio.new_event_loop()
         self._closing = threading.Event()
         self._started = False
         self._serve = serve(self._socket, address, self._hub, self._take_rows, self._closing)
-        self._thread = threading.Thread(target=self._live, name="live view", daemon=True)
+        self._thread = threading.Thread(target=self._run_server, name="live view", daemon=True)
         self._warnings = _Warnings(self)
 
     # ---- called in the thread of the run ----
@@ -74,7 +74,7 @@ class LiveView:
         scenario : Scenario
             The scenario of the run.
         columns : sequence of Column
-            Columns of its rows.
+            Columns of the run's rows.
         queue : CommandQueue or str
             Queue for commands, or the reason why they are rejected.
         """
@@ -89,13 +89,13 @@ class LiveView:
             begun = threading.Event()
             self._call(hub.begin, self._run, scenario, columns, queue)
             self._call(begun.set)
-            begun.wait(_CLOSING)
-        self._picked, self._due, self._last = np.array(hub.picked), 0.0, scenario.steps
+            begun.wait(_CLOSE_TIMEOUT)
+        self._picked, self._due, self._last_step = np.array(hub.picked), 0.0, scenario.steps
 
     def observe(self, k: int, row: Array) -> None:
         """Copy the shown columns of the row of step `k`, if a copy is due."""
         now = time.perf_counter()
-        if now >= self._due or k == self._last:
+        if now >= self._due or k == self._last_step:
             self._due = now + PERIOD
             self._rows.append((self._run, row[self._picked]))
 
@@ -120,7 +120,7 @@ class LiveView:
             self._loop.close()
         elif self._thread.is_alive():
             self._closing.set()
-            self._thread.join(_CLOSING)
+            self._thread.join(_CLOSE_TIMEOUT)
         self._socket.close()
 
     def __enter__(self) -> LiveView:
@@ -140,7 +140,7 @@ class LiveView:
         except RuntimeError:  # the thread has failed, which was logged
             log.debug("the view is closed")
 
-    def _live(self) -> None:
+    def _run_server(self) -> None:
         asyncio.set_event_loop(self._loop)
         try:
             self._loop.run_until_complete(self._serve)

@@ -22,7 +22,7 @@ from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import Sensing
 from cosim.simulation.signals import Array
 
-_TURNS = 6  # greatest number of spans that a table lists for a criterion
+_MAX_SPANS = 6  # greatest number of spans that a table lists for a criterion
 
 
 @dataclass(frozen=True)
@@ -33,13 +33,13 @@ class Contents:
     asked: str
     verdict: str
     remarks: tuple[str, ...]
-    claims: Table | None  # comparison with the paper's
+    claims: Table | None  # comparison with the paper's claims
     regions: Table | None
     numbers: tuple[Table, ...]
     setting: Table
     scenario: str  # text of the scenario file
-    repeat: tuple[str, ...]  # commands
-    repeats: str  # description of the commands
+    repeat: tuple[str, ...]  # commands that repeat the run
+    repeats: str  # description of these commands
     files: tuple[tuple[str, str], ...]  # name and description of files in the run folder
 
 
@@ -49,12 +49,12 @@ def contents_of(run: Run) -> Contents:
     Parameters
     ----------
     run : Run
-        Finished, interrupted or killed.
+        A completed, interrupted or killed run.
 
     Returns
     -------
     Contents
-        Plain texts, nothing escaped.
+        Contents as plain text, without any escapes.
     """
     commands, repeats = _repeating(run)
     return Contents(
@@ -83,9 +83,9 @@ def _remarks(run: Run) -> tuple[str, ...]:
     names += [f"{secondary.region.name}.clearance" for secondary in run.scenario.regions]
     count, first = 0, math.inf
     for block in run.record.blocks(["time", *names]):
-        broken = np.logical_or.reduce([~np.isfinite(block[name]) for name in names])
-        if broken.any():
-            count, first = count + int(np.count_nonzero(broken)), min(first, block["time"][np.argmax(broken)])
+        missing = np.logical_or.reduce([~np.isfinite(block[name]) for name in names])
+        if missing.any():
+            count, first = count + int(np.count_nonzero(missing)), min(first, block["time"][np.argmax(missing)])
     if not count:
         return log_remarks(run)
     many = f"{count} of {len(run.record)} rows of the record hold places or clearances that are no numbers"
@@ -113,7 +113,7 @@ def _regions(run: Run) -> Table | None:
         when = f"{violation.worst_at:.2f}" if math.isfinite(least) else "–"
         degrees = run.summary["clearance_unit"][region.name] == "rad"
         shown = f"{format_number(math.degrees(least), 4)}°" if degrees else f"{format_number(least, 4)} m"
-        lasting = violation.lasting()
+        violated_for = violation.duration()
         rows.append(
             (
                 region.name,
@@ -123,7 +123,7 @@ def _regions(run: Run) -> Table | None:
                 "hard" if region.hard else "soft",
                 shown,
                 when,
-                "never" if lasting is None else f"{lasting:.2f}",
+                "never" if violated_for is None else f"{violated_for:.2f}",
             )
         )
     head = (
@@ -142,15 +142,15 @@ class _Violation:
     def add(self, time: Array, clearance: Array) -> None:
         """Add the next rows."""
         known = np.where(np.isnan(clearance), np.inf, clearance)
-        at = int(np.argmin(known))
-        if known[at] < self._least:
-            self._least, self.worst_at = float(known[at]), float(time[at])
+        i = int(np.argmin(known))
+        if known[i] < self._least:
+            self._least, self.worst_at = float(known[i]), float(time[i])
         self._ended += sum(span.end - span.start for span in self._spans.add(clearance < 0.0, time))
 
-    def lasting(self) -> float | None:
+    def duration(self) -> float | None:
         """Return the total duration of violations of the region [s], None if there were none."""
-        still = self._spans.open
-        return self._ended + (still.end - still.start if still else 0.0) if self._least < 0.0 else None
+        last = self._spans.open
+        return self._ended + (last.end - last.start if last else 0.0) if self._least < 0.0 else None
 
 
 def _criteria(run: Run) -> Table | None:
@@ -162,16 +162,16 @@ def _criteria(run: Run) -> Table | None:
     costs = {
         r.criterion: format_number(r.region.crossing_cost, 3) for r in scenario.regions if plans and not r.region.hard
     }
-    turns, end = active_region_changes(run), run.record.value("time", -1)
+    changes, end = active_region_changes(run), run.record.value("time", -1)
     rows = []
     for i, criterion in enumerate(scenario.criteria):
         spans = [
             (start, stop, scenario.regions[index - 1].region.name)
-            for (start, index), (stop, _) in pairwise([*turns, (end, 0)])
+            for (start, index), (stop, _) in pairwise([*changes, (end, 0)])
             if index and scenario.criterion_places[index - 1] == i
         ]
-        shown = ", ".join(f"{start:.2f} to {stop:.2f} ({name})" for start, stop, name in spans[:_TURNS])
-        more = f", and {len(spans) - _TURNS} more" if len(spans) > _TURNS else ""
+        shown = ", ".join(f"{start:.2f} to {stop:.2f} ({name})" for start, stop, name in spans[:_MAX_SPANS])
+        more = f", and {len(spans) - _MAX_SPANS} more" if len(spans) > _MAX_SPANS else ""
         why = "; ".join(reason.words(scenario.arbiter.ramp) for reason in criterion.reasons)
         lasting = sum(stop - start for start, stop, _ in spans)
         row = (f"{i + 1} {criterion.name}", why, f"{lasting:.2f}" if spans else "never", f"{shown}{more}" or "–")
@@ -251,14 +251,14 @@ def _lyapunov(run: Run) -> Table | None:
     rows = tuple(
         (
             form,
-            *(format_number(course[which], 4) for which in ("start", "end", "least")),
-            str(course["increases"]),
+            *(format_number(form_summary[which], 4) for which in ("start", "end", "least")),
+            str(form_summary["increases"]),
             *(
-                "never" if course[which] is None else format_number(course[which], 5)
+                "never" if form_summary[which] is None else format_number(form_summary[which], 5)
                 for which in ("first_rise", "first_negative")
             ),
         )
-        for form, course in run.summary["lyapunov"].items()
+        for form, form_summary in run.summary["lyapunov"].items()
     )
     head = (
         "Form", "at the start [N m]", "at the end [N m]", "least [N m]", "steps in which it rose", "first [s]",

@@ -22,12 +22,12 @@ def html_report(contents: Contents, about: str, figures: Sequence[tuple[str, str
     about : str
         Line below the title, which describes the run.
     figures : sequence of (str, str, str)
-        Name, caption and SVG of each.
+        Name, caption and SVG of each figure.
 
     Returns
     -------
     str
-        HTML.
+        The page as HTML.
     """
     template = (resources.files("cosim.report") / "page.html").read_text(encoding="utf-8")
     return Template(template).substitute(

@@ -26,21 +26,21 @@ def write_report(run: Run, formats: Collection[str] = ("html",)) -> list[Path]:
     Parameters
     ----------
     run : Run
-        Finished, interrupted or killed.
+        A completed, interrupted or killed run.
     formats : collection of str
-        Of `FORMATS`: ``html`` is ``report.html`` with its figures as SVG, ``png`` is the figures as SVG and PNG.
+        Formats from `FORMATS`: ``html`` is ``report.html`` with its figures as SVG, ``png`` the figures as SVG and PNG.
 
     Returns
     -------
     list of Path
-        The files, the figures last.
+        The written files, the figures last.
     """
     # importing Matplotlib takes as long as all other imports together
-    from cosim.report.figures.sampled_rows import story_of
+    from cosim.report.figures.sampled_rows import make_figure_data
 
     scratch = Path(tempfile.mkdtemp(prefix=".report-", dir=run.folder))
     try:
-        files = _with_figures(run, story_of(run), formats, scratch)
+        files = _with_figures(run, make_figure_data(run), formats, scratch)
         shutil.rmtree(run.folder / FIGURES, ignore_errors=True)
         (scratch / FIGURES).replace(run.folder / FIGURES)
         written = [file.replace(run.folder / file.name) for file in files]
@@ -68,7 +68,7 @@ def _with_figures(run: Run, data: FigureData, formats: Collection[str], folder: 
 
 
 def about(run: Run) -> str:
-    """Describe the run in a line."""
+    """Describe the run in a line: scenario or log, vehicle, law and arbiter."""
     s = run.scenario
     if s.log:
         return f"A log of {s.vehicle.title}, imported from {s.log}."

@@ -10,6 +10,6 @@ class Table:
     """A table of texts."""
 
     title: str
-    head: tuple[str, ...]  # empty for a table of names and values
+    head: tuple[str, ...]  # names of the columns; empty for a table of names and values
     rows: tuple[tuple[str, ...], ...]
-    widths: tuple[float, ...]  # of the columns, relative
+    widths: tuple[float, ...]  # relative widths of the columns

@@ -92,7 +92,7 @@ class Page:
     Parameters
     ----------
     title : str
-        Of the page.
+        Title of the page.
     """
 
     def __init__(self, title: str) -> None:
@@ -141,9 +141,9 @@ def write_figures(folder: Path, drawings: Iterable[NamedFigure]) -> dict[str, Ht
     Parameters
     ----------
     folder : Path
-        Of the campaign.
+        Folder of the campaign.
     drawings : iterable of NamedFigure
-        In their order.
+        The figures; they are drawn while they are written.
 
     Returns
     -------
@@ -153,7 +153,7 @@ def write_figures(folder: Path, drawings: Iterable[NamedFigure]) -> dict[str, Ht
     Raises
     ------
     OSError
-        If they cannot be written; the earlier figures stay.
+        If the figures cannot be written; the earlier ones stay.
     """
     import matplotlib as mpl
 

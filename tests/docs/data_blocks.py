@@ -85,7 +85,7 @@ def _check_json(block: Block) -> None:
         scenario = load_scenario(block.directives.commands_of, ["commands.enabled=true"])
         desk = CommandDesk(scenario, CommandQueue(), lambda name: True)
         for line in lines:
-            if why := desk.take(line):
+            if why := desk.submit(line):
                 raise PageError(f"{block.where}: {line} is refused: {why}")
 
 

@@ -12,9 +12,9 @@ from cosim.live.watching.bars import Bars
 from cosim.live.watching.sources import Look
 from cosim.simulation.commands.commands import MODES
 
-_STYLES = {"#D55E00": "red", "#E69F00": "yellow", "#56B4E9": "blue"}  # of the terminal, for colours of criteria
+_STYLES = {"#D55E00": "red", "#E69F00": "yellow", "#56B4E9": "blue"}  # terminal colours of the criteria's colours
 _GOAL_STYLE = "green"
-_LONGEST_NAME = 12  # characters of a criterion
+_LONGEST_NAME = 12  # greatest number of characters of a criterion's name
 _FIRED = 0.005  # least strength of a rule that is shown
 _WIDE = 120  # least width for three columns, characters
 
@@ -29,14 +29,14 @@ def picture(look: Look, width: int = 80, height: int | None = None, ascii_only: 
     width : int
         Greatest length of a line, in characters.
     height : int, optional
-        Greatest number of lines; of regions and rules beyond it only the number is shown.
+        Greatest number of lines; regions and rules that do not fit are only counted.
     ascii_only : bool
         Draw bars in ASCII characters.
 
     Returns
     -------
     RenderableType
-        For a rich console of that width.
+        Lines for a rich console of that width.
     """
     bars = Bars(ascii_only)
     foot = _foot(look)
@@ -44,12 +44,12 @@ def picture(look: Look, width: int = 80, height: int | None = None, ascii_only: 
     if look.row is None:
         return Group(*head, Text("no rows yet"), *foot)
     wide = width >= _WIDE
-    room = None if height is None else height - len(head) - sum(_lines(text, width) for text in foot) - 1
+    free = None if height is None else height - len(head) - sum(_lines(text, width) for text in foot) - 1
     column = (width - 2 * (2 if wide else 1)) // (3 if wide else 2)
     weights, state, estimates = _weights(look, column, bars), _state(look), _estimates(look)
-    left_room = None if room is None else room - len(weights) - 1
-    rules_room = None if room is None else room - 1 - (0 if wide else len(state) + len(estimates) + 1)
-    distances, rules = _distances(look, column, bars, left_room), _rules(look, column, bars, rules_room)
+    free_left = None if free is None else free - len(weights) - 1
+    free_rules = None if free is None else free - 1 - (0 if wide else len(state) + len(estimates) + 1)
+    distances, rules = _distances(look, column, bars, free_left), _rules(look, column, bars, free_rules)
     columns = [[*weights, Text(), *distances], [*state, Text(), *estimates], rules]
     if not wide:
         columns = [columns[0], [*state, *estimates, Text(), *rules]]
@@ -136,7 +136,7 @@ def _weights(look: Look, width: int, bars: Bars) -> list[Text]:
     return lines
 
 
-def _distances(look: Look, width: int, bars: Bars, room: int | None) -> list[Text]:
+def _distances(look: Look, width: int, bars: Bars, lines_free: int | None) -> list[Text]:
     """Return a bar for each region with 0 in the middle: to the right respected, to the left violated."""
     scale = 10.0 * max(look.header["ramp"], 0.01)
     active = look["active"]
@@ -147,7 +147,7 @@ def _distances(look: Look, width: int, bars: Bars, room: int | None) -> list[Tex
             found.append((i != 0, i != active, clearance, i, region))
     found.sort(key=lambda entry: entry[:3])
     lines = [_title(f"Distances, bars to {scale:g} m")]
-    shown = found if room is None or len(found) < room else found[: max(1, room - 2)]
+    shown = found if lines_free is None or len(found) < lines_free else found[: max(1, lines_free - 2)]
     for _, _, clearance, i, region in shown:
         style = _style(look, region["criterion"])
         name = plain(region["name"])[:9]
@@ -178,7 +178,7 @@ def _state(look: Look) -> list[Text]:
     asked, acts = (math.hypot(*(look[f"{kind}.{axis}"] for axis in "XYZ")) for kind in ("command", "actuation"))
     north, east, depth = (look[f"position.{axis}"] for axis in "xyz")
     roll, pitch, yaw = (math.degrees(look[f"attitude.{angle}"]) for angle in ("roll", "pitch", "yaw"))
-    cut = look["wrench_saturated"] > 0.0 or look["allocation_saturated"] > 0.0
+    saturated = look["wrench_saturated"] > 0.0 or look["allocation_saturated"] > 0.0
     violated = [
         plain(region["name"])
         for region in look.header["regions"]
@@ -189,7 +189,7 @@ def _state(look: Look) -> list[Text]:
         Text(f"north {north:z.2f} east {east:z.2f} m"),
         Text(f"depth {depth:z.2f} m, speed {speed:.2f} m/s"),
         Text(f"roll {roll:z.0f}° pitch {pitch:z.0f}° yaw {yaw:z.0f}°"),
-        Text(f"force {asked:.1f} N asked, {acts:.1f} acts" + (", CUT" if cut else "")),
+        Text(f"force {asked:.1f} N asked, {acts:.1f} acts" + (", CUT" if saturated else "")),
     ]
     if violated:
         lines.append(Text(f"VIOLATED: {', '.join(violated)}", style="bold reverse"))
@@ -202,10 +202,10 @@ def _estimates(look: Look) -> list[Text]:
     return [_title("Estimates (true)"), Text("  ".join(parts[:2])), Text("  ".join(parts[2:]))]
 
 
-def _rules(look: Look, width: int, bars: Bars, room: int | None) -> list[Text]:
+def _rules(look: Look, width: int, bars: Bars, lines_free: int | None) -> list[Text]:
     rules = [(look[f"rule.{rule['label']}"], plain(rule["words"])) for rule in look.header["rules"]]
     fired = sorted((rule for rule in rules if rule[0] > _FIRED), reverse=True)
-    shown = fired if room is None or len(fired) <= room else fired[: max(0, room - 1)]
+    shown = fired if lines_free is None or len(fired) <= lines_free else fired[: max(0, lines_free - 1)]
     lines = [_title("Rules that fire")]
     for strength, words in shown:
         line = bars.part(strength, 5, "magenta").append(f" {strength:4.2f} ")

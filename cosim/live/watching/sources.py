@@ -28,7 +28,7 @@ from cosim.scenario.scenario import load_scenario
 from cosim.simulation.signals import Array
 
 _FRAME = 0.1  # s of the wall clock, between pictures
-_FAST = 200  # pictures of a run that is played back at full speed
+_FAST = 200  # number of pictures of a run that is played back at full speed
 _ROWS = 10_000  # greatest number of rows of a finished run
 _FRESH = 5.0  # s; a run whose newest part is older is not being recorded
 _ANSWER = 5.0  # s, timeout of a connection to a live view
@@ -80,8 +80,8 @@ class Look:
     """A run at one instant."""
 
     header: dict[str, Any]
-    row: Array | None  # (columns,), None before the first
-    note: str  # source of the row
+    row: Array | None  # (columns,), None before the first row
+    note: str  # description of the row's source
     ended: tuple[str, str] | None = None  # status and verdict, once the run is over
     silent: bool = False  # True if the recording has no new rows
 
@@ -97,7 +97,7 @@ def looks(what: str, rate: float | None = 1.0, once: bool = False) -> Iterator[L
     Parameters
     ----------
     what : str
-        A run folder; or the port, or the address (``ws://HOST:PORT``), of a live view.
+        Run folder; or port, or address (``ws://HOST:PORT``), of a live view.
     rate : float or None
         Simulated seconds per second in the playback of a finished run; None for full speed.
     once : bool
@@ -106,7 +106,7 @@ def looks(what: str, rate: float | None = 1.0, once: bool = False) -> Iterator[L
     Yields
     ------
     Look
-        Several a second.
+        The run at one instant, several times per second.
 
     Raises
     ------
@@ -119,8 +119,8 @@ def looks(what: str, rate: float | None = 1.0, once: bool = False) -> Iterator[L
         found = _live(_endpoint(what))
         return _newest(found) if once else found
     path = Path(what)
-    if _is_written(path):
-        found = _growing(path)
+    if _is_being_recorded(path):
+        found = _recording(path)
         return _newest(found) if once else found
     return _finished(path, rate, once)
 
@@ -157,7 +157,7 @@ def _finished(path: Path, rate: float | None, once: bool) -> Iterator[Look]:
     yield at(len(times) - 1, "replay", ended)
 
 
-def _is_written(path: Path) -> bool:
+def _is_being_recorded(path: Path) -> bool:
     """Return True if a run is being recorded in a folder."""
     parts = path / PARTS
     if (path / RECORD).exists() or (path / SUMMARY).exists() or not parts.is_dir():
@@ -169,7 +169,7 @@ def _is_written(path: Path) -> bool:
         return False
 
 
-def _growing(path: Path) -> Iterator[Look]:
+def _recording(path: Path) -> Iterator[Look]:
     scenario = load_scenario(path / SCENARIO)
     header: dict[str, Any] = header_of(scenario, ())
     row: Array | None = None

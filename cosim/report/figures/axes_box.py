@@ -8,7 +8,7 @@ from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 
 from cosim.report.figures.labels import Labels
-from cosim.report.figures.layout import written
+from cosim.report.figures.layout import format_tick
 from cosim.report.figures.shape_outlines import hull_of
 from cosim.simulation.signals import Array
 
@@ -18,17 +18,17 @@ _FACE, _GRID = "#f6f6f6", "#d8d8d8"
 
 
 class Box:
-    """The box between two corners.
+    """A box between two corners, in parallel projection.
 
     Parameters
     ----------
     low, high : ndarray, shape (3,)
-        [m, NED].
+        Corners of the box [m, NED].
 
     Attributes
     ----------
     view : ndarray, shape (2, 3)
-        The directions [NED] that point right and up in the picture.
+        Directions [NED] that point right and up in the picture.
     outline : ndarray, shape (n, 2)
         Closed outline of the box in the picture.
     """
@@ -42,10 +42,10 @@ class Box:
         self._least, self._most = self.outline.min(axis=0), self.outline.max(axis=0)
         self._scale = 1.0  # inches a metre
 
-    def height_for(self, width: float, most: float) -> float:
-        """Scale the box to a picture of a `width` and at most the height `most`; return its height [inch]."""
+    def scale_to(self, width: float, max_height: float) -> float:
+        """Scale the box to a picture of a `width` and at most a `max_height`; return its height [inch]."""
         across, up = self._most - self._least
-        self._scale = min((width - _LEFT - _ROUND) / across, (most - _BOTTOM - _ROUND) / up)
+        self._scale = min((width - _LEFT - _ROUND) / across, (max_height - _BOTTOM - _ROUND) / up)
         self._aside = (width - _LEFT - _ROUND - self._scale * across) / 2.0  # inches
         return float(self._scale * up + _BOTTOM + _ROUND)
 
@@ -101,7 +101,7 @@ class Box:
             end = self.view @ point
             ax.plot(*np.column_stack([end, end + 0.04 * aside]), color="#555555", linewidth=0.6)
             x, y = end + 0.07 * aside
-            ax.text(x, y, written(tick), fontsize=8, ha=horizontal, va="center" if axis == 2 else "top")
+            ax.text(x, y, format_tick(tick), fontsize=8, ha=horizontal, va="center" if axis == 2 else "top")
         ends = np.array([corner, corner])
         ends[:, axis] = self._low[axis], self._high[axis]
         flat = ends @ self.view.T

@@ -12,11 +12,12 @@ from cosim.report.figures.style import BLACK
 from cosim.results.record import Rows
 from cosim.simulation.signals import Array
 
-_NEAR = 0.02  # of the size of the way
-_TURNED = 0.05  # in parts of the quaternion
-_ROOM = 1.05  # more than up to where it rests
-_LATEST = 2.0 / 3.0  # of the run, up to which it must have come to rest
-_TAIL = 0.15  # of the axis
+# the vehicle rests within these distances of its final pose
+_NEAR = 0.02  # part of the path's extent
+_TURNED = 0.05  # difference of an element of the quaternion
+_MARGIN = 1.05  # time of the break, relative to the time from which the vehicle rests
+_LATEST = 2.0 / 3.0  # part of the run before which the break must be
+_TAIL = 0.15  # part of the axis that shows the rest
 
 
 def rests_from(record: Rows) -> float | None:
@@ -25,20 +26,23 @@ def rests_from(record: Rows) -> float | None:
     Returns
     -------
     float or None
-        None where it moves in the last third of the run, or a pose is missing.
+        The time, a little later for a margin; None if the vehicle moves in the last third of the run, or a pose is
+        missing.
     """
     time = record["time"]
     places = record.stack([f"position.{axis}" for axis in "xyz"])
     turns = record.stack([f"quaternion.e{i}" for i in range(4)])
     if len(time) < 2 or not (np.isfinite(places).all() and np.isfinite(turns).all()):
         return None
-    way = float(np.linalg.norm(np.ptp(places, axis=0)))
-    moves = (np.abs(places - places[-1]) > _NEAR * way).any(axis=1) | (np.abs(turns - turns[-1]) > _TURNED).any(axis=1)
+    extent = float(np.linalg.norm(np.ptp(places, axis=0)))
+    moves = (np.abs(places - places[-1]) > _NEAR * extent).any(axis=1) | (np.abs(turns - turns[-1]) > _TURNED).any(
+        axis=1
+    )
     rows = np.flatnonzero(moves)
     if not rows.size or rows[-1] + 1 == len(time):
         return None
     start, end = float(time[0]), float(time[-1])
-    rest = start + _ROOM * (float(time[rows[-1] + 1]) - start)
+    rest = start + _MARGIN * (float(time[rows[-1] + 1]) - start)
     return rest if start < rest < start + _LATEST * (end - start) else None
 
 
@@ -49,16 +53,16 @@ def break_time(axes: Sequence[Axes], rest: float, end: float) -> None:
     def forward(t: Array) -> Array:
         return np.where(t > rest, rest + slope * (t - rest), t)
 
-    def back(x: Array) -> Array:
+    def inverse(x: Array) -> Array:
         return np.where(x > rest, rest + (x - rest) / slope, x)
 
     ticks = [t for t in MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(0.0, rest) if 0.0 <= t <= 0.97 * rest]
     for ax in axes:
-        ax.set_xscale("function", functions=(forward, back))
+        ax.set_xscale("function", functions=(forward, inverse))
         ax.set_xlim(0.0, end)
         ax.xaxis.set_major_locator(FixedLocator([*ticks, end]))
         ax.axvspan(rest, end, color=BLACK, alpha=0.06, linewidth=0)
-    middle = back(np.array(rest + 0.5 * slope * (end - rest)))
+    middle = inverse(np.array(rest + 0.5 * slope * (end - rest)))
     axes[0].text(
         float(middle), 0.98, "at rest", transform=axes[0].get_xaxis_transform(), ha="center", va="top", fontsize=7
     )

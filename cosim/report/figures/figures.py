@@ -15,7 +15,7 @@ from cosim.report.figures.layout import FIGURE_STYLE
 from cosim.report.figures.style import FigureData, NamedFigure
 from cosim.report.figures.trajectory import is_known, targets_of
 
-_AFTER = {figure: f" (after Fig. {figure})" for figure in ("5a", "5b", "7")}  # of the paper
+_AFTER = {figure: f" (after Fig. {figure})" for figure in ("5a", "5b", "7")}  # captions' references to the paper
 
 
 def drawings(data: FigureData) -> Iterator[NamedFigure]:
@@ -29,7 +29,7 @@ def drawings(data: FigureData) -> Iterator[NamedFigure]:
     Yields
     ------
     NamedFigure
-        In the order of the report.
+        Figures in the order of the report.
     """
     for name, caption, draw in _figures(data):
         with mpl.rc_context(FIGURE_STYLE):

@@ -28,7 +28,7 @@ def norms_of(record: Rows) -> dict[str, Array]:
     Returns
     -------
     dict
-        By label.
+        Norm by label: ``acting`` and ``asked for``.
     """
     of = {"acting": "actuation", "asked for": "command"}
     forces = {words: record.stack([f"{name}.{axis}" for axis in "XYZ"]) for words, name in of.items()}
@@ -83,7 +83,7 @@ def thrusts_of(scenario: Scenario, record: Rows) -> Array:
     Returns
     -------
     ndarray
-        [N], as `thruster_caption` says.
+        Force of each thruster at each row [N].
     """
     vehicle = scenario.vehicle
     if scenario.actuation.through == "thrusters":

@@ -11,7 +11,7 @@ from cosim.simulation.signals import Array
 
 _LETTER, _HIGH = 0.066, 0.130  # inches, width of a letter and height of a line at the size below
 _MARK = 0.06  # inches, radius of a marker
-_MOST = 0.7  # fraction of the picture; larger areas get their label in a corner
+_MAX_SHARE = 0.7  # fraction of the picture's width and height; larger areas get their label in a corner
 _SIZE = 7
 _COLOUR = "#333333"
 _CORNERS = np.array([[i, j] for i in (-1.0, 1.0) for j in (-1.0, 1.0)])
@@ -23,30 +23,30 @@ class Labels:
     Parameters
     ----------
     ax : Axes
-        With its limits set.
+        Axes whose limits are set.
     scale : float
-        [inch/m], the same along both axes.
+        Scale of the picture along both axes [inch/m].
     frame : ndarray, shape (n, 2)
         Convex outline of the area for labels [m, in the picture].
     """
 
     def __init__(self, ax: Axes, scale: float, frame: Array) -> None:
         self._ax, self._scale, self._frame = ax, scale, frame
-        self._offered: list[tuple[str, Array, Array, Path]] = []
+        self._requested: list[tuple[str, Array, Array, Path]] = []
 
-    def offer(self, name: str, outline: Array) -> None:
+    def request(self, name: str, outline: Array) -> None:
         """Request a label for an outline, or for a marker at a point; shape (n, 2) [m, in the picture]."""
-        room = _MARK / self._scale if len(outline) == 1 else 0.0
-        self._offered.append((short(name), outline.min(axis=0) - room, outline.max(axis=0) + room, Path(outline)))
+        margin = _MARK / self._scale if len(outline) == 1 else 0.0
+        self._requested.append((short(name), outline.min(axis=0) - margin, outline.max(axis=0) + margin, Path(outline)))
 
-    def put(self, path: Array) -> None:
+    def place(self, path: Array) -> None:
         """Place the labels that fit, those of small outlines first, clear of a path of shape (n, 2)."""
         floor, ceiling, frame = self._frame.min(axis=0), self._frame.max(axis=0), Path(self._frame)
         taken: list[tuple[Array, Array]] = []
-        for name, low, high, outline in sorted(self._offered, key=lambda of: float(np.prod(of[2] - of[1]))):
+        for name, low, high, outline in sorted(self._requested, key=lambda label: float(np.prod(label[2] - label[1]))):
             size = np.array([_LETTER * len(name), _HIGH]) / self._scale
             low, high = np.maximum(low, floor), np.minimum(high, ceiling)
-            wide = bool((high - low > _MOST * (ceiling - floor)).all())
+            wide = bool((high - low > _MAX_SHARE * (ceiling - floor)).all())
             for middle in _candidates(low, high, size, wide):
                 least, most = middle - size / 2.0, middle + size / 2.0
                 corners = middle + size / 2.0 * _CORNERS

@@ -14,12 +14,12 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocat
 from cosim.report.figures.style import STYLE
 from cosim.simulation.signals import Array
 
-WIDTH = 6.8  # inches, of every figure
+WIDTH = 6.8  # inches, width of every figure
 LEFT, RIGHT, BOTTOM, TOP = 0.80, 0.14, 0.46, 0.10  # inches around the axes
-LEGEND_ROW = 0.19  # inches
+LEGEND_ROW = 0.19  # inches, height of a row
 _GAP = 0.14  # inches between axes
 _LABEL = 0.17  # inches from the figure's edge to the centre of an axis label
-_LONGEST = 34  # greatest number of letters of a name in a legend
+_MAX_LETTERS = 34  # greatest number of letters of a name in a legend
 _LETTERS, _MARK = 104, 7  # widths in letters of a legend: of the figure, and of a line with its gap
 
 # names are given by users: their $ and _ are not mathematics
@@ -45,9 +45,9 @@ def panels(
     Parameters
     ----------
     heights : sequence of float
-        Of the rows [inch].
+        Heights of the rows [inch].
     widths : sequence of float
-        Of the columns, relative to each other.
+        Widths of the columns, relative to each other.
     labels : sequence of str
         Labels of the legend above all axes.
     titles : float
@@ -58,7 +58,7 @@ def panels(
     Returns
     -------
     Figure, ndarray of Axes, shape (rows, columns)
-        With tick labels at the left and at the bottom only.
+        Figure, and its axes with tick labels at the left and at the bottom only.
     """
     top = TOP + LEGEND_ROW * legend_rows(labels) + titles
     total = top + sum(heights) + _GAP * (len(heights) - 1) + BOTTOM
@@ -87,10 +87,10 @@ def plain_numbers(ax: Axes) -> None:
     """Set few ticks at round numbers, without exponents."""
     for axis, most in ((ax.xaxis, 8), (ax.yaxis, 5)):
         axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]))
-        axis.set_major_formatter(FuncFormatter(written))
+        axis.set_major_formatter(FuncFormatter(format_tick))
 
 
-def written(value: float, _: object = None) -> str:
+def format_tick(value: float, _: object = None) -> str:
     """Format a number for an axis."""
     return f"{value:.6g}".replace("-", "−") if value else "0"
 
@@ -133,7 +133,7 @@ def limits_of(signals: Sequence[Array], *, least: float = 0.0, room: float = 0.0
     Parameters
     ----------
     signals : sequence of ndarray
-        NaN and infinity are ignored.
+        Signals of any shape; NaN and infinity are ignored.
     least : float
         Least span of the axis.
     room : float
@@ -142,7 +142,7 @@ def limits_of(signals: Sequence[Array], *, least: float = 0.0, room: float = 0.0
     Returns
     -------
     float, float
-        From -1 to 1, with margin, without finite values.
+        Lower and upper limit; those of -1 to 1 with margin if there is no finite value.
     """
     finite = [s[np.isfinite(s)] for s in map(np.asarray, signals)]
     shown = np.concatenate([f for f in finite if f.size] or [np.array([-1.0, 1.0])])
@@ -154,7 +154,7 @@ def limits_of(signals: Sequence[Array], *, least: float = 0.0, room: float = 0.0
 
 def short(name: str) -> str:
     """Shorten a name for a legend."""
-    return name if len(name) <= _LONGEST else name[: _LONGEST - 1].rstrip() + "…"
+    return name if len(name) <= _MAX_LETTERS else name[: _MAX_LETTERS - 1].rstrip() + "…"
 
 
 def _rows_of(labels: Sequence[str], across: float = _LETTERS) -> list[list[str]]:

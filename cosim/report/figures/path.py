@@ -33,7 +33,7 @@ from cosim.report.figures.style import (
     features_of,
     places_of,
 )
-from cosim.report.figures.trajectory import SampledPath, way_of
+from cosim.report.figures.trajectory import SampledPath, sample_path
 from cosim.scenario.colours import GOAL_COLOUR
 from cosim.simulation.signals import Array
 
@@ -47,15 +47,15 @@ _NAMED = 8  # greatest number of regions that are labelled in space
 
 def path_3d(data: FigureData) -> Figure:
     """Draw the path, regions and goal in space, as seen from the south-east and above."""
-    way = way_of(data)
-    low, high = _extent(data, way)
+    sampled = sample_path(data)
+    low, high = _extent(data, sampled)
     wide = np.maximum(high - low, 0.4 * (high - low).max())  # least relative extent of the box along an axis
     middle = (low + high) / 2.0
     low, high = middle - wide / 2.0, middle + wide / 2.0
-    entries = _entries(data, way)
+    entries = _entries(data, sampled)
     top = TOP + LEGEND_ROW * legend_rows(list(entries))
     box = Box(low, high)
-    height = box.height_for(WIDTH - 0.2, 4.4)
+    height = box.scale_to(WIDTH - 0.2, 4.4)
     figure = new_figure(height + top)
     ax = figure.add_axes((0.1 / WIDTH, 0.0, 1.0 - 0.2 / WIDTH, height / (height + top)))
     labels = box.draw(ax)
@@ -64,24 +64,24 @@ def path_3d(data: FigureData) -> Figure:
     for place in places_of(data):
         seen = _region(ax, place, low, high, box.view, clip)
         if seen and not place.faint and few:
-            labels.offer(place.region.name, np.vstack(seen))
+            labels.request(place.region.name, np.vstack(seen))
     for name, colour, feature in features_of(data):
         ax.plot(*(box.view @ feature), "*", color=colour, markersize=9)
-        labels.offer(name, (box.view @ feature)[None])
-    floor = np.column_stack([way.points[:, :2], np.full(len(way.points), high[2])])
+        labels.request(name, (box.view @ feature)[None])
+    floor = np.column_stack([sampled.points[:, :2], np.full(len(sampled.points), high[2])])
     ax.plot(*(floor @ box.view.T).T, color=BLACK, linewidth=0.8, alpha=0.25)
-    _path(ax, data, way, box.view)
-    labels.put(way.points @ box.view.T)
+    _path(ax, data, sampled, box.view)
+    labels.place(sampled.points @ box.view.T)
     legend(figure, entries)
     return figure
 
 
 def path_plane(data: FigureData) -> Figure:
     """Draw the path and the outlines of the regions from the side and from above."""
-    way = way_of(data)
-    low, high = _extent(data, way)
+    sampled = sample_path(data)
+    low, high = _extent(data, sampled)
     side, above, along = high[2] - low[2], high[1] - low[1], high[0] - low[0]
-    entries = _entries(data, way)
+    entries = _entries(data, sampled)
     top = TOP + LEGEND_ROW * legend_rows(list(entries)) + 0.16
     across = WIDTH - LEFT - RIGHT
     scale = min(across / along, _TALLEST / (side + above))  # inches a metre
@@ -109,13 +109,13 @@ def path_plane(data: FigureData) -> Figure:
         for place in places_of(data):
             seen = _region(ax, place, low, high, view)
             if seen and not place.faint:
-                labels.offer(place.region.name, np.vstack(seen))
+                labels.request(place.region.name, np.vstack(seen))
         for name, colour, feature in features_of(data):
             ax.plot(*(view @ feature), "*", color=colour, markersize=9)
-            labels.offer(name, (view @ feature)[None])
-        _targets(ax, way, view)
-        _path(ax, data, way, view)
-        labels.put(way.points @ view.T)
+            labels.request(name, (view @ feature)[None])
+        _targets(ax, sampled, view)
+        _path(ax, data, sampled, view)
+        labels.place(sampled.points @ view.T)
     ax.set_xlabel("north, NED x [m]")
     ax.xaxis.set_label_coords(0.5, (0.17 - BOTTOM) / (scale * (high - low)[1]))
     legend(figure, entries)
@@ -152,24 +152,24 @@ def _frame(low: Array, high: Array) -> Array:
     return np.array([low, [high[0], low[1]], high, [low[0], high[1]], low])
 
 
-def _path(ax: Axes, data: FigureData, way: SampledPath, view: Array) -> None:
+def _path(ax: Axes, data: FigureData, sampled: SampledPath, view: Array) -> None:
     """Draw the path, in the colour of a criterion while one of its regions is active."""
-    flat = way.points @ view.T
+    flat = sampled.points @ view.T
     ax.plot(*flat.T, color=PATH_COLOUR, linewidth=1.6)
     for i, criterion in enumerate(data.scenario.criteria):
-        there = way.given_way == i
+        there = sampled.given_way == i
         if there.any():
             there[:-1] |= there[1:]  # up to the beginning of the next piece
             ax.plot(*np.where(there[:, None], flat, np.nan).T, color=criterion.colour, linewidth=2.4)
-    if way.overlap.any():
-        ax.plot(*np.where(way.overlap[:, None], flat, np.nan).T, color=BLACK, linewidth=3)
+    if sampled.overlap.any():
+        ax.plot(*np.where(sampled.overlap[:, None], flat, np.nan).T, color=BLACK, linewidth=3)
     ax.plot(*flat[0], "x", color=BLACK, mew=2, markersize=7)
     ax.plot(*flat[-1], "o", color=BLACK, markersize=4)
 
 
-def _targets(ax: Axes, way: SampledPath, view: Array) -> None:
+def _targets(ax: Axes, sampled: SampledPath, view: Array) -> None:
     """Draw the targets that were commanded before the last one, faint, with their numbers in order."""
-    for i, (middle, radius) in enumerate(way.targets):
+    for i, (middle, radius) in enumerate(sampled.targets):
         centre = view @ middle
         if radius > 0.0:
             turn = np.linspace(0.0, 2.0 * np.pi, 49)
@@ -183,7 +183,7 @@ def _targets(ax: Axes, way: SampledPath, view: Array) -> None:
         )
 
 
-def _entries(data: FigureData, way: SampledPath) -> dict[str, Artist]:
+def _entries(data: FigureData, sampled: SampledPath) -> dict[str, Artist]:
     """Return the legend entries of a path figure, for elements that are drawn."""
     shown = {secondary.criterion for secondary in data.scenario.regions}
     entries: dict[str, Artist] = {}
@@ -192,13 +192,13 @@ def _entries(data: FigureData, way: SampledPath) -> dict[str, Artist]:
     entries |= {c.name: Patch(color=c.colour, alpha=0.4) for c in data.scenario.criteria if c.name in shown}
     entries["path"] = Line2D([], [], color=PATH_COLOUR, linewidth=1.6)
     for i, criterion in enumerate(data.scenario.criteria):
-        if (way.given_way == i).any():
+        if (sampled.given_way == i).any():
             entries[f"gives way to {criterion.name}"] = Line2D([], [], color=criterion.colour, linewidth=2.4)
-    if way.overlap.any():
+    if sampled.overlap.any():
         entries["in the overlap"] = Line2D([], [], color=BLACK, linewidth=3)
     entries["start"] = Line2D([], [], color=BLACK, linestyle="", marker="x", mew=2)
     entries["end"] = Line2D([], [], color=BLACK, linestyle="", marker="o", markersize=4)
-    if way.targets:
+    if sampled.targets:
         entries["earlier targets"] = Line2D([], [], color=GOAL_COLOUR, linestyle="", marker="D", markersize=3)
     return entries
 
@@ -210,9 +210,9 @@ def _with_gaps(lines: list[Array]) -> Array:
     return joined
 
 
-def _extent(data: FigureData, way: SampledPath) -> tuple[Array, Array]:
+def _extent(data: FigureData, sampled: SampledPath) -> tuple[Array, Array]:
     """Return the corners of a box around path, goal and near regions, with a margin."""
-    path = way.points
+    path = sampled.points
     places = list(places_of(data))
     all_bounds = [np.array(place.region.shape.bounds()) + place.shift for place in places]
     goals = [
@@ -220,7 +220,7 @@ def _extent(data: FigureData, way: SampledPath) -> tuple[Array, Array]:
         for place, bounds in zip(places, all_bounds, strict=True)
         if place.region.name == "goal" and not place.faint
     ]
-    targets = [np.array([middle - radius, middle + radius]) for middle, radius in way.targets]
+    targets = [np.array([middle - radius, middle + radius]) for middle, radius in sampled.targets]
     points = np.vstack([path, *goals, *targets])  # infinite bounds of the goal are ignored
     low, high = points.min(axis=0), points.max(axis=0)
     size = (high - low).max()

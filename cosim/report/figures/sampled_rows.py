@@ -29,8 +29,8 @@ _DRAWN_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")
 _EXTREME = ("attitude.", "membership.", "weight.", "estimate.", "lyapunov.")
 
 
-def story_of(run: Run) -> FigureData:
-    """Select the data from which the figures of a run are drawn.
+def make_figure_data(run: Run) -> FigureData:
+    """Select the rows from which the figures of a run are drawn.
 
     Of a long record these are the rows with the minimum and maximum of each drawn signal in each of some hundred parts
     of the run and of the enlarged spans; rows evenly spaced in time and along the path; and rows at which commands
@@ -39,7 +39,7 @@ def story_of(run: Run) -> FigureData:
     Returns
     -------
     FigureData
-        With the whole record if it is short, else with the selected rows in memory.
+        Scenario, summary, and the whole record if it is short, else the selected rows in memory.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def _rows(data: FigureData, names: list[str]) -> NDArray[np.intp]:
     blocks = (_signals_with_extremes(scenario, block) for block in record.blocks(names))
     extremes = extreme_rows(blocks, signals, np.unique(np.concatenate(edges)))
     even = np.linspace(0, n - 1, _EVEN).astype(np.intp)
-    return np.unique(np.concatenate([even, bounds, extremes, _along(record), _ordered(record)]))
+    return np.unique(np.concatenate([even, bounds, extremes, _along(record), _commanded(record)]))
 
 
 def _signals_with_extremes(scenario: Scenario, rows: Rows) -> list[Array]:
@@ -97,7 +97,7 @@ def _along(record: Rows) -> NDArray[np.intp]:
     return np.concatenate([np.empty(0, np.intp), *found])
 
 
-def _ordered(record: Rows) -> NDArray[np.intp]:
+def _commanded(record: Rows) -> NDArray[np.intp]:
     """Return the rows at which commands changed a signal, and the rows before them; thinned if there are many."""
     names = [name for name in record.units if name.startswith(("commands.", "target."))]
     found, first, before = [np.empty(0, np.intp)], 0, np.full((1, len(names)), np.nan)

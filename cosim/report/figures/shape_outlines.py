@@ -21,8 +21,8 @@ _AROUND = np.column_stack([np.cos(_TURN), np.sin(_TURN)])
 _CORNERS = np.array([[i, j, k] for i in (-1.0, 1.0) for j in (-1.0, 1.0) for k in (-1.0, 1.0)])
 _BOX_EDGES = [(a, b) for a in range(8) for b in range(a) if (_CORNERS[a] != _CORNERS[b]).sum() == 1]
 _SHARP = np.cos(np.radians(31.0))  # cosine of the angle between faces from which on their edge is drawn
-_BESIDE = 1e-3  # of a shape's size, distance from its outline of test points
-_GRID = 12  # points per side
+_BESIDE = 1e-3  # distance of test points from a shape's outline, relative to the shape's size
+_GRID = 12  # points of the test grid per side
 _PIECES = 4  # pieces of an edge of an outline whose visibility is tested
 
 
@@ -50,7 +50,7 @@ def lines_of_shape(shape: Shape, low: Array, high: Array, view: Array) -> ShapeL
     Returns
     -------
     ShapeLines
-        None if no part of it is in the box.
+        Lines of the shape; None if no part of it is in the box.
     """
     entry = shape_entry(shape)
     if entry.half_axes is not None:
@@ -96,7 +96,7 @@ def _ellipsoid(centre: Array, half_axes: Array, low: Array, high: Array, view: A
 def _between_planes(planes: Sequence[tuple[Array, Array]], low: Array, high: Array, view: Array) -> ShapeLines | None:
     corners = (low + high) / 2.0 + (high - low) / 2.0 * _CORNERS
     for point, normal in planes:
-        corners = _cut(corners, point, normal)
+        corners = _clip(corners, point, normal)
     if not len(corners):
         return None
     hull = hull_of(corners, view)
@@ -104,7 +104,7 @@ def _between_planes(planes: Sequence[tuple[Array, Array]], low: Array, high: Arr
     return ShapeLines([hull], [hull], sections)
 
 
-def _cut(corners: Array, point: Array, normal: Array) -> Array:
+def _clip(corners: Array, point: Array, normal: Array) -> Array:
     """Return the corners of the part of a convex body behind a plane."""
     out = (corners - point) @ normal
     behind, before = out <= 0.0, out > 0.0

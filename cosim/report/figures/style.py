@@ -39,10 +39,10 @@ STYLE: Any = {
     "svg.hashsalt": "subreach",
 }
 
-DPI = 160  # of figures as PNG
+DPI = 160  # resolution of figures as PNG
 
 _LEGEND_WIDTH, _LEGEND_MARK = 100, 7  # widths in letters: of a figure, and of a line or marker
-POINTS = 1000  # of a drawn curve, about the resolution of a figure's width
+POINTS = 1000  # number of points of a drawn curve, about the resolution of a figure's width
 
 
 @dataclass(frozen=True)
@@ -78,14 +78,14 @@ def thin(time: Array, signal: Array) -> tuple[Array, Array]:
     Parameters
     ----------
     time : ndarray, shape (n,)
-        [s].
+        Times [s].
     signal : ndarray, shape (n,)
         Values at these times; gaps of NaN are kept.
 
     Returns
     -------
     ndarray, ndarray
-        Time and signal; extremes are kept.
+        Remaining times [s] and values.
     """
     n = len(time)
     if n <= 2 * POINTS:
@@ -105,7 +105,7 @@ def regions_of(scenario: Scenario) -> Iterator[tuple[Region, str]]:
     Yields
     ------
     (Region, str)
-        The goal first, if there is one.
+        Region and colour; the goal first, if there is one.
     """
     goal, *colours = colours_of_regions(scenario)
     if scenario.has_goal:
@@ -119,20 +119,20 @@ class Place:
 
     region: Region
     colour: str
-    shift: Array  # (3,) m, NED, from its place in the scenario
-    faint: bool  # True at the start or end of its motion
+    shift: Array  # (3,) m, NED, from the region's position in the scenario
+    faint: bool  # True at the start or end of the region's motion
 
 
 def places_of(data: FigureData) -> Iterator[Place]:
     """Yield the goal at the end of the run, and each region at the time of its least clearance.
 
-    Each moving one is preceded by its places at the start and the end, marked as faint. Regions of attitude have no
-    place and are skipped.
+    A moving region is preceded by itself at the start and at the end, marked as faint. Regions of attitude have no
+    position and are skipped.
 
     Yields
     ------
     Place
-        The goal's first.
+        The goal, then the other regions in the order of the scenario.
     """
     dynamic = {secondary.region.name for secondary in data.scenario.regions if secondary.is_dynamic}
     for region, colour in regions_of(data.scenario):
@@ -154,7 +154,7 @@ def features_of(data: FigureData) -> Iterator[tuple[str, str, Array]]:
     Yields
     ------
     (str, str, ndarray)
-        In the order of the regions.
+        Name, colour and position, in the order of the regions.
     """
     for region, colour in regions_of(data.scenario):
         if isinstance(region.shape, Visibility):
@@ -167,7 +167,7 @@ def shifts_of(record: Rows, name: str) -> Array:
     Returns
     -------
     ndarray, shape (steps, 3)
-        Zeros for one at rest.
+        Shift at each step; zeros for a region at rest.
     """
     if f"{name}.shift.x" not in record.units:
         return np.zeros((len(record), 3))
@@ -180,11 +180,11 @@ def legend_columns(labels: Iterable[str]) -> int:
     Parameters
     ----------
     labels : iterable of str
-        At least one.
+        Labels of the legend, at least one.
 
     Returns
     -------
     int
-        At least 1.
+        Number of columns, at least 1.
     """
     return max(1, _LEGEND_WIDTH // (max(map(len, labels)) + _LEGEND_MARK))

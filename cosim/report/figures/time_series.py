@@ -120,7 +120,7 @@ def error_of(scenario: Scenario, record: Rows) -> tuple[str, Array]:
     Returns
     -------
     str, ndarray of shape (rows,)
-        [m].
+        Name, and error or distance at each row [m].
     """
     bounds = np.array(scenario.goal.bounds())
     if not np.isfinite(bounds).all():
@@ -216,8 +216,8 @@ def weights(data: FigureData) -> Figure:
 def clearance(data: FigureData) -> Figure:
     """Draw the clearance to each region and to the goal: distances, and angles of attitude regions below."""
     regions = list(regions_of(data.scenario))
-    of_places = [of for of in regions if not of_attitude(of[0].shape)]
-    of_angles = [of for of in regions if of_attitude(of[0].shape)]
+    of_places = [entry for entry in regions if not of_attitude(entry[0].shape)]
+    of_angles = [entry for entry in regions if of_attitude(entry[0].shape)]
     named = _named(data, [region.name for region, _ in regions])
     others = len(regions) - len(named)
     labels = [region.name for region, _ in (*of_places, *of_angles) if region.name in named]
@@ -227,7 +227,7 @@ def clearance(data: FigureData) -> Figure:
     command = [region.name for region, _ in regions if region.name in named]
     for row, group, unit in zip(axes, (of_places, of_angles), ("m", "°"), strict=False):
         signals = []
-        for region, colour in sorted(group, key=lambda of: of[0].name in named):  # the others behind
+        for region, colour in sorted(group, key=lambda entry: entry[0].name in named):  # the others behind
             signal = data.record[f"{region.name}.clearance"]
             signal = np.rad2deg(signal) if unit == "°" else np.where(np.abs(signal) < _AWAY, signal, np.nan)
             signals.append(signal)

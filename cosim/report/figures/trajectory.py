@@ -22,7 +22,7 @@ class SampledPath:
     points: Array  # (n, 3) m, NED
     given_way: NDArray[np.intp]  # (n,) index of the active region's criterion, -1 for the goal
     overlap: NDArray[np.bool_]  # (n,) True in the overlap of the scenario's regions
-    targets: list[tuple[Array, float]]  # before the last one: middle [m, NED], and radius [m], 0 for that of the goal
+    targets: list[tuple[Array, float]]  # earlier targets: center [m, NED] and radius [m], 0 for that of the goal
 
 
 def is_known(data: FigureData) -> bool:
@@ -30,18 +30,18 @@ def is_known(data: FigureData) -> bool:
     return bool(np.isfinite(data.record.stack(POSITION)).all(axis=1).any())
 
 
-def way_of(data: FigureData) -> SampledPath:
+def sample_path(data: FigureData) -> SampledPath:
     """Sample the path of a run.
 
     Parameters
     ----------
     data : FigureData
-        The run; its record has a finite position.
+        Data of a run whose record has a finite position.
 
     Returns
     -------
     SampledPath
-        With about as many points as a figure resolves.
+        Path with about as many points as a figure resolves.
     """
     path = data.record.stack(POSITION)
     known = np.flatnonzero(np.isfinite(path).all(axis=1))
@@ -57,7 +57,7 @@ def targets_of(data: FigureData) -> list[tuple[Array, float]]:
     Returns
     -------
     list of (ndarray of shape (3,), float)
-        The radius is 0 for the scenario's goal. Of a target that moves by itself there are at most 12.
+        Center and radius of at most 12 targets; the radius is 0 for the scenario's goal.
     """
     if not data.scenario.commands.enabled:
         return []

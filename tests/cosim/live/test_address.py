@@ -5,7 +5,7 @@ import socket
 import pytest
 
 from cosim.errors import TelemetryError
-from cosim.live.address import LiveAddress, bound, foreign_origin, parse_live
+from cosim.live.address import LiveAddress, foreign_origin, open_socket, parse_live
 
 
 def test_an_address_is_a_port_or_a_host_with_one():
@@ -73,6 +73,6 @@ def test_occupied_port_is_an_error_only_if_requested():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(TelemetryError, match=f"127.0.0.1:{port} cannot be opened"):
-            bound(LiveAddress(port=port, insisted=True))
-        with bound(LiveAddress(port=port)) as other:
+            open_socket(LiveAddress(port=port, insisted=True))
+        with open_socket(LiveAddress(port=port)) as other:
             assert other.getsockname()[1] != port

@@ -9,7 +9,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from cosim.live.command_desk import LONGEST
+from cosim.live.command_desk import MAX_LENGTH
 from cosim.live.server import CONNECTIONS
 from cosim.results.record import load_record
 from cosim.run.run import run_scenario
@@ -73,7 +73,7 @@ def test_malformed_requests_do_not_affect_the_run(live, tmp_path, caplog):
             foreign.recv(100)
     with connect(url) as client:  # more than a message may have
         with contextlib.suppress(ConnectionClosed):
-            client.send("x" * (LONGEST + 1))
+            client.send("x" * (MAX_LENGTH + 1))
         assert closed_with(client) == 1009
     with connect(url) as client:  # frames that are no frames
         client.socket.sendall(b"\xff" * 1000)

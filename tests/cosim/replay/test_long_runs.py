@@ -16,7 +16,7 @@ from cosim.io.strict_json import json_text
 from cosim.replay.events import _JoinedSpans
 from cosim.replay.trace import trace_of
 from cosim.report.contents import contents_of
-from cosim.report.figures.sampled_rows import story_of
+from cosim.report.figures.sampled_rows import make_figure_data
 from cosim.report.figures.style import FigureData
 from cosim.results.extremes import even_edges, extreme_rows
 from cosim.results.record import Record
@@ -90,7 +90,7 @@ def test_figures_of_a_long_run_are_thinned_and_keep_extremes(name, run_of, strea
     monkeypatch.setattr("cosim.report.figures.sampled_rows._MOST", 2000)
     monkeypatch.setattr("cosim.report.figures.sampled_rows._EVEN", 50)
     run = run_of(name)
-    story = story_of(streamed(run))
+    story = make_figure_data(streamed(run))
     n, drawn = len(run.record), story.record
     assert len(drawn) <= 2000 + 50 + 1000 + 200 or len(drawn) == n
     at = np.searchsorted(run.record["time"], drawn["time"])
@@ -117,8 +117,8 @@ def test_every_figure_of_a_long_run_is_drawn(name, run_of, streamed, monkeypatch
 
     monkeypatch.setattr("cosim.report.figures.sampled_rows._MOST", 2000)
     run = run_of(name)
-    stories = FigureData(run.scenario, run.record, run.summary), story_of(streamed(run))
-    whole, joined = ([drawing.name for drawing in drawings(story)] for story in stories)
+    stories = FigureData(run.scenario, run.record, run.summary), make_figure_data(streamed(run))
+    whole, few = ([drawing.name for drawing in drawings(story)] for story in stories)
     assert whole == few
 
 
@@ -151,7 +151,7 @@ def test_spans_do_not_depend_on_blocks(signal, data):
 def test_widest_gaps_do_not_depend_on_blocks(lengths, most, data):
     flags = np.array([i % 2 == 0 for i, length in enumerate(lengths) for _ in range(length)], bool)
     time = np.arange(len(flags)) * 1.0
-    joined = _JoinedSpans(most)
+    few = _JoinedSpans(most)
     at = sorted(data.draw(st.lists(st.integers(0, len(flags)), max_size=6)))
     for t, f in zip(np.split(time, at), np.split(flags, at), strict=True):
         few.add(f, t)
@@ -211,7 +211,7 @@ def _peaks(run, work):
 def _told(path):
     run = load_run(path)
     contents_of(run)
-    story_of(run)
+    make_figure_data(run)
     trace_of(run, 500_000).as_json()
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.replay.activity import active_regions, rests
+from cosim.replay.activity import active_regions, is_resting
 from cosim.replay.sampling import sampled_rows
 from cosim.replay.trace import nan_to_none, trace_of
 from cosim.replay.view_columns import ViewColumns
@@ -88,7 +88,7 @@ def test_no_region_is_active_without_membership_or_pose():
     ],
 )
 def test_at_rest_a_region_is_active_at_half_weight_or_violation(weight, clearance, goal, speed, active):
-    resting = rests(np.array([goal]), np.array([[0.0, speed, 0.0]]))
+    resting = is_resting(np.array([goal]), np.array([[0.0, speed, 0.0]]))
     asked, weights = np.array([[0.3, 0.0, 0.0]]), np.array([[weight, 0.0, 0.0]])
     assert active_regions([0], asked, weights, np.array([[clearance]]), resting).tolist() == [active]
 

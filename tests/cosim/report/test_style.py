@@ -16,7 +16,7 @@ from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
 
 
-def story_of(folder, name, *overrides):
+def make_figure_data(folder, name, *overrides):
     scenario = load_scenario(name, [*overrides, "time.duration=2.0"])
     run = run_scenario(scenario, folder, report=False)
     return FigureData(scenario, load_record(run.folder), run.summary)
@@ -26,14 +26,14 @@ def story_of(folder, name, *overrides):
 def inspection(tmp_path_factory):
     """A view that moves, with a goal that moves, at 0.5 m/s."""
     keys = ["goal.velocity=[0.5,0,0]", "regions.view.velocity=[0.5,0,0]", "regions.view.shape.half_angle=0.1"]
-    return story_of(tmp_path_factory.mktemp("runs") / "a", "pipe-inspection", *keys, "regions.view.hard=false")
+    return make_figure_data(tmp_path_factory.mktemp("runs") / "a", "pipe-inspection", *keys, "regions.view.hard=false")
 
 
 @pytest.fixture(scope="module")
 def drifting(tmp_path_factory):
     """Two buoys that approach and recede."""
     keys = ["regions.0.velocity=[-4.0,1.3,0]", "regions.1.velocity=[0.0,1.0,0.0]"]
-    return story_of(tmp_path_factory.mktemp("runs") / "b", "moving-obstacle", *keys)
+    return make_figure_data(tmp_path_factory.mktemp("runs") / "b", "moving-obstacle", *keys)
 
 
 def test_attitude_regions_are_not_drawn_but_features_are(inspection):

@@ -98,7 +98,7 @@ def test_vehicle_is_held_until_a_thruster_is_driven(serve):
 def test_an_idle_autopilot_is_lowered_from_the_surface_and_starts_where_the_scenario_does(serve, monkeypatch):
     """Here within 0.06 s; what drives a thruster before the vehicle is there waits for it."""
     monkeypatch.setattr(motion, "_AT_THE_SURFACE", 0.02)
-    monkeypatch.setattr(motion, "_LONGEST", 0.04)
+    monkeypatch.setattr(motion, "_MAX_DURATION", 0.04)
     served = serve("time.duration=0.02", "initial.position=[1,2,3]")
     with StandIn(served.address) as pilot:
         said = [pilot.fly(pwm) for pwm in 36 * (DISARMED,) + 60 * (NEUTRAL,)]
@@ -269,7 +269,7 @@ def test_second_sender_is_rejected_while_the_first_is_active(serve):
 @pytest.mark.medium
 def test_autopilot_on_another_port_replaces_a_silent_one(serve, monkeypatch):
     """With the next count the run continues, as behind a relay; any other count starts a new run."""
-    monkeypatch.setattr("cosim.sitl.server._PRESENT", 0.05)
+    monkeypatch.setattr("cosim.sitl.server._SENDER_TIMEOUT", 0.05)
     served = serve("time.duration=0.1")
     for first, steps in ((0, 10), (10, 10), (15, 120)):
         time.sleep(0.1)

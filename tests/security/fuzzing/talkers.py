@@ -15,7 +15,7 @@ from controller.laws import LAWS
 from cosim.campaigns import vary_from
 from cosim.campaigns.scenes.law_gains import gains_from
 from cosim.live.address import foreign_origin, parse_live
-from cosim.live.command_desk import LONGEST, CommandDesk
+from cosim.live.command_desk import MAX_LENGTH, CommandDesk
 from cosim.live.messages import bytes_of, text_of
 from cosim.live.watching import looks, picture
 from cosim.mavlink.listening import Watch
@@ -48,11 +48,11 @@ def command(seeds: Seeds) -> Case:
 
     def read(content: bytes) -> None:
         try:
-            message = content[:LONGEST].decode()
+            message = content[:MAX_LENGTH].decode()
         except UnicodeDecodeError:  # by which WebSocket has a connection fail
             return
         queue.take(0)
-        said = desk.take(message)
+        said = desk.submit(message)
         assert said is None or (said.isprintable() and 0 < len(said) < 300), said
 
     return Case(tuple(json.dumps(command).encode() for command in COMMANDS_LOG), read)

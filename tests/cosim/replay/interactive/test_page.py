@@ -69,7 +69,7 @@ def test_page_is_small_self_contained_and_reproduces_its_record(browser, page):
 
 def test_page_shows_the_rows_of_a_flight_that_repeats_its_record(browser, page, tmp_path, monkeypatch):
     """Of a long run the file has fewer than its flight; they are among those of the flight."""
-    monkeypatch.setattr("cosim.replay.pages.FLYING_BYTES", 80_000)
+    monkeypatch.setattr("cosim.replay.pages.MAX_BYTES_INTERACTIVE", 80_000)
     opened(browser, replay([page.parent / "run"], tmp_path / "page.html", interactive=True))
     rows = browser.js(
         "return [subreach.runs.length, subreach.runs[0].rows, subreach.charts[0].series()[0].time.length]"
