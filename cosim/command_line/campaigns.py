@@ -52,7 +52,7 @@ def _add_scenes(verb: argparse.ArgumentParser, arbiter: bool = True) -> None:
     verb.add_argument("--report-failures", action="store_true", help="report failing thrusters to the law")
     verb.add_argument(
         "--sensing", choices=("state", "sensors"), default="state",
-        help="what the law is given: the state with the scenes' noise, or what a navigation filter makes of IMU, DVL, "
+        help="input of the law: the state with the scenes' noise, or a navigation filter's estimate from IMU, DVL, "
         "compass, pressure sensor and USBL (default: state)",
     )  # fmt: skip
 
@@ -65,10 +65,10 @@ def _add_scenes(verb: argparse.ArgumentParser, arbiter: bool = True) -> None:
 
 
 def add_replays(verb: argparse.ArgumentParser) -> None:
-    """Add the flag for the number of worst rows with replays."""
+    """Add the flag for the number of worst flights that get a replay."""
     verb.add_argument(
         "--replays", type=whole(0, 1000), default=3, metavar="N",
-        help="the worst that are flown again to be seen in the browser (default: 3; of each law that is compared)",
+        help="number of worst flights that are repeated with a replay (default: 3; for each law that is compared)",
     )  # fmt: skip
 
 
@@ -134,13 +134,11 @@ def ablate(options: argparse.Namespace) -> int:
         done = fly_variants(
             options.scenes, options.out, names, conditions, options.settings, options.workers, not options.quiet
         )
-        for name, of in done.numbers["variants"].items():
-            violated = of["weighted_violation"]["other"]
+        for name, result in done.numbers["variants"].items():
+            violated = result["weighted_violation"]["other"]
             weighted = "" if violated is None else f", weighted violation {violated:.4g} m s on average"
-            say(
-                options,
-                f"{name} ({of['description']}): {of['completed']['rows']} of {of['scenes']} scenes completed{weighted}",
-            )
+            completed = f"{result['completed']['rows']} of {result['scenes']} scenes completed"
+            say(options, f"{name} ({result['description']}): {completed}{weighted}")
         print(write_ablation_page(options.out, options.replays))
 
     return resumable(run, options.out)
@@ -152,9 +150,9 @@ def resumable(run: Callable[[], None], out: Path) -> int:
     Parameters
     ----------
     run : callable
-        The campaign, which can be continued.
+        Function that runs the campaign, or continues it.
     out : Path
-        Its folder.
+        Folder of the campaign.
 
     Returns
     -------

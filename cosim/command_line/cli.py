@@ -44,8 +44,8 @@ _EPILOG = """examples:
 
 # flags that are accepted before and after the verb
 _EVERYWHERE = {
-    ("-v", "--verbose"): "log what happens inside",
-    ("-q", "--quiet"): "no progress, and no words on what happened: paths, errors and what was asked for alone",
+    ("-v", "--verbose"): "log internal events",
+    ("-q", "--quiet"): "no progress and no description of the outcome: print paths, errors and requested output alone",
 }
 
 
@@ -110,12 +110,12 @@ def _parser() -> argparse.ArgumentParser:
     show.add_argument("scenario", help="a shipped name, or a TOML file")
     show.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run")
 
-    check = verbs.add_parser("check", help="say before a run what stands against a scenario; exit code 1 if anything")
+    check = verbs.add_parser("check", help="find problems of a scenario before it is run; exit code 1 if there are any")
     check.add_argument("scenario", help="a shipped name, or a TOML file")
     check.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run")
     check.add_argument("--json", action="store_true", help="print it as JSON")
 
-    calibrate = verbs.add_parser("calibrate", help="fit the force limit and lag that bring the paper's window about")
+    calibrate = verbs.add_parser("calibrate", help="fit the force limit and lag that give the paper's overlap window")
     calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
 
     import_log.add_verb(verbs)
@@ -147,13 +147,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        Default: those of the process.
+        Arguments of the command; default: those of the process.
 
     Returns
     -------
     int
-        0; 1 if a check fails; 2 after an error of the user; 130 after Ctrl-C, SIGTERM or SIGHUP; 141 if the reader of
-        the output has closed it.
+        Exit status: 0; 1 if a check fails; 2 after an error of the user; 130 after Ctrl-C, SIGTERM or SIGHUP; 141 if
+        the reader of the output has closed it.
     """
     return run_guarded(lambda: _run(sys.argv[1:] if arguments is None else arguments))
 

@@ -27,7 +27,7 @@ def add_verb(verbs: Any) -> None:
     )
     verb.add_argument("--scenario", required=True, help="a shipped name, or a TOML file")
     verb.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run")
-    verb.add_argument("--profile", choices=PROFILES, default="ardusub", help="which autopilot it is (default: ardusub)")
+    verb.add_argument("--profile", choices=PROFILES, default="ardusub", help="type of the autopilot (default: ardusub)")
     verb.add_argument(
         "--steer-by", choices=_STEER_BY, default="sticks",
         help="sticks: surge, sway, heave and yaw while the autopilot keeps level; wrench: all six axes in manual mode; "
@@ -39,16 +39,19 @@ def add_verb(verbs: Any) -> None:
     )  # fmt: skip
     where = verb.add_mutually_exclusive_group()
     where.add_argument(
-        "--scene-origin", type=origin, metavar="LAT,LON", help="where the scene's origin is on the globe, in degrees"
+        "--scene-origin",
+        type=origin,
+        metavar="LAT,LON",
+        help="latitude and longitude of the scene's origin, in degrees",
     )
     where.add_argument(
         "--surveyed-origin", type=_position, metavar="N,E,D",
-        help="where the autopilot's local origin is in the scene, in metres (a negative number as "
+        help="position of the autopilot's local origin in the scene, in metres (a negative number as "
         "--surveyed-origin=-1,0,0)",
     )  # fmt: skip
     verb.add_argument(
         "--surface-pressure", type=number(500.0, 1200.0), default=1013.25, metavar="HPA",
-        help="of the air, for the depth (default: 1013.25)",
+        help="pressure of the air, from which depth is measured (default: 1013.25)",
     )  # fmt: skip
     verb.add_argument(
         "--water-density", type=number(900.0, 1200.0), default=1000.0, metavar="KG/M3", help="default: 1000; sea: 1025"
@@ -65,15 +68,15 @@ def add_verb(verbs: Any) -> None:
     )  # fmt: skip
     verb.add_argument(
         "--velocity-lag", type=number(0.01, 10.0), default=2.0, metavar="S",
-        help="of the autopilot's velocity loop, horizontally (default: 2)",
+        help="time constant of the autopilot's horizontal velocity loop (default: 2)",
     )  # fmt: skip
     verb.add_argument(
         "--vertical-lag", type=number(0.01, 10.0), default=0.5, metavar="S",
-        help="of the autopilot's velocity loop, vertically (default: 0.5)",
+        help="time constant of the autopilot's vertical velocity loop (default: 0.5)",
     )  # fmt: skip
     verb.add_argument(
         "--reckoning-error", type=number(0.0, 1.0), default=0.03, metavar="PART",
-        help="part of the way by which the autopilot's position may be off while it has no fix (default: 0.03)",
+        help="position error while the autopilot has no fix, as a part of the distance covered (default: 0.03)",
     )  # fmt: skip
     verb.add_argument(
         "--level-dive", type=number(0.0, 10.0), default=0.6, metavar="M",
@@ -81,18 +84,18 @@ def add_verb(verbs: Any) -> None:
     )  # fmt: skip
     verb.add_argument(
         "--least-battery", type=number(0.0, 100.0), default=0.0, metavar="PERCENT",
-        help="hold the vehicle below it (default: 0, never)",
+        help="charge below which the vehicle holds its position (default: 0, never)",
     )  # fmt: skip
     verb.add_argument(
         "--system-id", type=whole(1, 255), default=255, metavar="N",
-        help="of the companion; an ArduSub takes sticks from its SYSID_MYGCS alone (default: 255)",
+        help="system id of the companion; an ArduSub takes sticks from its SYSID_MYGCS alone (default: 255)",
     )  # fmt: skip
     verb.add_argument(
         "--timeout", type=number(0.1, 1e6), metavar="S", help="end if steering cannot begin in so many seconds"
     )
     verb.add_argument(
         "--speedup", type=number(0.01, 100.0), default=1.0, metavar="N",
-        help="of a simulated autopilot: its seconds a second of the wall clock (default: 1)",
+        help="speed of a simulated autopilot: its seconds per second of the wall clock (default: 1)",
     )  # fmt: skip
     verb.add_argument("--allow-remote", action="store_true", help="let the link leave this machine")
     verb.add_argument("--signing-key", type=Path, metavar="FILE", help="sign with the key in this file")
@@ -127,11 +130,11 @@ def companion(options: argparse.Namespace) -> int:
         link = stack.enter_context(NetworkLink(endpoint, key, (options.system_id, _COMPONENT), options.speedup))
         companion = Companion(scenario, link, chosen)
         live = open_live(options, stack)
-        untold = [companion.session.failsafes]
+        unprinted = [companion.session.failsafes]
 
         def show(state: str, missing: str) -> None:
-            if state != "waiting" and untold:
-                for line in untold.pop().text():
+            if state != "waiting" and unprinted:
+                for line in unprinted.pop().text():
                     print_status(line)
             print_status(state.replace("_", " ") + ("" if missing == "nothing" else f", waits for {missing}"))
 

@@ -37,7 +37,7 @@ def add_verb(verbs: Any, parser: argparse.ArgumentParser) -> None:
     Parameters
     ----------
     verbs : argparse subparsers
-        Of the command.
+        Subparsers of the command.
     parser : argparse.ArgumentParser
         Parser of the command, whose verbs are completed.
     """

@@ -21,12 +21,12 @@ def add_verbs(verbs: Any) -> None:
     export.add_argument("--out", type=Path, metavar="FILE", help="file to write (default: RUN.FORMAT here)")
     thinned = export.add_mutually_exclusive_group()
     thinned.add_argument(
-        "--every", type=whole(1, 10**9), default=1, metavar="N", help="one step of so many (default: all)"
+        "--every", type=whole(1, 10**9), default=1, metavar="N", help="export every N-th step (default: all)"
     )
-    thinned.add_argument("--rate", type=number(1e-9, 1e9), metavar="HZ", help="steps a simulated second, in its place")
+    thinned.add_argument("--rate", type=number(1e-9, 1e9), metavar="HZ", help="steps per simulated second")
     export.add_argument(
         "--signals", nargs="+", action="extend", default=[], metavar="GLOB",
-        help="names or patterns such as 'position.*' '*.clearance' (default: all); the time is always there",
+        help="names or patterns such as 'position.*' '*.clearance' (default: all); the time is always included",
     )  # fmt: skip
     export.add_argument("--force", action="store_true", help="replace a file that exists")
 
@@ -35,7 +35,11 @@ def add_verbs(verbs: Any) -> None:
     package.add_argument("--to", choices=("ssp",), default="ssp", help="format (default: ssp)")
     package.add_argument("--out", type=Path, metavar="FILE", help="file to write (default: SCENARIO.ssp here)")
     package.add_argument(
-        "--fmi", type=int, choices=(2, 3), default=2, help="of the FMUs (default: 2, which most masters of SSP take)"
+        "--fmi",
+        type=int,
+        choices=(2, 3),
+        default=2,
+        help="FMI version (default: 2, which most SSP masters support)",
     )
     package.add_argument(
         "--platforms", default="native",

@@ -22,14 +22,14 @@ _EPILOG = """examples:
 def add_verb(verbs: Any) -> None:
     """Add the verb to the subparsers of the command."""
     falsify = verbs.add_parser(
-        "falsify", help="search for what goes worst, or estimate how rare a violation is",
+        "falsify", help="search for the worst flight, or estimate the probability of a violation",
         epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
     falsify.add_argument(
         "what", metavar="FAMILY|SCENARIO",
         help="plain, hard, conflict or tour, as cosim scenes makes them; or a shipped name or TOML file, before --vary",
     )  # fmt: skip
-    falsify.add_argument("--law", help="such as pd; of a scenario, in the place of its own")
+    falsify.add_argument("--law", help="law such as pd; instead of a scenario's own")
     falsify.add_argument(
         "--vary", nargs="+", action="extend", default=[], metavar="KEY=LOW:HIGH[:log]",
         help="a key of the scenario and the range to search; or KEY=A,B,C",
@@ -38,12 +38,12 @@ def add_verb(verbs: Any) -> None:
         "--objective", default="clearance", metavar="clearance|violation|arrival",
         help="the least clearance (default), the greatest violation weighted by priority, or the latest arrival",
     )  # fmt: skip
-    falsify.add_argument("--budget", type=int, default=2000, metavar="N", help="flights (default: 2000)")
+    falsify.add_argument("--budget", type=int, default=2000, metavar="N", help="number of flights (default: 2000)")
     falsify.add_argument(
         "--rare-event", action="store_true",
-        help="estimate how likely a violation is, with an interval, in the place of a search for the worst",
+        help="estimate the probability of a violation with an interval, instead of searching for the worst flight",
     )  # fmt: skip
-    falsify.add_argument("--seed", type=int, default=0, metavar="S", help="of the search (default: 0)")
+    falsify.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the search (default: 0)")
     falsify.add_argument(
         "--out", type=Path, required=True, metavar="DIR",
         help="a new folder, or one that this command began: it goes on with what is left",
@@ -52,7 +52,7 @@ def add_verb(verbs: Any) -> None:
     add_replays(falsify)
     falsify.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-        help="set a gain of the law, or of a scenario a key; may be repeated",
+        help="set a gain of the law, or a key of the scenario; may be repeated",
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""``cosim excite`` and ``cosim identify``: what to drive, and what its runs say."""
+"""``cosim excite`` and ``cosim identify``: stick inputs for an identification, and parameters from its runs."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def add_verbs(verbs: Any) -> None:
     )  # fmt: skip
     identify.add_argument(
         "--nuisance", nargs="*", metavar="NAME",
-        help="what is estimated beside: current, force, delay, lever, bias, scale, asymmetry, random_force (default: "
+        help="nuisance parameters: current, force, delay, lever, bias, scale, asymmetry, random_force (default: "
         "current, lever, bias and scale)",
     )  # fmt: skip
     identify.add_argument(
@@ -67,14 +67,19 @@ def _add_excite(verbs: Any) -> None:
         "--box", nargs=3, type=length, default=(10.0, 10.0, 4.0), metavar=("NORTH", "EAST", "DOWN"),
         help="sizes of the water that may be used [m] (default: 10 10 4)",
     )  # fmt: skip
-    excite.add_argument("--depth", type=length, default=3.0, help="of the box's center [m] (default: 3)")
-    excite.add_argument("--time", type=number(1.0, 36000.0), default=300.0, help="of the whole [s] (default: 300)")
-    excite.add_argument("--free", nargs="+", metavar="KEY", help="what is to be identified, as for cosim identify")
-    excite.add_argument("--nuisance", nargs="*", metavar="NAME", help="what is estimated beside, as for cosim identify")
+    excite.add_argument("--depth", type=length, default=3.0, help="depth of the box's center [m] (default: 3)")
     excite.add_argument(
-        "--current", type=number(0.0, 2.0), default=0.1, help="that the box allows for [m/s] (default: 0.1)"
+        "--time", type=number(1.0, 36000.0), default=300.0, help="duration of all inputs [s] (default: 300)"
     )
-    excite.add_argument("--seed", type=whole(0, 2**31), default=0, help="of the candidates (default: 0)")
+    excite.add_argument("--free", nargs="+", metavar="KEY", help="parameters to identify, as for cosim identify")
+    excite.add_argument("--nuisance", nargs="*", metavar="NAME", help="nuisance parameters, as for cosim identify")
+    excite.add_argument(
+        "--current",
+        type=number(0.0, 2.0),
+        default=0.1,
+        help="current that the box allows for [m/s] (default: 0.1)",
+    )
+    excite.add_argument("--seed", type=whole(0, 2**31), default=0, help="seed of the candidates (default: 0)")
     excite.add_argument(
         "--out", type=Path, required=True, metavar="DIR", help="a new folder: scenario, commands, sticks.csv, page"
     )

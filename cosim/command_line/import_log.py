@@ -21,13 +21,16 @@ def add_verb(verbs: Any) -> None:
     log.add_argument("--vehicle", required=True, help="a shipped vehicle or a TOML file, whose thrusters are driven")
     log.add_argument("--scenario", help="shipped name or TOML file, whose goal and regions judge it (default: none)")
     log.add_argument("--map", type=Path, metavar="FILE", dest="columns", help="column map, for tables and bags of ROS")
-    log.add_argument("--rate", type=number(1e-3, 1e4), metavar="HZ", help="rows a second (default: by the log)")
+    log.add_argument("--rate", type=number(1e-3, 1e4), metavar="HZ", help="rows per second (default: by the log)")
     log.add_argument(
         "--curve", choices=("linear", "quadratic", "t200"),
-        help="from servo pulse to force (default: that of the vehicle's file)",
+        help="curve from servo pulse to force (default: that of the vehicle's file)",
     )  # fmt: skip
     log.add_argument(
-        "--voltage", type=number(1.0, 1e3), metavar="V", help="of the thrusters' supply (default: as the log says)"
+        "--voltage",
+        type=number(1.0, 1e3),
+        metavar="V",
+        help="supply voltage of the thrusters (default: that of the log)",
     )
     log.add_argument("--out", type=Path, metavar="RUN", help="the run folder (default: a new one below runs)")
     log.add_argument("--overwrite", action="store_true", help="replace the run that the folder holds")

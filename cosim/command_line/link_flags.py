@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cosim.live.view import LiveView
     from cosim.mavlink.wire.endpoint import Endpoint
 
-_GREATEST_TIMEOUT = 3600.0  # s
+_MAX_TIMEOUT = 3600.0  # s
 _SYSTEM = whole(1, 255)
 
 
@@ -28,7 +28,7 @@ def add_link_flags(parser: argparse.ArgumentParser, commands: bool = False, requ
     Parameters
     ----------
     parser : argparse.ArgumentParser
-        Of the verb.
+        Parser of the verb.
     commands : bool
         Add the flags for commands.
     required : bool
@@ -42,7 +42,7 @@ def add_link_flags(parser: argparse.ArgumentParser, commands: bool = False, requ
     )  # fmt: skip
     parser.add_argument(
         "--profile", choices=PROFILES, default=usual.profile,
-        help=f"as what the vehicle shows itself (default: {usual.profile})",
+        help=f"type of vehicle that the link imitates (default: {usual.profile})",
     )  # fmt: skip
     parser.add_argument("--allow-remote", action="store_true", help="let the link leave this machine")
     parser.add_argument(
@@ -54,11 +54,11 @@ def add_link_flags(parser: argparse.ArgumentParser, commands: bool = False, requ
     )
     parser.add_argument(
         "--system-id", type=_SYSTEM, default=usual.system_id, metavar="N",
-        help=f"of the vehicle (default: {usual.system_id})",
+        help=f"system id of the vehicle (default: {usual.system_id})",
     )  # fmt: skip
     parser.add_argument(
         "--origin", type=origin, default=usual.origin, metavar="LAT,LON",
-        help=f"where position 0 is on the globe, in degrees (default: {usual.origin[0]:g},{usual.origin[1]:g}; "
+        help=f"latitude and longitude of position 0, in degrees (default: {usual.origin[0]:g},{usual.origin[1]:g}; "
         "a negative latitude as --origin=-33.9,18.4)",
     )  # fmt: skip
     parser.set_defaults(commands=False, await_arm=False, link_loss=None, link_timeout=None)
@@ -73,10 +73,10 @@ def _add_command_flags(parser: argparse.ArgumentParser, usual: MavlinkOptions) -
     parser.add_argument("--await-arm", action="store_true", help="nothing moves before the vehicle is armed")
     parser.add_argument(
         "--link-loss", choices=LOSS_ACTIONS,
-        help=f"what to do when the ground station that commands falls silent (default: {usual.loss_action})",
+        help=f"action when the ground station that commands falls silent (default: {usual.loss_action})",
     )  # fmt: skip
     parser.add_argument(
-        "--link-timeout", type=number(0.1, _GREATEST_TIMEOUT), metavar="S",
+        "--link-timeout", type=number(0.1, _MAX_TIMEOUT), metavar="S",
         help=f"seconds of the wall clock that count as silence (default: {usual.loss_timeout:g})",
     )  # fmt: skip
 
@@ -87,7 +87,7 @@ def links_from(options: argparse.Namespace) -> tuple[list[Endpoint], MavlinkOpti
     Parameters
     ----------
     options : argparse.Namespace
-        Of a verb with the flags.
+        Parsed arguments of a verb with these flags.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def origin(text: str) -> tuple[float, float]:
 
 
 def add_live_flag(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add the flag to a verb, with words for `what` it does."""
+    """Add the flag to a verb; `what` is the beginning of its help."""
     parser.add_argument(
         "--live", nargs="?", const="", metavar="[HOST:]PORT",
         help=f"{what} (default: {HOST}:{PORT}, or another port if that is taken)",
@@ -145,12 +145,12 @@ def add_live_flag(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def open_live(options: argparse.Namespace, stack: contextlib.ExitStack) -> LiveView | None:
-    """Open the page that the flag asks for until the stack ends, and print where it is; None where it asks for none.
+    """Open the live page until the stack ends, and print its address; return None without the flag.
 
     Raises
     ------
     TelemetryError
-        If the address is none, leaves this machine without leave, or cannot be opened.
+        If the address is invalid, reaches other machines without --allow-remote, or cannot be opened.
     """
     if options.live is None:
         return None

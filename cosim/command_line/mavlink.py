@@ -17,7 +17,7 @@ from cosim.command_line.process import print_status
 from cosim.command_line.results import say
 from cosim.mavlink.wire.options import PROFILES
 
-_REDRAW, _SNAPSHOT = 0.25, 1.0  # s
+_REDRAW, _SNAPSHOT = 0.25, 1.0  # s between pictures, on a terminal and elsewhere
 _ONCE = 2.0  # s of listening, for one picture
 _WIDE = 160  # characters of a line without a terminal
 _HIDE, _SHOW, _CLEAR, _HOME, _END_OF_LINE, _BELOW = "\x1b[?25l", "\x1b[?25h", "\x1b[2J", "\x1b[H", "\x1b[K", "\x1b[J"
@@ -41,13 +41,13 @@ def add_verbs(verbs: Any) -> None:
     check = verbs.add_parser(
         "mavlink-check", help="check a MAVLink vehicle against what ground stations need; exit code 1 if anything fails"
     )
-    _add_ground(check, "where the vehicle is, such as udpin:127.0.0.1:14550; default: one of its own", "?")
+    _add_ground(check, "endpoint of the vehicle, such as udpin:127.0.0.1:14550; default: a built-in vehicle", "?")
     check.add_argument(
         "--commands", action="store_true",
-        help="also arm it, steer it and change its mission and parameters, all put back afterwards; "
-        "one of its own is always commanded",
+        help="also arm it, steer it and change its mission and parameters, all restored afterwards; "
+        "the built-in vehicle is always commanded",
     )  # fmt: skip
-    check.add_argument("--profile", choices=PROFILES, help="of the vehicle of its own (default: generic)")
+    check.add_argument("--profile", choices=PROFILES, help="profile of the built-in vehicle (default: generic)")
     check.add_argument("--json", action="store_true", help="print it as JSON")
 
 
@@ -140,7 +140,7 @@ def mavlink_check(options: argparse.Namespace) -> int:
     from cosim.mavlink.conformance.vehicle import own_vehicle
 
     if options.endpoint is not None and options.profile:
-        raise TelemetryError("--profile: is of the vehicle of its own, and goes without an endpoint")
+        raise TelemetryError("--profile: sets the built-in vehicle, expected no endpoint with it")
     results = []
     with contextlib.ExitStack() as stack:
         if options.endpoint is None:

@@ -15,7 +15,7 @@ def whole(low: int, high: int) -> Callable[[str], int]:
     Parameters
     ----------
     low, high : int
-        Least and greatest value, at least 0.
+        Least and greatest allowed value, at least 0.
 
     Returns
     -------
@@ -38,7 +38,7 @@ def number(low: float, high: float) -> Callable[[str], float]:
     Parameters
     ----------
     low, high : float
-        Least and greatest value.
+        Least and greatest allowed value.
 
     Returns
     -------

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from threading import current_thread, main_thread
 from types import FrameType
 
-FAULT, INTERRUPTED, NO_READER = 2, 130, 141  # the last two as in shells for SIGINT and SIGPIPE
+FAULT, INTERRUPTED, NO_READER = 2, 130, 141  # exit statuses; the last two as in shells for SIGINT and SIGPIPE
 
 _KILLS = ("SIGTERM", "SIGHUP")  # the second when the terminal closes; Windows does not have it
 

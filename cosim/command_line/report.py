@@ -22,16 +22,16 @@ def add_verbs(verbs: Any) -> None:
         "pictures; both with a comma between them",
     )  # fmt: skip
 
-    replay = verbs.add_parser("replay", help="write the page in which one or several runs can be seen again")
+    replay = verbs.add_parser("replay", help="write a page that replays one or several runs")
     replay.add_argument("folders", type=Path, nargs="+", metavar="RUN", help="a run folder, also of a killed run")
     replay.add_argument(
         "--out", type=Path, metavar="FILE",
         help="file to write (default: replay.html, in the folder of a single run, or here for several)",
     )  # fmt: skip
-    replay.add_argument("--title", help="of the page (default: the scenario's)")
+    replay.add_argument("--title", help="title of the page (default: the scenario's)")
     replay.add_argument(
         "--interactive", action="store_true",
-        help="let the page fly its run again, with a goal, regions, a current, noise, gains that its reader changes",
+        help="let the page simulate its run again, with another goal, regions, current, noise or gains",
     )  # fmt: skip
 
 

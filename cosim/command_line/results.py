@@ -22,11 +22,11 @@ def print_run(options: argparse.Namespace, run: Run, report: bool = True) -> Non
     Parameters
     ----------
     options : argparse.Namespace
-        Of the verb.
+        Parsed arguments of the verb.
     run : Run
-        Completed or interrupted.
+        A completed or interrupted run.
     report : bool
-        True if it has a report and a replay.
+        True if the run has a report and a replay.
     """
     from cosim.results.wording import verdict
 

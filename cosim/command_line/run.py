@@ -30,13 +30,13 @@ def add_verb(verbs: Any) -> None:
     )  # fmt: skip
     run.add_argument(
         "--rate", type=rate, metavar="N|max",
-        help="simulated seconds a second at the most (default: 1 with --commands or --live, else max)",
+        help="greatest number of simulated seconds per second (default: 1 with --commands or --live, else max)",
     )  # fmt: skip
-    run.add_argument("--json", action="store_true", help="print what it came to, and its files, as JSON")
+    run.add_argument("--json", action="store_true", help="print the outcome, and the paths of the files, as JSON")
     run.add_argument("--no-report", action="store_true", help="leave out the report, its figures and the replay")
     run.add_argument(
         "--replay-commands", dest="commands_log", type=Path, metavar="FILE",
-        help="repeat what an earlier run was commanded: its commands.jsonl, with its scenario.toml",
+        help="repeat the commands of an earlier run from its commands.jsonl, with its scenario.toml",
     )  # fmt: skip
     add_live_flag(run, "show the run in browsers while it goes on, and take their commands with --commands")
     add_link_flags(run, commands=True)
@@ -57,11 +57,11 @@ def run(options: argparse.Namespace) -> int:
     mavlink = _mavlink(options)
     scenario = load_scenario(options.scenario, overrides)
     usual = 1.0 if options.commands or options.live is not None else math.inf
-    most = usual if options.rate is None else options.rate
+    max_rate = usual if options.rate is None else options.rate
     with contextlib.ExitStack() as stack:
         live = open_live(options, stack)
         done = run_scenario(
-            scenario, options.out, mavlink, None if most == math.inf else most,
+            scenario, options.out, mavlink, None if max_rate == math.inf else max_rate,
             progress=not options.quiet,
             report=not options.no_report, commands_log=options.commands_log, live=live,
         )  # fmt: skip
@@ -83,7 +83,7 @@ def _json(run: Run) -> str:
 
 
 def _mavlink(options: argparse.Namespace) -> Mavlink | None:
-    """Return the MAVLink setup from the flags, None without endpoints."""
+    """Return the MAVLink setup from the flags; None without endpoints."""
     if not options.mavlink:
         for flag in ("signing_key", "allow_system"):
             if getattr(options, flag):

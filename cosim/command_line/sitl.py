@@ -34,7 +34,7 @@ def add_verbs(verbs: Any) -> None:
     sitl.add_argument(
         "--port", type=whole(1, 65535), metavar="N", help=f"default: {_PORTS['ardupilot']}, with px4 {_PORTS['px4']}"
     )
-    sitl.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="to listen on (default: %(default)s)")
+    sitl.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="bound address (default: %(default)s)")
     sitl.add_argument("--allow-remote", action="store_true", help="let the address be seen from other machines")
     sitl.add_argument(
         "--timeout",
@@ -44,7 +44,7 @@ def add_verbs(verbs: Any) -> None:
     )
     sitl.add_argument(
         "--record-rate", type=number(1e-3, 1e6), default=100.0, metavar="HZ",
-        help="rows of the record a simulated second at the most (default: 100)",
+        help="greatest number of rows of the record per simulated second (default: 100)",
     )  # fmt: skip
     sitl.add_argument(
         "--autopilot", metavar="ENDPOINT",
@@ -52,14 +52,18 @@ def add_verbs(verbs: Any) -> None:
     )  # fmt: skip
     sitl.add_argument(
         "--dvl", type=number(0.1, 100.0), metavar="HZ",
-        help="send it the velocity over ground so many times a simulated second: VISION_POSITION_DELTA",
+        help="rate at which the autopilot gets the velocity over ground, as VISION_POSITION_DELTA, in simulated time",
     )  # fmt: skip
     sitl.add_argument(
-        "--dvl-latency", type=number(0.0, 10.0), default=0.1, metavar="S", help="of those messages (default: 0.1)"
+        "--dvl-latency",
+        type=number(0.0, 10.0),
+        default=0.1,
+        metavar="S",
+        help="their latency (default: 0.1)",
     )
     sitl.add_argument(
         "--dvl-dropout", type=number(0.0, 1.0), default=0.0, metavar="PART",
-        help="part of those messages that do not come (default: 0)",
+        help="part of these messages that is lost (default: 0)",
     )  # fmt: skip
     sitl.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: runs/SCENARIO-TIME)")
     sitl.add_argument("--no-report", action="store_true", help="leave out the report, its figures and the replay")
@@ -128,9 +132,9 @@ def _address(host: str, port: int, allow_remote: bool) -> tuple[str, int]:
     from cosim.errors import RunError
 
     try:
-        found, here = resolve_host(host)
+        found, is_loopback = resolve_host(host)
     except OSError as error:
         raise RunError(f"--host {host!r}: is not known: {error}") from error
-    if not (allow_remote or here):
+    if not (allow_remote or is_loopback):
         raise RunError(f"--host {host!r}: {found} can be seen from other machines; --allow-remote lets it")
     return found, port

@@ -25,7 +25,7 @@ _EPILOG = """examples:
 def add_verbs(verbs: Any) -> None:
     """Add the verbs to the subparsers of the command."""
     sweep = verbs.add_parser(
-        "sweep", help="fly a scenario many times, with numbers of it varied",
+        "sweep", help="fly a scenario many times with varied numbers",
         epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
     sweep.add_argument("scenario", help="a shipped name (see cosim list), or a TOML file; it stands before --vary")
@@ -38,13 +38,13 @@ def add_verbs(verbs: Any) -> None:
         "--vehicles", type=Path, metavar="FILE.jsonl",
         help="vehicles that cosim identify has drawn: each is the plant of a row, and the law knows the scenario's own",
     )  # fmt: skip
-    sweep.add_argument("--samples", type=int, metavar="N", help="rows, unless the design is a grid")
+    sweep.add_argument("--samples", type=int, metavar="N", help="number of rows, unless the design is a grid")
     sweep.add_argument(
         "--design",
         metavar="grid|random|sobol|lhs|paired",
         help="how rows are spread (default: random; of --vehicles: paired)",
     )
-    sweep.add_argument("--seed", type=int, default=0, metavar="S", help="of the design and the rows (default: 0)")
+    sweep.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the design and the rows (default: 0)")
     sweep.add_argument(
         "--out", type=Path, required=True, metavar="DIR",
         help="a new folder, or one that this command began: it goes on with what is left",
@@ -55,8 +55,8 @@ def add_verbs(verbs: Any) -> None:
     )  # fmt: skip
     sweep.add_argument("--workers", type=WORKERS, metavar="N", help="processes (default: 1; with --dask: one a core)")
     where = sweep.add_mutually_exclusive_group()
-    where.add_argument("--dask", action="store_true", help="a Dask cluster of its own on this machine")
-    where.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="a Dask cluster that exists")
+    where.add_argument("--dask", action="store_true", help="start a Dask cluster on this machine")
+    where.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="use an existing Dask cluster")
     add_replays(sweep)
     sweep.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
@@ -77,7 +77,7 @@ def sweep(options: argparse.Namespace) -> int:
     from cosim.scenario.scenario import load_scenario
 
     if options.scheduler and options.workers:
-        raise RunError("--workers: expected none with --scheduler: the cluster has as many as it has")
+        raise RunError("--workers: expected none with --scheduler: the cluster sets their number")
     vary = vary_vehicles(options.vehicles) if options.vehicles else vary_from(options.vary)
     kind: Any = options.design or ("paired" if options.vehicles else "random")
     design = Design(vary, kind, options.samples, options.seed)

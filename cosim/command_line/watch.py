@@ -22,9 +22,9 @@ def add_verb(verbs: Any) -> None:
     )  # fmt: skip
     watch.add_argument(
         "--rate", type=rate, default=1.0, metavar="N|max",
-        help="simulated seconds a second, when a finished run is played back (default: 1)",
+        help="simulated seconds per second in the playback of a finished run (default: 1)",
     )  # fmt: skip
-    watch.add_argument("--once", action="store_true", help="print one picture of the newest there is, and end")
+    watch.add_argument("--once", action="store_true", help="print one picture of the newest row, and end")
 
 
 def watch(options: argparse.Namespace) -> int:
