@@ -31,7 +31,7 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.signals import Array, Column
 
-_HEARTBEAT = 1.1  # s of the wall clock without one, until one is sent; longer than the stream's second
+_HEARTBEAT = 1.1  # s of the wall clock without a heartbeat, after which one is sent; longer than the stream's second
 _STILL = 0.5  # s of the wall clock without a snapshot, after which streams go by that clock
 _SECOND = 1_000_000
 
@@ -91,10 +91,10 @@ class Autopilot:
             self._handlers.update(service.messages)
         self._clock_us = 0  # of the streams; never decreases
         self._last_us: int | None = None  # simulated time of the last snapshot
-        self._awaiting = False  # waiting for arming: simulated time is still 0
-        self._moved = False  # a snapshot came since the last tick
+        self._awaiting = False  # True while the run waits for arming: simulated time is still 0
+        self._moved = False  # True if simulated time has advanced since the last tick
         self._moved_at = -math.inf
-        self._beaten_at: dict[MessageSink, float] = {}
+        self._heartbeat_at: dict[MessageSink, float] = {}
         self._ticked: float | None = None
 
     def attach(self, link: MessageSink) -> None:
@@ -115,12 +115,12 @@ class Autopilot:
             the last one starts a new run.
         """
         context = self._context
-        context.look(row)
+        context.update(row)
         now = context.view.simulated_us
-        if (self._last_us is not None and now < self._last_us) or (now == 0 and context.outlived):
+        if (self._last_us is not None and now < self._last_us) or (now == 0 and context.run_has_ended):
             self._restart()
-            context.look(row)
-        self._awaiting = now == self._last_us == 0  # the same snapshot comes again and again
+            context.update(row)
+        self._awaiting = now == self._last_us == 0  # the snapshot of time 0 is repeated
         self._moved |= now != self._last_us
         self._clock_us += max(0, now - (now if self._last_us is None else self._last_us))
         self._last_us = now
@@ -190,10 +190,10 @@ class Autopilot:
             service.tick()
         context.status_texts.send_due()
         for link, streams in list(self._streams.items()):
-            if streams.beaten or link not in self._beaten_at:
-                streams.beaten = False
-                self._beaten_at[link] = now
-            elif now - self._beaten_at[link] >= _HEARTBEAT:
+            if streams.heartbeat_sent or link not in self._heartbeat_at:
+                streams.heartbeat_sent = False
+                self._heartbeat_at[link] = now
+            elif now - self._heartbeat_at[link] >= _HEARTBEAT:
                 streams.send(HEARTBEAT)
 
     def close(self, now: float) -> None:

@@ -30,9 +30,9 @@ class Events:
     def restart(self) -> None:
         """Reset; the next snapshot is the first."""
         self._before: View | None = None
-        self._fine: list[bool] = []
+        self._satisfied: list[bool] = []
         self._saturated = False
-        self._cut_us = 0  # time of the last saturation
+        self._saturated_us = 0  # time of the last saturation
 
     def watch(self) -> None:
         """Compare the vehicle's snapshot with the last one."""
@@ -40,7 +40,7 @@ class Events:
         before = self._before
         self._before = view
         if before is None:
-            self._fine = [clearance >= 0.0 for clearance in view.clearances]
+            self._satisfied = [clearance >= 0.0 for clearance in view.clearances]
             return
         self._watch_commands(before, view)
         self._watch_regions(view)
@@ -58,9 +58,9 @@ class Events:
             for message in (*status.heartbeat(context), *status.current_mode(context)):
                 context.send(message)
         if view.mode == before.mode == "mission" and view.item != before.item:
-            self._watch_course(before.item, view.item)
+            self._watch_mission(before.item, view.item)
 
-    def _watch_course(self, before: int, now: int) -> None:
+    def _watch_mission(self, before: int, now: int) -> None:
         """Report the mission items that were passed; items without a position are not reported."""
         passed = way(self._context.course, before, now) if before >= 0 else None
         for item in [before, *passed[:-1]] if passed else []:
@@ -68,7 +68,7 @@ class Events:
 
     def _reached_item(self, item: int) -> None:
         context = self._context
-        if not 0 <= item < len(context.course) or context.course[item].position is None:
+        if not 0 <= item < len(context.mission_items) or context.mission_items[item].position is None:
             return
         number = item + int(context.profile.home_is_first)
         context.send(context.make("MISSION_ITEM_REACHED", number))
@@ -77,21 +77,21 @@ class Events:
     def _watch_regions(self, view: View) -> None:
         m = self._context.mavlink
         for i, clearance in enumerate(view.clearances):
-            fine = self._fine[i]
+            satisfied = self._satisfied[i]
             # hysteresis of a margin about the surface; NaN changes nothing
-            now_fine = not clearance < -_MARGIN if fine else clearance > _MARGIN
-            if now_fine == fine:
+            now_satisfied = not clearance < -_MARGIN if satisfied else clearance > _MARGIN
+            if now_satisfied == satisfied:
                 continue
-            self._fine[i] = now_fine
+            self._satisfied[i] = now_satisfied
             if i == 0:
-                self._report_target(view, now_fine)
+                self._report_target(view, now_satisfied)
                 continue
             region = self._context.scenario.regions[i - 1].region
             what = "Attitude" if of_attitude(region.shape) else "Region"
-            inside = now_fine == (region.keep == "in")
+            inside = now_satisfied == (region.keep == "in")
             text = f"{what} {region.name} {'entered' if inside else 'left'}"
-            severity = m.MAV_SEVERITY_INFO if now_fine else m.MAV_SEVERITY_WARNING
-            self._context.say(text if now_fine else f"{text}: keep {region.keep}", severity, text, _EVERY)
+            severity = m.MAV_SEVERITY_INFO if now_satisfied else m.MAV_SEVERITY_WARNING
+            self._context.say(text if now_satisfied else f"{text}: keep {region.keep}", severity, text, _EVERY)
 
     def _report_target(self, view: View, inside: bool) -> None:
         context = self._context
@@ -103,10 +103,10 @@ class Events:
     def _watch_limits(self, view: View) -> None:
         context = self._context
         if view.saturated:
-            self._cut_us = view.boot_us
+            self._saturated_us = view.boot_us
             if not self._saturated:
                 context.say("Thrust saturated", context.mavlink.MAV_SEVERITY_WARNING, "saturated", _EVERY)
             self._saturated = True
-        elif self._saturated and view.boot_us - self._cut_us >= _RELEASED:
+        elif self._saturated and view.boot_us - self._saturated_us >= _RELEASED:
             self._saturated = False
             context.say("Thrust no longer saturated", None, "released", _EVERY)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from cosim.errors import RunError
 from cosim.mavlink.autopilot import Autopilot
-from cosim.mavlink.setup import ahead
+from cosim.mavlink.setup import max_lead
 from cosim.mavlink.thread import SNAPSHOT_PERIOD, SNAPSHOTS, LinkThread
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.link import open_links
@@ -22,8 +22,8 @@ from cosim.simulation.columns import names_of
 from cosim.simulation.signals import Array
 
 _LONGEST_SLEEP = 0.5  # s
-_WAITING = 0.002  # s, for the links to send what is queued
-_MOST_QUEUED = SNAPSHOTS // 2
+_WAITING = 0.002  # s between two looks at the queue while the links send
+_MAX_QUEUED = SNAPSHOTS // 2
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions,
     known = set(names_of(scenario))  # further columns could separate columns that are read as one slice
     columns = [column for column in record.columns if column.name in known or column.name.startswith("law.")]
     autopilot = Autopilot(scenario, columns, options, commands=None, live=False)
-    thread = LinkThread(autopilot, open_links(endpoints, options), scenario.time.step, ahead(scenario, rate))
+    thread = LinkThread(autopilot, open_links(endpoints, options), scenario.time.step, max_lead(scenario, rate))
     every = max(1, round(SNAPSHOT_PERIOD / scenario.time.step))
     thread.start()
     started, simulated = time.perf_counter(), 0.0
@@ -79,7 +79,7 @@ def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions,
             simulated = float(row[0])
             if rate is not None:
                 _sleep_until(started + simulated / rate)
-            while thread.waiting > _MOST_QUEUED:
+            while thread.waiting > _MAX_QUEUED:
                 time.sleep(_WAITING)
             thread.observe(k, row)
         while thread.waiting:

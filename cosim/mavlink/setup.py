@@ -40,16 +40,16 @@ class Mavlink:
         scenario : Scenario
             The scenario of the run.
         columns : sequence of Column
-            Columns of its rows.
+            Columns of the run's rows.
         commands : CommandQueue or None
             Queue that receives the commands; None accepts none.
         rate : float or None
-            Most simulated seconds per second of the wall clock; None for no limit.
+            Greatest number of simulated seconds per second of the wall clock; None for no limit.
 
         Returns
         -------
         LinkThread
-            The thread, not started.
+            The thread of the links, not started yet.
 
         Raises
         ------
@@ -58,9 +58,9 @@ class Mavlink:
         """
         autopilot = Autopilot(scenario, columns, self.options, commands if self.options.commands else None)
         links = open_links(self.endpoints, self.options)
-        return LinkThread(autopilot, links, scenario.time.step, ahead(scenario, rate))
+        return LinkThread(autopilot, links, scenario.time.step, max_lead(scenario, rate))
 
 
-def ahead(scenario: Scenario, rate: float | None) -> float:
-    """Return the most by which simulated time can lead the wall clock [s]; `rate` None is no limit."""
+def max_lead(scenario: Scenario, rate: float | None) -> float:
+    """Return the longest time [s] by which simulated time can lead the wall clock; a `rate` of None is no limit."""
     return scenario.time.duration if rate is None or rate > 1.0 else 0.0

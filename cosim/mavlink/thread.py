@@ -23,19 +23,19 @@ from cosim.simulation.signals import Array
 log = logging.getLogger(__name__)
 
 SNAPSHOT_PERIOD = 0.01  # s, simulated: the shortest period of a stream
-SNAPSHOTS = 8192  # queued at most; a full queue drops the oldest
+SNAPSHOTS = 8192  # greatest number in the queue; a full queue drops the oldest
 _PERIOD = 0.02  # s, polling period while idle: each poll delays the stepper by 0.1 ms
 _RUSHING = 0.2  # s, polling period in a run much faster than real time, whose stepper hardly ever pauses
 _MANY = 2500  # snapshots per second of the wall clock that mark such a run: 25 times real time
 _SOON = 0.004  # s, polling period during a conversation, in which a peer may wait for an answer
 _TALKING = 0.1  # s after the last accepted message, during which a conversation lasts
-_RECEIVING = 0.2e-3  # s, of a slice, for all links together
-_SENDING = 0.5e-3  # s, of a slice
+_RECEIVING = 0.2e-3  # s of a slice for receiving, for all links together
+_SENDING = 0.5e-3  # s of a slice for sending
 _REST_RECEIVING = 19  # ratio of rest to receiving: a flood gets a twentieth of the time
 _REST_SENDING = 3  # ratio of rest to sending
 _LONGEST_REST = 0.05  # s; long slices come from the stepper, which loads libraries before its first step
-_DRAINING = 2.0  # s, that closing waits for the queue
-_CLOSING = 4.0  # s, that closing waits in total
+_DRAINING = 2.0  # s for which closing waits for the queue
+_CLOSING = 4.0  # s for which closing waits in total
 
 
 class Vehicle(Protocol):
@@ -70,16 +70,16 @@ class LinkThread:
     vehicle : Vehicle
         The vehicle; its methods are called only in the thread.
     links : sequence of Link
-        Links, which are closed with the thread.
+        Links of the vehicle, which are closed with the thread.
     step : float
         Step of the run [s].
     ahead : float
-        Most by which simulated time can lead the wall clock [s]; logs start earlier by that.
+        Longest time by which simulated time can lead the wall clock [s]; logs start earlier by it.
 
     Attributes
     ----------
     dropped : int
-        Snapshots dropped from a full queue.
+        Number of snapshots dropped from a full queue.
     failures : dict of str to int
         Count of each kind of error in the vehicle's side; the thread continues after them.
     """
@@ -99,10 +99,10 @@ class LinkThread:
         self._waited = 0.0  # s, from then to the last one: time of waiting for arming
         self._looked = time.perf_counter()  # s, end of the last work
         self._shown = 0  # snapshots since then
-        self._heard = -math.inf  # s, monotonic, time of the last accepted message
+        self._received_at = -math.inf  # s, monotonic, time of the last accepted message
         self.dropped = 0
         self.failures: dict[str, int] = Counter()
-        self._thread = threading.Thread(target=self._live, name="mavlink", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="mavlink", daemon=True)
 
     def start(self) -> None:
         """Start the thread."""
@@ -144,11 +144,11 @@ class LinkThread:
 
     # ---- in the thread ----
 
-    def _live(self) -> None:
+    def _run(self) -> None:
         for link in self._links:
             self._guard("attach", self._vehicle.attach, link)
         while not self._closing.is_set():
-            time.sleep(self._turn())  # not an event, which releases the interpreter lock several times
+            time.sleep(self._run_slice())  # not an event, which releases the interpreter lock several times
         deadline = time.perf_counter() + _DRAINING
         while self._send_queued(time.perf_counter() + _SENDING) and time.perf_counter() < deadline:
             self._tend(time.monotonic())
@@ -156,7 +156,7 @@ class LinkThread:
         self._guard("close", self._vehicle.close, time.monotonic())
         self._close_links()
 
-    def _turn(self) -> float:
+    def _run_slice(self) -> float:
         """Run a slice of each kind of work; return the time to rest [s]."""
         began = time.perf_counter()
         for link in self._links:
@@ -173,7 +173,7 @@ class LinkThread:
         rest = min(rest, _LONGEST_REST)
         if more:
             return rest
-        if now - self._heard < _TALKING:
+        if now - self._received_at < _TALKING:
             return max(rest, _SOON)
         rushing = self._shown > _MANY * (began - self._looked)
         self._shown, self._looked = 0, began
@@ -185,10 +185,10 @@ class LinkThread:
 
     def _receive(self, link: Link, until: float) -> None:
         for frame, message in link.receive(until):
-            self._heard = time.monotonic()
+            self._received_at = time.monotonic()
             for tlog in self._logs:
                 tlog.send(frame)
-            self._guard("receive", self._vehicle.receive, link, message, self._heard)
+            self._guard("receive", self._vehicle.receive, link, message, self._received_at)
 
     def _send_queued(self, until: float) -> bool:
         """Pass snapshots to the vehicle until a time of `time.perf_counter`; return True if some are left."""

@@ -33,7 +33,7 @@ class Channel(Protocol):
         """
         ...
 
-    def heard(self, peer: Hashable, version: int) -> None:
+    def record_version(self, peer: Hashable, version: int) -> None:
         """Record that an accepted frame of MAVLink 1 or 2 was received from `peer`.
 
         A peer that has sent only MAVLink 1 is answered in MAVLink 1.

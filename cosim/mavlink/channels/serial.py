@@ -32,7 +32,7 @@ class Serial(OneStream):
     Raises
     ------
     TelemetryError
-        If it cannot be opened.
+        If the device cannot be opened.
     """
 
     def __init__(self, path: str, baud: int) -> None:

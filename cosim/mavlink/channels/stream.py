@@ -8,7 +8,7 @@ from typing import Final
 
 from cosim.mavlink.channels.channel import CHUNK
 
-WAITING = 1 << 16  # bytes
+WAITING = 1 << 16  # bytes, default limit of a queue
 _MUCH = 1 << 12  # bytes in the queue above which `put` writes at once
 STALL = 5.0  # s without progress, after which `flush` reports a stall
 
@@ -19,14 +19,16 @@ class Outgoing:
     Parameters
     ----------
     write : callable
-        Writes bytes and returns the number written, or raises OSError; BlockingIOError if it cannot write now.
+        Function that writes bytes and returns the number written; it raises BlockingIOError if it cannot write now,
+        another OSError if the other side has closed.
     limit : int
-        Bytes in the queue at most. A frame beyond the limit is dropped whole, so the other side never gets part of one.
+        Greatest number of bytes in the queue. A frame beyond the limit is dropped whole, so the other side never gets
+        part of one.
 
     Attributes
     ----------
     dropped : int
-        Frames dropped because the queue was full.
+        Number of frames dropped because the queue was full.
     """
 
     def __init__(self, write: Callable[[bytes], int], limit: int = WAITING) -> None:
@@ -82,9 +84,10 @@ class Stream:
     Parameters
     ----------
     read, write, close : callable
-        Calls of the operating system; their arguments are the most bytes to read, the bytes to write, and none.
+        Calls of the operating system; their arguments are the greatest number of bytes to read, the bytes to
+        write, and none.
     limit : int
-        Bytes in the queue at most.
+        Greatest number of bytes in the queue.
 
     Attributes
     ----------
@@ -153,7 +156,7 @@ class OneStream:
     stream : Stream or None
         The first stream, if it is open already.
     gone, slow : str
-        Words of the texts for frames dropped because the peer was absent, or too slow.
+        Words in the texts about frames that were dropped because the peer was absent (`gone`), or too slow (`slow`).
     """
 
     datagrams = False
@@ -169,7 +172,7 @@ class OneStream:
         data = None if stream is None else stream.read()
         return None if data is None else (stream, data)
 
-    def heard(self, peer: Hashable, version: int) -> None:
+    def record_version(self, peer: Hashable, version: int) -> None:
         """Record the MAVLink version of the peer."""
         assert isinstance(peer, Stream)
         peer.version = max(peer.version, version)

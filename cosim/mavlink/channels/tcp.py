@@ -67,7 +67,7 @@ class TcpIn:
                 return client, data
         return None
 
-    def heard(self, peer: Hashable, version: int) -> None:
+    def record_version(self, peer: Hashable, version: int) -> None:
         """Record the MAVLink version of a client; all clients are sent to, even if they never send."""
         assert isinstance(peer, Stream)
         peer.version = max(peer.version, version)

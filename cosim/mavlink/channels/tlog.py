@@ -63,7 +63,7 @@ class Tlog:
         """Return None: a log is only written."""
         return None
 
-    def heard(self, peer: Hashable, version: int) -> None:
+    def record_version(self, peer: Hashable, version: int) -> None:
         """Do nothing: a log has no peers."""
 
     def send(self, frame: bytes, old: bytes | None = None) -> bool:

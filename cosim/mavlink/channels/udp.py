@@ -28,7 +28,7 @@ class UdpOut:
     Raises
     ------
     TelemetryError
-        If there is no route to it.
+        If there is no route to the peer.
     """
 
     datagrams = True
@@ -46,7 +46,7 @@ class UdpOut:
         except OSError:  # nothing was received, or an earlier datagram was refused
             return None
 
-    def heard(self, peer: Hashable, version: int) -> None:
+    def record_version(self, peer: Hashable, version: int) -> None:
         """Record the MAVLink version of the peer."""
         self._version = max(self._version, version)
 
@@ -117,7 +117,7 @@ class UdpIn:
             return None
         return address, data
 
-    def heard(self, peer: Hashable, version: int) -> None:
+    def record_version(self, peer: Hashable, version: int) -> None:
         """Add this address to the peers, or renew it; count the frame if there are 8 already."""
         assert isinstance(peer, tuple)
         if peer in self._heard or len(self._heard) < PEERS:

@@ -1,4 +1,4 @@
-"""Where an autopilot differs from what the checks expect, and rightly so: that is said, and is no failure."""
+"""Known differences of autopilots from what the checks expect: they are reported, but are not failures."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from cosim.mavlink.conformance.outcome import Outcome, Subject
 
 @dataclass(frozen=True)
 class Baseline:
-    """An autopilot, and why it fails which checks."""
+    """An autopilot, and the checks that it is known to fail."""
 
     name: str
-    differences: Mapping[str, str]  # why, by the name of a check
+    differences: Mapping[str, str]  # reasons, by the name of the check
 
-    def judge(self, check: str, outcome: Outcome) -> Outcome:
-        """Return an outcome, or where this autopilot is known to fail the check that it differs, and why."""
-        why = self.differences.get(check)
-        if why is None or outcome.status != "fail":
+    def apply(self, check: str, outcome: Outcome) -> Outcome:
+        """Replace a failure that this autopilot is known for by ``differs`` with the reason; return other outcomes."""
+        reason = self.differences.get(check)
+        if reason is None or outcome.status != "fail":
             return outcome
-        return dataclasses.replace(outcome, status="differs", expected=f"{outcome.expected}; {self.name}: {why}")
+        return dataclasses.replace(outcome, status="differs", expected=f"{outcome.expected}; {self.name}: {reason}")
 
 
 ARDUSUB = Baseline(
@@ -33,8 +33,8 @@ ARDUSUB = Baseline(
         "parameter-unknown": "it is silent about a parameter that it lacks, and knows no PARAM_ERROR",
     },
 )
-NONE = Baseline("no known autopilot", {})  # ours, and PX4: of which none was checked so far
-_OWN = b"subreach"  # custom version of our simulated vehicle, which shows itself as an ArduSub, too
+NONE = Baseline("no known autopilot", {})  # for our vehicle, and for PX4, of which none was checked so far
+_OWN = b"subreach"  # custom version of our simulated vehicle, also when it imitates an ArduSub
 
 
 def baseline_of(subject: Subject) -> Baseline:

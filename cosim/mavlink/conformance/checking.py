@@ -16,9 +16,9 @@ from cosim.mavlink.wire.ground_end import GroundLink, Heard
 
 LISTENING = 6.0  # s of the vehicle's clock, in which its streams are recorded before any request
 _LONGEST = 60.0  # s of the wall clock, for a vehicle whose clock is slow
-_FINDING = 10.0  # s
-_GONE = 5.0  # s of silence
-_QUICK = 0.5  # s
+_FINDING = 10.0  # s, timeout of the first heartbeat
+_GONE = 5.0  # s of silence, after which the vehicle counts as gone
+_QUICK = 0.5  # s, timeout of an ack
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Result:
 
     check: Check
     outcome: Outcome
-    seconds: float  # of the wall clock
+    seconds: float  # s of the wall clock, duration of the check
 
 
 def connect_as_qgc(subject: Subject) -> Outcome:
@@ -83,17 +83,17 @@ def check_vehicle(link: GroundLink, writes: bool) -> Iterator[Result]:
     client = Client(link)
     if client.find(_FINDING) is None:
         raise TelemetryError(f"{link.name}: no vehicle was heard in {_FINDING:g} s")
-    client.forget()
+    client.discard_unread()
     subject = Subject(client, *_listen(client), writes)
     baseline = baseline_of(subject)
     for check in CHECKS:
         started = time.monotonic()
         outcome = check.run(subject) if writes or not check.writes else skipped("only with --commands")
-        outcome = baseline.judge(check.name, outcome)
+        outcome = baseline.apply(check.name, outcome)
         if time.monotonic() - client.last_heard > _GONE:
             raise TelemetryError(f"{link.name}: the vehicle has gone, in check {check.name}")
         yield Result(check, outcome, time.monotonic() - started)
-    _give_rates_back(subject)
+    _restore_rates(subject)
 
 
 def _listen(client: Client) -> tuple[tuple[Heard, ...], float]:
@@ -106,7 +106,7 @@ def _listen(client: Client) -> tuple[tuple[Heard, ...], float]:
     return heard, passed
 
 
-def _give_rates_back(subject: Subject) -> None:
+def _restore_rates(subject: Subject) -> None:
     """Request the default rates of all unasked messages, of which connecting as QGroundControl has changed some."""
     m = subject.mavlink
     for number in sorted({heard.message.get_msgId() for heard in subject.unasked}):

@@ -95,7 +95,7 @@ class Client:
         self._new.clear()
         return found
 
-    def forget(self) -> None:
+    def discard_unread(self) -> None:
         """Discard the messages not yet examined, so that the next wait examines only later ones."""
         self.pump()
         self._new.clear()
@@ -156,7 +156,7 @@ class Client:
 
     def command(self, command: int, parameters: Sequence[float] = (), timeout: float = 2.0) -> Any:
         """Send a COMMAND_LONG, `command` with `parameters`, and return its COMMAND_ACK; None after `timeout` [s]."""
-        self.forget()
+        self.discard_unread()
         self.send_command(command, parameters)
         return self.wait(lambda m: m.get_type() == "COMMAND_ACK" and m.command == command, timeout)
 
@@ -165,6 +165,6 @@ class Client:
 
         None after `timeout` [s]; the ack may come before or after.
         """
-        self.forget()
+        self.discard_unread()
         self.send_command(self.mavlink.MAV_CMD_REQUEST_MESSAGE, [message_id, index, 0, 0, 0, 0, 0])
         return self.wait(lambda m: m.get_msgId() == message_id, timeout)

@@ -22,7 +22,7 @@ def one_ack(subject: Subject) -> Outcome:
     m, client = subject.mavlink, subject.client
     command = m.MAV_CMD_REQUEST_MESSAGE
     started = time.monotonic()
-    client.forget()
+    client.discard_unread()
     client.send_command(command, [m.MAVLINK_MSG_ID_SYS_STATUS])
     acks = [h for h in client.collect(0.8) if h.kind == "COMMAND_ACK" and h.message.command == command]
     if len(acks) != 1:
@@ -38,7 +38,7 @@ def command_int(subject: Subject) -> Outcome:
     """Check that COMMAND_INT is executed like COMMAND_LONG, and gets one ack."""
     m, client = subject.mavlink, subject.client
     command, wanted = m.MAV_CMD_REQUEST_MESSAGE, m.MAVLINK_MSG_ID_AUTOPILOT_VERSION
-    client.forget()
+    client.discard_unread()
     client.send(
         m.MAVLink_command_int_message(
             *client.target, m.MAV_FRAME_GLOBAL, command, 0, 0, wanted, math.nan, math.nan, math.nan,
@@ -61,7 +61,7 @@ def unsupported(subject: Subject) -> Outcome:
 def wrong_target(subject: Subject) -> Outcome:
     """Check that messages for another system get no answer."""
     m, client = subject.mavlink, subject.client
-    client.forget()
+    client.discard_unread()
     client.send_command(m.MAV_CMD_REQUEST_MESSAGE, [m.MAVLINK_MSG_ID_AUTOPILOT_VERSION], (_NO_SYSTEM, 1))
     client.send(m.MAVLink_param_request_read_message(_NO_SYSTEM, 1, b"", 0))
     client.send(m.MAVLink_mission_request_list_message(_NO_SYSTEM, 1, 0))
@@ -73,7 +73,7 @@ def wrong_target(subject: Subject) -> Outcome:
 def broadcast(subject: Subject) -> Outcome:
     """Check that a broadcast command is answered."""
     m, client = subject.mavlink, subject.client
-    client.forget()
+    client.discard_unread()
     client.send_command(m.MAV_CMD_REQUEST_MESSAGE, [m.MAVLINK_MSG_ID_AUTOPILOT_VERSION], (0, 0))
     version = client.wait(lambda x: x.get_type() == "AUTOPILOT_VERSION", 1.0)
     return judged(version is not None, "an answer" if version else "nothing", "AUTOPILOT_VERSION")
@@ -152,7 +152,7 @@ def timesync(subject: Subject) -> Outcome:
     """Check that TIMESYNC is answered with the client's time and the vehicle's own."""
     m, client = subject.mavlink, subject.client
     sent = time.monotonic_ns()
-    client.forget()
+    client.discard_unread()
     client.send(m.MAVLink_timesync_message(0, sent))
     reply = client.wait(lambda x: x.get_type() == "TIMESYNC" and x.ts1 == sent, 1.0)
     if reply is None:
@@ -165,7 +165,7 @@ def ping(subject: Subject) -> Outcome:
     m, client = subject.mavlink, subject.client
     if subject.ardupilot:
         return skipped("ArduPilot answers none")
-    client.forget()
+    client.discard_unread()
     client.send(m.MAVLink_ping_message(time.time_ns() // 1000, 4711, 0, 0))
     reply = client.wait(lambda x: x.get_type() == "PING" and x.seq == 4711, 1.0)
     if reply is None:

@@ -18,7 +18,7 @@ _HEARTBEAT_TIMEOUT = 10.0
 _FTP_FILE = "@PARAM/param.pck"
 COMPONENT_METADATA = 397  # missing in all dialects of pymavlink
 _STREAMS_OF_ARDUPILOT = ((1, 2), (2, 2), (3, 2), (6, 3), (10, 20), (11, 10), (12, 3))  # group, Hz
-_MOST_MODES = 256
+_MAX_MODES = 256
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Step:
     name: str
     seconds: float
     retries: int
-    said: str  # its result, in words
+    said: str  # description of its result
     good: bool = True
 
 
@@ -60,12 +60,12 @@ def qgc_connect(client: Client) -> Connection:
     Parameters
     ----------
     client : Client
-        The client; it need not have found the vehicle yet.
+        Client, which need not have found the vehicle yet.
 
     Returns
     -------
     Connection
-        Its steps; none if no vehicle was received within 10 s.
+        Connection with its steps; without steps if no vehicle was received within 10 s.
     """
     if client.find(_HEARTBEAT_TIMEOUT) is None:
         return Connection(())
@@ -104,7 +104,7 @@ class _Connecting:
         m, command = self._mavlink, self._mavlink.MAV_CMD_REQUEST_MESSAGE
         for attempt in range(_ACK_TRIES):
             self._retries += attempt > 0
-            self._client.forget()
+            self._client.discard_unread()
             self._client.send_command(command, [message_id, index, 0, 0, 0, 0, 0])
             found: list[Any] = []
 
@@ -130,7 +130,7 @@ class _Connecting:
 
     def _modes(self) -> tuple[bool, str]:
         names: list[str] = []
-        for index in range(1, _MOST_MODES):
+        for index in range(1, _MAX_MODES):
             mode, result = self._request(self._mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, index)
             if mode is None:  # QGroundControl then uses its own list of the autopilot's modes
                 refused = result is not None and result != self._mavlink.MAV_RESULT_ACCEPTED
@@ -185,16 +185,16 @@ def fetch_parameters(client: Client) -> tuple[dict[int, Any], int | None, int]:
     dict
         PARAM_VALUE messages, by index.
     int or None
-        Parameters of the vehicle; None without an answer.
+        Number of parameters of the vehicle; None without an answer.
     int
-        Retries.
+        Number of repeated requests.
     """
     m, got, count, retries = client.mavlink, dict[int, Any](), None, 0
 
     def is_value(message: Any) -> bool:
         return bool(message.get_type() == "PARAM_VALUE" and message.param_index != 0xFFFF)
 
-    client.forget()
+    client.discard_unread()
     client.send(m.MAVLink_param_request_list_message(*client.target))
     timeout = _LIST_TIMEOUT
     while retries <= _PARAMETER_TRIES:
@@ -227,11 +227,11 @@ def fetch_mission(client: Client, kind: int) -> tuple[list[Any] | None, str, int
     Returns
     -------
     list or None
-        MISSION_ITEM_INT messages; None if some did not come.
+        MISSION_ITEM_INT messages; None if some were not received.
     str
-        The result, in words.
+        Description of the result.
     int
-        Retries.
+        Number of repeated requests.
     """
     m, target, retries = client.mavlink, client.target, 0
 
@@ -239,7 +239,7 @@ def fetch_mission(client: Client, kind: int) -> tuple[list[Any] | None, str, int
         nonlocal retries
         for attempt in range(_MISSION_TRIES):
             retries += attempt > 0
-            client.forget()
+            client.discard_unread()
             client.send(message)
             reply = client.wait(
                 lambda x: (

@@ -43,7 +43,7 @@ class Download(NamedTuple):
     """The result of a download."""
 
     data: bytes | None  # None without a file
-    said: str  # the error, in words; "" with data
+    said: str  # description of the error; empty with data
     retries: int
 
 
@@ -58,7 +58,7 @@ class _Session:
         """Send a request, with retries, and return its reply; None without one."""
         for attempt in range(_TRIES + 1):
             self.retries += attempt > 0
-            self.client.forget()
+            self.client.discard_unread()
             length = len(data) if size is None else size
             head = _HEADER.pack(self.sequence, self.number, opcode, length, 0, 0, offset)
             payload = (head + data).ljust(_PAYLOAD, b"\0")
@@ -99,7 +99,7 @@ def download(client: Client, path: str) -> Download:
     Returns
     -------
     Download
-        Its data, or the error.
+        Data of the file, or the description of the error.
     """
     session = _Session(client)
     opened = session.ask(_OPEN, data=path.encode())
@@ -134,7 +134,7 @@ def _burst(session: _Session, size: int) -> dict[int, bytes]:
 
 
 def _fill(session: _Session, size: int, pieces: dict[int, bytes]) -> int:
-    """Read what the bursts left out; return where the file ends, which ArduPilot's size is but an estimate of."""
+    """Read the parts that the bursts lack; return the size of the file, which ArduPilot only estimates beforehand."""
     at = 0
     while at < size:
         if at not in pieces:

@@ -108,7 +108,7 @@ def current_mode(subject: Subject) -> Outcome:
 def component_metadata(subject: Subject) -> Outcome:
     """Check that a request for an unknown message is answered at once, or QGroundControl waits."""
     client, m = subject.client, subject.mavlink
-    client.forget()
+    client.discard_unread()
     ack = client.command(m.MAV_CMD_REQUEST_MESSAGE, [COMPONENT_METADATA, 0, 0, 0, 0, 0, 0], _QUICK)
     if ack is None:
         return failed(f"no ack in {_QUICK:g} s", f"an ack for COMPONENT_METADATA ({COMPONENT_METADATA}) at once")

@@ -101,7 +101,7 @@ def upload(subject: Subject, items: list[Any]) -> int | None:
     """
     m, client = subject.mavlink, subject.client
     kind = m.MAV_MISSION_TYPE_MISSION
-    client.forget()
+    client.discard_unread()
     if not items:
         client.send(m.MAVLink_mission_clear_all_message(*client.target, kind))
     else:

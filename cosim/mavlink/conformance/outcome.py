@@ -10,7 +10,7 @@ from typing import Any, Literal
 from cosim.mavlink.conformance.client import Client
 from cosim.mavlink.wire.ground_end import Heard
 
-Status = Literal["pass", "fail", "skip", "differs"]  # the last: as this autopilot is known to
+Status = Literal["pass", "fail", "skip", "differs"]  # differs: a failure for which this autopilot is known
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Subject:
 
     client: Client
     unasked: tuple[Heard, ...]  # messages before the first request
-    seconds: float  # of the wall clock, in which they came
+    seconds: float  # s of the wall clock, in which these were received
     writes: bool  # True to allow arming, steering and mission uploads
 
     @property

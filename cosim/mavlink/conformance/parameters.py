@@ -47,7 +47,7 @@ def parameter_read(subject: Subject) -> Outcome:
 def parameter_unknown(subject: Subject) -> Outcome:
     """Check that an unknown parameter is refused at once, or MAVSDK waits for 3 s."""
     m, client = subject.mavlink, subject.client
-    client.forget()
+    client.discard_unread()
     client.send(m.MAVLink_param_request_read_message(*client.target, _UNKNOWN.encode(), -1))
     reply = client.wait(lambda x: x.get_type() in ("PARAM_ERROR", "PARAM_VALUE"), _QUICK)
     if reply is None:
@@ -141,7 +141,7 @@ def cached_hash(subject: Subject) -> Outcome:
     m, client = subject.mavlink, subject.client
     if client.vehicle is None or client.vehicle.autopilot != m.MAV_AUTOPILOT_PX4:
         return skipped("not PX4")
-    client.forget()
+    client.discard_unread()
     client.send(m.MAVLink_param_request_read_message(*client.target, b"_HASH_CHECK", -1))
     reply = client.wait(lambda x: x.get_type() in ("PARAM_ERROR", "PARAM_VALUE"), _QUICK)
     return passed(reply.get_type()) if reply is not None else failed("nothing", "PARAM_VALUE or PARAM_ERROR")
@@ -154,7 +154,7 @@ def _same(a: float, b: float) -> bool:
 def _read(subject: Subject, name: str = "", index: int = -1) -> Any:
     """Read one parameter; return its PARAM_VALUE, or None."""
     m, client = subject.mavlink, subject.client
-    client.forget()
+    client.discard_unread()
     client.send(m.MAVLink_param_request_read_message(*client.target, name.encode(), index))
     return client.wait(
         lambda x: x.get_type() == "PARAM_VALUE" and (x.param_id == name if name else x.param_index == index), _TIMEOUT
@@ -171,7 +171,7 @@ def _set(subject: Subject, parameter: Any, value: float) -> tuple[Any, bool]:
             errors.append(message)
         return message.get_type() == "PARAM_VALUE" and bool(message.param_id == parameter.param_id)
 
-    client.forget()
+    client.discard_unread()
     name = parameter.param_id.encode()
     client.send(m.MAVLink_param_set_message(*client.target, name, value, parameter.param_type))
     echo = client.wait(is_echo, _TIMEOUT)

@@ -100,7 +100,7 @@ def message_interval(subject: Subject) -> Outcome:
     number, asked = m.MAVLINK_MSG_ID_ATTITUDE, 1e6 / _ASKED
     ack = client.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, [number, asked, 0, 0, 0, 0, 0])
     rate = _attitude_rate(subject)
-    client.forget()
+    client.discard_unread()
     client.send_command(m.MAV_CMD_GET_MESSAGE_INTERVAL, [number])
     interval = client.wait(lambda x: x.get_type() == "MESSAGE_INTERVAL" and x.message_id == number, 1.0)
     client.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, [number, 0, 0, 0, 0, 0, 0])

@@ -27,7 +27,7 @@ _STARTING = 120.0  # s, includes compilation
 _HOST = "127.0.0.1"
 
 
-class _Begun:
+class _FirstStep:
     """Observer that sets an event at the first step."""
 
     def __init__(self) -> None:
@@ -44,7 +44,7 @@ def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> I
     Parameters
     ----------
     endpoints : sequence of Endpoint
-        Endpoints of its links.
+        Endpoints of the vehicle's links.
     options : MavlinkOptions
         Identity and profile.
 
@@ -59,7 +59,7 @@ def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> I
         If a link cannot be opened, or the vehicle does not start within 120 s.
     """
     scenario = load_scenario(_SCENARIO, _OVERRIDES)
-    commands, begun = CommandQueue(), _Begun()
+    commands, begun = CommandQueue(), _FirstStep()
     with Master(scenario) as master:
         failures: list[PlantError] = []
         autopilot = Autopilot(scenario, master.signals.columns, options, commands)

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from cosim.mavlink.listening.watch import Watch
 from cosim.mavlink.wire.ground_end import GroundLink
 
-_BEAT = 1.0  # s
-_SLICE = 0.1  # s
+_BEAT = 1.0  # s between two heartbeats
+_SLICE = 0.1  # s, longest wait for a message
 
 
 def follow(
@@ -22,13 +22,13 @@ def follow(
     link : GroundLink
         Link to listen on. A link that speaks first also sends a heartbeat once a second.
     watch : Watch
-        Receives the messages.
+        Watch that records the messages.
     period : float
         Time between two yields [s].
     seconds : float, optional
         Duration [s]; default: until interrupted.
     count : int, optional
-        Messages after which it ends.
+        Number of messages after which listening ends; default: no limit.
 
     Yields
     ------
@@ -43,7 +43,7 @@ def follow(
             beat = now + _BEAT
         end = due if seconds is None else min(due, started + seconds)
         for heard in link.receive(min(_SLICE, max(0.0, end - now))):
-            watch.take(heard)
+            watch.add(heard)
             if watch.total == count:
                 break
         now = time.monotonic()

@@ -27,11 +27,11 @@ def picture(link: GroundLink, watch: Watch, now: float, width: int = 120, height
     watch : Watch
         The received messages.
     now : float
-        Monotonic time [s].
+        Present time of the monotonic clock [s].
     width : int
-        Characters of a line at most.
+        Greatest number of characters of a line.
     height : int, optional
-        Lines at most; the last one counts the rows left out.
+        Greatest number of lines, of which the last one counts omitted rows; default: no limit.
 
     Returns
     -------

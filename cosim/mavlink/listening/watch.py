@@ -12,7 +12,7 @@ from cosim.mavlink.wire.ground_end import Heard
 ROWS = 300  # kinds of messages that have a row
 TEXTS = 5  # status texts that are kept
 _SAMPLES = 40  # samples of the count, for the rate
-_SAMPLING = 0.25  # s
+_SAMPLING = 0.25  # s between two samples
 _NAMED = ("NAMED_VALUE_FLOAT", "NAMED_VALUE_INT", "DEBUG_VECT", "DEBUG_FLOAT_ARRAY")
 
 
@@ -28,8 +28,8 @@ class Key(NamedTuple):
 class Row:
     """Messages of one kind from one sender."""
 
-    message: Any  # the newest
-    last: float  # s, its time of reception
+    message: Any  # newest message
+    last: float  # s, time of its reception
     count: int = 0
     samples: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_SAMPLES))
 
@@ -45,15 +45,15 @@ class Watch:
     Attributes
     ----------
     rows : dict of Key to Row
-        At most 300, in the order of first reception.
+        Rows in the order of first reception, at most 300.
     texts : deque of (float, Any)
         Time of reception [s] and message of recent STATUSTEXTs.
     vehicle : (int, int) or None
         System and component id of the first autopilot received.
     modes : dict of int to str
-        Names of its modes by custom mode, from AVAILABLE_MODES.
+        Names of the vehicle's modes by custom mode, from AVAILABLE_MODES.
     total, beyond : int
-        Messages received, and those without a row because there were 300.
+        Numbers of received messages, and of those without a row because there were 300.
     """
 
     def __init__(self) -> None:
@@ -65,7 +65,7 @@ class Watch:
         self._mavlink = dialect()
         self._sampled = 0.0
 
-    def take(self, heard: Heard) -> None:
+    def add(self, heard: Heard) -> None:
         """Add a received message."""
         self.total += 1
         label, message = heard.kind, heard.message

@@ -8,7 +8,7 @@ from typing import Any
 
 from cosim.mavlink.messages.pose import degrees
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
-from cosim.mavlink.wire.encode import wrapped
+from cosim.mavlink.wire.encode import wrap_time
 
 _CENTER, _SWING = 1500, 400  # µs of PWM: at rest, and to either end
 _SERVOS, _OUTPUTS = 16, 32
@@ -42,7 +42,7 @@ def nav_controller_output(context: VehicleContext) -> list[Any]:
 def servo_output_raw(context: VehicleContext) -> list[Any]:
     """SERVO_OUTPUT_RAW: thruster commands as pulses [µs], 0 for unused outputs; its time wraps."""
     pulses = (context.servo_pulses() + [0] * _SERVOS)[:_SERVOS]
-    return [context.make("SERVO_OUTPUT_RAW", wrapped(context.view.boot_us, 1), 0, *pulses)]
+    return [context.make("SERVO_OUTPUT_RAW", wrap_time(context.view.boot_us, 1), 0, *pulses)]
 
 
 def actuator_output_status(context: VehicleContext) -> list[Any]:
@@ -56,7 +56,7 @@ def rc_channels(context: VehicleContext) -> list[Any]:
     surge, sway, heave, roll, pitch, yaw = context.sticks
     order = pitch, roll, -heave, yaw, surge, sway
     pulses = [_CENTER + _SWING * stick for stick in order] + [0xFFFF] * 12
-    return [context.make("RC_CHANNELS", wrapped(context.view.boot_us), len(order), *pulses, 0xFF)]
+    return [context.make("RC_CHANNELS", wrap_time(context.view.boot_us), len(order), *pulses, 0xFF)]
 
 
 def position_target_local_ned(context: VehicleContext) -> list[Any]:
@@ -66,7 +66,7 @@ def position_target_local_ned(context: VehicleContext) -> list[Any]:
     mask = _POSITION_AND_VELOCITY | 0b111000
     return [
         context.make(
-            "POSITION_TARGET_LOCAL_NED", wrapped(view.boot_us), m.MAV_FRAME_LOCAL_NED, mask, *view.target, *none
+            "POSITION_TARGET_LOCAL_NED", wrap_time(view.boot_us), m.MAV_FRAME_LOCAL_NED, mask, *view.target, *none
         )
     ]
 
@@ -104,7 +104,7 @@ def weight_names(criteria: Sequence[str]) -> list[str]:
 
 def named_value_float(context: VehicleContext) -> list[Any]:
     """NAMED_VALUE_FLOAT: one for each of `named_values`."""
-    time = wrapped(context.view.boot_us)
+    time = wrap_time(context.view.boot_us)
     return [context.make("NAMED_VALUE_FLOAT", time, name, value) for name, value in named_values(context)]
 
 

@@ -7,12 +7,12 @@ from typing import Any
 
 from cosim.mavlink.vehicle.proximity import REACH, SECTORS
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
-from cosim.mavlink.wire.encode import wrapped
+from cosim.mavlink.wire.encode import wrap_time
 from cosim.scenario.tables import Vector3
 
-_MOST = 8  # in a message each, the nearest ones
+_MAX_OBSTACLES = 8  # greatest number of nearest obstacles, each in a message
 _FARTHEST = 1000.0  # m
-_CENTIMETRES = 100.0  # in a metre
+_CENTIMETRES = 100.0  # cm in a metre
 _INCREMENT = 360 // SECTORS  # degrees
 
 
@@ -45,12 +45,12 @@ def obstacle_distance_3d(context: VehicleContext) -> list[Any]:
     inwards = dict(zip(proximity.ids, proximity.inwards(view.position_ned), strict=True))
     near = sorted((clearance, i) for i in inwards if abs(clearance := view.clearances[i]) <= _FARTHEST)
     messages = []
-    for clearance, i in near[:_MOST]:
+    for clearance, i in near[:_MAX_OBSTACLES]:
         away = _nearest_point(clearance, inwards[i])
         if away is not None and all(map(math.isfinite, away)):
             kind = m.MAV_DISTANCE_SENSOR_UNKNOWN, m.MAV_FRAME_BODY_FRD, i
             values = *view.to_body(away), 0.0, _FARTHEST
-            messages.append(context.make("OBSTACLE_DISTANCE_3D", wrapped(view.boot_us), *kind, *values))
+            messages.append(context.make("OBSTACLE_DISTANCE_3D", wrap_time(view.boot_us), *kind, *values))
     return messages
 
 

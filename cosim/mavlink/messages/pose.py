@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
-from cosim.mavlink.wire.encode import wrapped
+from cosim.mavlink.wire.encode import wrap_time
 from cosim.scenario.tables import Vector3
 
 _E7 = 1e7  # in a degree
@@ -29,19 +29,19 @@ def degrees(angle: float) -> float:
 def attitude(context: VehicleContext) -> list[Any]:
     """ATTITUDE."""
     view = context.view
-    return [context.make("ATTITUDE", wrapped(view.boot_us), *view.euler, *view.rates)]
+    return [context.make("ATTITUDE", wrap_time(view.boot_us), *view.euler, *view.rates)]
 
 
 def attitude_quaternion(context: VehicleContext) -> list[Any]:
     """ATTITUDE_QUATERNION: from body, forward right down, to north east down."""
     view = context.view
-    return [context.make("ATTITUDE_QUATERNION", wrapped(view.boot_us), *view.quaternion, *view.rates)]
+    return [context.make("ATTITUDE_QUATERNION", wrap_time(view.boot_us), *view.quaternion, *view.rates)]
 
 
 def local_position_ned(context: VehicleContext) -> list[Any]:
     """LOCAL_POSITION_NED."""
     view = context.view
-    return [context.make("LOCAL_POSITION_NED", wrapped(view.boot_us), *view.position_ned, *view.velocity_ned)]
+    return [context.make("LOCAL_POSITION_NED", wrap_time(view.boot_us), *view.position_ned, *view.velocity_ned)]
 
 
 def global_position_int(context: VehicleContext) -> list[Any]:
@@ -51,7 +51,7 @@ def global_position_int(context: VehicleContext) -> list[Any]:
     speeds = [v * _CM for v in view.velocity_ned]
     heading = round(degrees(view.heading) * _CM) % 36000 if math.isfinite(view.heading) else math.nan
     values = latitude, longitude, altitude, -view.position_ned[2] * _MM, *speeds, heading
-    return [context.make("GLOBAL_POSITION_INT", wrapped(view.boot_us), *values)]
+    return [context.make("GLOBAL_POSITION_INT", wrap_time(view.boot_us), *values)]
 
 
 def vfr_hud(context: VehicleContext) -> list[Any]:

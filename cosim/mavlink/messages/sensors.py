@@ -7,7 +7,7 @@ from typing import Any
 
 from cosim.mavlink.messages.pose import globe
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
-from cosim.mavlink.wire.encode import wrapped
+from cosim.mavlink.wire.encode import wrap_time
 
 SURFACE_PRESSURE = 1013.25  # hPa
 WATER_DENSITY = 1000.0  # kg/m3, fresh water, ArduSub's default
@@ -25,14 +25,14 @@ def pressure_at(depth: float) -> float:
 
 def scaled_pressure(context: VehicleContext) -> list[Any]:
     """SCALED_PRESSURE: inside the hull, equal to that of the surface."""
-    return [context.make("SCALED_PRESSURE", wrapped(context.view.boot_us), SURFACE_PRESSURE, 0.0, 0)]
+    return [context.make("SCALED_PRESSURE", wrap_time(context.view.boot_us), SURFACE_PRESSURE, 0.0, 0)]
 
 
 def scaled_pressure2(context: VehicleContext) -> list[Any]:
     """SCALED_PRESSURE2: of the water, from the depth sensor, as in ArduSub."""
     view = context.view
     pressure = pressure_at(view.depth)
-    return [context.make("SCALED_PRESSURE2", wrapped(view.boot_us), pressure, pressure - SURFACE_PRESSURE, 0)]
+    return [context.make("SCALED_PRESSURE2", wrap_time(view.boot_us), pressure, pressure - SURFACE_PRESSURE, 0)]
 
 
 def scaled_imu2(context: VehicleContext) -> list[Any]:
@@ -40,7 +40,7 @@ def scaled_imu2(context: VehicleContext) -> list[Any]:
     view = context.view
     force = [a / GRAVITY * 1e3 for a in view.acceleration]
     rates = [w * 1e3 for w in view.measured_rates]
-    return [context.make("SCALED_IMU2", wrapped(view.boot_us), *force, *rates, 0, 0, 0)]
+    return [context.make("SCALED_IMU2", wrap_time(view.boot_us), *force, *rates, 0, 0, 0)]
 
 
 def highres_imu(context: VehicleContext) -> list[Any]:
@@ -64,7 +64,7 @@ def distance_sensor(context: VehicleContext) -> list[Any]:
     m, view = context.mavlink, context.view
     kind = m.MAV_DISTANCE_SENSOR_ULTRASOUND, 0, m.MAV_SENSOR_ROTATION_PITCH_270, 0xFF
     reach = 5, _DEEPEST_BOTTOM * _CENTI
-    return [context.make("DISTANCE_SENSOR", wrapped(view.boot_us), *reach, view.altitude * _CENTI, *kind)]
+    return [context.make("DISTANCE_SENSOR", wrap_time(view.boot_us), *reach, view.altitude * _CENTI, *kind)]
 
 
 def rangefinder(context: VehicleContext) -> list[Any]:
@@ -79,7 +79,7 @@ def water_depth(context: VehicleContext) -> list[Any]:
     view = context.view
     latitude, longitude, millimetres = globe(context, view.position_ned)
     values = 0, 1, latitude, longitude, millimetres / 1e3, *view.euler, view.altitude, 0.0
-    return [context.make("WATER_DEPTH", wrapped(view.boot_us), *values)]
+    return [context.make("WATER_DEPTH", wrap_time(view.boot_us), *values)]
 
 
 def battery_status(context: VehicleContext) -> list[Any]:

@@ -11,10 +11,10 @@ from packaging.version import Version
 from cosim.mavlink.messages.sensors import has_bottom
 from cosim.mavlink.vehicle.profile import MODE_NAMES, STANDARD_MODES, SUBMARINE
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
-from cosim.mavlink.wire.encode import wrapped
+from cosim.mavlink.wire.encode import wrap_time
 from cosim.simulation.commands.commands import MODES
 
-_PROTOCOL = 3  # of HEARTBEAT.mavlink_version, for MAVLink 2 as for 1
+_PROTOCOL = 3  # value of HEARTBEAT.mavlink_version, for MAVLink 2 as for 1
 _OFFICIAL, _DEVELOPMENT = 255, 0  # FIRMWARE_VERSION_TYPE
 
 
@@ -59,7 +59,7 @@ def sys_status(context: VehicleContext) -> list[Any]:
 def system_time(context: VehicleContext) -> list[Any]:
     """SYSTEM_TIME: the date at the start plus simulated time."""
     boot = context.view.boot_us
-    return [context.make("SYSTEM_TIME", context.unix_start_us + boot, wrapped(boot))]
+    return [context.make("SYSTEM_TIME", context.unix_start_us + boot, wrap_time(boot))]
 
 
 def extended_sys_state(context: VehicleContext) -> list[Any]:

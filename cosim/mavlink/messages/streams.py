@@ -30,7 +30,7 @@ class Streams:
 
     Attributes
     ----------
-    beaten : bool
+    heartbeat_sent : bool
         True if a heartbeat was sent since this was last set to False.
     """
 
@@ -39,7 +39,7 @@ class Streams:
         self._intervals: dict[int, int] = {}
         self._due: dict[int, int] = {}
         self._earliest = clock_us
-        self.beaten = False
+        self.heartbeat_sent = False
         for spec in MESSAGES.values():
             self._put(spec.id, self._default(spec))
 
@@ -80,7 +80,7 @@ class Streams:
         Returns
         -------
         bool
-            False if a message is unknown, or the load would exceed `GREATEST_LOAD`.
+            True if the intervals were changed; False if a message is unknown, or the load would exceed `GREATEST_LOAD`.
         """
         new: dict[int, int] = {}
         for message_id, interval_us in changes:
@@ -121,4 +121,4 @@ class Streams:
         """Send a message now."""
         for message in MESSAGES[message_id].build(self._context):
             self._link.send(message)
-        self.beaten |= message_id == HEARTBEAT
+        self.heartbeat_sent |= message_id == HEARTBEAT

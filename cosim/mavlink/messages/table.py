@@ -23,7 +23,7 @@ class Spec:
     id: int
     build: Callable[[VehicleContext], list[Any]]
     rate: float  # Hz, in simulated time; 0: on request only
-    group: int = 0  # of REQUEST_DATA_STREAM; 0: no group
+    group: int = 0  # MAV_DATA_STREAM of REQUEST_DATA_STREAM; 0: no group
     profiles: tuple[ProfileName, ...] = PROFILES  # profiles that stream it by default
     several: int = 1  # approximate number of messages at once
 

@@ -13,13 +13,16 @@ from cosim.simulation.commands.commands import Mode, SetAttitude, SetTarget
 from cosim.simulation.commands.stick_stabilizer import CLIMB_RATE
 
 _THRUST_IGNORED, _ATTITUDE_IGNORED = 1 << 6, 1 << 7  # type_mask
-_LASTS: dict[Mode, float] = {"reach": 3.0, "depth_hold": 5.0}  # s without another one, after which it ends
-_PATIENCE, _AGAIN = 3.0, 10.0  # s of set-points in another mode, after which that is worth a word; until the next one
+_LASTS: dict[Mode, float] = {
+    "reach": 3.0,
+    "depth_hold": 5.0,
+}  # s without a set-point, after which an attitude ends
+_PATIENCE, _REPORT_PERIOD = 3.0, 10.0  # s of set-points in another mode before a status text; s between two texts
 _STILL: Vector3 = (0.0, 0.0, 0.0)
 
 
 class AttitudeTargets(Service):
-    """Attitudes are kept as the autopilot keeps them whose profile the vehicle has.
+    """Apply set-points of attitude as the autopilot of the profile does.
 
     As ArduSub: in ALT_HOLD a set-point without thrust leaves surge, sway and the rate of depth to the sticks. In GUIDED
     thrust is a rate of climb, and nothing pushes ahead or aside. As PX4: in OFFBOARD, with a thrust along each body
@@ -30,11 +33,11 @@ class AttitudeTargets(Service):
         super().__init__(context)
         self.messages = {"SET_ATTITUDE_TARGET": self._attitude}
         self._last: SetAttitude | None = None
-        self._heard = self._waits_since = -math.inf
+        self._received_at = self._waits_since = -math.inf
 
     def restart(self) -> None:
         """Forget the last set-point."""
-        self._last, self._heard = None, -math.inf
+        self._last, self._received_at = None, -math.inf
 
     def on_snapshot(self) -> None:
         """Forget the last set-point once another mode is on."""
@@ -44,7 +47,7 @@ class AttitudeTargets(Service):
     def tick(self) -> None:
         """End an attitude that is no longer sent."""
         context, mode = self.context, self.context.mode_ahead
-        if self._last is None or mode not in _LASTS or context.now - self._heard < _LASTS[mode]:
+        if self._last is None or mode not in _LASTS or context.now - self._received_at < _LASTS[mode]:
             return
         self._last = None
         if mode == "reach":
@@ -59,17 +62,17 @@ class AttitudeTargets(Service):
         if not context.accepts_commands:
             context.submit()
             return
-        if not context.operator.may_steer(sender.system, context.now):
+        if not context.active_gcs.may_steer(sender.system, context.now):
             context.reject("another station has the vehicle in hand", "active gcs")
             return
         fault = self._fault(message)
         if fault:
             context.reject(f"attitude set-point with mask {message.type_mask}: {fault}", "attitude")
             return
-        if not self._counts(message):
-            self._wait()
+        if not self._applies(message):
+            self._report_waiting()
             return
-        self._waits_since, self._heard = -math.inf, context.now
+        self._waits_since, self._received_at = -math.inf, context.now
         command = self._command(message)
         if command != self._last and context.submit(command) == context.mavlink.MAV_RESULT_ACCEPTED:
             self._last = command
@@ -88,20 +91,20 @@ class AttitudeTargets(Service):
         asked = thrust_body_of(message) if mask & THRUST_BODY_SET else (0.0 if mask & _THRUST_IGNORED else thrust,)
         return "" if all(-1.0 <= part <= 1.0 for part in asked) else "a thrust is beyond -1 to 1"
 
-    def _counts(self, message: Any) -> bool:
+    def _applies(self, message: Any) -> bool:
         sticks_push = self.context.profile.name == "ardusub" and message.type_mask & _THRUST_IGNORED
         return bool(self.context.mode_ahead == ("depth_hold" if sticks_push else "reach"))
 
-    def _wait(self) -> None:
+    def _report_waiting(self) -> None:
         """Report set-points that are not applied in the present mode, once they have been received for 3 s."""
         context = self.context
-        if self._waits_since == -math.inf or context.now - self._heard > 1.0:
+        if self._waits_since == -math.inf or context.now - self._received_at > 1.0:
             self._waits_since = context.now
-        self._heard = context.now
+        self._received_at = context.now
         if context.now - self._waits_since >= _PATIENCE:
             modes = "ALT_HOLD without thrust, in GUIDED with it" if context.profile.name == "ardusub" else "offboard"
             text = f"Attitude set-points wait: they count in {modes}"
-            context.say(text, context.mavlink.MAV_SEVERITY_NOTICE, "early attitude", _AGAIN)
+            context.say(text, context.mavlink.MAV_SEVERITY_NOTICE, "early attitude", _REPORT_PERIOD)
 
     def _command(self, message: Any) -> SetAttitude:
         q0, q1, q2, q3 = message.q

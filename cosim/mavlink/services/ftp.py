@@ -8,7 +8,7 @@ from collections import OrderedDict
 from dataclasses import dataclass, field
 from typing import Any
 
-from cosim.mavlink.services.packed_parameters import bare_crc32, packed
+from cosim.mavlink.services.packed_parameters import bare_crc32, pack_parameters
 from cosim.mavlink.services.parameters import Parameters
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
@@ -65,7 +65,7 @@ class FileServer(Service):
     context : VehicleContext
         The vehicle.
     parameters : Parameters
-        Parameters that the file contains.
+        Service with the parameters that the file contains.
     """
 
     def __init__(self, context: VehicleContext, parameters: Parameters) -> None:
@@ -148,7 +148,7 @@ class FileServer(Service):
             raise RefusedError(_NOT_FOUND)
         everything = self._parameters.all()
         start, count = _number(query, "start", 0), _number(query, "count", len(everything))
-        return packed(everything[start : start + count], len(everything))
+        return pack_parameters(everything[start : start + count], len(everything))
 
     def _listing(self, path: str, offset: int) -> bytes:
         folder = path.strip("/")

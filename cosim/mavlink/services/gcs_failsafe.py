@@ -21,12 +21,12 @@ class GcsFailsafe(Service):
         self.messages = {"HEARTBEAT": self._heartbeat}
 
     def _heartbeat(self, sender: Sender, message: Any) -> None:
-        self.context.operator.beat(sender.system, self.context.now)
+        self.context.active_gcs.record_heartbeat(sender.system, self.context.now)
 
     def tick(self) -> None:
         """Check the silence of the station, report it, and apply the loss action."""
         context = self.context
-        silence = context.operator.silence(context.now)
+        silence = context.active_gcs.silence(context.now)
         lost = context.loss_action != "none" and silence > context.loss_timeout
         if lost and not context.failsafe:
             context.failsafe, self._reminded = True, context.now
@@ -38,7 +38,7 @@ class GcsFailsafe(Service):
         elif context.failsafe and not lost:
             context.failsafe = False
             self._acted = True
-            context.say(f"Link to station {context.operator.commander} regained", context.mavlink.MAV_SEVERITY_NOTICE)
+            context.say(f"Link to station {context.active_gcs.commander} regained", context.mavlink.MAV_SEVERITY_NOTICE)
         if not self._acted:
             self._acted = self._act()
 
@@ -46,7 +46,7 @@ class GcsFailsafe(Service):
         context = self.context
         action = context.loss_action
         then = "" if action == "warn" else f": {action}"
-        text = f"Link to station {context.operator.commander} lost for {silence:.0f} s{then}"
+        text = f"Link to station {context.active_gcs.commander} lost for {silence:.0f} s{then}"
         context.say(text, context.mavlink.MAV_SEVERITY_CRITICAL)
 
     def _act(self) -> bool:

@@ -27,8 +27,9 @@ _TIMEOUT = 3.0  # s of the wall clock
 _PITCH, _ROLL = 1, 2  # enabled_extensions
 _CENTER, _SWING = 1500, 400  # us of a channel
 _CHANNELS = 6  # pitch, roll, up, yaw, forward, right, as ArduSub has them
-_RELEASED, _IGNORED = 0, 0xFFFF  # a channel that is given back, and one that stays as it is
-_PUSHES: dict[Mode, int] = {"manual": 6, "stabilize": 3, "depth_hold": 2}  # axes that do; the others ask for something
+_RELEASED, _IGNORED = 0, 0xFFFF  # values of a channel that is released, and of one that stays unchanged
+# number of axes, from surge on, whose sticks command forces; those of the others command rates or angles
+_FORCE_AXES: dict[Mode, int] = {"manual": 6, "stabilize": 3, "depth_hold": 2}
 _NEUTRAL: Vector6 = (0.0,) * 6
 
 
@@ -42,12 +43,12 @@ class Manual(Service):
         reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
         self._mixer = None if vehicle.autopilot is None else MotorMixer(vehicle)
         self._reciprocal = np.divide(1.0, reach, out=np.zeros(6), where=reach > 0.0)
-        self._heard: float | None = None
+        self._received_at: float | None = None
         self._state = (context.armed, context.mode)
 
     def restart(self) -> None:
         """Release the sticks."""
-        self._heard = None
+        self._received_at = None
 
     def on_snapshot(self) -> None:
         """Reset the sticks to neutral, as the command handler does, when the mode changes or the vehicle is armed."""
@@ -58,16 +59,16 @@ class Manual(Service):
     def tick(self) -> None:
         """Release the sticks after 3 s without a message."""
         context = self.context
-        if self._heard is None or context.now - self._heard < _TIMEOUT:
+        if self._received_at is None or context.now - self._received_at < _TIMEOUT:
             return
-        self._heard = None
+        self._received_at = None
         if context.mode_ahead in STICK_MODES:
             self._submit(_NEUTRAL, by_gain=True)
             context.say("Lost manual control", context.mavlink.MAV_SEVERITY_CRITICAL, "sticks", _TIMEOUT)
 
     def _manual_control(self, sender: Sender, message: Any) -> None:
         if message.target == self.context.options.system_id:
-            self._take(sender, self._wrench(message), by_gain=True)
+            self._apply(sender, self._wrench(message), by_gain=True)
 
     def _override(self, sender: Sender, message: Any) -> None:
         pulses = [getattr(message, f"chan{i}_raw") for i in range(1, _CHANNELS + 1)]
@@ -77,19 +78,19 @@ class Manual(Service):
             old if pulse == _IGNORED else 0.0 if pulse == _RELEASED else _part((pulse - _CENTER) / _SWING)
             for pulse, old in zip(pulses, before, strict=True)
         )
-        self._take(sender, (surge, sway, -up + 0.0, roll, pitch, yaw), by_gain=False)
+        self._apply(sender, (surge, sway, -up + 0.0, roll, pitch, yaw), by_gain=False)
 
-    def _take(self, sender: Sender, sticks: Vector6, by_gain: bool) -> None:
+    def _apply(self, sender: Sender, sticks: Vector6, by_gain: bool) -> None:
         context = self.context
         if not context.accepts_commands:
             context.submit()
             return
         if context.mode_ahead not in STICK_MODES:
             return
-        if not context.operator.may_steer(sender.system, context.now):
+        if not context.active_gcs.may_steer(sender.system, context.now):
             context.reject("another station has the vehicle in hand", "active gcs")
             return
-        self._heard = context.now
+        self._received_at = context.now
         self._submit(sticks, by_gain)
 
     def _submit(self, sticks: Vector6, by_gain: bool) -> None:
@@ -112,10 +113,10 @@ class Manual(Service):
         gain = context.settings["commands.pilot_gain"]
         scale = gain if by_gain else 1.0
         scaled = np.array(sticks) * (scale, scale, scale, 1.0, 1.0, scale)  # the gain leaves roll and pitch alone
-        pushes, parts = np.arange(len(scaled)) < _PUSHES[mode], np.array(sticks)
+        is_force, parts = np.arange(len(scaled)) < _FORCE_AXES[mode], np.array(sticks)
         if self._mixer is not None:
-            mixed = np.clip(self._mixer.wrench(np.where(pushes, scaled, 0.0)) * self._reciprocal, -1.0, 1.0) / scale
-            parts[pushes] = mixed[pushes]
+            mixed = np.clip(self._mixer.wrench(np.where(is_force, scaled, 0.0)) * self._reciprocal, -1.0, 1.0) / scale
+            parts[is_force] = mixed[is_force]
         if mode != "manual":  # beyond a dead zone, a rate of turn and angles
             parts[5] = beyond_dead_zone(scaled[5], gain * YAW_DEAD_ZONE) / scale
             parts[3:5] = [beyond_dead_zone(part, LEAN_DEAD_ZONE) * LEAN / GREATEST_TILT for part in parts[3:5].tolist()]

@@ -15,7 +15,7 @@ from cosim.mavlink.wire.encode import whole
 from cosim.simulation.commands.commands import ChangeSetting, Command, MissionItem, SetCurrentItem, SetMission, SetMode
 from cosim.simulation.commands.mission_executor import way
 
-_MOST = 500  # items
+_MAX_ITEMS = 500
 _RETRY = 1.0  # s of the wall clock
 _RETRIES = 5
 _OF_REGIONS, _ALL = 0, 255  # MAV_MISSION_TYPE
@@ -29,7 +29,7 @@ class _Upload:
 
     sender: Sender
     count: int
-    asked: float  # s, time of the last request for an item
+    requested: float  # s, time of the last request for an item
     items: list[ReceivedMissionItem] = field(default_factory=list)
     decoded: list[MissionItem] = field(default_factory=list)  # without home
     retries: int = 0
@@ -78,12 +78,12 @@ class Missions(Service):
         """Update the parameters with settings changed by items passed since the last snapshot."""
         context, before = self.context, self._under_way
         now = self._under_way = context.view.item if context.mode == "mission" else -1
-        if now == before or not 0 <= now < len(context.course):
+        if now == before or not 0 <= now < len(context.mission_items):
             return
-        for item in way(context.course, before, now) or [now]:
-            for command in context.course[item].commands:
+        for item in way(context.mission_items, before, now) or [now]:
+            for command in context.mission_items[item].commands:
                 if isinstance(command, ChangeSetting):
-                    self._parameters.learn(command.key, command.value)
+                    self._parameters.record(command.key, command.value)
 
     # ---- download ----
 
@@ -132,16 +132,16 @@ class Missions(Service):
             self._ack(sender, m.MAV_MISSION_UNSUPPORTED if message.count else m.MAV_MISSION_ACCEPTED, kind)
         elif under_way is not None and under_way.sender != sender:
             self._ack(sender, m.MAV_MISSION_DENIED, kind)
-        elif message.count > _MOST:
+        elif message.count > _MAX_ITEMS:
             self._ack(sender, m.MAV_MISSION_NO_SPACE, kind)
         else:
             self._upload = _Upload(sender, message.count, context.now)
-            self._go_on(self._upload)
+            self._request_next(self._upload)
 
-    def _go_on(self, upload: _Upload) -> None:
+    def _request_next(self, upload: _Upload) -> None:
         """Request the next item, or finish the upload."""
         context, sender = self.context, upload.sender
-        upload.asked = context.now
+        upload.requested = context.now
         if len(upload.items) < upload.count:
             to = sender.system, sender.component
             sender.link.send(context.make("MISSION_REQUEST_INT", *to, len(upload.items), _OF_REGIONS))
@@ -152,7 +152,7 @@ class Missions(Service):
     def _take_item(self, sender: Sender, message: Any) -> None:
         m, upload, kind = self.context.mavlink, self._upload, message.mission_type
         if message.current in (_GO_THERE, _CHANGE_DEPTH) and kind == _OF_REGIONS:
-            self._ack(sender, self._go(sender, message), kind)
+            self._ack(sender, self._execute_guided(sender, message), kind)
             return
         if upload is None or upload.sender != sender or kind != _OF_REGIONS:
             self._ack(sender, m.MAV_MISSION_DENIED if not self.context.accepts_commands else m.MAV_MISSION_ERROR, kind)
@@ -165,7 +165,7 @@ class Missions(Service):
             self._ack(sender, result, kind)
             return
         upload.retries = 0
-        self._go_on(upload)
+        self._request_next(upload)
 
     def _add(self, upload: _Upload, message: Any) -> int:
         """Add an item to an upload, and return MAV_MISSION_RESULT."""
@@ -182,7 +182,7 @@ class Missions(Service):
         upload.items.append(item)
         return int(m.MAV_MISSION_ACCEPTED)
 
-    def _go(self, sender: Sender, message: Any) -> int:
+    def _execute_guided(self, sender: Sender, message: Any) -> int:
         """Execute a guided item at once, as of QGroundControl's go-to for ArduPilot; return MAV_MISSION_RESULT."""
         context, m = self.context, self.context.mavlink
         if message.command != m.MAV_CMD_NAV_WAYPOINT:
@@ -197,16 +197,16 @@ class Missions(Service):
         accepted = self._targets.go(sender, place) == m.MAV_RESULT_ACCEPTED
         return int(m.MAV_MISSION_ACCEPTED if accepted else m.MAV_MISSION_DENIED)
 
-    def _submit_mission(self, sender: Sender, items: list[ReceivedMissionItem], course: list[MissionItem]) -> int:
+    def _submit_mission(self, sender: Sender, items: list[ReceivedMissionItem], decoded: list[MissionItem]) -> int:
         """Submit a mission, and return MAV_MISSION_RESULT."""
         context, m = self.context, self.context.mavlink
-        result = context.submit(SetMission(tuple(course)))
+        result = context.submit(SetMission(tuple(decoded)))
         if result == m.MAV_RESULT_ACCEPTED:
-            context.plan, context.course = tuple(items), tuple(course)
-            for number, item in enumerate(course, self._first):
+            context.plan, context.mission_items = tuple(items), tuple(decoded)
+            for number, item in enumerate(decoded, self._first):
                 if item.position is not None:
-                    self._targets.warn_of(item.position, f"mission item {number}")
-            context.operator.commanded(sender.system)
+                    self._targets.warn_about(item.position, f"mission item {number}")
+            context.active_gcs.record_command(sender.system)
             return int(m.MAV_MISSION_ACCEPTED)
         return int(m.MAV_MISSION_DENIED if result == m.MAV_RESULT_DENIED else m.MAV_MISSION_ERROR)
 
@@ -218,11 +218,11 @@ class Missions(Service):
     def tick(self) -> None:
         """Request a missing item again each second; cancel the upload after five retries."""
         upload, context = self._upload, self.context
-        if upload is None or context.now - upload.asked < _RETRY:
+        if upload is None or context.now - upload.requested < _RETRY:
             return
         if upload.retries < _RETRIES:
             upload.retries += 1
-            self._go_on(upload)
+            self._request_next(upload)
         else:
             self._upload = None
             self._ack(upload.sender, context.mavlink.MAV_MISSION_OPERATION_CANCELLED, _OF_REGIONS)
@@ -252,7 +252,7 @@ class Missions(Service):
             return int(m.MAV_RESULT_DENIED if context.plan else m.MAV_RESULT_FAILED)
         result = context.submit(SetCurrentItem(item), *more)
         if result == m.MAV_RESULT_ACCEPTED:
-            context.operator.commanded(sender.system)
+            context.active_gcs.record_command(sender.system)
         return result
 
     def _set_current(self, sender: Sender, message: Any) -> None:

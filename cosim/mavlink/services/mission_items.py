@@ -30,7 +30,7 @@ class ItemError(Exception):
 def decode_mission_item(
     context: VehicleContext, item: ReceivedMissionItem, before: Sequence[MissionItem], count: int
 ) -> MissionItem:
-    """Decode a received mission item, and return it.
+    """Decode a received mission item.
 
     NAV_WAYPOINT is a sphere about its position, of its acceptance radius (parameter 2), or for 0 the scenario's goal
     region moved there; parameter 1 is the time to stay. NAV_SPLINE_WAYPOINT is the goal region, without its spline.
@@ -50,7 +50,12 @@ def decode_mission_item(
     before : sequence of MissionItem
         Decoded previous items.
     count : int
-        Items of the mission.
+        Number of items of the mission.
+
+    Returns
+    -------
+    MissionItem
+        The decoded item.
 
     Raises
     ------

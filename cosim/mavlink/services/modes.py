@@ -37,7 +37,7 @@ class Modes(Service):
     def _submit(self, sender: Sender, *commands: Command) -> int:
         result = self.context.submit(*commands)
         if result == self.context.mavlink.MAV_RESULT_ACCEPTED:
-            self.context.operator.commanded(sender.system)
+            self.context.active_gcs.record_command(sender.system)
         return result
 
     def _arm(self, call: Call) -> int:

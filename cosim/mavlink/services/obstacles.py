@@ -13,7 +13,7 @@ from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import AddObstacle, RemoveObstacle
 
 _UNMOVED = 0.05  # m, displacement below which no command is submitted
-_FORGOTTEN = 5.0  # s of the wall clock without a message, after which another obstacle may replace it
+_REPLACEABLE = 5.0  # s of the wall clock without a message, after which another obstacle may replace it
 _LOCAL_NED, _BODY_FRD, _LOCAL_FRD = 1, 12, 20
 _RADIUS = "commands.obstacle_radius"
 
@@ -24,7 +24,7 @@ class _Known:
 
     position: Vector3  # m, NED
     radius: float  # m
-    heard: float  # s, wall clock at its last message
+    received: float  # s, wall clock at the last message about it
 
 
 class Obstacles(Service):
@@ -57,7 +57,7 @@ class Obstacles(Service):
         number, radius = message.obstacle_id, context.settings[_RADIUS]
         known = self._known.get(number)
         if known is not None and known.radius == radius and math.dist(known.position, position) < _UNMOVED:
-            known.heard = context.now
+            known.received = context.now
             return
         if known is None and not self._has_room():
             context.reject(f"no room for obstacle {number}: {len(self._known)} have come already", "obstacle")
@@ -85,8 +85,8 @@ class Obstacles(Service):
             return True
         if not self._known:
             return False
-        oldest = min(self._known, key=lambda number: self._known[number].heard)
-        if context.now - self._known[oldest].heard < _FORGOTTEN:
+        oldest = min(self._known, key=lambda number: self._known[number].received)
+        if context.now - self._known[oldest].received < _REPLACEABLE:
             return False
         if context.submit(RemoveObstacle(oldest)) != context.mavlink.MAV_RESULT_ACCEPTED:
             return False

@@ -33,7 +33,7 @@ class Origin(Service):
             context.reject(f"origin at {latitude:g}, {longitude:g} deg", "origin")
         else:
             context.frame = LocalFrame(latitude, longitude, message.altitude * _MM)
-            context.operator.commanded(sender.system)
+            context.active_gcs.record_command(sender.system)
         for reply in (*pose.gps_global_origin(context), *pose.home_position(context)):
             context.send(reply)
 
@@ -51,7 +51,7 @@ class Origin(Service):
         if place is None or not math.hypot(place[0], place[1]) <= _FARTHEST_HOME:
             return int(m.MAV_RESULT_DENIED)
         context.home = place[0], place[1]
-        context.operator.commanded(call.sender.system)
+        context.active_gcs.record_command(call.sender.system)
         for message in pose.home_position(context):
             context.send(message)
         return int(m.MAV_RESULT_ACCEPTED)

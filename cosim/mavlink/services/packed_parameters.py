@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 
 _MAGIC = 0x671B
 _FLOAT = 4  # AP_PARAM_FLOAT
-_SHARED = 15  # most characters of a name shared with the previous one
+_SHARED = 15  # greatest number of characters that a name shares with the previous one
 _ALL_ONES = 0xFFFFFFFF
 
 
-def packed(parameters: Sequence[tuple[str, float]], total: int) -> bytes:
-    """Return parameters encoded as a packed file.
+def pack_parameters(parameters: Sequence[tuple[str, float]], total: int) -> bytes:
+    """Encode parameters as a packed file.
 
     Each has its type, the lengths of the prefix shared with the previous name and of the rest, the rest of the name,
     and its value, little-endian. A header has a magic number, their number, and the number of all parameters.
@@ -24,6 +24,11 @@ def packed(parameters: Sequence[tuple[str, float]], total: int) -> bytes:
         Names, all different, of up to sixteen characters, and values.
     total : int
         Number of all parameters.
+
+    Returns
+    -------
+    bytes
+        Content of the file.
     """
     parts = [struct.pack("<HHH", _MAGIC, len(parameters), total)]
     before = ""

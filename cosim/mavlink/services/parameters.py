@@ -116,7 +116,7 @@ class Parameters(Service):
         self._values[key] = value
         return result
 
-    def learn(self, key: str, value: float) -> None:
+    def record(self, key: str, value: float) -> None:
         """Record the value of a setting that a mission has changed."""
         with contextlib.suppress(CommandError):  # as the command handler does, which logs it
             self.context.settings.change(key, value)

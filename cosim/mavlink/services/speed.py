@@ -11,7 +11,7 @@ from plant_fmu import Vehicle
 
 SPEED = "law.gains.speed"  # key of the setting
 
-_AS_IT_IS, _AS_AT_FIRST = -1.0, -2.0  # special values of the protocol
+_UNCHANGED, _DEFAULT = -1.0, -2.0  # special values of the protocol
 
 
 def resolve_speed(context: VehicleContext, speed: float) -> float | None:
@@ -22,20 +22,20 @@ def resolve_speed(context: VehicleContext, speed: float) -> float | None:
     context : VehicleContext
         The vehicle, whose law has a speed.
     speed : float
-        Parameter 2: -1 for no change, -2 for the scenario's, else [m/s].
+        Parameter 2 of the command: -1 for no change, -2 for the scenario's speed, else the speed [m/s].
 
     Raises
     ------
     CommandError
         If the vehicle cannot reach that speed.
     """
-    if speed == _AS_IT_IS:
+    if speed == _UNCHANGED:
         return None
-    if speed == _AS_AT_FIRST:
+    if speed == _DEFAULT:
         return float(context.scenario.law.gains.speed)
-    most = terminal_speed(context.scenario.vehicle)
-    if not 0.0 < speed <= most:
-        raise CommandError(f"a speed of {speed:g} m/s, expected above 0 to {most:.3g} m/s, -1 or -2")
+    max_speed = terminal_speed(context.scenario.vehicle)
+    if not 0.0 < speed <= max_speed:
+        raise CommandError(f"a speed of {speed:g} m/s, expected above 0 to {max_speed:.3g} m/s, -1 or -2")
     return speed
 
 

@@ -17,9 +17,9 @@ _VECTORED_6DOF, _CUSTOM_FRAME = 2.0, 7.0  # ArduSub's FRAME_CONFIG
 _SERVOS = 14
 _MOTORS = (*range(33, 41), *range(82, 86))  # ArduPilot's SERVOn_FUNCTION of motors 1 to 12
 _EXACT = 1e-6  # m/s2; offsets of exactly 0 are those of an accelerometer that was never calibrated
-_WARN = 1.0  # of FS_PILOT_INPUT
+_WARN = 1.0  # value of FS_PILOT_INPUT
 _BLUEROV2_HEAVY, _UUV = 60002.0, 60000.0  # PX4's SYS_AUTOSTART
-_JOYSTICK_ALONE = 1.0  # of COM_RC_IN_MODE
+_JOYSTICK_ALONE = 1.0  # value of COM_RC_IN_MODE
 _STICKS_LAST = 3.0  # s
 _ON_LOSS: dict[LossAction, float] = {
     "none": 0.0,

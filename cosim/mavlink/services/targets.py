@@ -21,7 +21,7 @@ _VELOCITY, _ACCELERATION, _FORCE, _YAW, _YAW_RATE = 0b111000, 0b111 << 6, 1 << 9
 _LOCAL, _OFFSET, _BODY, _BODY_OFFSET, _BODY_FRD = 1, 7, 8, 9, 12
 _FROM_HERE = (_OFFSET, _BODY, _BODY_OFFSET, _BODY_FRD)
 _TURNED = (_BODY, _BODY_OFFSET, _BODY_FRD)
-_ANEW = 1.0  # s without set-points, after which an equal relative set-point is a new one
+_REPEAT_TIMEOUT = 1.0  # s without set-points, after which an equal relative set-point is a new one
 _EARLY = 1.0  # s, for which a set-point received before its mode is kept
 _PATIENCE = 3.0  # s of set-points in another mode, after which a status text is sent
 _VELOCITY_LASTS = 3.0  # s without another set-point, after which a velocity ends, as in ArduSub
@@ -134,7 +134,7 @@ class Targets(Service):
 
     def _set_point(self, sender: Sender, message: Any, frame: int, place: Vector3, raw: Vector3) -> None:
         context, mask = self.context, message.type_mask
-        if not self._may(sender):
+        if not self._may_steer(sender):
             return
         fault = _fault(message)
         if fault:
@@ -143,11 +143,11 @@ class Targets(Service):
         if context.mode_ahead != "reach":
             first, last, _ = self._early or (context.now, context.now, None)
             first = first if context.now - last < _EARLY else context.now
-            self._early = first, context.now, lambda: self._follow(message, frame, place, raw)
+            self._early = first, context.now, lambda: self._apply(message, frame, place, raw)
             return
-        self._follow(message, frame, place, raw)
+        self._apply(message, frame, place, raw)
 
-    def _follow(self, message: Any, frame: int, place: Vector3, raw: Vector3) -> None:
+    def _apply(self, message: Any, frame: int, place: Vector3, raw: Vector3) -> None:
         """Apply a set-point, unless it equals the last one."""
         context, mask = self.context, message.type_mask
         going = (0.0, 0.0, 0.0) if mask & _VELOCITY else (message.vx, message.vy, message.vz)
@@ -162,7 +162,7 @@ class Targets(Service):
                 commands.append(SetTarget(context.view.position_ned, radius, velocity))
         else:
             said = (frame, mask, raw, going, yaw)
-            if said != self._last or (frame in _FROM_HERE and since >= _ANEW):
+            if said != self._last or (frame in _FROM_HERE and since >= _REPEAT_TIMEOUT):
                 place = (*context.view.target[:2], place[2]) if mask & _X_Y else place
                 commands.append(SetTarget(place, None, velocity))
         if not commands:
@@ -173,17 +173,17 @@ class Targets(Service):
             self._last = said
             self._drifting = velocity if said[0] == "velocity" else None
             if self._drifting is None:
-                self.warn_of(place)
+                self.warn_about(place)
 
-    def warn_of(self, place: Vector3, of: str = "target") -> None:
+    def warn_about(self, place: Vector3, of: str = "target") -> None:
         """Send a warning for each objection to a target, which is accepted nevertheless.
 
         Parameters
         ----------
         place : tuple of float
-            Its center [m, NED].
+            Center of the target [m, NED].
         of : str
-            Its name in the text.
+            Name of the target in the text.
         """
         context = self.context
         for words in self._keep_in.objections(place, context.view, context.settings):
@@ -191,12 +191,12 @@ class Targets(Service):
                 f"Warning: {of} {words}", context.mavlink.MAV_SEVERITY_WARNING, f"{of} {words}", _WARNING_PERIOD
             )
 
-    def _may(self, sender: Sender) -> bool:
+    def _may_steer(self, sender: Sender) -> bool:
         context = self.context
         if not context.accepts_commands:
             context.submit()
             return False
-        if not context.operator.may_steer(sender.system, context.now):
+        if not context.active_gcs.may_steer(sender.system, context.now):
             context.reject("another station has the vehicle in hand", "active gcs")
             return False
         return True
@@ -219,7 +219,7 @@ class Targets(Service):
         sender : Sender
             Sender of the command.
         place : tuple of float
-            Its center [m, NED]; a coordinate that is not finite stays at the vehicle's.
+            Center of the target [m, NED]; a coordinate that is not finite stays at the vehicle's.
         yaw : float
             Heading [rad]; NaN for none.
 
@@ -229,7 +229,7 @@ class Targets(Service):
             MAV_RESULT.
         """
         context = self.context
-        if not self._may(sender):
+        if not self._may_steer(sender):
             return int(context.mavlink.MAV_RESULT_DENIED)
         x, y, z = (a if math.isfinite(a) else b for a, b in zip(place, context.view.position_ned, strict=True))
         commands: list[Command] = [SetTarget((x, y, z)) if any(map(math.isfinite, place)) else SetMode("hold")]
@@ -238,7 +238,7 @@ class Targets(Service):
         self._last, self._drifting = (), None
         result = context.submit(*commands)
         if result == context.mavlink.MAV_RESULT_ACCEPTED and isinstance(commands[0], SetTarget):
-            self.warn_of((x, y, z))
+            self.warn_about((x, y, z))
         return result
 
     def _turn(self, call: Call) -> int:
@@ -248,7 +248,7 @@ class Targets(Service):
             return int(context.mavlink.MAV_RESULT_DENIED)
         if call[4] == 1.0:
             angle = context.view.euler[2] + math.copysign(1.0, -1.0 if call[3] < 0.0 else 1.0) * angle
-        if not self._may(call.sender):
+        if not self._may_steer(call.sender):
             return int(context.mavlink.MAV_RESULT_DENIED)
         return context.submit(SetHeading(angle))
 
@@ -263,7 +263,7 @@ class Targets(Service):
             return int(m.MAV_RESULT_DENIED)
         if speed is None:
             return int(m.MAV_RESULT_ACCEPTED)
-        if not self._may(call.sender):
+        if not self._may_steer(call.sender):
             return int(m.MAV_RESULT_DENIED)
         return self._parameters.change(SPEED, speed)
 

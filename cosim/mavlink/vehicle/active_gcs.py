@@ -38,11 +38,11 @@ class ActiveGcs:
         self.commander = system
         return True
 
-    def commanded(self, system: int) -> None:
+    def record_command(self, system: int) -> None:
         """Record the system of an accepted command."""
         self.commander = system
 
-    def beat(self, system: int, now: float) -> None:
+    def record_heartbeat(self, system: int, now: float) -> None:
         """Record a heartbeat of a system."""
         if system not in self._beats and len(self._beats) >= _KNOWN:
             others = [known for known in self._beats if known != self.commander]

@@ -22,7 +22,7 @@ class Layout:
     scenario : Scenario
         Scenario of the run.
     columns : sequence of Column
-        Columns of its rows.
+        Columns of the run's rows.
     """
 
     def __init__(self, scenario: Scenario, columns: Sequence[Column]) -> None:
@@ -32,7 +32,7 @@ class Layout:
         self.criteria = scenario.criterion_names
         self.regions = tuple(region.region.name for region in scenario.regions)
         self.reports = tuple(column.name for column in columns if column.name.startswith("law."))
-        self.goal_middle = shape_center(scenario.goal)
+        self.goal_center = shape_center(scenario.goal)
         self.saturations = tuple(
             i for name, i in self.at.items() if name.endswith("saturated") or name.startswith("thrust_saturated[")
         )
@@ -43,6 +43,7 @@ class Layout:
         Returns
         -------
         ndarray, shape (n,)
+            Row in the order of the columns.
         """
         row = np.zeros(self.length)
         initial, commands = scenario.initial, scenario.commands
@@ -65,7 +66,7 @@ class Layout:
             ("position.x", initial.position),
             ("quaternion.e0", initial.quaternion),
             ("velocity.u", initial.velocity),
-            ("target.x", self.goal_middle),
+            ("target.x", self.goal_center),
         ):
             if first in self.at:
                 row[self.at[first] : self.at[first] + len(values)] = values

@@ -24,9 +24,9 @@ def mode_name(heartbeat: Any, names: Mapping[int, str]) -> str:
     Parameters
     ----------
     heartbeat : Any
-        Its HEARTBEAT.
+        HEARTBEAT of the vehicle.
     names : mapping of int to str
-        Names that the vehicle sent, by custom mode; they take precedence.
+        Names that the vehicle sent itself, by custom mode; they take precedence.
 
     Returns
     -------

@@ -73,7 +73,7 @@ class Profile:
     home_is_first : bool
         True if item 0 of a mission is home, as in ArduPilot.
     stands_for : tuple of int or None
-        Release of the imitated autopilot, or None.
+        Release of the imitated autopilot; None if none is imitated.
     """
 
     name: ProfileName
@@ -95,9 +95,9 @@ class Profile:
         Parameters
         ----------
         first, second : int
-            Its parameters 2 and 3: main mode and sub-mode of PX4, or ArduPilot's number. With sub-mode 0 a number of
-            ArduSub is no other mode of PX4 here, except 1 and 7: ACRO and CIRCLE in ArduSub, MANUAL and STABILIZED
-            in PX4.
+            Parameters 2 and 3 of the command: main mode and sub-mode of PX4, or ArduPilot's number. With sub-mode 0 a
+            number of ArduSub is no other mode of PX4 here, except 1 and 7: ACRO and CIRCLE in ArduSub, MANUAL and
+            STABILIZED in PX4.
         """
         if not self.packed:
             return self.mode_of(first)

@@ -16,8 +16,8 @@ from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import PARKED_POSITION, SecondaryRegion, Vector3
 from cosim.simulation.commands.settings import LiveSettings
 
-SECTORS = 72
-REACH = 20.0  # m
+SECTORS = 72  # number of sectors of a scan
+REACH = 20.0  # m, range of a scan
 _RAYS = 3  # in each sector: at full range the scan detects anything wider than 0.6 m
 _AT_REST = (0.0, 0.0, 0.0)
 
@@ -35,7 +35,7 @@ class Proximity:
     Attributes
     ----------
     ids : tuple of int
-        The n obstacles' numbers in the scenario, from 1.
+        Numbers of the n obstacles among the scenario's regions, from 1.
     """
 
     def __init__(self, scenario: Scenario) -> None:

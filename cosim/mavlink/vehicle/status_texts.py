@@ -11,7 +11,7 @@ from cosim.mavlink.wire.message_sink import MessageSink
 
 _CHUNK = 50  # characters of a STATUSTEXT
 _LONGEST_TEXT = 200  # characters
-_TEXTS = 12  # texts in each _PERIOD at most
+_TEXTS = 12  # greatest number of texts in each _PERIOD
 _PERIOD = 1.0  # s
 _WAITING = 48  # texts that wait for the next period
 _REFUSALS_PERIOD = 2.0  # s, between two reports of refusals of a kind
@@ -26,17 +26,17 @@ class StatusTexts:
     mavlink : module
         The dialect.
     make : Encoder
-        Makes messages.
+        Encoder of messages.
     links : sequence of MessageSink
         Attached links; the list may grow.
     clock : callable
-        Returns the wall clock [s].
+        Function that returns the wall clock [s].
     """
 
     def __init__(self, mavlink: Any, make: Encoder, links: Sequence[MessageSink], clock: Callable[[], float]) -> None:
         self._mavlink, self._make, self._links, self._clock = mavlink, make, links, clock
-        self._said: dict[str, float] = {}  # time of the last text, by key
-        self._said_lately: deque[float] = deque(maxlen=_TEXTS)
+        self._last_sent: dict[str, float] = {}  # time of the last text, by key
+        self._sent_at: deque[float] = deque(maxlen=_TEXTS)
         self._waiting: deque[list[Any]] = deque(maxlen=_WAITING)
         self._refusals: dict[str, dict[str, int]] = {}  # count of each unreported reason, by kind
         self._text_id = 0
@@ -47,19 +47,19 @@ class StatusTexts:
         Parameters
         ----------
         text : str
-            One line.
+            Text of one line.
         severity : int, optional
             MAV_SEVERITY; default: information.
         key : str
-            Key of texts of which one is sent in `every` seconds, and others are dropped.
+            Kind of text: of each kind one is sent in `every` seconds, and the others are dropped.
         every : float
             Least time between two texts of a key [s, wall clock].
         """
         now = self._clock()
-        if every and now - self._said.get(key, -every) < every:
+        if every and now - self._last_sent.get(key, -every) < every:
             return
         if every:
-            self._said[key] = now
+            self._last_sent[key] = now
         self._waiting.append(self.text(text, severity))
         self._send_waiting()
 
@@ -73,8 +73,8 @@ class StatusTexts:
         key : str
             Kind of refusal. Equal reasons are reported once, with their count.
         """
-        if self._clock() - self._said.get(f"reject {key}", -_REFUSALS_PERIOD) >= _REFUSALS_PERIOD:
-            self._said[f"reject {key}"] = self._clock()
+        if self._clock() - self._last_sent.get(f"reject {key}", -_REFUSALS_PERIOD) >= _REFUSALS_PERIOD:
+            self._last_sent[f"reject {key}"] = self._clock()
             self._refuse(reason)
             return
         reasons = self._refusals.setdefault(key, {})
@@ -85,8 +85,8 @@ class StatusTexts:
     def send_due(self) -> None:
         """Send the refusals and texts that are due."""
         now = self._clock()
-        for key in [key for key in self._refusals if now - self._said[f"reject {key}"] >= _REFUSALS_PERIOD]:
-            self._said[f"reject {key}"] = now
+        for key in [key for key in self._refusals if now - self._last_sent[f"reject {key}"] >= _REFUSALS_PERIOD]:
+            self._last_sent[f"reject {key}"] = now
             for reason, times in self._refusals.pop(key).items():
                 self._refuse(reason if times == 1 else f"{reason} ({times} times)")
         self._send_waiting()
@@ -96,8 +96,8 @@ class StatusTexts:
 
     def _send_waiting(self) -> None:
         now = self._clock()
-        while self._waiting and not (len(self._said_lately) == _TEXTS and now - self._said_lately[0] < _PERIOD):
-            self._said_lately.append(now)
+        while self._waiting and not (len(self._sent_at) == _TEXTS and now - self._sent_at[0] < _PERIOD):
+            self._sent_at.append(now)
             for message in self._waiting.popleft():
                 for link in self._links:
                     link.send(message)

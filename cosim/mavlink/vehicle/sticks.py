@@ -9,12 +9,12 @@ import numpy as np
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
-LEAN = math.radians(45.0)  # of a full stick of roll or pitch: ANGLE_MAX
+LEAN = math.radians(45.0)  # tilt that a full stick of roll or pitch commands: ANGLE_MAX
 # deflections of a stick at a pilot gain of 1 up to which it commands nothing
 YAW_DEAD_ZONE = 0.1  # 40 of 400 us
 LEAN_DEAD_ZONE = 0.075  # 30 of 400 us
 CLIMB_DEAD_ZONE = 0.2  # THR_DZ: 100 of 500
-_MOSTLY = 0.6  # of a thruster's greatest matrix element, above which it is mixed into an axis
+_MIN_SHARE = 0.6  # part of a thruster's greatest matrix element above which it is mixed into an axis
 
 
 class MotorMixer:
@@ -23,14 +23,14 @@ class MotorMixer:
     Parameters
     ----------
     vehicle : Vehicle
-        Vehicle, for its thrusters, their limits, and the curve of its table ``autopilot``.
+        Vehicle with the thrusters, their limits, and the curve of its table ``autopilot``.
 
     Attributes
     ----------
     asked : ndarray, shape (n, 6)
         Command of each thruster by a full stick of each axis.
     greatest : ndarray, shape (n,)
-        Force of each thruster [N], the mean of both ways.
+        Greatest force of each thruster [N], the mean of both directions.
     is_quadratic : bool
         True if the force is proportional to the square of the command.
     """
@@ -38,7 +38,7 @@ class MotorMixer:
     def __init__(self, vehicle: Vehicle) -> None:
         self._matrix, table = vehicle.thruster_matrix, vehicle.autopilot
         size = np.abs(self._matrix)
-        self.asked: Array = np.where(size > _MOSTLY * size.max(axis=1, keepdims=True), np.sign(self._matrix), 0.0).T
+        self.asked: Array = np.where(size > _MIN_SHARE * size.max(axis=1, keepdims=True), np.sign(self._matrix), 0.0).T
         self.greatest: Array = 0.5 * (vehicle.thrust_max - vehicle.thrust_min)
         self.is_quadratic = table is not None and table.curve == "quadratic"
 
@@ -62,7 +62,7 @@ def beyond_dead_zone(deflection: float, dead_zone: float) -> float:
     Returns
     -------
     float
-        -1 to 1; 0 within the dead zone, and linear beyond it.
+        Fraction from -1 to 1: 0 within the dead zone, and linear beyond it.
 
     Examples
     --------

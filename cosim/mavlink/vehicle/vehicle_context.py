@@ -30,7 +30,7 @@ from plant_fmu.autopilot import Autopilot, pulse_of_effort
 
 COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1: ground stations listen to no other
 
-_WISH_LASTS = 0.5  # s, until a snapshot shows the effect of a command
+_PREDICTION_LASTS = 0.5  # s, within which a snapshot shows the effect of a command
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class VehicleContext:
     scenario : Scenario
         Scenario of the run.
     columns : sequence of Column
-        Columns of its rows.
+        Columns of the run's rows.
     options : MavlinkOptions
         Identity, profile, and accepted systems.
     commands : CommandQueue or None
@@ -63,7 +63,7 @@ class VehicleContext:
     mavlink : module
         The dialect.
     make : Encoder
-        Makes messages.
+        Encoder of messages.
     view : View
         The latest snapshot.
     waited_us : int
@@ -83,15 +83,15 @@ class VehicleContext:
     status_texts : StatusTexts
         Sender of texts; `say`, `reject` and `text` are its methods.
     now : float
-        Wall clock at the last call [s].
+        Wall clock at the last call of the autopilot [s].
     failsafe : bool
         True while the commanding ground station is lost.
     loss_timeout, loss_action : float, str
         Silence of the commanding station [s] after which the action is taken, and the action.
     plan : tuple of ReceivedMissionItem
-        The mission, without home.
-    course : tuple of MissionItem
-        Its decoded items.
+        Received items of the mission, without home.
+    mission_items : tuple of MissionItem
+        Decoded items of the mission.
     sticks : tuple of float
         Last commanded sticks, X Y Z K M N, from -1 to 1.
     """
@@ -109,7 +109,7 @@ class VehicleContext:
         self.make = Encoder(self.mavlink)
         self.profile = PROFILES[options.profile]
         self.layout = Layout(scenario, columns)
-        self.operator = ActiveGcs()
+        self.active_gcs = ActiveGcs()
         self.links: list[MessageSink] = []
         self.now = 0.0
         self.failsafe = False
@@ -136,10 +136,10 @@ class VehicleContext:
         self.settings = LiveSettings(self.scenario)
         self.home = (0.0, 0.0)
         self.plan: tuple[ReceivedMissionItem, ...] = ()
-        self.course: tuple[MissionItem, ...] = ()
+        self.mission_items: tuple[MissionItem, ...] = ()
         self.sticks: Vector6 = (0.0,) * 6
         self._run = 0 if self._commands is None else self._commands.run
-        self._wished: tuple[float, Mode] | None = None
+        self._predicted: tuple[float, Mode] | None = None
         self._armed_before = self.view.armed
         self._mode_before: Mode = self.view.mode
 
@@ -151,7 +151,7 @@ class VehicleContext:
         return self._commands is not None
 
     @property
-    def outlived(self) -> bool:
+    def run_has_ended(self) -> bool:
         """True if the run has ended and no snapshot of the next one was received; commands are rejected until then."""
         return self._commands is not None and self._commands.run != self._run
 
@@ -168,15 +168,15 @@ class VehicleContext:
     @property
     def mode_ahead(self) -> Mode:
         """Mode after the submitted commands are applied."""
-        if self._wished is not None and self.now - self._wished[0] <= _WISH_LASTS:
-            return self._wished[1]
+        if self._predicted is not None and self.now - self._predicted[0] <= _PREDICTION_LASTS:
+            return self._predicted[1]
         return self.mode
 
-    def look(self, row: Array) -> None:
+    def update(self, row: Array) -> None:
         """Update from the next snapshot."""
         self.view, self.has_view = View(self.layout, row, self.waited_us), True
-        if self._wished is not None and self._wished[1] == self.view.mode:
-            self._wished = None
+        if self._predicted is not None and self._predicted[1] == self.view.mode:
+            self._predicted = None
 
     def home_ned(self) -> Vector3:
         """Return the position of home [m, NED]."""
@@ -229,25 +229,25 @@ class VehicleContext:
         for command in commands:
             try:
                 if not self._commands.submit(command, self._run):
-                    self.reject("the run is over" if self.outlived else "too many commands at once", "full")
+                    self.reject("the run is over" if self.run_has_ended else "too many commands at once", "full")
                     return int(m.MAV_RESULT_TEMPORARILY_REJECTED)
             except CommandError as error:
-                self.reject(str(error), "order")
+                self.reject(str(error), "command")
                 return int(m.MAV_RESULT_DENIED)
-            self._foresee(command)
+            self._predict(command)
         return int(m.MAV_RESULT_ACCEPTED)
 
-    def _foresee(self, command: Command) -> None:
+    def _predict(self, command: Command) -> None:
         match command:
             case Arm():
                 self._armed_before = command.armed
             case SetMode():
-                self._foresee_mode(command.mode)
+                self._predict_mode(command.mode)
             case SetTarget():
-                self._foresee_mode("reach")
+                self._predict_mode("reach")
 
-    def _foresee_mode(self, mode: Mode) -> None:
-        self._wished = None if mode == self.mode else (self.now, mode)
+    def _predict_mode(self, mode: Mode) -> None:
+        self._predicted = None if mode == self.mode else (self.now, mode)
         self._mode_before = mode
 
     def send(self, message: Any) -> None:

@@ -228,6 +228,6 @@ class View:
         """Center of the target region [m, NED]."""
         if "target.x" in self._layout.at:
             return self._three("target.x")
-        x, y, z = self._layout.goal_middle
+        x, y, z = self._layout.goal_center
         dx, dy, dz = self.shift("goal")
         return x + dx, y + dy, z + dz

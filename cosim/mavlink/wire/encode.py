@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-_GREATEST_FLOAT = 3.4028234e38  # of a float32
+_GREATEST_FLOAT = 3.4028234e38  # greatest float32
 _BITS = {"int8_t": 8, "int16_t": 16, "int32_t": 32, "int64_t": 64}
 
 # value of "unknown" where it is not 0, by message and field
@@ -37,7 +37,7 @@ def whole(x: float) -> int | None:
     return round(x) if math.isfinite(x) else None
 
 
-def wrapped(microseconds: int, per_unit: int = 1000) -> int:
+def wrap_time(microseconds: int, per_unit: int = 1000) -> int:
     """Convert a time since boot to units of `per_unit` microseconds, modulo 2**32."""
     return microseconds // per_unit & 0xFFFFFFFF
 
@@ -61,10 +61,10 @@ class Encoder:
     def __call__(self, name: str, *values: Any) -> Any:
         """Return the message of a name with these fields, in the dialect's order; extensions may be left out."""
         kind = self._classes[name]
-        fields = self._fields.get(name) or self._learn(name, kind)
+        fields = self._fields.get(name) or self._field_encoders(name, kind)
         return kind(*[encode(value) for encode, value in zip(fields, values, strict=False)])
 
-    def _learn(self, name: str, kind: Any) -> tuple[Encode, ...]:
+    def _field_encoders(self, name: str, kind: Any) -> tuple[Encode, ...]:
         fields = []
         for field, type_name in zip(kind.fieldnames, kind.fieldtypes, strict=True):
             length = kind.array_lengths[kind.ordered_fieldnames.index(field)]

@@ -14,7 +14,7 @@ Kind = Literal["udpout", "udpin", "tcpin", "tcp", "serial", "tlog"]
 _FORMS = "udpout:, udpin:, tcpin: or tcp:HOST:PORT, serial:DEVICE[:BAUD], or a file ending in .tlog"
 _NETWORK: dict[str, Kind] = {"udpout": "udpout", "udpin": "udpin", "tcpin": "tcpin", "tcp": "tcp", "tcpout": "tcp"}
 _BAUD = 57600  # default of telemetry radios
-_MOST_BAUD = 4_000_000
+_MAX_BAUD = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -80,10 +80,10 @@ def parse_endpoint(text: str, allow_remote: bool = False) -> Endpoint:
 def _address(text: str, host: str, allow_remote: bool) -> str:
     """Return the IPv4 address of a host; raise for other machines unless they are allowed."""
     try:
-        address, here = resolve_host(host)
+        address, is_loopback = resolve_host(host)
     except OSError as error:
         raise TelemetryError(f"endpoint {text!r}: host {host!r} is not known: {error}") from error
-    if not (allow_remote or here):
+    if not (allow_remote or is_loopback):
         raise TelemetryError(f"endpoint {text!r}: {address} is beyond this machine; --allow-remote lets it through")
     return address
 
@@ -92,7 +92,7 @@ def _serial(text: str, rest: str) -> tuple[str, int]:
     device, colon, baud = rest.rpartition(":")
     if not colon:
         device, baud = rest, str(_BAUD)
-    if not device or not (baud.isascii() and baud.isdecimal() and 0 < int(baud[:8]) <= _MOST_BAUD):
+    if not device or not (baud.isascii() and baud.isdecimal() and 0 < int(baud[:8]) <= _MAX_BAUD):
         raise TelemetryError(f"endpoint {text!r}: expected serial:DEVICE[:BAUD], such as serial:/dev/ttyUSB0:57600")
     return device, int(baud)
 

@@ -17,7 +17,7 @@ _SIGNED = 0x01  # bit of the incompatibility flags
 _SIGNATURE = 13  # bytes
 _CRC = 2  # bytes
 _SETUP_SIGNING = 256
-_LAST_OF_V1 = 255  # id of a message
+_LAST_OF_V1 = 255  # greatest id of a message in MAVLink 1
 _V2_HEADER = struct.Struct("<BBBxxBBHB")  # marker, length, flags, system, component, id in two parts
 _V2_WHOLE = struct.Struct("<BBBBBBBHB")  # the same with the compatibility flags and sequence number
 _V1_HEADER = struct.Struct("<BBxBBB")  # marker, length, system, component, id
@@ -29,8 +29,8 @@ class Kind(NamedTuple):
     """Properties of a message for the checks before decoding."""
 
     crc_extra: int
-    size: int  # most bytes of the payload
-    target: int | None  # offset of the target system in it
+    size: int  # greatest number of bytes of the payload
+    target: int | None  # offset of the target system in the payload
     old_size: int  # bytes of the payload in MAVLink 1, which has no extension fields
 
 
@@ -38,12 +38,12 @@ class Header(NamedTuple):
     """Sender and message of a frame; offsets are from its first byte."""
 
     size: int  # bytes of the whole frame
-    payload: int  # offset of its start
-    end: int  # offset of its end, where the checksum starts
+    payload: int  # offset of the payload's start
+    end: int  # offset of the payload's end, where the checksum starts
     signed: bool
     system: int
     component: int
-    message: int  # its id
+    message: int  # id of the message
 
 
 @dataclass(slots=True)
@@ -245,7 +245,7 @@ class Gate:
                 self.counts.unknown += 1
             elif self._is_for_us(frame, header):
                 if self.is_intact(frame, header):
-                    yield from self._judged(frame, header)
+                    yield from self._verified(frame, header)
                 else:
                     self.counts.checksum += 1
             at += header.size
@@ -253,7 +253,7 @@ class Gate:
     def frame(self, frame: bytes, header: Header) -> Iterator[tuple[bytes, Any]]:
         """Yield an intact frame with its message, if it is accepted."""
         if self._is_for_us(frame, header):
-            yield from self._judged(frame, header)
+            yield from self._verified(frame, header)
 
     def is_intact(self, frame: bytes, header: Header) -> bool:
         """Return True if the checksum of a known message's frame is right, and in MAVLink 1 its length is valid."""
@@ -279,11 +279,11 @@ class Gate:
             return False
         return True
 
-    def _judged(self, frame: bytes, header: Header) -> Iterator[tuple[bytes, Any]]:
+    def _verified(self, frame: bytes, header: Header) -> Iterator[tuple[bytes, Any]]:
         """Yield a frame with its message, if it is signed as required and can be decoded."""
         counts = self.counts
         if self._verifier is not None:
-            refusal = self._verifier.judge(frame, header.system, header.component, header.signed)
+            refusal = self._verifier.check(frame, header.system, header.component, header.signed)
             if refusal is not None:
                 setattr(counts, refusal.value, getattr(counts, refusal.value) + 1)
                 return

@@ -12,7 +12,7 @@ from cosim.mavlink.wire.framing import V2, Counts, Gate
 from cosim.mavlink.wire.link import Link, Signer, open_channel
 from cosim.mavlink.wire.signing import SigningClock, Verifier
 
-_AT_ONCE = 512  # most messages of one call
+_AT_ONCE = 512  # greatest number of messages of one call
 _PAUSE = 0.001  # s, polling period of an idle link
 _LONGEST = 0.05  # s, of reading without a pause
 
@@ -48,14 +48,14 @@ class GroundLink:
     channel : Channel
         Channel that carries the frames.
     old : int
-        Accepted frames of MAVLink 1.
+        Number of accepted frames of MAVLink 1.
     counts : Counts
         Counts of received frames by outcome.
 
     Raises
     ------
     TelemetryError
-        If it cannot be opened.
+        If the endpoint cannot be opened.
     """
 
     def __init__(self, endpoint: Endpoint, key: bytes | None = None, identity: Identity = GROUND_STATION) -> None:
@@ -111,7 +111,7 @@ class GroundLink:
         return self._link.troubles()
 
     def close(self) -> None:
-        """Close it. May be called twice."""
+        """Close the link. May be called twice."""
         self.channel.close()
 
     def __enter__(self) -> GroundLink:

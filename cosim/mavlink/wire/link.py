@@ -25,13 +25,13 @@ log = logging.getLogger(__name__)
 COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1, the only component that ground stations accept as a vehicle
 BUDGET = 200_000.0  # bytes/s, of the wall clock, into a network
 _BURST = 0.5  # s of the budget, that can be sent at once
-_RESERVED = 0.25  # fraction of it reserved for answers
+_RESERVED = 0.25  # fraction of the burst that is reserved for answers
 _ANSWERS = frozenset(  # sent only on the link of the request
     ("AUTOPILOT_VERSION", "AVAILABLE_MODES", "COMMAND_ACK", "FILE_TRANSFER_PROTOCOL", "LOG_DATA", "LOG_ENTRY",
      "MESSAGE_INTERVAL", "MISSION_ACK", "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_REQUEST_INT", "PARAM_ERROR",
      "PARAM_VALUE", "PING", "TIMESYNC")
 )  # fmt: skip
-_FIRST = frozenset(
+_PRIORITY = frozenset(  # messages that may use the reserved part of the budget
     {
         "HEARTBEAT", "STATUSTEXT", "COMMAND_ACK", "PARAM_VALUE", "PARAM_ERROR", "FILE_TRANSFER_PROTOCOL", "TIMESYNC",
         "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK",
@@ -65,10 +65,10 @@ class Budget:
         self._left = min(self._most, self._left + (now - self._last) * self._rate)
         self._last = now
 
-    def take(self, size: int, first: bool) -> bool:
-        """Take `size` bytes, and return True, if they are left; without `first` the reserved quarter must remain."""
+    def take(self, size: int, priority: bool) -> bool:
+        """Take `size` bytes, and return True, if they are left; without `priority` the reserved quarter must remain."""
         self._refill()
-        if self._left - size < (0.0 if first else _RESERVED * self._most):
+        if self._left - size < (0.0 if priority else _RESERVED * self._most):
             return False
         self._left -= size
         return True
@@ -114,7 +114,7 @@ class Link:
     source : (int, int)
         Own system and component id.
     budget : float, optional
-        Most bytes per second of the wall clock; default: no limit.
+        Greatest number of bytes per second of the wall clock; default: no limit.
     signer : Signer, optional
         Signer of the frames; default: none are signed.
 
@@ -123,7 +123,7 @@ class Link:
     logs : list of Link
         Logs that also get the answers sent on this link; streams are sent on each link anyway.
     sent, dropped, unencodable : int
-        Messages passed to the channel, dropped for the budget, and with a value that no field can hold.
+        Numbers of messages that were passed to the channel, dropped for the budget, and not encodable.
     """
 
     def __init__(
@@ -170,7 +170,7 @@ class Link:
                 self._reported.add(message.get_type())
                 log.warning("MAVLink: %s cannot be encoded: %s", message.get_type(), error)
             return False
-        if self._budget is not None and not self._budget.take(len(frame), message.get_type() in _FIRST):
+        if self._budget is not None and not self._budget.take(len(frame), message.get_type() in _PRIORITY):
             self.dropped += 1
             return False
         self._framer.count(old)
@@ -197,7 +197,7 @@ class Link:
             if found is not None:
                 version = 1 if found[0][0] == V1 else 2
                 self._old_peers |= version == 1
-                self.channel.heard(self._peer, version)
+                self.channel.record_version(self._peer, version)
                 yield found
                 continue
             received = self.channel.receive()

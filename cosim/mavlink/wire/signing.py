@@ -13,8 +13,8 @@ from typing import Final
 from cosim.errors import TelemetryError
 
 KEY_BYTES = 32
-_LONGEST_KEY = 4096  # bytes of its file
-STREAMS = 64  # senders whose last timestamps are kept
+_LONGEST_KEY = 4096  # bytes of a key file
+STREAMS = 64  # number of senders whose last timestamps are kept
 _EPOCH = 1_420_070_400  # s, 2015-01-01 in Unix time, the epoch of MAVLink's timestamps
 _PER_SECOND = 100_000  # timestamps count 10 us
 _MINUTE = 60 * _PER_SECOND
@@ -109,7 +109,7 @@ class SigningClock:
         self._last = min(max(self._last + 1, self.now), _LAST)
         return self._last
 
-    def heard(self, stamp: int) -> None:
+    def advance_to(self, stamp: int) -> None:
         """Advance to a timestamp with a valid signature."""
         self._last = max(self._last, stamp)
 
@@ -130,7 +130,7 @@ class Verifier:
         self._clock: Final = clock
         self._latest: dict[tuple[int, int, int], int] = {}  # timestamps, by system, component and link
 
-    def judge(self, frame: bytes, system: int, component: int, signed: bool) -> Refusal | None:
+    def check(self, frame: bytes, system: int, component: int, signed: bool) -> Refusal | None:
         """Return the reason to refuse a frame, or None to accept it.
 
         Only a frame with a valid signature updates the sender's last timestamp.
@@ -154,7 +154,7 @@ class Verifier:
         if latest is None and len(self._latest) >= STREAMS and not self._forget(oldest):
             return Refusal.CROWDED
         self._latest[sender] = stamp
-        self._clock.heard(stamp)
+        self._clock.advance_to(stamp)
         return None
 
     def _forget(self, oldest: int) -> bool:

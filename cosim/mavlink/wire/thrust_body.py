@@ -8,8 +8,8 @@ from typing import Any
 THRUST_BODY_SET = 1 << 5  # type_mask
 
 _FIELD = struct.Struct("<3f")
-_AT = 39  # bytes of the payload before it
-_HEADER = 10  # bytes of MAVLink 2
+_AT = 39  # offset of the field in the payload
+_HEADER = 10  # bytes of a header of MAVLink 2
 
 
 def with_thrust_body(mavlink: Any, *fields: Any, thrust_body: tuple[float, float, float]) -> Any:
@@ -23,6 +23,11 @@ def with_thrust_body(mavlink: Any, *fields: Any, thrust_body: tuple[float, float
         Fields of the message before the extension, in pymavlink's order.
     thrust_body : tuple of float
         Fractions of the greatest thrust ahead, right and down [-], -1 to 1.
+
+    Returns
+    -------
+    MAVLink_set_attitude_target_message
+        The message, whose frame in MAVLink 2 ends with the extension.
     """
     message = mavlink.MAVLink_set_attitude_target_message(*fields)
     whole = message.pack

@@ -16,7 +16,7 @@ from cosim.mavlink.channels.stream import Outgoing
 from cosim.mavlink.channels.tcp import TcpIn, TcpOut
 from cosim.mavlink.channels.tlog import Tlog
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
-from cosim.mavlink.setup import ahead
+from cosim.mavlink.setup import max_lead
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.link import open_links
 from cosim.mavlink.wire.options import MavlinkOptions
@@ -512,7 +512,7 @@ def test_tlog_of_a_fast_run_has_no_future_timestamps(tmp_path):
 
 @pytest.mark.parametrize(("rate", "seconds"), [(None, 12.0), (10.0, 12.0), (1.0, 0.0), (0.5, 0.0)])
 def test_lead_over_wall_clock_depends_on_duration_and_rate(rate, seconds):
-    assert ahead(load_scenario("paper", ["time.duration=12"]), rate) == seconds
+    assert max_lead(load_scenario("paper", ["time.duration=12"]), rate) == seconds
 
 
 def test_a_log_is_never_overwritten(tmp_path):

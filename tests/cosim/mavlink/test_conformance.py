@@ -78,7 +78,7 @@ class Scripted:
 def client_of(answer):
     client = Client(Scripted(answer))
     assert client.find(0.1) is not None
-    client.forget()
+    client.discard_unread()
     return client
 
 
@@ -232,10 +232,10 @@ def ardupilot(custom=b"d3adbeef"):
 def test_only_known_differences_of_ardusub_are_tolerated():
     baseline = baseline_of(Subject(ardupilot(), (), 1.0, False))
     assert set(baseline.differences) <= {check.name for check in CHECKS}
-    known = baseline.judge("parameter-unknown", failed("nothing", "an answer"))
+    known = baseline.apply("parameter-unknown", failed("nothing", "an answer"))
     assert known.status == "differs" and known.expected.startswith("an answer; ArduSub: it is silent")
-    assert baseline.judge("parameter-unknown", passed("fine")).status == "pass"
-    assert baseline.judge("one-ack", failed("two", "one")).status == "fail"
+    assert baseline.apply("parameter-unknown", passed("fine")).status == "pass"
+    assert baseline.apply("one-ack", failed("two", "one")).status == "fail"
     result = Result(CHECKS[0], known, 0.1)
     assert as_text(result).startswith("DIFFERS heartbeat-identity")
     assert summary([result]) == "0 passed, 0 failed, 1 differ as known, 0 skipped, 0.1 s"

@@ -32,7 +32,7 @@ class Script:
         self.looked += data is not None
         return None if data is None else (0, data)
 
-    def heard(self, peer, version): ...
+    def record_version(self, peer, version): ...
 
     def send(self, frame, old=None):
         return True

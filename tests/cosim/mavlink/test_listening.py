@@ -66,11 +66,11 @@ class Vehicle:
 def test_display_shows_vehicle_position_texts_and_messages(link):
     watch = Watch()
     for i in range(11):
-        watch.take(received(mavlink.MAVLink_attitude_message(100 * i, 0.1, -0.2, 0.3, 0, 0, 0), 0.1 * i))
-    watch.take(received(heartbeat(), 1.0))
-    watch.take(received(mavlink.MAVLink_local_position_ned_message(0, 1.5, -2.25, 3.0, 0, 0, 0), 1.0))
-    watch.take(received(mavlink.MAVLink_global_position_int_message(0, 0, 0, 0, -3000, 0, 0, 0, 0), 1.0))
-    watch.take(received(mavlink.MAVLink_statustext_message(4, b"region SR1 entered"), 1.0))
+        watch.add(received(mavlink.MAVLink_attitude_message(100 * i, 0.1, -0.2, 0.3, 0, 0, 0), 0.1 * i))
+    watch.add(received(heartbeat(), 1.0))
+    watch.add(received(mavlink.MAVLink_local_position_ned_message(0, 1.5, -2.25, 3.0, 0, 0, 0), 1.0))
+    watch.add(received(mavlink.MAVLink_global_position_int_message(0, 0, 0, 0, -3000, 0, 0, 0, 0), 1.0))
+    watch.add(received(mavlink.MAVLink_statustext_message(4, b"region SR1 entered"), 1.0))
     text = "\n".join(picture(link, watch, 1.0))
     assert "vehicle 1:1 PX4 SUBMARINE, mode OFFBOARD, ARMED, ACTIVE" in text
     assert "north 1.50 east -2.25 down 3.00 m, roll 5.7 pitch -11.5 yaw 17.2 deg, depth 3.00 m" in text
@@ -81,7 +81,7 @@ def test_display_shows_vehicle_position_texts_and_messages(link):
 def test_message_rates_track_arrivals_and_decay():
     watch = Watch()
     for i in range(400):
-        watch.take(received(mavlink.MAVLink_system_time_message(0, 0), 0.05 * i))
+        watch.add(received(mavlink.MAVLink_system_time_message(0, 0), 0.05 * i))
         watch.sample(0.05 * i)
     (row,) = watch.rows.values()
     assert row.rate(20.0) == pytest.approx(20.0, rel=0.05)
@@ -92,14 +92,14 @@ def test_message_rates_track_arrivals_and_decay():
 
 def test_silent_vehicle_is_marked_silent(link):
     watch = Watch()
-    watch.take(received(heartbeat(), 1.0))
+    watch.add(received(heartbeat(), 1.0))
     assert "SILENT" not in picture(link, watch, 3.0)[1]
     assert "SILENT for 9 s" in picture(link, watch, 10.0)[1]
 
 
 def test_ground_stations_are_no_vehicle(link):
     watch = Watch()
-    watch.take(received(heartbeat(autopilot=8, kind=6), 1.0, system=255))
+    watch.add(received(heartbeat(autopilot=8, kind=6), 1.0, system=255))
     assert watch.vehicle is None
     assert "no vehicle was heard" in picture(link, watch, 1.0)
 
@@ -107,8 +107,8 @@ def test_ground_stations_are_no_vehicle(link):
 def test_memory_is_bounded_under_a_flood_of_names_and_texts(link):
     watch = Watch()
     for i in range(20 * ROWS):
-        watch.take(received(mavlink.MAVLink_named_value_float_message(0, f"n{i}".encode(), 1.0), 1e-4 * i))
-        watch.take(received(mavlink.MAVLink_statustext_message(6, b"x"), 1e-4 * i, system=1 + i % 200))
+        watch.add(received(mavlink.MAVLink_named_value_float_message(0, f"n{i}".encode(), 1.0), 1e-4 * i))
+        watch.add(received(mavlink.MAVLink_statustext_message(6, b"x"), 1e-4 * i, system=1 + i % 200))
         watch.sample(1e-4 * i)
     assert len(watch.rows) == ROWS and len(watch.texts) == TEXTS
     assert watch.total == 40 * ROWS and watch.beyond > 0
@@ -129,8 +129,8 @@ def test_memory_is_bounded_under_a_flood_of_names_and_texts(link):
 def test_received_text_cannot_inject_terminal_codes(link, message):
     decoded = mavlink.MAVLink(None).decode(bytearray(message.pack(mavlink.MAVLink(None, 1, 1))))
     watch = Watch()
-    watch.take(received(heartbeat()))
-    watch.take(received(decoded))
+    watch.add(received(heartbeat()))
+    watch.add(received(decoded))
     assert all(line.isprintable() for line in picture(link, watch, 1.0, width=200))
 
 
@@ -139,7 +139,7 @@ def test_every_message_of_the_dialect_is_displayed(link):
     for number, kind in mavlink.mavlink_map.items():
         head = bytes([0xFD, 1, 0, 0, 0, 1, 1, *number.to_bytes(3, "little")])
         crc = mavlink.x25crc(head[1:] + b"\1" + bytes([kind.crc_extra])).crc
-        watch.take(received(codec.decode(bytearray(head + b"\1" + crc.to_bytes(2, "little")))))
+        watch.add(received(codec.decode(bytearray(head + b"\1" + crc.to_bytes(2, "little")))))
     shown = {line.split()[0] for line in picture(link, watch, 1.0) if "1:1" in line}
     assert len(watch.rows) == min(ROWS, len(mavlink.mavlink_map)) and len(shown) >= ROWS - 5
 
@@ -155,7 +155,7 @@ def test_values_rounded_to_zero_have_no_sign(link):
     place = mavlink.MAVLink_local_position_ned_message(0, -1e-3, -0.0, -1e-3, 0.0, 0.0, -1e-9)
     world = mavlink.MAVLink_global_position_int_message(0, 0, 0, 0, 1, 0, 0, 0, 0)
     for message in (heartbeat(), attitude, place, world):
-        watch.take(received(message))
+        watch.add(received(message))
     shown = "\n".join(picture(link, watch, 1.0))
     assert "roll 0.0 pitch 0.0 yaw 0.0 deg" in shown and "depth 0.00 m" in shown
     assert not re.search(r"-0\.0+\b", shown)

@@ -13,7 +13,7 @@ from cosim.mavlink.messages.control import weight_names
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.vehicle.layout import Layout, euler_of
 from cosim.mavlink.vehicle.view import View
-from cosim.mavlink.wire.encode import Encoder, float32, whole, wrapped
+from cosim.mavlink.wire.encode import Encoder, float32, whole, wrap_time
 from cosim.simulation.columns import names_of
 from cosim.simulation.signals import Column
 from plant_fmu import load_vehicle
@@ -268,7 +268,7 @@ def test_out_of_range_values_are_clamped_to_the_field():
 def test_link_numbers_are_rounded_clamped_and_wrapped():
     assert [whole(x) for x in (1.4, math.nan, math.inf, -2.0, 3)] == [1, None, None, -2, 3]
     assert float32(math.inf) == float32(1e300) == pytest.approx(3.4028234e38) and float32(-0.5) == -0.5
-    assert wrapped(2**32 * 1000 + 5000) == 5 and wrapped(2**32 + 7, 1) == 7
+    assert wrap_time(2**32 * 1000 + 5000) == 5 and wrap_time(2**32 + 7, 1) == 7
 
 
 def test_euler_angles_are_those_of_the_plant():

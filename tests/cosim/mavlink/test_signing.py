@@ -165,7 +165,7 @@ def test_streams_are_bounded_and_forgotten_only_when_a_repeat_would_be_too_old()
     extra = Station(key=KEY, link=200, stamp=begin + MINUTE - 100_000).pack(heartbeat())
     assert not accepts(gate, extra)
     assert refused(gate) == {"crowded": 1}
-    clock.heard(begin + MINUTE + 100_000)  # time goes by
+    clock.advance_to(begin + MINUTE + 100_000)  # time goes by
     assert accepts(gate, extra)
     assert not accepts(gate, first)
     assert refused(gate) == {"crowded": 1, "old": 1}

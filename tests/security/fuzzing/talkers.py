@@ -159,7 +159,7 @@ def to_ground(seeds: Seeds) -> Case:
     def read(content: bytes) -> None:
         watch = Watch()
         for _, m in Gate(Counts()).datagram(content):
-            watch.take(Heard(1.0, m.get_srcSystem(), m.get_srcComponent(), m.get_seq(), m.get_type(), m))
+            watch.add(Heard(1.0, m.get_srcSystem(), m.get_srcComponent(), m.get_seq(), m.get_type(), m))
         watch.sample(2.0)
         assert all(line.isprintable() for line in table(Link(), watch, 2.0))  # type: ignore[arg-type]
 
