@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cosim.results.run_result import Run
     from cosim.sitl.autopilot_link import AutopilotLink
 
-_PORTS = {"ardupilot": 9002, "px4": 4560}  # by backend, where an autopilot expects its simulator: UDP, TCP
+_PORTS = {"ardupilot": 9002, "px4": 4560}  # ports at which an autopilot expects its simulator: UDP, TCP
 
 
 def add_verbs(verbs: Any) -> None:

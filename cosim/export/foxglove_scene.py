@@ -23,6 +23,7 @@ from cosim.simulation.signals import Array
 
 MAP = "map"  # frame with z upwards, as in Foxglove
 _HALF_TURN = (0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0)  # about north-east: (north, east, down) to (east, north, up)
+_X, _Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 _LETTERS = 14.0  # pixels, font size
 _LINE = 2.0  # pixels, width
 _ARROW = 2.0  # hull radii, length of the arrow of the greatest thrust
@@ -122,7 +123,7 @@ def vehicle(scene: Scene) -> SceneUpdate:
         if length > 0.0 and np.linalg.norm(thruster.direction) > 0.0:
             arrow = entity.arrows.add(shaft_length=0.7 * length, head_length=0.3 * length)
             arrow.shaft_diameter, arrow.head_diameter = 0.05 * length, 0.15 * length
-            _set_pose(arrow.pose, thruster.position.tolist(), _turn_from_x(thruster.direction))
+            _set_pose(arrow.pose, thruster.position.tolist(), _shortest_turn(_X, thruster.direction))
             _set_colour(arrow.color, THRUST_COLOUR, 1.0)
     trail = message.entities.add(frame_id=NED, id="way", frame_locked=True)
     line = trail.lines.add(type=LinePrimitive.LINE_STRIP, thickness=_LINE, scale_invariant=True)
@@ -157,7 +158,7 @@ def _draw(entity: SceneEntity, solid: Solid, active: bool) -> None:
     elif isinstance(shape, Cylinder):
         drawn = entity.cylinders.add(bottom_scale=1.0, top_scale=1.0)
         start, end = np.array(shape.start), np.array(shape.end)
-        _set_pose(drawn.pose, ((start + end) / 2.0).tolist(), _turn_from_z(end - start))
+        _set_pose(drawn.pose, ((start + end) / 2.0).tolist(), _shortest_turn(_Z, end - start))
         _set_vector(drawn.size, [2.0 * shape.radius, 2.0 * shape.radius, float(np.linalg.norm(end - start))])
     else:
         drawn = entity.triangles.add()
@@ -207,14 +208,6 @@ def _set_colour(message: Any, colour: tuple[int, int, int], opaque: float) -> No
 def _unit(quaternion: Sequence[float]) -> list[float]:
     e = np.array(quaternion)
     return [float(part) for part in e / np.linalg.norm(e)]
-
-
-def _turn_from_x(direction: Array) -> list[float]:
-    return _shortest_turn(np.array([1.0, 0.0, 0.0]), direction)
-
-
-def _turn_from_z(direction: Array) -> list[float]:
-    return _shortest_turn(np.array([0.0, 0.0, 1.0]), direction)
 
 
 def _shortest_turn(start: Array, direction: Array) -> list[float]:

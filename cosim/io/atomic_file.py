@@ -63,7 +63,7 @@ def write_atomic(path: Path, content: bytes | str) -> Path:
     Raises
     ------
     OSError
-        As `atomic_file`.
+        If the file cannot be written, as for `atomic_file`.
     """
     with atomic_file(path) as file:
         file.write(content.encode() if isinstance(content, str) else content)

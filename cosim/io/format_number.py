@@ -17,7 +17,7 @@ def require_format(where: Path, found: object) -> None:
     where : Path
         Path of the file, which the message names.
     found : object
-        Its format number; None for a file without one, which is format 1.
+        Format number of the file; None for a file without one, which is format 1.
 
     Raises
     ------

@@ -74,7 +74,7 @@ def read_json(path: Path) -> dict[str, Any]:
     Raises
     ------
     RunError
-        If it cannot be read, or holds something else.
+        If the file cannot be read, or holds no object.
     """
     try:
         table = json.loads(path.read_text(encoding="utf-8"))

@@ -79,7 +79,7 @@ class CommandDesk:
         Raises
         ------
         CommandError
-            If it changes a setting that does not exist, or to a value out of range.
+            If the command changes an unknown setting, or to a value out of range.
         """
         if isinstance(command, ChangeSetting):
             self.settings.change(command.key, command.value)

@@ -26,8 +26,8 @@ from cosim.replay.page import replay_page
 log = logging.getLogger(__name__)
 
 PATH = "/ws"
-VIEWERS = 16  # at once
-CONNECTIONS = 4 * VIEWERS  # at once; more could use up the file descriptors that the run needs
+VIEWERS = 16  # greatest number at once
+CONNECTIONS = 4 * VIEWERS  # greatest number at once; more could use up the file descriptors that the run needs
 _PERIOD = 1.0 / 30.0  # s between polls for new rows while there are viewers
 _IDLE_PERIOD = 0.25  # s, the same without viewers
 _COMMAND_RATE = 20  # 1/s, sustained rate of commands of a viewer

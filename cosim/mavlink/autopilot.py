@@ -24,9 +24,9 @@ from cosim.mavlink.services.parameters import Parameters
 from cosim.mavlink.services.requests import Requests, Timing, banner
 from cosim.mavlink.services.service import Handler, Service
 from cosim.mavlink.services.targets import Targets
-from cosim.mavlink.vehicle.vehicle_context import COMPONENT_ID, Sender, VehicleContext
+from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.mavlink.wire.message_sink import MessageSink
-from cosim.mavlink.wire.options import MavlinkOptions
+from cosim.mavlink.wire.options import COMPONENT_ID, MavlinkOptions
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.signals import Array, Column

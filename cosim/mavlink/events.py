@@ -62,7 +62,7 @@ class Events:
 
     def _watch_mission(self, before: int, now: int) -> None:
         """Report the mission items that were passed; items without a position are not reported."""
-        passed = way(self._context.course, before, now) if before >= 0 else None
+        passed = way(self._context.mission_items, before, now) if before >= 0 else None
         for item in [before, *passed[:-1]] if passed else []:
             self._reached_item(item)
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cosim.replay.activity import RESTING_SIGNALS, active_regions, is_resting
+from cosim.results.required_columns import REGION_COLUMNS
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array, Column
 from fuzzy_arbiter.engines.firing import Firing
@@ -16,7 +17,6 @@ _DRAWN = (  # prefixes of the columns that a view draws
     "command.", "thruster_force[", "actuation.", "commands.", "target.", "wrench_saturated", "allocation_saturated",
     "autopilot.", "companion.", "stick.", "velocity_target.",
 )  # fmt: skip
-_DRAWN_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")
 
 
 class ViewColumns:
@@ -87,4 +87,4 @@ class ViewColumns:
 
 
 def _drawn(name: str) -> bool:
-    return name.startswith(_DRAWN) or name.endswith(_DRAWN_OF_REGIONS)
+    return name.startswith(_DRAWN) or name.endswith(REGION_COLUMNS)

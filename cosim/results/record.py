@@ -76,7 +76,7 @@ class Rows:
         Raises
         ------
         RunError
-            If they cannot be read.
+            If the signals cannot be read.
         KeyError
             If there is no such signal.
         """
@@ -97,7 +97,7 @@ class Rows:
         Raises
         ------
         RunError
-            If they cannot be read.
+            If the signals cannot be read.
         KeyError
             If there is no such signal.
         """
@@ -141,7 +141,7 @@ class Record(Rows):
     Raises
     ------
     RunError
-        If they cannot be read.
+        If the files cannot be read, or are not parts of one record.
 
     Examples
     --------

@@ -13,7 +13,7 @@ from cosim.simulation.columns import names_of
 log = logging.getLogger(__name__)
 
 _OPTIONAL = ("law.", "sensed.", "water_velocity.")  # prefixes of columns that are only exported
-_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")  # needed, also if a region's name has such a prefix
+REGION_COLUMNS = (".clearance", ".shift.x", ".shift.y", ".shift.z")  # suffixes of the needed columns of a region
 _NAMED = 3  # greatest number of columns named in a message
 
 
@@ -48,7 +48,7 @@ def require_columns(scenario: Scenario, record: Record) -> None:
 
 
 def _is_optional(name: str) -> bool:
-    return name.endswith(".value") or (name.startswith(_OPTIONAL) and not name.endswith(_OF_REGIONS))
+    return name.endswith(".value") or (name.startswith(_OPTIONAL) and not name.endswith(REGION_COLUMNS))
 
 
 def _list_names(names: Sequence[str]) -> str:

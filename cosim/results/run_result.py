@@ -251,9 +251,6 @@ def open_run(path: Path, scenario: Scenario, status: str, wall_time: float | Non
     as_flown = scenario_as_flown(scenario, record)
     summary = summarise(as_flown, record, status, wall_time)
     if scenario.commands.enabled:
-        summary["commands"] = _lines(path / COMMANDS_LOG)
+        log = path / COMMANDS_LOG
+        summary["commands"] = len(log.read_bytes().splitlines()) if log.exists() else 0
     return Run(path, scenario, as_flown, record, summary)
-
-
-def _lines(file: Path) -> int:
-    return len(file.read_bytes().splitlines()) if file.exists() else 0

@@ -52,7 +52,7 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
     RunError
         If the record cannot be read.
     KeyError
-        If it lacks a signal.
+        If the record lacks a signal.
     """
     names = [secondary.region.name for secondary in scenario.regions]
     first_rows = record.take(range(min(2, len(record))), ["time", *(f"{name}.clearance" for name in names)])

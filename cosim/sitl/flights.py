@@ -146,14 +146,9 @@ class Flights:
         except (PlantFmuError, CosimError) as error:
             status, failure = f"failed: {error}", error
         self.end(status)
-        runs = self._conclude()
+        runs = [flight.conclude(status, self._options.report) for flight, status in self._ended]
         if failure:
             raise failure
         if not runs:
             raise KeyboardInterrupt if interrupted else RunError(f"no autopilot connected: {status}")
         return Outcome(runs, counts)
-
-    def _conclude(self) -> list[Run]:
-        """Write the reports of all runs with at least one step, unless disabled, and return these runs."""
-        report = self._options.report
-        return [flight.conclude(status, report) for flight, status in self._ended]

@@ -25,7 +25,7 @@ class AutopilotLaw:
     channels : sequence of int
         Output of each thruster, from 1; 0 for none.
     efforts : sequence of callable
-        For each thruster, the map from its output to the fraction of its greatest force, -1 to 1.
+        Function of each thruster from its output to the fraction of its greatest force, -1 to 1.
     vehicle : Vehicle
         Vehicle whose thrust limits are the greatest forces.
     output_name : str

@@ -39,7 +39,7 @@ def decode(data: bytes) -> ServoPacket | None:
     Returns
     -------
     ServoPacket or None
-        None if it is not a servo packet.
+        The packet; None if the datagram is not a servo packet.
     """
     magic, packing = _MAGIC_OF_LENGTH.get(len(data), (0, None))
     if packing is None:

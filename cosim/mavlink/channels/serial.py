@@ -66,7 +66,7 @@ def open_line(path: str, baud: int) -> Stream:
     Raises
     ------
     OSError
-        If it cannot be opened.
+        If the device cannot be opened.
     TelemetryError
         If the operating system does not have the baud rate, or is Windows.
     """

@@ -17,7 +17,7 @@ _HEAD = struct.Struct("<HHH")  # magic, parameters in the file, parameters of th
 _CLEAN_REFUSALS = ("FileNotFound", "Fail", "UnknownCommand")
 _UNKNOWN = "NO_SUCH_PARAM"
 _QUICK, _TIMEOUT = 0.5, 2.0  # s
-_ROUNDING = 1e-6  # of a float32
+_ROUNDING = 1e-6  # relative rounding of a float32
 
 
 def parameter_list(subject: Subject) -> Outcome:

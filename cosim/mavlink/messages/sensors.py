@@ -12,9 +12,9 @@ from cosim.mavlink.wire.encode import wrap_time
 SURFACE_PRESSURE = 1013.25  # hPa
 WATER_DENSITY = 1000.0  # kg/m3, fresh water, ArduSub's default
 GRAVITY = 9.80665  # m/s2
-_PASCAL = 100.0  # in a hPa
+_PASCAL = 100.0  # Pa in a hPa
 _DEEPEST_BOTTOM = 655.0  # m below the vehicle; the range of DISTANCE_SENSOR
-_CENTI = 100  # in a unit
+_CENTI = 100  # cm in a m
 _HIGHRES_FIELDS = 0b111111 | 1 << 9 | 1 << 11  # accelerations, rates, pressure, pressure altitude
 
 

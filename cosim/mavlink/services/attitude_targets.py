@@ -59,11 +59,7 @@ class AttitudeTargets(Service):
 
     def _attitude(self, sender: Sender, message: Any) -> None:
         context = self.context
-        if not context.accepts_commands:
-            context.submit()
-            return
-        if not context.active_gcs.may_steer(sender.system, context.now):
-            context.reject("another station has the vehicle in hand", "active gcs")
+        if not self.may_steer(sender):
             return
         fault = self._fault(message)
         if fault:

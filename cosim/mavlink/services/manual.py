@@ -82,13 +82,9 @@ class Manual(Service):
 
     def _apply(self, sender: Sender, sticks: Vector6, by_gain: bool) -> None:
         context = self.context
-        if not context.accepts_commands:
-            context.submit()
+        if context.accepts_commands and context.mode_ahead not in STICK_MODES:
             return
-        if context.mode_ahead not in STICK_MODES:
-            return
-        if not context.active_gcs.may_steer(sender.system, context.now):
-            context.reject("another station has the vehicle in hand", "active gcs")
+        if not self.may_steer(sender):
             return
         self._received_at = context.now
         self._submit(sticks, by_gain)

@@ -23,8 +23,8 @@ from cosim.simulation.commands.commands import ChangeSetting
 _HASH = "_HASH_CHECK"
 _NO_INDEX = 0xFFFF
 _SLICE = 50  # values in each tick
-_ACTIONS: tuple[LossAction, ...] = ("none", "warn", "disarm", "hold", "surface")  # by ArduSub's FS_GCS_ENABLE
-_TIMEOUTS = (1.0, 120.0)  # s, of FS_GCS_TIMEOUT
+_ACTIONS: tuple[LossAction, ...] = ("none", "warn", "disarm", "hold", "surface")  # order of ArduSub's FS_GCS_ENABLE
+_TIMEOUTS = (1.0, 120.0)  # s, range of FS_GCS_TIMEOUT
 
 
 @dataclass(frozen=True)

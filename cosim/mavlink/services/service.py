@@ -75,6 +75,17 @@ class Service:
     def tick(self) -> None:
         """Run periodic work at wall clock `context.now`."""
 
+    def may_steer(self, sender: Sender) -> bool:
+        """Return True if the vehicle accepts set-points and sticks of a sender; report a refusal."""
+        context = self.context
+        if not context.accepts_commands:
+            context.submit()
+            return False
+        if not context.active_gcs.may_steer(sender.system, context.now):
+            context.reject("another station has the vehicle in hand", "active gcs")
+            return False
+        return True
+
     def on_snapshot(self) -> None:
         """Handle a new snapshot."""
 

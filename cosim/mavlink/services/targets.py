@@ -134,7 +134,7 @@ class Targets(Service):
 
     def _set_point(self, sender: Sender, message: Any, frame: int, place: Vector3, raw: Vector3) -> None:
         context, mask = self.context, message.type_mask
-        if not self._may_steer(sender):
+        if not self.may_steer(sender):
             return
         fault = _fault(message)
         if fault:
@@ -191,16 +191,6 @@ class Targets(Service):
                 f"Warning: {of} {words}", context.mavlink.MAV_SEVERITY_WARNING, f"{of} {words}", _WARNING_PERIOD
             )
 
-    def _may_steer(self, sender: Sender) -> bool:
-        context = self.context
-        if not context.accepts_commands:
-            context.submit()
-            return False
-        if not context.active_gcs.may_steer(sender.system, context.now):
-            context.reject("another station has the vehicle in hand", "active gcs")
-            return False
-        return True
-
     # ---- commands ----
 
     def _reposition(self, call: Call) -> int:
@@ -229,7 +219,7 @@ class Targets(Service):
             MAV_RESULT.
         """
         context = self.context
-        if not self._may_steer(sender):
+        if not self.may_steer(sender):
             return int(context.mavlink.MAV_RESULT_DENIED)
         x, y, z = (a if math.isfinite(a) else b for a, b in zip(place, context.view.position_ned, strict=True))
         commands: list[Command] = [SetTarget((x, y, z)) if any(map(math.isfinite, place)) else SetMode("hold")]
@@ -248,7 +238,7 @@ class Targets(Service):
             return int(context.mavlink.MAV_RESULT_DENIED)
         if call[4] == 1.0:
             angle = context.view.euler[2] + math.copysign(1.0, -1.0 if call[3] < 0.0 else 1.0) * angle
-        if not self._may_steer(call.sender):
+        if not self.may_steer(call.sender):
             return int(context.mavlink.MAV_RESULT_DENIED)
         return context.submit(SetHeading(angle))
 
@@ -263,7 +253,7 @@ class Targets(Service):
             return int(m.MAV_RESULT_DENIED)
         if speed is None:
             return int(m.MAV_RESULT_ACCEPTED)
-        if not self._may_steer(call.sender):
+        if not self.may_steer(call.sender):
             return int(m.MAV_RESULT_DENIED)
         return self._parameters.change(SPEED, speed)
 

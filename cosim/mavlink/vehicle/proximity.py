@@ -18,7 +18,7 @@ from cosim.simulation.commands.settings import LiveSettings
 
 SECTORS = 72  # number of sectors of a scan
 REACH = 20.0  # m, range of a scan
-_RAYS = 3  # in each sector: at full range the scan detects anything wider than 0.6 m
+_RAYS = 3  # number of rays in a sector: at full range the scan detects anything wider than 0.6 m
 _AT_REST = (0.0, 0.0, 0.0)
 
 

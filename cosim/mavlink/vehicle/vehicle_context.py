@@ -28,8 +28,6 @@ from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.signals import Array, Column
 from plant_fmu.autopilot import Autopilot, pulse_of_effort
 
-COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1: ground stations listen to no other
-
 _PREDICTION_LASTS = 0.5  # s, within which a snapshot shows the effect of a command
 
 

@@ -17,12 +17,11 @@ from cosim.mavlink.channels.udp import UdpIn, UdpOut
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.framing import V1, Counts, Framer, Gate, StreamReader
-from cosim.mavlink.wire.options import MavlinkOptions
+from cosim.mavlink.wire.options import COMPONENT_ID, MavlinkOptions
 from cosim.mavlink.wire.signing import SigningClock, Verifier
 
 log = logging.getLogger(__name__)
 
-COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1, the only component that ground stations accept as a vehicle
 BUDGET = 200_000.0  # bytes/s, of the wall clock, into a network
 _BURST = 0.5  # s of the budget, that can be sent at once
 _RESERVED = 0.25  # fraction of the burst that is reserved for answers
@@ -238,7 +237,7 @@ def open_links(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> list[L
     Raises
     ------
     TelemetryError
-        If one cannot be opened; the others are closed again.
+        If an endpoint cannot be opened; the others are closed again.
     """
     source, key, clock = (options.system_id, COMPONENT_ID), options.key, SigningClock()
     verifier = None if key is None else Verifier(key, clock)
@@ -262,7 +261,7 @@ def open_channel(endpoint: Endpoint) -> tuple[Channel, float | None]:
     Raises
     ------
     TelemetryError
-        If it cannot be opened.
+        If the endpoint cannot be opened.
     """
     if endpoint.kind == "tlog":
         return Tlog(endpoint.path), None

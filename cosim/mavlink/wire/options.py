@@ -10,6 +10,7 @@ LossAction = Literal["none", "warn", "hold", "surface", "disarm"]
 
 PROFILES: tuple[ProfileName, ...] = get_args(ProfileName)
 LOSS_ACTIONS: tuple[LossAction, ...] = get_args(LossAction)
+COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1, the only component that ground stations accept as a vehicle
 ORIGIN = (55.9097, -3.3203)  # deg, default latitude and longitude of position 0
 
 

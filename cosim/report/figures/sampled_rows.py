@@ -13,6 +13,7 @@ from cosim.report.figures.time_series import enlarged, error_of
 from cosim.report.figures.trajectory import POSITION
 from cosim.results.extremes import even_edges, extreme_rows, rows_at
 from cosim.results.record import Rows
+from cosim.results.required_columns import REGION_COLUMNS
 from cosim.results.run_result import Run
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
@@ -25,7 +26,6 @@ _DRAWN = (
     "time", "position.", "quaternion.", "velocity.", "attitude.", "membership.", "weight.", "estimate.", "command.",
     "actuation.", "thruster_force[", "commands.", "target.", "lyapunov.",
 )  # fmt: skip
-_DRAWN_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")
 _EXTREME = ("attitude.", "membership.", "weight.", "estimate.", "lyapunov.")
 
 
@@ -49,7 +49,7 @@ def make_figure_data(run: Run) -> FigureData:
     data = FigureData(run.scenario, run.record, run.summary)
     if len(run.record) <= _WHOLE:
         return data
-    names = [name for name in run.record.units if name.startswith(_DRAWN) or name.endswith(_DRAWN_OF_REGIONS)]
+    names = [name for name in run.record.units if name.startswith(_DRAWN) or name.endswith(REGION_COLUMNS)]
     return dataclasses.replace(data, record=run.record.take(_rows(data, names), names))
 
 
@@ -70,7 +70,7 @@ def _rows(data: FigureData, names: list[str]) -> NDArray[np.intp]:
 
 def _signals_with_extremes(scenario: Scenario, rows: Rows) -> list[Array]:
     """Return the signals whose extremes the figures must show."""
-    names = [name for name in rows.units if name.startswith(_EXTREME) or name.endswith(_DRAWN_OF_REGIONS)]
+    names = [name for name in rows.units if name.startswith(_EXTREME) or name.endswith(REGION_COLUMNS)]
     names += [f"actuation.{axis}" for axis in "XYZ"]
     _, error = error_of(scenario, rows)
     return [*(rows[name] for name in names), error, *norms_of(rows).values(), *thrusts_of(scenario, rows).T]
