@@ -23,9 +23,10 @@ from cosim.export.excerpt import Excerpt
 from cosim.export.names import group_columns, valid_names
 from cosim.export.protobuf_table import numbers_messages, numbers_schema
 from cosim.export.scene import POSITION, QUATERNION, Scene
+from cosim.replay.activity import active_at
 from cosim.replay.events import events_of
+from cosim.results.record import Rows
 from cosim.results.run_result import Run
-from cosim.simulation.signals import Array
 
 PACKAGE = "subreach"  # Protobuf package of the signals' schemas
 _CHUNK = 4 * 2**20  # bytes
@@ -71,7 +72,7 @@ def _write_messages(writer: Writer, excerpt: Excerpt) -> None:
         block = rows.to_array()
         times = np.rint(block[:, 0] * 1e9).astype(np.int64).tolist()
         messages = zip(*(numbers_messages(block[:, picked]) for _, picked in tables), strict=True)
-        draw = drawing.row_writer(block)
+        draw = drawing.row_writer(rows)
         for i, (time, row) in enumerate(zip(times, messages, strict=True)):
             for (channel, _), message in zip(tables, row, strict=True):
                 writer.add_message(channel, time, message, time)
@@ -97,7 +98,7 @@ class _Drawing:
     """Writes the scene as it changes."""
 
     def __init__(self, writer: Writer, run: Run, scene: Scene) -> None:
-        self._writer, self._scene = writer, scene
+        self._writer, self._run, self._scene = writer, run, scene
         self._channels: dict[str, int] = {}
         for topic, kind in (
             ("/tf_static", FrameTransforms),
@@ -117,19 +118,17 @@ class _Drawing:
         self._send("/tf_static", 0, foxglove.map_transform())
         self._send("/vehicle/model", 0, foxglove.vehicle(self._scene))
 
-    def row_writer(self, block: Array) -> Callable[[int, int], None]:
-        """Return a function that writes the scene of a row of a block, given its index and time [ns]."""
-        scene = self._scene
-        known = [bool(np.isfinite(row).all()) for row in block[:, scene.indices(POSITION + QUATERNION)]]
-        positions = block[:, scene.indices(POSITION)].tolist()
-        quaternions = block[:, scene.indices(QUATERNION)].tolist()
-        moved = {foxglove.frame_of(s): block[:, scene.shifts(s)].tolist() for s in scene.solids if s.moves}
-        active = scene.active(block)
+    def row_writer(self, rows: Rows) -> Callable[[int, int], None]:
+        """Return a function that writes the scene of one of the rows, given its index and time [ns]."""
+        known = np.isfinite(rows.stack(POSITION + QUATERNION)).all(axis=1)
+        positions, quaternions = rows.stack(POSITION).tolist(), rows.stack(QUATERNION).tolist()
+        moved = {foxglove.frame_of(s): rows.stack(s.shift).tolist() for s in self._scene.solids if s.moves}
+        active = active_at(self._run.scenario, rows).tolist()
 
         def draw(i: int, time: int) -> None:
             at = foxglove.timestamp(time)
             if known[i]:  # otherwise the vehicle keeps its last pose
-                shifts = {frame: rows[i] for frame, rows in moved.items()}
+                shifts = {frame: by_row[i] for frame, by_row in moved.items()}
                 self._send("/tf", time, foxglove.frame_transforms(at, positions[i], quaternions[i], shifts))
                 self._send("/vehicle/pose", time, foxglove.pose(at, positions[i], quaternions[i]))
             if self._changed(time) or active[i] != self._drawn:

@@ -30,6 +30,7 @@ from cosim.export.scene import (
     Scene,
     Solid,
 )
+from cosim.replay.activity import active_at
 from cosim.replay.events import events_of
 from cosim.results.record import Rows
 from cosim.simulation.signals import Array
@@ -157,7 +158,7 @@ class _Sender:
             began = time[0] if began is None else began
             ticks = np.floor((time - began) * _ARROWS)
             self._send_thrusts(block, np.flatnonzero(np.diff(ticks, prepend=tick) > 0.0))
-            active = np.array(self._scene.active(block.to_array()))
+            active = active_at(self._excerpt.run.scenario, block)
             self._send_activity(time, active, before)
             tick, before = ticks[-1], active[-1]
             self._recording.flush()  # bounds the memory of data that is not written yet
@@ -171,8 +172,7 @@ class _Sender:
         for solid in self._scene.solids:
             if solid.moves:
                 place = f"{_FRAMES[solid.frame]}/{rr.escape_entity_path_part(solid.name)}"
-                shifts = block.stack([f"{solid.name}.shift.{axis}" for axis in "xyz"])
-                self._send(time, place, rr.Transform3D.columns(translation=shifts))
+                self._send(time, place, rr.Transform3D.columns(translation=block.stack(solid.shift)))
 
     def _send_thrusts(self, block: Rows, rows: NDArray[np.intp]) -> None:
         if not self._forces:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +14,6 @@ from controller.regions.region_set import SHAPES, name_of, of_attitude, surface_
 from controller.regions.shape import Bounds, Shape
 from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
-from cosim.replay.activity import RESTING_SIGNALS, active_regions, is_resting
 from cosim.replay.header import header_of
 from cosim.replay.region_changes import changes_of, log_of
 from cosim.scenario.colours import colours_of_regions
@@ -42,6 +40,11 @@ class Solid:
     mesh: Mesh
     frame: str  # frame of the coordinates: `NED`, `PLACE` or `BODY`
     moves: bool  # True if the record has the region's shift
+
+    @property
+    def shift(self) -> list[str]:
+        """Names of the signals of a moving region's shift."""
+        return [f"{self.name}.shift.{axis}" for axis in "xyz"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,10 +80,8 @@ class Scene:
 
     def __init__(self, excerpt: Excerpt) -> None:
         self._excerpt = excerpt
-        self._record, scenario = excerpt.run.record, excerpt.run.scenario
-        names = [column.name for column in self._record.columns]
-        self._at = {name: i for i, name in enumerate(names)}
-        vehicle = header_of(scenario, self._record.columns)["vehicle"]
+        scenario = excerpt.run.scenario
+        vehicle = header_of(scenario, excerpt.run.record.columns)["vehicle"]
         self.hull_radius: float = vehicle["radius"]
         self.thrusters = tuple(
             Thruster(np.array(t["position"]), np.array(t["direction"]), max(abs(t["min"]), abs(t["max"])))
@@ -96,26 +97,6 @@ class Scene:
         limits = self._limits([shape for i, shape in all_shapes if i not in waiting])
         self.solids = tuple(self._solid(i, shape, limits) for i, shape in enumerate(at_start))
         self.changes = tuple((time, i, self._solid(i, shape, limits)) for time, i, shape in later)
-        self._criteria, criteria = scenario.criterion_places, scenario.criterion_names
-        self._memberships = self.indices([f"membership.{name}" for name in criteria])
-        self._weights = self.indices([f"weight.{name}" for name in criteria])
-        self._clearances = self.indices([f"{solid.name}.clearance" for solid in self.solids[1:]])
-
-    def indices(self, names: Sequence[str]) -> list[int]:
-        """Return the indices of signals in a row of the record."""
-        return [self._at[name] for name in names]
-
-    def active(self, rows: Array) -> list[int]:
-        """Return the index of the active solid at each row of the record, 0 for the goal."""
-        weights, clearances = rows[:, self._weights], rows[:, self._clearances]
-        goal, *velocity = self.indices(RESTING_SIGNALS)
-        resting = is_resting(rows[:, goal], rows[:, velocity])
-        active = active_regions(self._criteria, rows[:, self._memberships], weights, clearances, resting)
-        return [int(i) for i in active]
-
-    def shifts(self, solid: Solid) -> list[int]:
-        """Return the indices of the shift of a moving solid in a row of the record."""
-        return self.indices([f"{solid.name}.shift.{axis}" for axis in "xyz"])
 
     def trail(self) -> Array:
         """Return the path of the vehicle, thinned to at most 2000 points, shape (n, 3) [m, NED]."""

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from cosim.results.record import Rows
+from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
 RESTING_SIGNALS = ("goal.clearance", "velocity.u", "velocity.v", "velocity.w")  # signals that `is_resting` needs
@@ -70,3 +72,17 @@ def active_regions(
     is_secondary &= np.isfinite(critical).any(axis=1)
     is_secondary &= ~resting | (weights[rows, criterion] >= _DOMINANT_WEIGHT) | (critical.min(axis=1) < 0.0)
     return np.where(is_secondary, np.argmin(critical, axis=1) + 1, 0).astype(float)
+
+
+def activity_signals(scenario: Scenario) -> list[str]:
+    """Return the names of the signals that `active_at` needs."""
+    names = [f"{kind}.{name}" for kind in ("membership", "weight") for name in scenario.criterion_names]
+    return [*RESTING_SIGNALS, *names, *(f"{secondary.region.name}.clearance" for secondary in scenario.regions)]
+
+
+def active_at(scenario: Scenario, rows: Rows) -> NDArray[np.intp]:
+    """Return the index of the active region at each row of a run, shape (rows,): 0 for the goal."""
+    n, signals = len(scenario.criteria), rows.stack(activity_signals(scenario))
+    goal, velocity, memberships, weights, clearances = np.split(signals, [1, 4, 4 + n, 4 + 2 * n], axis=1)
+    resting = is_resting(goal[:, 0], velocity)
+    return active_regions(scenario.criterion_places, memberships, weights, clearances, resting).astype(np.intp)

@@ -11,7 +11,7 @@ from itertools import chain, pairwise
 import numpy as np
 
 from controller.regions.region_set import of_attitude
-from cosim.replay.activity import RESTING_SIGNALS, active_regions, is_resting
+from cosim.replay.activity import active_at, activity_signals
 from cosim.replay.command_words import command_events
 from cosim.replay.region_changes import Log
 from cosim.results.run_result import Run
@@ -117,15 +117,9 @@ def _active(run: Run) -> Iterator[Event]:
 
 def _all_changes(run: Run) -> Iterator[tuple[float, int]]:
     """Yield time and index of the active region's changes, 0 for the goal; first those of the first row."""
-    regions, places, before = run.scenario.regions, run.scenario.criterion_places, -1
-    memberships, weights = (
-        [f"{of}.{name}" for name in run.scenario.criterion_names] for of in ("membership", "weight")
-    )
-    clearances = [f"{secondary.region.name}.clearance" for secondary in regions]
-    for block in run.record.blocks(["time", *RESTING_SIGNALS, *memberships, *weights, *clearances]):
-        by_region = block.stack(clearances) if clearances else np.empty((len(block), 0))
-        resting = is_resting(block[RESTING_SIGNALS[0]], block.stack(RESTING_SIGNALS[1:]))
-        active = active_regions(places, block.stack(memberships), block.stack(weights), by_region, resting).astype(int)
+    before = -1
+    for block in run.record.blocks(["time", *activity_signals(run.scenario)]):
+        active = active_at(run.scenario, block)
         for row in np.flatnonzero(np.diff(active, prepend=before)).tolist():
             yield float(block["time"][row]), int(active[row])
         before = int(active[-1])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.replay.activity import RESTING_SIGNALS, active_regions, is_resting
+from cosim.replay.activity import active_at, activity_signals
 from cosim.report.figures.style import POINTS, FigureData
 from cosim.simulation.signals import Array
 
@@ -78,20 +78,8 @@ def _overlap(data: FigureData) -> NDArray[np.bool_]:
 
 def _given_way(data: FigureData, at: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the index of the active region's criterion at rows `at`, -1 for the goal."""
-    regions = data.scenario.regions
-    if not regions:
+    if not data.scenario.regions:
         return np.full(len(at), -1)
-    names, criteria = data.scenario.criterion_names, data.scenario.criterion_places
-    memberships, weights, clearances = (
-        np.column_stack([data.record[name][at] for name in names])
-        for names in (
-            [f"membership.{name}" for name in names],
-            [f"weight.{name}" for name in names],
-            [f"{secondary.region.name}.clearance" for secondary in regions],
-        )
-    )
-    goal, *velocity = (data.record[name][at] for name in RESTING_SIGNALS)
-    resting = is_resting(goal, np.column_stack(velocity))
-    active = active_regions(criteria, memberships, weights, clearances, resting).astype(int)
-    given_way: NDArray[np.intp] = np.array([-1, *criteria])[active]
+    active = active_at(data.scenario, data.record.take(at, activity_signals(data.scenario)))
+    given_way: NDArray[np.intp] = np.array([-1, *data.scenario.criterion_places])[active]
     return given_way
