@@ -192,6 +192,6 @@ def test_export_never_overwrites_the_run(run, tmp_path):
     before = (run / "record.parquet").read_bytes()
     (tmp_path / "link").symlink_to(run)
     for folder in (run, tmp_path / "link"):
-        with pytest.raises(ExportError, match="is of the run"):
+        with pytest.raises(ExportError, match="belongs to the run"):
             export_run(folder, "npz", run / "record.parquet", force=True)
     assert (run / "record.parquet").read_bytes() == before

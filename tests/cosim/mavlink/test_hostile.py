@@ -137,7 +137,7 @@ def test_flood_consumes_a_bounded_share_of_each_cycle(monkeypatch):
     slice_ = thread._RECEIVING
     for _ in range(500):
         began, before = clock.now, channel.looked
-        rest = links._turn()
+        rest = links._run_slice()
         took = clock.now - began
         assert 1 <= channel.looked - before <= slice_ / clock.LOOK
         assert slice_ < took < slice_ + clock.ANSWER + 10 * clock.LOOK  # what was begun in the slice is ended

@@ -179,7 +179,7 @@ def to_simulator(seeds: Seeds) -> Case:
     def read(content: bytes) -> None:
         codec.robust_parsing = True
         for controls in server._controls(codec, content):
-            law.take(controls)
+            law.set_outputs(controls)
 
     return Case((frames,), read)
 
@@ -191,7 +191,7 @@ def servos(seeds: Seeds) -> Case:
     def read(content: bytes) -> None:
         packet = wire.decode(content)
         if packet is not None:
-            law.take(packet.pwm)
+            law.set_outputs(packet.pwm)
 
     packets = [wire._MAGICS[magic].pack(magic, 400, 7, *[1500] * n) for magic, n in ((18458, 16), (29569, 32))]
     return Case(tuple(packets), read)
