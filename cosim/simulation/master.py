@@ -272,10 +272,8 @@ class Master:
     def measure_initial_state(self) -> None:
         """Fill the row with the initial state, which law and arbiter receive without noise; do not step the plant."""
         self._measured[:] = self._plant_measured
-        if self._sensor is not None:
-            self.state.position[:] = self.true_state.position
-            self.state.quaternion[:] = self.true_state.quaternion
-            self.state.velocity_body[:] = self.true_state.velocity_body
+        for given, true in zip(self.state[:3], self.true_state[:3], strict=True):  # the same where sensing is exact
+            given[:] = true
         self._evaluate_regions()
         if self.command_handler is not None:
             self.command_handler.update(0.0, float(self._given_evaluation.clearances[0]))
