@@ -11,7 +11,7 @@ from controller.errors import LawError
 
 Array = NDArray[np.float64]
 
-_ROUNDING = 1e-12  # of the greatest force: a smaller force counts as 0
+_ROUNDING = 1e-12  # force that counts as 0, as a part of the greatest force
 
 
 def _greatest(forces: Array) -> float:

@@ -14,12 +14,12 @@ from controller.errors import LawError
 from controller.law import Array, Diagnostic, Output, VehicleState
 from controller.regions.region_set import PackedRegions
 
-_REAL = "biufO"  # kinds of NumPy's types; O is of whole numbers too long for its own
-_LONGEST = 200  # characters of a value in a message
+_REAL = "biufO"  # kinds of NumPy's types of real numbers; O holds whole numbers too long for the others
+_LONGEST = 200  # greatest number of characters of a value in a message
 
 
 class RegionsSeen(NamedTuple):
-    """Regions evaluated at the measured pose; row i is of region i, in the order of the scenario.
+    """Regions evaluated at the measured pose; row i belongs to region i, in the order of the scenario.
 
     Examples
     --------
@@ -34,7 +34,7 @@ class RegionsSeen(NamedTuple):
     values: Array  # (n,) g, above 0 where violated, in the unit of the shape
     gradients: Array  # (n, 3) dg/dp, world frame
     rotation_gradients: Array  # (n, 3) dg/dtheta [1/rad], for a small rotation about the body's axes
-    clearances: Array  # (n,) to the surface, m (rad for shapes of attitude), below 0 where violated
+    clearances: Array  # (n,) distance to the surface, m (rad for shapes of attitude), below 0 where violated
     velocities: Array  # (n, 3) m/s, NED
     gains: Array  # (n,) alpha_i
     hard: NDArray[np.bool_]  # (n,) must not be violated
@@ -104,9 +104,9 @@ class FunctionLaw:
         Parameters
         ----------
         state, goal, regions, weights
-            As of `Law.step`.
+            State, regions and weights, as for `Law.step`.
         forces : ndarray, shape (6,) or (n_thrusters,)
-            Receives the forces [N, N m], as of `Law.step`.
+            Receives the forces [N, N m], as for `Law.step`.
 
         Raises
         ------
@@ -114,7 +114,7 @@ class FunctionLaw:
             If the function returns anything but finite numbers of the right shape.
         """
         given = VehicleState(*(part.copy() for part in state))
-        received = self._function(given, _seen(goal, given), _seen(regions, given), weights.copy())
+        received = self._function(given, _evaluate(goal, given), _evaluate(regions, given), weights.copy())
         numbers = _real_numbers(received)
         if numbers.shape != forces.shape or not np.isfinite(numbers).all():
             unit = "N and N m" if self.output == "wrench" else "N"
@@ -150,7 +150,7 @@ def qualified_name(law: object) -> str:
     Returns
     -------
     str
-        Such as ``my_laws:steer``, or ``my_laws.py:steer`` if that file is the script that runs.
+        Name such as ``my_laws:steer``, or ``my_laws.py:steer`` if that file is the script that runs.
     """
     named = law if hasattr(law, "__qualname__") else type(law)
     module, name = str(named.__module__), str(named.__qualname__)
@@ -158,7 +158,7 @@ def qualified_name(law: object) -> str:
     return f"{Path(script).name if script else module}:{name}"
 
 
-def _seen(regions: PackedRegions, state: VehicleState) -> RegionsSeen:
+def _evaluate(regions: PackedRegions, state: VehicleState) -> RegionsSeen:
     n = regions.kinds.size
     values, gradients, rotation_gradients, clearances = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
     regions.evaluate(state.position, state.quaternion, values, gradients, rotation_gradients, clearances)

@@ -25,8 +25,8 @@ Output = Literal["wrench", "thrusters"]
 G = TypeVar("G", bound=tuple[float, ...])
 
 
-_AS_THE_GAINS_SAY = np.zeros(12)
-_AS_THE_GAINS_SAY.flags.writeable = False
+_NO_DEVIATION = np.zeros(12)
+_NO_DEVIATION.flags.writeable = False
 NOTHING_EXPECTED = np.full(6, np.nan)
 NOTHING_EXPECTED.flags.writeable = False
 
@@ -44,10 +44,10 @@ class VehicleState(NamedTuple):
     """
 
     position: Array  # (3,) m, NED
-    quaternion: Array  # (4,) from body to world
-    velocity_body: Array  # (6,) over ground, m/s, rad/s
+    quaternion: Array  # (4,) unit quaternion from body to world, scalar first
+    velocity_body: Array  # (6,) velocity over ground, body frame, m/s, rad/s
     thruster_health: Array  # (m,) 1 working, or not reported as failed; 0 reported to give no force
-    deviation: Array = _AS_THE_GAINS_SAY  # (12,) standard deviations of position [m], velocity [m/s], attitude [rad],
+    deviation: Array = _NO_DEVIATION  # (12,) standard deviations of position [m], velocity [m/s], attitude [rad],
     # world axes, and rates [rad/s], body, of an estimate; 0: a measurement, whose noise is that of the law's gains
 
 
@@ -66,9 +66,9 @@ class VehicleModel(NamedTuple):
     linear_damping: Array  # (6,) N s/m, N m s/rad
     quadratic_damping: Array  # (6,) N s2/m2, N m s2/rad2
     thruster_matrix: Array  # (6, m) body wrench of one newton of each thruster
-    thrust_min: Array  # (m,) N
-    thrust_max: Array  # (m,) N
-    thrust_time_constant: Array  # (m,) s, of the thrusters' lag
+    thrust_min: Array  # (m,) N, least force of each thruster, 0 or negative
+    thrust_max: Array  # (m,) N, greatest force of each thruster
+    thrust_time_constant: Array  # (m,) s, time constant of each thruster's lag
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class CompiledLaw:
     ('k_p1', 'k_p2')
     """
 
-    name: ClassVar[str]  # of its module, given when the laws are loaded
+    name: ClassVar[str]  # name of the law's module, set when the laws are loaded
     output: ClassVar[Output]
     function: ClassVar[Any]  # plain Python in the translator's subset, or anything that can be called
     gains_type: ClassVar[type[Any]]  # a NamedTuple of floats with defaults
@@ -148,7 +148,7 @@ class CompiledLaw:
     memory: Any
     n_regions: int
     n_forces: int = 6
-    _state: VehicleState | None = None  # of the last step
+    _state: VehicleState | None = None  # state of the last step
 
     @classmethod
     def for_vehicle(
@@ -208,12 +208,12 @@ class CompiledLaw:
         Parameters
         ----------
         quaternion : array_like, shape (4,)
-            From body to world.
+            Desired attitude, a unit quaternion from body to world, scalar first.
 
         Raises
         ------
         LawError
-            If it is not of length 1.
+            If the quaternion is not of length 1.
         """
         self.memory.desired_quaternion[:] = validate_quaternion(quaternion)
 
@@ -290,7 +290,7 @@ class WrenchLaw(CompiledLaw):
 
     output: ClassVar[Output] = "wrench"
     above_zero: ClassVar[tuple[str, ...]]  # gains that must not be 0
-    memory_of: ClassVar[Callable[..., Any]]  # of attitude (4,), period (1,) and number of regions
+    make_memory: ClassVar[Callable[..., Any]]  # takes attitude (4,), period (1,) [s], and number of regions
 
     @classmethod
     def for_vehicle(
@@ -307,7 +307,7 @@ class WrenchLaw(CompiledLaw):
     def __init__(self, gains: Any, desired_quaternion: Array, period: float, n_regions: int) -> None:
         self.gains, self.n_regions = self.validate(gains), n_regions
         desired, lasting = validate_quaternion(desired_quaternion), np.array([validate_period(period)])
-        self.memory = type(self).memory_of(desired, lasting, n_regions)
+        self.memory = type(self).make_memory(desired, lasting, n_regions)
 
 
 def validate_period(period: float) -> float:
@@ -316,17 +316,17 @@ def validate_period(period: float) -> float:
     Parameters
     ----------
     period : float
-        [s].
+        Control period [s].
 
     Returns
     -------
     float
-        The same [s].
+        The same period [s].
 
     Raises
     ------
     LawError
-        If it is not a finite number above 0.
+        If the period is not a finite number above 0.
     """
     if not 0.0 < period < np.inf:
         raise LawError(f"control period is {period} s, expected a finite number above 0")
@@ -339,7 +339,7 @@ def validate_quaternion(quaternion: Array) -> Array:
     Parameters
     ----------
     quaternion : array_like, shape (4,)
-        From body to world.
+        Desired attitude, a unit quaternion from body to world, scalar first.
 
     Returns
     -------
@@ -349,7 +349,7 @@ def validate_quaternion(quaternion: Array) -> Array:
     Raises
     ------
     LawError
-        If it is not of length 1.
+        If the quaternion is not of length 1.
     """
     desired = np.array(quaternion, dtype=float)
     if desired.shape != (4,) or not abs(np.linalg.norm(desired) - 1.0) < 1e-6:

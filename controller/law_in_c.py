@@ -30,14 +30,14 @@ def translate_law(law: CompiledLaw, goal: PackedRegions, regions: PackedRegions,
     Returns
     -------
     str
-        C. Its bits are those of Python under ``-ffp-contract=off``.
+        C text, whose results are Python's to the last bit under ``-ffp-contract=off``.
 
     Raises
     ------
     LawError
         If it is a custom law in plain Python, or made for another number of regions.
     TranslationError
-        If the law is written in Python that is not translated; with file and line.
+        If the law uses Python that is not translated; the message names file and line.
 
     Examples
     --------

@@ -28,13 +28,13 @@ class Gains(NamedTuple):
     5.0
     """
 
-    k_p1: float = 18.8  # N/m3, on the primary region (16)
-    k_p2: float = 36.0  # N m, on attitude (26)
+    k_p1: float = 18.8  # N/m3, gain of the primary region (16)
+    k_p2: float = 36.0  # N m, gain of the attitude error (26)
     k_q: float = 100.0  # (22), (26); cancels in (25) and (27), where beta_i k_q = alpha_i: it enters the analysis alone
-    k_v1: float = 90.0  # N s/m (26)
-    k_v2: float = 40.0  # N m s/rad (26)
-    sigma_p: float = 0.08  # 1/(m2 s), of position in the adaptation (27)
-    sigma_a: float = 0.9  # rad/s, of attitude in the adaptation (27)
+    k_v1: float = 90.0  # N s/m, damping of translation (26)
+    k_v2: float = 40.0  # N m s/rad, damping of rotation (26)
+    sigma_p: float = 0.08  # 1/(m2 s), weight of position in the adaptation (27)
+    sigma_a: float = 0.9  # rad/s, weight of attitude in the adaptation (27)
     gamma: float = 2.0  # s2/kg, s2/(kg m2): Gamma = gamma I (27)
 
 
@@ -87,18 +87,18 @@ def secondary_error(values: Array, gradients: Array, betas: Array) -> Array:
     Parameters
     ----------
     values : ndarray, shape (n,)
-        g_i.
+        Values g_i of the regions.
     gradients : ndarray, shape (n, 3)
-        dg_i/dp; a region whose gradient is zero contributes nothing.
+        Gradients dg_i/dp; a region whose gradient is zero contributes nothing.
     betas : ndarray, shape (n,)
-        alpha_i / k_q.
+        Factors beta_i = alpha_i / k_q.
     """
     e_s = np.empty(3)
     e_s[0], e_s[1], e_s[2] = secondary_parts(values, gradients, betas, 1.0)
     return e_s
 
 
-def in_body(R: Rows, x: Vector3) -> Vector3:
+def to_body(R: Rows, x: Vector3) -> Vector3:
     """Return R^T x, a world vector in body axes."""
     return (
         R[0][0] * x[0] + R[1][0] * x[1] + R[2][0] * x[2],
@@ -129,32 +129,32 @@ def apply(
     R : three rows
         Rotation matrix from body to world.
     velocity_body : ndarray, shape (6,)
-        nu [m/s, rad/s].
+        Velocity nu [m/s, rad/s], body frame.
     gains : Gains
-        K_0 = diag(k_p1 R^T, k_p2 I), K_s = [k_q R^T; 0], K_v = diag(k_v1 I, k_v2 I) (26).
+        Gains of K_0 = diag(k_p1 R^T, k_p2 I), K_s = [k_q R^T; 0], K_v = diag(k_v1 I, k_v2 I) (26).
     period : float
         Time for which the wrench is held [s]; (27) is integrated over it by Euler's rule.
     estimate : ndarray, shape (4,)
-        phi-hat [N, N m], updated in place after its use.
+        Estimate phi-hat [N, N m], updated in place after its use.
     tau : ndarray, shape (6,)
         Receives the wrench [N, N m], body frame.
     """
     k_p1, k_q, nu = gains.k_p1, gains.k_q, velocity_body
     # (12): Z = [-k 0; 0 S(k)] with k = R^T e3, the last row of R
     k = R[2]
-    supported = turned_by(k, estimate[1], estimate[2], estimate[3])
-    pushed = in_body(R, (k_p1 * e_p[0] + k_q * e_s[0], k_p1 * e_p[1] + k_q * e_s[1], k_p1 * e_p[2] + k_q * e_s[2]))
+    supported = cross_product(k, estimate[1], estimate[2], estimate[3])
+    pushed = to_body(R, (k_p1 * e_p[0] + k_q * e_s[0], k_p1 * e_p[1] + k_q * e_s[1], k_p1 * e_p[2] + k_q * e_s[2]))
     for i in range(3):  # (25): Z phi-hat - K_0 e - K_s e_s - K_v nu
         tau[i] = -k[i] * estimate[0] - pushed[i] - gains.k_v1 * nu[i]
         tau[3 + i] = supported[i] - gains.k_p2 * e_att[i] - gains.k_v2 * nu[3 + i]
 
     # (27): -Gamma^-1 Z^T (nu + sigma J_e), of which Z^T = [-k^T 0; 0 -S(k)]
     ratio = k_q / k_p1
-    off = in_body(R, (e_p[0] + ratio * e_s[0], e_p[1] + ratio * e_s[1], e_p[2] + ratio * e_s[2]))
+    off = to_body(R, (e_p[0] + ratio * e_s[0], e_p[1] + ratio * e_s[1], e_p[2] + ratio * e_s[2]))
     sinking = 0.0
     for i in range(3):
         sinking += k[i] * (nu[i] + gains.sigma_p * off[i])
-    turning = turned_by(
+    turning = cross_product(
         k, nu[3] + gains.sigma_a * e_att[0], nu[4] + gains.sigma_a * e_att[1], nu[5] + gains.sigma_a * e_att[2]
     )
     estimate[0] += period / gains.gamma * sinking
@@ -162,7 +162,7 @@ def apply(
         estimate[1 + i] += period / gains.gamma * turning[i]
 
 
-def turned_by(k: Vector3, x: float, y: float, z: float) -> Vector3:
+def cross_product(k: Vector3, x: float, y: float, z: float) -> Vector3:
     """Return S(k) [x y z]^T = k x [x y z]^T: (4)."""
     return k[1] * z - k[2] * y, k[2] * x - k[0] * z, k[0] * y - k[1] * x
 
@@ -188,13 +188,13 @@ def step(
     quaternion, desired_quaternion : ndarray, shape (4,)
         Actual and desired attitude, from body to world.
     velocity_body : ndarray, shape (6,)
-        nu [m/s, rad/s].
+        Velocity nu [m/s, rad/s], body frame.
     goal_value : float
-        f of the primary region (13).
+        Value f of the primary region (13).
     goal_gradient : ndarray, shape (3,)
-        df/dp.
+        Gradient df/dp.
     values, gradients : ndarray, shape (n,), (n, 3)
-        g_i and dg_i/dp of the secondary regions (14).
+        Values g_i and gradients dg_i/dp of the secondary regions (14).
     alphas : ndarray, shape (n,)
         Gain of each region (section VII) times its weight from the arbiter (section VI).
     gains : Gains
@@ -202,7 +202,7 @@ def step(
     period : float
         Time for which the wrench is held [s]; (27) is integrated over it by Euler's rule.
     estimate : ndarray, shape (4,)
-        phi-hat, updated in place after its use.
+        Estimate phi-hat [N, N m], updated in place after its use.
     tau : ndarray, shape (6,)
         Receives the wrench [N, N m], body frame.
     """

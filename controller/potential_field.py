@@ -1,7 +1,7 @@
 """Common parts of the laws for comparison: a bounded pull to the goal, the push of all other regions, and damping.
 
-Their sources have no obstacles. Here each gets the potential force (22) of every secondary
-region, with all weights on, for none of the sources has an arbiter. A region is grown by a `reach`, so that it pushes
+Their sources have no obstacles and no arbiter. Here each law gets the potential force (22) of every secondary
+region, with a weight of 1. A region is grown by a `reach`, so that it pushes
 before the vehicle is at its surface, and g is the signed distance to the grown region, whose gradient has the length
 1, as (19) requires.
 """
@@ -26,19 +26,19 @@ _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 class Field(NamedTuple):
     """Work arrays for the evaluation of regions, and the results."""
 
-    goal_value: Array  # (1,)
-    goal_gradient: Array  # (1, 3)
-    goal_turning: Array  # (1, 3)
+    goal_value: Array  # (1,) g of the goal
+    goal_gradient: Array  # (1, 3) dg/dp, NED
+    goal_turning: Array  # (1, 3) dg/dtheta, body frame
     goal_clearance: Array  # (1,) m
-    values: Array  # (n,)
-    gradients: Array  # (n, 3)
-    rotation_gradients: Array  # (n, 3)
-    clearances: Array  # (n,) m
-    error: Array  # (3,) of the goal, NED
-    push: Array  # (3,) N, NED, of all other regions
+    values: Array  # (n,) g of the other regions
+    gradients: Array  # (n, 3) dg/dp, NED
+    rotation_gradients: Array  # (n, 3) dg/dtheta, body frame
+    clearances: Array  # (n,) m or rad
+    error: Array  # (3,) position error towards the goal, NED
+    push: Array  # (3,) N, NED, sum of the forces of all other regions
 
 
-def field_of(n_regions: int) -> Field:
+def empty_field(n_regions: int) -> Field:
     """Return the arrays for `n_regions` secondary regions."""
     return Field(
         goal_value=np.zeros(1),
@@ -79,12 +79,12 @@ def evaluate_field(
     for i in range(field.values.size):
         if regions.kinds[i] >= _ATTITUDE:
             continue
-        along(
+        add_along(
             field.gradients[i], -repulsion * regions.gains[i] * positive_part(reach - field.clearances[i]), field.push
         )
 
 
-def along(gradient: Array, length: float, total: Array) -> None:
+def add_along(gradient: Array, length: float, total: Array) -> None:
     """Add a vector of a length [N] along a gradient, shape (3,), to `total`; nothing if the gradient is zero."""
     norm = length3(gradient[0], gradient[1], gradient[2])
     if not norm <= 0.0:
@@ -103,12 +103,12 @@ def set_point_error(field: Field, inset: float, most: float) -> None:
     field : Field
         Evaluated regions; its `error` is written.
     inset : float
-        [m], at most the greatest clearance that the goal region has.
+        Clearance of the set point [m], at most the greatest clearance in the goal region.
     most : float
         Greatest length of the error [m].
     """
     field.error[:] = 0.0
-    along(field.goal_gradient[0], positive_part(inset - field.goal_clearance[0]), field.error)
+    add_along(field.goal_gradient[0], positive_part(inset - field.goal_clearance[0]), field.error)
     shorten(field.error, most)
 
 
@@ -126,14 +126,16 @@ def add_turned(R: Array, force: Array, factor: float, wrench: Array) -> None:
         wrench[i] += factor * (R[0, i] * force[0] + R[1, i] * force[1] + R[2, i] * force[2])
 
 
-def damp(velocity_body: Array, attitude_error: Vector3, k_p2: float, k_v1: float, k_v2: float, wrench: Array) -> None:
+def write_damping(
+    velocity_body: Array, attitude_error: Vector3, k_p2: float, k_v1: float, k_v2: float, wrench: Array
+) -> None:
     """Write the part of (25) that every law has, (6,) [N, N m]: -K_v nu, and -k_p2 times the attitude error (26)."""
     for i in range(3):
         wrench[i] = -k_v1 * velocity_body[i]
         wrench[3 + i] = -k_p2 * attitude_error[i] - k_v2 * velocity_body[3 + i]
 
 
-def keep_within(estimate: Array, first: int, last: int, bound: float) -> None:
+def clip_estimate(estimate: Array, first: int, last: int, bound: float) -> None:
     """Clip the numbers from `first` up to, not including, `last` of an estimate to +-`bound`; NaN stays.
 
     This projection prevents windup of the estimate while an obstacle holds the vehicle back.

@@ -156,8 +156,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 1 if `verify` found a defect; 2 if the input or an option is wrong; 130 if interrupted; 141 if the reader of
-        the output closed it.
+        Exit code: 0; 1 if `verify` found a defect; 2 if the input or an option is wrong; 130 if interrupted; 141 if the
+        reader of the output closed it.
     """
     if sys.stdout is None:  # closed by the parent process: the next file that is opened would take its place
         return _fault("standard output is closed; expected it open, such as on /dev/null")

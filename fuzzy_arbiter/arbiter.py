@@ -31,9 +31,9 @@ class Arbiter:
     Parameters
     ----------
     criteria : sequence of Criterion
-        In order of priority, the highest first; default: obstacle, shape, depth of the paper's section VI.
+        Criteria by descending priority; default: obstacle, shape, depth of the paper's section VI.
     form, weight, normalization, outside, points
-        Form of the system, as of `prioritised`.
+        Form of the system, as for `prioritised`.
     system : System, optional
         A Mamdani system, in place of all of the above.
     engine : {"auto", "closed", "exact", "grid", "skfuzzy"}
@@ -81,7 +81,7 @@ class Arbiter:
 
     @property
     def system(self) -> System:
-        """System that is evaluated."""
+        """The system that the arbiter evaluates."""
         return self._system
 
     @property
@@ -107,12 +107,12 @@ class Arbiter:
         inputs : sequence of float, array of shape (inputs,), mapping from input's name to float, or row of a data frame
             One value for each input; for plain criteria the degree in [0, 1] to which each asks for attention.
         **named : float
-            The same by keywords, in the place of `inputs`.
+            Values by keywords, in place of `inputs`.
 
         Returns
         -------
         Result of float
-            By position and by name; NaN for an output without default if no rule fires for it.
+            Values by position and by name; NaN for an output without default if no rule fires for it.
 
         Raises
         ------
@@ -150,7 +150,7 @@ class Arbiter:
         inputs : array_like, shape (n, inputs); or mapping, data frame, or array of named fields
             One sample in each row; or a column for each input, by name. Other columns of a data frame are passed over.
         **columns : array_like, shape (n,), or float
-            Columns by keywords, in the place of `inputs`; a single value counts for all rows.
+            Columns by keywords, in place of `inputs`; a single value counts for all rows.
 
         Returns
         -------
@@ -185,7 +185,7 @@ class Arbiter:
         Parameters
         ----------
         inputs, **named
-            As for a call.
+            Sample, as for a call.
 
         Returns
         -------
@@ -195,7 +195,7 @@ class Arbiter:
         Raises
         ------
         InputError
-            As for a call.
+            If the sample is invalid, as for a call.
         """
         return tuple.__new__(self._result, self._engine.centroids(self._samples.one(_one_of(inputs, named))))
 
@@ -205,17 +205,17 @@ class Arbiter:
         Parameters
         ----------
         inputs, **named
-            As for a call.
+            Sample, as for a call.
 
         Returns
         -------
         Explanation
-            Data; its `str` is a text for people.
+            Result as data; its `str` is a text for people.
 
         Raises
         ------
         InputError
-            As for a call.
+            If the sample is invalid, as for a call.
         """
         from fuzzy_arbiter.explanation import explain
 
@@ -227,7 +227,7 @@ class Arbiter:
         Returns
         -------
         Verification
-            Data; its `str` is a text for people.
+            Result as data; its `str` is a text for people.
         """
         from fuzzy_arbiter.verification import verify
 
@@ -250,7 +250,7 @@ class Arbiter:
         path : str or Path
             JSON, TOML, FCL, FIS or FLL file; its suffix selects the format.
         engine : str
-            As of `Arbiter`.
+            Name of the engine, as for `Arbiter`.
         outside : {"refuse", "clip"}, optional
             Treatment of an input outside its universe, in place of the file's.
         default : float or mapping from output's name to float, optional
@@ -324,12 +324,12 @@ class Arbiter:
         Parameters
         ----------
         engine : str
-            As of `Arbiter`.
+            Name of the engine, as for `Arbiter`.
 
         Returns
         -------
         Arbiter
-            A new one.
+            New arbiter with that engine.
         """
         return Arbiter(system=self._system, engine=engine)
 

@@ -11,7 +11,7 @@ from fuzzy_arbiter.errors import DefinitionError
 
 _T = TypeVar("_T")
 
-MAX_NAME = 200  # characters
+MAX_NAME = 200  # characters of a name
 
 
 def finite(value: object) -> float | None:
@@ -20,7 +20,7 @@ def finite(value: object) -> float | None:
     Returns
     -------
     float or None
-        None for a value that is not a finite real number; Booleans and texts are not numbers here.
+        Number; None for a value that is not a finite real number. Booleans and texts are not numbers here.
     """
     try:
         x = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan

@@ -30,7 +30,7 @@ Normalization = Literal["none", "range", "sum", "max"]
 Outside = Literal["refuse", "clip"]
 
 MAX_POINTS = 1_000_000_000
-# of an output's universe; moments are products of such widths, which must not over- or underflow
+# least and greatest width of an output's universe; moments are products of widths, which must not over- or underflow
 WIDTHS = (1e-100, 1e100)
 
 
@@ -41,12 +41,12 @@ class Variable:
     Attributes
     ----------
     name : str
-        Unlike those of all other variables.
+        Name, different from those of all other variables.
     universe : (float, float)
         Least and greatest value.
     terms : tuple of Term
-        At least one, unless it is an input that only the values of outputs depend on. A mapping from names to shapes
-        becomes that, and so does what `auto_terms` gives.
+        Terms, at least one unless only values of outputs depend on the input. A mapping from names to shapes
+        becomes a tuple of terms, and so does the result of `auto_terms`.
 
     Raises
     ------
@@ -227,11 +227,11 @@ class System:
     Attributes
     ----------
     inputs : tuple of Variable
-        In the order in which values come.
+        Inputs in the order of a sample's values.
     outputs : tuple of Output
-        In the order in which weights are given.
+        Outputs in the order of the weights.
     rules : tuple of Rule
-        At least one; a text such as ``if wind is calm then sail is full`` is a rule too.
+        Rules, at least one; a text such as ``if wind is calm then sail is full`` is a rule too.
     name : str
         Name of the system in files.
     conjunction : str

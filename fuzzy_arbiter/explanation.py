@@ -31,13 +31,13 @@ class FiredRule:
     Attributes
     ----------
     label : str
-        ``R1`` for the first rule.
+        Label of the rule; ``R1`` for the first.
     text : str
         The rule.
     strength : float
         Degree of its condition times its weight.
     conclusions : dict from str to str
-        For each output that it concludes on, the term.
+        Concluded term of each output that the rule concludes on.
     """
 
     label: str
@@ -58,21 +58,21 @@ class OutputDecision:
     Attributes
     ----------
     name : str
-        As results carry it: the name of the criterion whose weight the output is, else its own.
+        Name in results: that of the criterion whose weight the output is, else the output's own.
     variable : str
         Name of the output in the rules.
     cuts : dict from str to float
-        For each term, the greatest strength of the rules that conclude it.
+        Greatest strength of the rules that conclude each term.
     centroid : float
         Value in the universe, before it is normalized.
     weight : float
-        As the arbiter gives it; NaN if no rule fired and there is no default.
+        Weight from the arbiter; NaN if no rule fired and there is no default.
     decided_by : str or None
         Label of the rule that gives the greatest cut, of several the first; None if no rule fired.
     runner_up : str or None
         Label of the strongest rule for another term; None if none fired.
     margin : float
-        Strength of the one less that of the other; 0 is a tie.
+        Strength of the deciding rule less that of the runner-up; 0 is a tie.
     default_used : bool
         Whether no rule fired, so that the centroid is the output's default, or NaN if it has none.
     """
@@ -95,11 +95,11 @@ class Explanation:
     Attributes
     ----------
     inputs : tuple of InputDegrees
-        In the system's order.
+        Inputs in the system's order.
     rules : tuple of FiredRule
-        All of them, also those that did not fire.
+        All rules, also those that did not fire.
     outputs : tuple of OutputDecision
-        In the system's order.
+        Outputs in the system's order.
     winner : str or None
         The output with the greatest weight, by its name in results; None if that is shared, or all weights are 0. An
         output that is NaN takes no part.

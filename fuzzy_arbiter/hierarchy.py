@@ -100,7 +100,7 @@ def prioritised(
     Parameters
     ----------
     criteria : sequence of Criterion
-        In order of priority, the highest first.
+        Criteria by descending priority.
     form : {"hierarchical", "minimal", "conjunctive", "complete"}
         Form of the rules, for N criteria: 3N - 1 rules, as in the paper; 2N with a long *or* each;
         N + N (N + 1) / 2 without any *or*; or the complete table of N 2^N. The first three give the same weights
@@ -109,7 +109,7 @@ def prioritised(
         Template of the outputs; a criterion's number follows its name, and its first term is low. Results carry the
         names of the criteria.
     normalization, outside, points, name
-        As of `System`.
+        Settings, as for `System`.
 
     Returns
     -------

@@ -39,7 +39,7 @@ class HysteresisArbiter:
     Parameters
     ----------
     arbiter : Arbiter
-        Each of its inputs has two complementary terms.
+        Arbiter of which each input has two complementary terms.
     enter : float or mapping from input's name to float
         Degree of the on-term at which the latch closes, above `release`, at most 1.
     release : float or mapping from input's name to float
@@ -47,7 +47,7 @@ class HysteresisArbiter:
     dwell : float or mapping from input's name to float
         Least time that it stays closed [s]. It closes without delay: an obstacle must count at once.
     graded : bool
-        Whether a criterion whose latch is open counts with its degree, in the place of fully off. Weights then rise
+        True if a criterion whose latch is open counts with its degree, in place of fully off. Weights then rise
         smoothly before `enter`, and follow the noise there; when the latch opens they jump.
     on : mapping from input's name to str, optional
         Term of each input that asks for attention. By default the one that is not in the row at rest, which is the only
@@ -129,14 +129,14 @@ class HysteresisArbiter:
         Parameters
         ----------
         inputs : sequence of float, or mapping from input's name to float
-            As for an arbiter.
+            Sample, as for an arbiter.
         time : float, optional
             Time of the measurement [s]; it never decreases. Only a dwell needs it.
 
         Returns
         -------
         Result of float
-            One weight for each output, by position and by name.
+            Weight of each output, by position and by name.
 
         Raises
         ------

@@ -231,7 +231,7 @@ def anything(p: Proposition) -> Iterator[str]:
     Parameters
     ----------
     p : Proposition
-        A condition.
+        Condition of a rule.
 
     Yields
     ------

@@ -17,9 +17,9 @@ class Operators:
     Attributes
     ----------
     conjunction, implication : str
-        One of `fuzzy_arbiter.terms.norms.T_NORMS`.
+        Names from `fuzzy_arbiter.terms.norms.T_NORMS`.
     disjunction : str
-        One of `fuzzy_arbiter.terms.norms.S_NORMS`.
+        Name from `fuzzy_arbiter.terms.norms.S_NORMS`.
 
     Raises
     ------
@@ -51,11 +51,11 @@ class Rule:
     Attributes
     ----------
     condition : Proposition
-        On inputs.
+        Condition on inputs.
     conclusions : tuple of Is
-        On outputs, at least one.
+        Conclusions on outputs, at least one.
     weight : float
-        Above 0, at most 1.
+        Weight, above 0 and at most 1.
     operators : Operators or None
         Operators of its block, where a system has several; None for those of the system.
 
@@ -100,7 +100,7 @@ class Rule:
         Parameters
         ----------
         text : str
-            Such as ``if wind is calm then sail is full with 0.5``.
+            Text such as ``if wind is calm then sail is full with 0.5``.
         operators : Operators, optional
             Operators of its block.
 

@@ -30,7 +30,7 @@ def parse_rules(text: str) -> list[Rule]:
     Returns
     -------
     list of Rule
-        In the order of their first conclusions.
+        Rules in the order of their first conclusions.
 
     Raises
     ------
@@ -228,7 +228,7 @@ def bent_rules(
     weight : float
         Weight of the rule.
     carry : bool
-        Whether hedges also bend the conclusions after theirs, as fuzzylite takes them.
+        True if hedges also bend the conclusions after theirs, as in fuzzylite.
 
     Returns
     -------

@@ -59,7 +59,7 @@ class Samples:
         Returns
         -------
         sequence, or None
-            In the order of the inputs; None for other names or another type.
+            Values in the order of the inputs; None for other names or another type.
         """
         kind = type(inputs)
         if kind is dict and len(inputs) == len(self._names):
@@ -81,7 +81,7 @@ class Samples:
         Returns
         -------
         sequence of float
-            In the order of the inputs, in their universes.
+            Values in the order of the inputs, in their universes.
 
         Raises
         ------
@@ -108,7 +108,7 @@ class Samples:
         Returns
         -------
         ndarray, shape (n, inputs)
-            In their universes.
+            Values in the inputs' universes.
 
         Raises
         ------
@@ -132,14 +132,14 @@ class Samples:
         Returns
         -------
         values : ndarray, shape (n, inputs)
-            In their universes; of masked rows their least ends.
+            Values in the inputs' universes; in masked rows the universes' least ends.
         masked : ndarray of bool, shape (n,), or None
             True for rows with a masked value; None unless the array is masked.
 
         Raises
         ------
         InputError
-            As of `many`, but for masked values.
+            If the inputs are invalid, as for `many`; masked values are valid.
         """
         try:
             received = np.asarray(inputs)
@@ -178,7 +178,7 @@ class Samples:
         Returns
         -------
         ndarray or masked array, shape (n, inputs)
-            Not validated; an argument for `rows`.
+            Values that are not validated; an argument for `rows`.
 
         Raises
         ------

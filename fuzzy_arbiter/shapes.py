@@ -121,7 +121,7 @@ class Shape(Membership):
         Parameters
         ----------
         x : float
-            Any place, within the points or beyond.
+            Place, within the points or beyond.
 
         Returns
         -------
@@ -148,7 +148,7 @@ class Shape(Membership):
         Parameters
         ----------
         places : ndarray, shape (n,)
-            Finite.
+            Finite places.
 
         Returns
         -------
@@ -273,7 +273,7 @@ def triangle(left: float, peak: float, right: float) -> Shape:
     Returns
     -------
     Shape
-        As ``trimf`` of other tools.
+        Shape as ``trimf`` of other tools.
 
     Examples
     --------
@@ -295,7 +295,7 @@ def trapezoid(left: float, rise: float, fall: float, right: float) -> Shape:
     Returns
     -------
     Shape
-        As ``trapmf`` of other tools.
+        Shape as ``trapmf`` of other tools.
 
     Examples
     --------
@@ -318,7 +318,7 @@ def rising(start: float, end: float) -> Shape:
     Returns
     -------
     Shape
-        0 below the start and 1 above the end.
+        Shape with degree 0 below the start and 1 above the end.
 
     Examples
     --------
@@ -340,7 +340,7 @@ def falling(start: float, end: float) -> Shape:
     Returns
     -------
     Shape
-        1 below the start and 0 above the end.
+        Shape with degree 1 below the start and 0 above the end.
 
     Examples
     --------

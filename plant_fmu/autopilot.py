@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-MOST_CHANNELS = 32  # of the longer servo packet
-SHORTEST, LONGEST = 800, 2200  # us, of a pulse that a speed controller takes for one
+MAX_CHANNELS = 32  # channels of MAVLink's longer servo packet
+SHORTEST, LONGEST = 800, 2200  # us, lengths of pulses that a speed controller accepts
 
 Curve = Callable[[float], float]  # from a servo output [us] to a part of the greatest force, -1 to 1; or the inverse
 
@@ -20,10 +20,10 @@ class Autopilot:
     frame: str  # the autopilot's name for the arrangement of the thrusters, such as vectored_6dof
     channels: tuple[int, ...] = ()  # servo output of each thruster, from 1; 0 for none. Default: 1, 2, 3 ...
     signs: int | tuple[int, ...] = 1  # -1 where a pulse above neutral makes a thruster's force negative
-    pwm_neutral: int = 1500  # us
-    pwm_span: int = 400  # us, from neutral to full
-    pwm_dead_band: int = 25  # us, to either side of neutral, that give no force
-    curve: Literal["linear", "quadratic"] = "quadratic"  # of the force, over the part of the span
+    pwm_neutral: int = 1500  # us, pulse without force
+    pwm_span: int = 400  # us, distance from neutral to full force
+    pwm_dead_band: int = 25  # us, distance to either side of neutral within which there is no force
+    curve: Literal["linear", "quadratic"] = "quadratic"  # force over the part of the span
 
 
 def validate_autopilot(
@@ -51,8 +51,8 @@ def validate_autopilot(
     require(bool(given.frame) and given.frame.isprintable(), "autopilot.frame", repr(given.frame), "a name")
     for key, values in (("channels", channels), ("signs", signs)):
         require(len(values) == n_thrusters, f"autopilot.{key}", f"{len(values)} numbers", f"{n_thrusters}")
-    good = all(0 <= channel <= MOST_CHANNELS for channel in channels)
-    require(good, "autopilot.channels", channels, f"1 to {MOST_CHANNELS}, or 0 for none")
+    good = all(0 <= channel <= MAX_CHANNELS for channel in channels)
+    require(good, "autopilot.channels", channels, f"1 to {MAX_CHANNELS}, or 0 for none")
     used = [channel for channel in channels if channel]
     require(len(set(used)) == len(used), "autopilot.channels", channels, "each servo output once")
     require(all(abs(sign) == 1 for sign in signs), "autopilot.signs", signs, "1 or -1")
@@ -82,7 +82,8 @@ def effort_of_pulse(table: Autopilot, sign: int) -> Curve:
     Returns
     -------
     callable
-        u or u|u|, -1 to 1, with u the distance from neutral in spans; 0 within the dead band, and for an invalid pulse.
+        Function that returns u or u|u|, -1 to 1, with u the distance from neutral in spans; 0 within the dead band, and
+        for an invalid pulse.
     """
     neutral, span, dead_band, quadratic = (
         table.pwm_neutral, table.pwm_span, table.pwm_dead_band, table.curve == "quadratic",
@@ -105,12 +106,12 @@ def pulse_of_effort(table: Autopilot, sign: int) -> Curve:
     table : Autopilot
         Neutral, span and curve.
     sign : int
-        As for `effort_of_pulse`, whose inverse it is outside the dead band.
+        Sign as for `effort_of_pulse`, of which this is the inverse outside the dead band.
 
     Returns
     -------
     callable
-        Takes -1 to 1, and clips what is beyond; neutral for NaN.
+        Function of a part from -1 to 1, which it clips; it returns neutral for NaN.
 
     Examples
     --------

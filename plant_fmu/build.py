@@ -50,11 +50,11 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: Path, platforms: str = N
     what : Vehicle or Component
         Vehicle, whose numbers become the start values of the FMU's parameters; or another component.
     fmi : int
-        2 for FMI 2.0, 3 for FMI 3.0, both of a vehicle for co-simulation and model exchange.
+        FMI version: 2 or 3; that of a vehicle is for co-simulation and model exchange in both.
     out : Path
         File to write; it is written atomically.
     platforms : str
-        ``native`` for this machine; ``all``, or FMI 3.0's names with commas between them, such as
+        Platforms: ``native`` for this machine; ``all``, or FMI 3.0's names with commas between them, such as
         ``x86_64-linux,x86_64-windows``. Libraries that come with the package are taken where they fit. Else they are
         compiled, for this machine by whatever compiler is here, for others by that of the ziglang package. ``wasm``,
         alone or after a comma, adds a WebAssembly component to an FMU of FMI 3.0.
@@ -62,7 +62,7 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: Path, platforms: str = N
     Returns
     -------
     Path
-        `out`.
+        The written file, `out`.
 
     Raises
     ------
@@ -103,9 +103,9 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
     Parameters
     ----------
     what : Vehicle or Component
-        As for `build_fmu`.
+        Vehicle or component, as for `build_fmu`.
     fmi : int
-        2 or 3.
+        FMI version, 2 or 3.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
     """
     require_version(fmi)
     name = f"{what.name}-fmi{fmi}-{_digest(what, fmi)[:16]}"
-    path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{name}-{_maker()}.fmu"
+    path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{name}-{_compiler_digest()}.fmu"
     if _is_whole(path):  # a damaged file is built again
         return path
     component = _component(what)
@@ -172,7 +172,7 @@ def _digest(what: Vehicle | Component, fmi: int) -> str:
     return digest(neutral_members(what, fmi), native_platform().name, *FLAGS, fmpy.__version__)
 
 
-def _maker() -> str:
+def _compiler_digest() -> str:
     """Return a digest of the compiler: each compiler makes other bytes of the same sources."""
     with contextlib.suppress(BuildError):
         return digest({}, *prebuilt_files(), *find_compiler())[:8]

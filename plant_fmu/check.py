@@ -22,7 +22,7 @@ class Verdict:
     """One importer's result, and its greatest difference of an output at the stop time to FMPy's co-simulation."""
 
     result: Result
-    difference: float | None = None  # in the output's unit; None where there is nothing to compare
+    difference: float | None = None  # greatest difference, in the output's unit; None without a comparison
 
 
 def check_fmu(
@@ -39,16 +39,16 @@ def check_fmu(
     Parameters
     ----------
     path : Path
-        The FMU. Its binary is run, with the rights of this user.
+        Path of the FMU, whose binary is run with the rights of this user.
     stop_time, step : float, optional
-        [s]. Default: those of the FMU's default experiment, else 10 and 0.01.
+        End and step [s]. Default: those of the FMU's default experiment, else 10 and 0.01.
     start : mapping from str to float, optional
         Start values of parameters, inputs and states, by name.
 
     Returns
     -------
     list of Verdict
-        One for each importer, whether installed or not.
+        A verdict for each importer, installed or not.
 
     Raises
     ------

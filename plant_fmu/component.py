@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from plant_fmu.variables import Variable
 
-STOP_TIME = 10.0  # s, of the default experiment
-STEP = 0.01  # s
+STOP_TIME = 10.0  # s, end of the default experiment
+STEP = 0.01  # s, step of the default experiment
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,12 +22,12 @@ class Component:
     name: str  # model identifier, and the beginning of its names in C
     description: str  # one line
     variables: tuple[Variable, ...]  # the first is the time; states are consecutive, and so are derivatives
-    sources: Mapping[str, bytes]  # its C files, by name
-    contents: Callable[[int], Mapping[str, bytes]]  # by FMI version: further members of the FMU, by path
+    sources: Mapping[str, bytes]  # C files, by name
+    contents: Callable[[int], Mapping[str, bytes]]  # function from FMI version to further members, by path
     header: str = "variables.h"  # name of the C header that is generated from the variables
-    constants: Mapping[str, int] = field(default_factory=dict)  # in that header
-    stop_time: float = STOP_TIME  # s, of the default experiment
-    step: float = STEP  # s
+    constants: Mapping[str, int] = field(default_factory=dict)  # constants of that header
+    stop_time: float = STOP_TIME  # s, end of the default experiment
+    step: float = STEP  # s, step of the default experiment
 
     @property
     def has_states(self) -> bool:

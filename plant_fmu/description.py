@@ -13,16 +13,16 @@ from plant_fmu.quantities import DISPLAY_UNITS, UNITS, base_unit
 from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle
 
-DEFAULT_TOLERANCE = 1e-6  # relative
+DEFAULT_TOLERANCE = 1e-6  # relative tolerance of the default experiment
 
 _CAUSALITY = {"time": "independent", "state": "output", "input": "input", "output": "output", "derivative": "local",
               "parameter": "parameter"}  # fmt: skip
 _INITIAL = {"state": "exact", "output": "calculated", "derivative": "calculated", "parameter": "exact"}
-_ELEMENT = {  # by FMI version and type
+_ELEMENT = {  # XML element of a variable, by FMI version and type
     2: {"real": "Real", "integer": "Integer", "boolean": "Boolean"},
     3: {"real": "Float64", "integer": "Int32", "boolean": "Boolean"},
 }
-_INTERFACES = {  # by FMI version
+_INTERFACES = {  # capabilities, by FMI version
     2: {
         "canGetAndSetFMUstate": "true",
         "canSerializeFMUstate": "true",
@@ -59,7 +59,7 @@ def token(component: Component, fmi: int) -> str:
     component : Component
         Component of the FMU.
     fmi : int
-        2 or 3.
+        FMI version, 2 or 3.
 
     Returns
     -------
@@ -79,7 +79,7 @@ def model_description(component: Component, fmi: int, token: str) -> str:
     component : Component
         Component of the FMU.
     fmi : int
-        2 for FMI 2.0, 3 for FMI 3.0.
+        FMI version, 2 for FMI 2.0, 3 for FMI 3.0.
     token : str
         The FMU's guid or instantiation token.
 
@@ -213,7 +213,7 @@ def documentation(vehicle: Vehicle) -> str:
     Returns
     -------
     str
-        A table for each role, and one of the additional variables of a coupled plant.
+        Page with a table for each role, and one of the additional variables of a coupled plant.
     """
     rows = variables(vehicle)
     plain = {v.name for v in rows}

@@ -56,7 +56,7 @@ def one_line(said: object) -> str:
     Parameters
     ----------
     said : object
-        Such as ``FILE: key is VALUE, expected ...``.
+        Message, such as ``FILE: key is VALUE, expected ...``.
 
     Returns
     -------

@@ -71,7 +71,7 @@ class Quantity:
     minimum: float
     maximum: float
     nominal: float = 1.0
-    is_gain: bool = False  # of a control law, which is shown in the law's own unit
+    is_gain: bool = False  # True for a gain of a control law, which is shown in the law's own unit
 
     @property
     def display_unit(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-STANDARD_GRAVITY = 9.80665  # m/s2, of a kilogram-force
+STANDARD_GRAVITY = 9.80665  # m/s2, by which a kilogram-force is defined
 # us; at bollard, from the maker's performance table of September 2019, at some of its pulses
 PULSES = np.array([
     1100, 1148, 1200, 1248, 1300, 1348, 1400, 1440, 1460, 1468, 1500, 1532, 1540, 1560, 1600, 1648, 1700, 1748, 1800,
@@ -51,14 +51,14 @@ def force_of_pulse(pulses: NDArray[np.float64], voltages: NDArray[np.float64]) -
     Parameters
     ----------
     pulses : ndarray
-        [us], cut at 1100 and 1900.
+        Pulses [us], clipped to 1100 and 1900.
     voltages : ndarray of the same shape
-        [V], cut at 10 and 20.
+        Supply voltages [V], clipped to 10 and 20.
 
     Returns
     -------
     ndarray
-        [N], above 0 where the pulse is above neutral; NaN where pulse or voltage is.
+        Forces [N], above 0 where the pulse is above neutral; NaN where pulse or voltage is NaN.
 
     Examples
     --------

@@ -14,8 +14,8 @@ from plant_fmu.vehicle import Vehicle
 class ThrusterLine:
     """The line of action of a thruster; a wrench does not determine the thruster's place along it."""
 
-    force: NDArray[np.float64]  # (3,) of one newton, body frame; 0 for a thruster that only turns the body
-    nearest: NDArray[np.float64]  # (3,) m, its point nearest to the body origin
+    force: NDArray[np.float64]  # (3,) force for one newton, body frame; 0 for a thruster that only turns the body
+    nearest: NDArray[np.float64]  # (3,) m, body frame: the line's point nearest to the body origin
 
 
 def thruster_lines(vehicle: Vehicle) -> list[ThrusterLine]:
@@ -29,7 +29,7 @@ def thruster_lines(vehicle: Vehicle) -> list[ThrusterLine]:
     Returns
     -------
     list of ThrusterLine
-        In the order of the columns of the thruster matrix.
+        Lines in the order of the columns of the thruster matrix.
     """
     lines = []
     for column in vehicle.thruster_matrix.T:

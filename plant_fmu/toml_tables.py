@@ -19,8 +19,8 @@ from plant_fmu.errors import TableError
 T = TypeVar("T")
 
 MAX_FILE = 4_000_000  # bytes of a file; the longest in the package has a thousandth of that
-MAX_DEPTH = 20  # nested tables and lists
-MAX_DIGITS = 400  # of a whole number; beyond them it is no float either
+MAX_DEPTH = 20  # levels of nested tables and lists
+MAX_DIGITS = 400  # digits of a whole number, more than any float has
 
 _LONGEST_NAME = 100  # characters that are compared with known names
 
@@ -33,7 +33,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises
     ------
     TableError
-        If it cannot be read, is no TOML, or is too long or deep; the caller adds the file's name.
+        If the file cannot be read, is no TOML, or is too long or deep; the caller adds the file's name.
     """
     try:
         if path.exists() and not path.is_file():  # to open a pipe would wait for its other end
@@ -57,7 +57,7 @@ def require_modest(table: dict[str, Any]) -> None:
     Raises
     ------
     TableError
-        With the key in its message.
+        If the table is too deep, or a whole number too long; the message names the key.
     """
     waiting: list[tuple[str, Any, int]] = [(key, value, 1) for key, value in table.items()]
     while waiting:
@@ -92,7 +92,7 @@ def decode(table: dict[str, Any], kind: type[T], where: str = "") -> T:
     Raises
     ------
     TableError
-        At the first key that is unknown (the nearest known one is suggested), missing, or of another type.
+        If a key is unknown (the message suggests the nearest known one), missing, or of another type.
     """
     _refuse_unknown(table, kind, where)
     try:

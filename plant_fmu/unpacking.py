@@ -19,17 +19,17 @@ DESCRIPTION = "modelDescription.xml"
 
 MAX_SIZE = 2**30  # bytes of an FMU's files together, and
 MAX_FILES = 100_000  # their number, above which it is refused unread
-MAX_RATIO = 200  # of those bytes to the FMU's own: libraries and descriptions compress to a tenth or so,
+MAX_RATIO = 200  # ratio of those bytes to the FMU's own: libraries and descriptions compress to a tenth or so,
 FREE_SIZE = 2**26  # bytes, below which the ratio does not matter
 MAX_READ = 2**24  # bytes that are read at once: as the list of the files is, before any check
 MAX_NAME = 1000  # characters of a file's name
 MAX_XML = 2**26  # bytes of a description,
-MAX_ELEMENTS = 2_000_000  # its elements,
-MAX_DEPTH = 100  # and their nesting
+MAX_ELEMENTS = 2_000_000  # elements of a description,
+MAX_DEPTH = 100  # and levels of their nesting
 
-_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # those of FMI; the others have no bound when unpacked
-_DESCRIPTIONS = (DESCRIPTION, "sources/buildDescription.xml")  # that FMPy parses
-_PIECE = 2**20  # bytes
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # methods that FMI allows; others have no bound when unpacked
+_DESCRIPTIONS = (DESCRIPTION, "sources/buildDescription.xml")  # files that FMPy parses
+_PIECE = 2**20  # bytes that are parsed at once
 
 
 class _Source(io.BufferedReader):
@@ -45,7 +45,7 @@ class _Source(io.BufferedReader):
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[zipfile.ZipFile]:
+def open_fmu(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open an FMU whose files are safe to extract.
 
     Yields
@@ -93,10 +93,10 @@ def unpack(path: Path, folder: Path, platforms: Collection[str]) -> ET.Element:
     Raises
     ------
     FmuFileError
-        As `opened` and `descriptions`.
+        As `open_fmu` and `read_descriptions`.
     """
-    with opened(path) as archive:
-        root = descriptions(path, archive)
+    with open_fmu(path) as archive:
+        root = read_descriptions(path, archive)
         archive.extractall(folder, [name for name in archive.namelist() if _is_needed(name, platforms)])
     return root
 
@@ -106,13 +106,13 @@ def _is_needed(name: str, platforms: Collection[str]) -> bool:
     return below[0] in platforms if top == "binaries" and below else top not in ("documentation", "sources")
 
 
-def descriptions(path: Path, archive: zipfile.ZipFile) -> ET.Element:
+def read_descriptions(path: Path, archive: zipfile.ZipFile) -> ET.Element:
     """Return the model description, after a check of all descriptions that an importer parses.
 
     Raises
     ------
     FmuFileError
-        If one is no XML, declares a document type, or is too large or deep.
+        If a description is no XML, declares a document type, or is too large or deep.
     """
     names = set(archive.namelist())
     roots = [_parsed(f"{path}: {name}", archive, name) for name in _DESCRIPTIONS if name in names]

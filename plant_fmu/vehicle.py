@@ -21,8 +21,8 @@ Vector6 = tuple[float, float, float, float, float, float]
 Rows = tuple[tuple[float, ...], ...]
 Matrix = tuple[float | tuple[float, ...], ...]  # rows, or a diagonal
 
-GREATEST = 1e15  # of any number of a vehicle, so that derived numbers are finite
-MAX_THRUSTERS = 100
+GREATEST = 1e15  # bound of every number of a vehicle, so that derived numbers are finite
+MAX_THRUSTERS = 100  # thrusters of a vehicle
 
 # a name becomes C text and a file's name: neither may be a word that C99 or Windows keep for themselves
 _RESERVED = re.compile(
@@ -86,11 +86,11 @@ class Thrusters:
 
     matrix: Rows  # 6 rows (X Y Z K M N), a column for each thruster: wrench of one newton
     force_min: float | tuple[float, ...]  # N, most negative force
-    force_max: float | tuple[float, ...]  # N
-    time_constant: float | tuple[float, ...] = 0.0  # s
-    rate_limit: float | tuple[float, ...] = 0.0  # N/s, 0: none
+    force_max: float | tuple[float, ...]  # N, greatest force
+    time_constant: float | tuple[float, ...] = 0.0  # s, time constant of the lag
+    rate_limit: float | tuple[float, ...] = 0.0  # N/s, greatest change of the force; 0: none
     dead_band: float | tuple[float, ...] = 0.0  # part of the command's range that gives no force
-    curve: float | tuple[float, ...] = 0.0  # from 0, force linear in the command, to 1, quadratic
+    curve: float | tuple[float, ...] = 0.0  # 0: force linear in the command; 1: quadratic; between: a mixture
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class Hull:
     """The sphere about the body origin that meets surface and bottom, and the shape in pictures."""
 
     radius: float = 0.0  # m
-    shape: Literal["frame", "sphere"] = "frame"  # as pictures show it; the dynamics do not depend on it
+    shape: Literal["frame", "sphere"] = "frame"  # shape in pictures; the dynamics do not depend on it
 
 
 @dataclass(frozen=True)
@@ -128,26 +128,26 @@ class Vehicle:
 
     name: str  # a C identifier, once its hyphens are underscores
     title: str  # one line for people
-    source: str  # where the numbers come from
+    source: str  # origin of the numbers
     mass: float  # kg
     inertia: NDArray[np.float64]  # (3, 3) kg m2, about the body origin
-    r_G: NDArray[np.float64]  # (3,) m
-    r_B: NDArray[np.float64]  # (3,) m
+    r_G: NDArray[np.float64]  # (3,) m, body frame: centre of gravity
+    r_B: NDArray[np.float64]  # (3,) m, body frame: centre of buoyancy
     weight: float  # N
     buoyancy: float  # N
     added_mass: NDArray[np.float64]  # (6, 6) kg, kg m, kg m2
     linear_damping: NDArray[np.float64]  # (6,) N s/m, N m s/rad
     quadratic_damping: NDArray[np.float64]  # (6,) N s2/m2, N m s2/rad2
     thruster_matrix: NDArray[np.float64]  # (6, n) body wrench of one newton of each thruster
-    thrust_min: NDArray[np.float64]  # (n,) N
-    thrust_max: NDArray[np.float64]  # (n,) N
-    thrust_time_constant: NDArray[np.float64]  # (n,) s
-    thrust_rate_limit: NDArray[np.float64]  # (n,) N/s, 0 for none
-    thrust_dead_band: NDArray[np.float64]  # (n,) [-]
-    thrust_curve: NDArray[np.float64]  # (n,) [-]
-    hull_radius: float  # m
-    autopilot: Autopilot | None = None  # how one drives the thrusters; a channel and a sign for each
-    hull_shape: Literal["frame", "sphere"] = "frame"  # as pictures show it
+    thrust_min: NDArray[np.float64]  # (n,) N, most negative force of each thruster
+    thrust_max: NDArray[np.float64]  # (n,) N, greatest force of each thruster
+    thrust_time_constant: NDArray[np.float64]  # (n,) s, time constant of the lag
+    thrust_rate_limit: NDArray[np.float64]  # (n,) N/s, greatest change of the force; 0 for none
+    thrust_dead_band: NDArray[np.float64]  # (n,) [-] part of the command's range that gives no force
+    thrust_curve: NDArray[np.float64]  # (n,) [-] 0: force linear in the command; 1: quadratic
+    hull_radius: float  # m, radius of the sphere that meets surface and bottom
+    autopilot: Autopilot | None = None  # map from servo outputs to thrusters; a channel and a sign for each
+    hull_shape: Literal["frame", "sphere"] = "frame"  # shape in pictures
 
     @property
     def n_thrusters(self) -> int:
@@ -180,7 +180,7 @@ def load_vehicle(name_or_file: str | Path) -> Vehicle:
     Parameters
     ----------
     name_or_file : str or Path
-        Such as ``"odin"`` or ``"boats/mine.toml"``.
+        Name or file, such as ``"odin"`` or ``"boats/mine.toml"``.
 
     Returns
     -------

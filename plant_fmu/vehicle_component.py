@@ -33,7 +33,7 @@ def of_vehicle(
     stop_time, step : float, optional
         Times of the default experiment [s].
     coupled : bool, optional
-        With the inputs by which other components act on the vehicle; they are off while they are 0.
+        True to add the inputs by which other components act on the vehicle; they are off while they are 0.
 
     Returns
     -------
@@ -43,7 +43,7 @@ def of_vehicle(
     Raises
     ------
     BuildError
-        If a start value is not of a parameter, input or state, or beyond its range.
+        If a start value belongs to no parameter, input or state, or is beyond its range.
     VehicleError
         If a number of the vehicle is beyond the range of its parameter.
     """

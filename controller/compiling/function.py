@@ -23,7 +23,7 @@ from controller.translator.types import Type, type_of
 INTERPRETED = "SUBREACH_INTERPRETED"  # environment variable: if set, Python runs all functions, without a compiler
 Described = dict[int, tuple[Any, Type, list[int]]]  # arguments with their types and words, by their ids
 
-_MOST = 8  # sets of arguments in the cache
+_MAX_CACHED = 8  # sets of arguments in the cache
 _NONE = (None,) * 7
 _CALLBACK = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)
 
@@ -36,7 +36,7 @@ def c_text(function: Callable[..., None], arguments: tuple[Any, ...]) -> str:
     function : function
         Plain Python in the translator's subset, which returns nothing.
     arguments : tuple
-        Numbers, C-contiguous arrays, and tuples of such; their types count.
+        Numbers, C-contiguous arrays, and tuples of such; only their types matter.
 
     Returns
     -------
@@ -46,9 +46,9 @@ def c_text(function: Callable[..., None], arguments: tuple[Any, ...]) -> str:
     Raises
     ------
     TranslationError
-        If it, or what it calls, is beyond the subset; with file and line.
+        If the function, or one that it calls, is beyond the subset; the message names file and line.
     TypeError
-        If an argument is of another type.
+        If an argument has another type.
     """
     return _text(function, tuple(map(type_of, arguments)))
 
@@ -105,7 +105,7 @@ class BoundCall:
             call.kept = self._words, arguments  # so that `call` works without this object
             self.call: Callable[[], None] = call
         else:
-            self.words, self.call = 0, functools.partial(_quietly, function, arguments)
+            self.words, self.call = 0, functools.partial(_call_without_warnings, function, arguments)
             self._entry = _CALLBACK(self._called_back)
         self.address: int = ctypes.cast(self._entry, ctypes.c_void_p).value or 0
 
@@ -160,7 +160,7 @@ class CompiledFunction:
         Raises
         ------
         TranslationError, CompilationError
-            If it cannot be translated, or there is no compiler where one is needed.
+            If the function cannot be translated, or there is no compiler where one is needed.
         """
         # one by one: a comparison of two tuples item by item takes twice as long
         call, a0, b0, c0, d0, e0, f0, g0 = self._last
@@ -172,7 +172,7 @@ class CompiledFunction:
         key = tuple(map(id, arguments))
         bound = self._bound.get(key)
         if bound is None:
-            if len(self._bound) == _MOST:
+            if len(self._bound) == _MAX_CACHED:
                 self._bound, self._known = {}, {}
             bound = self._bound[key] = BoundCall(self._function, arguments, self._known)
         self._last = (bound.call, *arguments, *_NONE[len(arguments) :])
@@ -183,7 +183,7 @@ class CompiledFunction:
         return CompiledFunction, (self._function,)
 
 
-def _quietly(function: Any, arguments: tuple[Any, ...]) -> None:
+def _call_without_warnings(function: Any, arguments: tuple[Any, ...]) -> None:
     """Call a function without warnings of overflow and division by 0, as in C."""
     with np.errstate(all="ignore"):
         function(*arguments)

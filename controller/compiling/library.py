@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 first_use = logging.getLogger("controller.compiling.first_use")  # at INFO, before something is compiled
 first_use.propagate = False  # only for listeners by its name
 
-PREBUILT = Path(__file__).parents[1] / "prebuilt"  # in a wheel, with a folder for each platform; a checkout has none
+PREBUILT = Path(__file__).parents[1] / "prebuilt"  # one folder a platform in a wheel; missing in a checkout
 _MACHINE = {"amd64": "x86_64", "arm64": "aarch64"}
 _SYSTEM = {"win32": "windows"}
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
@@ -53,7 +53,7 @@ def library_of(text: str) -> ctypes.PyDLL:
     Raises
     ------
     CompilationError
-        If it has to be compiled, and there is no compiler or it fails.
+        If the library has to be compiled, and there is no compiler or it fails.
     """
     name = library_name(text)
     for folder in (PREBUILT / _platform(), _cache()):
@@ -75,7 +75,7 @@ def library_name(text: str) -> str:
     Returns
     -------
     str
-        A digest.
+        Digest of the text and of the compiler's flags.
     """
     return hashlib.sha256("\n".join((*FLAGS, text)).encode()).hexdigest()[:32]
 
@@ -150,14 +150,14 @@ def keep(built: Path, folder: Path) -> Path:
     Parameters
     ----------
     built : Path
-        The library.
+        Path of the library.
     folder : Path
-        Folder; it is made if it is missing.
+        Folder of the cache, which is made if it is missing.
 
     Returns
     -------
     Path
-        Path in the folder, or `built` if the folder cannot be written.
+        Path of the copy, or `built` if the folder cannot be written.
     """
     kept = folder / built.name
     try:
@@ -165,15 +165,15 @@ def keep(built: Path, folder: Path) -> Path:
         if not _is_trusted(folder):
             return built
         library = built.read_bytes()
-        _write_whole(checksum_path(kept), digest_of(library).encode())
-        _write_whole(kept, library)
+        _write_atomic(checksum_path(kept), digest_of(library).encode())
+        _write_atomic(kept, library)
     except OSError as error:
         log.warning("cache %s: %s; compiled for this process alone", folder, error.strerror or error)
         return built
     return kept
 
 
-def _write_whole(path: Path, data: bytes) -> None:
+def _write_atomic(path: Path, data: bytes) -> None:
     """Write a file atomically."""
     handle, scratch = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".part")
     try:

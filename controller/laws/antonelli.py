@@ -25,11 +25,11 @@ from controller.law import Array, VehicleState, WrenchLaw
 from controller.potential_field import (
     Field,
     add_turned,
-    damp,
+    clip_estimate,
+    empty_field,
     evaluate_field,
-    field_of,
-    keep_within,
     set_point_error,
+    write_damping,
 )
 from controller.quaternion import down_parts, error_parts, write_rotation
 from controller.regions.region_set import PackedRegions
@@ -45,13 +45,13 @@ class AntonelliGains(NamedTuple):
     k_v2: float = 40.0  # N m s/rad, K_D of rotation, section VII
     lambda_p: float = 0.0247  # 1/s, Lambda of position
     lambda_a: float = 0.9  # rad/s, Lambda of attitude: sigma_a of section VII
-    k_theta: float = 2.348  # s2/kg, of the force
-    k_theta_moment: float = 2.0  # s2/(kg m2), of moments: gamma of section VII
-    bound: float = 19.2  # N, of each component of the force
-    bound_moment: float = 65.0  # N m, of each component of the moments: above ODIN-like righting moments
+    k_theta: float = 2.348  # s2/kg, K_theta of the force
+    k_theta_moment: float = 2.0  # s2/(kg m2), K_theta of the moments: gamma of section VII
+    bound: float = 19.2  # N, bound of each component of the force
+    bound_moment: float = 65.0  # N m, bound of each component of the moments: above ODIN-like righting moments
     limit: float = 184.2  # N, greatest pull to the set point
     inset: float = 0.5  # m, clearance of the set point within the goal region: the centre of the scenes' goals
-    repulsion: float = 222.3  # N/m, of a region of gain 1
+    repulsion: float = 222.3  # N/m, slope of the push of a region of gain 1
     reach: float = 1.499  # m, clearance at which regions begin to push
 
 
@@ -63,7 +63,7 @@ class AntonelliMemory(NamedTuple):
     theta: Array  # (9,) first moments [N m], force [N, NED], moment [N m, NED]
     estimate: Array  # (4,) phi-hat from theta: the current's vertical force counts as weight
     report: Array  # (0,)
-    drive: Array  # (6,) s
+    drive: Array  # (6,) the vector s
     field: Field
 
 
@@ -96,7 +96,7 @@ def step(
     set_point_error(field, gains.inset, gains.limit / gains.k_p1)
     e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
     # the wrench
-    damp(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2, forces)
+    write_damping(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2, forces)
     add_turned(R, field.error, -gains.k_p1, forces)
     add_turned(R, field.push, 1.0, forces)
     for i in range(6):
@@ -112,15 +112,15 @@ def step(
         k_theta = gains.k_theta if 3 <= j < 6 else gains.k_theta_moment
         for i in range(6):
             theta[j] -= memory.period[0] / k_theta * Phi[i, j] * drive[i]
-    keep_within(theta, 0, 3, gains.bound_moment)
-    keep_within(theta, 3, 6, gains.bound)
-    keep_within(theta, 6, 9, gains.bound_moment)
+    clip_estimate(theta, 0, 3, gains.bound_moment)
+    clip_estimate(theta, 3, 6, gains.bound)
+    clip_estimate(theta, 6, 9, gains.bound_moment)
     memory.estimate[0] = -theta[5]
     for i in range(3):
         memory.estimate[1 + i] = theta[i]
 
 
-def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> AntonelliMemory:
+def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> AntonelliMemory:
     """Return the memory before the first step; `period` [s] has shape (1,)."""
     return AntonelliMemory(
         desired_quaternion=desired_quaternion,
@@ -129,7 +129,7 @@ def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> Anton
         estimate=np.zeros(4),
         report=np.zeros(0),
         drive=np.zeros(6),
-        field=field_of(n_regions),
+        field=empty_field(n_regions),
     )
 
 
@@ -137,7 +137,7 @@ class AntonelliLaw(WrenchLaw):
     """Adaptive set-point control with restoring forces and current, with the push of regions."""
 
     function = staticmethod(step)
-    memory_of = staticmethod(memory_of)
+    make_memory = staticmethod(make_memory)
     gains_type = AntonelliGains
     above_zero = ("k_p1", "k_theta", "k_theta_moment")
 

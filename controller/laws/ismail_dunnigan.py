@@ -19,14 +19,14 @@ class IsmailDunniganMemory(NamedTuple):
     period: Array  # (1,) s
     estimate: Array  # (4,) phi-hat [N, N m]
     report: Array  # (0,)
-    goal_value: Array  # (1,)
-    goal_gradient: Array  # (1, 3)
-    goal_turning: Array  # (1, 3)
+    goal_value: Array  # (1,) f
+    goal_gradient: Array  # (1, 3) df/dp, NED
+    goal_turning: Array  # (1, 3) df/dtheta, body frame; not used
     goal_clearance: Array  # (1,) m or rad
-    values: Array  # (n,)
-    gradients: Array  # (n, 3)
-    rotation_gradients: Array  # (n, 3)
-    clearances: Array  # (n,)
+    values: Array  # (n,) g_i
+    gradients: Array  # (n, 3) dg_i/dp, NED
+    rotation_gradients: Array  # (n, 3) dg_i/dtheta, body frame; not used
+    clearances: Array  # (n,) m or rad
     alphas: Array  # (n,) gains of the regions times their weights
 
 
@@ -62,7 +62,7 @@ def step(
     )
 
 
-def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> IsmailDunniganMemory:
+def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> IsmailDunniganMemory:
     """Return the memory before the first step; `period` [s] has shape (1,)."""
     return IsmailDunniganMemory(
         desired_quaternion=desired_quaternion,
@@ -93,7 +93,7 @@ class IsmailDunniganLaw(WrenchLaw):
     """
 
     function = staticmethod(step)
-    memory_of = staticmethod(memory_of)
+    make_memory = staticmethod(make_memory)
     gains_type = Gains
     above_zero = ("k_p1", "k_q", "gamma")
 

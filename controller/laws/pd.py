@@ -19,10 +19,10 @@ from controller.law import Array, VehicleState, WrenchLaw
 from controller.potential_field import (
     Field,
     add_turned,
-    damp,
+    empty_field,
     evaluate_field,
-    field_of,
     set_point_error,
+    write_damping,
 )
 from controller.quaternion import error_parts, write_rotation
 from controller.regions.region_set import PackedRegions
@@ -32,13 +32,13 @@ from controller.stack_array import zeros
 class PdGains(NamedTuple):
     """Defaults: by ``python -m benchmarks baselines --draws 120 --seed 0``, where no other source is given."""
 
-    k_p1: float = 155.9  # N/m
-    k_p2: float = 36.0  # N m, section VII
-    k_v1: float = 142.7  # N s/m
-    k_v2: float = 40.0  # N m s/rad, section VII
+    k_p1: float = 155.9  # N/m, gain of the position error
+    k_p2: float = 36.0  # N m, gain of the attitude error, section VII
+    k_v1: float = 142.7  # N s/m, damping of translation
+    k_v2: float = 40.0  # N m s/rad, damping of rotation, section VII
     limit: float = 164.1  # N, greatest pull to the set point
     inset: float = 0.5  # m, clearance of the set point within the goal region: the centre of the scenes' goals
-    repulsion: float = 223.8  # N/m, of a region of gain 1
+    repulsion: float = 223.8  # N/m, slope of the push of a region of gain 1
     reach: float = 1.354  # m, clearance at which regions begin to push
 
 
@@ -46,7 +46,7 @@ class PdMemory(NamedTuple):
     """Work arrays; there is no state between steps."""
 
     desired_quaternion: Array  # (4,)
-    estimate: Array  # (4,) zero: it estimates nothing
+    estimate: Array  # (4,) zeros: the law estimates nothing
     report: Array  # (0,)
     field: Field
 
@@ -66,18 +66,18 @@ def step(
     evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
     set_point_error(field, gains.inset, gains.limit / gains.k_p1)
     e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
-    damp(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2, forces)
+    write_damping(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2, forces)
     add_turned(R, field.error, -gains.k_p1, forces)
     add_turned(R, field.push, 1.0, forces)
 
 
-def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> PdMemory:
+def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> PdMemory:
     """Return the memory before the first step; `period` [s] has shape (1,)."""
     return PdMemory(
         desired_quaternion=desired_quaternion,
         estimate=np.zeros(4),
         report=np.zeros(0),
-        field=field_of(n_regions),
+        field=empty_field(n_regions),
     )
 
 
@@ -85,7 +85,7 @@ class PdLaw(WrenchLaw):
     """PD control to a set point, with the push of regions."""
 
     function = staticmethod(step)
-    memory_of = staticmethod(memory_of)
+    make_memory = staticmethod(make_memory)
     gains_type = PdGains
     above_zero = ("k_p1",)
 

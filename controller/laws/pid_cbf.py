@@ -57,7 +57,7 @@ from controller.laws.deployable.barrier import (
 )
 from controller.laws.deployable.model import Dynamics, Thrusters
 from controller.linear_algebra import copy
-from controller.potential_field import Field, add_turned, damp, evaluate_field, field_of, set_point_error
+from controller.potential_field import Field, add_turned, empty_field, evaluate_field, set_point_error, write_damping
 from controller.quadratic_program import Workspace
 from controller.quaternion import error_parts, write_rotation
 from controller.regions.kinds import FIRST_OF_ATTITUDE
@@ -65,25 +65,25 @@ from controller.regions.region_set import PackedRegions
 from controller.stack_array import zeros
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
-_PRICE = 1e-6  # of slack: the squared force per squared slack times mass that costs as much
-_ABOVE_ZERO = ("k_p1", "observer", "pull_in", "brake")
+_PRICE = 1e-6  # price of slack: squared force that costs as much as the square of slack times mass
+_ABOVE_ZERO = ("k_p1", "observer", "pull_in", "brake")  # gains that must not be 0
 
 
 class PidCbfGains(NamedTuple):
     """Defaults: by ``python -m benchmarks baselines --draws 120 --seed 0``, where no other source is given."""
 
-    k_p1: float = 149.4  # N/m
-    k_p2: float = 36.0  # N m, section VII
-    k_v1: float = 138.2  # N s/m
-    k_v2: float = 40.0  # N m s/rad, section VII
+    k_p1: float = 149.4  # N/m, gain of the position error
+    k_p2: float = 36.0  # N m, gain of the attitude error, section VII
+    k_v1: float = 138.2  # N s/m, damping of translation
+    k_v2: float = 40.0  # N m s/rad, damping of rotation, section VII
     limit: float = 180.6  # N, greatest pull to the set point
     inset: float = 0.5  # m, clearance of the set point within the goal region: the centre of the scenes' goals
-    repulsion: float = 44.62  # N/m, of a region of gain 1
+    repulsion: float = 44.62  # N/m, slope of the push of a region of gain 1
     reach: float = 1.277  # m, clearance at which regions begin to push
     observer: float = 1.243  # rad/s, bandwidth of the observer
     pull_in: float = 1.057  # 1/s, k_1 of a barrier
     brake: float = 1.142  # 1/s, k_2 of a barrier
-    margin: float = 0.05938  # m, or rad, kept of hard regions
+    margin: float = 0.05938  # m, or rad, clearance kept from hard regions
 
 
 class PidCbfMemory(NamedTuple):
@@ -95,9 +95,9 @@ class PidCbfMemory(NamedTuple):
     position: Array  # (3,) m, NED, estimated
     velocity: Array  # (6,) m/s, rad/s, over ground, estimated
     disturbance: Array  # (6,) m/s2, rad/s2: d-hat
-    still: model.Loads  # no load, in still water
-    acceleration: Array  # (6, m) of one newton of each thruster
-    estimate: Array  # (4,) the vertical disturbance [N], which counts as weight; zeros
+    still: model.Loads  # loads of zero, in still water
+    acceleration: Array  # (6, m) acceleration by one newton of each thruster
+    estimate: Array  # (4,) vertical disturbance [N], which counts as weight, then zeros
     report: Array  # (0,)
     field: Field
     observation: RegionObservation
@@ -131,7 +131,7 @@ def step(
     evaluate_field(pose, goal, regions, gains.repulsion, gains.reach, field)
     set_point_error(field, gains.inset, gains.limit / gains.k_p1)
     e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
-    damp(zeros(6), e_att, gains.k_p2, gains.k_v1, gains.k_v2, wrench)
+    write_damping(zeros(6), e_att, gains.k_p2, gains.k_v1, gains.k_v2, wrench)
     for i in range(3):
         force[i] = -gains.k_p1 * field.error[i] - gains.k_v1 * velocity[i] + field.push[i]
         force[i] -= mass * memory.disturbance[i]
@@ -268,7 +268,7 @@ class PidCbfLaw(CompiledLaw):
             acceleration=np.zeros((6, m)),
             estimate=np.zeros(4),
             report=np.zeros(0),
-            field=field_of(n_regions),
+            field=empty_field(n_regions),
             observation=empty_observation(n_regions),
             dynamics=model.make_dynamics(vehicle, np.zeros(0)),
             thrusters=model.make_thrusters(vehicle),

@@ -21,11 +21,11 @@ from controller.law import Array, VehicleState, WrenchLaw
 from controller.potential_field import (
     Field,
     add_turned,
-    damp,
+    clip_estimate,
+    empty_field,
     evaluate_field,
-    field_of,
-    keep_within,
     set_point_error,
+    write_damping,
 )
 from controller.quaternion import error_parts, write_rotation
 from controller.regions.region_set import PackedRegions
@@ -36,18 +36,18 @@ from controller.stack_array import zeros
 class SunCheahGains(NamedTuple):
     """Defaults: by ``python -m benchmarks baselines --draws 40 --seed 0``, where no other source is given."""
 
-    k_p1: float = 156.1  # N/m
-    k_p2: float = 36.0  # N m, section VII
-    k_v1: float = 153.2  # N s/m
-    k_v2: float = 40.0  # N m s/rad, section VII
-    sigma_p: float = 0.0375  # 1/s, of position in the adaptation
-    sigma_a: float = 0.9  # rad/s, of attitude in the adaptation, section VII
+    k_p1: float = 156.1  # N/m, gain of the position error
+    k_p2: float = 36.0  # N m, gain of the attitude error, section VII
+    k_v1: float = 153.2  # N s/m, damping of translation
+    k_v2: float = 40.0  # N m s/rad, damping of rotation, section VII
+    sigma_p: float = 0.0375  # 1/s, weight of position in the adaptation
+    sigma_a: float = 0.9  # rad/s, weight of attitude in the adaptation, section VII
     gamma: float = 1.363  # s2/kg, s2/(kg m2): L = I / gamma
-    bound: float = 30.5  # N, of the estimate of W - B
-    bound_moment: float = 65.0  # N m, of the other estimates: above the righting moments of ODIN-like vehicles
+    bound: float = 30.5  # N, bound of the estimate of W - B
+    bound_moment: float = 65.0  # N m, bound of the other estimates: above the righting moments of ODIN-like vehicles
     limit: float = 184.2  # N, greatest pull to the set point
     inset: float = 0.5  # m, clearance of the set point within the goal region: the centre of the scenes' goals
-    repulsion: float = 222.3  # N/m, of a region of gain 1
+    repulsion: float = 222.3  # N/m, slope of the push of a region of gain 1
     reach: float = 1.499  # m, clearance at which regions begin to push
 
 
@@ -80,7 +80,7 @@ def step(
     set_point_error(field, gains.inset, gains.limit / gains.k_p1)
     e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
     # the wrench
-    damp(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2, forces)
+    write_damping(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2, forces)
     add_turned(R, field.error, -gains.k_p1, forces)
     add_turned(R, field.push, 1.0, forces)
     for i in range(6):
@@ -95,11 +95,11 @@ def step(
     for j in range(4):
         for i in range(6):
             estimate[j] -= memory.period[0] / gains.gamma * Z[i, j] * drive[i]
-    keep_within(estimate, 0, 1, gains.bound)
-    keep_within(estimate, 1, 4, gains.bound_moment)
+    clip_estimate(estimate, 0, 1, gains.bound)
+    clip_estimate(estimate, 1, 4, gains.bound_moment)
 
 
-def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> SunCheahMemory:
+def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> SunCheahMemory:
     """Return the memory before the first step; `period` [s] has shape (1,)."""
     return SunCheahMemory(
         desired_quaternion=desired_quaternion,
@@ -107,7 +107,7 @@ def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> SunCh
         estimate=np.zeros(4),
         report=np.zeros(0),
         drive=np.zeros(6),
-        field=field_of(n_regions),
+        field=empty_field(n_regions),
     )
 
 
@@ -115,7 +115,7 @@ class SunCheahLaw(WrenchLaw):
     """Adaptive set-point control through the transposed Jacobian, with the push of regions."""
 
     function = staticmethod(step)
-    memory_of = staticmethod(memory_of)
+    make_memory = staticmethod(make_memory)
     gains_type = SunCheahGains
     above_zero = ("k_p1", "gamma")
 

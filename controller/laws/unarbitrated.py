@@ -14,7 +14,7 @@ import numpy as np
 from controller import paper_law
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.paper_law import Gains, positive_part
-from controller.potential_field import Field, evaluate_field, field_of, keep_within, shorten
+from controller.potential_field import Field, clip_estimate, empty_field, evaluate_field, shorten
 from controller.quaternion import error_parts, rotation_rows
 from controller.regions.region_set import PackedRegions
 
@@ -22,18 +22,18 @@ from controller.regions.region_set import PackedRegions
 class UnarbitratedGains(NamedTuple):
     """Defaults: by ``python -m benchmarks baselines --draws 40 --seed 0``, where no other source is given."""
 
-    k_p1: float = 506.5  # N/m3, on the primary region (16)
-    k_p2: float = 36.0  # N m, on attitude (26), section VII
-    k_v1: float = 27.32  # N s/m (26)
-    k_v2: float = 40.0  # N m s/rad (26), section VII
-    sigma_p: float = 1.661  # 1/(m2 s), of position in the adaptation (27)
-    sigma_a: float = 0.9  # rad/s, of attitude in the adaptation (27), section VII
+    k_p1: float = 506.5  # N/m3, gain of the primary region (16)
+    k_p2: float = 36.0  # N m, gain of the attitude error (26), section VII
+    k_v1: float = 27.32  # N s/m, damping of translation (26)
+    k_v2: float = 40.0  # N m s/rad, damping of rotation (26), section VII
+    sigma_p: float = 1.661  # 1/(m2 s), weight of position in the adaptation (27)
+    sigma_a: float = 0.9  # rad/s, weight of attitude in the adaptation (27), section VII
     gamma: float = 9.969  # s2/kg, s2/(kg m2): Gamma = gamma I (27)
-    bound: float = 35.35  # N, of the estimate of W - B
-    bound_moment: float = 65.0  # N m, of the other estimates: above the righting moments of ODIN-like vehicles
+    bound: float = 35.35  # N, bound of the estimate of W - B
+    bound_moment: float = 65.0  # N m, bound of the other estimates: above the righting moments of ODIN-like vehicles
     limit: float = 28.25  # N, greatest pull of the primary region
     margin: float = 0.1508  # m2: the pull ends where f of a sphere is -margin
-    repulsion: float = 2814.0  # N/m, of a region of gain 1
+    repulsion: float = 2814.0  # N/m, slope of the push of a region of gain 1
     reach: float = 0.6542  # m, clearance at which regions begin to push
 
 
@@ -70,18 +70,18 @@ def step(
     e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
     R = rotation_rows(state.quaternion)
     paper_law.apply(e_p, e_s, e_att, R, state.velocity_body, g, memory.period[0], estimate, forces)  # (25), (27)
-    keep_within(estimate, 0, 1, gains.bound)
-    keep_within(estimate, 1, 4, gains.bound_moment)
+    clip_estimate(estimate, 0, 1, gains.bound)
+    clip_estimate(estimate, 1, 4, gains.bound_moment)
 
 
-def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> UnarbitratedMemory:
+def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> UnarbitratedMemory:
     """Return the memory before the first step; `period` [s] has shape (1,)."""
     return UnarbitratedMemory(
         desired_quaternion=desired_quaternion,
         period=period,
         estimate=np.zeros(4),
         report=np.zeros(0),
-        field=field_of(n_regions),
+        field=empty_field(n_regions),
     )
 
 
@@ -89,7 +89,7 @@ class UnarbitratedLaw(WrenchLaw):
     """The paper's law with all weights on, within bounds."""
 
     function = staticmethod(step)
-    memory_of = staticmethod(memory_of)
+    make_memory = staticmethod(make_memory)
     gains_type = UnarbitratedGains
     above_zero = ("k_p1", "gamma")
 

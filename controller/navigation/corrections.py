@@ -43,14 +43,14 @@ from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-_GATE = 4.0  # standard deviations
+_GATE = 4.0  # standard deviations of an innovation, beyond which a sample is rejected
 _UNKNOWN = 10.0  # standard deviations of a sample, beyond which the sample is nearer to the velocity than the estimate
-_REJECTED_IN_A_ROW = 3  # samples: of outliers one in fifty, as many in a row are rare
+_REJECTED_IN_A_ROW = 3  # samples: where one in fifty is an outlier, as many in a row are rare
 CONFIRMED = 3.0  # accepted samples, after which a sample that contradicts them is an outlier
-_RESETS = 4.0  # of the covariance without a confirmed sample in between, after which the filter starts again
+_RESETS = 4.0  # resets of the covariance without a confirmed sample in between, after which the filter starts again
 _STEEP = 0.1  # cosine of the pitch, squared, below which a compass is not used
 _HALF_TURN, _TURN = 3.141592653589793, 6.283185307179586  # rad
-_LEAST_SCALE = 1e-3  # of a sensor without noise, in its unit, so that the covariance stays positive
+_LEAST_SCALE = 1e-3  # least noise of a sensor, in its unit, which keeps the covariance positive
 
 
 def correct_by_sensor(memory: NavigationMemory, measurements: Measurements, sensor: int, sensors: SensorModel) -> None:
@@ -63,7 +63,7 @@ def correct_by_sensor(memory: NavigationMemory, measurements: Measurements, sens
     measurements : Measurements
         Samples of all sensors.
     sensor : int
-        `DEPTH_SENSOR`, `DVL`, `COMPASS` or `USBL`.
+        Index of the sensor: `DEPTH_SENSOR`, `DVL`, `COMPASS` or `USBL`.
     sensors : SensorModel
         Noise of the sensors.
     """

@@ -33,22 +33,22 @@ class NavigationMemory(NamedTuple):
     velocity: Array  # (3,) m/s over ground, NED
     quaternion: Array  # (4,) from body to world
     constants: Array  # (9,) errors of gyros [rad/s] (3), accelerometers [m/s2] (3), compass [rad], depth [m], DVL
-    covariance: Array  # (18, 18) of the errors
-    time: Array  # (1,) s, of the estimate: that of the last IMU sample; NaN before the first
-    acceleration: Array  # (3,) m/s2 over ground, NED, of the last IMU sample
-    omega: Array  # (3,) rad/s, body axes, likewise
-    sample_times: Array  # (5,) s, of the last samples used
+    covariance: Array  # (18, 18) covariance of the errors
+    time: Array  # (1,) s, time of the estimate: that of the last IMU sample; NaN before the first
+    acceleration: Array  # (3,) m/s2 over ground, NED, at the last IMU sample
+    omega: Array  # (3,) rad/s, body axes, at the last IMU sample
+    sample_times: Array  # (5,) s, times of the last samples used
     previous_fix: Array  # (3,) m, NED, the last fix before the start; NaN: none yet
     rejected: Array  # (5,) samples rejected in a row
-    resets: Array  # (5,) of the covariance, by a sensor that is not confirmed since
+    resets: Array  # (5,) resets of the covariance by each sensor since it was confirmed
     accepted: Array  # (5,) samples accepted since the start, or since the sensor reset the covariance
-    innovations: Array  # (5, 3) of each sensor: sum of normalized squared innovations, their degrees, samples rejected
+    innovations: Array  # (5, 3) a row a sensor: sum of normalized squared innovations, their degrees, rejected samples
     started: Array  # (1,) 1 once there is an estimate
     imu_motion: Array  # (10,) change of position, velocity and attitude by the IMU alone, since the start
     imu_history: Array  # (128, 11) time and `imu_motion` of the last IMU samples
     recorded: NDArray[np.int64]  # (1,) number of recorded samples
     row: Array  # (18,) derivative of a measured number by the errors
-    gain: Array  # (18,)
+    gain: Array  # (18,) covariance times `row`: Kalman gain before its division by the variance
 
 
 def empty_memory() -> NavigationMemory:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-DEPTH_SENSOR, DVL, IMU, COMPASS, USBL, N_SENSORS = 0, 1, 2, 3, 4, 5  # in `Measurements.times`
+DEPTH_SENSOR, DVL, IMU, COMPASS, USBL, N_SENSORS = 0, 1, 2, 3, 4, 5  # indices in `Measurements.times`
 SENSORS = ("depth_sensor", "dvl", "imu", "compass", "usbl")
 
 # first of each in `Measurements.values`
@@ -35,7 +35,7 @@ class Measurements(NamedTuple):
         Array  # (15,) depth [m]; velocity over ground, body [m/s] (3); altitude [m]; specific force, body [m/s2] (3)
     )
     # angular velocity, body [rad/s] (3); heading [rad]; position, NED [m] (3)
-    times: Array  # (5,) s: of pressure sensor, DVL, IMU, compass, USBL; a later time than before marks a new sample
+    times: Array  # (5,) s: times of pressure sensor, DVL, IMU, compass, USBL; a later one marks a new sample
 
 
 class SensorModel(NamedTuple):
@@ -55,7 +55,7 @@ class SensorModel(NamedTuple):
     heading: float = 0.0035  # rad
     position: float = 0.15  # m
     depth_bias: float = 0.02  # m
-    velocity_scale: float = 0.005  # dimensionless, of the velocity
+    velocity_scale: float = 0.005  # dimensionless, scale error of the velocity
     acceleration_bias: float = 0.02  # m/s2
     angular_velocity_bias: float = 0.0017  # rad/s
     heading_bias: float = 0.0175  # rad

@@ -46,9 +46,9 @@ Array = NDArray[np.float64]
 _NEVER = -1e11  # s, before any sample
 _UNEXPLAINED = 4.0  # standard deviations of a fix, beyond which two differ by more than noise
 _FIX_DEVIATIONS, _FIX_DISTANCE = 6.0, 0.5  # standard deviations, and m, within which two fixes agree
-_LONGEST = 1.0  # s between two IMU samples, beyond which the filter starts again
+_MAX_GAP = 1.0  # s between two IMU samples, beyond which the filter starts again
 _FAR = 3.0  # m, standard deviation of a coordinate beyond which it counts as unknown
-_FAST = 0.5  # m/s, the same of the velocity
+_FAST = 0.5  # m/s, standard deviation of a velocity beyond which it counts as unknown
 _QUARTER_TURN = 1.5707963267948966  # rad
 
 
@@ -76,7 +76,7 @@ def _take_imu_sample(measurements: Measurements, sensors: SensorModel, memory: N
         omega[i] = measurements.values[ANGULAR_VELOCITY + i] - memory.constants[i]
         force[i] = measurements.values[ACCELERATION + i] - memory.constants[3 + i]
     period = time - memory.time[0]
-    if memory.started[0] > 0.0 and period <= _LONGEST:
+    if memory.started[0] > 0.0 and period <= _MAX_GAP:
         propagate(memory, force, omega, sensors, period)
     else:
         if memory.started[0] > 0.0:  # too long without a sample
@@ -115,7 +115,7 @@ def _start(measurements: Measurements, sensors: SensorModel, memory: NavigationM
     memory.position[2] = measurements.values[DEPTH]
     memory.recorded[0] = 0
     set_first_covariance(memory, sensors)
-    for i in range(2):  # of the mean of two; and where noise does not explain them, of a mean with a wrong one
+    for i in range(2):  # variance of a mean of two fixes; greater where noise does not explain their distance
         memory.covariance[POSITION + i, POSITION + i] -= 0.5 * square(sensors.position)
         if abs(apart[i]) > _UNEXPLAINED * sensors.position:
             memory.covariance[POSITION + i, POSITION + i] += 0.25 * square(apart[i])
@@ -139,7 +139,7 @@ def _set_attitude(quaternion: Array, roll: float, pitch: float, yaw: float) -> N
 def _write_state(memory: NavigationMemory, sensors: SensorModel, now: float, state: VehicleState) -> None:
     """Write the state at a time [s] with its standard deviations."""
     velocity, R, P = zeros(3), zeros(3, 3), memory.covariance
-    known = memory.started[0] > 0.0 and now - memory.time[0] <= _LONGEST
+    known = memory.started[0] > 0.0 and now - memory.time[0] <= _MAX_GAP
     if known:
         estimate_at(memory, now, state.position, velocity, state.quaternion)
         write_rotation(state.quaternion, R)

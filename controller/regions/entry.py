@@ -19,26 +19,27 @@ class Entry:
     Parameters
     ----------
     shape : type
-        The frozen dataclass, a `Shape`: its fields are the keys of a scenario.
+        Frozen dataclass, a `Shape`: its fields are the keys of a scenario.
     evaluate : callable
-        The compiled function of g, its gradient and the distance, as `Shape` says.
+        Compiled function of g, its gradient and the distance, as `Shape` describes it.
     example : Shape
-        An instance of it, for tests and pictures.
+        Instance of the shape, for tests and pictures.
     units : mapping of str to str
         Unit of each field of the dataclass, "" for none.
     surface : callable, optional
-        Its mesh, from an instance and the corners of a box that cuts an unbounded shape: pictures, replay and exports
-        draw it. A shape of attitude has none.
+        Function that makes the mesh of an instance within a box, which cuts an unbounded shape. Pictures, replay and
+        exports draw it. A shape of attitude has no mesh.
     of_attitude : bool, optional
-        True if it depends on attitude.
+        True if the shape depends on attitude.
     half_axes : callable, optional
-        Where it is an ellipsoid: its centre [m, NED], shape (3,), and its half axes as rows [m], shape (3, 3), of one
-        of them. Pictures then draw the exact ellipse of its outline, not its mesh.
+        Function of an ellipsoid that returns its centre [m, NED], shape (3,), and its half axes as rows [m], shape
+        (3, 3). Pictures then draw the exact ellipse of its outline, not its mesh.
     planes : callable, optional
-        Where planes bound an unbounded shape: a point [m, NED] and the outward unit normal of each plane, of one
-        of them. Pictures then cut the planes where the picture ends.
+        Function of an unbounded shape that returns a point [m, NED] and the outward unit normal of each bounding plane.
+        Pictures then cut the planes where the picture ends.
     convex : bool, optional
-        True if each is convex: rays, such as those of a proximity sensor, then step by tangents, else by distances.
+        True if every instance is convex. Rays, such as those of a proximity sensor, then step by tangents, otherwise by
+        distances.
 
     Raises
     ------

@@ -16,8 +16,8 @@ from controller.quaternion import rotation_matrix
 from controller.regions.shape import Array, Bounds
 
 AROUND = 32  # corners of a circle
-_TIMES_SPLIT = 2  # of each triangle of the icosahedron that becomes a ball
-_SAME_PLACE = 1e-8  # m
+_SPLITS = 2  # times that each triangle of the icosahedron is split to become a ball
+_SAME_PLACE = 1e-8  # m, grid on which corners count as one
 _GOLDEN = (1.0 + math.sqrt(5.0)) / 2.0
 
 
@@ -26,7 +26,7 @@ class Mesh:
     """Triangles abc whose normals (b - a) x (c - a) point outward."""
 
     vertices: Array  # (n, 3) m, NED
-    triangles: NDArray[np.intp]  # (m, 3) places in vertices
+    triangles: NDArray[np.intp]  # (m, 3) indices of vertices
 
 
 def closed_grid(points: Array) -> Mesh:
@@ -55,16 +55,16 @@ def sector(apex: Sequence[float], axis: Sequence[float], half_angle: float, reac
     Parameters
     ----------
     apex, axis : sequence of float
-        [m] and of any length above 0.
+        Apex [m], and axis of any length above 0.
     half_angle : float
-        Up to pi [rad].
+        Half angle, up to pi [rad].
     reach : float
-        [m].
+        Greatest distance from the apex [m].
 
     Returns
     -------
     Mesh
-        A cone with a round end.
+        Mesh of a cone with a round end.
     """
     along, *across = frame(np.array(axis, dtype=float))
     steps = max(2, math.ceil(half_angle / (2.0 * math.pi / AROUND)))
@@ -92,7 +92,7 @@ def ball() -> Mesh:
         (i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[k, i]
     ]
     mesh = Mesh(vertices / np.linalg.norm(vertices[0]), _outward(vertices, np.array(triangles)))
-    for _ in range(_TIMES_SPLIT):
+    for _ in range(_SPLITS):
         mesh = _split(mesh)
     return mesh
 
@@ -137,7 +137,7 @@ def patches(planes: Sequence[tuple[Array, Array]], limits: Bounds) -> Mesh:
     return Mesh(np.array(corners), np.array(triangles))
 
 
-def welded(mesh: Mesh) -> Mesh:
+def weld(mesh: Mesh) -> Mesh:
     """Merge corners within `_SAME_PLACE`, and remove triangles without area."""
     _, first, index = np.unique(np.round(mesh.vertices / _SAME_PLACE), axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)  # the corners stay in their order
@@ -178,7 +178,7 @@ def lathe(rings: Sequence[Array], first: Array, last: Array) -> Mesh:
     return Mesh(vertices, np.vstack(parts))
 
 
-def placed(points: Array, centre: Sequence[float], quaternion: Sequence[float]) -> Array:
+def place_points(points: Array, centre: Sequence[float], quaternion: Sequence[float]) -> Array:
     """Rotate points of a body [m] by a quaternion of any length, and move them to a centre [m, NED]."""
     e = np.array(quaternion, dtype=float)
     world: Array = np.array(centre) + points @ rotation_matrix(e / np.linalg.norm(e)).T

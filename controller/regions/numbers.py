@@ -23,7 +23,7 @@ Range = tuple[str, float, float]  # unit, least and greatest
 
 LENGTH: Range = ("m", -1e6, 1e6)
 SIZE: Range = ("m", 1e-9, 1e6)
-PART: Range = ("", -1.0, 1.0)  # of a unit vector, a unit quaternion or a rotation matrix, side by side
+PART: Range = ("", -1.0, 1.0)  # component of a unit vector, a unit quaternion or a rotation matrix
 ANGLE: Range = ("rad", 0.0, math.pi)
 
 
@@ -57,8 +57,8 @@ def constraints(numbers: Sequence[Number]) -> Iterator[tuple[str, int, int, str]
     Yields
     ------
     tuple of (str, int, int, str)
-        ``"unit"``, the first of numbers whose squares make 1, and how many they are; ``"rotation"`` and the first of
-        the nine of a rotation matrix, and 9; or ``"above"``, one number, and the index of the one that it exceeds;
+        Constraint: ``"unit"``, the first of numbers whose squares sum to 1, and their count; ``"rotation"``, the first
+        of the nine of a rotation matrix, and 9; or ``"above"``, a number, and the index of the one that it exceeds;
         each with a text for the error.
     """
     names = [number.name for number in numbers]

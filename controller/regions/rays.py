@@ -15,7 +15,7 @@ from controller.regions.shapes.prism import Prism
 from controller.stack_array import zeros
 
 TOUCHING = 1e-4  # m, the clearance at which a ray has met a surface
-LOOKS = 64  # steps along a ray, for each region
+MAX_STEPS = 64  # steps along a ray, for each region
 _PARALLEL = 1e-100  # part of a direction below which it is 0: its square, or a division by it, would leave the range
 
 _ELLIPSOID = Ellipsoid.kind
@@ -45,7 +45,7 @@ def ray_distances(regions: PackedRegions, origin: Array, directions: Array, fart
         Receives the distances [m]: 0 everywhere if the origin is inside, or on the surface; infinite where no region
         is nearer than `farthest`; NaN where the numbers of a ray or of a region within reach are lost. Each ends where
         the clearance is at most `TOUCHING`. Along a shape that is kept within, or a prism that is not convex, a ray
-        ends after `LOOKS` steps: nearer than the surface, never beyond it.
+        ends after `MAX_STEPS` steps: nearer than the surface, never beyond it.
     """
     distances[:] = math.inf
     start, piece = zeros(3), zeros(7)
@@ -96,7 +96,7 @@ def _meet(
             continue  # it passes by the circle and cannot meet the prism
         nearest = farthest if distances[k] > farthest else distances[k]
         here, way = first, 0.0
-        for _ in range(LOOKS):
+        for _ in range(MAX_STEPS):
             way += _stride(kind, convex, outward, here, dx, dy, dz)
             if not way < nearest:
                 break

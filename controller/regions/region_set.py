@@ -57,13 +57,13 @@ class Region:
     """
 
     name: str
-    shape: Shape  # as it is at time 0
+    shape: Shape  # shape at its place at time 0
     keep: Literal["in", "out"]
     velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
     gain: float = 1.0  # alpha_i of section VII, in N per unit of g
     hard: bool = True
     deviation: float | Vector3 = 0.0  # m, standard deviation of its place: in any direction, or north, east and down
-    crossing_cost: float = 2.0  # of a metre of path through it, half a metre deep, added to its length; if it is soft
+    crossing_cost: float = 2.0  # m, added to a path's length per metre through a soft region, half a metre deep
 
     @property
     def deviations(self) -> Vector3:
@@ -99,7 +99,7 @@ def name_of(shape: Shape) -> str:
     Parameters
     ----------
     shape : Shape
-        One of those in `SHAPES`.
+        Shape of a type in `SHAPES`.
 
     Returns
     -------
@@ -154,16 +154,16 @@ class PackedRegions(NamedTuple):
     Only `shifts` and `velocities` change, when regions move.
     """
 
-    kinds: NDArray[np.int64]  # (n,)
+    kinds: NDArray[np.int64]  # (n,) number of each shape's kind
     signs: Array  # (n,) +1 kept within, -1 kept out of
-    offsets: NDArray[np.int64]  # (n + 1,) into numbers
+    offsets: NDArray[np.int64]  # (n + 1,) into `numbers`
     numbers: Array  # packed numbers of the shapes, consecutive
     shifts: Array  # (n, 3) m, NED: displacement of each from its packed place
     velocities: Array  # (n, 3) m/s, NED
     gains: Array  # (n,) alpha_i
-    hard: NDArray[np.bool_]  # (n,)
+    hard: NDArray[np.bool_]  # (n,) True if the region must not be violated
     deviations: Array  # (n, 3) m, standard deviations of each place, NED
-    crossing_costs: Array  # (n,) of a metre of path through each, half a metre deep, added to its length
+    crossing_costs: Array  # (n,) m, added to a path's length per metre through each, half a metre deep
 
     def evaluate(
         self,
@@ -179,7 +179,7 @@ class PackedRegions(NamedTuple):
         Parameters
         ----------
         position : ndarray, shape (3,)
-            [m, NED].
+            Position [m, NED].
         quaternion : ndarray, shape (4,)
             Unit quaternion from body to world; shapes of position alone do not use it.
         values : ndarray, shape (n,)
@@ -213,12 +213,12 @@ def pack(regions: Sequence[Region]) -> PackedRegions:
     Parameters
     ----------
     regions : sequence of Region
-        Regions, also none.
+        Regions, none or more.
 
     Returns
     -------
     PackedRegions
-        In the same order.
+        Packed regions in the same order.
 
     Examples
     --------
@@ -300,9 +300,9 @@ def evaluate_pose(regions: PackedRegions, i: int, position: Array, e: Array, at:
     return evaluation
 
 
-def clearance_of_place(regions: PackedRegions, i: int, position: Array, room: Array) -> float:
-    """Return the clearance [m] as `clearance_at`, of a region of position alone; `room`, shape (3,), is scratch."""
-    clearance: float = -regions.signs[i] * evaluate_place(regions, i, position, room)[4]
+def clearance_of_place(regions: PackedRegions, i: int, position: Array, scratch: Array) -> float:
+    """Return the clearance [m] as `clearance_at`, of a region of position alone; `scratch` has shape (3,)."""
+    clearance: float = -regions.signs[i] * evaluate_place(regions, i, position, scratch)[4]
     return clearance
 
 
@@ -316,14 +316,14 @@ def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
     return clearance_of_place(regions, i, position, zeros(3))
 
 
-def clearance_of_pose(regions: PackedRegions, i: int, position: Array, quaternion: Array, room: Array) -> float:
-    """Return the clearance of one of the `regions`, `i`, of any kind, [m] or [rad], at a pose; `room` (3,) is scratch.
+def clearance_of_pose(regions: PackedRegions, i: int, position: Array, quaternion: Array, scratch: Array) -> float:
+    """Return the clearance of one of the `regions`, `i`, of any kind, [m] or [rad], at a pose.
 
-    The pose is a `position` [m, NED] and a unit `quaternion`.
+    The pose is a `position` [m, NED] and a unit `quaternion`; `scratch` has shape (3,).
     """
     if regions.kinds[i] < FIRST_OF_ATTITUDE:
-        return clearance_of_place(regions, i, position, room)
-    clearance: float = -regions.signs[i] * evaluate_pose(regions, i, position, quaternion, room)[0]
+        return clearance_of_place(regions, i, position, scratch)
+    clearance: float = -regions.signs[i] * evaluate_pose(regions, i, position, quaternion, scratch)[0]
     return clearance
 
 
@@ -369,14 +369,14 @@ def clearances_at(points: Array, region: Region) -> Array:
     Parameters
     ----------
     points : ndarray, shape (m, 3)
-        [m, NED].
+        Points [m, NED].
     region : Region
         Region to evaluate.
 
     Returns
     -------
     ndarray, shape (m,)
-        Clearances [m], as of `clearance_at`.
+        Clearances [m], as from `clearance_at`.
     """
     clearances = np.empty(len(points))
     arguments = pack([region]), np.ascontiguousarray(points, dtype=float), np.empty(3), clearances
@@ -384,11 +384,11 @@ def clearances_at(points: Array, region: Region) -> Array:
     return clearances
 
 
-def write_clearances(regions: PackedRegions, points: Array, room: Array, clearances: Array) -> None:
-    """Write `clearance_at` of the first of the `regions` at each of the points; `room`, shape (3,), is scratch."""
+def write_clearances(regions: PackedRegions, points: Array, scratch: Array, clearances: Array) -> None:
+    """Write `clearance_at` of the first of the `regions` at each of the points; `scratch` has shape (3,)."""
     for i in range(points.shape[0]):
         if regions.kinds[0] < FIRST_OF_ATTITUDE:
-            clearances[i] = clearance_of_place(regions, 0, points[i], room)
+            clearances[i] = clearance_of_place(regions, 0, points[i], scratch)
         else:
             clearances[i] = math.inf
 

@@ -26,8 +26,8 @@ Evaluation = tuple[float, float, float, float, float]
 # value of g [rad], its gradient by position (3 numbers, world), by rotation about the body's axes (3 numbers)
 EvaluationOfAttitude = tuple[float, float, float, float, float, float, float]
 
-UP_TO_ROUNDING = 1e-12
-GREATEST = 1e6  # m; squares and their sums stay far from overflow
+UP_TO_ROUNDING = 1e-12  # length below which a vector has no direction
+GREATEST = 1e6  # m, greatest coordinate and length; squares and their sums stay far from overflow
 
 
 class Shape(Protocol):
@@ -40,7 +40,7 @@ class Shape(Protocol):
     """
 
     kind: ClassVar[int]  # number of the shape in packed arrays; assigned when the shapes are loaded
-    unit: ClassVar[str]  # of g
+    unit: ClassVar[str]  # unit of g
 
     def packed(self) -> tuple[float, ...]:
         """Return the numbers that the compiled function reads."""
@@ -124,15 +124,15 @@ def unit(shape: str, key: str, vector: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(x / length for x in vector)
 
 
-def about(centre: Vector3, reach: Sequence[float]) -> Bounds:
+def centered_bounds(centre: Vector3, reach: Sequence[float]) -> Bounds:
     """Return the bounds about a centre with a reach along each axis.
 
     Parameters
     ----------
     centre : tuple of float
-        [m, NED].
+        Centre [m, NED].
     reach : sequence of float
-        Three lengths [m].
+        Half lengths along the three axes [m].
 
     Returns
     -------
@@ -149,16 +149,16 @@ def ball_bounds(centre: Vector3, radius: float) -> Bounds:
     Parameters
     ----------
     centre : tuple of float
-        [m, NED].
+        Centre [m, NED].
     radius : float
-        [m].
+        Radius [m].
 
     Returns
     -------
     Bounds
         Lowest and highest corner.
     """
-    return about(centre, (radius, radius, radius))
+    return centered_bounds(centre, (radius, radius, radius))
 
 
 def join(parts: Sequence[Bounds]) -> Bounds:
@@ -167,7 +167,7 @@ def join(parts: Sequence[Bounds]) -> Bounds:
     Parameters
     ----------
     parts : sequence of Bounds
-        At least one.
+        Bounds of the parts, at least one.
 
     Returns
     -------

@@ -37,9 +37,9 @@ def decay_bound(model: Model, gains: Gains, y: Array, velocity_body: Array, sigm
     gains : Gains
         Gains of the law.
     y : ndarray, shape (6,)
-        `mapped_error`.
+        Error y, as from `mapped_error`.
     velocity_body : ndarray, shape (6,)
-        nu [m/s, rad/s].
+        Velocity nu [m/s, rad/s], body frame.
     sigma_c0 : float
         sigma c_0 of (43) [N s/m, N m s/rad]: `bracket` is at least -sigma_c0 |nu|^2.
     """

@@ -48,9 +48,9 @@ def least_of_potential_test(mass: Array, gradient_norm: float, gains: Gains) -> 
     Parameters
     ----------
     mass : ndarray, shape (6, 6)
-        M, in SI units.
+        Mass matrix M, in SI units.
     gradient_norm : float
-        |df/dp|, above 0.
+        Norm |df/dp|, above 0.
     gains : Gains
         Gains of the law.
     """
@@ -77,11 +77,11 @@ def secondary_fit(mass: Array, gradient_norms: Array, betas: Array, gains: Gains
     Parameters
     ----------
     mass : ndarray, shape (6, 6)
-        M, in SI units.
+        Mass matrix M, in SI units.
     gradient_norms : ndarray, shape (n,)
-        |dg_i/dp| of the active regions.
+        Norms |dg_i/dp| of the active regions.
     betas : ndarray, shape (n,)
-        alpha_i / k_q of these, above 0.
+        Factors beta_i = alpha_i / k_q of these regions, above 0.
     gains : Gains
         Gains of the law.
     """
@@ -130,11 +130,11 @@ def damping_fit(
     Parameters
     ----------
     mass : ndarray, shape (6, 6)
-        M, in SI units.
+        Mass matrix M, in SI units.
     linear_damping : ndarray, shape (6,)
         Diagonal of D at rest, which is its least [N s/m, N m s/rad].
     jacobian_bound : float
-        `error_jacobian_bound`.
+        Bound, as from `error_jacobian_bound`.
     gains : Gains
         Gains of the law.
     translation_alone : bool
@@ -161,7 +161,7 @@ def sphere_radii(mass: Array, linear_damping: Array, radius: float, gains: Gains
     Parameters
     ----------
     mass : ndarray, shape (6, 6)
-        M, in SI units.
+        Mass matrix M, in SI units.
     linear_damping : ndarray, shape (6,)
         Diagonal of D at rest [N s/m, N m s/rad].
     radius : float

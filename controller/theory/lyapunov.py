@@ -33,7 +33,7 @@ def mapped_error(e_p: Array, e_s: Array, e_att: Array, R: Array, gains: Gains) -
     e_att : ndarray, shape (3,)
         Vector part of the error quaternion (23).
     R : ndarray, shape (3, 3)
-        From body to world.
+        Rotation matrix from body to world.
     gains : Gains
         Gains of the law.
     """
@@ -49,13 +49,13 @@ def mapped_error_rate(region_rate: Array, y: Array, error_quaternion: Array, R: 
     Parameters
     ----------
     region_rate : ndarray, shape (3,)
-        d/dt (e_p + (k_q/k_p1) e_s) along the motion, world frame.
+        Rate d/dt (e_p + (k_q/k_p1) e_s) along the motion, world frame.
     y : ndarray, shape (6,)
-        `mapped_error`.
+        Error y, as from `mapped_error`.
     error_quaternion : ndarray, shape (4,)
-        (23).
+        Error quaternion (23).
     R : ndarray, shape (3, 3)
-        From body to world.
+        Rotation matrix from body to world.
     omega : ndarray, shape (3,)
         Angular velocity [rad/s], body frame.
     """
@@ -90,15 +90,15 @@ def primary_value(
     gains : Gains
         Gains of the law.
     goal_value : float
-        f (13).
+        Value f of the goal (13).
     error_quaternion : ndarray, shape (4,)
-        (23), its scalar part at least 0.
+        Error quaternion (23), its scalar part at least 0.
     y : ndarray, shape (6,)
-        `mapped_error`; with e_s = 0 the secondary regions drop out.
+        Error y, as from `mapped_error`; with e_s = 0 the secondary regions drop out.
     velocity_body : ndarray, shape (6,)
-        nu [m/s, rad/s].
+        Velocity nu [m/s, rad/s], body frame.
     estimate : ndarray, shape (4,)
-        phi-hat [N, N m].
+        Estimate phi-hat [N, N m].
     """
     momentum = model.mass @ velocity_body
     wrong = model.phi - estimate
@@ -124,11 +124,11 @@ def printed_secondary(values: Array, gradients: Array, betas: Array, gains: Gain
     Parameters
     ----------
     values : ndarray, shape (n,)
-        g_i.
+        Values g_i of the secondary regions.
     gradients : ndarray, shape (n, 3)
-        dg_i/dp; a region whose gradient is zero contributes nothing, as in (19).
+        Gradients dg_i/dp; a region whose gradient is zero contributes nothing, as in (19).
     betas : ndarray, shape (n,)
-        alpha_i / k_q; a region of weight 0 contributes nothing.
+        Factors beta_i = alpha_i / k_q; a region of weight 0 contributes nothing.
     gains : Gains
         Gains of the law.
     """
@@ -159,7 +159,7 @@ def normalized_secondary(values: Array, gradients: Array, clearances: Array, bet
     Parameters
     ----------
     values, gradients, betas, gains
-        As `printed_secondary`.
+        Values, gradients, factors and gains, as `printed_secondary`.
     clearances : ndarray, shape (n,)
         Distances to the surfaces [m], negative where violated.
     """
@@ -189,9 +189,9 @@ def value_rate(model: Model, gains: Gains, y: Array, y_rate: Array, velocity_bod
     gains : Gains
         Gains of the law.
     y, y_rate : ndarray, shape (6,)
-        `mapped_error` and `mapped_error_rate`.
+        Error y and its rate, as from `mapped_error` and `mapped_error_rate`.
     velocity_body : ndarray, shape (6,)
-        nu [m/s, rad/s].
+        Velocity nu [m/s, rad/s], body frame.
     """
     drag = damping(model.linear_damping, model.quadratic_damping, velocity_body)
     drag[:3] += gains.k_v1

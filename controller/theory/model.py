@@ -18,7 +18,7 @@ class Model(NamedTuple):
 
     mass: Array  # (6, 6) kg, kg m, kg m2: M, rigid body plus added mass
     linear_damping: Array  # (6,) diagonal of D(0) [N s/m, N m s/rad]
-    quadratic_damping: Array  # (6,) of |nu| in D [N s2/m2, N m s2/rad2]
+    quadratic_damping: Array  # (6,) factor of |nu| in D [N s2/m2, N m s2/rad2]
     phi: Array  # (4,) true restoring parameters (12) [N, N m]
 
 
@@ -73,16 +73,16 @@ def restoring_defect(weight: float, buoyancy: float, r_G: Array, r_B: Array, qua
     Parameters
     ----------
     weight, buoyancy : float
-        [N].
+        Weight and buoyancy [N].
     r_G, r_B : ndarray, shape (3,)
         Centres of gravity and buoyancy [m], body frame.
     quaternion : ndarray, shape (4,)
-        From body to world.
+        Unit quaternion from body to world.
 
     Returns
     -------
     float
-        Greatest difference of a component.
+        Greatest difference of a component [N or N m].
     """
     k = down_in_body(quaternion)
     pull, push = weight * k, -buoyancy * k

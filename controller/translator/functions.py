@@ -15,14 +15,14 @@ from controller.translator.statements import Statements
 from controller.translator.types import BOOL, Array, Nothing, Record, Scalar, Tuple, Type
 
 # words of C, and names that its headers define
-_KEPT = {
+_RESERVED = {
     "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern",
     "float", "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short",
     "signed", "sizeof", "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile",
     "while", "bool", "true", "false", "NAN", "INFINITY", "gamma", "div", "free", "index", "j0", "j1", "jn",
     "y0", "y1", "yn", "time", "remove", "signal",
 }  # fmt: skip
-_PASSES = 6  # until the types of variables are fixed
+_MAX_PASSES = 6  # greatest number of passes until the types of variables are fixed
 
 
 class Functions(Protocol):
@@ -73,14 +73,14 @@ class Function(Statements):
         Raises
         ------
         TranslationError
-            In any case.
+            Always.
         """
         line = self._first + getattr(node, "lineno", 1) - 1
         raise TranslationError(f"{self._file}:{line}: {what}, which is not translated to C")
 
     def translate(self, name: str) -> str:
         """Return the function in C, under a name; afterwards the type of its result is known."""
-        for _ in range(_PASSES):
+        for _ in range(_MAX_PASSES):
             known, result = dict(self.names), self.result
             self.lines: list[str] = []
             self.declared: dict[str, str] = {}
@@ -119,7 +119,7 @@ class Function(Statements):
 
     def variable(self, name: str) -> str:
         """Return the C name of a variable."""
-        return f"{name}_" if name in _KEPT else name
+        return f"{name}_" if name in _RESERVED else name
 
     def temporary(self, kind: Type, code: str) -> Value:
         """Assign a value to a new variable, and return that."""

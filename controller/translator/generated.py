@@ -13,9 +13,9 @@ def functions_of(text: str, names: dict[str, Any]) -> dict[str, FunctionType]:
     Parameters
     ----------
     text : str
-        Python: functions alone, of our own making, since it is executed.
+        Python text of functions alone; it is executed, so it must not come from a user.
     names : dict
-        Objects that they refer to by name; ``__name__`` is the module that they belong to.
+        Objects that the functions refer to, by name; ``__name__`` is the module that they belong to.
 
     Returns
     -------

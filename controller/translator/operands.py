@@ -42,7 +42,7 @@ Operand = Value | Known | Items
 class Operands:
     """Compute the operands of one function; statements that they need first go to `lines`."""
 
-    names: dict[str, Type]  # of variables, as far as they are known
+    names: dict[str, Type]  # types of variables by name, as far as they are known
     globals: dict[str, Any]
     lines: list[str]
 

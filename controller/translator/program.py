@@ -70,7 +70,7 @@ class Program:
         Raises
         ------
         TranslationError
-            If it, or what it calls, is beyond the subset; with file and line.
+            If the function, or one that it calls, is beyond the subset; the message names file and line.
         """
         self._reserved.add(name)
         if not isinstance(function, FunctionType):
@@ -98,7 +98,7 @@ class Program:
         Raises
         ------
         TranslationError
-            If it, or what it calls, is beyond the subset.
+            If the function, or one that it calls, is beyond the subset.
         """
         key = (function, arguments)
         if key not in self._instances:

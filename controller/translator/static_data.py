@@ -27,12 +27,12 @@ def static_data(program: Program, name: str, arguments: tuple[Any, ...]) -> str:
     Returns
     -------
     str
-        C, to be put after the program's text. Arrays are static, and may be written.
+        C text to put after the program's text. Arrays are static, and may be written.
 
     Raises
     ------
     TypeError
-        If an argument has a type without words in C.
+        If an argument has a type that is not translated to C.
     """
     arrays: list[str] = []
 
@@ -96,7 +96,7 @@ def array_data(array: np.ndarray, name: str, qualifier: str = "static") -> str:
 
 
 class Expression(int):
-    """An integer that C works out, such as the address of a function."""
+    """An integer that C computes, such as the address of a function."""
 
     text: str
 

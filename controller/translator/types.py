@@ -12,7 +12,7 @@ import numpy as np
 class Scalar:
     """A number or a truth value."""
 
-    c: str
+    c: str  # name in C
 
 
 DOUBLE, INT, UINT, BOOL = Scalar("double"), Scalar("int64_t"), Scalar("uint64_t"), Scalar("bool")
@@ -31,7 +31,7 @@ class Array:
 
     @property
     def c(self) -> str:
-        """The name of its struct."""
+        """Name of the array's struct in C."""
         return f"{_SHORT[self.item]}{'' if self.contiguous else 's'}_{self.ndim}"
 
 
@@ -60,7 +60,7 @@ class Record:
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """Names of its items."""
+        """Names of the items."""
         names: tuple[str, ...] = self.python._fields  # type: ignore[attr-defined]
         return names
 
@@ -84,7 +84,7 @@ def type_of(value: Any) -> Type:
     Raises
     ------
     TypeError
-        If it is of another type.
+        If the argument has another type.
     """
     if isinstance(value, np.ndarray):
         item = _ITEMS.get(value.dtype)

@@ -23,20 +23,20 @@ class FlightConfig(NamedTuple):
 
     goal: PackedRegions
     regions: PackedRegions
-    criteria: NDArray[np.int64]  # (n,) of each region
-    priorities: Array  # (n,) of each region, for the score alone
-    inputs: PackedInputs  # of the arbiter
-    step: float  # s, of the plant
-    steps: int  # of the plant
-    control_every: int  # plant steps
-    arbiter_every: int  # plant steps
+    criteria: NDArray[np.int64]  # (n,) index of each region's criterion
+    priorities: Array  # (n,) factor of each region's violation in the score; laws do not receive it
+    inputs: PackedInputs  # sources of the arbiter's inputs
+    step: float  # s, co-simulation step of the plant
+    steps: int  # number of plant steps
+    control_every: int  # plant steps between two control steps
+    arbiter_every: int  # plant steps between two evaluations of the arbiter
     moving: bool  # True if any region moves
     goal_places: Array  # (p, 3) m, NED: shifts of the goal to its next positions, in turn
     goal_stay: int  # plant steps that the vehicle has to stay in the goal before it moves to its next position
     exact: bool  # True if law and arbiter receive the true state
     noise: Array  # (control steps, 6) m, m/s: added to position and linear velocity; (0, 6) if exact
     dead_from: float  # s, time at which position and linear velocity are lost
-    dead_until: float  # s
+    dead_until: float  # s, time at which they are measured again
     frozen: bool  # True: their last values are held meanwhile; False: they are NaN
     through_sensors: bool  # True: the law receives the navigation filter's estimate
     sensors: SensorModel  # the filter's model of the sensors
@@ -48,17 +48,17 @@ class FlightConfig(NamedTuple):
     remaining: Array  # (f,) remaining effectiveness; NaN for a thruster that is stuck at its last force
     report_failures: bool  # True if failures are reported to the law
     thrusters: int  # number of thrusters that give the wrench; 0: it acts on the body directly
-    bound: int  # index of the law's bound of the clearances in its report, -1: it has none
-    clock: NDArray[np.int64]  # of `c_calls.Clock`; (0,) if the law is not timed
+    bound: int  # index in the law's report of its bound of the clearances; -1: it has none
+    clock: NDArray[np.int64]  # (3,) numbers of a `c_calls.Clock`; (0,) if the law is not timed
 
 
 class Allocator(NamedTuple):
     """Arguments of `controller.allocation.allocate`, with a stage for each number of reported failures."""
 
-    inverse: Array  # (stages, m, 6)
-    lower: Array  # (stages, m)
-    upper: Array  # (stages, m)
-    direction: bool
+    inverse: Array  # (stages, m, 6) N per N, N m: thruster forces for a wrench
+    lower: Array  # (stages, m) N
+    upper: Array  # (stages, m) N
+    direction: bool  # True: saturation keeps the wrench's direction; False: it cuts each thruster
 
 
 class BoundLaw(NamedTuple):
@@ -67,9 +67,9 @@ class BoundLaw(NamedTuple):
     address: int
     words: int
     is_wrench: bool  # True: it gives a wrench; False: thruster forces
-    estimate: Array  # (4,) in its memory
-    expected: Array  # (6,) in its memory, prediction for the next step: m, NED, and m/s, body
-    report: Array  # (r,) in its memory
+    estimate: Array  # (4,) N, N m: estimate of phi (12), in the law's memory
+    expected: Array  # (6,) prediction for the next step, in the law's memory: m, NED, and m/s, body
+    report: Array  # (r,) diagnostics, in the law's memory
 
 
 class BoundArbiter(NamedTuple):
@@ -82,22 +82,22 @@ class BoundArbiter(NamedTuple):
 class Workspace(NamedTuple):
     """Arrays of a flight in progress."""
 
-    state: VehicleState  # measured, for the law
-    arbiter_state: VehicleState  # for the arbiter
+    state: VehicleState  # measured state, which the law receives
+    arbiter_state: VehicleState  # state that the arbiter uses
     measurements: Measurements
     navigation: NavigationMemory
-    now: Array  # (1,) s
+    now: Array  # (1,) s, time of the step
     signals: ArbiterSignals
-    by_criterion: Array  # (criteria,) weights
-    weights: Array  # (n,)
-    clearances: Array  # (n,) true ones
-    seen: Array  # (n,) those at the arbiter's pose
+    by_criterion: Array  # (criteria,) weight of each criterion
+    weights: Array  # (n,) weight of each region's criterion
+    clearances: Array  # (n,) m or rad, at the true pose
+    arbiter_clearances: Array  # (n,) m or rad, at the arbiter's pose
     goal_clearance: Array  # (1,) m or rad
     wrench: Array  # (6,) N, N m, body frame
-    before: Array  # (i,) inputs of the step before
+    before: Array  # (i,) commanded inputs of the step before
     stuck: Array  # (i,) inputs of stuck thrusters, NaN for others
-    at: Array  # (3,)
-    ticks: NDArray[np.int64]  # (2,)
+    scratch: Array  # (3,) for `clearance_of_pose`
+    ticks: NDArray[np.int64]  # (2,) for `c_calls.seconds`
 
 
 def make_workspace(setup: FlightConfig, criteria: int, inputs: int, thrusters: int) -> Workspace:
@@ -106,14 +106,14 @@ def make_workspace(setup: FlightConfig, criteria: int, inputs: int, thrusters: i
     Parameters
     ----------
     setup : FlightConfig
-        Of the flight.
+        Configuration of the flight.
     criteria, inputs, thrusters : int
         Number of criteria, plant inputs and thrusters.
 
     Returns
     -------
     Workspace
-        With zeros, and all thrusters healthy.
+        Workspace of zeros, with all thrusters healthy.
     """
     n = setup.criteria.size
     return Workspace(
@@ -126,12 +126,12 @@ def make_workspace(setup: FlightConfig, criteria: int, inputs: int, thrusters: i
         by_criterion=np.zeros(criteria),
         weights=np.zeros(n),
         clearances=np.zeros(n),
-        seen=np.zeros(n),
+        arbiter_clearances=np.zeros(n),
         goal_clearance=np.zeros(1),
         wrench=np.zeros(6),
         before=np.zeros(inputs),
         stuck=np.full(inputs, np.nan),
-        at=np.zeros(3),
+        scratch=np.zeros(3),
         ticks=np.zeros(2, np.int64),
     )
 
@@ -144,7 +144,7 @@ class FlightMetrics(NamedTuple):
     inside: bool  # True if inside at the end
     least_clearance: float  # m, least over hard regions in space; negative: violated; inf: there is none
     least_angle: float  # rad, the same for hard regions of attitude
-    goal_clearance: float  # m, greatest
+    goal_clearance: float  # m, greatest; negative: the goal was never reached
     effort: float  # N s, integral of the magnitude of the force on the body
     thrust_effort: float  # N s, sum over thrusters of the integral of the given force's magnitude
     thrust_variation: float  # N, sum of the absolute changes of the commands, from 0 on
@@ -160,7 +160,7 @@ class FlightOutputs(NamedTuple):
     """Outputs of a flight."""
 
     metrics: Array  # (15,) in the order of `FlightMetrics`
-    estimate: Array  # (4,) used in the last control step
+    estimate: Array  # (4,) N, N m: estimate of phi (12) that the last control step used
     trace: Array  # (control steps, 17 + c + i + r), or (0, 0) for none; a row: time, true position, quaternion
     # and velocity, position as measured, the weights of the c criteria, the i inputs, the law's r reports
     reasons: Array  # (control steps, 12 + n + c + m + f), or (0, 0); a row: clearances of the goal and the n regions, c

@@ -24,7 +24,7 @@ from cosim.batch.flight_config import (
     make_workspace,
 )
 from cosim.batch.fused_loop import fly_law
-from cosim.batch.outcome import OUTCOME, Flown, nothing
+from cosim.batch.outcome import OUTCOME, BatchResult, empty_outcomes
 from cosim.batch.variation import Variation
 from cosim.errors import RunError, ScenarioError
 from cosim.results.summary import SETTLED_FOR
@@ -39,9 +39,9 @@ from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant, PlantError
 from plant_fmu.running.native import Native
 
-_ROUNDING = 1e-6  # of a step, as in the master
+_ROUNDING = 1e-6  # tolerance of times, as a part of a step, as in the master
 _NO_CLOCK = np.empty(0, np.int64)
-_NONE = Allocator(np.zeros((1, 0, 6)), np.zeros((1, 0)), np.zeros((1, 0)), False)
+_NO_ALLOCATION = Allocator(np.zeros((1, 0, 6)), np.zeros((1, 0)), np.zeros((1, 0)), False)
 
 
 class FusedFlyer:
@@ -65,13 +65,13 @@ class FusedFlyer:
         self.variation = variation
         base = variation.base
         require_fused(base)
-        for key, (_, expected) in _fixed(base).items():
+        for key, (_, expected) in _fixed_keys(base).items():
             if key in variation.keys:
                 raise RunError(f"{key} varies, expected {expected!r} for flights without a record")
         require_builtin_law(base)
         self._plant = Plant(base.vehicle)
 
-    def fly(self, values: Array, seeds: NDArray[np.int64]) -> Flown:
+    def fly(self, values: Array, seeds: NDArray[np.int64]) -> BatchResult:
         """Fly a batch.
 
         Parameters
@@ -83,17 +83,17 @@ class FusedFlyer:
 
         Returns
         -------
-        Flown
+        BatchResult
             Outcome of each row, or the reason why it was refused.
         """
-        outcomes, refused = nothing(len(seeds)), {}
-        for row, (of_row, seed) in enumerate(zip(values, seeds, strict=True)):
+        outcomes, refused = empty_outcomes(len(seeds)), {}
+        for row, (row_values, seed) in enumerate(zip(values, seeds, strict=True)):
             try:
-                scenario = self.variation.scenario(of_row.tolist(), int(seed))
+                scenario = self.variation.scenario(row_values.tolist(), int(seed))
                 outcomes[row] = self.fly_one(scenario)[0]
             except (ScenarioError, PlantError) as error:
                 refused[row] = str(error)
-        return Flown(outcomes, refused)
+        return BatchResult(outcomes, refused)
 
     def fly_one(self, scenario: Scenario, trace: bool = False) -> tuple[NDArray[np.void], Array]:
         """Fly one scenario of the variation.
@@ -101,9 +101,9 @@ class FusedFlyer:
         Parameters
         ----------
         scenario : Scenario
-            From `Variation.scenario`.
+            Scenario from `Variation.scenario`.
         trace : bool
-            Return a trace, see `cosim.batch.fused_loop`.
+            Return a trace, as in `FlightOutputs`.
 
         Returns
         -------
@@ -133,13 +133,13 @@ class FusedFlyer:
 
 def require_fused(scenario: Scenario, what: str = "flights without a record") -> None:
     """Raise `RunError` for the first key of a scenario that the fused loop does not support; `what` needs the loop."""
-    for key, (received, expected) in _fixed(scenario).items():
+    for key, (received, expected) in _fixed_keys(scenario).items():
         if received != expected:
             way = f", such as by --set {key}={expected}" if isinstance(expected, str) else ""
             raise RunError(f"{key} is {received!r}, expected {expected!r} for {what}{way}")
 
 
-def _fixed(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
+def _fixed_keys(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
     """Return the present and the required value of each key that has to have a fixed value."""
     return {
         "arbiter.engine": (scenario.arbiter.engine, Arbiter(system=scenario.rules.system).engine),
@@ -157,9 +157,9 @@ def fly_scenario(
     Parameters
     ----------
     plant : Plant
-        Of the scenario's vehicle.
+        Plant of the scenario's vehicle.
     scenario : Scenario
-        With nothing that `FusedFlyer` refuses.
+        Scenario without features that `FusedFlyer` refuses.
     trace : bool
         Return a trace.
     clock : ndarray of int
@@ -188,7 +188,7 @@ def fly_scenario(
     losses = plant.native(LOSSES, ())
     losses.inputs[:] = [plant[name] for name in LOSSES] if scenario.outages else 0.0
     setup = configure_flight(scenario, n if through else 0, clock)
-    allocator = failure_stages(scenario, setup) if through else _NONE
+    allocator = failure_stages(scenario, setup) if through else _NO_ALLOCATION
     decisions = -(-scenario.steps // scenario.control_every)
     criteria, rules = len(scenario.criteria), scenario.rules
     inputs = native.inputs.size
@@ -204,7 +204,7 @@ def exchanged_variables(scenario: Scenario) -> tuple[tuple[str, ...], tuple[str,
     Parameters
     ----------
     scenario : Scenario
-        What is flown.
+        The scenario.
 
     Returns
     -------
@@ -237,7 +237,7 @@ def configure_flight(scenario: Scenario, thrusters: int, clock: NDArray[np.int64
     Returns
     -------
     FlightConfig
-        With the regions at time 0.
+        Configuration with the regions at time 0.
     """
     sensing, step = scenario.sensing, scenario.time.step
     decisions = -(-scenario.steps // scenario.control_every)
@@ -290,14 +290,14 @@ def failure_stages(scenario: Scenario, setup: FlightConfig) -> Allocator:
     Parameters
     ----------
     scenario : Scenario
-        With the vehicle and its limits.
+        Scenario with the vehicle and its limits.
     setup : FlightConfig
-        With the scenario's failures.
+        Configuration with the scenario's failures.
 
     Returns
     -------
     Allocator
-        The first stage is without failures.
+        Arguments by stage; the first is without failures.
     """
     vehicle, limits = scenario.vehicle, scenario.actuation.limits
     health, stages = np.ones(vehicle.n_thrusters), []

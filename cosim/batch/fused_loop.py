@@ -38,7 +38,7 @@ from plant_fmu.running.native import Native
 Array = NDArray[np.float64]
 
 _SPHERE, _ATTITUDE = Sphere.kind, FIRST_OF_ATTITUDE
-_LAW = (POINTER,)  # arguments of a law's function
+_WORDS = (POINTER,)  # argument of the C functions of law and arbiter
 
 
 def fly(  # noqa: C901 - one loop, as a whole
@@ -66,20 +66,20 @@ def fly(  # noqa: C901 - one loop, as a whole
     losses : Native
         The same plant: inputs are the sensors' loss probabilities `LOSSES` before any outage.
     allocator : Allocator
-        For a wrench that thrusters give.
+        Allocation of a wrench that thrusters give.
     law : BoundLaw
-        Bound to the workspace's state and weights, to goal and regions of the setup, and to the plant's inputs as its
-        forces, or to the workspace's wrench if thrusters give it.
+        Law bound to the workspace's state and weights, to goal and regions of the setup, and to its output: the plant's
+        inputs, or the workspace's wrench if thrusters give it.
     arbiter : BoundArbiter
-        Bound to the workspace's inputs of the rules and weights of the criteria.
+        Arbiter bound to the workspace's inputs of the rules and weights of the criteria.
     workspace : Workspace
-        From `make_workspace`, a new one for each flight.
+        Workspace from `make_workspace`, a new one for each flight.
     out : FlightOutputs
         Receives the results of the flight, up to a failure of the FMU.
     """
     m, n, inputs = setup.thrusters, setup.regions.kinds.size, native.inputs
-    state, weights, clearances, seen = workspace.state, workspace.weights, workspace.clearances, workspace.seen
-    by_criterion, goal_clearance = workspace.by_criterion, workspace.goal_clearance
+    state, weights, by_criterion = workspace.state, workspace.weights, workspace.by_criterion
+    clearances, goal_clearance, seen = workspace.clearances, workspace.goal_clearance, workspace.arbiter_clearances
     arbiter_state = workspace.arbiter_state
     position, quaternion = native.outputs[:3], native.outputs[3:7]
     first_inside, last_entered, inside = -1, -1, False
@@ -121,8 +121,8 @@ def fly(  # noqa: C901 - one loop, as a whole
         if place > 0:
             for axis in range(3):
                 setup.goal.shifts[0, axis] += setup.goal_places[place - 1, axis]
-        _clearances(setup.regions, position, quaternion, clearances, workspace.at)
-        _clearances(setup.goal, position, quaternion, goal_clearance, workspace.at)
+        _clearances(setup.regions, position, quaternion, clearances, workspace.scratch)
+        _clearances(setup.goal, position, quaternion, goal_clearance, workspace.scratch)
         for i in range(n):
             if setup.regions.hard[i]:
                 if setup.regions.kinds[i] < _ATTITUDE:
@@ -163,7 +163,7 @@ def fly(  # noqa: C901 - one loop, as a whole
             arbiter_clearances = clearances
             write_arbiter_state(state, law.expected, arbiter_state)
             if not setup.exact:
-                _clearances(setup.regions, arbiter_state.position, arbiter_state.quaternion, seen, workspace.at)
+                _clearances(setup.regions, arbiter_state.position, arbiter_state.quaternion, seen, workspace.scratch)
                 arbiter_clearances = seen
             workspace.now[0] = now
             compute_inputs(
@@ -175,7 +175,7 @@ def fly(  # noqa: C901 - one loop, as a whole
                 arbiter_clearances,
                 workspace.signals,
             )
-            call_c(arbiter.address, _LAW, arbiter.words)
+            call_c(arbiter.address, _WORDS, arbiter.words)
             for i in range(n):
                 weights[i] = by_criterion[setup.criteria[i]]
         # law and allocation
@@ -183,7 +183,7 @@ def fly(  # noqa: C901 - one loop, as a whole
             started = seconds(setup.clock, workspace.ticks) if timed else 0.0
             steers = not setup.through_sensors or workspace.navigation.started[0] > 0.0  # there is a state estimate
             if steers:
-                call_c(law.address, _LAW, law.words)
+                call_c(law.address, _WORDS, law.words)
                 bound = law.report[setup.bound] if setup.bound >= 0 else np.nan
             else:
                 inputs[:] = 0.0
@@ -322,18 +322,18 @@ def fly_law(
     Parameters
     ----------
     setup, native, effectiveness, losses, allocator, workspace
-        As for `fly`.
+        Arguments of `fly`.
     law : CompiledLaw
-        A new one for each flight.
+        Law, a new one for each flight.
     rules : System
         Rules of the arbiter, for the workspace's inputs.
     trace : ndarray
-        As of `FlightOutputs`.
+        Array that becomes `FlightOutputs.trace`.
 
     Returns
     -------
     FlightMetrics, ndarray, shape (4,)
-        Metrics of the flight, and its last estimate.
+        Metrics of the flight, and the law's last estimate of phi [N, N m] (12).
 
     Raises
     ------

@@ -17,16 +17,16 @@ from controller.allocation import Allocation
 from controller.regions import pack
 from cosim.batch.lanes_library import lanes_library
 from cosim.batch.lanes_rows import Array, Rows, require_lanes
-from cosim.batch.outcome import Flown, Outcomes, nothing
+from cosim.batch.outcome import BatchResult, Outcomes, empty_outcomes
 from cosim.batch.variation import Variation
 from cosim.results.summary import SETTLED_FOR
 
 _REFUSAL = 512  # bytes of a message
-_MARKS = (
+_METRICS = (
     "first_inside", "last_entered", "inside", "least_clearance", "least_angle", "goal_clearance", "weighted_violation",
     "effort", "max_force", "max_speed", "final_x", "final_y", "final_z", "phi1", "phi2", "phi3", "phi4", "stopped",
 )  # fmt: skip
-_SAME = _MARKS[_MARKS.index("weighted_violation") : _MARKS.index("stopped")]  # by the names of outcomes
+_SAME = _METRICS[_METRICS.index("weighted_violation") : _METRICS.index("stopped")]  # outcomes of the same name
 
 
 class Batch(ctypes.Structure):
@@ -71,9 +71,9 @@ class LanesFlyer:
         self._fly: Any = library.lanes_fly
         self._fly.argtypes, self._fly.restype = [ctypes.POINTER(Batch)], ctypes.c_int
         self._batch, self._kept = Batch(), dict[str, NDArray[Any]]()
-        self._describe()
+        self._set_constant_fields()
 
-    def _describe(self) -> None:
+    def _set_constant_fields(self) -> None:
         """Set the fields that are the same for all rows."""
         base, rows, b = self.variation.base, self._rows, self._batch
         packed, thrusters = pack(rows.regions), base.actuation.through == "thrusters"
@@ -102,7 +102,7 @@ class LanesFlyer:
         self._kept[name] = numbers
         setattr(self._batch, name, numbers.ctypes.data)
 
-    def fly(self, values: Array, seeds: NDArray[np.int64]) -> Flown:
+    def fly(self, values: Array, seeds: NDArray[np.int64]) -> BatchResult:
         """Fly a batch.
 
         Parameters
@@ -114,10 +114,10 @@ class LanesFlyer:
 
         Returns
         -------
-        Flown
+        BatchResult
             Outcome of each row, or the reason why it was refused.
         """
-        outcomes = nothing(len(seeds))
+        outcomes = empty_outcomes(len(seeds))
         rows, refused = self._rows.fill(
             np.asarray(values, dtype=float).reshape(len(seeds), len(self.variation.keys)), seeds
         )
@@ -126,14 +126,14 @@ class LanesFlyer:
         good = np.array([not reason for reason in reasons], np.bool_)
         refused |= {int(at): reason for at, reason in zip(flown, reasons, strict=True) if reason}
         outcomes[flown[good]] = self._outcomes(metrics[good])
-        return Flown(outcomes, dict(sorted(refused.items())))
+        return BatchResult(outcomes, dict(sorted(refused.items())))
 
     def _fly_rows(self, rows: Array) -> tuple[Array, list[str]]:
         """Fly rows; return their metrics, shape (rows, metrics), and the plant's reasons for refusing them or ""."""
         n, b = len(rows), self._batch
         n_regions = b.n_regions
         b.n_rows, b.moving = n, bool(rows[:, rows.shape[1] - 3 * n_regions :].any())
-        metrics, refusals = np.zeros((n, len(_MARKS))), np.zeros(n, f"S{_REFUSAL}")
+        metrics, refusals = np.zeros((n, len(_METRICS))), np.zeros(n, f"S{_REFUSAL}")
         self._point("rows", rows)
         self._point("marks", metrics)
         self._point("refusals", refusals)
@@ -144,12 +144,12 @@ class LanesFlyer:
     def _outcomes(self, metrics: Array) -> Outcomes:
         """Convert metrics to outcomes."""
         step, steps = self._batch.step, self._batch.steps
-        by_name = dict(zip(_MARKS, metrics.T, strict=True))
+        by_name = dict(zip(_METRICS, metrics.T, strict=True))
 
         def when(at: Array) -> Array:
             return np.where(at >= 0.0, at * step, np.nan)
 
-        out = nothing(len(metrics))
+        out = empty_outcomes(len(metrics))
         inside, stopped = by_name["inside"] > 0.0, by_name["stopped"]
         last = np.where(stopped >= 0.0, stopped, steps)
         out["reached"], out["reach_time"] = by_name["first_inside"] >= 0.0, when(by_name["first_inside"])

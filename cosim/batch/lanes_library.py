@@ -28,7 +28,7 @@ from plant_fmu.vehicle_component import of_vehicle
 
 _TOKEN = "lanes"  # noqa: S105 -- not a secret: instantiation token, which no model description repeats
 _NARROW = ("-Wno-psabi",)  # only this library calls its functions with vectors
-_FMI = ("fmi3.c", "fmi3_unsupported.c")  # left out, since there is no importer
+_FMI = ("fmi3.c", "fmi3_unsupported.c")  # sources that are left out, since there is no importer
 
 # lanes per register, but at least four: vectors of two lanes take as long as those of four
 _WIDTH = """#ifdef __AVX512F__
@@ -37,7 +37,7 @@ _WIDTH = """#ifdef __AVX512F__
 #define LANES 4
 #endif
 """
-_OF_PLANT = ("plant.c", "actuators.c", "environment.c", "elementary.c")  # sources that a step needs
+_STEP_SOURCES = ("plant.c", "actuators.c", "environment.c", "elementary.c")  # sources of the plant that a step needs
 
 
 @functools.cache
@@ -57,7 +57,7 @@ def lanes_library(vehicle: Vehicle, flags: tuple[str, ...] = (), beside: Path | 
     Returns
     -------
     CDLL
-        With the functions of ``csrc/lanes.h``.
+        Library with the functions of ``csrc/lanes.h``.
 
     Raises
     ------
@@ -121,13 +121,13 @@ def machine_library(
 def _files(vehicle: Vehicle, beside: Path | None = None) -> dict[str, bytes]:
     """Return the C files: for one vehicle in ``one/``, for several in ``many/``, and wrappers that compile those."""
     component = of_vehicle(vehicle)
-    sources, own = c_sources(component, 3), _own("cosim/batch/csrc")
+    sources, own = c_sources(component, 3), _lanes_sources()
     for name in _FMI:
         del sources[name]
     one = {**sources, component.header: header(component, _TOKEN).encode(), "start.c": own["start.c"]}
     one |= {"lanes.h": own["lanes.h"], "arbiter.c": to_c(Arbiter().system).encode()}
     lanes = replace(component, name=f"{vehicle.name}_lanes")  # prefix of its functions
-    many = {name: text for name, text in sources.items() if name.endswith(".h") or name in _OF_PLANT}
+    many = {name: text for name, text in sources.items() if name.endswith(".h") or name in _STEP_SOURCES}
     many |= law_sources() | {name: text for name, text in own.items() if name != "start.c"}
     many |= {component.header: header(lanes, _TOKEN).encode(), "width.h": _WIDTH.encode()}
     if beside is not None:
@@ -138,9 +138,8 @@ def _files(vehicle: Vehicle, beside: Path | None = None) -> dict[str, bytes]:
     return files
 
 
-def _own(folder: str) -> dict[str, bytes]:
-    package, _, inside = folder.partition("/")
-    found = resources.files(package).joinpath(inside)
+def _lanes_sources() -> dict[str, bytes]:
+    found = resources.files("cosim.batch") / "csrc"
     return {file.name: file.read_bytes() for file in found.iterdir() if file.name.endswith((".c", ".h"))}
 
 

@@ -34,7 +34,7 @@ _VARIED = (
 )
 # parameters that start clocks in the plant
 _CLOCKED = ("depth_sensor.rate", "dvl.rate", "imu.rate", "compass.rate", "usbl.rate", "current_variation.")
-# numbers that are checked together: of a unit quaternion, and of shapes whose points must not coincide
+# numbers that are checked together: the parts of a unit quaternion, and shapes whose points must not coincide
 _JOINT = ("initial.quaternion.", "law.desired_quaternion.")
 _JOINT_SHAPES = (Pipe, Prism)
 _PAPER = "the paper's"
@@ -149,12 +149,12 @@ class Rows:
         for i, column in enumerate(columns.T):
             for side, extreme in enumerate((np.fmin.reduce(column), np.fmax.reduce(column))):
                 beyond = extreme < self._ranges[i, 0] if side == 0 else extreme > self._ranges[i, 1]
-                if beyond and self._takes(i, float(extreme)):
+                if beyond and self._accepts(i, float(extreme)):
                     self._ranges[i, side] = extreme
         within = (columns >= self._ranges[:, 0]) & (columns <= self._ranges[:, 1])
         return np.asarray(within.all(axis=1), np.bool_)
 
-    def _takes(self, i: int, value: float) -> bool:
+    def _accepts(self, i: int, value: float) -> bool:
         """Return True if the scenario accepts a value of key `i`, with all others as in the base."""
         values = [*self._base_values(), 0.0]
         values[i] = value
@@ -211,7 +211,7 @@ def require_lanes(scenario: Scenario) -> None:
         ("arbiter.engine", s.arbiter.engine, "closed"),
         ("arbiter.file", s.arbiter.file, ""),
         ("arbiter.rules", s.arbiter.rules, "ordered"),
-        ("criteria", _said(s), _PAPER),
+        ("criteria", _criteria_in_words(s), _PAPER),
         ("master.order", s.master.order, "gauss-seidel"),
         ("commands.enabled", s.commands.enabled, False),
         ("sensing", "noisy" if not s.sensing.exact else "exact", "exact"),
@@ -229,7 +229,7 @@ def require_lanes(scenario: Scenario) -> None:
         raise RunError(f"plant.substep is {s.plant.substep} s, expected a millionth of time.step or more for lanes")
 
 
-def _said(scenario: Scenario) -> str:
+def _criteria_in_words(scenario: Scenario) -> str:
     return _PAPER if scenario.has_paper_criteria else f"one's own ({', '.join(scenario.criterion_names)})"
 
 

@@ -37,18 +37,18 @@ FIELDS: dict[str, tuple[type, str, str]] = {
 
 OUTCOME = np.dtype([(name, kind) for name, (kind, _, _) in FIELDS.items()])
 
-Outcomes = NDArray[Any]  # of OUTCOME
+Outcomes = NDArray[Any]  # items of type OUTCOME
 
 
 @dataclass(frozen=True)
-class Flown:
-    """A batch of flights."""
+class BatchResult:
+    """Outcomes of a batch of flights."""
 
-    outcomes: Outcomes  # (rows,)
-    refused: dict[int, str] = field(default_factory=dict)  # by row in the batch: why scenario or plant refused it
+    outcomes: Outcomes  # (rows,); false and NaN in refused rows
+    refused: dict[int, str] = field(default_factory=dict)  # reason of scenario or plant, by row in the batch
 
 
-def nothing(rows: int) -> Outcomes:
+def empty_outcomes(rows: int) -> Outcomes:
     """Make empty outcomes: false and NaN.
 
     Parameters
@@ -59,7 +59,7 @@ def nothing(rows: int) -> Outcomes:
     Returns
     -------
     ndarray of OUTCOME, shape (rows,)
-        To be filled.
+        Outcomes to be filled.
     """
     outcomes = np.zeros(rows, OUTCOME)
     for name, (kind, _, _) in FIELDS.items():

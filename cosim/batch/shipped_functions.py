@@ -47,7 +47,7 @@ from plant_fmu.running.native import Native
 from plant_fmu.vehicle import load_vehicle
 
 _VEHICLE = "bluerov2_heavy"  # the functions do not depend on the vehicle
-_PERIOD = 0.02  # s
+_PERIOD = 0.02  # s, control period of the laws
 _INTEGERS, _FLAT, _TABLE = np.zeros(1, np.int64), np.zeros(1), np.zeros((1, 3))
 
 
@@ -57,7 +57,7 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     state = VehicleState(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(6), np.ones(1))
     yield navigate, (empty_measurements(), _FLAT, SensorModel(), empty_memory(), state)
     for law in LAWS.values():
-        yield law.function, _of_law(law, state, goal, regions)
+        yield law.function, _law_arguments(law, state, goal, regions)
     found = RegionEvaluation(_FLAT, _TABLE, _TABLE, _FLAT)
     yield evaluate_places, (RegionPlaces(goal, regions), state, found)
     yield evaluate_packed, (regions, state.position, state.quaternion, _FLAT, _TABLE, _TABLE, _FLAT)
@@ -67,10 +67,10 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     inputs = pack_inputs((), PAPER, PAPER_RULES, 1.0)
     yield write_arbiter_state, (state, _FLAT, state)
     yield compute_inputs, (inputs, goal, regions, state, _FLAT, _FLAT, empty_signals(inputs, 1, 3))
-    yield fly, _of_flight(goal, regions)
+    yield fly, _flight_arguments(goal, regions)
 
 
-def _of_law(
+def _law_arguments(
     law: type[CompiledLaw], state: VehicleState, goal: PackedRegions, regions: PackedRegions
 ) -> tuple[Any, ...]:
     gains, level = law.gains_type(), np.array([1.0, 0.0, 0.0, 0.0])
@@ -78,7 +78,7 @@ def _of_law(
     return state, goal, regions, _FLAT, gains, made.memory, np.zeros(made.n_forces)
 
 
-def _of_flight(goal: PackedRegions, regions: PackedRegions) -> tuple[Any, ...]:
+def _flight_arguments(goal: PackedRegions, regions: PackedRegions) -> tuple[Any, ...]:
     references = np.zeros(1, np.uint32)
     native = Native(0, 0, 0, 0, references, _FLAT, references, _FLAT, _INTEGERS)
     inputs = pack_inputs((), PAPER, PAPER_RULES, 1.0)
@@ -108,7 +108,7 @@ def write_libraries(platforms: str, folder: Path) -> None:
     Parameters
     ----------
     platforms : str
-        ``all``, by the compiler of the ziglang package, or ``native``, by any.
+        Platforms: ``all``, by the compiler of the ziglang package, or ``native``, by any compiler.
     folder : Path
         Output folder, with a subfolder for each platform.
 

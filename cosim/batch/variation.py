@@ -8,7 +8,7 @@ from typing import Any
 
 from controller import ControllerError
 from cosim.errors import ScenarioError
-from cosim.scenario.changes import joined, value_at
+from cosim.scenario.changes import join_keys, value_at
 from cosim.scenario.key_names import PARAMETERS
 from cosim.scenario.scenario import Scenario, validate_scenario
 from cosim.scenario.toml_file import place_of
@@ -33,7 +33,7 @@ class Variation:
     base : Scenario
         The base scenario.
     keys : tuple of str
-        In the order of their values.
+        Keys in the order of their values.
 
     Raises
     ------
@@ -57,12 +57,12 @@ class Variation:
         Parameters
         ----------
         key : str
-            As in `keys`.
+            Key, as in `keys`.
 
         Returns
         -------
         float, text, list or table
-            In the key's unit.
+            Value in the key's unit.
 
         Raises
         ------
@@ -79,7 +79,7 @@ class Variation:
         values : sequence of float
             One for each key, in its unit.
         seed : int
-            Of the measurement noise and the plant's random parts.
+            Seed of the measurement noise and the plant's random parts.
 
         Returns
         -------
@@ -99,7 +99,7 @@ class Variation:
             else:
                 at, last = place_of(table, key)
                 at[last] = value
-        table["changed"] = joined(table["changed"], (k for k, value in changes.items() if value != self.number(k)))
+        table["changed"] = join_keys(table["changed"], (k for k, value in changes.items() if value != self.number(k)))
         try:
             return validate_scenario(table, self.base.name, self.base.vehicle)
         except (PlantFmuError, ControllerError) as error:
@@ -113,18 +113,18 @@ class Variation:
         values : sequence of float
             One for each key.
         seed : int
-            As for `scenario`.
+            Seed, as for `scenario`.
 
         Returns
         -------
         list of str
-            ``key=value``, to the last bit.
+            Overrides ``key=value`` that keep each value to the last bit.
         """
         return [f"{key}={value!r}" for key, value in self._changes(values, seed)]
 
     def _changes(self, values: Sequence[float], seed: int) -> Iterator[tuple[str, float | int]]:
         for key, value in zip(self.keys, values, strict=True):
-            yield key, _as(self.number(key), float(value), key)
+            yield key, _convert(self.number(key), float(value), key)
         for key in self._seeds:
             yield key, int(seed)
 
@@ -136,7 +136,7 @@ class Variation:
         return True
 
 
-def _as(like: float | int, value: float, key: str) -> float | int:
+def _convert(like: float | int, value: float, key: str) -> float | int:
     """Convert a value to int if the key has one; numbers of shapes may be written as int, but are floats."""
     if isinstance(like, float) or key.startswith("goal.") or ".shape." in key:
         return value

@@ -93,7 +93,7 @@ class CommandDesk:
                     f"region is {command.region!r}, expected one of {', '.join(self._movable) or 'none'}"
                 )
             case ShiftRegion() if command.region in self._slots and not self._is_occupied(command.region):
-                raise CommandError(f"region is {command.region!r}: no such obstacle has come")
+                raise CommandError(f"region is {command.region!r}: no such obstacle has been added")
             case SetMission():
                 for item in command.items:
                     for inner in item.commands:

@@ -130,11 +130,11 @@ class Hub:
                 if region is not None:
                     self._change(region, time)
             case AddObstacle():
-                name = self._slot_names[self._slots.take(command.number)]
+                name = self._slot_names[self._slots.assign(command.number)]
                 self._change(name, time, Sphere(PARKED_POSITION, command.radius))
                 self._header["changes"][-1]["number"] = command.number  # for commands that move or remove it
             case RemoveObstacle():
-                self._slots.leave(command.number)
+                self._slots.release(command.number)
 
     def _change(self, name: str, time: float, shape: Shape | None = None) -> None:
         """Record a changed shape or gain of a region; default: those of the settings."""

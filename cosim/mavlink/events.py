@@ -7,7 +7,7 @@ from cosim.mavlink.messages import status
 from cosim.mavlink.vehicle.profile import MODE_NAMES
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.vehicle.view import View
-from cosim.simulation.commands.mission_executor import way
+from cosim.simulation.commands.mission_executor import passed_items
 
 _MARGIN = 0.01  # m or rad past a region's surface, beyond which it counts as entered or left
 _RELEASED = 1_000_000  # µs of simulated time without saturation, before its end is reported
@@ -62,7 +62,7 @@ class Events:
 
     def _watch_mission(self, before: int, now: int) -> None:
         """Report the mission items that were passed; items without a position are not reported."""
-        passed = way(self._context.mission_items, before, now) if before >= 0 else None
+        passed = passed_items(self._context.mission_items, before, now) if before >= 0 else None
         for item in [before, *passed[:-1]] if passed else []:
             self._reached_item(item)
 

@@ -18,7 +18,7 @@ from cosim.results.record import Record, load_record
 from cosim.results.required_columns import require_columns
 from cosim.results.run_result import SCENARIO
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.columns import names_of
+from cosim.simulation.columns import column_names
 from cosim.simulation.signals import Array
 
 _LONGEST_SLEEP = 0.5  # s
@@ -67,7 +67,7 @@ def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions,
         raise RunError(f"{folder}: holds no run ({SCENARIO} is missing)")
     scenario, record = load_scenario(folder / SCENARIO, imported=True), load_record(folder)
     require_columns(scenario, record)
-    known = set(names_of(scenario))  # further columns could separate columns that are read as one slice
+    known = set(column_names(scenario))  # further columns could separate columns that are read as one slice
     columns = [column for column in record.columns if column.name in known or column.name.startswith("law.")]
     autopilot = Autopilot(scenario, columns, options, commands=None, live=False)
     thread = LinkThread(autopilot, open_links(endpoints, options), scenario.time.step, max_lead(scenario, rate))

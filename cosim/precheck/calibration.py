@@ -19,11 +19,11 @@ from cosim.scenario.scenario import Limit, Scenario, Time
 from cosim.simulation.master import Master
 from cosim.simulation.signals import Array, Signals
 
-FORCE_BOUNDS = (50.0, 1000.0)  # N
-LAG_BOUNDS = (0.0, 2.0)  # s
+FORCE_BOUNDS = (50.0, 1000.0)  # N, bounds of the fitted force limit
+LAG_BOUNDS = (0.0, 2.0)  # s, bounds of the fitted lag
 
 _DURATION = 6.0  # s, twice what the paper's window takes
-_GRID = (13, 9)  # forces, evenly in their logarithm, and lags
+_GRID = (13, 9)  # number of forces, evenly in their logarithm, and of lags
 _MISSED = 10.0  # s, residual of a path that misses the overlap
 
 
@@ -31,9 +31,9 @@ _MISSED = 10.0  # s, residual of a path that misses the overlap
 class Fit:
     """The fitted limit and lag, and the window that they give."""
 
-    force: float  # N
-    time_constant: float  # s
-    window: tuple[float, float]  # s
+    force: float  # N, limit on the body force
+    time_constant: float  # s, lag behind the limit
+    window: tuple[float, float]  # s, entry into the overlap and exit
     cost: float  # s2, half the sum of squares
 
 
@@ -94,7 +94,7 @@ def calibrate(scenario: Scenario) -> Fit:
     Parameters
     ----------
     scenario : Scenario
-        Usually ``paper``.
+        The scenario, usually ``paper``.
 
     Returns
     -------

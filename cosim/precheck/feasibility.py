@@ -13,15 +13,15 @@ from controller.laws.deployable.path_planning.search import line_margin
 from controller.regions import Region
 from controller.regions.region_set import of_attitude
 from cosim.precheck.finding import Finding, status
+from cosim.precheck.path_search import SearchedPath, find_path, path_limits
 from cosim.precheck.region_intersection import Overlap, box_about, box_within, search
-from cosim.precheck.region_values import evaluated
-from cosim.precheck.way import Way, find_way, path_limits
+from cosim.precheck.region_values import evaluate_regions
 from cosim.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
 
 _MARGIN = 3.0  # m, margin around start and regions of the box that is searched
-_MAX_MARGIN = 1e5  # m
+_MAX_MARGIN = 1e5  # m, greatest margin that is tried
 
 
 def region_findings(scenario: Scenario) -> Iterator[Finding]:
@@ -35,7 +35,7 @@ def region_findings(scenario: Scenario) -> Iterator[Finding]:
     Yields
     ------
     Finding
-        Start; goal with all regions; regions together; overlaps of regions to keep out of; path.
+        Findings on the start, the goal with all regions, the regions together, overlaps to keep out of, and the path.
     """
     goal, start = scenario.goal_region, scenario.initial.position
     regions = [secondary.region for secondary in scenario.regions]
@@ -46,9 +46,9 @@ def region_findings(scenario: Scenario) -> Iterator[Finding]:
     yield from (_start(region, scenario) for region in violated)
     yield from _common(goal, placed, low, high, moving)
     yield from _between(placed, low, high)
-    yield _way(scenario, [r for r in placed if r not in violated], [r.name for r in violated])
+    yield _path(scenario, [r for r in placed if r not in violated], [r.name for r in violated])
     if scenario.goal_then:
-        text = f"The goal's next {len(scenario.goal_then)} places are not looked at: what is found is of the first."
+        text = f"The goal's next {len(scenario.goal_then)} places are not checked: the findings are for the first."
         yield Finding("regions", "next places", "note", text)
 
 
@@ -64,12 +64,12 @@ def _box(goal: Region, regions: Sequence[Region], start: tuple[float, float, flo
 
 
 def _clearance(region: Region, scenario: Scenario) -> float:
-    return float(evaluated([region], scenario.initial.position, scenario.initial.quaternion)[2][0])
+    return float(evaluate_regions([region], scenario.initial.position, scenario.initial.quaternion)[2][0])
 
 
 def _start(region: Region, scenario: Scenario) -> Finding:
     start = scenario.initial.position
-    _, (gradient,), (clearance,) = evaluated([region], start, scenario.initial.quaternion)
+    _, (gradient,), (clearance,) = evaluate_regions([region], start, scenario.initial.quaternion)
     turned = of_attitude(region.shape)
     text = f"The start violates {region.name} by {-clearance:.3f} {'rad' if turned else 'm'}."
     name, numbers = f"start, {region.name}", {"clearance": float(clearance)}
@@ -94,13 +94,13 @@ def _common(goal: Region, regions: Sequence[Region], low: Array, high: Array, mo
     box = box_within(goal, low, high)
     overlap = search([goal, *regions], *box)
     yield Finding(
-        "regions", "goal and regions", status(overlap.found), _said(overlap, "the goal and every region") + moving,
+        "regions", "goal and regions", status(overlap.found), _in_words(overlap, "the goal and every region") + moving,
         "" if overlap.found else _mend(goal, regions, box), _numbers(overlap),
     )  # fmt: skip
     if not overlap.found:
         together = search(regions, low, high)
         yield Finding(
-            "regions", "regions together", status(together.found), _said(together, "every region"),
+            "regions", "regions together", status(together.found), _in_words(together, "every region"),
             "" if together.found else f"Relax each of them by {-together.depth:.3f} m, or draw them together.",
             _numbers(together),
         )  # fmt: skip
@@ -137,29 +137,29 @@ def _between(regions: Sequence[Region], low: Array, high: Array) -> Iterator[Fin
         yield Finding("regions", "overlaps", "note", text, numbers=numbers)
 
 
-def _way(scenario: Scenario, kept: Sequence[Region], left_out: Sequence[str]) -> Finding:
+def _path(scenario: Scenario, kept: Sequence[Region], left_out: Sequence[str]) -> Finding:
     """Search a path by the deployable law's planner that satisfies all regions, or else the hard ones."""
     but = f", {', '.join(left_out)} left aside (violated at the start)" if left_out else ""
     soft = [region.name for region in kept if not region.hard]
-    way = _search(scenario, kept)
-    if way.found:
-        text = f"The deployable law's search finds a way that satisfies the regions all along{but}: {_measures(way)}."
-        return Finding("regions", "way", "holds", text, numbers=_way_numbers(way))
-    if soft and (way := _search(scenario, [region for region in kept if region.hard])).found:
+    path = _search(scenario, kept)
+    if path.found:
+        text = f"The deployable law's search finds a way that satisfies the regions all along{but}: {_measures(path)}."
+        return Finding("regions", "way", "holds", text, numbers=_path_numbers(path))
+    if soft and (path := _search(scenario, [region for region in kept if region.hard])).found:
         text = (
             f"The deployable law's search finds a way that satisfies the hard regions all along{but}, but none that "
-            f"satisfies {', '.join(soft)} too: {_measures(way)}."
+            f"satisfies {', '.join(soft)} too: {_measures(path)}."
         )
-        return Finding("regions", "way", "note", text, numbers=_way_numbers(way))
-    text = f"The deployable law's search finds no way from the start into the goal{but}, within {way.searched:g} s."
+        return Finding("regions", "way", "note", text, numbers=_path_numbers(path))
+    text = f"The deployable law's search finds no way from the start into the goal{but}, within {path.searched:g} s."
     width = 2.0 * line_margin(path_limits(_gains(scenario)))
     advice = f"Open a passage of at least {width:.2f} m between the regions."
-    return Finding("regions", "way", "fails", text, advice, _way_numbers(way))
+    return Finding("regions", "way", "fails", text, advice, _path_numbers(path))
 
 
-def _search(scenario: Scenario, regions: Sequence[Region]) -> Way:
+def _search(scenario: Scenario, regions: Sequence[Region]) -> SearchedPath:
     start = scenario.initial.position
-    return find_way(regions, scenario.goal_region, start, _gains(scenario), scenario.time.duration)
+    return find_path(regions, scenario.goal_region, start, _gains(scenario), scenario.time.duration)
 
 
 def _gains(scenario: Scenario) -> DeployableGains:
@@ -167,17 +167,17 @@ def _gains(scenario: Scenario) -> DeployableGains:
     return gains if isinstance(gains, DeployableGains) else DeployableGains()
 
 
-def _measures(way: Way) -> str:
-    corners = len(way.corners) - 2
+def _measures(path: SearchedPath) -> str:
+    corners = len(path.corners) - 2
     turns = "straight" if corners == 0 else f"{corners} corner{'s' if corners > 1 else ''}"
-    return f"{way.length:.1f} m, {turns}"
+    return f"{path.length:.1f} m, {turns}"
 
 
-def _way_numbers(way: Way) -> dict[str, float | bool]:
-    return {"found": way.found, "length": way.length, "clearance": way.clearance, "searched": way.searched}
+def _path_numbers(path: SearchedPath) -> dict[str, float | bool]:
+    return {"found": path.found, "length": path.length, "clearance": path.clearance, "searched": path.searched}
 
 
-def _said(overlap: Overlap, what: str) -> str:
+def _in_words(overlap: Overlap, what: str) -> str:
     if overlap.found:
         return f"Found a common point of {what} at {_point(overlap.point)}, {overlap.depth:.3f} m within all of them."
     if overlap.excluded:

@@ -24,7 +24,7 @@ def check_text(check: Check) -> str:
     Returns
     -------
     str
-        Several lines.
+        Text of several lines.
     """
     lines = [f"{check.title} ({check.scenario}; {check.vehicle}, {check.law} law)"]
     for topic, heading in _TOPICS.items():
@@ -53,7 +53,7 @@ def check_json(check: Check) -> str:
     Returns
     -------
     str
-        An object with ``holds`` and the findings, each with its numbers.
+        JSON object with ``holds`` and the findings, each with its numbers.
     """
     findings = [
         {

@@ -48,12 +48,12 @@ def check_scenario(scenario: Scenario) -> Check:
     Parameters
     ----------
     scenario : Scenario
-        With any law; (31)-(45) are checked for the paper's law only.
+        Scenario with any law; (31)-(45) are checked for the paper's law only.
 
     Returns
     -------
     Check
-        Of the true vehicle, and of the regions at time 0.
+        Findings on the true vehicle, and on the regions at time 0.
 
     Raises
     ------
@@ -73,6 +73,6 @@ def check_scenario(scenario: Scenario) -> Check:
         weights = start_weights(scenario)
         findings += [*gain_findings(scenario, weights), asked_finding(scenario, weights)]
     else:
-        text = f"(31)-(45) are of the paper's law, not of this one ({scenario.law.name}): passed over."
+        text = f"(31)-(45) hold for the paper's law alone: not checked for {scenario.law.name}."
         findings.append(Finding("law", "(38), (45)", "note", text))
     return Check(scenario.name, scenario.title, scenario.law.name, scenario.vehicle.name, tuple(findings))

@@ -20,8 +20,8 @@ from controller.regions.region_set import clearances_at
 Array = NDArray[np.float64]
 Vector3 = tuple[float, float, float]
 
-TOLERANCE = 0.01  # m, of the common depth
-_MOST_BOXES = 400_000  # in one round of halving
+TOLERANCE = 0.01  # m, accuracy of the common depth
+_MAX_BOXES = 400_000  # greatest number of boxes in one round of halving
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,9 @@ def common_depth(points: Array, regions: Sequence[Region]) -> Array:
     Parameters
     ----------
     points : ndarray, shape (m, 3)
-        [m, NED].
+        Points [m, NED].
     regions : sequence of Region
-        At least one.
+        Regions, at least one.
     """
     depths: Array = np.min([clearances_at(points, region) for region in regions], axis=0)
     return depths
@@ -63,7 +63,7 @@ def search(regions: Sequence[Region], low: Array, high: Array, tolerance: float 
     Parameters
     ----------
     regions : sequence of Region
-        At least one.
+        Regions, at least one.
     low, high : ndarray, shape (3,)
         Corners of the box [m, NED], finite.
     tolerance : float
@@ -72,7 +72,7 @@ def search(regions: Sequence[Region], low: Array, high: Array, tolerance: float 
     Returns
     -------
     Overlap
-        With `at_most` - `depth` at most `tolerance`, unless the search ended before.
+        Best point, with `at_most` - `depth` at most `tolerance` unless the search ended before.
     """
     half = 0.5 * (np.asarray(high, dtype=float) - low)
     centres = (np.asarray(low, dtype=float) + half)[None, :]
@@ -82,23 +82,23 @@ def search(regions: Sequence[Region], low: Array, high: Array, tolerance: float 
         depths = common_depth(centres, regions)
         at = int(np.argmax(depths))
         if depths[at] > best:
-            best_point, best = _polished(regions, centres[at], float(depths[at]), low, high)
+            best_point, best = _refine(regions, centres[at], float(depths[at]), low, high)
         reach = depths + float(np.linalg.norm(half))
         bound = max(best, min(bound, float(reach.max())))
         if bound - best <= tolerance:
             break
         open_boxes = centres[reach > best + tolerance]
-        if 8 * len(open_boxes) > _MOST_BOXES:
+        if 8 * len(open_boxes) > _MAX_BOXES:
             break
         half = 0.5 * half
         offsets = np.array(np.meshgrid(*([-1.0, 1.0],) * 3)).reshape(3, -1).T * half
         centres = (open_boxes[:, None, :] + offsets[None, :, :]).reshape(-1, 3)
-    best_point, best = _polished(regions, best_point, best, low, high)
+    best_point, best = _refine(regions, best_point, best, low, high)
     x, y, z = (float(c) for c in best_point)
     return Overlap((x, y, z), best, bound)
 
 
-def _polished(regions: Sequence[Region], point: Array, depth: float, low: Array, high: Array) -> tuple[Array, float]:
+def _refine(regions: Sequence[Region], point: Array, depth: float, low: Array, high: Array) -> tuple[Array, float]:
     """Improve a point by Nelder-Mead, since the least clearance is not smooth; return point and depth."""
     done = minimize(
         lambda p: -float(common_depth(p[None, :], regions)[0]), point, method="Nelder-Mead",
@@ -107,16 +107,16 @@ def _polished(regions: Sequence[Region], point: Array, depth: float, low: Array,
     return (np.asarray(done.x), -float(done.fun)) if -done.fun > depth else (point, depth)
 
 
-def box_about(regions: Sequence[Region], points: Sequence[Vector3], room: float) -> tuple[Array, Array]:
+def box_about(regions: Sequence[Region], points: Sequence[Vector3], margin: float) -> tuple[Array, Array]:
     """Return the corners of a box that holds points and the finite bounds of regions, with a margin.
 
     Parameters
     ----------
     regions : sequence of Region
-        May be empty; infinite bounds are ignored.
+        Regions, none or more; infinite bounds are ignored.
     points : sequence of tuple of float
-        At least one [m, NED].
-    room : float
+        Points, at least one [m, NED].
+    margin : float
         Margin [m].
 
     Returns
@@ -129,7 +129,7 @@ def box_about(regions: Sequence[Region], points: Sequence[Vector3], room: float)
         lowest, highest = np.array(region.shape.bounds())
         low = np.minimum(low, np.where(np.isfinite(lowest), lowest, np.inf))
         high = np.maximum(high, np.where(np.isfinite(highest), highest, -np.inf))
-    return low - room, high + room
+    return low - margin, high + margin
 
 
 def box_within(region: Region, low: Array, high: Array) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ from controller.regions import Region, pack
 Array = NDArray[np.float64]
 
 
-def evaluated(
+def evaluate_regions(
     regions: Sequence[Region], position: Sequence[float] | Array, quaternion: Sequence[float]
 ) -> tuple[Array, Array, Array]:
     """Evaluate regions at a pose, at their positions at time 0.
@@ -20,11 +20,11 @@ def evaluated(
     Parameters
     ----------
     regions : sequence of Region
-        n of them.
+        The n regions.
     position : sequence of float
-        [m, NED].
+        Position [m, NED].
     quaternion : sequence of float
-        From body to world.
+        Unit quaternion from body to world, scalar first.
 
     Returns
     -------

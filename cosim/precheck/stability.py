@@ -26,7 +26,7 @@ from controller.theory import (
 from controller.theory.conditions import least_of_potential_test
 from controller.theory.model import asymmetry, damping, least_inertia, restoring_defect, skew_defect
 from cosim.precheck.finding import Finding, status
-from cosim.precheck.region_values import evaluated
+from cosim.precheck.region_values import evaluate_regions
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_model, true_vehicle
 from cosim.simulation.arbitration import Arbitration
@@ -34,7 +34,7 @@ from fuzzy_arbiter import Arbiter
 
 Array = NDArray[np.float64]
 
-_ROUNDING = 1e-9  # of the greatest element
+_ROUNDING = 1e-9  # tolerance of defects, as a part of the greatest element
 _SAMPLES = 50  # velocities and attitudes at which a property is checked
 _LEVEL = (1.0, 0.0, 0.0, 0.0)  # a goal does not depend on attitude
 _STEP = 1e-4  # m, for the central differences of e_p
@@ -51,7 +51,7 @@ def vehicle_findings(scenario: Scenario) -> Iterator[Finding]:
     Yields
     ------
     Finding
-        In that order.
+        Findings on Property 1, 2, 3, and (12).
     """
     vehicle, model = true_vehicle(scenario), true_model(scenario)
     rng = np.random.default_rng(1)
@@ -113,7 +113,7 @@ def start_weights(scenario: Scenario) -> Array:
     """
     initial = scenario.initial
     secondary = [r.region for r in scenario.regions]
-    clearances = evaluated(secondary, initial.position, initial.quaternion)[2]
+    clearances = evaluate_regions(secondary, initial.position, initial.quaternion)[2]
     position, quaternion, velocity = map(np.array, (initial.position, initial.quaternion, initial.velocity))
     state = VehicleState(position, quaternion, velocity, np.ones(scenario.vehicle.n_thrusters))
     arbiter = Arbiter(system=scenario.rules.system, engine=scenario.arbiter.engine)
@@ -129,14 +129,14 @@ def gain_findings(scenario: Scenario, weights: Array) -> Iterator[Finding]:
     Parameters
     ----------
     scenario : Scenario
-        With the paper's law.
+        Scenario with the paper's law.
     weights : ndarray, shape (n,)
-        Of each secondary region at the start, from the arbiter.
+        Weight of each secondary region at the start, from the arbiter.
 
     Yields
     ------
     Finding
-        (38), first two conditions as one matrix; third; (45), first; second and third.
+        Findings on (38) 1 and 2 as one matrix, (38) 3, (45) 1, and (45) 2 and 3.
     """
     gains: Gains = scenario.law.gains
     model = true_model(scenario)
@@ -203,7 +203,7 @@ def _mend_attitude(model: Model, gains: Gains, slope: float) -> str:
 
 def _secondary(model: Model, gains: Gains, weights: Array, scenario: Scenario) -> Finding:
     regions = [secondary.region for secondary in scenario.regions]
-    values, gradients, _ = evaluated(regions, scenario.initial.position, scenario.initial.quaternion)
+    values, gradients, _ = evaluate_regions(regions, scenario.initial.position, scenario.initial.quaternion)
     alphas = np.array([region.gain for region in regions]) * weights
     active = (values > 0.0) & (alphas > 0.0)
     fit = secondary_fit(model.mass, np.linalg.norm(gradients[active], axis=1), alphas[active] / gains.k_q, gains)
@@ -261,7 +261,7 @@ def _damped(
 
 
 def _value_and_gradient(goal: Region, position: Array) -> tuple[float, Array]:
-    (value,), (gradient,), _ = evaluated([goal], position, _LEVEL)
+    (value,), (gradient,), _ = evaluate_regions([goal], position, _LEVEL)
     return float(value), gradient
 
 

@@ -12,7 +12,7 @@ from controller import paper_law
 from controller.paper_law import primary_error, secondary_error
 from controller.quaternion import error_parts, rotation_rows
 from cosim.precheck.finding import Finding, status
-from cosim.precheck.region_values import evaluated
+from cosim.precheck.region_values import evaluate_regions
 from cosim.precheck.thrust_margin import Margin, ThrustMargin, greatest_force, least_left, thrust_margin
 from cosim.results.wording import format_force
 from cosim.scenario.scenario import Scenario
@@ -20,7 +20,7 @@ from cosim.scenario.true_vehicle import true_vehicle
 
 Array = NDArray[np.float64]
 
-_ROUNDING = 1e-6  # N, of the linear programs
+_ROUNDING = 1e-6  # N, tolerance of the linear programs
 
 
 def thrust_findings(scenario: Scenario) -> Iterator[Finding]:
@@ -34,7 +34,7 @@ def thrust_findings(scenario: Scenario) -> Iterator[Finding]:
     Yields
     ------
     Finding
-        Holding still; one thruster lost, unless the first one fails.
+        Findings on holding still, and on one thruster lost unless the first one fails.
     """
     vehicle, phi = true_vehicle(scenario), scenario.true_restoring_parameters
     quaternion, current = np.array(scenario.law.desired_quaternion), np.array(scenario.plant.current)
@@ -96,19 +96,19 @@ def asked_finding(scenario: Scenario, weights: Array) -> Finding:
     Parameters
     ----------
     scenario : Scenario
-        With the paper's law.
+        Scenario with the paper's law.
     weights : ndarray, shape (n,)
-        Of each secondary region at the start, from the arbiter.
+        Weight of each secondary region at the start, from the arbiter.
 
     Returns
     -------
     Finding
-        Of the body force alone, at zero moment.
+        Finding on the body force alone, at zero moment.
     """
     gains, initial, vehicle = scenario.law.gains, scenario.initial, true_vehicle(scenario)
-    (f,), (slope,), _ = evaluated([scenario.goal_region], initial.position, initial.quaternion)
+    (f,), (slope,), _ = evaluate_regions([scenario.goal_region], initial.position, initial.quaternion)
     regions = [secondary.region for secondary in scenario.regions]
-    values, gradients, _ = evaluated(regions, initial.position, initial.quaternion)
+    values, gradients, _ = evaluate_regions(regions, initial.position, initial.quaternion)
     betas = np.array([region.gain for region in regions]) * weights / gains.k_q
     quaternion, desired = np.array(initial.quaternion), np.array(scenario.law.desired_quaternion)
     R, turned = rotation_rows(quaternion), error_parts(desired, quaternion)

@@ -39,8 +39,8 @@ class Margin:
 class ThrustMargin:
     """Forces that the thrusters of a vehicle at rest can give while its attitude is kept."""
 
-    hold: tuple[float, ...]  # (6,) N, N m, body frame: against current, weight and buoyancy
-    drag: float  # N, of the current
+    hold: tuple[float, ...]  # (6,) N, N m, body frame: wrench against current, weight and buoyancy
+    drag: float  # N, drag of the current
     excess_weight: float  # N, W - B
     thrust: Margin | None  # least over the directions, without `hold`; None if the limits exclude a zero wrench
     left: Margin | None  # least over the directions beside `hold`; None if `hold` alone is not feasible
@@ -53,9 +53,9 @@ def greatest_force(vehicle: Vehicle, direction_body: Array, hold: Array, alive: 
     Parameters
     ----------
     vehicle : Vehicle
-        Its thrusters and their limits.
+        Vehicle with its thrusters and their limits.
     direction_body : ndarray, shape (3,)
-        Unit vector, body frame.
+        Direction, a unit vector, body frame.
     hold : ndarray, shape (6,)
         Constant wrench that the thrusters give too [N, N m].
     alive : ndarray of bool, shape (n,)
@@ -64,7 +64,7 @@ def greatest_force(vehicle: Vehicle, direction_body: Array, hold: Array, alive: 
     Returns
     -------
     float or None
-        [N], at the moment of `hold`; None if `hold` is not feasible.
+        Greatest force [N] beside `hold`; None if `hold` is not feasible.
     """
     matrix = np.column_stack([vehicle.thruster_matrix, -np.r_[direction_body, 0.0, 0.0, 0.0]])
     bounds = [*zip(vehicle.thrust_min * alive, vehicle.thrust_max * alive, strict=True), (0.0, None)]
@@ -78,7 +78,7 @@ def held_wrench(model: Model, quaternion: Array, current: Array) -> Array:
     Parameters
     ----------
     model : Model
-        Its `mass` is the added mass alone, which causes Munk's moment.
+        Model whose `mass` is the added mass alone, which causes Munk's moment.
     quaternion : ndarray, shape (4,)
         Attitude, from body to world.
     current : ndarray, shape (3,)
@@ -99,7 +99,7 @@ def thrust_margin(vehicle: Vehicle, phi: Array, quaternion: Array, current: Arra
     vehicle : Vehicle
         The true vehicle.
     phi : ndarray, shape (4,)
-        Its restoring parameters [N, N m] (12).
+        Restoring parameters of the vehicle [N, N m] (12).
     quaternion : ndarray, shape (4,)
         Attitude that is kept, from body to world.
     current : ndarray, shape (3,)
@@ -108,7 +108,7 @@ def thrust_margin(vehicle: Vehicle, phi: Array, quaternion: Array, current: Arra
     Returns
     -------
     ThrustMargin
-        Over the 26 `DIRECTIONS`.
+        Least forces over the 26 `DIRECTIONS`.
     """
     hold = held_wrench(_added(vehicle, phi), quaternion, current)
     weightless = held_wrench(_added(vehicle, np.zeros(4)), quaternion, current)

@@ -27,7 +27,7 @@ from cosim.simulation.commands.commands import (
     SetMission,
     SetMode,
 )
-from cosim.simulation.commands.mission_executor import way
+from cosim.simulation.commands.mission_executor import passed_items
 from cosim.simulation.commands.settings import LiveSettings
 from cosim.simulation.commands.sources import read_log
 from cosim.simulation.environment import shape_center
@@ -129,7 +129,7 @@ class _Changes:
                 self._item, begun = max(self._item, 0) - 1, True
         if now is None or not 0 <= now < len(self._items) or (now == self._item and not begun):
             return
-        for item in way(self._items, self._item, now) or [now]:
+        for item in passed_items(self._items, self._item, now) or [now]:
             yield from self._items[item].commands
         self._item = now
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from cosim.errors import RunError
 from cosim.results.record import Record
 from cosim.scenario.scenario import Scenario
-from cosim.simulation.columns import names_of
+from cosim.simulation.columns import column_names
 
 log = logging.getLogger(__name__)
 
@@ -32,7 +32,7 @@ def require_columns(scenario: Scenario, record: Record) -> None:
     RunError
         If columns are missing or in another order; the message names some of them.
     """
-    expected, found = names_of(scenario), list(record.units)
+    expected, found = column_names(scenario), list(record.units)
     missing = [name for name in expected if name not in record.units]
     needed = [name for name in missing if not _is_optional(name)]
     if needed:

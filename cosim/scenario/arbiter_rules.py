@@ -19,11 +19,11 @@ from fuzzy_arbiter.formats import FORMATS, reads
 from plant_fmu.toml_tables import hint
 
 MAX_TEXT = 200_000  # characters of a file of rules
-MAX_INPUTS = 32
+MAX_INPUTS = 32  # inputs of a file of rules
 
 Kind = Literal["given", "time", "depth", "speed", "membership", "clearance", "closing_speed", "approach_time"]
-VEHICLE: dict[str, str] = {"time": "s", "depth": "m", "speed": "m/s"}  # signals of the vehicle, and their units
-OF_REGIONS: dict[str, tuple[str, str]] = {  # signals of a region or the goal; second: unit for regions of attitude
+VEHICLE_SIGNALS: dict[str, str] = {"time": "s", "depth": "m", "speed": "m/s"}  # signals of the vehicle, and their units
+REGION_SIGNALS: dict[str, tuple[str, str]] = {  # signals of a region or the goal; second: unit for regions of attitude
     "clearance": ("m", "rad"),
     "closing_speed": ("m/s", "rad/s"),
     "approach_time": ("s", "s"),
@@ -34,7 +34,7 @@ OF_REGIONS: dict[str, tuple[str, str]] = {  # signals of a region or the goal; s
 class InputSignal:
     """Source of an input of the rules."""
 
-    name: str  # of the input
+    name: str  # name of the input
     kind: Kind
     of: int = 0  # index of the criterion; or of the region, 0 for the goal
     unit: str = ""
@@ -48,6 +48,12 @@ class ArbiterRules:
 
     system: System  # one output for each criterion, in their order
     inputs: tuple[InputSignal, ...]  # one for each input
+
+    @property
+    def signals(self) -> tuple[InputSignal, ...]:
+        """The inputs; none if they are the memberships of the criteria, in their order."""
+        memberships = [("membership", i) for i in range(len(self.system.outputs))]
+        return () if [(signal.kind, signal.of) for signal in self.inputs] == memberships else self.inputs
 
 
 def read_rules(setup: ArbiterSetup) -> ArbiterSetup:
@@ -93,7 +99,7 @@ def check_rules(
     Parameters
     ----------
     setup : ArbiterSetup
-        From `read_rules`.
+        Setup from `read_rules`.
     criteria : tuple of CriterionSetup
         The criteria, each of which needs an output.
     regions : sequence of SecondaryRegion
@@ -196,7 +202,7 @@ def _signals(
     }
     of_criteria = {criterion.name: i for i, criterion in enumerate(criteria)}
     for name in names:
-        default = name if name in VEHICLE else f"membership.{name}" if name in of_criteria else None
+        default = name if name in VEHICLE_SIGNALS else f"membership.{name}" if name in of_criteria else None
         key, value = f"arbiter.inputs.{name}", setup.inputs.get(name, default)
         if value is None:
             raise ScenarioError(
@@ -206,17 +212,17 @@ def _signals(
             yield InputSignal(name, "given", course=_course(value, key), what="given")
             continue
         kind, _, of = value.partition(".")
-        if kind in VEHICLE and not of:
-            yield InputSignal(name, kind, unit=VEHICLE[kind], what=value)  # type: ignore[arg-type]
+        if kind in VEHICLE_SIGNALS and not of:
+            yield InputSignal(name, kind, unit=VEHICLE_SIGNALS[kind], what=value)  # type: ignore[arg-type]
         elif kind == "membership":
             _require_known(of, of_criteria, key, value, "criterion")
             yield InputSignal(name, "membership", of_criteria[of], what=value)
-        elif kind in OF_REGIONS:
+        elif kind in REGION_SIGNALS:
             _require_known(of, places, key, value, "region")
             place, unit = places[of]
-            yield InputSignal(name, kind, place, OF_REGIONS[kind][unit == "rad"], what=value)  # type: ignore[arg-type]
+            yield InputSignal(name, kind, place, REGION_SIGNALS[kind][unit == "rad"], what=value)  # type: ignore[arg-type]
         else:
-            forms = (*VEHICLE, "membership.CRITERION", *(f"{form}.REGION" for form in OF_REGIONS))
+            forms = (*VEHICLE_SIGNALS, "membership.CRITERION", *(f"{form}.REGION" for form in REGION_SIGNALS))
             raise ScenarioError(f"{key} is {value!r}, expected one of {', '.join(forms)}, or a number")
 
 

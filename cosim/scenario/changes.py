@@ -15,9 +15,9 @@ from plant_fmu.toml_tables import hint
 from plant_fmu.vehicle import Vehicle
 
 # keys that no title lists: texts, recording, reporting and commands; seeds, and the text of a named file
-_BESIDE = ("title", "changed", "compare", "intersection", "record", "commands")
-_SILENT = ("sensing.seed", "plant.parameters.seed", "arbiter.text")
-_NAMED = 3  # changes that a title spells out
+_UNLISTED_TABLES = ("title", "changed", "compare", "intersection", "record", "commands")
+_UNLISTED_KEYS = ("sensing.seed", "plant.parameters.seed", "arbiter.text")
+_MAX_LISTED = 3  # changes that a title spells out
 
 
 def changed_keys(before: dict[str, Any], after: dict[str, Any], vehicle: Vehicle) -> tuple[str, ...]:
@@ -33,7 +33,7 @@ def changed_keys(before: dict[str, Any], after: dict[str, Any], vehicle: Vehicle
     Returns
     -------
     tuple of str
-        With dots, as for ``--set``; the key of the whole list or shape if its length or type differs.
+        Keys with dots, as for ``--set``; that of the whole list or shape if its length or type differs.
     """
     known = known_parameters(vehicle)
     one, other = (
@@ -43,7 +43,7 @@ def changed_keys(before: dict[str, Any], after: dict[str, Any], vehicle: Vehicle
     law = other["law"]["name"]
     if law in LAWS and law != one["law"]["name"]:  # gains are compared with the new law's defaults
         one["law"] = one["law"] | {"gains": LAWS[law].gains_type()._asdict()}
-    return joined((), differing_keys(one, other))
+    return join_keys((), differing_keys(one, other))
 
 
 def differing_keys(before: Any, after: Any, path: str = "") -> Iterator[str]:
@@ -52,14 +52,14 @@ def differing_keys(before: Any, after: Any, path: str = "") -> Iterator[str]:
     Parameters
     ----------
     before, after : dict, or a value in one
-        Of tables, lists, texts and numbers.
+        Tables, lists, texts or numbers.
     path : str
         Key of `before` and `after`.
 
     Yields
     ------
     str
-        With dots; items of lists by name if they have one.
+        Key with dots; items of lists by name if they have one.
     """
     if isinstance(before, dict) and isinstance(after, dict):
         if before.get("type") == after.get("type") and (not path or before.keys() <= after.keys()):
@@ -80,7 +80,7 @@ def differing_keys(before: Any, after: Any, path: str = "") -> Iterator[str]:
         yield path
 
 
-def joined(before: Sequence[str], more: Iterable[str]) -> tuple[str, ...]:
+def join_keys(before: Sequence[str], more: Iterable[str]) -> tuple[str, ...]:
     """Join two lists of keys, each key once, without those that no title lists.
 
     Parameters
@@ -93,9 +93,9 @@ def joined(before: Sequence[str], more: Iterable[str]) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        In their order.
+        Keys in their order.
     """
-    varied = (key for key in more if key.partition(".")[0] not in _BESIDE and key not in _SILENT)
+    varied = (key for key in more if key.partition(".")[0] not in _UNLISTED_TABLES and key not in _UNLISTED_KEYS)
     return tuple(dict.fromkeys([*before, *varied]))
 
 
@@ -105,16 +105,16 @@ def value_at(table: dict[str, Any], key: str, vehicle: Vehicle) -> Any:
     Parameters
     ----------
     table : dict
-        Of the scenario, defaults filled in.
+        Table of the scenario, defaults filled in.
     key : str
-        As for ``--set``.
+        Key, as for ``--set``.
     vehicle : Vehicle
-        Of the scenario.
+        Vehicle of the scenario.
 
     Returns
     -------
     float, text, list or table
-        In the key's own unit.
+        Value in the key's own unit.
 
     Raises
     ------
@@ -136,22 +136,22 @@ def shown_title(table: dict[str, Any], vehicle: Vehicle, law: str) -> str:
     Parameters
     ----------
     table : dict
-        Of the scenario, defaults filled in.
+        Table of the scenario, defaults filled in.
     vehicle : Vehicle
-        Of the scenario.
+        Vehicle of the scenario.
     law : str
         Name of the law that flies it.
 
     Returns
     -------
     str
-        Such as ``Force limited to 108 N (changed: limit.force = 500 N)``.
+        Title, such as ``Force limited to 108 N (changed: limit.force = 500 N)``.
     """
     notes = [] if law in LAWS else [f"flown by {law}"]
     keys = [key for key in table["changed"] if law in LAWS or not f"{key}.".startswith("law.")]
     if keys:
-        more = f" and {len(keys) - _NAMED} more" if len(keys) > _NAMED else ""
-        notes.append(f"changed: {', '.join(_setting(table, key, vehicle) for key in keys[:_NAMED])}{more}")
+        more = f" and {len(keys) - _MAX_LISTED} more" if len(keys) > _MAX_LISTED else ""
+        notes.append(f"changed: {', '.join(_setting(table, key, vehicle) for key in keys[:_MAX_LISTED])}{more}")
     return f"{table['title']} ({'; '.join(notes)})" if notes else str(table["title"])
 
 

@@ -29,7 +29,7 @@ def colours_of_regions(scenario: Scenario) -> list[str]:
     Returns
     -------
     list of str
-        The goal's first, such as ``["#009E73", "#D55E00"]``.
+        Colours, the goal's first, such as ``["#009E73", "#D55E00"]``.
     """
     own = {criterion.name: criterion.colour for criterion in scenario.criteria}
     seen = dict.fromkeys(own, 0)

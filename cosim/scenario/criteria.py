@@ -41,12 +41,12 @@ class Reason:
     ramp: float | None = None  # m or rad, width of a ramp; None for the arbiter's
 
     def is_of(self, region: SecondaryRegion) -> bool:
-        """Return True if it applies to a region: clearance to regions in space, angle to those of attitude."""
+        """Return True if this reason applies to a region: clearance if in space, angle if of attitude."""
         other = "clearance" if of_attitude(region.region.shape) else "angle"
         return self.quantity != other
 
     def words(self, width: float) -> str:
-        """Describe it in words; `width` is that of the arbiter's ramp [m or rad]."""
+        """Describe the reason in words; `width` is that of the arbiter's ramp [m or rad]."""
         if self.term is None:
             return f"within {width if self.ramp is None else self.ramp:g} m or rad"
         unit = QUANTITIES[self.quantity]
@@ -75,7 +75,7 @@ def check_criteria(
     Raises
     ------
     ScenarioError
-        At the first invalid key.
+        If a key is invalid; the message names the first one.
     """
     if not 1 <= len(entries) <= MAX_CRITERIA:
         raise ScenarioError(f"criteria: {len(entries)} came, expected 1 to {MAX_CRITERIA}")

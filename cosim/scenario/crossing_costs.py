@@ -19,8 +19,8 @@ from cosim.scenario.arbiter_rules import ArbiterRules, InputSignal
 from cosim.scenario.tables import SecondaryRegion
 from fuzzy_arbiter import Arbiter, System
 
-_EQUAL = 2.0  # m
-_PREFERRED = 5.0
+_EQUAL = 2.0  # m, cost at share 1/2
+_PREFERRED = 5.0  # factor of the cost at share 1
 
 
 def with_crossing_costs(
@@ -31,13 +31,13 @@ def with_crossing_costs(
     Parameters
     ----------
     regions : tuple of SecondaryRegion
-        Of the scenario.
+        Secondary regions of the scenario.
     criteria : sequence of str
         Names of the criteria, by descending priority.
     rules : ArbiterRules
         Rules that weigh the criteria.
     depth : float
-        Of the vehicle at the start [m], for rules with this input; speed and time are 0.
+        Depth of the vehicle at the start [m], for rules with this input; speed and time are 0.
     """
     soft = {r.criterion for r in regions if not r.region.hard and not of_attitude(r.region.shape)}
     if not soft:

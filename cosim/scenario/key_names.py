@@ -11,7 +11,7 @@ from plant_fmu.vehicle import Vehicle
 
 PARAMETERS = "plant.parameters."
 
-_WORDS = {  # for keys whose parts make no clear name
+_WORDS = {  # names of keys whose parts make no clear name
     "time.duration": "duration",
     "time.step": "time step",
     "time.control": "control period",
@@ -36,14 +36,14 @@ _WORDS = {  # for keys whose parts make no clear name
     "commands.hold_radius": "radius held in",
     "commands.surface_depth": "depth when surfaced",
 }
-_AXES = {3: "xyz", 4: "wxyz", 6: "uvwpqr"}  # by the length of the vector
+_AXES = {3: "xyz", 4: "wxyz", 6: "uvwpqr"}  # names of a vector's elements, by its length
 
 
 class KeyName(NamedTuple):
     """Name of a key in words, and its unit."""
 
     words: str
-    unit: str  # "" for a pure number, or if it is not known
+    unit: str  # unit; "" for a pure number, or if it is not known
 
     @property
     def label(self) -> str:
@@ -57,16 +57,16 @@ def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
     Parameters
     ----------
     key : str
-        With dots, as for ``--set``; a key of the scenario.
+        Key of the scenario, with dots, as for ``--set``.
     table : dict
-        Of the scenario, defaults filled in.
+        Table of the scenario, defaults filled in.
     vehicle : Vehicle
-        Of the scenario.
+        Vehicle of the scenario.
 
     Returns
     -------
     KeyName
-        Such as ``start position y`` and ``m``.
+        Name and unit, such as ``start position y`` and ``m``.
     """
     if key.startswith(PARAMETERS):
         name = key.removeprefix(PARAMETERS)
@@ -79,10 +79,10 @@ def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
     if head == "regions" and len(rest) > 1:
         regions = table["regions"]
         at = next((r for r in regions if r["name"] == rest[0]), None) or regions[int(rest[0])]
-        return _of_region(at["name"], at, rest[1:])
+        return _region_key_name(at["name"], at, rest[1:])
     if head == "goal" and rest:
         own = rest[0] in ("velocity", "streamed", "then", "stay")
-        return _of_region("the goal", table["goal"] | {"shape": table["goal"]}, rest if own else ["shape", *rest])
+        return _region_key_name("the goal", table["goal"] | {"shape": table["goal"]}, rest if own else ["shape", *rest])
     if head in ("failures", "outages") and len(rest) == 2:
         return KeyName(f"{rest[1]} of {head[:-1]} {rest[0]}", KEYS[f"{head}[].{rest[1]}"].unit)
     if head == "criteria" and len(rest) > 1:
@@ -98,7 +98,7 @@ def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
     return KeyName(_WORDS.get(key, key.replace(".", " ").replace("_", " ")), unit)
 
 
-def _of_region(name: str, region: dict[str, Any], path: list[str]) -> KeyName:
+def _region_key_name(name: str, region: dict[str, Any], path: list[str]) -> KeyName:
     """Return the name of a key of a region or of its shape."""
     if path[0] == "shape" and len(path) > 1:
         _, key, *places = path

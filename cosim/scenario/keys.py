@@ -17,9 +17,9 @@ class Key(NamedTuple):
     """Unit and meaning of a key, in Markdown."""
 
     unit: str
-    meaning: str  # in a few words
+    meaning: str  # meaning in a few words
     more: str = ""  # addition for the reference
-    default: str = ""  # in words, unless the tables have it as a value
+    default: str = ""  # default in words, unless the tables have it as a value
 
 
 # by the path to the key; regions[] means each region
@@ -39,7 +39,7 @@ KEYS = {
     "compare": Key("", '`"paper"` puts the paper\'s claims beside the run'),
     "intersection": Key("", "names of the regions, to be kept out of, whose overlap is reported", default="all"),
     "report_failures": Key("", "law and allocation are informed when a thruster fails"),
-    "time.duration": Key("s", "of the run"),
+    "time.duration": Key("s", "duration of the run"),
     "time.step": Key("s", "co-simulation step; the other periods are whole multiples"),
     "time.control": Key("s", "period of the law", default="the step"),
     "time.arbiter": Key("s", "period of the arbiter", default="the step"),
@@ -49,13 +49,13 @@ KEYS = {
     "plant.parameters": Key(
         "", "parameters of the FMU over those of the vehicle, such as `mass` or `r_G.z`", "; not for the law"
     ),
-    "initial.position": Key("m", "north east down"),
-    "initial.quaternion": Key("", "body to world, scalar first"),
-    "initial.velocity": Key("m/s, rad/s", "body frame"),
+    "initial.position": Key("m", "position at time 0, north east down"),
+    "initial.quaternion": Key("", "attitude at time 0, body to world, scalar first"),
+    "initial.velocity": Key("m/s, rad/s", "velocity at time 0, body frame"),
     "goal": Key("", "a shape in space: the primary region", ", see below"),
-    "goal.velocity": Key("m/s", "as of a region", ", below", default="0 0 0"),
-    "goal.streamed": Key("", "as of a region", ", below", default="false"),
-    "goal.then": Key("m", "middles of the goal, north east down, where it is next in turn", ", below", default="none"),
+    "goal.velocity": Key("m/s", "velocity of the goal, north east down", "; as `regions[].velocity`", default="0 0 0"),
+    "goal.streamed": Key("", "moved from outside during the run", "; as `regions[].streamed`", default="false"),
+    "goal.then": Key("m", "next centres of the goal in turn, north east down", ", below", default="none"),
     "goal.stay": Key("s", "time within the goal before the goal moves to its next place", default="5"),
     "law.name": Key(
         "", "one of `controller.LAWS`",
@@ -64,12 +64,12 @@ KEYS = {
     ),
     "law.desired_quaternion": Key("", "attitude to be kept, body to world, scalar first"),
     "law.gains": Key(
-        "", "of that law", "; of the paper's law section VII: `k_p1 k_p2 k_q k_v1 k_v2 sigma_p sigma_a gamma`",
+        "", "gains of that law", "; the paper's law, section VII: `k_p1 k_p2 k_q k_v1 k_v2 sigma_p sigma_a gamma`",
         default="the law's own",
     ),
     "arbiter.engine": Key("", "`closed`, `exact`, `grid` or `skfuzzy`", "; see [arbiter.md](arbiter.md#engines)"),
     "arbiter.ramp": Key("m", "width over which a membership falls outside its region; rad for regions of attitude"),
-    "arbiter.points": Key("", "of the output universe, for `grid` and `skfuzzy`"),
+    "arbiter.points": Key("", "samples of the output universe, for `grid` and `skfuzzy`"),
     "arbiter.rules": Key(
         "", "`ordered`: by the criteria's order; `reversed`, `crisp`, `none`: to compare with",
         ", see [criteria.md](criteria.md#to-compare-with); not beside a file",
@@ -78,18 +78,21 @@ KEYS = {
         "", "rules of one's own, beside the file that names it",
         ": any format of [fuzzy_arbiter](arbiter.md#formats), see [criteria.md](criteria.md#rules-of-ones-own)",
     ),
-    "arbiter.text": Key("", "what stands in it", "; runs write it into their folder"),
-    "arbiter.inputs": Key("", "what each input of these rules gets", default="none"),
+    "arbiter.text": Key("", "content of that file", "; runs write it into their folder"),
+    "arbiter.inputs": Key("", "signal for each input of these rules", default="none"),
     "criteria": Key(
-        "", "what regions may ask attention for", ", see [criteria.md](criteria.md)", default="the paper's three"
+        "", "reasons for which regions ask for attention", ", see [criteria.md](criteria.md)",
+        default="the paper's three",
     ),
-    "criteria[].name": Key("", "its own: a letter, then at most 23 letters, digits and _"),
+    "criteria[].name": Key("", "unique name: a letter, then at most 23 letters, digits and _"),
     "criteria[].order": Key("", "priority: the least comes first", default="its place in the list"),
-    "criteria[].colour": Key("", "of figures and pages, `#RRGGBB`", default="one that no other has"),
-    "criteria[].membership": Key("", "why it asks: of `ramp`, `clearance`, `angle`, `approach_time` the strongest",
-        default="`arbiter.ramp`"),
+    "criteria[].colour": Key("", "colour in figures and pages, `#RRGGBB`", default="one that no other has"),
+    "criteria[].membership": Key(
+        "", "memberships by `ramp`, `clearance`, `angle`, `approach_time`; the greatest counts",
+        default="`arbiter.ramp`",
+    ),
     "limit.force": Key(
-        "N", "on the norm of the direct body force", "; direction kept, moment left alone; not with thrusters"
+        "N", "limit on the norm of the direct body force", "; direction kept, moment left alone; not with thrusters"
     ),
     "limit.time_constant": Key("s", "lag behind that limit"),
     "actuation.through": Key(
@@ -102,13 +105,13 @@ KEYS = {
         ": what the navigation filter makes of them, see [navigation.md](navigation.md)",
     ),
     "sensing.position_noise": Key("m", "standard deviation of each measured coordinate"),
-    "sensing.velocity_noise": Key("m/s", "the same of each measured linear velocity, body frame"),
-    "sensing.seed": Key("", "of the noise"),
-    "sensing.dead_from": Key("s", "when measured position and linear velocity are lost"),
-    "sensing.dead_for": Key("s", "for how long"),
-    "sensing.frozen": Key("", "in that time the last values are held, instead of NaN"),
+    "sensing.velocity_noise": Key("m/s", "standard deviation of each measured linear velocity, body frame"),
+    "sensing.seed": Key("", "seed of the noise"),
+    "sensing.dead_from": Key("s", "time at which measured position and linear velocity are lost"),
+    "sensing.dead_for": Key("s", "duration of that loss"),
+    "sensing.frozen": Key("", "the last values are held during that loss, instead of NaN"),
     "master.order": Key(
-        "", "`gauss-seidel`, or `jacobi`: each part on what all had put out a step before",
+        "", "`gauss-seidel`, or `jacobi`: each part uses the outputs of the step before",
         ", see [The order of a step](#the-order-of-a-step)",
     ),
     "record.lyapunov": Key(
@@ -119,37 +122,37 @@ KEYS = {
         "", "the running vehicle takes [commands](mavlink.md) from outside", "; `cosim run --commands` sets it"
     ),
     "commands.await_arm": Key("", "nothing moves before it is armed", "; `--await-arm` sets it"),
-    "commands.obstacles": Key("", "spheres to be kept out of that may come in while it runs; 100 at most"),
-    "commands.obstacle_radius": Key("m", "of one whose size is not given"),
-    "commands.obstacle_gain": Key("N", "of each, per unit of g"),
-    "commands.hold_radius": Key("m", "of the sphere that the vehicle holds in, and surfaces in"),
-    "commands.surface_depth": Key("m", "of that sphere's centre when it surfaces"),
-    "commands.pilot_gain": Key("", "part of the greatest wrench along an axis that full sticks give"),
+    "commands.obstacles": Key("", "greatest number of obstacles that commands add during the run, up to 100"),
+    "commands.obstacle_radius": Key("m", "radius of an obstacle whose size is not given"),
+    "commands.obstacle_gain": Key("N", "gain of each obstacle, per unit of g"),
+    "commands.hold_radius": Key("m", "radius of the target sphere in modes hold and surface"),
+    "commands.surface_depth": Key("m", "depth of that sphere's centre in mode surface"),
+    "commands.pilot_gain": Key("", "part of the greatest wrench along an axis that a full stick commands"),
     "failures": Key("", "thrusters that fail; only where `thrusters` carry the wrench", default="none"),
-    "failures[].thruster": Key("", "from 1"),
-    "failures[].time": Key("s", "from when on it fails"),
-    "failures[].effectiveness": Key("", "part of its force that is left, 0 to 1"),
+    "failures[].thruster": Key("", "number of the thruster, from 1"),
+    "failures[].time": Key("s", "time of the failure"),
+    "failures[].effectiveness": Key("", "part of its force that remains, 0 to 1"),
     "failures[].stuck": Key("", "it keeps the force that was commanded last"),
     "outages": Key("", "times in which a sensor gives no samples; where sensing is through `sensors`", default="none"),
     "outages[].sensor": Key("", "`depth_sensor`, `dvl`, `imu`, `compass` or `usbl`"),
-    "outages[].time": Key("s", "when it begins"),
-    "outages[].duration": Key("s", "for how long"),
+    "outages[].time": Key("s", "beginning of the outage"),
+    "outages[].duration": Key("s", "duration of the outage"),
     "regions": Key("", "secondary regions", default="none"),
-    "regions[].name": Key("", "its own: letters, digits, blanks, - and _"),
-    "regions[].criterion": Key("", "one of criteria", ": whose weight multiplies its gain"),
+    "regions[].name": Key("", "unique name: letters, digits, blanks, - and _"),
+    "regions[].criterion": Key("", "name of the criterion", " whose weight multiplies the gain"),
     "regions[].keep": Key("", "`in` or `out`"),
     "regions[].gain": Key("", "alpha of section VII"),
     "regions[].shape": Key("", "a shape", ", below"),
-    "regions[].velocity": Key("m/s", "north east down; the law receives it"),
+    "regions[].velocity": Key("m/s", "velocity, north east down; the law receives it"),
     "regions[].streamed": Key("", "moved from outside during the run", ", below"),
     "regions[].deviation": Key(
         "m", "standard deviation of its place, or three: north, east, down", ": margins of the deployable law grow"
     ),
     "regions[].priority": Key(
-        "", "by which its violation counts in the score", ": `weighted_violation`; neither arbiter nor law is given it"
+        "", "factor of its violation in the score", " `weighted_violation`; neither arbiter nor law receives it"
     ),
     "regions[].hard": Key(
-        "", "must not be violated", "; the paper's law, and a law of plain potentials, do not ask"
+        "", "must not be violated", "; the paper's law and laws of plain potentials do not use it"
     ),
 }  # fmt: skip
 
@@ -168,12 +171,12 @@ def unit_of_shape(kind: str, key: str) -> str:
     kind : str
         Type of the shape, such as ``"sphere"``.
     key : str
-        Such as ``"radius"``.
+        Key of the shape, such as ``"radius"``.
 
     Returns
     -------
     str
-        Empty if it has none.
+        Unit; empty if the key has none.
     """
     return ENTRIES[kind].units.get(key, "") if kind in ENTRIES else ""
 
@@ -200,14 +203,14 @@ def unit_of_gain(law: str, gain: str) -> str:
     Parameters
     ----------
     law : str
-        Its name.
+        Name of the law.
     gain : str
-        Such as ``"k_p1"``.
+        Name of the gain, such as ``"k_p1"``.
 
     Returns
     -------
     str
-        Empty if it has none, or if it is not known.
+        Unit; empty if the gain has none, or if it is not known.
     """
     unit = _UNIT.match(_gain_comments(law).get(gain, ""))
     return unit[0] if unit else ""

@@ -20,19 +20,19 @@ def law_of(scenario: Scenario) -> CompiledLaw:
     Parameters
     ----------
     scenario : Scenario
-        With the law's name, gains and vehicle.
+        Scenario with the law's name, gains and vehicle.
 
     Returns
     -------
     CompiledLaw
-        With the vehicle's nominal model: it does not receive changes of the plant by the scenario.
+        Law with the vehicle's nominal model: it does not receive the scenario's `plant.parameters`.
 
     Raises
     ------
     LawError
-        If it cannot be set up.
+        If the law cannot be set up.
     RunError
-        If it is a custom law.
+        If the scenario has a custom law.
     """
     require_builtin_law(scenario)
     return LAWS[scenario.law.name].for_vehicle(
@@ -61,17 +61,17 @@ def with_custom_law(law: Law, scenario: Scenario) -> Scenario:
     law : Law
         The custom law.
     scenario : Scenario
-        With any law.
+        Scenario with any law.
 
     Returns
     -------
     Scenario
-        With the source of the law as ``law.name``, and no gains.
+        Scenario with the source of the law as ``law.name``, and no gains.
 
     Raises
     ------
     LawError
-        If it does not implement `controller.Law`, such as a plain function.
+        If the law does not implement `controller.Law`, such as a plain function.
     ScenarioError
         If the scenario needs a built-in law, or applies a wrench while the law drives thrusters.
     """

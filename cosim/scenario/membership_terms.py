@@ -17,7 +17,7 @@ from fuzzy_arbiter.terms.parser import Node
 from fuzzy_arbiter.terms.values import Formula
 
 _REACH = 1000.0  # m, rad or s: bound of the arguments for which a formula must give degrees
-MAX_WAITING = 32  # stack depth of a formula
+MAX_STACK = 32  # stack depth of a formula
 FUNCTIONS = (
     *("+", "-", "*", "/", "^", "pow", "~", "abs", "sqrt", "exp", "log", "cos", "sin", "tan"),
     *("min", "max", "lt", "le", "gt", "ge", "eq", "neq"),
@@ -33,9 +33,9 @@ def read_term(data: Any, of_time: bool, where: str) -> Membership:
     data : object
         Points, or a table with a kind and its numbers.
     of_time : bool
-        True if its argument is the time to contact, which is never below 0.
+        True if the argument is the time to contact, which is never below 0.
     where : str
-        Its key, for error messages.
+        Key of the term, for error messages.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def read_term(data: Any, of_time: bool, where: str) -> Membership:
     Raises
     ------
     ScenarioError
-        If it is invalid, a curve that jumps, or has functions that runs do not support.
+        If the term is invalid, is a curve that jumps, or has functions that runs do not support.
     """
     return _read(json.dumps(data, default=str), of_time, where)
 
@@ -71,12 +71,12 @@ def _read(value: str, of_time: bool, where: str) -> Membership:
     if isinstance(term, Curve) and term.jumps:
         raise ScenarioError(f"{where}: {term.kind} {list(term.parameters)} jumps, expected a change without jumps")
     for _, tree in pieces_of(term):
-        unknown = next((word for word in _called(tree) if word not in FUNCTIONS), None)
+        unknown = next((word for word in _functions_in(tree) if word not in FUNCTIONS), None)
         if unknown is not None:
             known = ", ".join(word for word in FUNCTIONS if word.isalpha())
             raise ScenarioError(f"{where}: the function {unknown!r}, expected of {known}; arbiter.file takes any")
-        if _waiting(tree) > MAX_WAITING:
-            raise ScenarioError(f"{where}: a formula nested so deep, expected at most {MAX_WAITING} numbers that wait")
+        if _stack_depth(tree) > MAX_STACK:
+            raise ScenarioError(f"{where}: a formula nested so deep, expected at most {MAX_STACK} numbers that wait")
     return term
 
 
@@ -91,12 +91,12 @@ def pieces_of(term: Membership) -> list[tuple[float, Node]]:
     return [(float("inf"), term.expression(["x"]).tree)] if isinstance(term, Formula) else []
 
 
-def _called(tree: Node) -> list[str]:
-    return [tree[0], *(word for part in tree[1:] for word in _called(part))] if isinstance(tree, tuple) else []
+def _functions_in(tree: Node) -> list[str]:
+    return [tree[0], *(word for part in tree[1:] for word in _functions_in(part))] if isinstance(tree, tuple) else []
 
 
-def _waiting(tree: Node) -> int:
-    return max(k + _waiting(part) for k, part in enumerate(tree[1:])) if isinstance(tree, tuple) else 1
+def _stack_depth(tree: Node) -> int:
+    return max(k + _stack_depth(part) for k, part in enumerate(tree[1:])) if isinstance(tree, tuple) else 1
 
 
 def term_in_words(term: Membership, unit: str) -> str:
@@ -105,14 +105,14 @@ def term_in_words(term: Membership, unit: str) -> str:
     Parameters
     ----------
     term : Membership
-        From `read_term`.
+        Term from `read_term`.
     unit : str
-        Unit of its argument.
+        Unit of the term's argument.
 
     Returns
     -------
     str
-        Points, a kind and its parameters, or a formula.
+        Points, kind and parameters, or formula, as text.
     """
     if isinstance(term, Shape):
         return ", ".join(f"{degree:g} at {place:g} {unit}" for place, degree in term.points)

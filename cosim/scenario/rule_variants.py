@@ -21,17 +21,17 @@ def rules_by_order(variant: RuleVariant, criteria: tuple[CriterionSetup, ...], p
     Parameters
     ----------
     variant : {"ordered", "reversed", "crisp", "none"}
-        ``ordered`` as in section VI of the paper; ``reversed`` with the order reversed; ``crisp`` with memberships
-        rounded to 0 or 1; ``none`` with each weight by its own input, which is the constant 1.
+        Variant: ``ordered`` as in section VI of the paper; ``reversed`` with the order reversed; ``crisp`` with
+        memberships rounded to 0 or 1; ``none`` with each weight by its own input, which is the constant 1.
     criteria : tuple of CriterionSetup
-        By descending priority.
+        Criteria by descending priority.
     points : int
         Samples of the outputs, for engines that sample.
 
     Returns
     -------
     System
-        With an input named like each criterion, and its weight as output, in the order of the criteria.
+        System with an input named like each criterion, and its weight as output, in the order of the criteria.
     """
     fuzzy = [criterion.fuzzy for criterion in criteria]
     if variant == "reversed":

@@ -19,7 +19,7 @@ from controller.regions.shape import Shape
 from controller.restoring import parameters
 from cosim.errors import ScenarioError
 from cosim.scenario.arbiter_rules import ArbiterRules, check_rules, read_rules
-from cosim.scenario.changes import changed_keys, differing_keys, joined, shown_title
+from cosim.scenario.changes import changed_keys, differing_keys, join_keys, shown_title
 from cosim.scenario.criteria import PAPER, CriterionSetup, check_criteria, check_criteria_of_regions
 from cosim.scenario.crossing_costs import with_crossing_costs
 from cosim.scenario.keys import comments
@@ -43,7 +43,7 @@ from cosim.scenario.tables import (
     TimeEntry,
     Vector3,
 )
-from cosim.scenario.toml_file import flat, list_scenarios, override, read_table, set_key
+from cosim.scenario.toml_file import flatten, list_scenarios, override, read_table, set_key
 from cosim.scenario.toml_text import scenario_text
 from cosim.scenario.validation import (
     check_commands,
@@ -85,14 +85,14 @@ class Scenario:
     vehicle: Vehicle
     vehicle_file: Path | None  # file of the vehicle; None for a shipped one
     time: Time
-    steps: int  # of the plant
-    control_every: int  # steps
-    arbiter_every: int  # steps
+    steps: int  # number of plant steps
+    control_every: int  # plant steps between two control steps
+    arbiter_every: int  # plant steps between two evaluations of the arbiter
     plant: PlantSetup
     initial: Initial
     law: LawSetup
     arbiter: ArbiterSetup
-    criteria: tuple[CriterionSetup, ...]  # by descending priority
+    criteria: tuple[CriterionSetup, ...]  # criteria by descending priority
     rules: ArbiterRules  # rules that weigh the criteria
     limit: Limit
     actuation: Actuation
@@ -126,7 +126,7 @@ class Scenario:
         Returns
         -------
         str
-            In TOML, with every default filled in.
+            TOML text, with every default filled in.
         """
         return scenario_text(
             self.table | ({"vehicle": vehicle} if vehicle else {}),
@@ -139,7 +139,7 @@ class Scenario:
         Parameters
         ----------
         changes : mapping of str to value
-            By key, with dots between its parts, as for ``--set``; regions by index or by name.
+            Values by key, with dots between its parts, as for ``--set``; regions by index or by name.
 
         Returns
         -------
@@ -231,9 +231,9 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = (), impor
     Parameters
     ----------
     name_or_file : str or Path
-        Such as ``"paper"`` or ``"mine.toml"``.
+        Name or file, such as ``"paper"`` or ``"mine.toml"``.
     overrides : sequence of str
-        ``key=value``, with dots between the keys and a TOML value; regions by index or by name.
+        Changes ``key=value``, with dots between the keys and a TOML value; regions by index or by name.
     imported : bool
         Allow the scenario of a run that was imported from a log, which cannot be run.
 
@@ -283,7 +283,7 @@ def _with_changes(scenario: Scenario, table: dict[str, Any], titled: dict[str, A
         keys: Iterable[str] = differing_keys(titled, table)
     else:
         keys = changed_keys(before.table, scenario.table, scenario.vehicle)
-    return dataclasses.replace(scenario, table=scenario.table | {"changed": joined(scenario.table["changed"], keys)})
+    return dataclasses.replace(scenario, table=scenario.table | {"changed": join_keys(scenario.table["changed"], keys)})
 
 
 def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None = None) -> Scenario:
@@ -306,11 +306,11 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
     Raises
     ------
     ScenarioError, PlantFmuError, ControllerError
-        At the first invalid key.
+        If a key is invalid; the message names the first one.
     """
     plant = table.get("plant")
     if isinstance(plant, dict) and isinstance(plant.get("parameters"), dict):
-        plant["parameters"] = flat(plant["parameters"])
+        plant["parameters"] = flatten(plant["parameters"])
     file = decode(table, File)
     check_texts(file)
     time = check_time(file.time)

@@ -52,8 +52,8 @@ DATA_SHEETS: dict[str, float] = {
 _CONSTANT = SensorModel(
     depth_bias=0.02, velocity_scale=0.005, acceleration_bias=0.02, angular_velocity_bias=0.0017, heading_bias=0.0175
 )
-_STREAM = 2  # beside the seed
-_ROUNDING = 1e-6  # of a step
+_STREAM = 2  # second part of the generator's seed, which separates its stream from that of the noise
+_ROUNDING = 1e-6  # tolerance of times, as a part of a step
 
 
 def sensor_parameters(seed: int, over: Mapping[str, float]) -> dict[str, float]:
@@ -62,14 +62,14 @@ def sensor_parameters(seed: int, over: Mapping[str, float]) -> dict[str, float]:
     Parameters
     ----------
     seed : int
-        Of the constant errors and of all noise.
+        Seed of the constant errors and of all noise.
     over : mapping of str to float
-        Parameters that override them.
+        Parameters that override those of the data sheets and the drawn ones.
 
     Returns
     -------
     dict of str to float
-        SI units; includes `over`.
+        Parameters in SI units; includes `over`.
     """
     draw = np.random.default_rng([seed, _STREAM]).standard_normal(9)
     names = (
@@ -96,7 +96,7 @@ def sensor_model(parameters: Mapping[str, float]) -> SensorModel:
     Parameters
     ----------
     parameters : mapping of str to float
-        From `sensor_parameters`; a missing one has the default of `SensorModel`.
+        Parameters from `sensor_parameters`; a missing one has the default of `SensorModel`.
     """
     usual = SensorModel()
     return _CONSTANT._replace(
@@ -120,14 +120,14 @@ def outage_schedule(
     outages : iterable of Outage
         The outages of the scenario.
     parameters : mapping of str to float
-        With the loss probabilities outside of outages.
+        Sensor parameters, with the loss probabilities outside of outages.
     step : float
-        Of the plant [s].
+        Step of the plant [s].
 
     Returns
     -------
     list of tuple
-        Step of the plant, sensor as in `SENSORS`, probability; in order of time.
+        Number of the plant step, index of the sensor in `SENSORS`, loss probability; in order of time.
     """
     changes = []
     for outage in outages:

@@ -14,7 +14,7 @@ def start_values(scenario: Scenario) -> dict[str, float]:
     Returns
     -------
     dict of str to float
-        By the names of the FMU's variables.
+        Values by the names of the FMU's variables.
     """
     initial, plant, limit = scenario.initial, scenario.plant, scenario.limit
     values = {"substep": plant.substep, "wrench_time_constant": limit.time_constant}

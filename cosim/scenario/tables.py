@@ -23,9 +23,9 @@ class PlantSetup:
     """Setup of the plant."""
 
     fmi: Literal[2, 3] = 3
-    current: Vector3 = (0.0, 0.0, 0.0)  # m/s, of the water, world frame
+    current: Vector3 = (0.0, 0.0, 0.0)  # m/s, velocity of the water, world frame
     substep: float = 0.005  # s, greatest integration step
-    parameters: dict[str, float | bool] = field(default_factory=dict)  # of the FMU, by name, over those of the vehicle
+    parameters: dict[str, float | bool] = field(default_factory=dict)  # FMU parameters that override the vehicle's
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Initial:
     """State of the vehicle at time 0."""
 
     position: Vector3  # m, NED
-    quaternion: Vector4 = (1.0, 0.0, 0.0, 0.0)  # from body to world, scalar first
+    quaternion: Vector4 = (1.0, 0.0, 0.0, 0.0)  # unit quaternion from body to world, scalar first
     velocity: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # m/s, rad/s, body frame
 
 
@@ -43,7 +43,7 @@ class ArbiterSetup:
 
     engine: Literal["closed", "exact", "grid", "skfuzzy"] = "closed"
     ramp: float = 0.2  # m (rad for regions of attitude), width over which a membership falls from 1 to 0 outside
-    points: int = 101  # of the output universe, for grid and skfuzzy
+    points: int = 101  # samples of the output universe, for grid and skfuzzy
     rules: Literal["ordered", "reversed", "crisp", "none"] = "ordered"  # rule variant without a file
     file: str = ""  # rule file in a format of fuzzy_arbiter; empty: rules by the order of the criteria
     text: str = ""  # content of the file
@@ -55,7 +55,7 @@ class Limit:
     """Limit of the direct body wrench, followed by a lag."""
 
     force: float = math.inf  # N, on the norm of the body force; its direction is kept, the moment left alone
-    time_constant: float = 0.0  # s
+    time_constant: float = 0.0  # s, time constant of the lag
 
 
 @dataclass(frozen=True)
@@ -63,15 +63,15 @@ class Actuation:
     """Path of the law's wrench to the body."""
 
     through: Literal["wrench", "thrusters"] = "wrench"
-    limits: Literal["direction", "per-thruster"] = "direction"  # how thruster forces are brought within limits
+    limits: Literal["direction", "per-thruster"] = "direction"  # scale all thruster forces alike, or cut each
 
 
 @dataclass(frozen=True)
 class Failure:
     """A thruster that gives less force, or a constant one, from some time on."""
 
-    thruster: int  # from 1
-    time: float  # s
+    thruster: int  # number of the thruster, from 1
+    time: float  # s, time of the failure
     effectiveness: float = 0.0  # remaining fraction of its force
     stuck: bool = False  # True: it keeps the force that was commanded last
 
@@ -86,7 +86,7 @@ class Outage:
     """A period in which a sensor gives no samples."""
 
     sensor: Literal["depth_sensor", "dvl", "imu", "compass", "usbl"]
-    time: float  # s, when it begins
+    time: float  # s, beginning of the outage
     duration: float  # s
 
 
@@ -99,8 +99,8 @@ class Sensing:
 
     through: Literal["state", "sensors"] = "state"
     position_noise: float = 0.0  # m, standard deviation of each coordinate, white, drawn anew at each control step
-    velocity_noise: float = 0.0  # m/s, the same of each linear velocity
-    seed: int = 0
+    velocity_noise: float = 0.0  # m/s, standard deviation of each linear velocity, likewise
+    seed: int = 0  # seed of the noise
     dead_from: float = math.inf  # s, time at which both are lost
     dead_for: float = 0.0  # s, duration of the loss
     frozen: bool = False  # True: the last values are held meanwhile; False: they are NaN
@@ -119,10 +119,10 @@ class Commands:
     enabled: bool = False
     await_arm: bool = False  # True: the run starts once the vehicle is armed
     obstacles: int = 8  # number of obstacle slots
-    obstacle_radius: float = 0.5  # m, of obstacles without a given size
-    obstacle_gain: float = 100.0  # N per unit of g
-    hold_radius: float = 0.3  # m, of the target sphere in modes hold and surface
-    surface_depth: float = 0.5  # m, depth of its centre in mode surface
+    obstacle_radius: float = 0.5  # m, radius of obstacles without a given size
+    obstacle_gain: float = 100.0  # N per unit of g, gain of each obstacle
+    hold_radius: float = 0.3  # m, radius of the target sphere in modes hold and surface
+    surface_depth: float = 0.5  # m, depth of that sphere's centre in mode surface
     pilot_gain: float = 0.5  # fraction of the greatest wrench at full stick
 
 
@@ -170,7 +170,7 @@ class CriterionEntry:
     name: str
     order: int | None = None  # the least comes first; default: its index in the list, from 1
     colour: str = ""  # #RRGGBB; default: an unused one
-    membership: dict[str, Any] = field(default_factory=dict)  # by quantity; default: the arbiter's ramp
+    membership: dict[str, Any] = field(default_factory=dict)  # terms by quantity; default: the arbiter's ramp
 
 
 # section VI of the paper; the colours are Okabe and Ito's, which are safe for colour blindness
@@ -186,14 +186,14 @@ class RegionEntry:
     """A secondary region; the keys of its shape depend on the shape."""
 
     name: str
-    criterion: str  # the name of one
+    criterion: str  # name of a criterion
     keep: Literal["in", "out"]
     gain: float
     shape: dict[str, Any]
     velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
     streamed: bool = False  # moved from outside during the run
     hard: bool = True  # must not be violated, for laws that distinguish hard and soft regions
-    deviation: float | tuple[float, float, float] = 0.0  # m, standard, of its position: in any direction, or for NED
+    deviation: float | tuple[float, float, float] = 0.0  # m, standard deviation of its position: one number, or NED
     priority: float = 1.0  # factor of its violation in the score; laws do not receive it
 
 
@@ -207,7 +207,7 @@ class File:
     goal: dict[str, Any] = field(default_factory=dict)  # empty only for an imported log without a goal
     title: str = ""
     log: str = ""  # name of the file that the run was imported from
-    changed: tuple[str, ...] = ()  # keys, since the title was written
+    changed: tuple[str, ...] = ()  # keys that were changed since the title was written
     compare: Literal["", "paper"] = ""
     intersection: tuple[str, ...] = ()
     report_failures: bool = False
@@ -226,8 +226,8 @@ class File:
     regions: tuple[RegionEntry, ...] = ()
 
 
-def is_own(law: str) -> bool:
-    """Return True if this is the name of a custom law, its source, such as ``mine.py:steer``."""
+def is_custom_law(law: str) -> bool:
+    """Return True if a law's name is the source of a custom law, such as ``mine.py:steer``."""
     return ":" in law
 
 
@@ -254,12 +254,12 @@ class LawSetup:
 
     name: str  # one of controller.LAWS; with a colon: source of a custom law, such as mine.py:steer
     desired_quaternion: Vector4  # attitude to be kept, from body to world, scalar first
-    gains: Any  # of that law's gains_type; `NoGains` for a custom law
+    gains: Any  # gains of that law's gains_type; `NoGains` for a custom law
 
     @property
     def own(self) -> bool:
         """Whether it is a custom law, whose code is not in the file."""
-        return is_own(self.name)
+        return is_custom_law(self.name)
 
 
 @dataclass(frozen=True)

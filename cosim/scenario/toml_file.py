@@ -39,8 +39,8 @@ class ScenarioTable(NamedTuple):
     """Table of a scenario's file, merged into that of its base."""
 
     table: dict[str, Any]
-    name: str  # of the scenario
-    titled: dict[str, Any]  # table of the scenario whose title it has: its own, or that of a base
+    name: str  # name of the scenario
+    titled: dict[str, Any]  # table of the scenario whose title this one has: its own, or that of a base
 
 
 def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | None = None) -> ScenarioTable:
@@ -58,12 +58,12 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
     Returns
     -------
     ScenarioTable
-        Not checked yet.
+        Table that has not been checked yet.
 
     Raises
     ------
     ScenarioError
-        If a base is unknown, or a base of itself.
+        If a base is unknown, or a scenario is its own base.
     TableError
         If a file cannot be read.
     """
@@ -141,7 +141,7 @@ def override(table: dict[str, Any], text: str) -> None:
     table : dict
         Table of a scenario.
     text : str
-        ``key=value``, with dots between the keys and a TOML value, or a bare word; items of lists by index or name.
+        Change ``key=value``, with dots between the keys and a TOML value, or a bare word; lists by index or name.
         Another ``law.name`` drops the gains of the law before, another ``arbiter.file`` its inputs.
 
     Raises
@@ -182,10 +182,10 @@ def set_key(table: dict[str, Any], key: str, value: Any) -> None:
     table : dict
         Table of a scenario.
     key : str
-        With dots between its parts; items of lists by index or name. Another ``law.name`` drops the gains of the law
-        before, another ``arbiter.file`` its inputs.
+        Key, with dots between its parts; items of lists by index or name. Another ``law.name`` drops the gains of the
+        law before, another ``arbiter.file`` its inputs.
     value : object
-        Of a type of TOML.
+        Value, of a type of TOML.
 
     Raises
     ------
@@ -228,7 +228,7 @@ def _index(items: list[Any], part: str, key: str) -> int:
     )
 
 
-def flat(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+def flatten(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     """Join nested keys with dots, since TOML nests ``r_G.z = 0.1``, the name of a parameter of the FMU.
 
     Parameters
@@ -243,10 +243,10 @@ def flat(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     dict
         Values by flat key.
     """
-    joined: dict[str, Any] = {}
+    flat: dict[str, Any] = {}
     for key, value in table.items():
-        joined |= flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
-    return joined
+        flat |= flatten(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
+    return flat
 
 
 def place_of(table: dict[str, Any], key: str) -> tuple[Any, Any]:
@@ -255,9 +255,9 @@ def place_of(table: dict[str, Any], key: str) -> tuple[Any, Any]:
     Parameters
     ----------
     table : dict
-        Of a scenario.
+        Table of a scenario.
     key : str
-        With dots; items of lists by index or name.
+        Key with dots; items of lists by index or name.
 
     Returns
     -------

@@ -28,7 +28,7 @@ def scenario_text(table: Mapping[str, Any], said: Mapping[str, str]) -> str:
     Returns
     -------
     str
-        TOML that reads back as the table.
+        TOML text that reads back as the table.
     """
     return "\n".join(_lines(table, said)) + "\n"
 

@@ -26,12 +26,12 @@ def true_vehicle(scenario: Scenario) -> Vehicle:
     Parameters
     ----------
     scenario : Scenario
-        With `plant.parameters`.
+        Scenario with `plant.parameters`.
 
     Returns
     -------
     Vehicle
-        Not checked: the FMU may still refuse its numbers.
+        True vehicle, not checked: the FMU may still refuse its numbers.
     """
     vehicle, over = scenario.vehicle, scenario.plant.parameters
     changed: dict[str, float | Array] = {}
@@ -60,12 +60,12 @@ def true_model(scenario: Scenario) -> Model:
     Parameters
     ----------
     scenario : Scenario
-        With `plant.parameters`.
+        Scenario with `plant.parameters`.
 
     Returns
     -------
     Model
-        For still water.
+        Model of the true vehicle in still water.
     """
     vehicle = true_vehicle(scenario)
     return Model(

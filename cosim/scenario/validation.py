@@ -34,19 +34,19 @@ from cosim.scenario.tables import (
     Time,
     TimeEntry,
     Vector3,
-    is_own,
+    is_custom_law,
 )
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.toml_tables import decode, hint
 from plant_fmu.variables import variables
 from plant_fmu.vehicle import Vehicle
 
-ROUNDING = 1e-6  # of one period, within which periods count as multiples
-MAX_STEPS = 100_000_000
-MAX_POINTS = 100_001
-MAX_TEXT = 200  # characters
-MAX_SEEN = 100  # obstacle slots
-REGION_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,39}")  # a column of the record, a label of figures
+ROUNDING = 1e-6  # tolerance of a multiple of the step, as a part of the step
+MAX_STEPS = 100_000_000  # plant steps of a run
+MAX_POINTS = 100_001  # samples of the arbiter's output universe
+MAX_TEXT = 200  # characters of a text
+MAX_OBSTACLES = 100  # obstacle slots
+REGION_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,39}")  # valid in column names and labels of figures
 
 # parameters of the FMU for which a scenario has other keys
 _OWN_KEYS = {
@@ -62,7 +62,7 @@ class GoalMotion:
     """Keys of the goal beside those of its shape."""
 
     velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
-    streamed: bool = False
+    streamed: bool = False  # moved from outside during the run
     then: tuple[Vector3, ...] = ()  # m, NED: next positions of its centre, in turn
     stay: float = 5.0  # s, time within the goal before it moves to the next position
 
@@ -159,8 +159,12 @@ def check_commands(
         _require(not commands.await_arm, "commands.await_arm", "true", "false without commands.enabled: no way to arm")
         return ()
     _require(not record.lyapunov, "record.lyapunov", "true", "false with commands.enabled: V is of one target")
-    _require(not is_own(law), "commands.enabled", "true", f"false: nothing of {law} can be commanded from outside")
-    _require(0 <= commands.obstacles <= MAX_SEEN, "commands.obstacles", commands.obstacles, f"0 to {MAX_SEEN}")
+    _require(
+        not is_custom_law(law), "commands.enabled", "true", f"false: nothing of {law} can be commanded from outside"
+    )
+    _require(
+        0 <= commands.obstacles <= MAX_OBSTACLES, "commands.obstacles", commands.obstacles, f"0 to {MAX_OBSTACLES}"
+    )
     for key in ("obstacle_radius", "hold_radius"):
         value = getattr(commands, key)
         _require(0.0 < value < math.inf, f"commands.{key}", value, "above 0 m")
@@ -274,7 +278,7 @@ def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_
     ScenarioError
         If there is no such law, or it has no such gains.
     """
-    if is_own(entry.name):
+    if is_custom_law(entry.name):
         if entry.gains:
             raise ScenarioError(f"law.gains has {next(iter(entry.gains))!r}, expected nothing with a law of one's own")
         validate_quaternion(np.array(entry.desired_quaternion))

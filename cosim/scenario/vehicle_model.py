@@ -14,7 +14,7 @@ def vehicle_model(vehicle: Vehicle) -> VehicleModel:
     Returns
     -------
     VehicleModel
-        With the centre of gravity at the origin.
+        Nominal model with the centre of gravity at the origin.
     """
     rigid_mass = np.zeros((6, 6))
     rigid_mass[:3, :3] = vehicle.mass * np.eye(3)

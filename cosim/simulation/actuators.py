@@ -114,7 +114,7 @@ def saturate(wrench: Array) -> bool:
     Parameters
     ----------
     wrench : ndarray, shape (6,)
-        [N, N m].
+        Force and moment [N, N m].
 
     Returns
     -------

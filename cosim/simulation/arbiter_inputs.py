@@ -22,7 +22,7 @@ from cosim.simulation.signals import Array
 
 _KINDS = ("membership", "clearance", "closing_speed", "approach_time", "depth", "speed", "time", "given")
 _MEMBERSHIP, _CLEARANCE, _CLOSING_SPEED, _APPROACH_TIME, _DEPTH, _SPEED, _TIME, _GIVEN = range(len(_KINDS))
-_AHEAD = 1e-5  # s, of the difference quotient of a closing speed: errors by rounding and by curvature are 1e-9 m/s
+_AHEAD = 1e-5  # s, step of a closing speed's difference quotient: rounding and curvature each err by 1e-9 m/s
 
 
 class PackedInputs(NamedTuple):
@@ -32,10 +32,10 @@ class PackedInputs(NamedTuple):
     kinds: NDArray[np.int64]  # (m,) in the order of `_KINDS`
     places: NDArray[np.int64]  # (m,) criterion, or region: 0 the goal
     upper: Array  # (m,) upper end of the universe, also the value of an input that is infinite or NaN
-    offsets: NDArray[np.int64]  # (m + 1,) into the courses
-    times: Array  # s: of the points of given signals, one course behind the other
-    values: Array  # of these points
-    of_goal: bool  # True if an input is of the goal
+    offsets: NDArray[np.int64]  # (m + 1,) into `times` and `values`
+    times: Array  # s: times of the points of given signals, one signal behind the other
+    values: Array  # values of these points
+    of_goal: bool  # True if an input depends on the goal
     by_speed: bool  # True if an input or a membership needs closing speeds
 
 
@@ -57,7 +57,7 @@ def pack_inputs(
     Parameters
     ----------
     regions : sequence of SecondaryRegion
-        Of the scenario.
+        Secondary regions of the scenario.
     criteria : sequence of CriterionSetup
         Criteria of these regions.
     rules : ArbiterRules
@@ -68,12 +68,10 @@ def pack_inputs(
     Returns
     -------
     PackedInputs
-        With ramps that `Arbitration.set_ramp` may change.
+        Packed inputs, whose ramps `Arbitration.set_ramp` may change.
     """
-    signals, system = rules.inputs, rules.system
+    signals, system = rules.signals, rules.system
     memberships = pack_memberships(regions, criteria, ramp)
-    if [(signal.kind, signal.of) for signal in signals] == [("membership", i) for i in range(len(criteria))]:
-        signals = ()
     courses = [signal.course for signal in signals]
     return PackedInputs(
         memberships=memberships,
@@ -143,7 +141,7 @@ def compute_inputs(
     now : ndarray, shape (1,)
         Time [s].
     clearances : ndarray, shape (n,)
-        Of the regions at that pose [m or rad].
+        Clearance of each region at that pose [m or rad].
     signals : ArbiterSignals
         Receives the result.
     """

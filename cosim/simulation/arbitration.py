@@ -26,15 +26,15 @@ class Arbitration:
     Parameters
     ----------
     scenario : Scenario
-        Its criteria and the inputs of its rules.
+        Scenario that defines the criteria and the inputs of the rules.
     arbiter : Arbiter
-        With the scenario's rules.
+        Arbiter with the scenario's rules.
     measured : VehicleState
         The state that the law receives.
     now : ndarray, shape (1,)
         Time [s].
     clearances : ndarray, shape (n,)
-        Of each region at the pose of `state` [m], or [rad] of attitude.
+        Clearance of each region at the pose of `state` [m], or [rad] of attitude.
     memberships, weights : ndarray, shape (criteria,)
         Receive membership and weight of each criterion.
     inputs : ndarray, shape (m,), optional

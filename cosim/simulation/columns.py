@@ -26,26 +26,26 @@ def columns_of(scenario: Scenario, plant: SteppedPlant, law: Law) -> list[Column
     scenario : Scenario
         The scenario of the run.
     plant : SteppedPlant
-        Its outputs, flags and inputs are columns.
+        Plant whose outputs, flags and inputs are columns.
     law : Law
-        Its diagnostics are columns.
+        Law whose diagnostics are columns.
 
     Returns
     -------
     list of Column
-        In the order of the row.
+        Columns in the order of the row.
     """
     channels = (plant.outputs.channels, plant.flags.channels, plant.inputs.channels)
     return _columns(scenario, *channels, law.diagnostics)
 
 
-def names_of(scenario: Scenario) -> list[str]:
+def column_names(scenario: Scenario) -> list[str]:
     """Return the names of the columns of a run, without the diagnostics of a custom law.
 
     Returns
     -------
     list of str
-        In the order of the row.
+        Names in the order of the row.
     """
     return [column.name for column in columns_without_plant(scenario)]
 
@@ -56,7 +56,7 @@ def columns_without_plant(scenario: Scenario) -> list[Column]:
     Returns
     -------
     list of Column
-        In the order of the row.
+        Columns in the order of the row.
     """
     table = [v for v in variables(scenario.vehicle) if not v.local]
     outputs, flags, inputs = (
@@ -77,8 +77,8 @@ def _columns(
     regions = [("goal", scenario.goal), *((r.region.name, r.region.shape) for r in scenario.regions)]
     return [
         Column("time", "s", "Simulated time at the beginning of the step"),
-        *_of(outputs),
-        *_of(flags),
+        *_as_columns(outputs),
+        *_as_columns(flags),
         *(Column(f"{name}.value", shape.unit, f"g of {name}, above 0 where violated") for name, shape in regions),
         *(
             Column(f"{name}.clearance", "rad", f"Angle left within {name}, below 0 where violated")
@@ -100,29 +100,29 @@ def _columns(
             for name, unit in zip("XYZKMN", _FORCE_UNITS, strict=True)
         ),
         Column("allocation_saturated", "", "The thrusters' limits cut the wrench that the law asks for"),
-        *_of(inputs),
+        *_as_columns(inputs),
         *(
             Column(f"{name}.shift.{axis}", "m", f"How far {name} has moved {where} from where the scenario has it")
             for name in scenario.moving
             for axis, where in zip("xyz", ("north", "east", "down"), strict=True)
         ),
         *([Column("goal.place", "", "Which of the goal's places it is at, from 0")] if scenario.goal_then else []),
-        *_sensed(scenario),
-        *_ordered(scenario),
+        *_sensing_columns(scenario),
+        *_command_columns(scenario),
         *(Column(f"law.{d.name}", d.unit, d.description) for d in diagnostics),
         *lyapunov_columns(scenario),
-        *_rules(scenario),
+        *_arbiter_input_columns(scenario),
     ]
 
 
-def _rules(scenario: Scenario) -> Iterator[Column]:
+def _arbiter_input_columns(scenario: Scenario) -> Iterator[Column]:
     """Yield the columns of the arbiter's inputs, where these are not the memberships alone."""
     if scenario.arbiter.file:
         for signal in scenario.rules.inputs:
             yield Column(f"arbiter.{signal.name}", signal.unit, f"Input {signal.name} of the arbiter: {signal.what}")
 
 
-def _sensed(scenario: Scenario) -> Iterator[Column]:
+def _sensing_columns(scenario: Scenario) -> Iterator[Column]:
     if scenario.sensing.exact:
         return
     for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
@@ -140,7 +140,7 @@ def _sensed(scenario: Scenario) -> Iterator[Column]:
         yield Column(f"deviation.rate.{name}", "rad/s", f"Standard deviation of the sensed rate {name}, body frame")
 
 
-def _ordered(scenario: Scenario) -> Iterator[Column]:
+def _command_columns(scenario: Scenario) -> Iterator[Column]:
     if not scenario.commands.enabled:
         return
     yield Column("commands.armed", "", "The thrusters may work")
@@ -151,5 +151,5 @@ def _ordered(scenario: Scenario) -> Iterator[Column]:
     yield Column("target.radius", "m", "Radius of the target region if it is a sphere of its own, 0 if it is the goal")
 
 
-def _of(channels: Sequence[Channel]) -> list[Column]:
+def _as_columns(channels: Sequence[Channel]) -> list[Column]:
     return [Column(channel.name, channel.unit, channel.description) for channel in channels]

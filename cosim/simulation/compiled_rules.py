@@ -38,9 +38,9 @@ class BoundRules:
     Parameters
     ----------
     system : System
-        The rules. Inputs clip, and each output has a rule that fires for any input, or a default.
+        Rules whose inputs clip, and of which each output has a default, or a rule that fires for any input.
     inputs, outputs : ndarray
-        C-contiguous; the outputs are filled with what the arbiter's exact engine gives, to the last bit.
+        C-contiguous arrays; the call fills the outputs with the results of the arbiter's exact engine, to the last bit.
 
     Attributes
     ----------

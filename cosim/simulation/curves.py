@@ -27,8 +27,8 @@ class PackedCurves(NamedTuple):
     offsets: NDArray[np.int64]  # (r + 1,) into the pieces
     ends: Array  # m, rad or s: where each piece ends, the last of a term at infinity
     starts: NDArray[np.int64]  # (pieces + 1,) into the programs
-    words: NDArray[np.int64]  # in the order of `_WORDS`
-    numbers: Array  # of each word that is a number
+    words: NDArray[np.int64]  # (words,) indices into `_WORDS`
+    numbers: Array  # (words,) value of each word that is a number
 
 
 def pack_curves(terms: Sequence[Membership | None]) -> PackedCurves:
@@ -42,7 +42,7 @@ def pack_curves(terms: Sequence[Membership | None]) -> PackedCurves:
     Returns
     -------
     PackedCurves
-        In the order of the terms.
+        Curves in the order of the terms.
     """
     pieces = [pieces_of(term) if term else [] for term in terms]
     programs = [_program(tree) for of in pieces for _, tree in of]
@@ -70,7 +70,7 @@ def curve_degree(packed: PackedCurves, k: int, x: float) -> float:
     Parameters
     ----------
     packed : PackedCurves
-        Of the terms.
+        Curves of the terms.
     k : int
         Index of a term that has pieces.
     x : float
@@ -79,7 +79,7 @@ def curve_degree(packed: PackedCurves, k: int, x: float) -> float:
     Returns
     -------
     float
-        NaN at NaN.
+        Degree in [0, 1]; NaN where `x` is NaN.
     """
     piece, last = packed.offsets[k], packed.offsets[k + 1] - 1
     while piece < last and x > packed.ends[piece]:
@@ -97,22 +97,22 @@ def curve_degree(packed: PackedCurves, k: int, x: float) -> float:
 
 
 def _value(packed: PackedCurves, piece: int, x: float) -> float:
-    stack, n = zeros(32), 0  # `MAX_WAITING`
+    stack, n = zeros(32), 0  # `MAX_STACK` of cosim.scenario.membership_terms
     for at in range(packed.starts[piece], packed.starts[piece + 1]):
         word = packed.words[at]
         if word in (_NUMBER, _X):
             stack[n] = packed.numbers[at] if word == _NUMBER else x
             n += 1
         elif _NEGATE <= word <= _TAN:
-            stack[n - 1] = _of_one(word, stack[n - 1])
+            stack[n - 1] = _apply_unary(word, stack[n - 1])
         else:
             n -= 1
-            stack[n - 1] = _of_two(word, stack[n - 1], stack[n])
+            stack[n - 1] = _apply_binary(word, stack[n - 1], stack[n])
     value: float = stack[0]
     return value
 
 
-def _of_one(word: int, a: float) -> float:
+def _apply_unary(word: int, a: float) -> float:
     """Apply a function of one number with the results of IEEE 754 where Python raises."""
     value: float = math.nan
     if word == _NEGATE:
@@ -130,8 +130,8 @@ def _of_one(word: int, a: float) -> float:
     return value
 
 
-def _of_two(word: int, a: float, b: float) -> float:
-    """Apply a function of two numbers, likewise."""
+def _apply_binary(word: int, a: float, b: float) -> float:
+    """Apply a function of two numbers with the results of IEEE 754 where Python raises."""
     value: float = 0.0
     if word == _ADD:
         value = a + b

@@ -20,26 +20,26 @@ from cosim.scenario.tables import PARKED_POSITION, Vector3
 from cosim.simulation.signals import Array
 
 _AT_REST = (0.0, 0.0, 0.0)
-_ROUNDING = 1e-6  # of a step
+_ROUNDING = 1e-6  # tolerance of times, as a part of a step
 
 
 @dataclass(frozen=True)
 class _Target:
     """A target region."""
 
-    packed: PackedRegions  # of this region alone
+    packed: PackedRegions  # this region alone
     middle: Array  # (3,) m, NED: centre of its shape as packed
     origin: Array  # (3,) m, NED: its shift from there, extrapolated to time 0 at its present velocity
-    radius: float  # m, of a sphere; 0 for the shape of the scenario's goal
+    radius: float  # m, radius of a sphere; 0 for the shape of the scenario's goal
 
 
 class RegionEvaluation(NamedTuple):
     """Values of goal and n regions at a pose; the goal's come first."""
 
-    values: Array  # (n + 1,) g
-    gradients: Array  # (n + 1, 3) of g by position, world frame
-    rotation_gradients: Array  # (n + 1, 3) of g by rotation, body frame [1/rad]
-    clearances: Array  # (n + 1,) m, or rad of attitude
+    values: Array  # (n + 1,) g, above 0 where violated
+    gradients: Array  # (n + 1, 3) derivative of g by position, world frame
+    rotation_gradients: Array  # (n + 1, 3) derivative of g by rotation, body frame [1/rad]
+    clearances: Array  # (n + 1,) distance left to each boundary: m, or rad of attitude
 
 
 class RegionPlaces(NamedTuple):
@@ -55,7 +55,7 @@ class RegionEnvironment:
     Parameters
     ----------
     scenario : Scenario
-        With the regions.
+        Scenario with goal and regions.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class RegionEnvironment:
         Parameters
         ----------
         time : float
-            [s].
+            Time [s].
         shifts : ndarray, shape (moving regions, 3)
             Receives the shift of each moving region from its place in the scenario [m, NED].
         """
@@ -121,7 +121,7 @@ class RegionEnvironment:
         Returns
         -------
         RegionEvaluation
-            With zeros in the other arrays.
+            Evaluation with zeros in the other arrays.
         """
         n = len(self._names)
         return RegionEvaluation(values, np.zeros((n, 3)), np.zeros((n, 3)), clearances)
@@ -132,7 +132,7 @@ class RegionEnvironment:
         Parameters
         ----------
         state : VehicleState
-            Its position and attitude are used.
+            State whose position and attitude are used.
         evaluation : RegionEvaluation
             Receives the values.
         """
@@ -144,9 +144,9 @@ class RegionEnvironment:
         Parameters
         ----------
         position : ndarray, shape (3,)
-            [m, NED].
+            Position [m, NED].
         quaternion : ndarray, shape (4,)
-            From body to world.
+            Unit quaternion from body to world, scalar first.
         """
         n = len(self._names)
         found = self.empty_evaluation(np.zeros(n), np.zeros(n))
@@ -159,7 +159,7 @@ class RegionEnvironment:
         Parameters
         ----------
         clearance : float
-            Of the goal at the true position, once a step [m].
+            Clearance of the goal at the true position [m]; pass it once a step.
         place : ndarray, shape (1,)
             Receives the index of the goal's place, from 0; shape (0,) for a goal with one place.
         """
@@ -203,13 +203,13 @@ class RegionEnvironment:
         slot : int
             Slot for dynamic obstacles, from 0.
         position : tuple of float
-            Of its centre [m, NED].
+            Position of its centre [m, NED].
         radius : float
-            [m].
+            Radius [m].
         velocity : tuple of float
-            From then on [m/s, NED].
+            Velocity from that time on [m/s, NED].
         time : float
-            [s].
+            Time [s].
         """
         i = self._dynamic[slot]
         self._reshape(self.regions, i, Sphere(PARKED_POSITION, radius))
@@ -232,7 +232,7 @@ class RegionEnvironment:
             raise CommandError(f"region is {name!r}, expected one of {', '.join(movable) or 'none'}")
         i = self._names.index(name) - 1
         if i in self._dynamic and not self._origins[i].any():
-            raise CommandError(f"region is {name!r}: no such obstacle has come")
+            raise CommandError(f"region is {name!r}: no such obstacle has been added")
         self._origins[i] += by
 
     # ---- the target ----
@@ -256,13 +256,13 @@ class RegionEnvironment:
         Parameters
         ----------
         position : tuple of float
-            Of its centre [m, NED].
+            Position of its centre [m, NED].
         radius : float or None
-            Of a sphere [m]; None for the shape of the scenario's goal.
+            Radius of a sphere [m]; None for the shape of the scenario's goal.
         velocity : tuple of float
-            From then on [m/s, NED].
+            Velocity from that time on [m/s, NED].
         time : float
-            [s].
+            Time [s].
         """
         target = self._new_target(radius, position)
         target.packed.velocities[0] = velocity
@@ -329,7 +329,7 @@ def shape_center(shape: Shape) -> Vector3:
     Parameters
     ----------
     shape : Shape
-        In space.
+        Shape in space, not of attitude.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""V of the paper's law's analysis as signals of a run."""
+"""The Lyapunov function V of the paper's law, and its rate, as signals of a run."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_model
 from cosim.simulation.signals import Array, Column
 
-FORMS = ("printed", "normalized", "primary")  # in the order of the columns
+FORMS = ("printed", "normalized", "primary")  # forms of V, in the order of the columns
 
-_STEP = 1e-4  # m, by which the errors are differentiated along the motion
+_STEP = 1e-4  # m, half width of the central differences along the motion
 
 
 def lyapunov_columns(scenario: Scenario) -> list[Column]:
@@ -43,16 +43,16 @@ class LyapunovSignals:
     Parameters
     ----------
     scenario : Scenario
-        With the paper's law.
+        Scenario with the paper's law.
     state : VehicleState
         The true state, read at each `write`.
     goal, regions : PackedRegions
         The goal alone, and the n secondary regions. The theory takes them to be at rest: if they move, the rate is
         that of the vehicle's own motion.
     weights : ndarray, shape (n,)
-        Of each secondary region, from the arbiter.
+        Weight of each secondary region, from the arbiter.
     estimate : ndarray, shape (4,)
-        Phi-hat.
+        The law's estimate phi-hat of the restoring parameters [N, N m] (12).
     out : ndarray, shape (4,)
         Receives the signals of `lyapunov_columns`.
     """
@@ -72,8 +72,8 @@ class LyapunovSignals:
         self._state, self._goal, self._regions = state, goal, regions
         self._weights, self._estimate, self._out = weights, estimate, out
         n = len(weights)
-        self._of_goal = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
-        self._of_regions = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
+        self._goal_buffers = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
+        self._region_buffers = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
 
     def write(self) -> None:
         """Write V in its three forms, and its rate."""
@@ -82,7 +82,7 @@ class LyapunovSignals:
         R, turned = rotation_matrix(state.quaternion), error(self._desired, state.quaternion)
         region_rate = self._region_rate(R @ velocity[:3], betas)
         e_p, e_s = self._region_errors(state.position, betas)
-        f, (g, g_gradients, _, clearances) = self._of_goal[0][0], self._of_regions
+        f, (g, g_gradients, _, clearances) = self._goal_buffers[0][0], self._region_buffers
         y = mapped_error(e_p, e_s, turned[1:], R, gains)
         alone = mapped_error(e_p, np.zeros(3), turned[1:], R, gains)
         value = primary_value(model, gains, f, turned, y, velocity, estimate)
@@ -107,7 +107,7 @@ class LyapunovSignals:
 
     def _region_errors(self, position: Array, betas: Array) -> tuple[Array, Array]:
         """Evaluate goal and regions at a position; return e_p and e_s, shape (3,) each."""
-        self._goal.evaluate(position, self._state.quaternion, *self._of_goal)
-        self._regions.evaluate(position, self._state.quaternion, *self._of_regions)
-        (f, *_), (gradient, *_) = self._of_goal[:2]
-        return primary_error(f, gradient), secondary_error(*self._of_regions[:2], betas)
+        self._goal.evaluate(position, self._state.quaternion, *self._goal_buffers)
+        self._regions.evaluate(position, self._state.quaternion, *self._region_buffers)
+        (f, *_), (gradient, *_) = self._goal_buffers[:2]
+        return primary_error(f, gradient), secondary_error(*self._region_buffers[:2], betas)

@@ -34,12 +34,12 @@ from cosim.simulation.stepped_plant import SteppedPlant
 from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant
 
-_MAX_SLEEP = 3600.0  # s
+_MAX_SLEEP = 3600.0  # s of the wall clock, longest sleep of a paced run between two steps
 _MAX_LAG = 0.1  # s of the wall clock: lag that a paced run catches up; beyond it the schedule shifts
 _ARMING_PERIOD = 0.005  # s of the wall clock, between polls of the commands while the run waits for arming
-_ROUNDING = 1e-6  # of a step
+_ROUNDING = 1e-6  # tolerance of times, as a part of a step
 _DOWN: Array = np.array([0.0, 0.0, 1.0])
-_FIRST_APPLIED = "thruster_force[1]"  # outputs before it are read before doStep, this one and those behind it after
+_FIRST_APPLIED = "thruster_force[1]"  # outputs before it are read before doStep, it and the later ones after
 
 
 class Observer(Protocol):
@@ -185,7 +185,7 @@ class Master:
         Parameters
         ----------
         observers : sequence of Observer
-            Called in this order after each step.
+            Observers, called in this order after each step.
         rate : float, optional
             Greatest number of simulated seconds per wall-clock second; default: no limit.
         commands : CommandSource, optional
@@ -222,7 +222,7 @@ class Master:
         k : int
             Number of the step.
         commands : CommandSource, optional
-            As for `run`.
+            Commands during the run, as for `run`.
 
         Raises
         ------
@@ -270,10 +270,10 @@ class Master:
             self._sensor.measure(self.signals.row[0], k % self.scenario.control_every == 0)
 
     def measure_initial_state(self) -> None:
-        """Fill the row with the initial state. The plant is not stepped, and no noise is drawn."""
+        """Fill the row with the initial state, which law and arbiter receive without noise; do not step the plant."""
         self._measured[:] = self._plant_measured
-        if self._sensor is not None:
-            self._sensor.give_true_state()
+        for given, true in zip(self.state[:3], self.true_state[:3], strict=True):  # the same where sensing is exact
+            given[:] = true
         self._evaluate_regions()
         if self.command_handler is not None:
             self.command_handler.update(0.0, float(self._given_evaluation.clearances[0]))
@@ -374,11 +374,11 @@ class Master:
         Parameters
         ----------
         name : str
-            Of a region with ``streamed = true`` in the scenario, or ``"goal"``.
+            Name of a region with ``streamed = true`` in the scenario, or ``"goal"``.
         displacement : array_like, shape (3,)
-            At the beginning of the next step, from the region's place in the scenario [m, NED].
+            Displacement at the beginning of the next step, from the region's place in the scenario [m, NED].
         velocity : array_like, shape (3,)
-            From then on [m/s, NED]; the law receives it too.
+            Velocity from the next step on [m/s, NED]; the law receives it too.
 
         Raises
         ------

@@ -24,12 +24,12 @@ class PackedMemberships(NamedTuple):
     regions: NDArray[np.int64]  # (r,) index of the region
     criteria: NDArray[np.int64]  # (r,) index of the region's criterion
     quantities: NDArray[np.int64]  # (r,) 0 its clearance, 1 the time to contact
-    ramps: Array  # (r,) m or rad, where the membership reaches 0; NaN: it goes by points or a curve
+    ramps: Array  # (r,) m or rad, clearance where the membership reaches 0; NaN: points or a curve define it
     follows: NDArray[np.bool_]  # (r,) True if the ramp is the arbiter's
     offsets: NDArray[np.int64]  # (r + 1,) into the points
-    places: Array  # m, rad or s: of the points, one row's behind the other's
-    degrees: Array  # of the points
-    curves: PackedCurves  # of curved terms, which have no points
+    places: Array  # m, rad or s: abscissae of the points, one row behind the other
+    degrees: Array  # memberships at the points
+    curves: PackedCurves  # the curved terms, which have no points
     by_time: bool  # True if a row needs the time to contact
 
 
@@ -41,11 +41,11 @@ def pack_memberships(
     Parameters
     ----------
     regions : sequence of SecondaryRegion
-        May be empty.
+        Regions; may be empty.
     criteria : sequence of CriterionSetup
         Criteria of these regions, in their order.
     width : float
-        Of the arbiter's ramp [m or rad].
+        Width of the arbiter's ramp [m or rad].
 
     Returns
     -------
@@ -84,13 +84,13 @@ def compute_memberships(
     Parameters
     ----------
     packed : PackedMemberships
-        Of n regions.
+        Membership functions of n regions.
     clearances : ndarray, shape (n,)
-        Of each region [m], or [rad] of attitude; NaN gives 0.
+        Clearance of each region [m], or [rad] of attitude; NaN gives 0.
     approach_times : ndarray, shape (n,)
         Time to contact of each region [s]; shape (0,) where no row needs it.
     memberships : ndarray, shape (criteria,)
-        Receives them, in [0, 1].
+        Receives the memberships, in [0, 1].
     """
     for i in range(memberships.size):
         memberships[i] = 0.0

@@ -1,4 +1,4 @@
-"""The measured state that law and arbiter receive: noise on position and velocity, and gaps without them."""
+"""The measured state that law and arbiter receive: noise on position and velocity, and times without them."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from controller import VehicleState
 from cosim.scenario.tables import Sensing
 from cosim.simulation.signals import Array
 
-STREAM = 1  # beside the seed, as in scored scenes: a scene and a scenario of one seed have the same noise
+STREAM = 1  # second part of the seed, as in scored scenes: a scene and a scenario of one seed have the same noise
 
 
 class Sensor:
-    """Computes the measured state from the true one.
+    """Computes the measured state from the true state.
 
     Parameters
     ----------
     sensing : Sensing
-        Noise and gaps.
+        Noise, and the time in which position and velocity are lost.
     true_state : VehicleState
         Views of the true state.
     given : VehicleState
@@ -30,21 +30,15 @@ class Sensor:
         self._deviation: Array = np.repeat([sensing.position_noise, sensing.velocity_noise], 3)
         self._noise: Array = np.zeros(6)
 
-    def give_true_state(self) -> None:
-        """Write the true state, as before the first measurement."""
-        self._given.position[:] = self._true_state.position
-        self._given.quaternion[:] = self._true_state.quaternion
-        self._given.velocity_body[:] = self._true_state.velocity_body
-
     def measure(self, time: float, anew: bool) -> None:
         """Write the measured state at a time.
 
         Parameters
         ----------
         time : float
-            [s].
+            Time [s].
         anew : bool
-            Draw new noise, as at each control step; otherwise that of the last one stays.
+            True at a control step: draw new noise; otherwise the last noise stays.
         """
         sensing, true_state, given = self._sensing, self._true_state, self._given
         if anew:

@@ -13,7 +13,7 @@ from cosim.simulation.sensor import Sensor
 from cosim.simulation.signals import Signals
 from cosim.simulation.stepped_plant import SteppedPlant
 
-_ROUNDING = 1e-6  # of a step
+_ROUNDING = 1e-6  # tolerance of times, as a part of a step
 FIRST, FIRST_TIME = "measured.depth", f"measured.time.{SENSORS[0]}"  # outputs of the plant, the others follow
 
 
@@ -23,21 +23,17 @@ class SensorNavigation:
     Parameters
     ----------
     scenario : Scenario
-        With the sensors and their outages.
+        Scenario with the sensors and their outages.
     plant : SteppedPlant
-        With the sensors.
+        Plant with the sensors.
     signals : Signals
         Their row holds the plant's outputs.
-    true_state : VehicleState
-        Views of the true state.
     given : VehicleState
         Receives the estimate.
     """
 
-    def __init__(
-        self, scenario: Scenario, plant: SteppedPlant, signals: Signals, true_state: VehicleState, given: VehicleState
-    ) -> None:
-        self._true_state, self._given, self._plant = true_state, given, plant
+    def __init__(self, scenario: Scenario, plant: SteppedPlant, signals: Signals, given: VehicleState) -> None:
+        self._plant = plant
         parameters = scenario_sensors(scenario)
         self.navigator = Navigator(sensor_model(parameters), given)
         samples = self.navigator.measurements
@@ -47,12 +43,6 @@ class SensorNavigation:
         )
         self._changes = outage_schedule(scenario.outages, parameters, scenario.time.step)
         self._step = scenario.time.step
-
-    def give_true_state(self) -> None:
-        """Write the true state, as before the first measurement."""
-        self._given.position[:] = self._true_state.position
-        self._given.quaternion[:] = self._true_state.quaternion
-        self._given.velocity_body[:] = self._true_state.velocity_body
 
     def measure(self, time: float, anew: bool) -> None:
         """Apply sensor outages due at a time [s], and write the estimate from the samples. `anew` is not used."""
@@ -72,9 +62,9 @@ def make_sensing(
     Parameters
     ----------
     scenario : Scenario
-        Its key `sensing` is used.
+        Scenario; its key `sensing` is used.
     plant : SteppedPlant
-        With the sensors.
+        Plant with the sensors.
     signals : Signals
         Their row holds the returned state.
     true_state : VehicleState
@@ -83,7 +73,7 @@ def make_sensing(
     Returns
     -------
     VehicleState, and Sensor, SensorNavigation or None
-        The true state itself and None where sensing is exact.
+        State for law and arbiter, and its writer; the true state itself and None where sensing is exact.
     """
     if scenario.sensing.exact:
         return true_state, None
@@ -93,4 +83,4 @@ def make_sensing(
         return given, Sensor(scenario.sensing, true_state, given)
     quaternion, deviation = signals.view("sensed.e0", 4), signals.view("deviation.position.x", 12)
     given = VehicleState(position, quaternion, velocity, health, deviation)
-    return given, SensorNavigation(scenario, plant, signals, true_state, given)
+    return given, SensorNavigation(scenario, plant, signals, given)

@@ -26,14 +26,14 @@ class Signals:
     Parameters
     ----------
     columns : sequence of Column
-        In the order of the row.
+        Columns in the order of the row.
 
     Attributes
     ----------
     columns : tuple of Column
-        In the order of the row.
+        Columns in the order of the row.
     row : ndarray, shape (n,)
-        The present values.
+        Values of the present step, each in its column's unit.
     """
 
     def __init__(self, columns: Sequence[Column]) -> None:

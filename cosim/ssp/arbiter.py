@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 from cosim.scenario.scenario import Scenario
 from cosim.ssp.c_sources import c_files, under_own_names
-from cosim.ssp.controller import rule_inputs
 from cosim.ssp.documentation import contents
 from fuzzy_arbiter import System
 from fuzzy_arbiter.export import to_c
@@ -31,12 +30,12 @@ def arbiter_component(scenario: Scenario) -> Component:
     Parameters
     ----------
     scenario : Scenario
-        With the closed engine, or one with the same results.
+        Scenario with the closed engine, or one with the same results.
 
     Returns
     -------
     Component
-        Without states, for co-simulation.
+        Component without states, for co-simulation.
     """
     rows = (
         Variable("time", "time", "time", q.TIME, "Simulated time"),
@@ -62,12 +61,12 @@ def arbiter_component(scenario: Scenario) -> Component:
 
 def _inputs(scenario: Scenario) -> Iterator[Variable]:
     """Yield the inputs of the rules: the memberships, or the scenario's signals."""
-    for i, signal in enumerate(rule_inputs(scenario)):
+    for i, signal in enumerate(scenario.rules.signals):
         low, high = scenario.rules.system.inputs[i].universe
         unit = signal.unit if signal.unit in q.UNITS else ""
         quantity = Quantity(unit, min(low, 0.0), max(high, 0.0))  # masters start inputs with 0
         yield Variable(f"arbiter.{signal.name}", "input", f"inputs[{i}]", quantity, signal.what)
-    for i, name in enumerate(() if rule_inputs(scenario) else scenario.criterion_names):
+    for i, name in enumerate(() if scenario.rules.signals else scenario.criterion_names):
         what = f"Degree to which criterion {name} asks for attention"
         yield Variable(f"membership.{name}", "input", f"inputs[{i}]", q.FRACTION, what)
 

@@ -13,14 +13,14 @@ def c_files(package: str, folder: str) -> dict[str, bytes]:
     Parameters
     ----------
     package : str
-        Such as ``"controller"``.
+        Name of the package, such as ``"controller"``.
     folder : str
         Folder in the package.
 
     Returns
     -------
     dict of str to bytes
-        By name.
+        Files by name.
     """
     found = resources.files(package).joinpath(*folder.split("/"))
     return {file.name: file.read_bytes() for file in found.iterdir() if file.name.endswith((".c", ".h"))}
@@ -32,7 +32,7 @@ def under_own_names(files: dict[str, bytes]) -> dict[str, bytes]:
     Parameters
     ----------
     files : dict of str to bytes
-        By name; files that do not depend on FMI.
+        Files by name, which do not depend on FMI.
 
     Returns
     -------

@@ -9,7 +9,6 @@ from controller import CompiledLaw, LawError
 from controller.navigation.measurements import SENSORS
 from controller.regions import Region
 from controller.regions.region_set import of_attitude
-from cosim.scenario.arbiter_rules import InputSignal
 from cosim.scenario.keys import comments, unit_of_gain
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
@@ -36,8 +35,8 @@ thrusters, are those of the scenario; they are no parameters.
 
 Numbers of shapes are those that the shape works with: unit vectors and rotation matrices must stay such."""
 
-_LEAST, _MOST = 1e-9, 1e9
-_PERIOD = Quantity("s", 1e-6, 1e6)
+_LEAST, _MOST = 1e-9, 1e9  # bounds of gains
+_PERIOD = Quantity("s", 1e-6, 1e6)  # period of the law
 # units of gains by the unit of the goal's g; the gains are documented for m2
 _UNITS_BY_GOAL = {
     "N/m3": {"m2": "N/m3", "m": "N/m", "": "N.m"},
@@ -52,12 +51,12 @@ def controller_component(scenario: Scenario) -> Component:
     Parameters
     ----------
     scenario : Scenario
-        With a built-in law, and without streamed regions.
+        Scenario with a built-in law, and without streamed regions.
 
     Returns
     -------
     Component
-        Without states, for co-simulation.
+        Component without states, for co-simulation.
     """
     regions = [scenario.goal_region, *(secondary.region for secondary in scenario.regions)]
     translated = translate_loop(scenario, regions, prefixes(regions))
@@ -80,12 +79,12 @@ def prefixes(regions: Sequence[Region]) -> list[str]:
     Parameters
     ----------
     regions : sequence of Region
-        The goal first.
+        Regions, the goal first.
 
     Returns
     -------
     list of str
-        Of letters, digits and underscores, as in FMI's structured naming.
+        Prefixes of letters, digits, underscores and dots, as in FMI's structured naming.
     """
     found = ["goal"]
     for region in regions[1:]:
@@ -117,7 +116,7 @@ def _variables(scenario: Scenario, regions: Sequence[Region], places: Places) ->
         yield Variable(f"weight.{name}", "input", f"inputs.weights[{i}]", q.FRACTION, f"Weight of criterion {name}")
     yield from _outputs(scenario, regions)
     yield from _parameters(scenario, places)
-    yield from _of_regions(regions, places)
+    yield from _region_parameters(regions, places)
 
 
 def _samples(scenario: Scenario) -> Iterator[Variable]:
@@ -164,7 +163,7 @@ def _outputs(scenario: Scenario, regions: Sequence[Region]) -> Iterator[Variable
     for i, name in enumerate(scenario.criterion_names):
         what = f"Degree to which criterion {name} asks for attention"
         yield output(f"membership.{name}", f"memberships[{i}]", "", what)
-    for i, signal in enumerate(rule_inputs(scenario)):
+    for i, signal in enumerate(scenario.rules.signals):
         unit = signal.unit if signal.unit in UNITS else ""
         yield output(f"arbiter.{signal.name}", f"rule_inputs[{i}]", unit, f"Of the arbiter's rules: {signal.what}")
     for i in range(4):
@@ -177,13 +176,6 @@ def _outputs(scenario: Scenario, regions: Sequence[Region]) -> Iterator[Variable
         yield output(f"{prefix}.clearance", f"clearances[{i}]", unit, f"{kind} {region.name}, below 0 where violated")
 
 
-def rule_inputs(scenario: Scenario) -> tuple[InputSignal, ...]:
-    """Return the input signals of the arbiter's rules; empty if these are the memberships."""
-    signals = scenario.rules.inputs
-    plain = [(signal.kind, signal.of) for signal in signals]
-    return () if plain == [("membership", i) for i in range(len(scenario.criteria))] else signals
-
-
 def _parameter(name: str, member: str, quantity: Quantity, description: str, start: float) -> Variable:
     return Variable(name, "parameter", member, quantity, description, float(start))
 
@@ -193,8 +185,8 @@ def _parameters(scenario: Scenario, places: Places) -> Iterator[Variable]:
     for i, (name, start) in enumerate(law.gains._asdict().items()):
         unit = unit_of_gain(law.name, name).replace(" ", ".")
         unit = _UNITS_BY_GOAL.get(unit, {}).get(scenario.goal.unit, unit)
-        least = 0.0 if _takes(law, name, 0.0) else _LEAST
-        most = next((most for most in (_MOST, 1.0) if _takes(law, name, most)), max(float(start), least))
+        least = 0.0 if _accepts(law, name, 0.0) else _LEAST
+        most = next((most for most in (_MOST, 1.0) if _accepts(law, name, most)), max(float(start), least))
         quantity = Quantity(unit if unit in UNITS else "", least, most, is_gain=True)
         description = _without_unit(said.get(f"law.gains.{name}", "")) or f"Gain {name} of the law"
         yield _parameter(f"law.gains.{name}", f"parameters.gains[{i}]", quantity, description, start)
@@ -211,7 +203,7 @@ def _parameters(scenario: Scenario, places: Places) -> Iterator[Variable]:
     yield from _motion("initial.", "parameter", "parameters.start", numbers, "At the start:")
 
 
-def _takes(law: CompiledLaw, gain: str, value: float) -> bool:
+def _accepts(law: CompiledLaw, gain: str, value: float) -> bool:
     """Return True if a law accepts the value of a gain."""
     try:
         law.validate(law.gains._replace(**{gain: value}))
@@ -226,7 +218,7 @@ def _without_unit(comment: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def _of_regions(regions: Sequence[Region], places: Places) -> Iterator[Variable]:
+def _region_parameters(regions: Sequence[Region], places: Places) -> Iterator[Variable]:
     number = 0
     for i, (region, prefix) in enumerate(zip(regions, prefixes(regions), strict=True)):
         if i:

@@ -18,18 +18,18 @@ def contents(title: str, words: str, rows: Sequence[Variable], fmi: int) -> dict
     Parameters
     ----------
     title : str
-        Of the page.
+        Title of the page.
     words : str
         Description, in paragraphs separated by empty lines.
     rows : sequence of Variable
-        Of the FMU.
+        Variables of the FMU.
     fmi : int
-        2 or 3.
+        FMI version, 2 or 3.
 
     Returns
     -------
     dict of str to bytes
-        By path in the archive.
+        Files by path in the archive.
 
     Raises
     ------

@@ -86,7 +86,7 @@ class Loop:
     Parameters
     ----------
     scenario : Scenario
-        With features that a system of FMUs supports.
+        Scenario without features that a system of FMUs lacks.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class Loop:
     law : CompiledLaw
         The law in its initial state.
     functions : dict of str to (function, tuple)
-        By name in C, with their arguments.
+        Functions by name in C, with their arguments.
     """
 
     def __init__(self, scenario: Scenario) -> None:

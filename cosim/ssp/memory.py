@@ -54,12 +54,12 @@ class Memory:
                 self.definitions.append(array_data(array, name, "static const"))
 
     def name(self, array: np.ndarray, expression: str) -> None:
-        """Let an array stand where a C expression says."""
+        """Place an array at the address of a C expression."""
         self._constants[id(array)] = expression
         self._kept.append(array)
 
     def is_named(self, array: np.ndarray) -> bool:
-        """Return whether an array is a constant, or stands where a C expression says."""
+        """Return True if an array is a constant, or has the address of a C expression."""
         return id(array) in self._constants
 
     def call(self, program: Program, name: str, arguments: tuple[Any, ...]) -> str:
@@ -68,11 +68,11 @@ class Memory:
         Parameters
         ----------
         program : Program
-            It exports the function as ``translated_name``.
+            Program that exports the function as ``translated_name``.
         name : str
-            Of the function.
+            Name of the function.
         arguments : tuple
-            Its arguments, or `Named` ones.
+            Arguments of the function, each a value or `Named`.
         """
 
         def pointer(array: np.ndarray, _: str) -> str:

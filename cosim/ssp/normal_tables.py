@@ -11,17 +11,17 @@ import math
 import numpy as np
 
 OUTERMOST = 3.6541528853610088  # abscissa at which the tail begins
-_LAYERS = 256
-_STEPS = 2.0**52  # of a layer's width
-_FACTOR = 2549297995355413924 << 64 | 4865540595714422341  # of PCG's linear congruential generator
-_SIZE = 2**128  # of its state
+_LAYERS = 256  # number of layers
+_STEPS = 2.0**52  # number of steps into which the generator divides a layer's width
+_FACTOR = 2549297995355413924 << 64 | 4865540595714422341  # multiplier of PCG's linear congruential generator
+_SIZE = 2**128  # modulus of its state
 
 
 def ziggurat() -> str:
     """Return the C header with the layers: ``WIDTHS``, ``INNER`` and ``HEIGHTS``.
 
-    NumPy's widths are rounded otherwise than these are worked out here, in their last bits: so it is NumPy that gives
-    them. The others decide alone whether a number is taken.
+    NumPy rounds its widths in another way, so that their last bits differ from a computation here: the widths are read
+    from its generator. The other two only decide whether a number is accepted.
     """
     density, x = math.exp(-0.5 * OUTERMOST**2), OUTERMOST
     area = OUTERMOST * density + math.sqrt(math.pi / 2.0) * math.erfc(OUTERMOST / math.sqrt(2.0))
@@ -29,7 +29,7 @@ def ziggurat() -> str:
     for _ in range(_LAYERS - 2):  # inwards, each layer with the same area
         x = math.sqrt(-2.0 * math.log(area / x + math.exp(-0.5 * x * x)))
         edges.append(x)
-    edges.append(0.0)  # of the top
+    edges.append(0.0)  # edge of the top layer
     edges.reverse()
     base = area / density  # width of a rectangle as large as the lowest layer with its tail
     inner = [OUTERMOST / base, *(a / b for a, b in zip(edges, edges[1:], strict=False))]
@@ -46,7 +46,7 @@ def ziggurat() -> str:
 
 
 def _widths() -> list[float]:
-    """Return a 2^52-nd part of the width of each of NumPy's layers: what it draws one step from the middle."""
+    """Return the width of each of NumPy's layers over 2^52: the number that it draws one step from the middle."""
     generator, widths = np.random.PCG64(0), []
     state = generator.state
     back, increment = pow(_FACTOR, -1, _SIZE), state["state"]["inc"]

@@ -17,6 +17,6 @@ def shape_numbers(shape: Shape) -> tuple[tuple[str, Quantity], ...]:
     Returns
     -------
     tuple of (str, Quantity)
-        In the order of ``shape.packed()``.
+        Names and quantities in the order of ``shape.packed()``.
     """
     return tuple((name, Quantity(unit, least, greatest)) for name, unit, least, greatest, _ in shape.numbers())

@@ -27,7 +27,7 @@ class Part:
     """One FMU of the system."""
 
     name: str
-    source: str  # of the FMU, in the archive
+    source: str  # path of the FMU in the archive
     component: Component
     connectors: tuple[str, ...]  # names of the inputs and outputs with a connector
 
@@ -41,9 +41,9 @@ class Part:
 class Wire:
     """Connection of outputs of one part to the inputs of the same names of another."""
 
-    start: str
-    end: str
-    names: tuple[str, ...]
+    start: str  # name of the part with the outputs
+    end: str  # name of the part with the inputs
+    names: tuple[str, ...]  # names of the variables
 
 
 def structure(
@@ -54,13 +54,13 @@ def structure(
     Parameters
     ----------
     name, description : str
-        Of the system.
+        Name and description of the system.
     parts : sequence of Part
-        In stepping order, for masters that use it.
+        Parts in stepping order, for masters that use it.
     wires : sequence of Wire
         Connections between the parts.
     stop_time, step : float
-        [s]; SSP 1.0 has no element for the step, so it is in annotations of OSP and OMSimulator.
+        End and step [s]; SSP 1.0 has no element for the step, so it is in annotations of OSP and OMSimulator.
 
     Returns
     -------

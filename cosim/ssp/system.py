@@ -44,18 +44,18 @@ def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str =
     Parameters
     ----------
     scenario : Scenario
-        With a built-in law, and without commands and streamed regions.
+        Scenario with a built-in law, and without commands and streamed regions.
     out : Path
         The file to write, atomically and with deterministic content.
     fmi : int
-        2 or 3, of all three FMUs. Most SSP masters support 2 only.
+        FMI version of all three FMUs, 2 or 3. Most SSP masters support 2 only.
     platforms : str
-        As for `plant_fmu.build_fmu`.
+        Platforms of the FMUs, as for `plant_fmu.build_fmu`.
 
     Returns
     -------
     Path
-        `out`.
+        The written file, `out`.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def plant_component(scenario: Scenario) -> Component:
     Parameters
     ----------
     scenario : Scenario
-        Its vehicle, initial state and plant parameters are used.
+        Scenario whose vehicle, initial state and plant parameters are used.
 
     Returns
     -------

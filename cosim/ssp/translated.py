@@ -44,8 +44,8 @@ class Places:
 class Translated:
     """C files, and the places of their arrays."""
 
-    files: dict[str, str]  # by name
-    constants: dict[str, int]  # for the generated header
+    files: dict[str, str]  # C files and headers by name
+    constants: dict[str, int]  # macros of the generated header
     places: Places
 
 
@@ -55,9 +55,9 @@ def translate_loop(scenario: Scenario, regions: Sequence[Region], names: Sequenc
     Parameters
     ----------
     scenario : Scenario
-        With a built-in law.
+        Scenario with a built-in law.
     regions : sequence of Region
-        Of the scenario, the goal first.
+        Regions of the scenario, the goal first.
     names : sequence of str
         Prefix of the variables of each region.
 

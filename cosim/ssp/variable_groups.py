@@ -10,7 +10,7 @@ from plant_fmu.component import Component
 from plant_fmu.markup import xml_text
 
 _NAMESPACE = "https://open-simulation-platform.com/OspModelDescription/1.0.0"
-_LAST = re.compile(r"(?:\.[^.\[\]]+|\[\d+\])$")  # of a structured name
+_LAST = re.compile(r"(?:\.[^.\[\]]+|\[\d+\])$")  # last part of a structured name
 
 
 def osp_model_description(component: Component, names: Iterable[str]) -> str:
@@ -21,7 +21,7 @@ def osp_model_description(component: Component, names: Iterable[str]) -> str:
     component : Component
         The FMU's component.
     names : iterable of str
-        Inputs and outputs with a connector.
+        Names of the inputs and outputs with a connector.
 
     Returns
     -------

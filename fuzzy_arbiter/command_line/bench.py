@@ -17,7 +17,7 @@ from fuzzy_arbiter.engines.firing import Array, Firing
 from fuzzy_arbiter.errors import ArbiterError, EngineError
 
 REPEATS = 5
-_SECONDS = 0.06  # of a repeat, about
+_SECONDS = 0.06  # s, approximate duration of a repeat
 _MOST_ROWS = 100_000
 
 
@@ -55,7 +55,7 @@ def bench(system: System) -> list[Cost]:
     Returns
     -------
     list of Cost
-        For each engine.
+        Cost of each engine.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def table(costs: list[Cost]) -> str:
     Parameters
     ----------
     costs : list of Cost
-        As from `bench`.
+        Costs, as from `bench`.
 
     Returns
     -------

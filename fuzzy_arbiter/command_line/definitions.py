@@ -56,7 +56,7 @@ def described(arbiter: Arbiter) -> str:
     Returns
     -------
     str
-        Lines.
+        Text of several lines.
     """
     system = arbiter.system
     lines = [system.name, ""]
@@ -106,9 +106,9 @@ def convert(file: str, out: str, native: bool, block: str | None = None) -> None
     out : str
         File to write; its suffix selects the format.
     native : bool
-        Whether its centroids shall be the weights, so that other tools give them without a normalization.
+        True to make the centroids the weights, so that other tools give them without a normalization.
     block : str, optional
-        As of `load_system`.
+        Name of the block, as for `load_system`.
 
     Raises
     ------

@@ -46,7 +46,7 @@ def draw(
     at : sequence of str
         Values of inputs, as ``name=value``.
     relief : bool
-        Whether a surface is drawn in three dimensions.
+        True to draw a surface in three dimensions.
 
     Returns
     -------
@@ -98,14 +98,14 @@ def middles(at: Sequence[str], system: System) -> list[str]:
     Parameters
     ----------
     at : sequence of str
-        As ``name=value``; nothing is added to values without names.
+        Values as ``name=value``; nothing is added to values without names.
     system : System
         System whose inputs these are.
 
     Returns
     -------
     list of str
-        As ``name=value``.
+        Values as ``name=value``.
     """
     if not all("=" in word for word in at):
         return []

@@ -48,7 +48,7 @@ def require_suffix(out: str, expected: Sequence[str]) -> None:
     Parameters
     ----------
     out : str
-        Path.
+        Path of the output.
     expected : sequence of str
         Suffixes, without the dot.
 

@@ -20,14 +20,14 @@ def sample(words: Sequence[str], system: System) -> list[float] | dict[str, floa
     Parameters
     ----------
     words : sequence of str
-        All as ``name=value``, or all values in the order of the inputs.
+        Words of the command line: all as ``name=value``, or all values in the order of the inputs.
     system : System
         System whose inputs these are.
 
     Returns
     -------
     list or dict of float
-        As an arbiter takes it.
+        Sample for a call of an arbiter.
 
     Raises
     ------

@@ -30,7 +30,7 @@ def choose(system: System, engine: str) -> tuple[Engine, str]:
     Returns
     -------
     Engine
-        Ready to evaluate.
+        Engine of the system.
     str
         The reason, in words.
 

@@ -21,7 +21,7 @@ def centroids(cuts: Array, shape: Outline) -> Array:
     Returns
     -------
     ndarray, shape (n,)
-        In the universe.
+        Centroids, in the universe.
     """
     terms, n = cuts.shape
     area, moment = np.zeros(n), np.zeros(n)

@@ -30,7 +30,7 @@ from fuzzy_arbiter.engines.plain import beyond_plain
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.hierarchy import DEGREE
 
-SMOOTHSTEP = (0.0, 0.0, 3.0, -2.0)  # which is never outside [0, 1]
+SMOOTHSTEP = (0.0, 0.0, 3.0, -2.0)  # coefficients of 3 h^2 - 2 h^3, which stays within [0, 1]
 _BLOCK = 8192  # samples evaluated at a time; longer arrays leave the caches and are allocated anew each time
 
 
@@ -54,7 +54,7 @@ class ClosedEngine(Engine):
     Attributes
     ----------
     clauses : tuple of tuple of frozenset
-        For each output, the literals of which the least degree, and of all clauses the greatest, is h.
+        Clauses of each output: h is the greatest over its clauses of the least degree of a clause's literals.
     ladder : tuple, or None
         The literals m_1, m_2, .. if the rules are those of prioritised criteria.
     raw, scaled : tuple of tuple of Piece

@@ -17,7 +17,7 @@ from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.terms.values import Constant, Value
 
 Shortcut = Callable[[Sequence[float]], list[float] | None]
-_BLOCK = 8192  # samples at a time, so that what is worked on stays in the cache
+_BLOCK = 8192  # samples that are evaluated together, so that they stay in the processor's cache
 _EACH_BY_ITSELF = ("range", "none")  # normalizations that use one output at a time
 
 
@@ -34,7 +34,7 @@ class Engine(ABC):
     Attributes
     ----------
     scale : list of (float, float)
-        For each output the centroids that become 0 and 1; none if they are not normalized.
+        Centroids of each output that become 0 and 1; empty without a normalization.
 
     Raises
     ------
@@ -63,7 +63,7 @@ class Engine(ABC):
         Returns
         -------
         float
-            In the output's universe.
+            Centroid in the output's universe.
         """
 
     @abstractmethod
@@ -75,12 +75,12 @@ class Engine(ABC):
         k : int
             Index of the output.
         cuts : ndarray, shape (terms, n)
-            Degrees in [0, 1]; not all of one sample are 0.
+            Degrees in [0, 1] at which its terms are cut; not all of one sample are 0.
 
         Returns
         -------
         ndarray, shape (n,)
-            In the output's universe.
+            Centroids in the output's universe.
         """
 
     def centroids(self, inputs: Sequence[float]) -> list[float]:
@@ -111,9 +111,9 @@ class Engine(ABC):
         Parameters
         ----------
         k, cuts
-            As of `centroid`.
+            Output and cuts, as for `centroid`.
         inputs : sequence of float
-            The sample, and the values of the outputs before; of these the terms of some outputs are functions.
+            The sample, and the values of the outputs before, on both of which terms of the output may depend.
 
         Returns
         -------
@@ -128,14 +128,14 @@ class Engine(ABC):
         Parameters
         ----------
         k, cuts
-            As of `centroid_of_many`.
+            Output and cuts, as for `centroid_of_many`.
         inputs : ndarray, shape (n, inputs and k outputs)
             The samples, and the values of the outputs before.
 
         Returns
         -------
         ndarray, shape (n,)
-            Each as of `value`.
+            Raw values, as from `value`.
         """
         return self.centroid_of_many(k, cuts)
 
@@ -158,17 +158,17 @@ class Engine(ABC):
             for start in range(0, len(inputs), _BLOCK):
                 block = slice(start, start + _BLOCK)
                 for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(inputs[block]))):
-                    self._some(k, cuts, inputs[block], result[block, k])
+                    self._fill_fired(k, cuts, inputs[block], result[block, k])
             for k in range(len(outputs)):
-                self._complete(k, result[:, k])
+                self._fill_defaults(k, result[:, k])
             return result
         result = np.empty((len(inputs), len(outputs)))
         for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(inputs))):
-            self._some(k, cuts, np.column_stack([inputs, result[:, :k]]), result[:, k])
-            self._complete(k, result[:, k])
+            self._fill_fired(k, cuts, np.column_stack([inputs, result[:, :k]]), result[:, k])
+            self._fill_defaults(k, result[:, k])
         return result
 
-    def _some(self, k: int, cuts: Array, known: Array, values: Array) -> None:
+    def _fill_fired(self, k: int, cuts: Array, known: Array, values: Array) -> None:
         """Fill in the values of an output where rules fire, and NaN where none does."""
         fires = np.asarray(cuts.any(axis=0))
         if fires.all():
@@ -177,7 +177,7 @@ class Engine(ABC):
             values[:] = math.nan
             values[fires] = self.values(k, cuts[:, fires], known[fires])
 
-    def _complete(self, k: int, values: Array) -> None:
+    def _fill_defaults(self, k: int, values: Array) -> None:
         """Fill in the values before or the default of an output where it has no value, and hold it in its range."""
         output = self.system.outputs[k]
         defined = np.isfinite(values)
@@ -200,7 +200,7 @@ class Engine(ABC):
         Returns
         -------
         tuple of float
-            Normalized by the system's normalization; NaN for an output without default if no rule fires for it.
+            Values after the system's normalization; NaN for an output without default if no rule fires for it.
         """
         raw = self.centroids(inputs)
         if not self.scale:
@@ -219,7 +219,7 @@ class Engine(ABC):
         Returns
         -------
         ndarray, shape (n, outputs)
-            Normalized by the system's normalization; NaN where no rule fires for an output without default.
+            Values after the system's normalization; NaN where no rule fires for an output without default.
         """
         raw = self.centroids_of_many(inputs)
         if not self.scale:
@@ -233,8 +233,8 @@ class Engine(ABC):
         Returns
         -------
         callable, or None
-            From any object to its weights; None unless the object is a sequence with a number for each input, in its
-            universe.
+            Function from any object to its weights; it returns None unless the object is a sequence with a number for
+            each input, in its universe.
         """
         return None
 
@@ -269,14 +269,14 @@ def normalize_weights(weights: Sequence[float], normalization: str) -> tuple[flo
     Parameters
     ----------
     weights : sequence of float
-        In [0, 1], or NaN, which stays and counts for nothing.
+        Weights in [0, 1], or NaN, which stays and counts for nothing.
     normalization : {"none", "range", "sum", "max"}
         ``none`` and ``range`` leave the weights unchanged.
 
     Returns
     -------
     tuple of float
-        Divided by their sum or their greatest; all 0 if that is 0.
+        Weights divided by their sum or their greatest; all 0 if that is 0.
     """
     if normalization in _EACH_BY_ITSELF:
         return tuple(weights)
@@ -292,14 +292,14 @@ def normalize_weights_of_many(weights: Array, normalization: str) -> Array:
     Parameters
     ----------
     weights : ndarray, shape (n, outputs)
-        In [0, 1], or NaN, which stays and counts for nothing.
+        Weights in [0, 1], or NaN, which stays and counts for nothing.
     normalization : {"none", "range", "sum", "max"}
         ``none`` and ``range`` leave the weights unchanged.
 
     Returns
     -------
     ndarray, shape (n, outputs)
-        Each row divided by its sum or its greatest; all 0 if that is 0.
+        Weights, each row divided by its sum or its greatest; all 0 if that is 0.
     """
     if normalization in _EACH_BY_ITSELF:
         return weights

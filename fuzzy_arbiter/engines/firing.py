@@ -65,7 +65,7 @@ def number_logic(operators: System | Operators) -> Logic[float]:
     Returns
     -------
     Logic of float
-        On degrees in [0, 1].
+        Operators on degrees in [0, 1].
     """
     conjunction, disjunction = T_NORMS[operators.conjunction], S_NORMS[operators.disjunction]
     return Logic(
@@ -86,7 +86,7 @@ def array_logic(operators: System | Operators, n: int = 1) -> Logic[Array]:
     Returns
     -------
     Logic of ndarray
-        On arrays of one shape, degrees in [0, 1].
+        Operators on arrays of one shape, of degrees in [0, 1].
     """
     conjunction, disjunction = T_NORMS[operators.conjunction], S_NORMS[operators.disjunction]
     return Logic(
@@ -208,7 +208,7 @@ class Firing:
         Returns
         -------
         list of ndarray, shape (n,)
-            For each rule, in the order of the rules.
+            Strengths of each rule, in the order of the rules.
         """
         known: dict[tuple[str, str], Array] = {}
 
@@ -237,7 +237,7 @@ class Firing:
         Returns
         -------
         list of list of float
-            For each output, and each of its slots: of its terms, if they are joined by their maximum; 0 where no rule
+            Strength of each slot of each output; a slot is a term if terms are joined by their maximum. 0 where no rule
             fires.
         """
         result = []
@@ -259,7 +259,7 @@ class Firing:
         Returns
         -------
         list of ndarray, shape (slots, n)
-            For each output.
+            Strengths of the slots of each output.
         """
         result = []
         for slots, norm in zip(self.slots, self._joins, strict=True):
@@ -283,7 +283,7 @@ class Firing:
         Returns
         -------
         list of float
-            In the order of its terms; 0 where no rule fires.
+            Strengths in the order of its terms; 0 where no rule fires.
         """
         result = [0.0] * len(self.system.outputs[k].terms)
         for slot in self.slots[k]:

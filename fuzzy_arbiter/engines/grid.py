@@ -24,8 +24,8 @@ from fuzzy_arbiter.engines.plain import beyond_plain
 from fuzzy_arbiter.errors import EngineError
 
 LEAST_AREA = float(np.finfo(np.float64).eps)  # scikit-fuzzy divides by no area less than this
-_BLOCK = 4096  # samples at a time, so that what is worked on stays in the cache
-_ROUNDING = 4 * LEAST_AREA
+_BLOCK = 4096  # samples that are evaluated together, so that they stay in the processor's cache
+_ROUNDING = 4 * LEAST_AREA  # tolerance of degrees
 
 
 class GridEngine(Engine):
@@ -108,12 +108,12 @@ class _Piece:
     If it has more than one cell, no two of the terms cross in it.
     """
 
-    start: float  # from the universe's least place
+    start: float  # distance of its start from the universe's least place
     width: float
-    cells: int
-    terms: tuple[Line, ...]  # those that are not 0
-    own: tuple[Line, ...]  # those that may cross their own cut
-    foreign: tuple[Line, ...]  # those that may cross the cut of a higher term, with that cut's index
+    cells: int  # number of grid cells
+    terms: tuple[Line, ...]  # terms that are not 0
+    own: tuple[Line, ...]  # terms that may cross their own cut
+    foreign: tuple[Line, ...]  # terms that may cross the cut of a higher term, with that cut's index
 
 
 def require_plain(system: System, engine: str, curved_inputs: bool) -> None:
@@ -126,7 +126,7 @@ def require_plain(system: System, engine: str, curved_inputs: bool) -> None:
     engine : str
         Name of the engine, for the message.
     curved_inputs : bool
-        Whether terms of inputs may be any membership functions.
+        True if terms of inputs may be any membership functions.
 
     Raises
     ------

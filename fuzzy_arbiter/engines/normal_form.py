@@ -29,12 +29,12 @@ def ladder(system: System, clauses: Sequence[Sequence[Clause]]) -> tuple[Literal
     system : System
         System with the rules.
     clauses : sequence of sequence of frozenset
-        As from `high_clauses`.
+        Clauses of each output, as from `high_clauses`.
 
     Returns
     -------
     tuple, or None
-        For each output the literal that makes it high, if none of those before it holds.
+        Literal of each output that makes it high if none of those before it holds.
     """
     complements = _complements(system)
     steps: list[Literal] = []
@@ -54,13 +54,13 @@ def high_clauses(system: System) -> list[tuple[Clause, ...]] | str:
     Parameters
     ----------
     system : System
-        With conjunction min and disjunction max.
+        System with conjunction min and disjunction max.
 
     Returns
     -------
     list of tuple of frozenset, or str
-        For each output, such that the cut of its second term is the greatest of the clauses' least degrees, and that of
-        its first term one minus this; or the reason why there are no such clauses.
+        Clauses of each output, such that the cut of its second term is the greatest of the clauses' least degrees, and
+        that of its first term one minus this; or the reason why there are no such clauses.
     """
     complements = _complements(system)
     result = []

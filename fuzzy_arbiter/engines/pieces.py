@@ -42,7 +42,7 @@ class Piece:
         Parameters
         ----------
         h : float
-            In this piece.
+            Cut of the second term, within this piece.
 
         Returns
         -------
@@ -61,7 +61,7 @@ def pieces(output: Output) -> tuple[tuple[Piece, ...], tuple[Piece, ...]]:
     Parameters
     ----------
     output : Output
-        With two terms.
+        Output with two terms.
 
     Returns
     -------

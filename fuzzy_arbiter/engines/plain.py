@@ -18,7 +18,7 @@ def beyond_plain(system: System, curved_inputs: bool = False) -> str:
     system : System
         System to check.
     curved_inputs : bool
-        Whether terms of inputs may be any membership functions.
+        True if terms of inputs may be any membership functions.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def curved(variable: Variable) -> str:
     Returns
     -------
     str
-        In words; empty if there is none.
+        Description in words; empty if all terms are piecewise linear.
     """
     for term in variable.terms:
         if not isinstance(term.shape, Shape):
@@ -77,7 +77,7 @@ def bent(p: Proposition) -> bool:
     Returns
     -------
     bool
-        True if it does.
+        True if the condition has one.
     """
     if isinstance(p, Not):
         return bent(p.part)

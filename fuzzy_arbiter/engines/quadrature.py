@@ -20,17 +20,17 @@ from fuzzy_arbiter.shapes import Array, Membership
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
 
-BOUND = 1e-9  # of the universe's width: more than a centroid is off
-_TOLERANCE = 1e-13  # of the area, for each part
+BOUND = 1e-9  # bound of a centroid's error, as a part of the universe's width
+_TOLERANCE = 1e-13  # tolerance of each part, as a part of the area
 _NODES, _WEIGHTS = (x.reshape(-1, 1) for x in np.polynomial.legendre.leggauss(16))
-_SCAN = 16  # places in each smooth part of the terms, between which bends are looked for
-_BESIDE = 1e-9  # of a part's width: how far from its ends the first and last of these are
-_HALVINGS = 45
-_MOST = 20_000  # parts
+_SCAN = 16  # places in each smooth part of the terms, between which bends are searched
+_BESIDE = 1e-9  # distance of the first and the last of these places from the part's ends, as a part of its width
+_HALVINGS = 45  # greatest number of halvings of a part
+_MAX_PARTS = 20_000  # greatest number of parts
 # a slot meets its cut; it and its cut sum to 1; it and those before it sum to 1; it passes those before it
 _CUT, _REST, _FULL, _PASSED = -1, -2, -3, -4
-_NEAR = 1e-11  # of the universe: how near to a bend is near enough, as what is missed is the square of that
-_EQUAL = 1.0 - 1e-12  # heights are equal whose quotient is above this
+_NEAR = 1e-11  # tolerance of a bend's place, as a part of the universe: the error of the integral is its square
+_EQUAL = 1.0 - 1e-12  # heights count as equal if their quotient is above this
 
 
 class Parts(NamedTuple):
@@ -55,7 +55,7 @@ class Quadrature:
     Attributes
     ----------
     exact : bool
-        Whether its integrals are exact to rounding: all is polynomial between its bends.
+        Whether the integrals are exact to rounding: the joined terms are polynomials between their bends.
     """
 
     def __init__(self, output: Output, slots: Sequence[Slot]) -> None:
@@ -83,12 +83,12 @@ class Quadrature:
         Parameters
         ----------
         cuts : sequence of float, length slots
-            Degree of each slot; not all are 0.
+            Strength of each slot, in [0, 1]; not all are 0.
 
         Returns
         -------
         float
-            In the universe; NaN if what is joined has no area.
+            Value in the universe; NaN if the joined terms have no area.
 
         Raises
         ------
@@ -225,7 +225,7 @@ class _Joined:
             count += len(starts)
             if len(starts) == 0:
                 break
-            if count > _MOST:
+            if count > _MAX_PARTS:
                 raise EngineError(
                     f"output {self.of._output.name!r}: its joined terms are too rough to be integrated to {BOUND:g} of "
                     "its universe; expected smoother terms"

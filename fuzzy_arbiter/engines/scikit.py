@@ -21,7 +21,7 @@ from fuzzy_arbiter.engines.grid import require_plain, sampled
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
 
-Values = tuple[float | None, ...]  # of the outputs; None where no rule fires
+Values = tuple[float | None, ...]  # value of each output; None where no rule fires
 
 _REMEMBERED = 4096  # results kept for inputs that come again, as crisp ones do
 _CONJUNCTIONS = {"min": np.fmin, "prod": np.multiply}

@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 from fuzzy_arbiter.definition import Variable
 
 Numbers = Sequence[Any]  # all floats, or all fractions
-TINY = 1e-120  # if no cut is greater, all are made larger alike: the centroid stays, and nothing underflows
-LARGER = 2.0**266
+TINY = 1e-120  # if no cut is greater, all are scaled up alike: the centroid stays, and nothing underflows
+LARGER = 2.0**266  # factor of that scaling
 
 
 class Outline(NamedTuple):
@@ -51,14 +51,14 @@ def outline(variable: Variable, number: Callable[[float], Any] = float) -> Outli
     Parameters
     ----------
     variable : Variable
-        An output.
+        Output whose terms are joined.
     number : callable
-        `float`, or `fractions.Fraction` for exact results.
+        Type of the results: `float`, or `fractions.Fraction` for exact ones.
 
     Returns
     -------
     Outline
-        In these numbers.
+        Outline in numbers of that type.
     """
     knots = tuple(map(number, variable.knots))
     shapes = [[(number(x), number(y)) for x, y in term.straight.points] for term in variable.terms]
@@ -106,7 +106,7 @@ def clipped(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, order
     cuts : sequence of float, length terms
         Degree at which each term is clipped.
     places, left, right, order
-        As of `Outline`.
+        Parts of an `Outline`.
 
     Returns
     -------
@@ -153,12 +153,12 @@ def scaled(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers) -> tup
     cuts : sequence of float, length terms
         Degree by which each term is scaled.
     places, left, right
-        As of `Outline`.
+        Parts of an `Outline`.
 
     Returns
     -------
     area, moment : float
-        As of `clipped`.
+        Area and moment, as from `clipped`.
     """
     zero = cuts[0] * 0
     one = zero + 1
@@ -202,9 +202,9 @@ def centroid(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, orde
     cuts : sequence of float, length terms
         Degree at which each term is clipped; not all are 0.
     places, left, right, order
-        As of `Outline`.
+        Parts of an `Outline`.
     scales : bool
-        Whether a cut scales its term in the place of clipping it.
+        True if a cut scales its term, False if it clips it.
 
     Returns
     -------
@@ -233,14 +233,14 @@ def alone(output: Variable, number: Callable[[float], Any] = float) -> list[Any]
     Parameters
     ----------
     output : Variable
-        An output.
+        Output whose terms are joined.
     number : callable
-        `float`, or `fractions.Fraction` for exact results.
+        Type of the results: `float`, or `fractions.Fraction` for exact ones.
 
     Returns
     -------
     list of float
-        In the order of the terms.
+        Centroids in the order of the terms.
     """
     shape = outline(output, number)
     n = len(output.terms)

@@ -21,7 +21,7 @@ class Weighted:
     Parameters
     ----------
     output : Output
-        With the defuzzifier ``average`` or ``sum``.
+        Output with the defuzzifier ``average`` or ``sum``.
     inputs, outputs : sequence of str
         Names of the system's inputs, and of the outputs before this one, in order.
     """
@@ -45,7 +45,7 @@ class Weighted:
         Returns
         -------
         float
-            NaN or infinite if that of a term is.
+            Value of the output; NaN or infinite if that of a term is.
         """
         total = weight = 0.0
         for cut, number in zip(cuts, self._numbers, strict=True):
@@ -60,14 +60,14 @@ class Weighted:
         Parameters
         ----------
         cuts : ndarray, shape (terms, n)
-            Strengths; not all of one sample are 0.
+            Strengths of the terms; not all of one sample are 0.
         inputs : ndarray, shape (n, inputs and outputs)
             The samples, and the values of the outputs before this one.
 
         Returns
         -------
         ndarray, shape (n,)
-            Each as `value` gives it, to rounding.
+            Values, each as from `value`, to rounding.
         """
         total, weight = np.zeros((2, cuts.shape[1]))
         for cut, array in zip(cuts, self._arrays, strict=True):

@@ -77,12 +77,12 @@ def called(texts: Iterable[str]) -> list[str]:
     Returns
     -------
     list of str
-        Each once, in the order of their names.
+        Names of the functions, each once, in alphabetical order.
 
     Raises
     ------
     UnsupportedError
-        If one is not exported.
+        If a function is not exported.
     """
     found = {name for text in texts for name in _CALL.findall(text) if name not in ("or", "and", "not")}
     found |= {name for norm in found & _C_NORMS.keys() for name in _CALL.findall(_C_NORMS[norm]) if name in _C_NORMS}
@@ -99,7 +99,7 @@ def in_python(name: str) -> str:
     Parameters
     ----------
     name : str
-        One of those that `called` returns.
+        Name from `called`.
 
     Returns
     -------
@@ -123,7 +123,7 @@ def in_c(name: str) -> str:
     Parameters
     ----------
     name : str
-        One of those that `called` returns.
+        Name from `called`.
 
     Returns
     -------

@@ -80,7 +80,7 @@ class Program:
     system : System
         System that the program evaluates.
     statements : tuple of Statement
-        From the inputs ``x1``, ``x2``, .. to the outputs ``y1``, ``y2``, ..
+        Statements from the inputs ``x1``, ``x2``, .. to the outputs ``y1``, ``y2``, ..
     outlines : tuple of Outline or None
         Outlines of the outputs, if they are swept; None for one of values; empty where there is a closed form.
     functions : tuple of str
@@ -110,7 +110,7 @@ def program(system: System) -> Program:
     Returns
     -------
     Program
-        With the results of the engine that ``auto`` takes, to the last bit.
+        Program with the results of the engine that ``auto`` selects, to the last bit.
 
     Raises
     ------

@@ -124,12 +124,12 @@ def load(path: str | Path, block: str | None = None) -> System:
     path : str or Path
         JSON, TOML, FCL, FIS or FLL file; its suffix, in any case, selects the format.
     block : str, optional
-        As of `reads`.
+        Name of the block, as for `reads`.
 
     Returns
     -------
     System
-        As of `reads`.
+        System of the file, as from `reads`.
 
     Raises
     ------

@@ -141,7 +141,7 @@ def chosen_block(tokens: list[Token], name: str | None) -> list[Token]:
     Returns
     -------
     list of Token
-        All of them, if the text does not consist of function blocks and `name` is None.
+        Tokens of the block; all tokens if the text does not consist of function blocks and `name` is None.
 
     Raises
     ------

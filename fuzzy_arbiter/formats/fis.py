@@ -20,7 +20,7 @@ from fuzzy_arbiter.terms.values import Constant, Linear, Value
 
 __all__ = ["read", "write"]
 
-_SIGNS = "'=:,"  # at which MATLAB's reader cuts its lines
+_SIGNS = "'=:,"  # characters at which MATLAB's reader splits lines
 
 
 def write(system: System) -> str:

@@ -32,7 +32,7 @@ def read_rules(
     inputs, outputs : sequence
         Variables that the numbers refer to, in their order.
     fuzzylite : bool
-        Whether hedges are fuzzylite's, and not Octave's.
+        True for fuzzylite's hedges, False for Octave's.
 
     Returns
     -------
@@ -111,9 +111,9 @@ def with_complements(output: Output, rules: Sequence[tuple[int, Rule]]) -> Outpu
     Parameters
     ----------
     output : Output
-        As the text defines it.
+        Output as the text defines it.
     rules : sequence of (int, Rule)
-        Of `read_rules`, each with its line.
+        Rules from `read_rules`, each with its line.
 
     Returns
     -------

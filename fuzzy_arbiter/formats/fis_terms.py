@@ -22,7 +22,7 @@ def read_function(function: str, text: str, line: int, term: str, inputs: int | 
     Parameters
     ----------
     function : str
-        Such as ``trimf``.
+        Name of the function, such as ``trimf``.
     text : str
         Text in its brackets.
     line : int
@@ -132,7 +132,7 @@ def numbers_of(text: str, line: int, what: str) -> list[float]:
     Returns
     -------
     list of float
-        Finite.
+        Finite numbers.
 
     Raises
     ------

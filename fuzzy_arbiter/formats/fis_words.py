@@ -34,7 +34,7 @@ STRAIGHT = {
     "binarymf": ("Binary", 2),
     "discretemf": ("Discrete", 0),
 }
-MATLAB = ("gaussmf", "gauss2mf", "gbellmf", "sigmf", "dsigmf", "psigmf", "zmf", "smf", "pimf")  # which it has, too
+MATLAB = ("gaussmf", "gauss2mf", "gbellmf", "sigmf", "dsigmf", "psigmf", "zmf", "smf", "pimf")  # MATLAB has them too
 CURVES = {kind.fis[0]: (name, kind.fis[1]) for name, kind in KINDS.items() if kind.fis[0]}
 VALUES = ("constant", "linear", "function")
 SHOULDERS = {"linsmf": rising, "linzmf": falling}

@@ -85,7 +85,7 @@ def read_shape(kind: str, text: str, line: int, inputs: int | None = None) -> Me
     Returns
     -------
     Membership or Value
-        With degrees up to the term's height.
+        Shape with degrees up to the term's height.
 
     Raises
     ------

@@ -32,7 +32,7 @@ def read_json(text: str) -> System:
     Returns
     -------
     System
-        As of `fuzzy_arbiter.formats.schema.system_of`.
+        System, as from `fuzzy_arbiter.formats.schema.system_of`.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def read_toml(text: str) -> System:
     Returns
     -------
     System
-        As of `fuzzy_arbiter.formats.schema.system_of`.
+        System, as from `fuzzy_arbiter.formats.schema.system_of`.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def write_toml(system: System) -> str:
     Returns
     -------
     str
-        With a table for each variable, and the points of a term on one line.
+        TOML text with a table for each variable, and the points of a term on one line.
     """
     # by hand, for tomli_w writes each number of a list on its own line: 14 lines for a triangle
     lines = [f"{key} = {_text(value)}" for key, value in _settings(system)]

@@ -22,12 +22,12 @@ def fold_normalization(system: System) -> System:
     Parameters
     ----------
     system : System
-        With the normalization ``range`` or ``none``.
+        System with the normalization ``range`` or ``none``.
 
     Returns
     -------
     System
-        With the normalization ``none``; the same system if it has that.
+        System with the normalization ``none``; the same system if it has that.
 
     Raises
     ------

@@ -22,12 +22,12 @@ def say_number(x: float) -> str:
     Parameters
     ----------
     x : float
-        Finite.
+        Finite number.
 
     Returns
     -------
     str
-        With a point or an exponent unless it is a whole number; an exponent follows a point, as in IEC 61131-3.
+        Text with a point or an exponent unless it is a whole number; an exponent follows a point, as in IEC 61131-3.
     """
     text = repr(float(x))
     if "e" in text and "." not in text:
@@ -41,12 +41,12 @@ def say_numbers(xs: Iterable[float]) -> str:
     Parameters
     ----------
     xs : iterable of float
-        Finite.
+        Finite numbers.
 
     Returns
     -------
     str
-        Each as of `say_number`.
+        Numbers, each as from `say_number`.
     """
     return " ".join(map(say_number, xs))
 
@@ -66,7 +66,7 @@ def read_number(text: str, line: int, what: str) -> float:
     Returns
     -------
     float
-        Finite.
+        Finite number.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def shortened(text: str) -> str:
     Returns
     -------
     str
-        At most 400 characters.
+        Text of at most 400 characters.
     """
     return text if len(text) <= 400 else f"{text[:250]} ... {text[-140:]}"
 
@@ -147,9 +147,9 @@ def assembled(
     line : int
         Line where the system begins.
     inputs, outputs
-        As of `System`.
+        Inputs and outputs, as for `System`.
     rules : sequence of (int, Rule)
-        Each with its line.
+        Rules, each with its line.
     **options
         The other attributes of `System`.
 
@@ -201,7 +201,7 @@ def require_word(name: str, format: str, reserved: frozenset[str]) -> None:
     name : str
         Name of a system, variable or term.
     format, reserved
-        As of `require_words`.
+        Format and reserved words, as for `require_words`.
 
     Raises
     ------
@@ -249,7 +249,7 @@ def blocks(system: System) -> list[tuple[Operators, list[tuple[int, Rule]]]]:
     Returns
     -------
     list of (Operators, list of (int, Rule))
-        In the rules' order; each rule with its number from 0.
+        Operators and their rules, in the rules' order; each rule with its number from 0.
     """
     own = Operators(system.conjunction, system.disjunction, system.implication)
     result: list[tuple[Operators, list[tuple[int, Rule]]]] = []

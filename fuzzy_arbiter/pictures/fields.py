@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _TIE = 1e-9  # weights closer than this are equal
 _UNDEFINED = "#d9d9d9"
-_SHADES = 5  # of the margin
+_SHADES = 5  # number of shades of the margin
 
 
 def surface(
@@ -49,7 +49,7 @@ def surface(
     Returns
     -------
     Axes
-        On which it was drawn, blank where an output is undefined.
+        Axes of the picture, blank where an output is undefined.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def decisions(
     Returns
     -------
     Axes
-        On which it was drawn, white where the greatest is shared, grey where an output is undefined.
+        Axes of the picture, white where the greatest is shared, grey where an output is undefined.
 
     Raises
     ------

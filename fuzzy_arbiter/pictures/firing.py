@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MOST_ROWS = 10
-_LETTERS = 50  # of a line of a rule
-_HEIGHT = 0.72  # of a term of degree 1, in rows
-_TALL = 1.6  # how many times higher the outline at the foot is drawn
+_LETTERS = 50  # letters in a line of a rule
+_HEIGHT = 0.72  # height of a term of degree 1, in rows
+_TALL = 1.6  # factor of the height of the outline at the foot
 
 
 def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes | None = None) -> Axes:
@@ -47,7 +47,7 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
     Returns
     -------
     Axes
-        On which it was drawn.
+        Axes of the picture.
 
     Raises
     ------

@@ -54,7 +54,7 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
     Returns
     -------
     Axes
-        On which it was drawn.
+        Axes of the picture.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def corners(term: Term, universe: tuple[float, float]) -> tuple[list[float], lis
     Returns
     -------
     places, degrees : list of float
-        From one end of the universe to the other.
+        Places and degrees from one end of the universe to the other.
     """
     low, high = universe
     if not isinstance(term.shape, Shape):  # as many corners as make it look smooth
@@ -139,7 +139,7 @@ def profile(
     Returns
     -------
     Axes
-        On which it was drawn; lines have gaps where an output is undefined.
+        Axes of the picture; lines have gaps where an output is undefined.
 
     Raises
     ------
@@ -189,12 +189,12 @@ def normalizations(
     at : mapping from str to float, optional
         Values of the others; default: the middle of each universe.
     axes : mapping from str to Axes, optional
-        For each normalization that is to be drawn; default: four of a new figure.
+        Axes of each normalization to draw; default: four of a new figure.
 
     Returns
     -------
     dict of Axes by str
-        On which it was drawn, by normalization.
+        Axes of the picture, by normalization.
 
     Raises
     ------

@@ -104,12 +104,12 @@ def weights_at(arbiter: Arbiter, fixed: Mapping[str, float], over: Mapping[str, 
     fixed : mapping from str to float
         Inputs with one value.
     over : mapping from str to ndarray, shape (n,)
-        All other inputs.
+        Values of all other inputs, by name.
 
     Returns
     -------
     ndarray, shape (n, outputs)
-        Weights.
+        Weights of the outputs at each place.
     """
     system = arbiter.system
     n = len(next(iter(over.values())))
@@ -125,7 +125,7 @@ def said(values: Mapping[str, float]) -> str:
     Returns
     -------
     str
-        As ``a = 1, b = 0.5``.
+        Text such as ``a = 1, b = 0.5``.
     """
     return ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
 

@@ -17,7 +17,7 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 DASHES = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (1, 2)))
 HATCHES = ("////", "....", "\\\\\\\\", "xx", "----", "||||")
 INK, FAINT = "#333333", "#999999"
-_LETTERS = 14  # of a legend or title to an inch of the axes
+_LETTERS = 14  # letters of a legend or title in an inch of the axes
 
 
 def require_matplotlib() -> None:
@@ -40,7 +40,7 @@ def new_axes(width: float, height: float, **keywords: Any) -> Axes:
     width, height : float
         Size of the figure [in].
     **keywords
-        For the axes, such as ``projection``.
+        Options of the axes, such as ``projection``.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def colour(i: int) -> str:
     Parameters
     ----------
     i : int
-        From 0.
+        Index, from 0.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def hatch(i: int) -> str:
     Parameters
     ----------
     i : int
-        From 0.
+        Index, from 0.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def line_style(i: int) -> dict[str, Any]:
     Parameters
     ----------
     i : int
-        From 0.
+        Index, from 0.
 
     Returns
     -------
@@ -122,7 +122,7 @@ def legend_above(ax: Axes, names: Sequence[str], title: str = "") -> None:
     Parameters
     ----------
     ax : Axes
-        With labelled lines.
+        Axes with labelled lines.
     names : sequence of str
         Their labels.
     title : str
@@ -172,12 +172,12 @@ def room(ax: Axes) -> int:
     Parameters
     ----------
     ax : Axes
-        As wide as they are before the layout, which changes little.
+        Axes, whose width before the layout is used; the layout changes little.
 
     Returns
     -------
     int
-        In a line, 20 or more.
+        Number of letters in a line, 20 or more.
     """
     return max(20, int(_LETTERS * ax.bbox.width / ax.figure.dpi))
 

@@ -53,12 +53,12 @@ def auto_terms(terms: int | Sequence[str]) -> AutomaticTerms:
     Returns
     -------
     AutomaticTerms
-        Their degrees add up to 1 everywhere.
+        Terms whose degrees sum to 1 everywhere.
 
     Raises
     ------
     DefinitionError
-        If it is another number, or fewer than two names.
+        If `terms` is another number, or has fewer than two names.
 
     Examples
     --------

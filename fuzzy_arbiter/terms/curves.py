@@ -26,7 +26,7 @@ class Curve(Membership):
     kind : str
         Name of the kind, such as ``gaussian``; `KINDS` lists all.
     parameters : tuple of float
-        As many as the kind has, in its order.
+        Parameters of the kind, in its order.
     height : float
         Factor of all degrees, above 0 and at most 1.
 
@@ -134,12 +134,12 @@ class Curve(Membership):
         Parameters
         ----------
         degree : float
-            Above 0, at most the height.
+            Degree, above 0 and at most the height.
 
         Returns
         -------
         float
-            The place, perhaps infinite.
+            Place, which may be infinite.
         """
         inverse = KINDS[self.kind].inverse
         assert inverse is not None, self.kind
@@ -174,14 +174,14 @@ def curve(kind: str, *parameters: float, height: float = 1.0) -> Membership:
         ``spike`` (center, width), ``concave`` (inflection, end), ``arc`` and ``semi_ellipse`` (start, end), and
         ``singleton`` (place), which is 1 there and 0 elsewhere.
     *parameters : float
-        As many as the kind has.
+        Parameters of the kind, in its order.
     height : float
         Factor of all degrees.
 
     Returns
     -------
     Membership
-        Callable: from a place to the degree.
+        Membership function, which is called with a place and returns the degree.
 
     Raises
     ------

@@ -15,7 +15,7 @@ import numpy as np
 from fuzzy_arbiter.terms.functions import ALL
 from fuzzy_arbiter.terms.parser import Node, parsed
 
-_BINDS = {"+": 1, "-": 1, "*": 2, "/": 2, "%": 2, "~": 3, "^": 4}
+_BINDS = {"+": 1, "-": 1, "*": 2, "/": 2, "%": 2, "~": 3, "^": 4}  # precedence of the operators
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class Expression:
     Attributes
     ----------
     text : str
-        With ``+ - * / % ^``, parentheses, names, and functions such as ``sin(x)``; texts with one tree are equal.
+        Text with ``+ - * / % ^``, parentheses, names, and functions such as ``sin(x)``; texts with one tree are equal.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def array_function(node: Node) -> Callable[[Mapping[str, Any]], Any]:
     Returns
     -------
     callable
-        From names to arrays, to an array, or to a number where nothing depends on the names.
+        Function from a mapping of names to arrays; it returns an array, or a number where nothing depends on the names.
     """
     if isinstance(node, float):
         return lambda values: node
@@ -142,7 +142,7 @@ def said(node: Node) -> str:
     Returns
     -------
     str
-        With no more parentheses than are needed.
+        Text with no more parentheses than are needed.
     """
     return _said(node)[0]
 

@@ -19,9 +19,9 @@ class CurveKind:
     Attributes
     ----------
     parameters : tuple of str
-        Their names, in the order of `Curve.parameters`.
+        Names of the parameters, in the order of `Curve.parameters`.
     pieces : callable
-        From the parameters to its smooth pieces, whose expressions use ``x`` and the parameters' names.
+        Function from the parameters to the smooth pieces, whose expressions use ``x`` and the parameters' names.
     good : callable
         Predicate: True if the parameters are valid.
     expected : str
@@ -29,9 +29,10 @@ class CurveKind:
     fll, fis, fcl : Word, optional
         Word of fuzzylite, of MATLAB or fuzzylite, and of jFuzzyLogic; empty if there is none.
     polynomial : bool
-        Whether its pieces are polynomials.
+        Whether the pieces are polynomials.
     inverse : callable, optional
-        For one that only rises or only falls: pieces over its degree ``w``, which give the place.
+        Function for a kind that only rises or only falls: from the parameters to pieces over the degree ``w``, which
+        give the place.
     """
 
     parameters: tuple[str, ...]

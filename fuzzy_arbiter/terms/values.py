@@ -36,7 +36,7 @@ class Value(ABC):
         Raises
         ------
         DefinitionError
-            If it does not fit these inputs.
+            If the value does not fit these inputs.
         """
 
     def number(self, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Sequence[float]], float]:
@@ -91,14 +91,14 @@ class Linear(Value):
     Attributes
     ----------
     coefficients : tuple of float
-        One for each input, in the order of the system's inputs.
+        Coefficient of each input, in the order of the system's inputs.
     constant : float
         Constant term of the sum.
 
     Raises
     ------
     DefinitionError
-        If one is not finite.
+        If a coefficient or the constant is not finite.
 
     Examples
     --------
@@ -153,7 +153,7 @@ class Linear(Value):
         Returns
         -------
         Linear or None
-            None if the tree has another form.
+            Linear value; None if the tree has another form.
         """
         coefficients = dict.fromkeys(inputs, 0.0)
         constant = 0.0
@@ -177,7 +177,7 @@ class Formula(Value, Membership):
     Attributes
     ----------
     text : str
-        As of `fuzzy_arbiter.terms.expressions.Expression`.
+        Text of a `fuzzy_arbiter.terms.expressions.Expression`.
 
     Raises
     ------
@@ -210,7 +210,7 @@ class Formula(Value, Membership):
         Raises
         ------
         DefinitionError
-            If it uses other names than these.
+            If the formula uses other names than these.
         """
         whole, known = self._whole, (*inputs, *outputs)
         unknown = sorted(whole.names - set(known))

@@ -54,7 +54,7 @@ class Stretch:
     start, end : float
         Ends of the stretch.
     start_in, end_in : bool
-        Whether the ends belong to it.
+        Whether the ends belong to the stretch.
     least, greatest : float
         Bounds of the sum in it, reached or approached.
     """
@@ -85,14 +85,14 @@ def rank(degree: Fraction, levels: Sequence[Fraction]) -> int:
     Parameters
     ----------
     degree : Fraction
-        In [0, 1].
+        Degree in [0, 1].
     levels : sequence of Fraction, length L
-        They increase.
+        Levels, which increase.
 
     Returns
     -------
     int
-        2 i + 1 at level i, 2 i below it and above the one before.
+        Rank: 2 i + 1 at level i, 2 i below it and above the level before.
     """
     i = bisect_left(levels, degree)
     return 2 * i + (i < len(levels) and levels[i] == degree)
@@ -104,14 +104,14 @@ def crisp(variable: Variable, levels: Sequence[Fraction]) -> Domain:
     Parameters
     ----------
     variable : Variable
-        An input.
+        Input of the system.
     levels : sequence of Fraction
-        See `rank`.
+        Levels, as for `rank`.
 
     Returns
     -------
     Domain
-        The last term first.
+        Domain, the last term first.
     """
     names = variable.term_names
     degrees = [[Fraction(a == b) for b in names] for a in reversed(names)]
@@ -125,14 +125,14 @@ def graded(variable: Variable, levels: Sequence[Fraction]) -> Domain:
     Parameters
     ----------
     variable : Variable
-        An input.
+        Input of the system.
     levels : sequence of Fraction
-        See `rank`.
+        Levels, as for `rank`.
 
     Returns
     -------
     Domain
-        Every pattern of ranks that there is, once.
+        Domain with every pattern of ranks that occurs, once.
     """
     degrees = _exact(variable)
     places = list(map(Fraction, variable.knots))
@@ -160,7 +160,7 @@ def stretches(variable: Variable) -> tuple[Stretch, ...]:
     Parameters
     ----------
     variable : Variable
-        An input.
+        Input of the system.
 
     Returns
     -------

@@ -21,8 +21,8 @@ Reach = Literal["exact", "bound", "samples"]
 HALF = Fraction(1, 2)
 SUPPORT = (Fraction(0), Fraction(1))
 FIRES, FULLY = rank(Fraction(0), SUPPORT), rank(Fraction(1), SUPPORT) - 1  # ranks to exceed
-ANY = 2**30  # groups
-SAMPLES = 4096
+ANY = 2**30  # number of groups that is never reached, for no upper limit
+SAMPLES = 4096  # greatest number of sampled combinations
 
 
 class Effort:
@@ -31,7 +31,7 @@ class Effort:
     Parameters
     ----------
     limit : int
-        Statements in all.
+        Greatest number of statements in all.
     searches : int
         Number of searches.
     """
@@ -58,7 +58,7 @@ def greatest_term(output: Output) -> str:
     Parameters
     ----------
     output : Output
-        An output of the system.
+        Output of the system.
 
     Returns
     -------
@@ -77,12 +77,12 @@ def rules_on(system: System, statement: Is) -> tuple[Rule, ...]:
     system : System
         System to verify.
     statement : Is
-        About an output.
+        Statement about an output.
 
     Returns
     -------
     tuple of Rule
-        In their order.
+        Rules in their order.
     """
     return tuple(rule for rule in system.rules if statement in rule.conclusions)
 
@@ -154,7 +154,7 @@ class Questions:
         Returns
         -------
         list of Answer
-            For each goal.
+            Answer to each goal.
         """
         together: dict[frozenset[str], list[int]] = {}
         for i, goal in enumerate(goals):

@@ -22,7 +22,7 @@ def row_strengths(system: System, place: Mapping[str, float | str]) -> list[floa
     Returns
     -------
     list of float
-        In the order of the rules.
+        Strengths in the order of the rules.
     """
     row = {v.name: place.get(v.name, v.term_names[-1]) for v in system.inputs}
     logic = number_logic(system)
@@ -48,7 +48,7 @@ def reasons(system: System, strengths: Sequence[float], statements: Sequence[Is]
     Returns
     -------
     str
-        Such as ``alpha_1 is low by R2, alpha_1 is high by R1``.
+        Text such as ``alpha_1 is low by R2, alpha_1 is high by R1``.
     """
     parts = []
     for statement in dict.fromkeys(statements):

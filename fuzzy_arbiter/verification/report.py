@@ -9,7 +9,7 @@ from fuzzy_arbiter.table import aligned
 from fuzzy_arbiter.verification.cells import Stretch
 
 Severity = Literal["fault", "warning", "note"]
-SHOWN_ROWS = 32
+SHOWN_ROWS = 32  # greatest number of crisp rows in the text
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class Check:
     name : str
         ``complete``, ``consistent`` or ``exclusive``, and each of them with ``graded_`` in front.
     holds : bool or None
-        None if that was not decided.
+        True if the check holds; None if that was not decided.
     how : str
         Method of the check, and the range of its answer.
     """
@@ -84,13 +84,13 @@ class Verification:
     inputs, outputs : tuple of str
         Names of the inputs and outputs.
     checks : tuple of Check
-        Answers.
+        Answers of the checks.
     findings : tuple of Finding
-        Worst first.
+        Findings, the worst first.
     row_count : int
         Number of crisp rows.
     rows : tuple of Row
-        All of them, the last term first; none if there are too many.
+        All crisp rows, the last term first; none if there are too many.
     stretches : tuple of Stretch
         Stretches on which the degrees of an input do not sum to 1.
 

@@ -116,7 +116,7 @@ def labels(system: System) -> dict[Proposition, str]:
     Returns
     -------
     dict from Proposition to str
-        Such as ``R1, R4``.
+        Labels such as ``R1, R4``, by condition.
     """
     result: dict[Proposition, str] = {}
     for i, rule in enumerate(system.rules):

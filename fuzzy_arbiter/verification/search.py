@@ -117,16 +117,16 @@ class Search:
         Parameters
         ----------
         limit : int
-            Most statements to evaluate.
+            Greatest number of statements to evaluate.
         wanted : int
             Boxes to find; with more than one for one goal only.
 
         Returns
         -------
         list of Answer
-            For each goal.
+            Answer to each goal.
         int
-            Statements that were evaluated.
+            Number of statements that were evaluated.
         """
         found: list[list[Box]] = [[] for _ in self._goals]
         wanting = list(range(len(self._goals)))

@@ -28,7 +28,7 @@ FLAGS = (
 )  # fmt: skip
 _BESIDE_STEPS = ("constants.c", "forces_tangent.c", "tangent.c")  # not in a step: unrolling only makes them larger
 _WARNINGS = ("-Wall", "-Wextra", "-Wpedantic")
-_ZIGLANG = "ziglang>=0.13"  # which is a C compiler too
+_ZIGLANG = "ziglang>=0.13"  # the package holds a C compiler
 
 
 def find_compiler() -> list[str]:
@@ -107,7 +107,7 @@ def compile_library(
     library : Path
         File to write.
     flags : sequence of str, optional
-        After `FLAGS`.
+        Compiler flags after `FLAGS`.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def compile_library(
             list(pool.map(run_compiler, commands))
         run_compiler([*compiler, *FLAGS, *link, *map(str, objects), "-o", str(library), "-lm"])
     if not library.is_file():
-        raise BuildError(f"C compiler {shlex.join(compiler)} failed: it wrote no library, and no word")
+        raise BuildError(f"C compiler {shlex.join(compiler)} failed: it wrote neither a library nor a message")
 
 
 def _compact(source: Path) -> tuple[str, ...]:
@@ -157,7 +157,7 @@ def run_compiler(command: Sequence[str]) -> None:
         raise BuildError(f"C compiler {command[0]}: {error.strerror or error}") from error
     if done.returncode != 0:
         lines = done.stderr.splitlines()
-        said = [line for line in lines if "error" in line] or lines or ["it wrote nothing, and no word"]
+        said = [line for line in lines if "error" in line] or lines or ["it wrote no message"]
         raise BuildError(f"C compiler {command[0]} failed: {said[0].strip()}")
     for line in done.stderr.splitlines():
         log.debug("%s", line)

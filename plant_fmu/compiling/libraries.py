@@ -31,14 +31,14 @@ def compiled_libraries(
     token : str
         Token of their description.
     fmi : int
-        2 or 3.
+        FMI version, 2 or 3.
     compilers : sequence of (Platform, list of str)
         Each platform with the command of a compiler for it.
 
     Returns
     -------
     list of (Platform, bytes)
-        In the order of `compilers`.
+        Libraries in the order of `compilers`.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def compiled_libraries(
     return made
 
 
-def made_from(component: Component, token: str, fmi: int) -> str:
+def source_digest(component: Component, token: str, fmi: int) -> str:
     """Return a digest of the sources, headers and flags of libraries, independent of platform and compiler.
 
     Parameters
@@ -69,12 +69,12 @@ def made_from(component: Component, token: str, fmi: int) -> str:
     token : str
         Token of their description.
     fmi : int
-        2 or 3.
+        FMI version, 2 or 3.
 
     Returns
     -------
     str
-        Hexadecimal.
+        Digest as a hexadecimal text.
     """
     files = {**c_sources(component, fmi), component.header: header(component, token).encode()}
     for file in FMI_HEADERS.glob(f"fmi{fmi}*.h"):
@@ -96,7 +96,7 @@ def digest(files: dict[str, bytes], *words: str) -> str:
     Returns
     -------
     str
-        Hexadecimal.
+        Digest as a hexadecimal text.
     """
     found = hashlib.sha256(" ".join(words).encode())
     for name, data in sorted(files.items()):

@@ -79,7 +79,7 @@ def without_wasm(text: str) -> tuple[str | None, bool]:
     Parameters
     ----------
     text : str
-        Names of platforms, as of `plant_fmu.build_fmu`.
+        Names of platforms, as for `plant_fmu.build_fmu`.
 
     Returns
     -------
@@ -99,12 +99,12 @@ def cross_platforms(text: str) -> list[Platform]:
     Parameters
     ----------
     text : str
-        ``all``, or names of FMI 3.0 with commas between them.
+        List of platforms: ``all``, or names of FMI 3.0 with commas between them.
 
     Returns
     -------
     list of Platform
-        Each once, in the order of `PLATFORMS`.
+        Platforms, each once, in the order of `PLATFORMS`.
 
     Raises
     ------

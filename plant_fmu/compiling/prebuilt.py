@@ -20,21 +20,21 @@ from pathlib import Path
 
 from plant_fmu.archive import write_archive
 from plant_fmu.compiling.compiler import cross_compiler, find_compiler
-from plant_fmu.compiling.libraries import compiled_libraries, made_from
+from plant_fmu.compiling.libraries import compiled_libraries, source_digest
 from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
-from plant_fmu.compiling.signature import signed_anew
+from plant_fmu.compiling.signature import re_sign
 from plant_fmu.component import Component
 from plant_fmu.errors import BuildError
 from plant_fmu.variables import Variable
 from plant_fmu.vehicle import Vehicle, load_vehicle, shipped_vehicles
 from plant_fmu.vehicle_component import of_vehicle
 
-FOLDER = Path(__file__).parents[1] / "prebuilt"  # in a wheel; a checkout has none
-NAME = "prebuilt"  # prefix of their functions
+FOLDER = Path(__file__).parents[1] / "prebuilt"  # folder in a wheel; missing in a checkout
+NAME = "prebuilt"  # prefix of the libraries' functions
 
 STAND_IN = "{" + "-".join("0" * n for n in (8, 4, 4, 4, 12)) + "}"  # instead of a token
 _GIVEN = ("state", "input", "parameter")  # roles of variables with a start value
-_ROW = struct.Struct("<4d")  # of the table: start, min, max, nominal; every platform is little-endian
+_ROW = struct.Struct("<4d")  # row of the table: start, min, max, nominal; every platform is little-endian
 
 
 def prebuilt_files() -> list[str]:
@@ -54,14 +54,14 @@ def prebuilt_libraries(
     token : str
         Token of their description.
     fmi : int
-        2 or 3.
+        FMI version, 2 or 3.
     platforms : sequence of Platform
         Targets of the libraries.
 
     Returns
     -------
     list of (Platform, bytes) or None
-        In the order of `platforms`; None where the package has not all of them from these sources: an installation
+        Libraries in the order of `platforms`; None where the package lacks one from these sources: an installation
         from a checkout has only this machine's.
 
     Raises
@@ -91,7 +91,7 @@ def shipped_structures() -> list[Component]:
     Returns
     -------
     list of Component
-        One for each number of thrusters.
+        Components, one for each number of thrusters.
     """
     vehicles = [load_vehicle(name) for name in shipped_vehicles()]
     structures = [general_component(of_vehicle(v)) for v in (*vehicles, _with_thrusters(vehicles[0], 6))]
@@ -104,11 +104,11 @@ def write_prebuilt(structure: Component, fmi: int, platforms: str, folder: Path)
     Parameters
     ----------
     structure : Component
-        One of `shipped_structures`.
+        Component from `shipped_structures`.
     fmi : int
-        2 or 3.
+        FMI version, 2 or 3.
     platforms : str
-        ``all``, by the compiler of the ziglang package, or ``native``, by any.
+        Platforms: ``all``, by the compiler of the ziglang package, or ``native``, by any compiler.
     folder : Path
         Folder of the file.
 
@@ -149,7 +149,7 @@ def general_component(component: Component) -> Component:
     Returns
     -------
     Component
-        Equal for all components that differ only in numbers, except for the description.
+        Component that is equal for all that differ only in numbers, except for its description.
     """
     rows = tuple(replace(v, start=_stand_in(i)) if v.role in _GIVEN else v for i, v in enumerate(component.variables))
     return replace(component, name=NAME, variables=rows)
@@ -165,16 +165,16 @@ def file_name(general: Component, fmi: int) -> str:
     Parameters
     ----------
     general : Component
-        From `general_component`.
+        Component from `general_component`.
     fmi : int
-        2 or 3.
+        FMI version, 2 or 3.
 
     Returns
     -------
     str
-        The name, with a digest of everything that the libraries are compiled from.
+        Name with a digest of everything that the libraries are compiled from.
     """
-    return f"fmi{fmi}-{made_from(general, STAND_IN, fmi)[:32]}.zip"
+    return f"fmi{fmi}-{source_digest(general, STAND_IN, fmi)[:32]}.zip"
 
 
 def _member(platform: Platform) -> str:
@@ -200,10 +200,10 @@ def _numbered(library: bytes, general: Component, component: Component, token: s
     written = bytearray(library)
     for old, new in changes:
         if library.count(old) != 1 or len(old) != len(new):
-            raise BuildError("a library that comes with subreach has not the table that was expected")
+            raise BuildError("a library that comes with subreach has another table of variables than expected")
         at = library.index(old)
         written[at : at + len(new)] = new
-    return signed_anew(bytes(written))
+    return re_sign(bytes(written))
 
 
 def _row(v: Variable) -> bytes:

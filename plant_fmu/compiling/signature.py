@@ -12,13 +12,13 @@ import struct
 from plant_fmu.errors import BuildError
 
 _MACH_O_64 = b"\xcf\xfa\xed\xfe"  # little-endian
-_HEADER = 32  # bytes
-_CODE_SIGNATURE = 0x1D  # load command
+_HEADER = 32  # bytes of the file's header
+_CODE_SIGNATURE = 0x1D  # number of the load command that locates the signature
 _DIRECTORY = 0xFADE0C02  # magic of the list of hashes; all of the signature is big-endian
 _SHA256 = (32, 2)  # bytes of a hash, and its kind
 
 
-def signed_anew(library: bytes) -> bytes:
+def re_sign(library: bytes) -> bytes:
     """Return a library with a valid signature.
 
     Parameters
@@ -29,12 +29,12 @@ def signed_anew(library: bytes) -> bytes:
     Returns
     -------
     bytes
-        As long as `library`.
+        Library of the same length.
 
     Raises
     ------
     BuildError
-        If the signature is of another kind than a linker's.
+        If the signature is not of the kind that a linker writes.
     """
     if not library.startswith(_MACH_O_64):
         return library

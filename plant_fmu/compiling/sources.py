@@ -32,7 +32,7 @@ def c_sources(component: Component, fmi: int) -> dict[str, bytes]:
     component : Component
         The component.
     fmi : int
-        2 or 3.
+        FMI version, 2 or 3.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def compiled_files(component: Component, fmi: int) -> list[str]:
     component : Component
         The component.
     fmi : int
-        2 or 3.
+        FMI version, 2 or 3.
 
     Returns
     -------

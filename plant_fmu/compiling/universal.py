@@ -13,7 +13,7 @@ from plant_fmu.errors import BuildError
 
 FAT_MAGIC = 0xCAFEBABE
 _MACH_O_64 = b"\xcf\xfa\xed\xfe"  # little-endian
-_PAGE = {0x01000007: 12, 0x0100000C: 14}  # of x86-64 and 64-bit ARM, in bytes as a power of two
+_PAGE = {0x01000007: 12, 0x0100000C: 14}  # page size of x86-64 and 64-bit ARM, in bytes as a power of two
 _HEADER = struct.Struct(">II")  # magic, number of libraries
 _ENTRY = struct.Struct(">IIIII")  # processor, its variant, offset, size, alignment as a power of two
 _PROCESSOR = struct.Struct("<II")  # after the magic of a library
@@ -25,7 +25,7 @@ def universal_library(libraries: Sequence[bytes]) -> bytes:
     Parameters
     ----------
     libraries : sequence of bytes
-        64-bit libraries (Mach-O), each for another processor.
+        Libraries (64-bit Mach-O), each for another processor.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def universal_library(libraries: Sequence[bytes]) -> bytes:
     Raises
     ------
     BuildError
-        If one is no such library, or two are for one processor.
+        If an item is no such library, or two are for one processor.
     """
     by_processor: dict[tuple[int, int], bytes] = {}
     for library in libraries:

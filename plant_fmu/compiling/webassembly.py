@@ -41,8 +41,8 @@ def module(component: Component, token: str, beside: Mapping[str, bytes] | None 
     Returns
     -------
     bytes
-        It imports nothing, and exports ``memory``, ``_initialize`` and what `beside` does; without that, ``malloc``,
-        ``free`` and FMI 3.0's C functions.
+        Module that imports nothing, and exports ``memory``, ``_initialize`` and the exports of `beside`; without that,
+        ``malloc``, ``free`` and FMI 3.0's C functions.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def module(component: Component, token: str, beside: Mapping[str, bytes] | None 
     """
     with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:
         exports = () if beside else ("-Wl,--export-dynamic", "-Wl,--export=malloc,--export=free")
-        return _compiled(component, token, Path(scratch), dict(beside or {}), exports)
+        return _compile_module(component, token, Path(scratch), dict(beside or {}), exports)
 
 
 def component_binary(component: Component, token: str) -> bytes:
@@ -77,7 +77,7 @@ def component_binary(component: Component, token: str) -> bytes:
     Returns
     -------
     bytes
-        It imports ``fmi:fmi3/callbacks@3.0.0``, and exports ``common``, ``co-simulation`` and, where there are states,
+        Component that imports ``fmi:fmi3/callbacks@3.0.0``, and exports ``common``, ``co-simulation`` and, with states,
         ``model-exchange``.
 
     Raises
@@ -92,7 +92,7 @@ def component_binary(component: Component, token: str) -> bytes:
     with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:
         folder = Path(scratch)
         core, typed, whole = folder / "core.wasm", folder / "typed.wasm", folder / "component.wasm"
-        core.write_bytes(_compiled(component, token, folder, more, flags))
+        core.write_bytes(_compile_module(component, token, folder, more, flags))
         (folder / "fmu.wit").write_text(wit(component.has_states), encoding="utf-8")
         embed = ["component", "embed", str(folder / "fmu.wit"), "--world", "fmu", str(core), "-o", str(typed)]
         run_compiler([*tools, *embed])
@@ -138,7 +138,9 @@ def members(component: Component, token: str) -> dict[str, bytes]:
     }
 
 
-def _compiled(component: Component, token: str, folder: Path, more: dict[str, bytes], flags: tuple[str, ...]) -> bytes:
+def _compile_module(
+    component: Component, token: str, folder: Path, more: dict[str, bytes], flags: tuple[str, ...]
+) -> bytes:
     """Return a core module of a component's sources and more; `folder` is for intermediate files."""
     for name, data in {**c_sources(component, 3), component.header: header(component, token).encode(), **more}.items():
         (folder / name).write_bytes(data)

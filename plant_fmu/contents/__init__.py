@@ -25,14 +25,14 @@ def contents(vehicle: Vehicle, fmi: int, rows: Sequence[Variable] | None = None)
     vehicle : Vehicle
         The vehicle.
     fmi : int
-        2 or 3.
+        FMI version, 2 or 3.
     rows : sequence of Variable, optional
         Variables of its FMU, where they start at other values than the vehicle's own.
 
     Returns
     -------
     dict of str to bytes
-        By path in the archive; the same bytes for the same vehicle.
+        Members by path in the archive; the same bytes for the same vehicle.
 
     Raises
     ------

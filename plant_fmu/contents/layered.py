@@ -74,7 +74,7 @@ def reference_files(vehicle: Vehicle, results: Reference) -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        ``NAME_start.ssv``, ``NAME_in.csv`` and ``NAME_out.csv``. In the CSV files the first row names the variables;
+        Files ``NAME_start.ssv``, ``NAME_in.csv`` and ``NAME_out.csv``. In CSV files the first row names the variables;
         two rows of one time are a jump.
     """
     values = {**START, **CURRENT}

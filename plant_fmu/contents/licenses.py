@@ -21,12 +21,12 @@ def licenses(fmi: int) -> dict[str, str]:
     Parameters
     ----------
     fmi : int
-        2 or 3.
+        FMI version, 2 or 3.
 
     Returns
     -------
     dict of str to str
-        ``license.txt``, the entry in both FMI versions, and the files that it refers to.
+        File ``license.txt``, the entry in both FMI versions, and the files that it refers to.
 
     Raises
     ------

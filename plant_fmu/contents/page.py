@@ -31,14 +31,14 @@ def page(vehicle: Vehicle, fmi: int, rows: Sequence[Variable] | None = None) -> 
     vehicle : Vehicle
         The vehicle.
     fmi : int
-        2 or 3.
+        FMI version, 2 or 3.
     rows : sequence of Variable, optional
         Variables of its FMU, where they start at other values than the vehicle's own.
 
     Returns
     -------
     str
-        An HTML page: the equations from ``pages/index.html`` in the package, and tables of the variables.
+        HTML page: the equations from ``pages/index.html`` in the package, and tables of the variables.
     """
     return Template(text("index.html")).substitute(
         name=escape(vehicle.name),
@@ -79,7 +79,7 @@ def tables(rows: Sequence[Variable]) -> str:
     Returns
     -------
     str
-        HTML.
+        Tables as HTML.
     """
     shown = [v for v in rows if v.role != "time"]
     roles = list(dict.fromkeys([*_ROLES, *(v.role for v in shown)]))

@@ -16,7 +16,7 @@ from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-HOLD, INTERVAL = 1.0, 0.2  # s: for which a command is held, and between rows of the results
+HOLD, INTERVAL = 1.0, 0.2  # s: time for which a command is held, and time between rows of the results
 
 STATES = (
     *(f"position.{a}" for a in "xyz"),
@@ -42,8 +42,8 @@ _TABLE = {
     "M": "0+--+0000-++-+-0",
     "N": "00+--00++--+0+-0",
 }
-_FORCE = 0.25  # of the greatest that the thrusters give
-_ANGULAR_ACCELERATION = 0.6  # rad/s2, of a vehicle at rest
+_FORCE = 0.25  # commanded force, as a part of the greatest that the thrusters give
+_ANGULAR_ACCELERATION = 0.6  # rad/s2, effect of a commanded moment on a vehicle at rest
 _FULL_AHEAD, _BEYOND = 6, 1.2  # a second in which the command is beyond the thrusters' limits
 
 RATE_LIMITED_LAG = 1e-3  # s, the least time constant of a thruster with a rate limit, as the plant defines it
@@ -53,9 +53,9 @@ RATE_LIMITED_LAG = 1e-3  # s, the least time constant of a thruster with a rate 
 class Reference:
     """A manoeuvre and its results."""
 
-    input_names: tuple[str, ...]  # of the columns after the time
-    inputs: Array  # (rows, 1 + inputs), s, N, N m; two rows of one time are a jump
-    results: Array  # (rows, 17), the columns of COLUMNS
+    input_names: tuple[str, ...]  # names of the columns of `inputs` after the time
+    inputs: Array  # (rows, 1 + inputs), time [s] and inputs [N, N m]; two rows of one time are a jump
+    results: Array  # (rows, 17), a column for each of COLUMNS
 
 
 def reference(vehicle: Vehicle) -> Reference:
@@ -64,7 +64,7 @@ def reference(vehicle: Vehicle) -> Reference:
     Returns
     -------
     Reference
-        16 s, from still thrusters, in a steady current, without surface and bottom.
+        Manoeuvre of 16 s, from still thrusters, in a steady current, without surface and bottom.
     """
     from scipy.integrate import solve_ivp  # half a second, and needed for nothing else
 

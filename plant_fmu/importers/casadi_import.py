@@ -13,7 +13,7 @@ from plant_fmu.errors import ImporterError
 from plant_fmu.importers.fmu_file import FmuFile
 from plant_fmu.importers.task import Answer, Jacobian, Task
 
-TOLERANCE = 1e-12  # relative and absolute
+TOLERANCE = 1e-12  # relative and absolute tolerance of the integrator
 _MAX_STEPS = 10**6
 
 

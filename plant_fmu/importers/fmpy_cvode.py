@@ -9,7 +9,7 @@ import fmpy
 from plant_fmu.importers.fmu_file import FmuFile
 from plant_fmu.importers.task import Answer, Task
 
-TOLERANCE = 1e-10  # relative
+TOLERANCE = 1e-10  # relative tolerance of the integrator
 
 
 def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:

@@ -12,7 +12,7 @@ import fmpy
 from plant_fmu.errors import FmuFileError
 from plant_fmu.importers.task import Task
 from plant_fmu.model_limits import validate_description
-from plant_fmu.unpacking import descriptions, opened
+from plant_fmu.unpacking import open_fmu, read_descriptions
 
 _INTERFACES = {"CoSimulation": "CS", "ModelExchange": "ME"}
 
@@ -23,7 +23,7 @@ class FmuVariable:
 
     name: str
     reference: int
-    kind: str  # of FMI, such as "Real" or "Float64"
+    kind: str  # FMI's type, such as "Real" or "Float64"
     causality: str
 
     @property
@@ -37,13 +37,13 @@ class FmuFile:
     """An FMU file that is safe to extract, with the content of its model description."""
 
     path: Path
-    fmi: int  # 2 or 3
-    interfaces: dict[str, dict[str, str]]  # "CS", "ME": the attributes of the interface
+    fmi: int  # FMI version, 2 or 3
+    interfaces: dict[str, dict[str, str]]  # attributes of each interface, by "CS" and "ME"
     variables: tuple[FmuVariable, ...]
-    states: int  # continuous ones
-    event_indicators: int
-    stop_time: float  # s, of its default experiment
-    step: float  # s, likewise
+    states: int  # number of continuous states
+    event_indicators: int  # number of event indicators
+    stop_time: float  # s, end of its default experiment
+    step: float  # s, step of its default experiment
     runs_here: bool  # it has a binary for this machine
 
     def of(self, causality: str) -> tuple[FmuVariable, ...]:
@@ -65,8 +65,8 @@ def read_fmu(path: Path) -> FmuFile:
         If there is no such file, it is not safe to extract, or has no valid model description of FMI 2.0 or 3.0.
     """
     path = Path(path)
-    with opened(path) as archive:
-        root = descriptions(path, archive)
+    with open_fmu(path) as archive:
+        root = read_descriptions(path, archive)
         version = root.get("fmiVersion", "")
         if root.tag != "fmiModelDescription" or version.split(".")[0] not in ("2", "3"):
             raise FmuFileError(f"{path}: is of FMI version {version!r}, expected 2.0 or 3.0")

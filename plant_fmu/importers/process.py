@@ -31,9 +31,9 @@ def run_importer(importer: Importer, fmu: FmuFile, task: Task, timeout: float = 
     Parameters
     ----------
     importer : Importer
-        One of `IMPORTERS`.
+        Importer from `IMPORTERS`.
     fmu : FmuFile
-        From `read_fmu`.
+        FMU, as from `read_fmu`.
     task : Task
         Simulation to run.
     timeout : float

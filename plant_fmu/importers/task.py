@@ -12,9 +12,9 @@ from plant_fmu.errors import TaskError
 Status = Literal["ok", "failed", "not installed", "does not apply"]
 Jacobian = dict[str, dict[str, float]]  # by name: [state whose derivative is taken][state or input]
 
-MAX_STEPS = 100_000_000
+MAX_STEPS = 100_000_000  # steps of a task
 
-_ROUNDING = 1e-9  # relative, of a stop time against a whole number of steps
+_ROUNDING = 1e-9  # relative tolerance of a stop time against a whole number of steps
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Task:
     Parameters
     ----------
     stop_time, step : float
-        [s]; the stop time is a whole number of steps.
+        End and step [s]; the stop time is a whole number of steps.
     start : mapping from str to float
         Start values of parameters, inputs and states by name, in the units of the model description.
 
@@ -59,7 +59,7 @@ class Answer:
     """The result that a driver returns from its process when the importer accepted the FMU."""
 
     values: dict[str, float] = field(default_factory=dict)  # real outputs at the stop time
-    jacobian: Jacobian = field(default_factory=dict)  # at the start
+    jacobian: Jacobian = field(default_factory=dict)  # Jacobian of the states' derivatives at the start
     note: str = ""
 
 

@@ -23,10 +23,10 @@ class _View:
     """A direction of view; body axes are given by their indices in x, y, z."""
 
     title: str
-    across: int  # to the right
-    upright: int
+    across: int  # axis that points to the right
+    upright: int  # axis that is drawn upright
     down: bool  # the upright axis points downwards
-    eye: tuple[float, float, float]  # from the body towards the viewer
+    eye: tuple[float, float, float]  # direction from the body towards the viewer
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +51,9 @@ _VIEWS = (
 _AXES = ("x forward", "y to starboard", "z down")
 _PUSH, _HULL, _WEIGHT, _LIFT = "#0072b2", "#999999", "#d55e00", "#009e73"
 _FLAT = 0.2  # part of a unit force in the plane of a view, below which it is drawn as a dot or a cross
-_SAME = 1e-3  # of the vehicle's reach; points at a smaller distance are one place
-_ROOM, _ARROW, _BESIDE, _LETTER = 1.7, 0.42, 0.17, 0.06  # of that reach: half a view, an arrow, to a number, a letter
+_SAME = 1e-3  # part of the vehicle's reach: points at a smaller distance are one place
+# parts of that reach: half a view, an arrow, the distance to a number, a letter
+_ROOM, _ARROW, _BESIDE, _LETTER = 1.7, 0.42, 0.17, 0.06
 _AROUND = 16  # possible places of the numbers about an end of an arrow
 _NOTE = (
     "An arrow is the force of a positive command; a dot comes towards you, a cross goes away. A vehicle's file has the "

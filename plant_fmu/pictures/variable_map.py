@@ -25,8 +25,8 @@ FAMILIES = {
     "calculation": ("substep", "seed"),
 }
 _COLOURS = {"input": "#e69f00", "state": "#0072b2", "output": "#009e73", "parameter": "#cc79a7"}
-_LINE, _HEAD, _GAP, _WIDTH = 0.185, 0.36, 0.32, 3.75  # in: a line, a box's head, between boxes, a box
-_MARGIN, _LETTER = 0.15, 8.0  # in, points
+_LINE, _HEAD, _GAP, _WIDTH = 0.185, 0.36, 0.32, 3.75  # inches: line, head of a box, gap between boxes, box
+_MARGIN, _LETTER = 0.15, 8.0  # inches; points
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Row:
 
     text: str  # such as position.{x, y, z}
     count: int
-    units: str  # and remarks
+    units: str  # units and remarks
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def rows_of(table: Iterable[Variable]) -> list[Row]:
     Parameters
     ----------
     table : iterable of Variable
-        In the order of the table.
+        Variables in the order of the table.
 
     Returns
     -------

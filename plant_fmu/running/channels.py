@@ -31,24 +31,24 @@ class Channels:
     """Inputs or outputs side by side, in the order of the model description."""
 
     channels: tuple[Channel, ...]
-    values: NDArray[Any]  # (n,) the buffer itself: it changes in place
+    values: NDArray[Any]  # (n,) the buffer itself, which changes in place
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Their names."""
+        """Names of the channels."""
         return tuple(channel.name for channel in self.channels)
 
     def __len__(self) -> int:
         return len(self.channels)
 
 
-class Bound:
+class BoundCalls:
     """The buffers of an instance, and the calls of a step over them.
 
     Parameters
     ----------
     instance : Instance
-        The FMU's instance; the calls are for its life alone.
+        Instance of the FMU; the calls are valid during its life alone.
     brief : bool
         True if the calls take microseconds: they keep Python's global lock. Otherwise each call releases it.
 
@@ -59,7 +59,7 @@ class Bound:
     starts : ndarray, shape (n,)
         Start values of the inputs.
     set_inputs, get_outputs, get_flags, do_step : Call
-        Made with ``function(*arguments)``, which takes most of the time of a step.
+        Calls, made as ``function(*arguments)``; they take most of the time of a step.
     now, length : ctypes.c_double
         Arguments of `do_step` [s].
     ended : ctypes.c_bool

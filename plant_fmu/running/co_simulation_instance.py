@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant_fmu.errors import PlantError
-from plant_fmu.running.channels import DOUBLES, Bound
+from plant_fmu.running.channels import DOUBLES, BoundCalls
 from plant_fmu.running.instance import WARNING, Instance
 from plant_fmu.running.state import Clock
-from plant_fmu.running.values import Value, checked, require_settable
+from plant_fmu.running.values import Value, convert_value, require_settable
 
-_LONGEST_STEP = 1e9  # s
+_LONGEST_STEP = 1e9  # s, bound of a step
 _AT_ZERO = Clock(0.0, 0, math.nan)
 
 
@@ -42,7 +42,7 @@ class CoSimulationInstance:
     flags : Channels
         Boolean outputs; `read_flags` updates ``flags.values``.
     time : float
-        [s].
+        Present time [s].
 
     Raises
     ------
@@ -53,7 +53,7 @@ class CoSimulationInstance:
     def __init__(self, path: Path, brief: bool = False) -> None:
         self._instance = Instance(path)
         try:
-            self._bound = bound = Bound(self._instance, brief)
+            self._bound = bound = BoundCalls(self._instance, brief)
         except BaseException:
             self._instance.close()
             raise
@@ -62,10 +62,10 @@ class CoSimulationInstance:
         self._output_at = {name: i for i, name in enumerate(self.outputs.names)}
         self._calls = (*bound.set_inputs, *bound.do_step, *bound.get_outputs)
         self._now, self._ended = bound.now, bound.ended
-        self._wind(_AT_ZERO, initialised=False)
+        self._set_clock(_AT_ZERO, initialised=False)
 
-    def _wind(self, clock: Clock, *, initialised: bool) -> None:
-        """Set the clock. The next step calls `_pace`, whatever its length, for NaN equals no number."""
+    def _set_clock(self, clock: Clock, *, initialised: bool) -> None:
+        """Set the clock. The next step calls `_change_step`, whatever its length, since NaN equals no number."""
         self._start, self._count, self._last_step = clock.start, clock.count, clock.step
         self._step = math.nan
         self.time, self.initialised = clock.time, initialised
@@ -99,7 +99,7 @@ class CoSimulationInstance:
         Parameters
         ----------
         values : mapping from str to float, int, bool or str
-            In the units of the model description; all of one type are set at once.
+            Values by name, in the units of the model description; all of one type are set at once.
 
         Raises
         ------
@@ -113,7 +113,7 @@ class CoSimulationInstance:
             require_settable(variable, self.initialised)
             variables, numbers = batches.setdefault(variable.type, ([], []))
             variables.append(variable)
-            numbers.append(checked(variable, value))
+            numbers.append(convert_value(variable, value))
         # real numbers go last, in one call, of which the FMU takes all or none
         for _, (variables, numbers) in sorted(batches.items(), key=lambda batch: batch[0] in DOUBLES):
             self._instance.set(variables, numbers)
@@ -126,7 +126,7 @@ class CoSimulationInstance:
     def __setitem__(self, name: str, value: Value) -> None:
         if name in self._input_at:
             self._require_open()
-            self.inputs.values[self._input_at[name]] = checked(self._variable(name), value)
+            self.inputs.values[self._input_at[name]] = convert_value(self._variable(name), value)
         else:
             self.set({name: value})
 
@@ -194,7 +194,7 @@ class CoSimulationInstance:
             instance.do(fmu.exitInitializationMode)
         except PlantError as error:
             raise PlantError(f"{error}; reset(), then set what is right") from error
-        self._wind(Clock(time, 0, math.nan), initialised=True)
+        self._set_clock(Clock(time, 0, math.nan), initialised=True)
         self._read()
 
     def reset(self) -> None:
@@ -207,9 +207,9 @@ class CoSimulationInstance:
         """
         self._require_open()
         self._instance.do(self._instance.fmu.reset)
-        self._instance.messages.said()  # so that a later error does not quote earlier messages
+        self._instance.messages.take_failures()  # so that a later error does not quote earlier messages
         self.inputs.values[:] = self._bound.starts
-        self._wind(_AT_ZERO, initialised=False)
+        self._set_clock(_AT_ZERO, initialised=False)
 
     def step(self, step: float) -> None:
         """Send the inputs, advance by `step`, and read the outputs.
@@ -217,7 +217,7 @@ class CoSimulationInstance:
         Parameters
         ----------
         step : float
-            [s].
+            Length of the step [s].
 
         Raises
         ------
@@ -225,7 +225,7 @@ class CoSimulationInstance:
             If the FMU refuses a value or the step, or the plant is not initialised or closed.
         """
         if step != self._step:
-            self._pace(step)
+            self._change_step(step)
         set_inputs, of_inputs, do_step, of_step, get_outputs, of_outputs = self._calls
         self._now.value = self.time
         if set_inputs(*of_inputs) > WARNING or do_step(*of_step) > WARNING:
@@ -237,7 +237,7 @@ class CoSimulationInstance:
         if self._ended.value:
             raise PlantError(f"t = {self.time:.6g} s: the FMU asks to end the simulation")
 
-    def _pace(self, step: float) -> None:
+    def _change_step(self, step: float) -> None:
         """Prepare steps of another length than before."""
         self._require_initialised("cannot step")
         number = isinstance(step, (int, float, np.integer, np.floating)) and not isinstance(step, bool)
@@ -253,7 +253,7 @@ class CoSimulationInstance:
             raise PlantError(f"the inputs are refused: {self._said()}")
 
     def _said(self) -> str:
-        return self._instance.messages.said() or "the FMU failed without a word"
+        return self._instance.messages.take_failures() or "the FMU failed without a message"
 
     def _read(self) -> None:
         get_outputs, of_outputs = self._bound.get_outputs
@@ -266,7 +266,7 @@ class CoSimulationInstance:
         Returns
         -------
         ndarray of bool, shape (n,)
-            ``flags.values``, which changes in place.
+            The array ``flags.values``, which changes in place.
 
         Raises
         ------
@@ -283,7 +283,7 @@ class CoSimulationInstance:
     def close(self) -> None:
         """Free the instance, unload the library and remove the extracted files. May be called twice."""
         self._instance.close()
-        self._wind(Clock(self.time, 0, math.nan), initialised=False)
+        self._set_clock(Clock(self.time, 0, math.nan), initialised=False)
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         raise PlantError("a plant cannot be copied or pickled, expected save() and serialise() for its state")

@@ -52,11 +52,11 @@ class Messages:
         if status > WARNING:
             self._failures.append(" ".join(text.split()))
 
-    def said(self) -> str:
+    def take_failures(self) -> str:
         """Return the failures since the last call, joined by semicolons, and clear them; "" for none."""
-        said = "; ".join(self._failures)
+        text = "; ".join(self._failures)
         self._failures.clear()
-        return said
+        return text
 
 
 class Instance:
@@ -70,16 +70,16 @@ class Instance:
     Attributes
     ----------
     fmi : int
-        2 or 3.
+        FMI version, 2 or 3.
     variables : dict from str to fmpy.model_description.ScalarVariable
-        By name, in the order of the model description.
+        Variables by name, in the order of the model description.
     fmu : FMU2Slave or FMU3Slave
         FMPy's object for the FMU.
 
     Raises
     ------
     PlantError
-        If it cannot be loaded; no file is left behind.
+        If the FMU cannot be loaded; no file is left behind.
     """
 
     def __init__(self, path: Path) -> None:
@@ -97,7 +97,7 @@ class Instance:
             raise
         except Exception as error:
             self._end()
-            raise PlantError(f"{path}: {self.messages.said() or _one_line(error)}") from error
+            raise PlantError(f"{path}: {self.messages.take_failures() or _one_line(error)}") from error
         except BaseException:
             self._end()
             raise
@@ -149,7 +149,7 @@ class Instance:
         try:
             return call(*arguments, **named)
         except Exception as error:
-            raise PlantError(self.messages.said() or _one_line(error)) from error
+            raise PlantError(self.messages.take_failures() or _one_line(error)) from error
 
     def get(self, variable: Any) -> Any:
         """Return the value of a scalar variable, as a float, int, bool or str."""

@@ -23,9 +23,9 @@ class Native(NamedTuple):
     set_values: int  # fmi3SetFloat64
     get_values: int  # fmi3GetFloat64
     do_step: int  # fmi3DoStep
-    input_references: NDArray[np.uint32]  # (n,)
+    input_references: NDArray[np.uint32]  # (n,) value references of the inputs
     inputs: NDArray[np.float64]  # (n,) sent by set_values
-    output_references: NDArray[np.uint32]  # (m,)
+    output_references: NDArray[np.uint32]  # (m,) value references of the outputs
     outputs: NDArray[np.float64]  # (m,) filled by get_values
     results: NDArray[np.int64]  # (4,) results of fmi3DoStep by pointer, each at the first byte of its element
 
@@ -38,7 +38,7 @@ def native_of(instance: Instance, inputs: tuple[str, ...], outputs: tuple[str, .
     instance : Instance
         Instance of an FMI 3.0 FMU.
     inputs, outputs : tuple of str
-        Real scalar variables, in the order of the buffers.
+        Names of real scalar variables, in the order of the buffers.
 
     Returns
     -------

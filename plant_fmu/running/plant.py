@@ -36,7 +36,7 @@ class Plant(CoSimulationInstance):
     flags : Channels
         Boolean outputs; `read_flags` updates ``flags.values``.
     time : float
-        [s].
+        Present time [s].
     initialised : bool
         True if the plant can step.
 
@@ -93,7 +93,7 @@ class Plant(CoSimulationInstance):
         Parameters
         ----------
         state : State
-            From `save` or `deserialise`.
+            State from `save` or `deserialise`.
 
         Raises
         ------
@@ -104,7 +104,7 @@ class Plant(CoSimulationInstance):
         self._instance.sweep()
         self._instance.do(self._instance.fmu.setFMUState, state.handle(self._instance))
         self.inputs.values[:] = state.inputs
-        self._wind(state.clock, initialised=state.initialised)
+        self._set_clock(state.clock, initialised=state.initialised)
         if self.initialised:
             self._read()
 
@@ -148,7 +148,7 @@ class Plant(CoSimulationInstance):
         Returns
         -------
         ndarray, shape (m, n)
-            Row i, column j: unknown i by known j, in their units.
+            Derivatives, in row i and column j of unknown i by known j, in their units.
 
         Raises
         ------

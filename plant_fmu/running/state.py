@@ -25,7 +25,7 @@ class Clock:
     """The time of a plant: `count` steps of `step` after `start`, so that no rounding adds up."""
 
     start: float  # s
-    count: int
+    count: int  # number of steps
     step: float  # s, NaN before the first step
 
     @property
@@ -44,7 +44,7 @@ class State:
     initialised : bool
         True if the plant was initialised then.
     inputs : ndarray, shape (n,)
-        Inputs at that time.
+        Inputs at that time, each in its unit.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ def from_bytes(data: bytes, instance: Instance) -> State:
     Raises
     ------
     PlantError
-        If the bytes are no state, of another FMU, or damaged.
+        If the bytes are no state, a state of another FMU, or damaged.
     """
     if len(data) < _HEAD.size + _BODY.size or not data.startswith(_MAGIC):
         raise PlantError(f"{len(data)} bytes came, expected a serialised state of a plant")

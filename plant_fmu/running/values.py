@@ -13,15 +13,15 @@ from plant_fmu.running.channels import DOUBLES
 Value = float | int | bool | str
 
 _REALS = (*DOUBLES, "Float32")
-_WHOLE = {  # number of bits, and True if signed
+_WHOLE = {  # number of bits of each type of whole numbers, and True if signed
     "Integer": (32, True),
-    "Enumeration": (32, True),  # of FMI 3.0 it is wider; no enumeration has that many items
+    "Enumeration": (32, True),  # wider in FMI 3.0, but no enumeration has that many items
     **{f"Int{bits}": (bits, True) for bits in (8, 16, 32, 64)},
     **{f"UInt{bits}": (bits, False) for bits in (8, 16, 32, 64)},
 }
 
 
-def checked(variable: Any, value: object) -> Value:
+def convert_value(variable: Any, value: object) -> Value:
     """Convert a value to its variable's type.
 
     Parameters
@@ -80,7 +80,7 @@ def require_settable(variable: Any, initialised: bool) -> None:
     if calculated or variable.variability == "constant" or variable.causality == "structuralParameter":
         raise PlantError(f"{variable.name} cannot be set, expected a parameter, an input or a start value")
     if initialised and variable.variability != "tunable":
-        raise PlantError(f"{variable.name} cannot be set any more: initialise() fixed it, reset() loosens it")
+        raise PlantError(f"{variable.name} cannot be set any more: initialise() fixed it, until reset()")
 
 
 def _real(variable: Any, value: object) -> float:

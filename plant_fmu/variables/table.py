@@ -21,7 +21,7 @@ def variables(vehicle: Vehicle, coupled: bool = False) -> list[Variable]:
     vehicle : Vehicle
         Vehicle with the start values and the number of thrusters.
     coupled : bool, optional
-        With the inputs by which other components act on the vehicle.
+        True to add the inputs by which other components act on the vehicle.
 
     Returns
     -------
@@ -323,7 +323,7 @@ def _sensors() -> Iterator[Variable]:
 
 
 def _discrete(vehicle: Vehicle) -> Iterator[Variable]:
-    """Integers, then Booleans."""
+    """Yield the integers, then the Booleans."""
     description = "Seed of all noise and of the current's variation"
     yield replace(_parameter("seed", "seed", q.SEED, description), type="integer")
     description = "Buoyancy fades as the hull leaves the water at depth 0"

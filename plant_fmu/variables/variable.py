@@ -28,11 +28,11 @@ class Variable:
 
     name: str  # structured name, such as ``thrust[1]``
     role: Role
-    member: str  # where it lives in the C struct Model
+    member: str  # its member of the C struct Model
     quantity: Quantity
     description: str
     start: float = 0.0
-    depends: tuple[str, ...] = ()  # names, or beginnings followed by *, of what a calculated variable follows from
+    depends: tuple[str, ...] = ()  # names, or beginnings followed by *, of the variables that it is calculated from
     type: Type = "real"
     local: bool = False  # a state that is no output
 

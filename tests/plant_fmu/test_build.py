@@ -183,7 +183,7 @@ def test_missing_compiler_gives_one_line_error(tmp_path, capsys, monkeypatch):
     ("compiler", "words"),
     [
         (f"{sys.executable} -c raise(SystemExit('error:_no_luck'))", "no_luck"),
-        (f"{sys.executable} -c pass", "no library"),
+        (f"{sys.executable} -c pass", "neither a library nor a message"),
         ("gcc 'x", "quotation"),
         ("no-such-compiler", "not on the PATH"),
     ],

@@ -142,7 +142,7 @@ def test_failed_construction_leaves_no_files(tmp_path, scratch, monkeypatch):
     def interrupted(instance, brief):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(plant_fmu.running.co_simulation_instance, "Bound", interrupted)
+    monkeypatch.setattr(plant_fmu.running.co_simulation_instance, "BoundCalls", interrupted)
     with pytest.raises(KeyboardInterrupt):
         Plant("odin")
     assert list(scratch.iterdir()) == []

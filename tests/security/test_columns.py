@@ -18,7 +18,7 @@ from cosim.results.run_result import SUMMARY, load_run
 from cosim.run.run_folder import report_again
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import list_scenarios
-from cosim.simulation.columns import names_of
+from cosim.simulation.columns import column_names
 from cosim.simulation.master import Master
 
 KINDS = {
@@ -68,13 +68,13 @@ class Table:
 @pytest.fixture(scope="module", params=KINDS.values(), ids=KINDS)
 def kind(request):
     scenario = kind_of(request.param)
-    return scenario, names_of(scenario)
+    return scenario, column_names(scenario)
 
 
 @pytest.mark.medium
 def test_d6_each_missing_column_is_named(kind, monkeypatch, caplog):
     scenario, names = kind
-    monkeypatch.setattr("cosim.simulation.columns.names_of", lambda _: names)
+    monkeypatch.setattr("cosim.simulation.columns.column_names", lambda _: names)
     taken_along = 0
     for name in names:
         caplog.clear()
@@ -101,7 +101,7 @@ def test_d6_the_names_are_those_of_the_run(kind):
 def test_d6_the_names_are_those_of_every_shipped_scenario(name):
     scenario = load_scenario(name)
     with Master(scenario) as master:
-        assert names_of(scenario) == [column.name for column in master.signals.columns]
+        assert column_names(scenario) == [column.name for column in master.signals.columns]
 
 
 @pytest.mark.parametrize(
@@ -111,11 +111,11 @@ def test_d6_columns_in_another_order_are_rejected(ordered_run, swapped):
     """What is read side by side would be another quantity."""
     scenario = load_scenario(ordered_run / "scenario.toml")
     other = dict(zip(swapped, reversed(swapped), strict=True))
-    names = [other.get(name, name) for name in names_of(scenario)]
+    names = [other.get(name, name) for name in column_names(scenario)]
     with pytest.raises(RunError, match="stands elsewhere"):
         require_columns(scenario, Table(names))
     with pytest.raises(RunError, match="stands elsewhere"):
-        require_columns(scenario, Table(["of another", *names_of(scenario)]))
+        require_columns(scenario, Table(["of another", *column_names(scenario)]))
 
 
 @pytest.fixture
@@ -172,7 +172,7 @@ def test_d6_unfinished_run_is_checked(lacking):
 @pytest.mark.slow
 def test_d6_every_column_of_a_file_dropped_singly(lacking, ordered_run, caplog, monkeypatch):
     names = list(load_record(ordered_run).units)
-    monkeypatch.setattr("cosim.simulation.columns.names_of", lambda _: names)
+    monkeypatch.setattr("cosim.simulation.columns.column_names", lambda _: names)
     summary, refused = load_run(ordered_run).summary, 0
     for name in names:
         caplog.clear()

@@ -10,9 +10,19 @@ import numpy as np
 from controller.quaternion import rotation_matrix
 from controller.regions.entry import Entry
 from controller.regions.geometry import product_distance, to_local, to_world
-from controller.regions.mesh import Mesh, placed
+from controller.regions.mesh import Mesh, place_points
 from controller.regions.numbers import SIZE, TURNED, Number, vector
-from controller.regions.shape import Array, Bounds, Evaluation, Vector3, Vector4, about, require, require_finite, unit
+from controller.regions.shape import (
+    Array,
+    Bounds,
+    Evaluation,
+    Vector3,
+    Vector4,
+    centered_bounds,
+    require,
+    require_finite,
+    unit,
+)
 
 
 @dataclass(frozen=True)
@@ -52,7 +62,7 @@ class Box:
         """Return the corners of the upright box about it."""
         R = rotation_matrix(np.array(unit("box", "quaternion", self.quaternion)))
         reach = np.abs(R) @ np.array(self.size) / 2.0
-        return about(self.centre, reach.tolist())
+        return centered_bounds(self.centre, reach.tolist())
 
 
 def box(p: Array, q: Array) -> Evaluation:
@@ -72,7 +82,7 @@ def surface(shape: Box, limits: Bounds) -> Mesh:
     corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     triangles = np.array([t for a, b, c, d in faces for t in ((a, b, c), (a, c, d))])
-    return Mesh(placed(corners * np.array(shape.size), shape.centre, shape.quaternion), triangles)
+    return Mesh(place_points(corners * np.array(shape.size), shape.centre, shape.quaternion), triangles)
 
 
 _UNITS = {"centre": "m", "size": "m", "quaternion": ""}

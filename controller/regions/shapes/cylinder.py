@@ -18,7 +18,7 @@ from controller.regions.shape import (
     Bounds,
     Evaluation,
     Vector3,
-    about,
+    centered_bounds,
     join,
     require,
     require_finite,
@@ -67,7 +67,9 @@ class Cylinder:
     def bounds(self) -> Bounds:
         """Return the corners of the upright box about it."""
         axis = unit("cylinder", "axis", tuple(b - a for a, b in zip(self.start, self.end, strict=True)))
-        discs = [about(p, [self.radius * math.sqrt(1.0 - x * x) for x in axis]) for p in (self.start, self.end)]
+        discs = [
+            centered_bounds(p, [self.radius * math.sqrt(1.0 - x * x) for x in axis]) for p in (self.start, self.end)
+        ]
         return join(discs)
 
 

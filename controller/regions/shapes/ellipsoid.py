@@ -11,9 +11,19 @@ from controller.arithmetic import length3, square
 from controller.quaternion import rotation_matrix
 from controller.regions.entry import Entry
 from controller.regions.geometry import to_local, to_world
-from controller.regions.mesh import Mesh, ball, placed
+from controller.regions.mesh import Mesh, ball, place_points
 from controller.regions.numbers import SIZE, TURNED, Number, vector
-from controller.regions.shape import Array, Bounds, Evaluation, Vector3, Vector4, about, require, require_finite, unit
+from controller.regions.shape import (
+    Array,
+    Bounds,
+    Evaluation,
+    Vector3,
+    Vector4,
+    centered_bounds,
+    require,
+    require_finite,
+    unit,
+)
 
 _STEPS = 200  # more than the root below ever needs
 
@@ -55,7 +65,7 @@ class Ellipsoid:
         """Return the corners of the upright box about it."""
         R = rotation_matrix(np.array(unit("ellipsoid", "quaternion", self.quaternion)))
         reach = np.linalg.norm(R * np.array(self.semi_axes), axis=1)
-        return about(self.centre, reach.tolist())
+        return centered_bounds(self.centre, reach.tolist())
 
 
 def ellipsoid(p: Array, q: Array) -> Evaluation:
@@ -96,13 +106,13 @@ def surface(shape: Ellipsoid, limits: Bounds) -> Mesh:
     """Return a ball, scaled along the axes."""
     unit_ball = ball()
     scaled = unit_ball.vertices * np.array(shape.semi_axes)
-    return Mesh(placed(scaled, shape.centre, shape.quaternion), unit_ball.triangles)
+    return Mesh(place_points(scaled, shape.centre, shape.quaternion), unit_ball.triangles)
 
 
 def half_axes(shape: Ellipsoid) -> tuple[Array, Array]:
     """Return its centre and its half axes."""
     centre = np.array(shape.centre)
-    return centre, placed(np.diag(shape.semi_axes), shape.centre, shape.quaternion) - centre
+    return centre, place_points(np.diag(shape.semi_axes), shape.centre, shape.quaternion) - centre
 
 
 _UNITS = {"centre": "m", "semi_axes": "m", "quaternion": ""}

@@ -11,14 +11,14 @@ import numpy as np
 
 from controller.regions.entry import Entry
 from controller.regions.geometry import clamp
-from controller.regions.mesh import AROUND, Mesh, lathe, welded
+from controller.regions.mesh import AROUND, Mesh, lathe, weld
 from controller.regions.numbers import LENGTH, SIZE, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, join, require, require_finite
 
-_MOST_STEPS = 20_000  # along a ray that runs beside a straight stretch, just inside its surface
-_ROUNDING = 1e-12  # of the radius
-_BEND = math.radians(15.0)  # between rings about a corner
-_STRAIGHT = 1e-9  # of a turn that is none
+_MAX_STEPS = 20_000  # steps of a ray; many where it runs just inside the surface of a straight stretch
+_ROUNDING = 1e-12  # distance to the surface that counts as 0, as a part of the radius
+_BEND = math.radians(15.0)  # rad, angle between rings about a corner
+_STRAIGHT = 1e-9  # rad, turn below which a line counts as straight
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def pipe(p: Array, q: Array) -> Evaluation:
 def surface(shape: Pipe, limits: Bounds) -> Mesh:
     """Return rings along its line, and its round ends."""
     first, rings, last = _rings(shape, AROUND)
-    return welded(lathe(rings, first, last))  # inside a bend, rings share their corners
+    return weld(lathe(rings, first, last))  # inside a bend, rings share their corners
 
 
 def _rings(shape: Pipe, around: int) -> tuple[Array, list[Array], Array]:
@@ -155,7 +155,7 @@ def _left(shape: Pipe, origins: Array, directions: Array) -> Array:
     packed = np.array(shape.packed())
     gone = np.zeros(len(origins))
     inside = np.arange(len(origins))
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MAX_STEPS):
         left = np.array([-pipe(p, packed)[4] for p in origins[inside] + gone[inside, None] * directions[inside]])
         inside, left = inside[left > _ROUNDING * shape.radius], left[left > _ROUNDING * shape.radius]
         if not inside.size:

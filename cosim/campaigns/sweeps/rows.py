@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from cosim.batch.outcome import FIELDS, Flown, nothing
+from cosim.batch.outcome import FIELDS, BatchResult, empty_outcomes
 from cosim.batch.variation import Variation
 from cosim.campaigns.store.columns import of_numbers, of_texts
 from cosim.campaigns.store.plan import SWEEP, code_digest, versions
@@ -73,7 +73,7 @@ def schema_of(keys: tuple[str, ...]) -> Any:
     )
 
 
-def table_of(keys: tuple[str, ...], batch: SweepBatch, flown: Flown) -> Any:
+def table_of(keys: tuple[str, ...], batch: SweepBatch, flown: BatchResult) -> Any:
     """Convert flights to a table.
 
     Parameters
@@ -82,7 +82,7 @@ def table_of(keys: tuple[str, ...], batch: SweepBatch, flown: Flown) -> Any:
         The keys that vary.
     batch : SweepBatch
         The batch.
-    flown : Flown
+    flown : BatchResult
         Its outcomes.
 
     Returns
@@ -202,7 +202,7 @@ class SweepWork:
 
     def refused(self, row: int, reason: str) -> Any:
         """Return the table of one row that could not be flown."""
-        return table_of(self.variation.keys, self.batch(np.array([row])), Flown(nothing(1), {0: reason}))
+        return table_of(self.variation.keys, self.batch(np.array([row])), BatchResult(empty_outcomes(1), {0: reason}))
 
 
 def _files(scenario: Scenario) -> dict[str, bytes]:

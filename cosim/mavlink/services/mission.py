@@ -13,7 +13,7 @@ from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.mavlink.wire.encode import whole
 from cosim.simulation.commands.commands import ChangeSetting, Command, MissionItem, SetCurrentItem, SetMission, SetMode
-from cosim.simulation.commands.mission_executor import way
+from cosim.simulation.commands.mission_executor import passed_items
 
 _MAX_ITEMS = 500
 _RETRY = 1.0  # s of the wall clock
@@ -80,7 +80,7 @@ class Missions(Service):
         now = self._under_way = context.view.item if context.mode == "mission" else -1
         if now == before or not 0 <= now < len(context.mission_items):
             return
-        for item in way(context.mission_items, before, now) or [now]:
+        for item in passed_items(context.mission_items, before, now) or [now]:
             for command in context.mission_items[item].commands:
                 if isinstance(command, ChangeSetting):
                     self._parameters.record(command.key, command.value)

@@ -53,9 +53,9 @@ class CommandHandler:
     scenario : Scenario
         The scenario of the run, with commands enabled.
     environment : RegionEnvironment
-        Its target and obstacles are moved.
+        Environment whose target and obstacles the commands move.
     actuators : Actuators
-        Their limits are changed.
+        Actuators whose limits the commands change.
     state : VehicleState
         The state that the law receives.
     out : ndarray, shape (7,)
@@ -92,21 +92,21 @@ class CommandHandler:
         self._environment, self._actuators, self._state, self._out = environment, actuators, state, out
         vehicle = scenario.vehicle
         # greatest wrench along and about each axis, which a full stick commands
-        self._reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+        self._greatest_wrench = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
         self._manual: Array = np.zeros(6)
         self._by_gain = True  # whether the pilot's gain scales the sticks
         self._attitude: SetAttitude | None = None
-        self._stabilizer = StickStabilizer(vehicle, state, scenario.time.control, self._reach)
+        self._stabilizer = StickStabilizer(vehicle, state, scenario.time.control, self._greatest_wrench)
         self._mission = MissionExecutor()
         self._slots = ObstacleSlots(scenario.commands.obstacles)
 
     @property
     def automatic_control(self) -> bool:
         """Whether the law computes the forces; otherwise `wrench` does."""
-        return self.armed and self.mode not in STICK_MODES and not self._pushed
+        return self.armed and self.mode not in STICK_MODES and not self._commanded_force
 
     @property
-    def _pushed(self) -> bool:
+    def _commanded_force(self) -> bool:
         """Whether an attitude with a force is commanded in the law's place."""
         return self.mode == "reach" and self._attitude is not None and self._attitude.force is not None
 
@@ -116,7 +116,7 @@ class CommandHandler:
             return np.zeros(6)
         gain = self.settings["commands.pilot_gain"] if self._by_gain else 1.0
         if self.mode == "manual":
-            wrench: Array = gain * self._manual * self._reach
+            wrench: Array = gain * self._manual * self._greatest_wrench
             return wrench
         sticks, attitude, rate = self._manual, self._attitude, None
         if attitude is not None and attitude.force is not None:
@@ -131,7 +131,7 @@ class CommandHandler:
         command : Command
             The command.
         time : float
-            Of the step [s].
+            Time of the step [s].
         """
         was_automatic = self.automatic_control
         try:
@@ -168,7 +168,7 @@ class CommandHandler:
                 self.changed = True
                 self._apply_setting(command.key)
             case SetMission():
-                self._mission.take(command.items)
+                self._mission.set_items(command.items)
                 if self.mode == "mission":
                     self._set_mode("hold", time)
             case SetCurrentItem():
@@ -183,10 +183,10 @@ class CommandHandler:
     def _move_regions(self, command: AddObstacle | RemoveObstacle | ShiftRegion, time: float) -> None:
         match command:
             case AddObstacle():
-                slot = self._slots.take(command.number)
+                slot = self._slots.assign(command.number)
                 self._environment.add_obstacle(slot, command.position, command.radius, command.velocity, time)
             case RemoveObstacle():
-                left = self._slots.leave(command.number)
+                left = self._slots.release(command.number)
                 if left is not None:
                     self._environment.remove_obstacle(left)
             case ShiftRegion():
@@ -254,9 +254,9 @@ class CommandHandler:
         Parameters
         ----------
         time : float
-            Of the step [s].
+            Time of the step [s].
         clearance : float
-            Of the target region at the measured pose [m]; 0 or above within it.
+            Clearance of the target region at the measured pose [m]; 0 or above within it.
 
         Returns
         -------
@@ -279,14 +279,14 @@ def greatest_wrench(matrix: Array, lower: Array, upper: Array) -> Array:
     Parameters
     ----------
     matrix : ndarray, shape (6, m)
-        Body wrench of one newton of each thruster.
+        Body wrench of one newton of each thruster [-, m].
     lower, upper : ndarray, shape (m,)
         Limits of each thruster [N].
 
     Returns
     -------
     ndarray, shape (6,)
-        [N, N m]; 0 for an axis that the thrusters cannot actuate.
+        Greatest wrench [N, N m]; 0 for an axis that the thrusters cannot actuate.
     """
     inverse = np.linalg.pinv(matrix)
     limit = np.minimum(-lower, upper)

@@ -18,10 +18,10 @@ STICK_MODES: tuple[Mode, ...] = ("manual", "stabilize", "depth_hold")  # manual 
 
 NOT_A_COMMAND = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)  # raised by msgspec for an invalid text
 
-_FAR = 1e5  # m; beyond it nothing is commanded
-_FAST = 1e2  # m/s
-_LONG = 1e9  # s
-_UNIT = 1e-2  # by which a quaternion's length may differ from 1
+_FAR = 1e5  # m, greatest coordinate, displacement and radius of a command
+_FAST = 1e2  # m/s, greatest velocity of a command
+_LONG = 1e9  # s, longest stay of a mission item
+_UNIT = 1e-2  # greatest deviation of a quaternion's length from 1
 
 
 def _tag(name: str) -> str:
@@ -80,7 +80,7 @@ class SetAttitude(_Command, frozen=True):
     Another mode, another target, or an attitude of None ends it.
     """
 
-    quaternion: tuple[float, float, float, float] | None  # from body to world, scalar first
+    quaternion: tuple[float, float, float, float] | None  # unit quaternion from body to world, scalar first
     force: Vector3 | None = None  # fractions [-] of the greatest force along each body axis; None: the sticks'
     rate_down: float | None = None  # m/s, of the depth, in place of a vertical force
 

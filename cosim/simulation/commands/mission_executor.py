@@ -15,15 +15,15 @@ class MissionExecutor:
     Attributes
     ----------
     items : tuple of MissionItem
-        Of the mission.
+        Items of the mission.
     at : int
         Index of the present item, from 0; -1 before the mission begins.
     """
 
     def __init__(self) -> None:
-        self.take(())
+        self.set_items(())
 
-    def take(self, items: tuple[MissionItem, ...]) -> None:
+    def set_items(self, items: tuple[MissionItem, ...]) -> None:
         """Replace the mission; the new one has not begun."""
         self.items, self.at = items, -1
         self._jumps: dict[int, int] = {}  # number of jumps made, by item
@@ -57,9 +57,9 @@ class MissionExecutor:
         Parameters
         ----------
         time : float
-            [s].
+            Time [s].
         clearance : float
-            Of the target region [m]; 0 or above within it. It is not used for an item without a position.
+            Clearance of the target region [m]; 0 or above within it. It is not used for an item without a position.
         """
         if not 0 <= self.at < len(self.items):
             return None
@@ -75,7 +75,7 @@ class MissionExecutor:
         return self.at + 1 if self.at + 1 < len(self.items) else None
 
 
-def way(items: Sequence[MissionItem], before: int, now: int) -> list[int] | None:
+def passed_items(items: Sequence[MissionItem], before: int, now: int) -> list[int] | None:
     """Return the items that a mission passed through from one item to the present one.
 
     Only items without a position are passed through at once.
@@ -83,14 +83,14 @@ def way(items: Sequence[MissionItem], before: int, now: int) -> list[int] | None
     Parameters
     ----------
     items : sequence of MissionItem
-        Of the mission.
+        Items of the mission.
     before, now : int
         Indices of the item before and of the present one.
 
     Returns
     -------
     list of int or None
-        Ends with `now`; None if the mission does not lead there from `before`.
+        Indices that end with `now`; None if the mission does not lead there from `before`.
     """
     ways, seen = [[before + 1]], set[int]()
     while ways:

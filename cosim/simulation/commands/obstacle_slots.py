@@ -18,7 +18,7 @@ class ObstacleSlots:
         self._taken: dict[int, int] = {}  # by the number of the obstacle
         self._free = list(range(count))
 
-    def take(self, number: int) -> int:
+    def assign(self, number: int) -> int:
         """Return the slot of an obstacle, from 0; assign a free one if it has none yet.
 
         Raises
@@ -32,7 +32,7 @@ class ObstacleSlots:
             self._taken[number] = self._free.pop(0)
         return self._taken[number]
 
-    def leave(self, number: int) -> int | None:
+    def release(self, number: int) -> int | None:
         """Free the slot of an obstacle and return it; None if it has none."""
         slot = self._taken.pop(number, None)
         if slot is not None:

@@ -14,9 +14,9 @@ from cosim.errors import CommandError
 from cosim.scenario.scenario import Scenario
 from plant_fmu.variables import variables
 
-_GREATEST_RAMP = 1e3  # m
-_LEAST_RADIUS = 1e-2  # m
-_OF_COMMANDS = {  # unit, least, greatest
+_GREATEST_RAMP = 1e3  # m, greatest value of ``arbiter.ramp``
+_LEAST_RADIUS = 1e-2  # m, least radius of obstacles and of the target while holding
+_COMMAND_SETTINGS = {  # unit, least, greatest
     "obstacle_radius": ("m", _LEAST_RADIUS, 1e3),
     "hold_radius": ("m", _LEAST_RADIUS, 1e3),
     "surface_depth": ("m", 0.0, 1e3),
@@ -28,7 +28,7 @@ _OF_COMMANDS = {  # unit, least, greatest
 class Setting:
     """A setting and its present value."""
 
-    key: str  # as `cosim run --set` takes it
+    key: str  # key of the scenario, as for `cosim run --set`
     unit: str
     value: float
 
@@ -46,9 +46,9 @@ class LiveSettings:
     Attributes
     ----------
     gains : NamedTuple
-        Of the law.
+        Gains of the law.
     shapes : dict of str to Shape
-        Of the regions, and of the goal.
+        Shape of each region, and of ``"goal"``, by name.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -63,7 +63,7 @@ class LiveSettings:
         self._add("arbiter.ramp", "m", scenario.arbiter.ramp, 0.0, _GREATEST_RAMP)
         self._add_limits(scenario)
         if scenario.commands.enabled:
-            for name, (unit, least, greatest) in _OF_COMMANDS.items():
+            for name, (unit, least, greatest) in _COMMAND_SETTINGS.items():
                 self._add(f"commands.{name}", unit, getattr(scenario.commands, name), least, greatest)
 
     def _add(self, key: str, unit: str, value: float, least: float, greatest: float) -> None:
@@ -116,7 +116,7 @@ class LiveSettings:
         Parameters
         ----------
         key : str
-            Of a setting.
+            Key of a setting.
         value : float
             New value, in the setting's unit.
 

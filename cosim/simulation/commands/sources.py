@@ -15,7 +15,7 @@ from cosim.errors import CommandError, RunError
 from cosim.scenario.validation import MAX_STEPS
 from cosim.simulation.commands.commands import NOT_A_COMMAND, Command, validate_command
 
-QUEUED = 256  # commands between two steps; further ones are refused
+QUEUED = 256  # greatest number of commands between two steps; further ones are rejected
 
 
 class CommandSource(Protocol):
@@ -37,7 +37,7 @@ class CommandQueue:
     Attributes
     ----------
     run : int
-        Number of the run that takes them, from 0; a reset begins the next one.
+        Number of the run that takes the commands, from 0; a reset begins the next one.
     """
 
     exhausted = False
@@ -53,7 +53,7 @@ class CommandQueue:
         Parameters
         ----------
         command : Command
-            To be applied.
+            Command to queue.
         run : int, optional
             Number of the run for which it is; default: any.
 
@@ -65,7 +65,7 @@ class CommandQueue:
         Raises
         ------
         CommandError
-            If a number of it is out of range.
+            If a number of the command is out of range.
         """
         validate_command(command)
         with self._lock:
@@ -106,7 +106,7 @@ def read_log(file: Path) -> list[tuple[int, Command]]:
     Returns
     -------
     list of (int, Command)
-        In the order in which they were applied.
+        Step and command, in the order in which they were applied.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def read_log(file: Path) -> list[tuple[int, Command]]:
     except OSError as error:
         raise RunError(f"{file}: {error.strerror or error}") from error
     if _OLDER.match(content):
-        raise RunError(f"{file}: has the words of an older version ('order'), expected those of this one ('command')")
+        raise RunError(f"{file}: is a log of an older version ('order'), expected one with 'command'")
     lines, whole = content.splitlines(), content.count(b"\n")
     entries = []
     for number, line in enumerate(lines, 1):
@@ -139,7 +139,7 @@ class ScheduledCommands:
     Parameters
     ----------
     entries : iterable of (int, Command)
-        Each with the step that takes it, in the order of the steps.
+        Commands, each with the step that takes it, in the order of the steps.
     """
 
     def __init__(self, entries: Iterable[tuple[int, Command]]) -> None:

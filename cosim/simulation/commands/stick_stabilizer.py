@@ -13,13 +13,13 @@ from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
 _CENTERED = 0.02  # fraction of full stick below which it counts as released
-GREATEST_TILT = math.radians(30.0)  # of full roll and pitch sticks
+GREATEST_TILT = math.radians(30.0)  # rad, desired roll or pitch at full stick
 YAW_RATE = math.radians(
     202.5
 )  # rad/s of a full stick at a pilot gain of 1, as ArduSub has it: 45 deg/s by ACRO_YAW_P of 4.5
-CLIMB_RATE = 0.3  # m/s of a full stick
+CLIMB_RATE = 0.3  # m/s, vertical speed at full stick
 _FARTHEST = math.radians(20.0), 0.3  # rad, m: bounds by which desired heading and depth may lead the vehicle's
-_ATTITUDE, _DEPTH, _INTEGRAL = 2.5, 1.5, 0.3  # rad/s of both loops, 1/s of the depth's integral
+_ATTITUDE, _DEPTH, _INTEGRAL = 2.5, 1.5, 0.3  # rad/s, frequencies of both loops; 1/s, gain of the depth's integral
 _NORTH, _EAST, _DOWN = np.eye(3)
 
 
@@ -35,7 +35,7 @@ class StickStabilizer:
     state : VehicleState
         The state that the law receives; read at each step.
     period : float
-        Between two steps [s].
+        Time between two steps [s].
     reach : ndarray, shape (6,)
         Greatest wrench along and about each axis [N, N m].
     """
@@ -58,9 +58,9 @@ class StickStabilizer:
         Parameters
         ----------
         sticks : ndarray, shape (6,)
-            Fractions of X Y Z K M N, -1 to 1.
+            Stick positions for X, Y, Z, K, M, N, from -1 to 1.
         gain : float
-            The pilot's, 0 to 1.
+            The pilot's gain, 0 to 1.
         keep_depth : bool
             True: the vertical stick commands a vertical speed, and the depth is kept once it is released. False: it
             commands a force.
@@ -70,7 +70,7 @@ class StickStabilizer:
         Returns
         -------
         ndarray, shape (6,)
-            [N, N m], body frame; 0 in elements whose state is NaN.
+            Wrench [N, N m], body frame; 0 in elements whose state is NaN.
         """
         if math.isnan(self._heading):  # there was no measurement when it was set
             self._heading = self._yaw()

@@ -100,8 +100,8 @@ def test_prebuilt_library_needs_no_compiler(cache, tmp_path, monkeypatch, compil
     [
         ("/nowhere/cc", "no C compiler: CC is '/nowhere/cc', which is not on the PATH"),
         ("'", 'no C compiler: CC is "\'": No closing quotation'),
-        ("true", "C compiler true failed: it wrote no library, and no word"),
-        ("false", "C compiler false failed: it wrote no library, and no word"),
+        ("true", "C compiler true failed: it wrote neither a library nor a message"),
+        ("false", "C compiler false failed: it wrote neither a library nor a message"),
     ],
 )
 def test_missing_compiler_gives_one_line_error(cache, monkeypatch, command, words):

@@ -21,7 +21,7 @@ from cosim.campaigns.scenes.flyer import SceneFlyer
 from cosim.campaigns.scenes.generator import generate_scenes
 from cosim.campaigns.scenes.scene_file import read_scenes
 from cosim.mavlink.vehicle.proximity import Proximity
-from cosim.precheck.way import find_way
+from cosim.precheck.path_search import find_path
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 
@@ -62,7 +62,7 @@ def test_shipped_functions_are_exactly_those_called(called, tmp_path):
             flyer.fly(np.zeros((1, 0)), np.zeros(1, np.int64))
     with Master(load_scenario("paper", SHORT), FunctionLaw(lambda *_: np.zeros(6))) as master:
         master.run()
-    find_way([], load_scenario("paper").goal_region, (0.0, 0.0, 0.0), DeployableGains(), 0.1)
+    find_path([], load_scenario("paper").goal_region, (0.0, 0.0, 0.0), DeployableGains(), 0.1)
     clearances_at(np.zeros((2, 3)), Region("ball", Sphere((0.0, 0.0, 0.0), 1.0), "out"))
     assert called == {(one, tuple(map(type_of, arguments))) for one, arguments in shipped_functions()}
 

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from cosim.batch.outcome import FIELDS, Flown, nothing
+from cosim.batch.outcome import FIELDS, BatchResult, empty_outcomes
 from cosim.campaigns import Design, vary_from
 from cosim.campaigns.sweeps import rows
 from cosim.scenario.scenario import load_scenario
@@ -26,7 +26,7 @@ class Fake:
         self.variation = variation
 
     def fly(self, values, seeds):
-        outcomes, refused = nothing(len(seeds)), {}
+        outcomes, refused = empty_outcomes(len(seeds)), {}
         for i, row in enumerate(values):
             if self.row_time:
                 time.sleep(self.row_time)
@@ -39,7 +39,7 @@ class Fake:
         outcomes["min_clearance"] = np.where(seeds % 5 == 0, np.inf, x)
         outcomes["stopped_at"] = np.nan
         outcomes["reach_time"] = np.where(x > 0.0, x * 3.0, np.nan)
-        return Flown(outcomes, refused)
+        return BatchResult(outcomes, refused)
 
     def meet(self, row):
         """Do what a row of these values does to a process."""

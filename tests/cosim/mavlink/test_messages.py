@@ -14,7 +14,7 @@ from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.vehicle.layout import Layout, euler_of
 from cosim.mavlink.vehicle.view import View
 from cosim.mavlink.wire.encode import Encoder, float32, whole, wrap_time
-from cosim.simulation.columns import names_of
+from cosim.simulation.columns import column_names
 from cosim.simulation.signals import Column
 from plant_fmu import load_vehicle
 from plant_fmu.autopilot import effort_of_pulse, pulse_of_effort
@@ -285,7 +285,7 @@ def test_weight_names_of_custom_criteria_are_unique():
 
 def test_the_weights_and_memberships_of_four_criteria_are_sent():
     four = scenario(name="inspection-visibility")
-    columns = [Column(name, "", "") for name in names_of(four)]
+    columns = [Column(name, "", "") for name in column_names(four)]
     weights, memberships = (0.5, 0.25, 0.125, 0.75), (1.0, 0.0, 0.5, 0.25)
     row = np.zeros(len(columns))
     for of, values in (("weight", weights), ("membership", memberships)):

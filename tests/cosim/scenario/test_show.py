@@ -82,7 +82,7 @@ def test_shown_vectors_take_one_line_and_keys_are_explained(name, shown):
 
 
 def test_units_depend_on_law_vehicle_and_shape(shown):
-    assert re.search(r"^k_p1 = 18.8 +# N/m3, on the primary region", shown("paper"), re.M)
+    assert re.search(r"^k_p1 = 18.8 +# N/m3, gain of the primary region", shown("paper"), re.M)
     text = shown("docking")
     assert re.search(r"^speed = 1.2 +# m/s, greatest over ground", text, re.M)
     assert re.search(r"^buoyancy = 134.57 +# N, ", text, re.M)

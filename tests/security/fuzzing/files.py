@@ -134,7 +134,7 @@ def _zipped(description: bytes) -> bytes:
     return made.getvalue()
 
 
-@reader("FMU", "zip", "plant_fmu.unpacking:opened", "plant_fmu.unpacking:_parsed")
+@reader("FMU", "zip", "plant_fmu.unpacking:open_fmu", "plant_fmu.unpacking:_parsed")
 def fmu(seeds: Seeds) -> Case:
     return seeds.file("it.fmu", read_fmu, _zipped(SMALL))
 

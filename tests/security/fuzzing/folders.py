@@ -33,7 +33,7 @@ from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts, load_log_facts
 from cosim.results.record import PARTS, RECORD, load_record
 from cosim.results.run_result import _read_summary, load_run, open_run
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.columns import names_of
+from cosim.simulation.columns import column_names
 from cosim.simulation.commands.sources import read_log
 from tests.security.fuzzing.registry import SCENES, Case, Seeds, reader
 
@@ -108,8 +108,8 @@ def part(seeds: Seeds) -> Case:
 def run(seeds: Seeds) -> Case:
     """Make every output of a run, for any numbers."""
     folder, flown = seeds.folder(seeds.run), load_run(seeds.run)
-    names = names_of(flown.planned)
-    seeds.patch.setattr("cosim.simulation.columns.names_of", lambda _: names)
+    names = column_names(flown.planned)
+    seeds.patch.setattr("cosim.simulation.columns.column_names", lambda _: names)
 
     def read(content: bytes) -> None:
         (folder / RECORD).write_bytes(content)

@@ -44,7 +44,7 @@ ITS_OWN = {  # what parses nothing that comes from outside: why
     "plant_fmu.build:_has_checksums": "a file of the cache, built anew if it is damaged",
     "plant_fmu.compiling.prebuilt:prebuilt_libraries": "what came with the package; test_prebuilt damages it",
     "plant_fmu.compiling.signature:_signed": "what the linker wrote",
-    "plant_fmu.compiling.signature:signed_anew": "what the linker wrote",
+    "plant_fmu.compiling.signature:re_sign": "what the linker wrote",
     "plant_fmu.compiling.universal:universal_library": "what the linker wrote",
     "plant_fmu.importers.__main__:main": "what its parent process wrote",
     "plant_fmu.importers.process:run_importer": "what its child process wrote",

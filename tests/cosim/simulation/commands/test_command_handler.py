@@ -290,7 +290,7 @@ def test_shifted_regions_keep_their_shape_and_are_recorded(fly):
     [
         ("ships", "expected one of view, pipe"),
         ("goal", "expected one of view"),
-        ("seen 2", "no such obstacle has come"),
+        ("seen 2", "no such obstacle has been added"),
     ],
 )
 def test_shift_of_an_unknown_region_is_rejected(fly, caplog, region, why):

@@ -213,5 +213,5 @@ def test_d4_invalid_index_is_rejected(index):
 
 def test_log_of_an_older_version_is_rejected_by_its_key(tmp_path):
     (log := tmp_path / "orders.jsonl").write_bytes(b'{"step":0,"order":{"order":"arm","armed":true}}\n')
-    with pytest.raises(RunError, match=r"orders\.jsonl: has the words of an older version \('order'\), expected"):
+    with pytest.raises(RunError, match=r"orders\.jsonl: is a log of an older version \('order'\), expected"):
         ReplayedCommands(log)

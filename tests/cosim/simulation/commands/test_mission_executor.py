@@ -6,7 +6,7 @@ import pytest
 
 from cosim.errors import CommandError
 from cosim.simulation.commands.commands import MissionItem
-from cosim.simulation.commands.mission_executor import MissionExecutor, way
+from cosim.simulation.commands.mission_executor import MissionExecutor, passed_items
 
 PLACE = MissionItem((1.0, 2.0, 3.0), 0.5)
 AT_ONCE = MissionItem(None)
@@ -15,7 +15,7 @@ AT_ONCE = MissionItem(None)
 def followed(items, clearance=1.0, steps=12, start=0):
     """Return the items under way, step by step, of one second each."""
     course = MissionExecutor()
-    course.take(tuple(items))
+    course.set_items(tuple(items))
     course.begin(start)
     seen = [course.at]
     for time in range(steps):
@@ -38,7 +38,7 @@ def test_only_position_items_must_be_reached():
 
 def test_stay_time_restarts_after_leaving_the_region():
     course = MissionExecutor()
-    course.take((MissionItem((0.0, 0.0, 0.0), stay=2.0), PLACE))
+    course.set_items((MissionItem((0.0, 0.0, 0.0), stay=2.0), PLACE))
     course.begin(0)
     clearances = [-1.0, 0.1, -0.1, 0.0, 0.1, 0.1]
     following = [course.following(float(time), clearance) for time, clearance in enumerate(clearances)]
@@ -58,7 +58,7 @@ def test_jumps_repeat_their_stated_count():
 
 def test_restarting_the_mission_resets_jump_counts():
     course = MissionExecutor()
-    course.take((PLACE, MissionItem(None, jump=0, times=1), PLACE))
+    course.set_items((PLACE, MissionItem(None, jump=0, times=1), PLACE))
     for _ in range(2):
         course.begin(1)
         assert course.following(0.0, 1.0) == 0
@@ -70,7 +70,7 @@ def test_restarting_the_mission_resets_jump_counts():
 
 def test_current_region_is_that_of_the_last_position_item():
     course = MissionExecutor()
-    course.take((AT_ONCE, PLACE, AT_ONCE, AT_ONCE))
+    course.set_items((AT_ONCE, PLACE, AT_ONCE, AT_ONCE))
     assert course.enter(3) is AT_ONCE and course.region() is PLACE
     course.enter(0)
     assert course.region() is None
@@ -78,9 +78,14 @@ def test_current_region_is_that_of_the_last_position_item():
 
 def test_path_between_items_includes_immediate_items():
     items = [PLACE, AT_ONCE, MissionItem(None, jump=0, times=2), PLACE, PLACE]
-    assert way(items, 0, 1) == [1] and way(items, 0, 3) == [1, 2, 3] and way(items, 3, 4) == [4]
-    assert way(items, 1, 0) == [2, 0]
-    assert way(items, -1, 0) == [0]
-    assert way(items, 0, 4) is None and way(items, 4, 0) is None and way(items, 3, 1) is None
-    assert way([], 0, 5) is None
-    assert way([MissionItem(None, jump=0)], -1, 1) == [0, 1] and way([MissionItem(None, jump=0)], -1, 7) is None
+    assert (
+        passed_items(items, 0, 1) == [1] and passed_items(items, 0, 3) == [1, 2, 3] and passed_items(items, 3, 4) == [4]
+    )
+    assert passed_items(items, 1, 0) == [2, 0]
+    assert passed_items(items, -1, 0) == [0]
+    assert passed_items(items, 0, 4) is None and passed_items(items, 4, 0) is None and passed_items(items, 3, 1) is None
+    assert passed_items([], 0, 5) is None
+    assert (
+        passed_items([MissionItem(None, jump=0)], -1, 1) == [0, 1]
+        and passed_items([MissionItem(None, jump=0)], -1, 7) is None
+    )

@@ -20,13 +20,13 @@ from cosim.precheck.region_intersection import Vector3, common_depth
 Array = NDArray[np.float64]
 
 SEARCH_TIME = 120.0  # s of flight time, greatest duration of the search
-PERIOD = 0.02  # s
-_SEED = 1
+PERIOD = 0.02  # s, control period of the law, in which the search takes a step
+_SEED = 1  # seed of the search
 _SAMPLE = 0.02  # m, between the points of a path at which its clearance is evaluated
 
 
 @dataclass(frozen=True)
-class Way:
+class SearchedPath:
     """Result of a search: a path, or none."""
 
     corners: tuple[Vector3, ...]  # m, NED: start, corners, and an end in the goal; empty if no path was found
@@ -49,17 +49,19 @@ def path_limits(gains: DeployableGains) -> PathLimits:
     return PathLimits(gains.clearance, gains.margin, gains.speed, gains.depth)
 
 
-def find_way(regions: Sequence[Region], goal: Region, start: Vector3, gains: DeployableGains, duration: float) -> Way:
+def find_path(
+    regions: Sequence[Region], goal: Region, start: Vector3, gains: DeployableGains, duration: float
+) -> SearchedPath:
     """Search a path from a start into the goal that satisfies regions throughout, at their positions at time 0.
 
     Parameters
     ----------
     regions : sequence of Region
-        Treated as hard ones.
+        Regions, all treated as hard ones.
     goal : Region
         Region in which the path ends.
     start : tuple of float
-        [m, NED].
+        Position of the start [m, NED].
     gains : DeployableGains
         Gains of the law, with the clearance of paths.
     duration : float
@@ -67,8 +69,8 @@ def find_way(regions: Sequence[Region], goal: Region, start: Vector3, gains: Dep
 
     Returns
     -------
-    Way
-        With the path if one was found.
+    SearchedPath
+        Result, with the path if one was found.
     """
     at_rest = [dataclasses.replace(region, hard=True, velocity=(0.0, 0.0, 0.0)) for region in regions]
     plan, place = empty_plan(len(at_rest), _SEED), np.array(start, dtype=float)
@@ -86,8 +88,8 @@ def find_way(regions: Sequence[Region], goal: Region, start: Vector3, gains: Dep
         least = float(common_depth(_samples(points), at_rest).min()) if at_rest else math.inf
         if least >= 0.0:
             corners = tuple((float(x), float(y), float(z)) for x, y, z in points)
-            return Way(corners, least, taken * PERIOD)
-    return Way((), min(least, 0.0), taken * PERIOD)
+            return SearchedPath(corners, least, taken * PERIOD)
+    return SearchedPath((), min(least, 0.0), taken * PERIOD)
 
 
 def _samples(points: Array) -> Array:

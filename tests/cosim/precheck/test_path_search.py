@@ -6,7 +6,7 @@ import pytest
 from controller.laws.deployable.gains import DeployableGains
 from controller.regions import Box, Region, Sphere
 from controller.regions.region_set import clearances_at
-from cosim.precheck.way import find_way
+from cosim.precheck.path_search import find_path
 
 ORIGIN, GAINS = (0.0, 0.0, 5.0), DeployableGains()
 
@@ -40,7 +40,7 @@ GOAL = ball("goal", 6.0, 0.5)
     ids=["open", "rock", "soft", "wall", "wide wall", "shut in", "tube", "plugged tube", "start at a surface"],
 )
 def test_path_is_found_if_one_exists(regions, found):
-    way = find_way(regions, GOAL, ORIGIN, GAINS, 60.0)
+    way = find_path(regions, GOAL, ORIGIN, GAINS, 60.0)
     assert way.found is found
     if not found:
         assert way.searched == pytest.approx(60.0)
@@ -52,10 +52,10 @@ def test_path_is_found_if_one_exists(regions, found):
 
 
 def test_the_length_is_that_of_the_path():
-    way = find_way([], GOAL, ORIGIN, GAINS, 60.0)
+    way = find_path([], GOAL, ORIGIN, GAINS, 60.0)
     assert way.length == pytest.approx(5.8, abs=1e-6)  # 0.3 m into the ball
     assert way.clearance == np.inf and way.searched < 1.0
 
 
 def test_search_time_is_bounded_by_the_run_duration():
-    assert find_way([WALL], GOAL, ORIGIN, GAINS, 3.0).searched == pytest.approx(3.0)
+    assert find_path([WALL], GOAL, ORIGIN, GAINS, 3.0).searched == pytest.approx(3.0)
