@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from cosim.errors import IdentificationError
 from cosim.identification.command_errors import Impulses, open_impulses
+from cosim.identification.lag import lagged
 from cosim.identification.log import Log
 from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-_LEAST_LAG = 1e-4  # s; a shorter one is none
+_DIPOLE = 4.0  # a part of a force, less in the first half of a time and more in the second: of first moment 1
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,7 @@ class Actuation:
     by_lag: Array  # (steps, 2, 6) N/s, N m/s, by the time constant of all thrusters
     by_scale: Array  # (thrusters, steps, 2, 6) N, N m, by a factor of each thruster
     by_loss: Array  # (thrusters, steps, 2, 6) N, N m, by the part that each thruster lacks backward
+    by_changes: Array  # (12, steps, 2, 6) N, N m, by when each axis changes between samples: phase, then spread
     lag: float  # s, time constant of all thrusters
 
 
@@ -63,22 +64,33 @@ class CommandedForces:
 
         self._mean = self._means(forces)
         self._mean_backward = self._means(np.minimum(forces[:, : vehicle.n_thrusters], 0.0))
+        self._mean_changes = [np.zeros((self.steps, vehicle.n_thrusters))] * 2
+        if log.sampled:
+            changes = np.diff(forces[:, : vehicle.n_thrusters], axis=0, append=forces[-1:, : vehicle.n_thrusters])
+            middles = self._times + 0.5 * np.diff(self._times, append=self._times[-1])
+            halves = np.column_stack([self._times, middles]).ravel()
+            signs = np.tile([[-1.0], [1.0]], (len(changes), 1))
+            moved = (-np.repeat(changes, 2, axis=0), _DIPOLE * np.repeat(changes, 2, axis=0) * signs)
+            self._mean_changes = [self._means(x, halves) for x in moved]
 
-    def _means(self, forces: Array) -> Array:
+    def _means(self, forces: Array, held_from: Array | None = None) -> Array:
         """Return the mean over each step of the grid: of held values, or of samples with straight lines between."""
-        spans = np.diff(self._times, append=self._times[-1])[:, None]
+        times = self._times if held_from is None else held_from
+        spans = np.diff(times, append=times[-1])[:, None]
         slopes = np.zeros_like(forces)
-        if self._sampled:
+        if self._sampled and held_from is None:
             slopes[:-1] = np.diff(forces, axis=0) / spans[:-1]
         pieces = forces * spans + 0.5 * slopes * spans**2
         edges = np.arange(self.steps + 1) * self.step
-        at = np.clip(np.searchsorted(self._times, edges, side="right") - 1, 0, len(self._times) - 1)
-        since = (edges - self._times[at])[:, None]
+        at = np.clip(np.searchsorted(times, edges, side="right") - 1, 0, len(times) - 1)
+        since = (edges - times[at])[:, None]
         impulse = (np.cumsum(pieces, axis=0) - pieces)[at] + forces[at] * since + 0.5 * slopes[at] * since**2
         means: Array = np.diff(impulse, axis=0) / self.step
         return means
 
-    def actuation(self, lag: float, scales: Array, losses: Array | None = None) -> Actuation:
+    def actuation(
+        self, lag: float, scales: Array, losses: Array | None = None, changes: Array | None = None
+    ) -> Actuation:
         """Return the wrench of each step.
 
         Parameters
@@ -89,6 +101,10 @@ class CommandedForces:
             Factor of each thruster's force.
         losses : ndarray, shape (thrusters,), optional
             Part of its force that each thruster lacks backward; default: none.
+        changes : ndarray, shape (12,), optional
+            When each axis of the thrusters' wrench changes between two samples: how much later than in the middle, in
+            the time between them; and how much more the wrench has changed in the second half than a straight line
+            says, as first moment about the middle, in the change times the time squared. Default: as the line says.
 
         Returns
         -------
@@ -97,14 +113,23 @@ class CommandedForces:
         """
         n = self._matrix.shape[1]
         lost = np.zeros(n) if losses is None else losses
-        force, by_lag = _lagged(self._mean[:, :n] - lost * self._mean_backward, lag, self.step)
-        backward, _ = _lagged(self._mean_backward, lag, self.step)
+        force, by_lag = lagged(self._mean[:, :n] - lost * self._mean_backward, lag, self.step)
+        backward, _ = lagged(self._mean_backward, lag, self.step)
         matrix = (self._matrix * scales).T
         wrench = force @ matrix
+        by_changes = np.zeros((2, 6, *wrench.shape))
+        if self._sampled:
+            for own, mean in zip(by_changes, self._mean_changes, strict=True):
+                from_rest = np.concatenate([np.zeros_like(mean[:1]), mean])
+                behind = lagged(from_rest, lag, self.step)[0][1:]
+                own[range(6), ..., range(6)] = np.moveaxis(behind @ matrix, 2, 0)
+        by_changes = by_changes.reshape(12, *wrench.shape)
+        if changes is not None:
+            wrench += np.einsum("i,iksj->ksj", changes, by_changes)
         wrench[:, 0] += self._mean[:, n:]
         by_scale = self._matrix.T[:, None, None, :] * np.moveaxis(force, 2, 0)[..., None]
         by_loss = -matrix[:, None, None, :] * np.moveaxis(backward, 2, 0)[..., None]
-        return Actuation(wrench, by_lag @ matrix, by_scale, by_loss, lag)
+        return Actuation(wrench, by_lag @ matrix, by_scale, by_loss, by_changes, lag)
 
 
 def steady_forces(commands: Array, vehicle: Vehicle) -> Array:
@@ -129,28 +154,3 @@ def steady_forces(commands: Array, vehicle: Vehicle) -> Array:
     live = np.maximum((part - dead) / np.where(dead < 1.0, 1.0 - dead, 1.0), 0.0)
     result: Array = np.where((dead == 0.0) & (curve == 0.0), limited, limit * live * (1.0 - curve + curve * live))
     return result
-
-
-def _lagged(forces: Array, lag: float, step: float) -> tuple[Array, Array]:
-    """Return forces behind a lag, shape (steps, 2, n): mean and change of each step; and the same by the lag.
-
-    Over a step they head for one value. Before the first they are taken to be at rest with it.
-    """
-    zero = np.zeros((1, forces.shape[1]))
-    if lag < _LEAST_LAG:
-        behind = np.diff(forces, axis=0, prepend=forces[:1]) / step
-        return np.stack([forces, 0.0 * forces], axis=1), np.stack([-behind, 0.0 * behind], axis=1)
-    pole = math.exp(-step / lag)
-    pole_by_lag = pole * step / lag**2
-    share = lag / step * (1.0 - pole)  # of the gap at the step's begin, in its mean
-    share_by_lag = (1.0 - pole) / step - lag / step * pole_by_lag
-    ends, _ = lfilter([1.0 - pole], [1.0, -pole], forces, axis=0, zi=forces[:1] * pole)
-    begins = np.concatenate([forces[:1], ends[:-1]])
-    gaps = begins - forces
-    ends_by_lag, _ = lfilter([1.0], [1.0, -pole], gaps * pole_by_lag, axis=0, zi=zero)
-    begins_by_lag = np.concatenate([zero, ends_by_lag[:-1]])
-    means_by_lag = gaps * share_by_lag + begins_by_lag * share
-    return (
-        np.stack([forces + gaps * share, ends - begins], axis=1),
-        np.stack([means_by_lag, ends_by_lag - begins_by_lag], axis=1),
-    )

@@ -14,10 +14,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
-from cosim.identification.measurements import turn_tangent
-from cosim.identification.shooting import Motion
+from cosim.identification.lag import lagged
 
 Array = NDArray[np.float64]
 
@@ -91,73 +89,40 @@ def _mean_about(values: Array, count: int) -> Array:
     return result
 
 
-def start_by_impulse(motion: Motion, starts: Sequence[int], inverse_mass: Array) -> Array:
-    """Return the change of a start that an impulse at a later time is equal to from then on, shape (times, n, 6).
-
-    Parameters
-    ----------
-    motion : Motion
-        At these times; its first directions are the n starts.
-    starts : sequence of int
-        What a start may change: position 0 to 2, rotation 3 to 5, velocity 6 to 11.
-    inverse_mass : ndarray, shape (6, 6)
-        Of body and added mass.
-    """
-    n = len(starts)
-    flow = np.empty((len(motion.states), n, n))  # from the start to each time, along the starts' directions
-    for row, which in enumerate(starts):
-        if 3 <= which < 6:
-            turns = np.array([turn_tangent(q, which - 3) for q in motion.states[:, 3:7]])
-            flow[:, row] = 4.0 * np.einsum("kdq,kq->kd", motion.tangents[:, :n, 3:7], turns)
-        else:
-            flow[:, row] = motion.tangents[:, :n, which if which < 3 else which + 1]
-    pushed = np.zeros((n, 6))
-    pushed[list(starts).index(6) :] = inverse_mass
-    moved: Any = np.linalg.solve(flow, np.broadcast_to(pushed, (len(flow), n, 6)))
-    result: Array = moved
-    return result
-
-
-def response(impulses: Impulses, lag: float, step: float, begin: float, moved: Array, rows: Array, at: Array) -> Array:
-    """Return the residuals by each impulse, shape (rows, 6 bins).
+def wrenches(impulses: Impulses, lag: float, step: float, begin: float, steps: int) -> Array:
+    """Return the wrench of each error behind the lag, over each step of a window, shape (errors, steps, 2, 6).
 
     Parameters
     ----------
     impulses : Impulses
-        Of the run.
+        Of the run. Each bin has twelve errors: six of its impulse, and six that move impulse within it.
     lag : float
         Time constant of the thrusters [s].
     step : float
         Of the window's grid [s].
     begin : float
         Of the window, since the first command [s].
-    moved : ndarray, shape (steps, n, 6)
-        Change of the window's start that an impulse in each step of the grid is equal to, from then on.
-    rows : ndarray, shape (rows, n)
-        Residuals by the start.
-    at : ndarray, shape (rows,)
-        Times of the residuals, since the window's begin [s].
+    steps : int
+        Of the window.
+
+    Returns
+    -------
+    ndarray
+        Mean over each step, and change from its begin to its end [N, N m], of one standard deviation.
     """
-    steps = len(moved)
-    edges = begin + step * np.arange(steps + 1)
-    used = (impulses.ends > begin - _TAIL * lag - _BIN) & (impulses.begins < edges[-1])
     before = int(np.ceil((_TAIL * lag + 2.0 * _BIN) / step))  # steps before the window
     grid = begin + step * np.arange(-before, steps + 1)
-    k = np.clip(np.floor(at / step).astype(int), 0, steps - 1)
-    part = np.clip(at / step - k, 0.0, 1.0)
-    pole = float(np.exp(-step / lag)) if lag > 0.0 else 0.0
-    found = []
+    used = (impulses.ends > begin - _TAIL * lag - _BIN) & (impulses.begins < grid[-1])
+    shares, roots = [np.zeros((len(grid) - 1, 0))], [np.zeros((0, 6, 6))]
     for b, e, root, shifted in zip(
         *(x[used] for x in (impulses.begins, impulses.ends, impulses.roots, impulses.shifted)), strict=True
     ):
-        halves = [_shares(grid, x, x + 0.5 * (e - b)) for x in (b, 0.5 * (b + e))]
-        for share in (0.5 * (halves[0] + halves[1]), shifted * (halves[0] - halves[1])):
-            lagged = np.asarray(lfilter([1.0 - pole], [1.0, -pole], share))[before:]
-            added = np.einsum("k,kni,ij->knj", lagged, moved, root)
-            total = np.cumsum(added, axis=0)
-            reached = total[k] - (1.0 - part)[:, None, None] * added[k]
-            found.append(np.einsum("rn,rnj->rj", rows, reached))
-    result: Array = np.concatenate(found, axis=1) if found else np.zeros((len(rows), 0))
+        first, second = (_shares(grid, x, x + 0.5 * (e - b)) for x in (b, 0.5 * (b + e)))
+        shares.append(np.column_stack([0.5 * (first + second), shifted * (first - second)]))
+        roots.append(np.stack([root, root]))
+    course = lagged(np.concatenate(shares, axis=1) / step, lag, step)[0][before:]
+    found = np.einsum("ksc,cij->cjksi", course, np.concatenate(roots))
+    result: Array = found.reshape(-1, steps, 2, 6)
     return result
 
 
@@ -174,7 +139,7 @@ def whitener(by_impulse: Array, size: float) -> Whitener:
     Parameters
     ----------
     by_impulse : ndarray, shape (rows, n)
-        Residuals by each impulse, as `response` has them.
+        Residuals by each impulse, in standard deviations.
     size : float
         Factor of all impulses.
     """
@@ -202,3 +167,28 @@ def most_likely_size(residuals: Sequence[Array], by_impulses: Sequence[Array]) -
         total = 1.0 + np.square(_SIZES)[:, None] * variances[kept]
         lost += np.sum(np.log(total) + squares / total, axis=1)
     return float(_SIZES[int(np.argmin(lost))])
+
+
+def noise_parts(
+    residuals: Sequence[Array], whiteners: Sequence[Whitener], topics: Sequence[NDArray[np.str_]]
+) -> dict[str, float]:
+    """Return the part of its noise that each topic has, in one step towards the greatest likelihood (Harville 1977).
+
+    Parameters
+    ----------
+    residuals : sequence of ndarray, shape (rows,)
+        Of each window, in standard deviations, without what the start explains.
+    whiteners : sequence of Whitener
+        Of the covariance of each window.
+    topics : sequence of ndarray, shape (rows,)
+        Of which topic each row is.
+    """
+    squares, freedom = dict[str, float](), dict[str, float]()
+    for residual, white, own in zip(residuals, whiteners, topics, strict=True):
+        share = white.variances / (1.0 + white.variances)
+        left = residual - white.directions @ (share * (white.directions.T @ residual))
+        free = 1.0 - np.square(white.directions) @ share
+        for name in np.unique(own):
+            squares[name] = squares.get(name, 0.0) + float(np.sum(np.square(left[own == name])))
+            freedom[name] = freedom.get(name, 0.0) + float(np.sum(free[own == name]))
+    return {str(name): float(np.sqrt(squares[name] / max(freedom[name], 1e-9))) for name in squares}

@@ -93,3 +93,39 @@ def test_rate_limit_is_rejected(vehicle):
     slow = dataclasses.replace(vehicle, thrust_rate_limit=np.full(8, 10.0))
     with pytest.raises(IdentificationError, match="rate_limit"):
         CommandedForces(log_of(vehicle), slow, STEP)
+
+
+@pytest.mark.parametrize("phase", [0.2, 0.5, 0.87])
+def test_changes_between_samples_may_be_steps(vehicle, phase):
+    """Steps at one part of each period have the same impulse and, behind a lag, nearly the same wrench."""
+    log = dataclasses.replace(log_of(vehicle, period=0.1), wrench=np.zeros((60, 6)), sampled=True)
+    times = np.concatenate([log.times[:1], log.times[:-1] + 0.1 * phase])
+    steps = CommandedForces(dataclasses.replace(log, times=times, sampled=False), vehicle, 0.1)
+    lines, scales = CommandedForces(log, vehicle, 0.1), np.linspace(0.9, 1.1, 8)
+    changes = np.repeat([phase - 0.5, phase * (1.0 - phase) / 2.0 - 1.0 / 12.0], 6)
+    expected = steps.actuation(0.0, scales).wrench[:58, 0]
+    assert lines.actuation(0.0, scales, changes=changes).wrench[:58, 0] == pytest.approx(expected)
+    fine, few = (
+        CommandedForces(x, vehicle, 0.005) for x in (dataclasses.replace(log, times=times, sampled=False), log)
+    )
+    late = np.where(np.arange(12) < 6, changes, 0.0)
+    behind, near, far = (
+        x.wrench[400:1140:20, 0] - 0.5 * x.wrench[400:1140:20, 1] for x in (  # at samples, long after the first one
+            fine.actuation(0.3, scales), few.actuation(0.3, scales, changes=changes),
+            few.actuation(0.3, scales, changes=late),
+        )
+    )  # fmt: skip
+    assert np.abs(near - behind).max() < 0.5 * np.abs(far - behind).max()
+
+
+def test_derivatives_by_changes_between_samples(vehicle):
+    log = dataclasses.replace(log_of(vehicle, period=0.1), sampled=True)
+    forces, scales, h = CommandedForces(log, vehicle, STEP), np.linspace(0.9, 1.1, 8), 1e-6
+    changes = np.linspace(-0.1, 0.1, 12)
+    found = forces.actuation(0.15, scales, changes=changes).by_changes
+    for i in range(12):
+        bit = np.where(np.arange(12) == i, h, 0.0)
+        both = [forces.actuation(0.15, scales, changes=changes + sign * bit).wrench for sign in (1, -1)]
+        assert found[i] == pytest.approx((both[0] - both[1]) / (2.0 * h), abs=1e-6)
+    held = CommandedForces(dataclasses.replace(log, sampled=False), vehicle, STEP)
+    assert not held.actuation(0.15, scales).by_changes.any()
