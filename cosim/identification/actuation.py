@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from cosim.errors import IdentificationError
-from cosim.identification.command_errors import Impulses, open_impulses
-from cosim.identification.lag import lagged
+from cosim.identification.command_errors import BIN, Impulses, open_impulses
 from cosim.identification.log import Log
 from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
+_LEAST_LAG = 1e-4  # s; a shorter one is none
+_TAIL = 3.0  # time constants, after which an impulse has passed the lag
 _DIPOLE = 4.0  # a part of a force, less in the first half of a time and more in the second: of first moment 1
 
 
@@ -27,7 +30,7 @@ class Actuation:
     by_lag: Array  # (steps, 2, 6) N/s, N m/s, by the time constant of all thrusters
     by_scale: Array  # (thrusters, steps, 2, 6) N, N m, by a factor of each thruster
     by_loss: Array  # (thrusters, steps, 2, 6) N, N m, by the part that each thruster lacks backward
-    by_changes: Array  # (12, steps, 2, 6) N, N m, by when each axis changes between samples: phase, then spread
+    by_changes: Array  # (13, steps, 2, 6) N, N m, by how commands change between samples
     lag: float  # s, time constant of all thrusters
 
 
@@ -64,14 +67,16 @@ class CommandedForces:
 
         self._mean = self._means(forces)
         self._mean_backward = self._means(np.minimum(forces[:, : vehicle.n_thrusters], 0.0))
-        self._mean_changes = [np.zeros((self.steps, vehicle.n_thrusters))] * 2
+        self._mean_changes = [np.zeros((self.steps, vehicle.n_thrusters))] * 3
         if log.sampled:
             changes = np.diff(forces[:, : vehicle.n_thrusters], axis=0, append=forces[-1:, : vehicle.n_thrusters])
             middles = self._times + 0.5 * np.diff(self._times, append=self._times[-1])
             halves = np.column_stack([self._times, middles]).ravel()
             signs = np.tile([[-1.0], [1.0]], (len(changes), 1))
             moved = (-np.repeat(changes, 2, axis=0), _DIPOLE * np.repeat(changes, 2, axis=0) * signs)
+            bends = np.diff(changes, axis=0, prepend=changes[:1])
             self._mean_changes = [self._means(x, halves) for x in moved]
+            self._mean_changes.append(self._means(bends / 12.0, np.append(self._times[:1], middles[:-1])))
 
     def _means(self, forces: Array, held_from: Array | None = None) -> Array:
         """Return the mean over each step of the grid: of held values, or of samples with straight lines between."""
@@ -101,10 +106,12 @@ class CommandedForces:
             Factor of each thruster's force.
         losses : ndarray, shape (thrusters,), optional
             Part of its force that each thruster lacks backward; default: none.
-        changes : ndarray, shape (12,), optional
+        changes : ndarray, shape (13,), optional
             When each axis of the thrusters' wrench changes between two samples: how much later than in the middle, in
             the time between them; and how much more the wrench has changed in the second half than a straight line
-            says, as first moment about the middle, in the change times the time squared. Default: as the line says.
+            says, as first moment about the middle, in the change times the time squared. Last, how much more smoothly
+            than by lines all axes change: as behind a filter of that variance, in the time squared by twelve. Default:
+            as the lines say.
 
         Returns
         -------
@@ -113,17 +120,19 @@ class CommandedForces:
         """
         n = self._matrix.shape[1]
         lost = np.zeros(n) if losses is None else losses
-        force, by_lag = lagged(self._mean[:, :n] - lost * self._mean_backward, lag, self.step)
-        backward, _ = lagged(self._mean_backward, lag, self.step)
+        force, by_lag = _lagged(self._mean[:, :n] - lost * self._mean_backward, lag, self.step)
+        backward, _ = _lagged(self._mean_backward, lag, self.step)
         matrix = (self._matrix * scales).T
         wrench = force @ matrix
-        by_changes = np.zeros((2, 6, *wrench.shape))
+        by_changes = np.zeros((13, *wrench.shape))
         if self._sampled:
-            for own, mean in zip(by_changes, self._mean_changes, strict=True):
+            moved: list[Array] = []
+            for mean in self._mean_changes:
                 from_rest = np.concatenate([np.zeros_like(mean[:1]), mean])
-                behind = lagged(from_rest, lag, self.step)[0][1:]
-                own[range(6), ..., range(6)] = np.moveaxis(behind @ matrix, 2, 0)
-        by_changes = by_changes.reshape(12, *wrench.shape)
+                moved.append(_lagged(from_rest, lag, self.step)[0][1:] @ matrix)
+            late, spread, by_changes[12] = moved
+            by_changes[range(6), ..., range(6)] = np.moveaxis(late, 2, 0)
+            by_changes[range(6, 12), ..., range(6)] = np.moveaxis(spread, 2, 0)
         if changes is not None:
             wrench += np.einsum("i,iksj->ksj", changes, by_changes)
         wrench[:, 0] += self._mean[:, n:]
@@ -154,3 +163,86 @@ def steady_forces(commands: Array, vehicle: Vehicle) -> Array:
     live = np.maximum((part - dead) / np.where(dead < 1.0, 1.0 - dead, 1.0), 0.0)
     result: Array = np.where((dead == 0.0) & (curve == 0.0), limited, limit * live * (1.0 - curve + curve * live))
     return result
+
+
+def error_wrenches(impulses: Impulses, lag: float, step: float, begin: float, steps: int) -> Array:
+    """Return the wrench of each error behind the lag, over each step of a window, shape (errors, steps, 2, 6).
+
+    Parameters
+    ----------
+    impulses : Impulses
+        Of the run. Each bin has twelve errors: six of its impulse, and six that move impulse within it.
+    lag : float
+        Time constant of the thrusters [s].
+    step : float
+        Of the window's grid [s].
+    begin : float
+        Of the window, since the first command [s].
+    steps : int
+        Of the window.
+
+    Returns
+    -------
+    ndarray
+        Mean over each step, and change from its begin to its end [N, N m], of one standard deviation.
+    """
+    before = int(np.ceil((_TAIL * lag + 2.0 * BIN) / step))  # steps before the window
+    grid: Any = begin + step * np.arange(-before, steps + 1)
+    used = (impulses.ends > begin - _TAIL * lag - BIN) & (impulses.begins < grid[-1])
+    shares, roots = [np.zeros((len(grid) - 1, 0))], [np.zeros((0, 6, 6))]
+    for b, e, root, shifted in zip(
+        *(x[used] for x in (impulses.begins, impulses.ends, impulses.roots, impulses.shifted)), strict=True
+    ):
+        first, second = (_shares(grid, x, x + 0.5 * (e - b)) for x in (b, 0.5 * (b + e)))
+        shares.append(np.column_stack([0.5 * (first + second), shifted * (first - second)]))
+        roots.append(np.stack([root, root]))
+    course = _lagged(np.concatenate(shares, axis=1) / step, lag, step)[0][before:]
+    found = np.einsum("ksc,cij->cjksi", course, np.concatenate(roots))
+    result: Array = found.reshape(-1, steps, 2, 6)
+    return result
+
+
+def _shares(grid: Any, begin: float, end: float) -> Array:
+    """Return the part of a span that lies in each step of a grid."""
+    inside = np.minimum(grid[1:], end) - np.maximum(grid[:-1], begin)
+    result: Array = np.clip(inside, 0.0, None) / max(end - begin, 1e-9)
+    return result
+
+
+def _lagged(forces: Array, lag: float, step: float) -> tuple[Array, Array]:
+    """Return forces behind a lag as they are over each step of a grid, and the same by the lag.
+
+    Parameters
+    ----------
+    forces : ndarray, shape (steps, n)
+        To which they head over each step [N]. Before the first step they are at rest with it.
+    lag : float
+        Time constant [s].
+    step : float
+        Of the grid [s].
+
+    Returns
+    -------
+    forces : ndarray, shape (steps, 2, n)
+        Mean of each step, and change from its begin to its end [N].
+    by_lag : ndarray, shape (steps, 2, n)
+        Their derivatives [N/s].
+    """
+    zero = np.zeros((1, forces.shape[1]))
+    if lag < _LEAST_LAG:
+        behind = np.diff(forces, axis=0, prepend=forces[:1]) / step
+        return np.stack([forces, 0.0 * forces], axis=1), np.stack([-behind, 0.0 * behind], axis=1)
+    pole = math.exp(-step / lag)
+    pole_by_lag = pole * step / lag**2
+    share = lag / step * (1.0 - pole)  # of the gap at the step's begin, in its mean
+    share_by_lag = (1.0 - pole) / step - lag / step * pole_by_lag
+    ends, _ = lfilter([1.0 - pole], [1.0, -pole], forces, axis=0, zi=forces[:1] * pole)
+    begins = np.concatenate([forces[:1], ends[:-1]])
+    gaps = begins - forces
+    ends_by_lag, _ = lfilter([1.0], [1.0, -pole], gaps * pole_by_lag, axis=0, zi=zero)
+    begins_by_lag = np.concatenate([zero, ends_by_lag[:-1]])
+    means_by_lag = gaps * share_by_lag + begins_by_lag * share
+    return (
+        np.stack([forces + gaps * share, ends - begins], axis=1),
+        np.stack([means_by_lag, ends_by_lag - begins_by_lag], axis=1),
+    )

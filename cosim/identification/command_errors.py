@@ -8,22 +8,20 @@ are correlated: they are weighed by the inverse root of that covariance (general
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.identification.lag import lagged
-
 Array = NDArray[np.float64]
 
-_BIN = 0.05  # s; errors of shorter periods are taken together
+BIN = 0.05  # s; errors of shorter periods are taken together
 _SHIFTED = 0.25, 0.5  # part of an error that goes from the first half to the second: of one period, of several
 _AROUND = 0.5  # s, to either side, over which squared changes are averaged
-_TAIL = 3.0  # time constants, after which an impulse has passed the lag
 _SIZES = np.concatenate([[0.0], np.geomspace(0.02, 10.0, 80)])  # of the errors, in those of steps at any time
+_UPDATES, _SOME = 3, 4  # of the noise of each topic, by every fourth window
+_LEAST_PART = 0.05  # of the noise that differences of samples say
 _LEAST = 1e-2  # of the noise's variance: smaller ones hardly change a weight
 
 
@@ -70,7 +68,7 @@ def open_impulses(times: Array, forces: Array, matrix: Array) -> Impulses:
     squares = changes[:, :, None] * changes[:, None, :]
     near = 0.5 * (_mean_about(squares, 3) + _mean_about(squares, round(2.0 * _AROUND / float(np.median(periods)))))
     covariances = near * np.square(periods)[:, None, None] / 12.0
-    group = np.floor((times[:-1] - times[0]) / _BIN + 1e-6).astype(int)
+    group = np.floor((times[:-1] - times[0]) / BIN + 1e-6).astype(int)
     starts = np.flatnonzero(np.diff(group, prepend=-1))
     sizes, axes = np.linalg.eigh(np.add.reduceat(covariances, starts, axis=0))
     return Impulses(
@@ -86,50 +84,6 @@ def _mean_about(values: Array, count: int) -> Array:
     first = np.clip(np.arange(len(values)) - count // 2, 0, None)
     last = np.minimum(np.arange(len(values)) + count // 2 + 1, len(values))
     result: Array = (sums[last] - sums[first]) / (last - first)[:, None, None]
-    return result
-
-
-def wrenches(impulses: Impulses, lag: float, step: float, begin: float, steps: int) -> Array:
-    """Return the wrench of each error behind the lag, over each step of a window, shape (errors, steps, 2, 6).
-
-    Parameters
-    ----------
-    impulses : Impulses
-        Of the run. Each bin has twelve errors: six of its impulse, and six that move impulse within it.
-    lag : float
-        Time constant of the thrusters [s].
-    step : float
-        Of the window's grid [s].
-    begin : float
-        Of the window, since the first command [s].
-    steps : int
-        Of the window.
-
-    Returns
-    -------
-    ndarray
-        Mean over each step, and change from its begin to its end [N, N m], of one standard deviation.
-    """
-    before = int(np.ceil((_TAIL * lag + 2.0 * _BIN) / step))  # steps before the window
-    grid = begin + step * np.arange(-before, steps + 1)
-    used = (impulses.ends > begin - _TAIL * lag - _BIN) & (impulses.begins < grid[-1])
-    shares, roots = [np.zeros((len(grid) - 1, 0))], [np.zeros((0, 6, 6))]
-    for b, e, root, shifted in zip(
-        *(x[used] for x in (impulses.begins, impulses.ends, impulses.roots, impulses.shifted)), strict=True
-    ):
-        first, second = (_shares(grid, x, x + 0.5 * (e - b)) for x in (b, 0.5 * (b + e)))
-        shares.append(np.column_stack([0.5 * (first + second), shifted * (first - second)]))
-        roots.append(np.stack([root, root]))
-    course = lagged(np.concatenate(shares, axis=1) / step, lag, step)[0][before:]
-    found = np.einsum("ksc,cij->cjksi", course, np.concatenate(roots))
-    result: Array = found.reshape(-1, steps, 2, 6)
-    return result
-
-
-def _shares(grid: Any, begin: float, end: float) -> Array:
-    """Return the part of a span that lies in each step of a grid."""
-    inside = np.minimum(grid[1:], end) - np.maximum(grid[:-1], begin)
-    result: Array = np.clip(inside, 0.0, None) / max(end - begin, 1e-9)
     return result
 
 
@@ -192,3 +146,39 @@ def noise_parts(
             squares[name] = squares.get(name, 0.0) + float(np.sum(np.square(left[own == name])))
             freedom[name] = freedom.get(name, 0.0) + float(np.sum(free[own == name]))
     return {str(name): float(np.sqrt(squares[name] / max(freedom[name], 1e-9))) for name in squares}
+
+
+def most_likely_errors(
+    residuals: Sequence[Array], by_impulses: Sequence[Array], topics: Sequence[NDArray[np.str_]],
+    known: Mapping[str, float],
+) -> tuple[float, dict[str, float]]:  # fmt: skip
+    """Return the factor of all impulses and the noise of each topic that explain residuals best.
+
+    Parameters
+    ----------
+    residuals, by_impulses : sequence of ndarray, shape (rows,) and (rows, n)
+        As `most_likely_size` takes them, by the noise that is known.
+    topics : sequence of ndarray, shape (rows,)
+        Of which topic each row is.
+    known : mapping of str to float
+        The part of its noise that each topic has, by its name; 1 where it is not named.
+
+    Returns
+    -------
+    float
+        The factor.
+    dict of str to float
+        The part of its noise that each topic has, at the most 1.
+    """
+    parts = {str(name): known.get(str(name), 1.0) for own in topics for name in np.unique(own)}
+    residuals, by_impulses = [x.copy() for x in residuals], [x.copy() for x in by_impulses]
+    for _ in range(_UPDATES):
+        size = most_likely_size(residuals[::_SOME], by_impulses[::_SOME])
+        whiteners = [whitener(by, size) for by in by_impulses[::_SOME]]
+        for name, part in noise_parts(residuals[::_SOME], whiteners, topics[::_SOME]).items():
+            new = float(np.clip(parts[name] * part, _LEAST_PART, 1.0))
+            for residual, by, own in zip(residuals, by_impulses, topics, strict=True):
+                residual[own == name] *= parts[name] / new
+                by[own == name] *= parts[name] / new
+            parts[name] = new
+    return most_likely_size(residuals, by_impulses), parts

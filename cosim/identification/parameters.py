@@ -36,7 +36,6 @@ _LEAST_LINEAR, _LEAST_QUADRATIC = (10.0, 0.5), (50.0, 1.0)  # the least deviatio
 _BUOYANCY = 0.05  # of the weight
 _CENTER = 0.03  # m
 _MASS, _INERTIA = 0.02, 0.2  # parts
-_SPREAD = 0.037  # first moment of a step at a time uniform in a period, less that of a straight line
 _LAG, _MOST_LAG = 0.2, 2.0  # s
 _THRUST = 0.1  # part, of each thruster: 3.5 % of all eight together
 
@@ -123,7 +122,7 @@ def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
     places = {
         "delay": [name for name in TOPICS if any(log.topic(name) for log in logs)],
         "asymmetry": [f"{i + 1}" for i in range(logs[0].thrust.shape[1])],
-        "phase": [f"{said} of {axis}" for said in ("lateness", "spread") for axis in _SIX],
+        "phase": [*(f"{said} of {axis}" for said in ("lateness", "spread") for axis in _SIX), "smoothness"],
     }
     made: list[Parameter] = []
     if odd := [name for name in names if name not in (*NUISANCES, RANDOM_FORCE)]:
@@ -135,11 +134,11 @@ def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
         for run in runs if name in ("current", "force", "bias", "phase") else (None,):
             said = "" if run is None else f" of run {run + 1}"
             for index, axis in enumerate(places.get(name, list(axes))):
-                is_spread = axis.startswith("spread")
+                if name == "phase":
+                    unit, deviation = _CHANGES[axis.split(" ")[0]]
                 plant = f"current.{axis}" if name == "current" else axis if name == "delay" else ""
                 made.append(Parameter(
-                    f"{label} {axis}".strip() + said, "periods2" if is_spread else unit, name, 0.0,
-                    _SPREAD if is_spread else deviation, plant=plant, index=index, run=run,
+                    f"{label} {axis}".strip() + said, unit, name, 0.0, deviation, plant=plant, index=index, run=run
                 ))  # fmt: skip
     return made
 
@@ -211,7 +210,7 @@ def setting_of(
         Time constant of the thrusters where it is not free [s].
     """
     plant: dict[str, float] = {}
-    scales, losses, changes = np.ones(forces.thrusters), np.zeros(forces.thrusters), np.zeros(12)
+    scales, losses, changes = np.ones(forces.thrusters), np.zeros(forces.thrusters), np.zeros(13)
     delays = dict[str, float]()
     force, lever, bias, scale = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
     for p, x in zip(parameters, values, strict=True):
@@ -313,8 +312,11 @@ _NUISANCES: dict[str, tuple[str, str, float, str]] = {  # name, unit, deviation 
     "bias": ("gyro bias", "rad/s", 0.01, "pqr"),
     "scale": ("DVL scale error", "", 0.01, " "),
     "asymmetry": ("loss backward of thruster", "", 0.1, ""),
-    "phase": ("changes between samples:", "periods", 0.29, ""),  # that of a time uniform in a period
+    "phase": ("changes between samples:", "", 1.0, ""),
 }
+_CHANGES = {  # unit and deviation: those of steps at a time uniform in a period
+    "lateness": ("periods", 0.29), "spread": ("periods2", 0.037), "smoothness": ("periods2/12", 1.0),
+}  # fmt: skip
 _KEYS = {
     "_of_body": (
         "rigid_body.mass", "rigid_body.weight", "rigid_body.inertia", "rigid_body.center_of_gravity",

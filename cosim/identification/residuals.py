@@ -16,19 +16,13 @@ from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
 from cosim.identification import measurements
-from cosim.identification.actuation import CommandedForces
-from cosim.identification.command_errors import (
-    Whitener,
-    most_likely_size,
-    noise_parts,
-    whitener,
-    wrenches,
-)
+from cosim.identification.actuation import CommandedForces, error_wrenches
+from cosim.identification.command_errors import Whitener, most_likely_errors, whitener
 from cosim.identification.log import Log, Topic
 from cosim.identification.measurements import turn_tangent
 from cosim.identification.parameters import Parameter, Setting, setting_of
 from cosim.identification.shooting import STATE_SIZE, Directions, Motion, Shooter
-from cosim.identification.windows import Window
+from cosim.identification.windows import Window, topic_names
 from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -39,8 +33,6 @@ _FORCE = 0.5  # N, standard deviation of a random force before any residual is k
 _LEAST_FORCE = 0.01  # N
 _SOLVED = 0.05  # of a start's standard deviation: what is left is linear
 _MOST_SOLVES = 12
-_NOISE_UPDATES, _SOME = 3, 4  # of the noise of each topic where commands are sampled, by every fourth window
-_LEAST_PART = 0.05  # of the noise that differences of samples say
 
 
 @dataclass(frozen=True)
@@ -103,7 +95,7 @@ class Residuals:
         self.holds_starts = False  # as samples have them, while the free numbers are far off
         self._found: dict[int, _Start] = {}
         self._tried: dict[int, _Start] = {}
-        self.weights: list[Array] = [np.ones(rows_of(window)) for window in windows]
+        self.weights: list[Array] = [np.ones(len(topic_names(window))) for window in windows]
         self.command_error: float | None = None  # size of what sampled commands leave open; None: nothing, or not known
         self.whiteners: list[Whitener | None] = [None] * len(windows)
         self._noise_parts: dict[str, float] = {}  # of topics whose noise is less than said
@@ -170,7 +162,7 @@ class Residuals:
         inside = slice(window.first, window.first + window.steps)
         times = [
             topic.times + topic.shift - setting.delays.get(topic.name, topic.shift) + off
-            for topic in window.topics for off in _offsets(topic)
+            for topic in window.topics for off in topic.offsets
         ]  # fmt: skip
         order = np.argsort(np.concatenate(times), kind="stable")
         motion = self._shooter.predict(
@@ -181,7 +173,7 @@ class Residuals:
         back[order] = np.arange(len(order))
         count = 0
         for topic in window.topics:
-            size, several = len(topic.times), len(_offsets(topic))
+            size, several = len(topic.times), len(topic.offsets)
             at = back[count : count + several * size].reshape(several, size)
             count += several * size
             one = several == 1
@@ -219,27 +211,17 @@ class Residuals:
             left.append(residual - q @ (q.T @ residual))
             projected.append(by - q @ (q.T @ by))
             by_impulses.append(by)
-        which = [self._topic_of_rows(window) for window in self.windows]
-        for _ in range(_NOISE_UPDATES):
-            size = most_likely_size(left[::_SOME], projected[::_SOME])
-            whiteners = [whitener(by, size) for by in projected[::_SOME]]
-            for name, part in noise_parts(left[::_SOME], whiteners, which[::_SOME]).items():
-                known = self._noise_parts.get(name, 1.0)
-                part = float(np.clip(known * part, _LEAST_PART, 1.0)) / known
-                self._noise_parts[name] = known * part
-                for rows, own in zip((*left, *projected, *by_impulses), 3 * which, strict=True):
-                    rows[own == name] /= part
-        self.command_error = most_likely_size(left, projected)
-        self.whiteners = [whitener(by, self.command_error) for by in by_impulses]
-
-    def _topic_of_rows(self, window: Window) -> NDArray[np.str_]:
-        return np.concatenate([np.full(len(t.times) * len(t.components), t.name) for t in window.topics])
+        which = [topic_names(window) for window in self.windows]
+        self.command_error, parts = most_likely_errors(left, projected, which, self._noise_parts)
+        before = [self._per_noise(window) for window in self.windows]
+        self._noise_parts = parts
+        for i, by in enumerate(by_impulses):
+            by *= (self._per_noise(self.windows[i]) / before[i])[:, None]
+            self.whiteners[i] = whitener(by, self.command_error)
 
     def _per_noise(self, window: Window) -> Array:
         """Return for each row by how much less than said its topic's noise is."""
-        return np.concatenate([
-            np.full(len(t.times) * len(t.components), 1.0 / self._noise_parts.get(t.name, 1.0)) for t in window.topics
-        ])  # fmt: skip
+        return np.array([1.0 / self._noise_parts.get(name, 1.0) for name in topic_names(window)])
 
     def _by_impulse(self, i: int, settings: Sequence[Setting], start: Array) -> Array:
         """Return the residuals of a window by the impulses that sampled commands leave open."""
@@ -247,7 +229,7 @@ class Residuals:
         setting, impulses = settings[window.run], self._forces[window.run].impulses
         if impulses is None:
             return np.zeros((len(self.weights[i]), 0))
-        pushed = wrenches(impulses, setting.actuation.lag, self._step, window.first * self._step, window.steps)
+        pushed = error_wrenches(impulses, setting.actuation.lag, self._step, window.first * self._step, window.steps)
         n = len(pushed)
         directions = Directions(np.zeros((n, STATE_SIZE)), [None] * n, range(n), np.zeros((n, 3)), pushed)
         found = np.concatenate([along for _, _, along in self._sampled(i, setting, start, directions)])
@@ -411,13 +393,3 @@ class Residuals:
                 moved[which if which < 3 else which + 1] += by
         moved[3:7] /= np.linalg.norm(moved[3:7])
         return moved
-
-
-def rows_of(window: Window) -> int:
-    """Return the number of residuals of a window."""
-    return sum(len(topic.times) * len(topic.components) for topic in window.topics)
-
-
-def _offsets(topic: Topic) -> tuple[float, ...]:
-    """Return where about the time of a sample the motion is averaged [s]."""
-    return (-topic.spread, topic.spread) if topic.spread else (0.0,)
