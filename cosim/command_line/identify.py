@@ -41,8 +41,8 @@ def add_verbs(verbs: Any) -> None:
     )  # fmt: skip
     identify.add_argument(
         "--nuisance", nargs="*", metavar="NAME",
-        help="nuisance parameters: current, force, delay, lever, bias, scale, asymmetry, random_force (default: "
-        "current, lever, bias and scale)",
+        help="nuisance parameters: current, force, delay, lever, bias, scale, asymmetry, phase, random_force (default: "
+        "current, lever, bias, scale and phase)",
     )  # fmt: skip
     identify.add_argument(
         "--held-out", nargs="+", type=Path, default=[], metavar="RUN", help="run folders that are predicted, not fitted"

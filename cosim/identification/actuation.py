@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from cosim.errors import IdentificationError
-from cosim.identification.command_errors import Impulses, open_impulses
+from cosim.identification.command_errors import BIN, Impulses, open_impulses
 from cosim.identification.log import Log
 from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
 _LEAST_LAG = 1e-4  # s; a shorter one is none
+_TAIL = 3.0  # time constants, after which an impulse has passed the lag
+_DIPOLE = 4.0  # a part of a force, less in the first half of a time and more in the second: of first moment 1
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,7 @@ class Actuation:
     by_lag: Array  # (steps, 2, 6) N/s, N m/s, by the time constant of all thrusters
     by_scale: Array  # (thrusters, steps, 2, 6) N, N m, by a factor of each thruster
     by_loss: Array  # (thrusters, steps, 2, 6) N, N m, by the part that each thruster lacks backward
+    by_changes: Array  # (13, steps, 2, 6) N, N m, by how commands change between samples
     lag: float  # s, time constant of all thrusters
 
 
@@ -63,22 +67,35 @@ class CommandedForces:
 
         self._mean = self._means(forces)
         self._mean_backward = self._means(np.minimum(forces[:, : vehicle.n_thrusters], 0.0))
+        self._mean_changes = [np.zeros((self.steps, vehicle.n_thrusters))] * 3
+        if log.sampled:
+            changes = np.diff(forces[:, : vehicle.n_thrusters], axis=0, append=forces[-1:, : vehicle.n_thrusters])
+            middles = self._times + 0.5 * np.diff(self._times, append=self._times[-1])
+            halves = np.column_stack([self._times, middles]).ravel()
+            signs = np.tile([[-1.0], [1.0]], (len(changes), 1))
+            moved = (-np.repeat(changes, 2, axis=0), _DIPOLE * np.repeat(changes, 2, axis=0) * signs)
+            bends = np.diff(changes, axis=0, prepend=changes[:1])
+            self._mean_changes = [self._means(x, halves) for x in moved]
+            self._mean_changes.append(self._means(bends / 12.0, np.append(self._times[:1], middles[:-1])))
 
-    def _means(self, forces: Array) -> Array:
+    def _means(self, forces: Array, held_from: Array | None = None) -> Array:
         """Return the mean over each step of the grid: of held values, or of samples with straight lines between."""
-        spans = np.diff(self._times, append=self._times[-1])[:, None]
+        times = self._times if held_from is None else held_from
+        spans = np.diff(times, append=times[-1])[:, None]
         slopes = np.zeros_like(forces)
-        if self._sampled:
+        if self._sampled and held_from is None:
             slopes[:-1] = np.diff(forces, axis=0) / spans[:-1]
         pieces = forces * spans + 0.5 * slopes * spans**2
         edges = np.arange(self.steps + 1) * self.step
-        at = np.clip(np.searchsorted(self._times, edges, side="right") - 1, 0, len(self._times) - 1)
-        since = (edges - self._times[at])[:, None]
+        at = np.clip(np.searchsorted(times, edges, side="right") - 1, 0, len(times) - 1)
+        since = (edges - times[at])[:, None]
         impulse = (np.cumsum(pieces, axis=0) - pieces)[at] + forces[at] * since + 0.5 * slopes[at] * since**2
         means: Array = np.diff(impulse, axis=0) / self.step
         return means
 
-    def actuation(self, lag: float, scales: Array, losses: Array | None = None) -> Actuation:
+    def actuation(
+        self, lag: float, scales: Array, losses: Array | None = None, changes: Array | None = None
+    ) -> Actuation:
         """Return the wrench of each step.
 
         Parameters
@@ -89,6 +106,12 @@ class CommandedForces:
             Factor of each thruster's force.
         losses : ndarray, shape (thrusters,), optional
             Part of its force that each thruster lacks backward; default: none.
+        changes : ndarray, shape (13,), optional
+            When each axis of the thrusters' wrench changes between two samples: how much later than in the middle, in
+            the time between them; and how much more the wrench has changed in the second half than a straight line
+            says, as first moment about the middle, in the change times the time squared. Last, how much more smoothly
+            than by lines all axes change: as behind a filter of that variance, in the time squared by twelve. Default:
+            as the lines say.
 
         Returns
         -------
@@ -101,10 +124,21 @@ class CommandedForces:
         backward, _ = _lagged(self._mean_backward, lag, self.step)
         matrix = (self._matrix * scales).T
         wrench = force @ matrix
+        by_changes = np.zeros((13, *wrench.shape))
+        if self._sampled:
+            moved: list[Array] = []
+            for mean in self._mean_changes:
+                from_rest = np.concatenate([np.zeros_like(mean[:1]), mean])
+                moved.append(_lagged(from_rest, lag, self.step)[0][1:] @ matrix)
+            late, spread, by_changes[12] = moved
+            by_changes[range(6), ..., range(6)] = np.moveaxis(late, 2, 0)
+            by_changes[range(6, 12), ..., range(6)] = np.moveaxis(spread, 2, 0)
+        if changes is not None:
+            wrench += np.einsum("i,iksj->ksj", changes, by_changes)
         wrench[:, 0] += self._mean[:, n:]
         by_scale = self._matrix.T[:, None, None, :] * np.moveaxis(force, 2, 0)[..., None]
         by_loss = -matrix[:, None, None, :] * np.moveaxis(backward, 2, 0)[..., None]
-        return Actuation(wrench, by_lag @ matrix, by_scale, by_loss, lag)
+        return Actuation(wrench, by_lag @ matrix, by_scale, by_loss, by_changes, lag)
 
 
 def steady_forces(commands: Array, vehicle: Vehicle) -> Array:
@@ -131,10 +165,68 @@ def steady_forces(commands: Array, vehicle: Vehicle) -> Array:
     return result
 
 
-def _lagged(forces: Array, lag: float, step: float) -> tuple[Array, Array]:
-    """Return forces behind a lag, shape (steps, 2, n): mean and change of each step; and the same by the lag.
+def error_wrenches(impulses: Impulses, lag: float, step: float, begin: float, steps: int) -> Array:
+    """Return the wrench of each error behind the lag, over each step of a window, shape (errors, steps, 2, 6).
 
-    Over a step they head for one value. Before the first they are taken to be at rest with it.
+    Parameters
+    ----------
+    impulses : Impulses
+        Of the run. Each bin has twelve errors: six of its impulse, and six that move impulse within it.
+    lag : float
+        Time constant of the thrusters [s].
+    step : float
+        Of the window's grid [s].
+    begin : float
+        Of the window, since the first command [s].
+    steps : int
+        Of the window.
+
+    Returns
+    -------
+    ndarray
+        Mean over each step, and change from its begin to its end [N, N m], of one standard deviation.
+    """
+    before = int(np.ceil((_TAIL * lag + 2.0 * BIN) / step))  # steps before the window
+    grid: Any = begin + step * np.arange(-before, steps + 1)
+    used = (impulses.ends > begin - _TAIL * lag - BIN) & (impulses.begins < grid[-1])
+    shares, roots = [np.zeros((len(grid) - 1, 0))], [np.zeros((0, 6, 6))]
+    for b, e, root, shifted in zip(
+        *(x[used] for x in (impulses.begins, impulses.ends, impulses.roots, impulses.shifted)), strict=True
+    ):
+        first, second = (_shares(grid, x, x + 0.5 * (e - b)) for x in (b, 0.5 * (b + e)))
+        shares.append(np.column_stack([0.5 * (first + second), shifted * (first - second)]))
+        roots.append(np.stack([root, root]))
+    course = _lagged(np.concatenate(shares, axis=1) / step, lag, step)[0][before:]
+    found = np.einsum("ksc,cij->cjksi", course, np.concatenate(roots))
+    result: Array = found.reshape(-1, steps, 2, 6)
+    return result
+
+
+def _shares(grid: Any, begin: float, end: float) -> Array:
+    """Return the part of a span that lies in each step of a grid."""
+    inside = np.minimum(grid[1:], end) - np.maximum(grid[:-1], begin)
+    result: Array = np.clip(inside, 0.0, None) / max(end - begin, 1e-9)
+    return result
+
+
+def _lagged(forces: Array, lag: float, step: float) -> tuple[Array, Array]:
+    """Return forces behind a lag as they are over each step of a grid, and the same by the lag.
+
+    Parameters
+    ----------
+    forces : ndarray, shape (steps, n)
+        To which they head over each step [N]. Before the first step they are at rest with it.
+    lag : float
+        Time constant [s].
+    step : float
+        Of the grid [s].
+
+    Returns
+    -------
+    forces : ndarray, shape (steps, 2, n)
+        Mean of each step, and change from its begin to its end [N].
+    by_lag : ndarray, shape (steps, 2, n)
+        Their derivatives [N/s].
     """
     zero = np.zeros((1, forces.shape[1]))
     if lag < _LEAST_LAG:

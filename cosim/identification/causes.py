@@ -56,7 +56,7 @@ def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values
     every = [*parameters, *(p for group in groups.values() for p in group)]
     problem = Residuals(logs, vehicle, every, windows, step, fitted.force_deviation is not None)
     problem.force_deviation = fitted.force_deviation
-    problem.weights, problem.whiteners = fitted.weights, fitted.whiteners
+    problem.weigh_as(fitted)
     at = np.concatenate([values, [p.start for p in every[len(values) :]]])
     settings = problem.settings(at)
     try:
@@ -90,7 +90,7 @@ def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values
 
 def _left_by_random_force(forced: Residuals, fitted: Residuals, values: Array) -> float:
     """Return the squares that are left, a Gauss-Newton step on, where each window has a constant force of its own."""
-    forced.weights, forced.whiteners = fitted.weights, fitted.whiteners
+    forced.weigh_as(fitted)
     settings = forced.settings(values)
     try:
         reduced = [forced.reduced(i, settings, values) for i in range(len(forced.windows))]

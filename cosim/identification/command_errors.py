@@ -8,24 +8,20 @@ are correlated: they are weighed by the inverse root of that covariance (general
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
-
-from cosim.identification.measurements import turn_tangent
-from cosim.identification.shooting import Motion
 
 Array = NDArray[np.float64]
 
-_BIN = 0.05  # s; errors of shorter periods are taken together
+BIN = 0.05  # s; errors of shorter periods are taken together
 _SHIFTED = 0.25, 0.5  # part of an error that goes from the first half to the second: of one period, of several
 _AROUND = 0.5  # s, to either side, over which squared changes are averaged
-_TAIL = 3.0  # time constants, after which an impulse has passed the lag
 _SIZES = np.concatenate([[0.0], np.geomspace(0.02, 10.0, 80)])  # of the errors, in those of steps at any time
+_UPDATES, _SOME = 3, 4  # of the noise of each topic, by every fourth window
+_LEAST_PART = 0.05  # of the noise that differences of samples say
 _LEAST = 1e-2  # of the noise's variance: smaller ones hardly change a weight
 
 
@@ -72,7 +68,7 @@ def open_impulses(times: Array, forces: Array, matrix: Array) -> Impulses:
     squares = changes[:, :, None] * changes[:, None, :]
     near = 0.5 * (_mean_about(squares, 3) + _mean_about(squares, round(2.0 * _AROUND / float(np.median(periods)))))
     covariances = near * np.square(periods)[:, None, None] / 12.0
-    group = np.floor((times[:-1] - times[0]) / _BIN + 1e-6).astype(int)
+    group = np.floor((times[:-1] - times[0]) / BIN + 1e-6).astype(int)
     starts = np.flatnonzero(np.diff(group, prepend=-1))
     sizes, axes = np.linalg.eigh(np.add.reduceat(covariances, starts, axis=0))
     return Impulses(
@@ -91,90 +87,13 @@ def _mean_about(values: Array, count: int) -> Array:
     return result
 
 
-def start_by_impulse(motion: Motion, starts: Sequence[int], inverse_mass: Array) -> Array:
-    """Return the change of a start that an impulse at a later time is equal to from then on, shape (times, n, 6).
-
-    Parameters
-    ----------
-    motion : Motion
-        At these times; its first directions are the n starts.
-    starts : sequence of int
-        What a start may change: position 0 to 2, rotation 3 to 5, velocity 6 to 11.
-    inverse_mass : ndarray, shape (6, 6)
-        Of body and added mass.
-    """
-    n = len(starts)
-    flow = np.empty((len(motion.states), n, n))  # from the start to each time, along the starts' directions
-    for row, which in enumerate(starts):
-        if 3 <= which < 6:
-            turns = np.array([turn_tangent(q, which - 3) for q in motion.states[:, 3:7]])
-            flow[:, row] = 4.0 * np.einsum("kdq,kq->kd", motion.tangents[:, :n, 3:7], turns)
-        else:
-            flow[:, row] = motion.tangents[:, :n, which if which < 3 else which + 1]
-    pushed = np.zeros((n, 6))
-    pushed[list(starts).index(6) :] = inverse_mass
-    moved: Any = np.linalg.solve(flow, np.broadcast_to(pushed, (len(flow), n, 6)))
-    result: Array = moved
-    return result
-
-
-def response(impulses: Impulses, lag: float, step: float, begin: float, moved: Array, rows: Array, at: Array) -> Array:
-    """Return the residuals by each impulse, shape (rows, 6 bins).
-
-    Parameters
-    ----------
-    impulses : Impulses
-        Of the run.
-    lag : float
-        Time constant of the thrusters [s].
-    step : float
-        Of the window's grid [s].
-    begin : float
-        Of the window, since the first command [s].
-    moved : ndarray, shape (steps, n, 6)
-        Change of the window's start that an impulse in each step of the grid is equal to, from then on.
-    rows : ndarray, shape (rows, n)
-        Residuals by the start.
-    at : ndarray, shape (rows,)
-        Times of the residuals, since the window's begin [s].
-    """
-    steps = len(moved)
-    edges = begin + step * np.arange(steps + 1)
-    used = (impulses.ends > begin - _TAIL * lag - _BIN) & (impulses.begins < edges[-1])
-    before = int(np.ceil((_TAIL * lag + 2.0 * _BIN) / step))  # steps before the window
-    grid = begin + step * np.arange(-before, steps + 1)
-    k = np.clip(np.floor(at / step).astype(int), 0, steps - 1)
-    part = np.clip(at / step - k, 0.0, 1.0)
-    pole = float(np.exp(-step / lag)) if lag > 0.0 else 0.0
-    found = []
-    for b, e, root, shifted in zip(
-        *(x[used] for x in (impulses.begins, impulses.ends, impulses.roots, impulses.shifted)), strict=True
-    ):
-        halves = [_shares(grid, x, x + 0.5 * (e - b)) for x in (b, 0.5 * (b + e))]
-        for share in (0.5 * (halves[0] + halves[1]), shifted * (halves[0] - halves[1])):
-            lagged = np.asarray(lfilter([1.0 - pole], [1.0, -pole], share))[before:]
-            added = np.einsum("k,kni,ij->knj", lagged, moved, root)
-            total = np.cumsum(added, axis=0)
-            reached = total[k] - (1.0 - part)[:, None, None] * added[k]
-            found.append(np.einsum("rn,rnj->rj", rows, reached))
-    result: Array = np.concatenate(found, axis=1) if found else np.zeros((len(rows), 0))
-    return result
-
-
-def _shares(grid: Any, begin: float, end: float) -> Array:
-    """Return the part of a span that lies in each step of a grid."""
-    inside = np.minimum(grid[1:], end) - np.maximum(grid[:-1], begin)
-    result: Array = np.clip(inside, 0.0, None) / max(end - begin, 1e-9)
-    return result
-
-
 def whitener(by_impulse: Array, size: float) -> Whitener:
     """Return the inverse root of the covariance of residuals under impulses of a size.
 
     Parameters
     ----------
     by_impulse : ndarray, shape (rows, n)
-        Residuals by each impulse, as `response` has them.
+        Residuals by each impulse, in standard deviations.
     size : float
         Factor of all impulses.
     """
@@ -202,3 +121,64 @@ def most_likely_size(residuals: Sequence[Array], by_impulses: Sequence[Array]) -
         total = 1.0 + np.square(_SIZES)[:, None] * variances[kept]
         lost += np.sum(np.log(total) + squares / total, axis=1)
     return float(_SIZES[int(np.argmin(lost))])
+
+
+def noise_parts(
+    residuals: Sequence[Array], whiteners: Sequence[Whitener], topics: Sequence[NDArray[np.str_]]
+) -> dict[str, float]:
+    """Return the part of its noise that each topic has, in one step towards the greatest likelihood (Harville 1977).
+
+    Parameters
+    ----------
+    residuals : sequence of ndarray, shape (rows,)
+        Of each window, in standard deviations, without what the start explains.
+    whiteners : sequence of Whitener
+        Of the covariance of each window.
+    topics : sequence of ndarray, shape (rows,)
+        Of which topic each row is.
+    """
+    squares, freedom = dict[str, float](), dict[str, float]()
+    for residual, white, own in zip(residuals, whiteners, topics, strict=True):
+        share = white.variances / (1.0 + white.variances)
+        left = residual - white.directions @ (share * (white.directions.T @ residual))
+        free = 1.0 - np.square(white.directions) @ share
+        for name in np.unique(own):
+            squares[name] = squares.get(name, 0.0) + float(np.sum(np.square(left[own == name])))
+            freedom[name] = freedom.get(name, 0.0) + float(np.sum(free[own == name]))
+    return {str(name): float(np.sqrt(squares[name] / max(freedom[name], 1e-9))) for name in squares}
+
+
+def most_likely_errors(
+    residuals: Sequence[Array], by_impulses: Sequence[Array], topics: Sequence[NDArray[np.str_]],
+    known: Mapping[str, float],
+) -> tuple[float, dict[str, float]]:  # fmt: skip
+    """Return the factor of all impulses and the noise of each topic that explain residuals best.
+
+    Parameters
+    ----------
+    residuals, by_impulses : sequence of ndarray, shape (rows,) and (rows, n)
+        As `most_likely_size` takes them, by the noise that is known.
+    topics : sequence of ndarray, shape (rows,)
+        Of which topic each row is.
+    known : mapping of str to float
+        The part of its noise that each topic has, by its name; 1 where it is not named.
+
+    Returns
+    -------
+    float
+        The factor.
+    dict of str to float
+        The part of its noise that each topic has, at the most 1.
+    """
+    parts = {str(name): known.get(str(name), 1.0) for own in topics for name in np.unique(own)}
+    residuals, by_impulses = [x.copy() for x in residuals], [x.copy() for x in by_impulses]
+    for _ in range(_UPDATES):
+        size = most_likely_size(residuals[::_SOME], by_impulses[::_SOME])
+        whiteners = [whitener(by, size) for by in by_impulses[::_SOME]]
+        for name, part in noise_parts(residuals[::_SOME], whiteners, topics[::_SOME]).items():
+            new = float(np.clip(parts[name] * part, _LEAST_PART, 1.0))
+            for residual, by, own in zip(residuals, by_impulses, topics, strict=True):
+                residual[own == name] *= parts[name] / new
+                by[own == name] *= parts[name] / new
+            parts[name] = new
+    return most_likely_size(residuals, by_impulses), parts

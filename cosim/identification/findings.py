@@ -160,7 +160,8 @@ _CAUSES = {
     "delay": "late samples", "scale": "the DVL's scale", "force": "a constant force, as of a tether",
     "asymmetry": "thrusters that are weaker backward", "thrusters.matrix": "unequal thrusters",
     "thrusters.time_constant": "a lag of the thrusters", "current": "a current", "lever": "the DVL's lever arm",
-    "bias": "biases of the gyro", "random_force": "a force that changes in time, such as of waves or a tether",
+    "bias": "biases of the gyro", "phase": "commands that change early or late between samples",
+    "random_force": "a force that changes in time, such as of waves or a tether",
 }  # fmt: skip
 
 

@@ -63,10 +63,12 @@ class Fit:
         return [i for i in self.vehicle_part() if self.intervals.prior_part[i] > RESTS]
 
     def alike(self, least: float) -> Iterator[tuple[str, str]]:
-        """Yield pairs of numbers whose correlation is beyond `least`, the most alike first."""
+        """Yield pairs of numbers, one of the vehicle's, whose correlation is beyond `least`, the most alike first."""
         size = np.abs(np.triu(self.intervals.correlation, 1))
         for i, j in sorted(np.argwhere(size > least), key=lambda pair: -size[tuple(pair)]):
-            yield self.parameters[i].name, self.parameters[j].name
+            one, other = self.parameters[i], self.parameters[j]
+            if not (one.is_nuisance and other.is_nuisance):
+                yield one.name, other.name
 
     def worst_topic(self) -> tuple[str, float]:
         """Return the topic that is explained worst, and the root mean square of its residuals in its noise."""

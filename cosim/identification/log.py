@@ -71,6 +71,11 @@ class Topic:
         """Names of the components of its residual."""
         return tuple(_AXES[self.name])
 
+    @property
+    def offsets(self) -> tuple[float, ...]:
+        """Times about that of a sample whose mean it is [s]."""
+        return (-self.spread, self.spread) if self.spread else (0.0,)
+
 
 @dataclass(frozen=True)
 class Log:

@@ -17,16 +17,16 @@ from cosim.identification.measurements import Errors
 from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
-Kind = Literal["plant", "lag", "thrust", "current", "force", "delay", "lever", "bias", "scale", "asymmetry"]
+Kind = Literal["plant", "lag", "thrust", "current", "force", "delay", "lever", "bias", "scale", "asymmetry", "phase"]
 
 # what is freed unless the user says otherwise: mass, weight, centre of gravity and inertia are known better by scales
 DEFAULT_FREE = (
     "hydrodynamics.added_mass", "hydrodynamics.linear_damping", "hydrodynamics.quadratic_damping",
     "hydrostatics.buoyancy", "hydrostatics.center_of_buoyancy", "thrusters.time_constant",
 )  # fmt: skip
-NUISANCES: tuple[Kind, ...] = ("current", "force", "delay", "lever", "bias", "scale", "asymmetry")
+NUISANCES: tuple[Kind, ...] = ("current", "force", "delay", "lever", "bias", "scale", "asymmetry", "phase")
 RANDOM_FORCE = "random_force"  # a nuisance that is eliminated from each window, and no parameter
-DEFAULT_NUISANCES = ("current", "lever", "bias", "scale")
+DEFAULT_NUISANCES = ("current", "lever", "bias", "scale", "phase")
 
 _ELEMENT = re.compile(r"(?P<key>[a-z_]+\.[a-z_]+)(?:\.(?P<row>\d+)(?:\.(?P<column>\d+))?|\.(?P<part>diagonal))?")
 _SIX = "XYZKMN"
@@ -104,7 +104,8 @@ def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
     names : sequence of str
         Of `NUISANCES`: a current and a constant force of each run, north and east; the delay of each topic behind the
         commands; the lever arm and the scale error of the DVL; the gyro's biases of each run; the part of its force
-        that each thruster lacks backward. `RANDOM_FORCE` makes no parameter.
+        that each thruster lacks backward; of runs whose commands are samples, when between two samples each axis of
+        the wrench changes. `RANDOM_FORCE` makes no parameter.
     logs : sequence of Log
         The runs.
 
@@ -121,6 +122,7 @@ def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
     places = {
         "delay": [name for name in TOPICS if any(log.topic(name) for log in logs)],
         "asymmetry": [f"{i + 1}" for i in range(logs[0].thrust.shape[1])],
+        "phase": [*(f"{said} of {axis}" for said in ("lateness", "spread") for axis in _SIX), "smoothness"],
     }
     made: list[Parameter] = []
     if odd := [name for name in names if name not in (*NUISANCES, RANDOM_FORCE)]:
@@ -128,9 +130,12 @@ def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
         raise IdentificationError(f"--nuisance {odd[0]}: is unknown, expected some of {expected}")
     for name in (known for known in NUISANCES if known in names):
         label, unit, deviation, axes = _NUISANCES[name]
-        for run in range(len(logs)) if name in ("current", "force", "bias") else (None,):
+        runs = [run for run, log in enumerate(logs) if name != "phase" or log.sampled]
+        for run in runs if name in ("current", "force", "bias", "phase") else (None,):
             said = "" if run is None else f" of run {run + 1}"
-            for index, axis in enumerate(places.get(name, axes)):
+            for index, axis in enumerate(places.get(name, list(axes))):
+                if name == "phase":
+                    unit, deviation = _CHANGES[axis.split(" ")[0]]
                 plant = f"current.{axis}" if name == "current" else axis if name == "delay" else ""
                 made.append(Parameter(
                     f"{label} {axis}".strip() + said, unit, name, 0.0, deviation, plant=plant, index=index, run=run
@@ -205,7 +210,8 @@ def setting_of(
         Time constant of the thrusters where it is not free [s].
     """
     plant: dict[str, float] = {}
-    scales, losses, delays = np.ones(forces.thrusters), np.zeros(forces.thrusters), dict[str, float]()
+    scales, losses, changes = np.ones(forces.thrusters), np.zeros(forces.thrusters), np.zeros(13)
+    delays = dict[str, float]()
     force, lever, bias, scale = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
     for p, x in zip(parameters, values, strict=True):
         if p.run not in (None, run):
@@ -219,6 +225,8 @@ def setting_of(
                 scales[p.index] = x
             case "asymmetry":
                 losses[p.index] = x
+            case "phase":
+                changes[p.index] = x
             case "delay":
                 delays[p.plant] = float(x)
             case "force":
@@ -229,7 +237,7 @@ def setting_of(
                 bias[p.index] = x
             case "scale":
                 scale = float(x)
-    actuation = forces.actuation(lag, scales, losses)
+    actuation = forces.actuation(lag, scales, losses, changes)
     return Setting(plant, actuation, force, Errors(lever, scale, bias), delays)
 
 
@@ -304,7 +312,11 @@ _NUISANCES: dict[str, tuple[str, str, float, str]] = {  # name, unit, deviation 
     "bias": ("gyro bias", "rad/s", 0.01, "pqr"),
     "scale": ("DVL scale error", "", 0.01, " "),
     "asymmetry": ("loss backward of thruster", "", 0.1, ""),
+    "phase": ("changes between samples:", "", 1.0, ""),
 }
+_CHANGES = {  # unit and deviation: those of steps at a time uniform in a period
+    "lateness": ("periods", 0.29), "spread": ("periods2", 0.037), "smoothness": ("periods2/12", 1.0),
+}  # fmt: skip
 _KEYS = {
     "_of_body": (
         "rigid_body.mass", "rigid_body.weight", "rigid_body.inertia", "rigid_body.center_of_gravity",

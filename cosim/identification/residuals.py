@@ -7,7 +7,7 @@ on the free numbers only, and keeps cost and gradient.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,19 +16,13 @@ from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
 from cosim.identification import measurements
-from cosim.identification.actuation import CommandedForces
-from cosim.identification.command_errors import (
-    Whitener,
-    most_likely_size,
-    response,
-    start_by_impulse,
-    whitener,
-)
+from cosim.identification.actuation import CommandedForces, error_wrenches
+from cosim.identification.command_errors import Whitener, most_likely_errors, whitener
 from cosim.identification.log import Log, Topic
 from cosim.identification.measurements import turn_tangent
-from cosim.identification.parameters import Parameter, Setting, setting_of, with_values
+from cosim.identification.parameters import Parameter, Setting, setting_of
 from cosim.identification.shooting import STATE_SIZE, Directions, Motion, Shooter
-from cosim.identification.windows import Window
+from cosim.identification.windows import Window, topic_names
 from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -101,10 +95,10 @@ class Residuals:
         self.holds_starts = False  # as samples have them, while the free numbers are far off
         self._found: dict[int, _Start] = {}
         self._tried: dict[int, _Start] = {}
-        self.weights: list[Array] = [np.ones(rows_of(window)) for window in windows]
-        self._vehicle = vehicle
+        self.weights: list[Array] = [np.ones(len(topic_names(window))) for window in windows]
         self.command_error: float | None = None  # size of what sampled commands leave open; None: nothing, or not known
         self.whiteners: list[Whitener | None] = [None] * len(windows)
+        self._noise_parts: dict[str, float] = {}  # of topics whose noise is less than said
 
     def settings(self, values: Array) -> list[Setting]:
         """Return the settings of each run by the free numbers."""
@@ -142,38 +136,62 @@ class Residuals:
         setting = settings[window.run]
         inside = slice(window.first, window.first + window.steps)
         moving = [j for j, p in enumerate(self.parameters) if full and self._moves(p, window.run)]
+        n, residuals, starts, rows = len(self._starts), [], [], []
+        for topic, sampled, along in self._sampled(i, setting, start, self._directions(moving, setting, inside, start)):
+            residuals.append(measurements.residual(topic, sampled.states, setting.errors).ravel())
+            starts.append(along[:, :n])
+            jacobian = np.zeros((len(along), len(self.parameters)))
+            jacobian[:, moving] = along[:, n:]
+            if full:
+                self._add_errors(jacobian, topic, sampled, setting, window.run)
+            rows.append(jacobian)
+        less = self._per_noise(window)
+        found = (
+            less * np.concatenate(residuals),
+            less[:, None] * np.concatenate(starts),
+            less[:, None] * np.concatenate(rows),
+        )
+        whiten = self.whiteners[i]
+        return found if whiten is None else (whiten(found[0]), whiten(found[1]), whiten(found[2]))
+
+    def _sampled(
+        self, i: int, setting: Setting, start: Array, directions: Directions
+    ) -> Iterator[tuple[Topic, Motion, Array]]:
+        """Yield each topic of a window, the motion at its samples, and its residuals' derivatives along directions."""
+        window = self.windows[i]
+        inside = slice(window.first, window.first + window.steps)
         times = [
             topic.times + topic.shift - setting.delays.get(topic.name, topic.shift) + off
-            for topic in window.topics for off in _offsets(topic)
+            for topic in window.topics for off in topic.offsets
         ]  # fmt: skip
         order = np.argsort(np.concatenate(times), kind="stable")
         motion = self._shooter.predict(
             setting.plant, start[:13], setting.actuation.wrench[inside], self._step, np.concatenate(times)[order],
-            self._directions(moving, setting, inside, start), setting.force + (start[13:] if len(start) > 13 else 0.0),
+            directions, setting.force + (start[13:] if len(start) > 13 else 0.0),
         )  # fmt: skip
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
-        count, residuals, starts, rows = 0, [], [], []
+        count = 0
         for topic in window.topics:
-            size, several = len(topic.times), len(_offsets(topic))
+            size, several = len(topic.times), len(topic.offsets)
             at = back[count : count + several * size].reshape(several, size)
             count += several * size
-            sampled = Motion(*(x[at].mean(axis=0) for x in (motion.states, motion.rates, motion.tangents)))
-            residuals.append(measurements.residual(topic, sampled.states, setting.errors).ravel())
+            one = several == 1
+            sampled = Motion(*(
+                x[at[0]] if one else x[at].mean(axis=0) for x in (motion.states, motion.rates, motion.tangents)
+            ))  # fmt: skip
             along = measurements.derivative(topic, sampled.states, sampled.tangents, setting.errors)
-            along = along.reshape(len(residuals[-1]), -1)
-            starts.append(along[:, : len(self._starts)])
-            jacobian = np.zeros((len(along), len(self.parameters)))
-            jacobian[:, moving] = along[:, len(self._starts) :]
-            if full:
-                self._add_errors(jacobian, topic, sampled, setting, window.run)
-            rows.append(jacobian)
-        found = np.concatenate(residuals), np.concatenate(starts), np.concatenate(rows)
-        whiten = self.whiteners[i]
-        return found if whiten is None else (whiten(found[0]), whiten(found[1]), whiten(found[2]))
+            yield topic, sampled, along.reshape(size * len(topic.components), -1)
+
+    def weigh_as(self, other: Residuals) -> None:
+        """Take weights, noise and errors of the commands from residuals of the same windows."""
+        self.weights, self.whiteners, self._noise_parts = other.weights, other.whiteners, other._noise_parts
 
     def update_command_errors(self, values: Array) -> None:
         """Weigh the residuals from now on by what sampled commands leave open, of the size that explains them best.
+
+        Where commands are not known, the noise of a topic is not known from its samples' differences, which contain the
+        motion: that is its upper bound. The likelihood gives both, the noise of each topic and the size of the errors.
 
         Parameters
         ----------
@@ -183,45 +201,45 @@ class Residuals:
         if not any(forces.impulses for forces in self._forces):
             return
         settings = self.settings(values)
-        inverse: Any = np.linalg.inv(with_values(self._vehicle, self.parameters, values).mass_matrix)
         starts = [self.solve_start(i, settings, values) for i in range(len(self.windows))]
         self.whiteners = [None] * len(self.windows)
-        by_impulses, left, projected = [], [], []
+        by_impulses, left, projected = list[Array](), list[Array](), list[Array]()
         for i, start in enumerate(starts):
             residual, by_start, _ = self.raw(i, settings, start, full=False)
-            by = self._by_impulse(i, settings, start, by_start, inverse)
+            by = self._by_impulse(i, settings, start)
             q, _ = np.linalg.qr(by_start)
             left.append(residual - q @ (q.T @ residual))
             projected.append(by - q @ (q.T @ by))
             by_impulses.append(by)
-        self.command_error = most_likely_size(left, projected)
-        self.whiteners = [whitener(by, self.command_error) for by in by_impulses]
+        which = [topic_names(window) for window in self.windows]
+        self.command_error, parts = most_likely_errors(left, projected, which, self._noise_parts)
+        before = [self._per_noise(window) for window in self.windows]
+        self._noise_parts = parts
+        for i, by in enumerate(by_impulses):
+            by *= (self._per_noise(self.windows[i]) / before[i])[:, None]
+            self.whiteners[i] = whitener(by, self.command_error)
 
-    def _by_impulse(
-        self, i: int, settings: Sequence[Setting], start: Array, by_start: Array, inverse_mass: Array
-    ) -> Array:
+    def _per_noise(self, window: Window) -> Array:
+        """Return for each row by how much less than said its topic's noise is."""
+        return np.array([1.0 / self._noise_parts.get(name, 1.0) for name in topic_names(window)])
+
+    def _by_impulse(self, i: int, settings: Sequence[Setting], start: Array) -> Array:
         """Return the residuals of a window by the impulses that sampled commands leave open."""
         window = self.windows[i]
-        setting, forces = settings[window.run], self._forces[window.run]
-        if forces.impulses is None:
-            return np.zeros((len(by_start), 0))
-        inside = slice(window.first, window.first + window.steps)
-        middle: Array = self._step * np.arange(0.5, window.steps)
-        motion = self._shooter.predict(
-            setting.plant, start[:13], setting.actuation.wrench[inside], self._step, middle,
-            self._directions([], setting, inside, start), setting.force + (start[13:] if len(start) > 13 else 0.0),
-        )  # fmt: skip
-        own = [which for which in self._starts if which not in _FORCES]
-        moved = start_by_impulse(motion, own, inverse_mass)
-        return response(
-            forces.impulses, setting.actuation.lag, self._step, window.first * self._step, moved,
-            by_start[:, : len(own)], self._row_times(i),
-        )  # fmt: skip
+        setting, impulses = settings[window.run], self._forces[window.run].impulses
+        if impulses is None:
+            return np.zeros((len(self.weights[i]), 0))
+        pushed = error_wrenches(impulses, setting.actuation.lag, self._step, window.first * self._step, window.steps)
+        n = len(pushed)
+        directions = Directions(np.zeros((n, STATE_SIZE)), [None] * n, range(n), np.zeros((n, 3)), pushed)
+        found = np.concatenate([along for _, _, along in self._sampled(i, setting, start, directions)])
+        result: Array = self._per_noise(window)[:, None] * found
+        return result
 
     @staticmethod
     def _moves(p: Parameter, run: int) -> bool:
         """Return True if a parameter changes the motion of a run, and not only its measurements."""
-        return p.run in (None, run) and p.kind in ("plant", "lag", "thrust", "asymmetry", "current", "force")
+        return p.run in (None, run) and p.kind in ("plant", "lag", "thrust", "asymmetry", "phase", "current", "force")
 
     def _directions(self, moving: Sequence[int], setting: Setting, inside: slice, start: Array) -> Directions:
         n, count = len(self._starts), len(self._starts) + len(moving)
@@ -245,7 +263,10 @@ class Residuals:
             else:
                 inputs[row] = len(wrenches)
                 actuation = setting.actuation
-                changes = {"lag": actuation.by_lag[None], "thrust": actuation.by_scale, "asymmetry": actuation.by_loss}
+                changes = {
+                    "lag": actuation.by_lag[None], "thrust": actuation.by_scale, "asymmetry": actuation.by_loss,
+                    "phase": actuation.by_changes,
+                }  # fmt: skip
                 wrenches.append(changes[p.kind][p.index][inside])
         wrench = np.stack(wrenches) if wrenches else np.empty((0, 0, 2, 6))
         return Directions(tangents, names, inputs, force, wrench)
@@ -372,13 +393,3 @@ class Residuals:
                 moved[which if which < 3 else which + 1] += by
         moved[3:7] /= np.linalg.norm(moved[3:7])
         return moved
-
-
-def rows_of(window: Window) -> int:
-    """Return the number of residuals of a window."""
-    return sum(len(topic.times) * len(topic.components) for topic in window.topics)
-
-
-def _offsets(topic: Topic) -> tuple[float, ...]:
-    """Return where about the time of a sample the motion is averaged [s]."""
-    return (-topic.spread, topic.spread) if topic.spread else (0.0,)

@@ -136,3 +136,8 @@ def _fault(log: Log, vehicle: Vehicle, window: Window, length: float) -> str:
     if len(thrust) and beyond.mean(axis=0).max() > _MOST_SATURATED:
         return f"a thruster is beyond its limits for more than {100 * _MOST_SATURATED:.0f} % of it"
     return ""
+
+
+def topic_names(window: Window) -> NDArray[np.str_]:
+    """Return of which topic each residual of a window is."""
+    return np.repeat([t.name for t in window.topics], [len(t.times) * len(t.components) for t in window.topics])

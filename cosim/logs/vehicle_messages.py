@@ -139,9 +139,10 @@ class VehicleMessages:
             self._contents.unread[f"DISTANCE_SENSOR of orientation {m.orientation}"] += 1
 
     def _on_vision_position_delta(self, m: Any, at: float) -> None:
-        if m.time_delta_usec > 0:
+        if m.time_delta_usec > 0:  # the mean over these seconds, which end when the message comes
             seconds = m.time_delta_usec * 1e-6
-            self._put("dvl", "VISION_POSITION_DELTA", NO_STAMP, at, [d / seconds for d in m.position_delta])
+            values = [d / seconds for d in m.position_delta]
+            self._put("dvl", "VISION_POSITION_DELTA", NO_STAMP, at - 0.5 * seconds, values)
 
     def _on_param_value(self, m: Any, at: float) -> None:
         name = m.param_id if isinstance(m.param_id, str) else m.param_id.decode("ascii", "replace")

@@ -7,6 +7,8 @@
 #include "instance.h"
 #include "shooting.h"
 
+typedef double Row __attribute__((vector_size(16 * sizeof(double)))); /* N_RIGID numbers, for vectors of the processor */
+
 static const double FASTEST = 1e3; /* m/s, rad/s: faster than any vehicle */
 
 typedef struct {
@@ -15,43 +17,127 @@ typedef struct {
     double *tangent, *stage, *slopes[4]; /* (n_directions, 13) each */
 } Shooter;
 
+/* Writes the tangent of the rate along a change of the state, of a parameter (NULL: none), and of the wrench. */
+static void differentiate(Shooter *s, const double rate[N_RIGID], const double R[3][3], const double rigid[N_RIGID],
+                          double *parameter, const double dtau[6], double slope[N_RIGID])
+{
+    double own[3][3], dR[3][3], dwater[3], turned[3], pushed[6];
+
+    memcpy(s->seed.state.rigid, rigid, sizeof s->seed.state.rigid);
+    memcpy(own, R, sizeof own);
+    memcpy(pushed, dtau, sizeof pushed);
+    rotation_tangent(s->model.state.rigid + 3, rigid + 3, dR);
+    to_body((const double(*)[3])dR, s->asked->force, turned);
+    for (int i = 0; i < 3; i++)
+        pushed[i] += turned[i];
+    if (parameter)
+        *parameter = 1.0;
+    derivative_tangent(&s->model, &s->seed, rate, pushed, own, dR, dwater, slope);
+    if (parameter)
+        *parameter = 0.0;
+}
+
+/* Writes the velocity through the water, and its rate, both from those of the model's state. */
+static void relative_to_water(const Shooter *s, const double rate[N_RIGID], const double R[3][3], double nu_r[6],
+                              double nu_r_rate[6])
+{
+    const Parameters *p = &s->model.plant.parameters;
+    const double *x = s->model.state.rigid;
+    double water[3], water_rate[3], current[3], current_rate[3], turning[3];
+
+    environment_current(p, &s->model.held.drift, s->model.time, x[2], water);
+    for (int i = 0; i < 3; i++)
+        water_rate[i] = s->model.held.drift.slope[i] + (x[2] > 0.0 ? p->current_shear[i] * rate[2] : 0.0);
+    to_body(R, water, current);
+    to_body(R, water_rate, current_rate);
+    cross(x + 10, current, turning);
+    for (int i = 0; i < 3; i++) {
+        nu_r[i] = x[7 + i] - current[i];
+        nu_r_rate[i] = rate[7 + i] - current_rate[i] + turning[i];
+        nu_r[3 + i] = x[10 + i];
+        nu_r_rate[3 + i] = rate[10 + i];
+    }
+}
+
+/* Adds the tangent of the wrench along a parameter that acts by the motion through the water alone. Returns false, and adds
+ * nothing, for any other. */
+static int add_by_motion(const Shooter *s, const double *parameter, const double nu_r[6], const double nu_r_rate[6],
+                         double dwrench[6])
+{
+    const Parameters *dp = &s->seed.plant.parameters;
+    const ptrdiff_t linear = parameter - dp->linear_damping, quadratic = parameter - dp->quadratic_damping;
+    const ptrdiff_t mass = parameter - &dp->added_mass[0][0];
+
+    if (linear >= 0 && linear < 6)
+        dwrench[linear] -= nu_r[linear];
+    else if (quadratic >= 0 && quadratic < 6)
+        dwrench[quadratic] -= fabs(nu_r[quadratic]) * nu_r[quadratic];
+    else if (mass >= 0 && mass < 36) { /* -A v_r' - C_A(v_r) v_r */
+        static const double still[6] = {0.0};
+        const ptrdiff_t i = mass / 6, j = mass % 6;
+        double momentum[6] = {0.0};
+        momentum[i] = nu_r[j];
+        momentum[j] = nu_r[i];
+        dwrench[i] -= nu_r_rate[j];
+        if (i != j)
+            dwrench[j] -= nu_r_rate[i];
+        subtract_coriolis_tangent(still, momentum, nu_r, still, dwrench);
+    } else
+        return 0;
+    return 1;
+}
+
 /* Computes the rate of the model's state at a fraction of step k, and that of each direction's tangent in `along`. */
 static void evaluate(Shooter *s, int k, double part, const double *along, double rate[N_RIGID], double *slope)
 {
+    static const double still[N_RIGID] = {0.0};
     const Prediction *asked = s->asked;
-    const double *wrench = asked->wrench + 12 * (size_t)k, *force = asked->force, off = part - 0.5;
-    double R[3][3], dR[3][3], dwater[3], tau[6], pushed[3];
+    const double *wrench = asked->wrench + 12 * (size_t)k, off = part - 0.5;
+    double R[3][3], tau[6], pushed[3], nu_r[6], nu_r_rate[6];
+    Row by_state[N_RIGID];
 
     plant_rotation(s->model.state.rigid + 3, R);
     for (int i = 0; i < 6; i++)
         tau[i] = wrench[i] + off * wrench[6 + i];
-    to_body((const double(*)[3])R, force, pushed);
+    to_body((const double(*)[3])R, asked->force, pushed);
     for (int i = 0; i < 3; i++)
         tau[i] += pushed[i];
     plant_derivative(&s->model.plant, &s->model.held.drift, s->model.time, s->model.state.rigid, tau, rate);
+    if (!asked->n_directions)
+        return;
+
+    /* the rate's derivatives by the state: nothing depends on where north and east are */
+    for (int i = 2; i < N_RIGID; i++) {
+        double unit[N_RIGID] = {0.0}, column[sizeof(Row) / sizeof(double)] = {0.0};
+        unit[i] = 1.0;
+        differentiate(s, rate, (const double(*)[3])R, unit, NULL, still, column);
+        memcpy(&by_state[i], column, sizeof by_state[i]);
+    }
+    relative_to_water(s, rate, (const double(*)[3])R, nu_r, nu_r_rate);
 
     for (int j = 0; j < asked->n_directions; j++) {
+        const double *tangent = along + N_RIGID * (size_t)j;
         const int parameter = asked->parameter_directions[j], input = asked->input_directions[j];
-        const double *dforce = asked->force_tangents + 3 * (size_t)j;
-        double dtau[6] = {0.0}, turned[3];
+        double *moved = slope + N_RIGID * (size_t)j, dwrench[6] = {0.0}, accelerated[6];
 
-        memcpy(s->seed.state.rigid, along + N_RIGID * (size_t)j, sizeof s->seed.state.rigid);
-        rotation_tangent(s->model.state.rigid + 3, s->seed.state.rigid + 3, dR);
-        to_body((const double(*)[3])dR, force, turned);
-        to_body((const double(*)[3])R, dforce, pushed);
-        for (int i = 0; i < 3; i++)
-            dtau[i] = turned[i] + pushed[i];
+        to_body((const double(*)[3])R, asked->force_tangents + 3 * (size_t)j, dwrench);
         if (input >= 0) {
             const double *change = asked->wrench_tangents + 12 * ((size_t)input * asked->n_steps + k);
             for (int i = 0; i < 6; i++)
-                dtau[i] += change[i] + off * change[6 + i];
+                dwrench[i] += change[i] + off * change[6 + i];
         }
         double *seeded = parameter >= 0 ? variable_real(&s->seed, &VARIABLES[parameter]) : NULL;
-        if (seeded)
-            *seeded = 1.0;
-        derivative_tangent(&s->model, &s->seed, rate, dtau, R, dR, dwater, slope + N_RIGID * (size_t)j);
-        if (seeded)
-            *seeded = 0.0;
+        if (!seeded || add_by_motion(s, seeded, nu_r, nu_r_rate, dwrench)) {
+            multiply6((const double(*)[6])s->model.plant.derived.mass_inverse, dwrench, accelerated);
+            memset(moved, 0, 7 * sizeof(double));
+            memcpy(moved + 7, accelerated, sizeof accelerated);
+        } else
+            differentiate(s, rate, (const double(*)[3])R, still, seeded, dwrench, moved);
+        Row sum = tangent[2] * by_state[2];
+        for (int i = 3; i < N_RIGID; i++)
+            sum += tangent[i] * by_state[i];
+        for (int n = 0; n < N_RIGID; n++)
+            moved[n] += sum[n];
     }
 }
 

@@ -93,3 +93,51 @@ def test_rate_limit_is_rejected(vehicle):
     slow = dataclasses.replace(vehicle, thrust_rate_limit=np.full(8, 10.0))
     with pytest.raises(IdentificationError, match="rate_limit"):
         CommandedForces(log_of(vehicle), slow, STEP)
+
+
+@pytest.mark.parametrize("phase", [0.2, 0.5, 0.87])
+def test_changes_between_samples_may_be_steps(vehicle, phase):
+    """Steps at one part of each period have the same impulse and, behind a lag, nearly the same wrench."""
+    log = dataclasses.replace(log_of(vehicle, period=0.1), wrench=np.zeros((60, 6)), sampled=True)
+    times = np.concatenate([log.times[:1], log.times[:-1] + 0.1 * phase])
+    steps = CommandedForces(dataclasses.replace(log, times=times, sampled=False), vehicle, 0.1)
+    lines, scales = CommandedForces(log, vehicle, 0.1), np.linspace(0.9, 1.1, 8)
+    changes = np.append(np.repeat([phase - 0.5, phase * (1.0 - phase) / 2.0 - 1.0 / 12.0], 6), 0.0)
+    expected = steps.actuation(0.0, scales).wrench[:58, 0]
+    assert lines.actuation(0.0, scales, changes=changes).wrench[:58, 0] == pytest.approx(expected)
+    fine, few = (
+        CommandedForces(x, vehicle, 0.005) for x in (dataclasses.replace(log, times=times, sampled=False), log)
+    )
+    late = np.where(np.arange(13) < 6, changes, 0.0)
+    behind, near, far = (
+        x.wrench[400:1140:20, 0] - 0.5 * x.wrench[400:1140:20, 1] for x in (  # at samples, long after the first one
+            fine.actuation(0.3, scales), few.actuation(0.3, scales, changes=changes),
+            few.actuation(0.3, scales, changes=late),
+        )
+    )  # fmt: skip
+    assert np.abs(near - behind).max() < 0.5 * np.abs(far - behind).max()
+
+
+def test_derivatives_by_changes_between_samples(vehicle):
+    log = dataclasses.replace(log_of(vehicle, period=0.1), sampled=True)
+    forces, scales, h = CommandedForces(log, vehicle, STEP), np.linspace(0.9, 1.1, 8), 1e-6
+    changes = np.linspace(-0.1, 0.1, 13)
+    found = forces.actuation(0.15, scales, changes=changes).by_changes
+    for i in range(13):
+        bit = np.where(np.arange(13) == i, h, 0.0)
+        both = [forces.actuation(0.15, scales, changes=changes + sign * bit).wrench for sign in (1, -1)]
+        assert found[i] == pytest.approx((both[0] - both[1]) / (2.0 * h), abs=1e-6)
+    held = CommandedForces(dataclasses.replace(log, sampled=False), vehicle, STEP)
+    assert not held.actuation(0.15, scales).by_changes.any()
+
+
+def test_smoothness_is_a_second_moment(vehicle):
+    """A filter's second moment is half the second derivative of what it filters: of a slow sine, known by hand."""
+    times = 0.1 * np.arange(200)
+    sine = np.repeat(5.0 * np.sin(0.8 * times)[:, None], vehicle.n_thrusters, axis=1)
+    log = Log("one", times, sine, np.zeros((200, 6)), (), sampled=True)
+    forces, scales = CommandedForces(log, vehicle, STEP), np.ones(vehicle.n_thrusters)
+    found = forces.actuation(0.0, scales).by_changes[12, :, 0]
+    middles = STEP * (np.arange(len(found)) + 0.5)
+    expected = (-(0.8**2) * 5.0 * np.sin(0.8 * middles) * 0.1**2 / 12.0)[:, None] * vehicle.thruster_matrix.sum(axis=1)
+    assert found[20:-20] == pytest.approx(expected[20:-20], abs=0.1 * np.abs(expected).max())

@@ -16,6 +16,7 @@ from cosim.errors import CosimError, ImportLogError
 from cosim.io.strict_json import json_text
 from cosim.logs.formats.dataflash import _Takers
 from cosim.logs.selection import select_topics
+from cosim.logs.vehicle_messages import VehicleMessages
 from cosim.results.log_facts import load_log_facts
 from tests.cosim.logs.conftest import LOGS
 
@@ -304,6 +305,10 @@ def test_visual_odometry_is_the_mean_velocity_of_its_interval(contents):
     takers.take("VISO", {"TimeUS": 2e6, "dt": 0.2, "PosDX": 0.1, "PosDY": -0.02, "PosDZ": 0.0, "conf": 90.0} | turned)
     source = contents.sources["dvl", "VISO"]
     assert source.count == 1
+    assert next(source.blocks())[0, 1:] == pytest.approx([1.9, 0.5, -0.1, 0.0])
+    message = mavlink.MAVLink_vision_position_delta_message(2_000_000, 200_000, [0.0] * 3, [0.1, -0.02, 0.0], 90.0)
+    VehicleMessages(contents, 1, 3, 12).take(255, 197, message, 2.0)
+    source = contents.sources["dvl", "VISION_POSITION_DELTA"]
     assert next(source.blocks())[0, 1:] == pytest.approx([1.9, 0.5, -0.1, 0.0])
 
 
