@@ -68,16 +68,38 @@ class TurnLead:
 
 
 class LevelLead:
-    """Convert the commands of roll and pitch that level a vehicle to lean angles of an ArduSub's attitude loop.
+    """Convert the moments that tilt a vehicle to lean angles of an ArduSub's attitude loop.
 
-    Surge and sway tilt a vehicle whose horizontal thrusters are eccentric. The loop commands the rate
-    P_a (lean - angle), and the thrusters u = P e + I integral(e) of its error e. So a lean u/(P_a P), which washes out
-    in P/I seconds, gives the command u while the angle is zero. Gains are ArduSub's defaults until `set_gains`.
+    Surge and sway tilt a vehicle whose horizontal thrusters are eccentric, and so does Munk's moment. Both are known
+    before the tilt. The loop commands the rate P_a (lean - angle), and the thrusters u = P e + I integral(e) of its
+    error e. So a lean u/(P_a P), which washes out in P/I seconds, gives the command u while the angle is zero.
+
+    The leans are feed-forward alone: they depend on neither angles nor rates, and not on a law's moments. A law's
+    attitude loop around the autopilot's, delayed by the link, would only take margin. A law that adapts its restoring
+    moments would even find the stiffness of the autopilot's loop in place of the vehicle's, and cancel it.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Vehicle, for its added mass.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, vehicle: Vehicle) -> None:
+        self._added: Array = vehicle.added_mass[:3, :3]
         self._settled: Array = np.zeros(2)
         self.set_gains({})
+
+    def moments(self, velocity: Array) -> Array:
+        """Return the moments about roll and pitch, shape (2,) [N m], that cancel Munk's, v x (M_A v).
+
+        Parameters
+        ----------
+        velocity : ndarray, shape (3,)
+            [m/s], body frame; what is not finite counts as 0.
+        """
+        speed = np.where(np.isfinite(velocity), velocity, 0.0)
+        result: Array = np.cross(speed, self._added @ speed)[:2]
+        return result
 
     def set_gains(self, parameters: Mapping[str, float]) -> None:
         """Set the gains of both axes to those of pitch in an ArduSub's parameters; missing ones are its defaults."""
