@@ -151,11 +151,14 @@ class Output:
         turn = 0.0 if self._profile.name == "ardusub" else None
         return (velocity_target(self._mavlink, system, self.velocity, turn),)
 
-    def descend(self, state: ReportedState, speed: float) -> Sequence[Any]:
-        """Return the messages of a level descent at a speed [m/s] on the spot, by velocity or by stick."""
+    def descend(self, state: ReportedState, speed: float, back: Array, period: float) -> Sequence[Any]:
+        """Return the messages of a level descent at a speed [m/s], by velocity or by stick, for a `period` [s].
+
+        By velocity it stays on the spot, to which `back`, shape (2,) [m, NE], is the way; by stick the autopilot does.
+        """
         self.clear()
         if self._steer_by == "velocity":
-            self.velocity[2] = speed
+            self.velocity[:] = self._lead.hold(back, speed, state, period)
             return (velocity_target(self._mavlink, state.system or 0, self.velocity, 0.0),)
         self.sticks[2] = self._scale.climb_stick(speed)
         return (self._sticks(state.system or 0),)

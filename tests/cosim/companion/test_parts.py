@@ -295,6 +295,18 @@ def test_velocity_lead_compensates_unknown_gain_and_lag(gain, lag, push):
     assert state.velocity[0] == pytest.approx(wanted, abs=0.005)
 
 
+def test_a_dive_by_velocity_stays_on_the_spot_against_a_current():
+    """An ArduSub that did dv/dt = 0.27 asked - 0.65 (v - 0.12 m/s) was carried 0.8 m away by a velocity of 0."""
+    lead, state, period = VelocityLead(HEAVY, 2.0, 0.5), reported((0.0, 0.0, 0.0)), 0.02
+    farthest = 0.0
+    for _ in range(350):
+        asked = lead.hold(-state.position[:2], 0.2, state, period)
+        state.velocity[:2] += period * (0.27 * asked[:2] - 0.65 * (state.velocity[:2] - (0.12, -0.05)))
+        state.position[:] += period * state.velocity
+        farthest = max(farthest, float(np.linalg.norm(state.position[:2])))
+    assert asked[2] == 0.2 and farthest < 0.15 and np.linalg.norm(state.position[:2]) < 0.1
+
+
 def test_distance_without_a_fix_is_accumulated():
     """Of 3 m north and 4 m down the horizontal part, and only while the estimate says that it is relative."""
     relative, absolute = 8, 24  # flags of EKF_STATUS_REPORT and ESTIMATOR_STATUS
