@@ -28,9 +28,11 @@ from cosim.results.wording import verdict
 from cosim.run.run_folder import claim, conclude
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import SecondaryRegion
+from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.master import Master, Observer
 from cosim.simulation.signals import Array
+from plant_fmu import Vehicle
 
 if TYPE_CHECKING:  # websockets wait until a flight is shown
     from cosim.live.view import LiveView
@@ -38,6 +40,7 @@ if TYPE_CHECKING:  # websockets wait until a flight is shown
 _RELEASE = 2.0  # s at the most, that letting go takes at the end
 _NO_COMMANDS = "a companion's page shows alone: take over at the autopilot's ground station"
 _STEADY = 0.1  # m, of drift between two sources, up to which it is their noise
+_RESERVE = 0.3  # of the thrusters' force, for moments that the autopilot gives
 _UNSEEN = 0.05  # m, by which an autopilot's position may be off without a sign of it
 
 
@@ -46,15 +49,16 @@ _UNSEEN = 0.05  # m, by which an autopilot's position may be off without a sign 
 _FILTERED = {"law.gains.position_noise": 0.01, "law.gains.velocity_noise": 0.05}
 # the autopilot has the thrusters: what one of them does is not what the law asked of it
 _NOT_ISOLATED = {"law.gains.failure_threshold": 0.0}
-# its attitude loop takes care of moments
-_NOT_TURNED = _NOT_ISOLATED | {"law.gains.adaptation": 0.0, "law.gains.moment_bound": 1e-3}
+# its attitude loop gives the moments: a law that finds out restoring moments, or the effectiveness of each thruster, by
+# what its own moments do, finds the stiffness of that loop, and works against it
+_NOT_TURNED = _NOT_ISOLATED | {
+    "law.gains.adaptation": 0.0,
+    "law.gains.moment_bound": 1e-3,
+    "law.gains.effectiveness_estimation": 0.0,
+}
 _NOT_LIFTED = {"law.gains.restoring_drift": 0.0, "law.gains.restoring_bound": 1e-3}  # its depth loop, of weight
 # its velocity loop takes care of weight, moments, current and lag: what the law would find out of them is not so
-_NOT_ESTIMATED = (
-    _NOT_TURNED
-    | _NOT_LIFTED
-    | {"law.gains.effectiveness_estimation": 0.0, "law.gains.lag_bound": 0.0, "law.gains.current_bound": 1e-3}
-)
+_NOT_ESTIMATED = _NOT_LIFTED | {"law.gains.lag_bound": 0.0, "law.gains.current_bound": 1e-3}
 
 
 def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks", profile: ProfileName = "ardusub") -> Scenario:
@@ -83,10 +87,13 @@ def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks", profile:
     arbiter = max(1, round(scenario.time.arbiter / period)) * period
     duration = max(1, round(scenario.time.duration / period)) * period
     gains: dict[str, float] = _NOT_ISOLATED
-    if steer_by == "attitude":
-        gains = _NOT_TURNED | (_NOT_LIFTED if profile == "ardusub" else {})
+    if steer_by != "wrench":
+        fastest = FASTEST if steer_by == "velocity" else _speed_with_reserve(scenario.vehicle)
+        gains = _NOT_TURNED | {"law.gains.speed": min(getattr(scenario.law.gains, "speed", fastest), fastest)}
+    if steer_by == "attitude" and profile == "ardusub":
+        gains |= _NOT_LIFTED
     if steer_by == "velocity":
-        gains = _NOT_ESTIMATED | {"law.gains.speed": min(getattr(scenario.law.gains, "speed", FASTEST), FASTEST)}
+        gains |= _NOT_ESTIMATED
     return scenario.replace(
         (_FILTERED | gains if scenario.law.name == "deployable" else {})
         | {
@@ -102,6 +109,14 @@ def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks", profile:
             "commands.obstacles": 0,
         }
     )
+
+
+def _speed_with_reserve(vehicle: Vehicle) -> float:
+    """Return the speed ahead [m/s] at which drag leaves the autopilot a part of the thrusters, for its moments."""
+    force = (1.0 - _RESERVE) * greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)[0]
+    linear, quadratic = float(vehicle.linear_damping[0]), float(vehicle.quadratic_damping[0])
+    slope = linear + math.sqrt(linear**2 + 4.0 * quadratic * force)
+    return 2.0 * float(force) / slope if slope > 0.0 else math.inf
 
 
 def _is_fence(secondary: SecondaryRegion) -> bool:

@@ -85,6 +85,7 @@ class LevelDive:
         self._armed_depth: float | None = None  # m, of where it was armed
         self._armed_at = self._aligned_at = math.inf  # our time [s] of arming, and of the last alignment
         self._begun: tuple[float, float] | None = None  # our time [s]; clearance then [m]
+        self._place: Array = np.zeros(2)  # m, NE, where it began
         self._arrived_at: float | None = None
         self._is_done = False
         self._texts_read = 0  # of the autopilot's texts
@@ -122,7 +123,7 @@ class LevelDive:
                 )
                 self._is_done = True
                 return False
-            self._begun = now, here
+            self._begun, self._place = (now, here), state.position[:2].copy()
         if self.clearance is not None:
             self.outside = max(0.0, min(0.0, self._begun[1]) - self.clearance(state.position))
         return True
@@ -138,6 +139,10 @@ class LevelDive:
     def speed_down(self, state: ReportedState) -> float:
         """Return the downward speed to command now [m/s]; 0 for a vehicle that is too deep."""
         return min(max(_GAIN * self._depth_left(state), 0.0), _FASTEST)
+
+    def way_back(self, state: ReportedState) -> Array:
+        """Return the horizontal way to where the dive began, shape (2,) [m, NE]."""
+        return self._place - state.position[:2]
 
     def _depth_left(self, state: ReportedState) -> float:
         assert self._armed_depth is not None

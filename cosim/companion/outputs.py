@@ -101,7 +101,7 @@ class Output:
         self._scale = scale_of(vehicle, self._profile, pilot_gain, sticks_by)
         self._yaw_part = _YAW_PART if profile == "ardusub" else 1.0
         self._all_axes = steer_by == "wrench" or (steer_by == "sticks" and profile == "ardusub")
-        self._turn, self._lead, self._level_lead = TurnLead(vehicle), VelocityLead(vehicle, *lags), LevelLead()
+        self._turn, self._lead, self._level_lead = TurnLead(vehicle), VelocityLead(vehicle, *lags), LevelLead(vehicle)
         self._overridden = False  # True while overridden channels are not released
         self.sticks, self.velocity, self.attitude = np.zeros(6), np.zeros(3), np.zeros(4)
 
@@ -131,8 +131,10 @@ class Output:
                 self.attitude[:] = self._turn.attitude(wrench, state)
                 return self._attitude(wrench, state, period)
             case "sticks":
+                wrench = wrench.copy()
+                wrench[3:5] = self._level_lead.moments(state.velocity_body[:3])
                 self.sticks[:] = self._scale.sticks(wrench)
-                self.sticks[3:5] = self._level(wrench, period)
+                self.sticks[3:5] = self._lean(period)
                 self.sticks[5] = self._scale.yaw_rate_stick(self._yaw_part * self._turn.yaw_rate(wrench, state))
             case "wrench":
                 self.sticks[:] = self._scale.sticks(wrench)
@@ -149,11 +151,14 @@ class Output:
         turn = 0.0 if self._profile.name == "ardusub" else None
         return (velocity_target(self._mavlink, system, self.velocity, turn),)
 
-    def descend(self, state: ReportedState, speed: float) -> Sequence[Any]:
-        """Return the messages of a level descent at a speed [m/s] on the spot, by velocity or by stick."""
+    def descend(self, state: ReportedState, speed: float, back: Array, period: float) -> Sequence[Any]:
+        """Return the messages of a level descent at a speed [m/s], by velocity or by stick, for a `period` [s].
+
+        By velocity it stays on the spot, to which `back`, shape (2,) [m, NE], is the way; by stick the autopilot does.
+        """
         self.clear()
         if self._steer_by == "velocity":
-            self.velocity[2] = speed
+            self.velocity[:] = self._lead.hold(back, speed, state, period)
             return (velocity_target(self._mavlink, state.system or 0, self.velocity, 0.0),)
         self.sticks[2] = self._scale.climb_stick(speed)
         return (self._sticks(state.system or 0),)
@@ -193,11 +198,11 @@ class Output:
         self.sticks[2:] = self._scale.climb_stick(rate_down), 0.0, 0.0, 0.0
         return attitude_target(self._mavlink, system, self.attitude, None), self._sticks(system)
 
-    def _level(self, wrench: Array, period: float) -> Array:
-        """Return the sticks of roll and pitch, shape (2,), with which the autopilot keeps the vehicle level."""
+    def _lean(self, period: float) -> Array:
+        """Return the sticks of roll and pitch, shape (2,), for which an ArduSub commands what they say now."""
         if self._profile.name != "ardusub":
             return np.zeros(2)
-        return self._scale.lean_sticks(self._level_lead.angles(self._scale.sticks(wrench)[3:5], period))
+        return self._scale.lean_sticks(self._level_lead.angles(self.sticks[3:5], period))
 
     def _sticks(self, system: int) -> Any:
         if self._sticks_by == "manual-control":

@@ -289,7 +289,8 @@ class AutopilotSession:
                 self._send_mode(self._dive_mode, now)
                 messages = output.still(self.reported)
             else:
-                messages = output.descend(self.reported, self.dive.speed_down(self.reported))
+                speed, back = self.dive.speed_down(self.reported), self.dive.way_back(self.reported)
+                messages = output.descend(self.reported, speed, back, period)
         elif state == "engaging":
             self.supervisor.asked_for_mode(now)
             self._send_mode(self._steered_in, now)

@@ -18,6 +18,7 @@ from plant_fmu import Vehicle
 FASTEST = 0.5  # m/s, greatest speed of a law that steers by velocity: a velocity loop brakes later than thrusters
 _FASTEST_ASKED, _FASTEST_TURN = 0.8, 0.6  # m/s, rad/s, greatest set-points
 _OBSERVED = 1.5  # rad/s, both poles of the observer
+_HELD = 0.6  # rad/s, with which a place is held
 _RATE_LAG, _ANGLE_LAG = 0.3, 0.3  # s, of an autopilot's loops of rate and angle
 _FARTHEST, _TILT = 0.35, 0.1  # rad, greatest lead of set-points of angles; greatest roll and pitch
 _ANGLE_P, _RATE_P, _RATE_I = 6.0, 0.135, 0.09  # ATC_ANG_PIT_P [1/s], ATC_RAT_PIT_P [s], ATC_RAT_PIT_I; of roll alike
@@ -68,16 +69,38 @@ class TurnLead:
 
 
 class LevelLead:
-    """Convert the commands of roll and pitch that level a vehicle to lean angles of an ArduSub's attitude loop.
+    """Convert the moments that tilt a vehicle to lean angles of an ArduSub's attitude loop.
 
-    Surge and sway tilt a vehicle whose horizontal thrusters are eccentric. The loop commands the rate
-    P_a (lean - angle), and the thrusters u = P e + I integral(e) of its error e. So a lean u/(P_a P), which washes out
-    in P/I seconds, gives the command u while the angle is zero. Gains are ArduSub's defaults until `set_gains`.
+    Surge and sway tilt a vehicle whose horizontal thrusters are eccentric, and so does Munk's moment. Both are known
+    before the tilt. The loop commands the rate P_a (lean - angle), and the thrusters u = P e + I integral(e) of its
+    error e. So a lean u/(P_a P), which washes out in P/I seconds, gives the command u while the angle is zero.
+
+    The leans are feed-forward alone: they depend on neither angles nor rates, and not on a law's moments. A law's
+    attitude loop around the autopilot's, delayed by the link, would only take margin. A law that adapts its restoring
+    moments would even find the stiffness of the autopilot's loop in place of the vehicle's, and cancel it.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Vehicle, for its added mass.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, vehicle: Vehicle) -> None:
+        self._added: Array = vehicle.added_mass[:3, :3]
         self._settled: Array = np.zeros(2)
         self.set_gains({})
+
+    def moments(self, velocity: Array) -> Array:
+        """Return the moments about roll and pitch, shape (2,) [N m], that cancel Munk's, v x (M_A v).
+
+        Parameters
+        ----------
+        velocity : ndarray, shape (3,)
+            [m/s], body frame; what is not finite counts as 0.
+        """
+        speed = np.where(np.isfinite(velocity), velocity, 0.0)
+        result: Array = np.cross(speed, self._added @ speed)[:2]
+        return result
 
     def set_gains(self, parameters: Mapping[str, float]) -> None:
         """Set the gains of both axes to those of pitch in an ArduSub's parameters; missing ones are its defaults."""
@@ -146,7 +169,31 @@ class VelocityLead:
         speed = state.velocity_body[:3]
         force = np.where(np.isfinite(wrench[:3]), wrench[:3], 0.0)
         drag = (self._linear + self._quadratic * np.abs(speed)) * speed
-        wanted = rotation_matrix(state.quaternion) @ ((force - drag) / self._mass)
+        wanted: Array = rotation_matrix(state.quaternion) @ ((force - drag) / self._mass)
+        return self._set_point(wanted, state, period)
+
+    def hold(self, back: Array, speed_down: float, state: ReportedState, period: float) -> Array:
+        """Return the velocity [m/s, NED], shape (3,), that holds a place, against a current too, at a speed down.
+
+        Parameters
+        ----------
+        back : ndarray, shape (2,)
+            From the vehicle to the place, horizontally [m, NE].
+        speed_down : float
+            Velocity down that is asked for as it is [m/s].
+        state : ReportedState
+            Present state.
+        period : float
+            Time since the last call [s].
+        """
+        wanted = np.zeros(3)
+        wanted[:2] = _HELD**2 * back - 2.0 * _HELD * state.velocity[:2]
+        asked = self._set_point(wanted, state, period)
+        asked[2] = speed_down
+        return asked
+
+    def _set_point(self, wanted: Array, state: ReportedState, period: float) -> Array:
+        """Return the velocity that gives an acceleration [m/s2, NED]."""
         self._observe(state.velocity, period)
         asked: Array = state.velocity + self._lag * (wanted - self._beside)
         length = float(np.linalg.norm(asked))

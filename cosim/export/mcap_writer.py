@@ -120,7 +120,7 @@ class _Drawing:
 
     def row_writer(self, rows: Rows) -> Callable[[int, int], None]:
         """Return a function that writes the scene of one of the rows, given its index and time [ns]."""
-        known = np.isfinite(rows.stack(POSITION + QUATERNION)).all(axis=1)
+        known: NDArray[np.bool_] = np.isfinite(rows.stack(POSITION + QUATERNION)).all(axis=1)
         positions, quaternions = rows.stack(POSITION).tolist(), rows.stack(QUATERNION).tolist()
         moved = {foxglove.frame_of(s): rows.stack(s.shift).tolist() for s in self._scene.solids if s.moves}
         active = active_at(self._run.scenario, rows).tolist()

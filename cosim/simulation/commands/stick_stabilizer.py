@@ -19,7 +19,8 @@ YAW_RATE = math.radians(
 )  # rad/s of a full stick at a pilot gain of 1, as ArduSub has it: 45 deg/s by ACRO_YAW_P of 4.5
 CLIMB_RATE = 0.3  # m/s, vertical speed at full stick
 _FARTHEST = math.radians(20.0), 0.3  # rad, m: bounds by which desired heading and depth may lead the vehicle's
-_ATTITUDE, _DEPTH, _INTEGRAL = 2.5, 1.5, 0.3  # rad/s, frequencies of both loops; 1/s, gain of the depth's integral
+_ATTITUDE, _DEPTH = 5.0, 1.5  # rad/s, frequencies of both loops; an ArduSub's loop of angles has 6 1/s
+_INTEGRAL = 0.3  # 1/s, gain of the depth's integral
 _NORTH, _EAST, _DOWN = np.eye(3)
 
 

@@ -15,7 +15,7 @@ from cosim.companion.frame_alignment import FrameAlignment, SceneOrigin
 from cosim.companion.heading import HeadingWatch, LevelDive
 from cosim.companion.link import NetworkLink
 from cosim.companion.options import CompanionOptions
-from cosim.companion.outputs import Output, require_taken
+from cosim.companion.outputs import require_taken
 from cosim.companion.safety import CONDITIONS, Observation, Supervisor
 from cosim.companion.set_points import TurnLead, VelocityLead, attitude_target, velocity_target
 from cosim.companion.sticks import channels_override, channels_released, manual_control, scale_of
@@ -207,48 +207,6 @@ def test_rc_override_realizes_the_desired_wrench(wrench):
     assert made == pytest.approx(np.array(wrench), rel=0.01, abs=0.05)
 
 
-def angle_of(pulse):
-    """Return the lean [rad] of a pulse off the middle, as pwm_to_angle_dz and ANGLE_MAX have it."""
-    return math.radians(45.0) * math.copysign(max(abs(pulse) - 30.0, 0.0) / 370.0, pulse)
-
-
-def greatest_tilt(forces, leaning=True):
-    """Return the greatest tilt [rad] under a sequence of surge, sway, heave [N], in ArduSub's STABILIZE.
-
-    As AC_AttitudeControl has it, with its default gains; a body with the published inertia and moments.
-    """
-    output = Output(mavlink, HEAVY, "ardusub", "sticks", "manual-control", 1.0, (2.0, 0.5))
-    state, period, tilt = reported((0.0, 0.0, 0.0)), 0.02, 0.0
-    inertia = (np.diag(HEAVY.inertia) + np.diag(HEAVY.added_mass)[3:])[:2]
-    angle, rate, integral = np.zeros(2), np.zeros(2), np.zeros(2)
-    for force in forces:
-        (message,) = output.messages(np.array([*force, 0.0, 0.0, 0.0]), state, period)
-        m = decoded(message)
-        asked = np.array([angle_of(m.t), angle_of(m.s)]) if leaning else np.zeros(2)
-        for _ in range(4):
-            wrong = 6.0 * (asked - angle) - rate
-            integral = np.clip(integral + 0.09 * wrong * period / 4, -0.444, 0.444)
-            roll, pitch = 0.135 * wrong + integral
-            motors = VECTORED_6DOF @ (m.x / 1e3, m.y / 1e3, (500 - m.z) / 500, roll, pitch, 0.0)
-            made = HEAVY.thruster_matrix @ (-40.0 * motors * np.abs(motors))
-            righting = 131.588 * 0.01 * np.sin(angle)
-            damping = np.diag((1.19, 0.47)) @ (rate * np.abs(rate)) + np.array([0.0, 0.8]) * rate
-            rate = rate + period / 4 * (made[3:5] - righting - damping) / inertia
-            angle = angle + period / 4 * rate
-        tilt = max(tilt, float(np.hypot(*angle)))
-    return tilt
-
-
-@pytest.mark.parametrize("force", [(36.0, 0.0, 5.0), (0.0, -40.0, 8.0), (25.0, 25.0, 15.0)])
-def test_leans_keep_an_ardusub_level_while_it_is_pushed(force):
-    """Thrusters 0.085 m above the center tilt it as surge or sway sets in and turns round; without the leans by 20."""
-    ramp = [min(k / 50, 1.0) for k in range(200)]
-    turn = [max(1.0 - k / 50, -1.0) for k in range(200)]
-    forces = [(part * force[0], part * force[1], force[2]) for part in ramp + turn]
-    assert greatest_tilt(forces) < math.radians(6.0)
-    assert greatest_tilt(forces, leaning=False) > math.radians(15.0)
-
-
 def test_state_is_predicted_over_its_age():
     """A steady motion, 40 ms after its messages came, and with a stamp no older than that; no further than 0.1 s."""
     state = reported((1.0, 2.0, 3.0), heard=10.0)
@@ -335,6 +293,18 @@ def test_velocity_lead_compensates_unknown_gain_and_lag(gain, lag, push):
         asked = lead.velocity(np.array([force, 0.0, 0.0, 0.0, 0.0, 0.0]), state, period)[0]
         state.velocity[0] += period * ((gain * asked - speed) / lag + push)
     assert state.velocity[0] == pytest.approx(wanted, abs=0.005)
+
+
+def test_a_dive_by_velocity_stays_on_the_spot_against_a_current():
+    """An ArduSub that did dv/dt = 0.27 asked - 0.65 (v - 0.12 m/s) was carried 0.8 m away by a velocity of 0."""
+    lead, state, period = VelocityLead(HEAVY, 2.0, 0.5), reported((0.0, 0.0, 0.0)), 0.02
+    farthest = 0.0
+    for _ in range(350):
+        asked = lead.hold(-state.position[:2], 0.2, state, period)
+        state.velocity[:2] += period * (0.27 * asked[:2] - 0.65 * (state.velocity[:2] - (0.12, -0.05)))
+        state.position[:] += period * state.velocity
+        farthest = max(farthest, float(np.linalg.norm(state.position[:2])))
+    assert asked[2] == 0.2 and farthest < 0.15 and np.linalg.norm(state.position[:2]) < 0.1
 
 
 def test_distance_without_a_fix_is_accumulated():

@@ -3,6 +3,7 @@
 import random
 import struct
 import time
+from contextlib import closing
 from importlib import resources
 
 import numpy as np
@@ -363,11 +364,11 @@ def test_a_plant_that_fails_leaves_its_record(serve):
     assert len(load_record(served.server._flights._ended[0][0].folder)["time"]) == 5
 
 
-def test_occupied_port_is_reported(serve, tmp_path):
-    served = serve(timeout=0.1)
+def test_occupied_port_is_reported():
     flights = Flights(FlightOptions(), "ardupilot", law_of_pwm)
-    with pytest.raises(RunError, match=rf"UDP 127.0.0.1:{served.address[1]}: Address already in use"):
-        JsonServer(flights, served.address)
+    with closing(JsonServer(flights, ("127.0.0.1", 0))) as server:
+        with pytest.raises(RunError, match=rf"UDP 127.0.0.1:{server.address[1]}: Address already in use"):
+            JsonServer(flights, server.address)
 
 
 @pytest.mark.parametrize(
