@@ -17,6 +17,7 @@ from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from mcap.writer import Writer
 from mcap_protobuf.schema import register_schema
+from numpy.typing import NDArray
 
 from cosim.export import foxglove_scene as foxglove
 from cosim.export.excerpt import Excerpt
