@@ -10,6 +10,7 @@ from cosim.errors import IdentificationError
 from cosim.identification.fit import STAGES, Fit
 from cosim.identification.intervals import DISAGREES
 from cosim.identification.log import UNITS, Log, command_period
+from cosim.identification.parameters import NUISANCES, RANDOM_FORCE
 
 _LOST = 10.0  # chi2 by degrees of freedom, above which nothing was identified
 _ALIKE = 0.95  # correlation, beyond which runs do not separate two numbers
@@ -141,11 +142,14 @@ def _cause(fit: Fit, slow: bool) -> str:
     late = {name: x for name, x in fit.delays.items() if x > _LATE}
     if late and not slow and not any(p.kind == "delay" for p in fit.parameters):
         said = ", ".join(f"{name.replace('_', ' ')} {x:.2f} s" for name, x in late.items())
-        return f"Samples come late behind the commands: {said}. Estimate that: --nuisance delay."
+        return f"Samples come late behind the commands: {said}. Estimate that, too: {_nuisance_flag(fit, 'delay')}."
     named = [cause for cause in fit.causes if cause.share > NAMED]
     if named:
         said = ", ".join(f"{_CAUSES[c.flag.split()[1]]} ({100 * c.share:.0f} %: {c.flag})" for c in named[:3])
-        return f"What would explain most of that, in one step of the fit: {said}."
+        return (
+            f"What would explain most of that, in one step of the fit: {said}. A flag takes the place of what it names "
+            f"now, {_nuisance_flag(fit)}: give it whole."
+        )
     if fit.forces is not None:
         return "The force may change within windows too: no delay, scale or factor of a thruster explains the rest."
     if slow:
@@ -154,6 +158,13 @@ def _cause(fit: Fit, slow: bool) -> str:
         "No delay, scale, force or factor of a thruster explains that: look for a current or an error of a sensor "
         "that changes in time, and for parts that the model has not."
     )
+
+
+def _nuisance_flag(fit: Fit, *more: str) -> str:
+    """Return the flag that names the nuisances of a fit, and more of them."""
+    kinds = {p.kind for p in fit.parameters}
+    named = [name for name in NUISANCES if name in kinds]
+    return " ".join(["--nuisance", *named, *([RANDOM_FORCE] if fit.forces is not None else []), *more])
 
 
 _CAUSES = {

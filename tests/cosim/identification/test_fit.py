@@ -173,11 +173,12 @@ def test_a_cause_that_is_not_estimated_is_named(log, late, vehicle):
     """Samples that are late, and a DVL that measures 5 % too much; what changes in time has no name."""
     parameters = free_parameters(vehicle, FREE) + nuisances(("current", "bias"), [log])
     said = " ".join(warnings(fit([late], vehicle, parameters), [late]))
-    assert "Samples come late" in said and "--nuisance delay" in said
+    assert "Samples come late" in said and "too: --nuisance current bias delay." in said  # what is named now stays
     scaled = tuple(dataclasses.replace(t, values=1.05 * t.values) if t.name == "velocity" else t for t in log.topics)
     done = fit([dataclasses.replace(log, topics=scaled)], vehicle, parameters)
     assert done.causes[0].flag == "--nuisance scale" and done.causes[0].share > 0.3
-    assert "the DVL's scale (" in " ".join(warnings(done, [log]))
+    said = " ".join(warnings(done, [log]))
+    assert "the DVL's scale (" in said and "what it names now, --nuisance current bias: give it whole" in said
 
 
 @pytest.mark.slow
