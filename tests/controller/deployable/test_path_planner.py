@@ -51,7 +51,7 @@ def length_of(way, count, start=START):
 def path_cost(way, count, regions):
     """Return what a way costs."""
     cost = empty_cost(regions.kinds.size)
-    begin_cost(cost, START)
+    begin_cost(cost, START, np.zeros(3))
     while not add_cost(cost, way, count, regions, GAINS, np.inf):
         pass
     return cost.cost[0]
@@ -233,7 +233,7 @@ def test_clearance_evaluations_are_bounded(monkeypatch):
     way = np.zeros((CORNERS + 1, 3))
     way[:] = [(100.0 * (i + 1), 50.0 * (-1.0) ** i, 2.5) for i in range(CORNERS + 1)]
     cost, calls = empty_cost(3), [0]
-    begin_cost(cost, START)
+    begin_cost(cost, START, np.zeros(3))
     while not add_cost(cost, way, CORNERS + 1, regions, GAINS, np.inf):
         calls.append(len(looked))
     assert max(np.diff(calls)) <= 64 * 3 and len(looked) == 512 * 3

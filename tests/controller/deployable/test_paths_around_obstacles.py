@@ -49,12 +49,28 @@ def price(depth, away=0.0):
     return max(depth, 0.0) + 0.5 * np.clip((depth + away) / 0.2, 0.0, 1.0)
 
 
-def expected_cost(points, packed, gains=GAINS):
+def near_price(free, gains=GAINS):
+    """Return what a metre costs at a clearance of hard regions."""
+    deep, lack = max(gains.margin - free, 0.0), max(gains.clearance - free, 0.0)
+    return 3.0 * (lack / gains.clearance) ** 2 + 200.0 * (min(deep / 0.1, 1.0) + deep)
+
+
+def expected_stay(end, packed, drift=0.0):
+    """Look at the end now; if it drifts, also at hard regions, and a second, three and nine seconds later."""
+    drifts, prices = np.any(drift), []
+    for later in (0.0, 1.0, 3.0, 9.0) if drifts else (0.0,):
+        place = end + np.asarray(drift) * later
+        soft = packed.crossing_costs[3] * price(-soft_clearance(packed, place, later), 0.05)
+        prices.append(soft + drifts * near_price(clearance(packed, place, later)))
+    return 3.0 * np.mean(prices)
+
+
+def expected_cost(points, packed, gains=GAINS, drift=0.0):
     """Look at all regions at each stride. Return the cost, what hard regions add, and soft ones on the way."""
     points = np.asarray(points)
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     enough, total, penalty, through, samples = gains.clearance + 3.0 / 0.7, lengths.sum(), 0.0, 0.0, 0
-    stay = 3.0 * packed.crossing_costs[3] * price(-soft_clearance(packed, points[-1]), 0.05)
+    stay = expected_stay(points[-1], packed, drift)
     for leg, length in enumerate(lengths):
         s = 0.0
         while s < length:
@@ -70,18 +86,15 @@ def expected_cost(points, packed, gains=GAINS):
             stride = max(0.7 * (free - gains.clearance), 0.5 * (free - gains.margin), 0.08)
             stride = min(stride, room, length - s + 1e-9)
             through += stride * packed.crossing_costs[3] * price(-soft)
-            penalty += stride * 3.0 * (max(gains.clearance - free, 0.0) / gains.clearance) ** 2
-            if free < gains.margin:
-                deep = gains.margin - free
-                penalty += stride * 200.0 * (min(deep / 0.1, 1.0) + deep)
+            penalty += stride * near_price(free)
             s += stride
     return total + penalty + through + stay, penalty, through
 
 
-def cost_of(way, count, packed, start=START, most=np.inf):
+def cost_of(way, count, packed, start=START, most=np.inf, drift=(0.0, 0.0, 0.0)):
     """Return what the planner makes of a way, and in how many calls."""
     cost, calls = empty_cost(packed.kinds.size), 1
-    begin_cost(cost, start)
+    begin_cost(cost, start, np.array(drift))
     while not add_cost(cost, way, count, packed, GAINS, most):
         calls += 1
     return cost.cost, calls
@@ -102,8 +115,9 @@ def test_path_cost_matches_dense_evaluation():
         packed.velocities[:3] = rng.normal(size=(3, 3)) * rng.choice([0.05, 0.4])
         packed.deviations[:3] = rng.uniform(0.0, 0.05, size=(3, 3))
         packed.crossing_costs[3] = rng.uniform(0.2, 10.0)
-        expected, penalty, through = expected_cost([START, *way[:count]], packed)
-        found, took = cost_of(way, count, packed)
+        drift = rng.normal(0.0, 0.2, 3) * (k % 2)
+        expected, penalty, through = expected_cost([START, *way[:count]], packed, drift=drift)
+        found, took = cost_of(way, count, packed, drift=drift)
         assert found == pytest.approx([expected, penalty, through], rel=1e-9)
         calls.append(took)
         length = np.linalg.norm(np.diff([START, *way[:count]], axis=0), axis=1).sum()
@@ -498,7 +512,7 @@ def test_path_is_updated_and_replaced_by_a_sufficiently_cheaper_one():
     """Turn by turn: the end goes with the goal, corners are passed, the cheaper way stays."""
     wall = Region("box", Box((5.0, -0.8, 2.6), (1.0, 9.0, 9.0)), "out", (-0.03, 0.0, 0.02))
     packed, goal, plan = pack([REGIONS[0], wall, *REGIONS[2:]]), pack([GOAL]), empty_plan(5, 1)
-    goal.velocities[0] = 0.05, -0.02, 0.01
+    goal.velocities[0] = drift = 0.05, -0.02, 0.01
     start, taken, grown, evaluated_from = START.copy(), 0, 0, START
     for k in range(400):
         start = start + np.array([0.004, 0.0, 0.0])
@@ -519,12 +533,12 @@ def test_path_is_updated_and_replaced_by_a_sufficiently_cheaper_one():
         grown += plan.search.of_goal.size[0] != nodes
         if phase == way_round._BEGIN and plan.phase[0] == way_round._CANDIDATE:  # the path, in one call
             np.testing.assert_allclose(way, before, rtol=1e-12)
-            assert plan.cost == pytest.approx(expected_cost([start, *before], packed), rel=1e-9)
+            assert plan.cost == pytest.approx(expected_cost([start, *before], packed, drift=drift), rel=1e-9)
             evaluated_from = start
             if found > 0:
                 assert np.array_equal(plan.candidate[:found], plan.found[:found]) or blocked
         elif phase == way_round._CANDIDATE and plan.phase[0] == way_round._BEGIN and not blocked:
-            new = expected_cost([evaluated_from, *candidate], packed)
+            new = expected_cost([evaluated_from, *candidate], packed, drift=drift)
             if new[0] < cost[0] - 0.03 - 0.01 * cost[0]:
                 taken += 1
                 assert plan.cost == pytest.approx(new, rel=1e-3)  # regions move meanwhile

@@ -24,7 +24,7 @@ CRITERIA = [("obstacle", "#D55E00"), ("shape", "#E69F00"), ("depth", "#56B4E9"),
 
 @pytest.fixture(scope="module")
 def four(shipped_run):
-    return load_run(shipped_run("inspection-visibility", "time.duration=24").folder)
+    return load_run(shipped_run("inspection-visibility", "time.duration=29").folder)
 
 
 @pytest.fixture(scope="module")
@@ -52,18 +52,18 @@ def test_events_and_report_name_the_active_criterion(four):
     turns = [(event.time, event.text) for event in events_of(four, ()) if event.kind == "active"]
     assert [text for _, text in turns] == [
         "Gives way to view (visibility)", "Gives way to pillar (obstacle)", "Goes for the goal again",
-        "Gives way to pillar (obstacle)", "Gives way to view (visibility)",
+        "Gives way to pillar (obstacle)", "Goes for the goal again", "Gives way to view (visibility)",
     ]  # fmt: skip
     (table,) = (table for table in contents_of(four).numbers if table.title == "Criteria")
     assert [row[0] for row in table.rows] == [f"{i + 1} {name}" for i, (name, _) in enumerate(CRITERIA)]
     obstacle, shape, _, visibility = table.rows
     assert obstacle[1] == "within 0.3 m or rad; approach time: 1 at 1 s, 0 at 3 s" and shape[2] == "never"
     assert visibility[1] == "clearance: 1 at -0.4 m, 0 at 0.1 m"
-    assert visibility[3].startswith(f"{turns[0][0]:.2f} to {turns[1][0]:.2f} (view), {turns[4][0]:.2f} to ")
+    assert visibility[3].startswith(f"{turns[0][0]:.2f} to {turns[1][0]:.2f} (view), {turns[5][0]:.2f} to ")
     weights = np.column_stack([four.record[f"weight.{name}"] for name, _ in CRITERIA])
     costs = {row[0].split()[-1]: row[-1] for row in table.rows}  # 5^(2 share - 1) times 2 m, of three with soft regions
     assert costs == {"obstacle": "–", "shape": "10", "depth": "2", "visibility": "0.4"}
-    led = (weights.argmax(axis=1) == 0) & (four.record["membership.obstacle"] > 0.0)
+    led = (weights.argmax(axis=1) == 0) & (weights[:, 0] >= 0.005)  # below, it is shown as 0.00
     assert float(obstacle[2]) == pytest.approx(led.sum() * 0.01, abs=0.2)  # turns that are back at once do not count
 
 

@@ -34,6 +34,8 @@ _NEAR = 3.0  # m of path, cost of a metre on the surface
 _ENTERED = 0.5  # m of depth, equivalent cost of being in a soft region at a depth of
 _SHALLOW = 0.2  # m or more; proportional at less depth
 _STAY = 3.0  # m of path, equivalent cost of the stay at its end
+_LOOKS = 4  # evaluations of a stay that moves with the goal, the first of them now
+_LATER = (1.0, 3.0)  # s from now, of the second; and the ratio of the times of each later one to that before
 _AWAY = 0.05  # m outside a soft region, within which a stay counts as inside: keeps the end off its surface
 _COARSE = 0.25  # m, least distance between two evaluations near the surface of a soft region
 _SPHERE = Sphere.kind
@@ -44,6 +46,7 @@ class PathCost(NamedTuple):
     """The cost of a path, complete or not yet."""
 
     start: Array  # (3,) m, NED: of the path, when the evaluation began
+    drift: Array  # (3,) m/s, NED: of its end, with the goal
     counts: NDArray[np.int64]  # (2,) next leg to evaluate, evaluations so far
     travelled: Array  # (2,) m: along previous legs, and along this leg
     cost: Array  # (3,) m: so far; part by hard regions; part by soft regions on the way
@@ -52,12 +55,15 @@ class PathCost(NamedTuple):
 
 def empty_cost(n_regions: int) -> PathCost:
     """Return the state before the first evaluation, for `n_regions`."""
-    return PathCost(np.zeros(3), np.zeros(2, dtype=np.int64), np.zeros(2), np.zeros(3), np.zeros(n_regions))
+    return PathCost(
+        np.zeros(3), np.zeros(3), np.zeros(2, dtype=np.int64), np.zeros(2), np.zeros(3), np.zeros(n_regions)
+    )
 
 
-def begin_cost(cost: PathCost, start: Array) -> None:
-    """Begin the evaluation of a path from a start, shape (3,) [m, NED]."""
+def begin_cost(cost: PathCost, start: Array, drift: Array) -> None:
+    """Begin the evaluation of a path from a start [m, NED] to an end that drifts [m/s, NED], shape (3,) each."""
     copy(start, cost.start)
+    copy(drift, cost.drift)
     cost.counts[:] = 0
     cost.travelled[:] = 0.0
     cost.cost[:] = 0.0
@@ -93,7 +99,7 @@ def add_cost(cost: PathCost, path: Array, count: int, regions: PackedRegions, li
         if cost.cost[0] > most:
             return True
         if leg == count:
-            cost.cost[0] += _STAY * _stay_cost(path[count - 1], regions)
+            cost.cost[0] += _STAY * _stay_cost(path[count - 1], cost.drift, regions, limits)
             return True
         begin = cost.start if leg == 0 else path[leg - 1]
         length = length3(path[leg, 0] - begin[0], path[leg, 1] - begin[1], path[leg, 2] - begin[2])
@@ -111,13 +117,7 @@ def add_cost(cost: PathCost, path: Array, count: int, regions: PackedRegions, li
         free, soft, reach = _evaluate_place(cost, place, regions, limits)
         spare = max(_TRUST * (free - limits.clearance), 0.5 * (free - limits.margin))  # m, no surface in between
         stride = min(max(spare, _STRIDE[0]), reach)
-        penalty, lack = 0.0, limits.clearance - free
-        if lack > 0.0:
-            penalty = _NEAR * square(lack / limits.clearance)
-            if free < limits.margin:
-                deep = limits.margin - free
-                penalty += _INSIDE * (min(deep / _EDGE, 1.0) + deep)
-        _add_stride(cost, min(stride, length - s + 1e-9), soft, penalty)
+        _add_stride(cost, min(stride, length - s + 1e-9), soft, _near_cost(free, limits))
     return False
 
 
@@ -169,10 +169,38 @@ def _depth_cost(depth: float, away: float) -> float:
     return _ENTERED * min((depth + away) / _SHALLOW, 1.0) + max(depth, 0.0) if depth > -away else 0.0
 
 
-def _stay_cost(end: Array, regions: PackedRegions) -> float:
-    """Return the cost of soft regions per metre at the end of a path [m, NED], at their present positions."""
-    total, room = 0.0, zeros(3)
-    for i in range(regions.kinds.size):
-        if not regions.hard[i] and regions.kinds[i] < _ATTITUDE:
-            total += regions.crossing_costs[i] * _depth_cost(-clearance_of_place(regions, i, end, room), _AWAY)
-    return total
+def _near_cost(free: float, limits: PathLimits) -> float:
+    """Return the cost per metre at a clearance of hard regions [m]."""
+    lack = limits.clearance - free
+    if lack <= 0.0:
+        return 0.0
+    cost = _NEAR * square(lack / limits.clearance)
+    if free < limits.margin:
+        deep = limits.margin - free
+        cost += _INSIDE * (min(deep / _EDGE, 1.0) + deep)
+    return cost
+
+
+def _stay_cost(end: Array, drift: Array, regions: PackedRegions, limits: PathLimits) -> float:
+    """Return the cost per metre of a stay at the end of a path [m, NED].
+
+    An end that drifts [m/s, NED] with the goal is also evaluated where it will be later, and near hard regions: they
+    may come in its way. The cost is the mean.
+    """
+    drifts = drift[0] != 0.0 or drift[1] != 0.0 or drift[2] != 0.0
+    looks, later, total, place, room = _LOOKS if drifts else 1, 0.0, 0.0, zeros(3), zeros(3)
+    for _ in range(looks):
+        free = limits.clearance
+        for i in range(regions.kinds.size):
+            if regions.kinds[i] >= _ATTITUDE or (regions.hard[i] and not drifts):
+                continue
+            for axis in range(3):
+                place[axis] = end[axis] + (drift[axis] - regions.velocities[i, axis]) * later
+            clearance = clearance_of_place(regions, i, place, room)
+            if regions.hard[i]:
+                free = min(free, clearance - uncertainty(regions, i))
+            else:
+                total += regions.crossing_costs[i] * _depth_cost(-clearance, _AWAY)
+        total += _near_cost(free, limits)
+        later = max(_LATER[0], _LATER[1] * later)
+    return total / looks

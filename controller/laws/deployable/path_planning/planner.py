@@ -219,13 +219,13 @@ def _evaluate(plan: PathPlan, start: Array, goal: PackedRegions, regions: Packed
     """Continue the evaluation of path or candidate, in turn; the candidate becomes the path if it costs less."""
     cost = plan.new_cost
     if plan.phase[0] == _BEGIN:
-        begin_cost(cost, start)
+        begin_cost(cost, start, goal.velocities[0])
         plan.phase[0] = _PATH
     if plan.phase[0] == _PATH:
         if add_cost(cost, plan.path, plan.counts[0], regions, limits, np.inf):
             copy(cost.cost, plan.cost)
             _choose_candidate(plan, start, goal, limits)
-            begin_cost(cost, cost.start)
+            begin_cost(cost, cost.start, goal.velocities[0])
             plan.phase[0] = _CANDIDATE
         return
     most = plan.cost[0] - _BETTER - _BETTER_PART * plan.cost[0]
