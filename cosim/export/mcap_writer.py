@@ -17,7 +17,6 @@ from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from mcap.writer import Writer
 from mcap_protobuf.schema import register_schema
-from numpy.typing import NDArray
 
 from cosim.export import foxglove_scene as foxglove
 from cosim.export.excerpt import Excerpt
@@ -121,14 +120,14 @@ class _Drawing:
 
     def row_writer(self, rows: Rows) -> Callable[[int, int], None]:
         """Return a function that writes the scene of one of the rows, given its index and time [ns]."""
-        known: NDArray[np.bool_] = np.isfinite(rows.stack(POSITION + QUATERNION)).all(axis=1)
+        known = set(np.flatnonzero(np.isfinite(rows.stack(POSITION + QUATERNION)).all(axis=1)).tolist())
         positions, quaternions = rows.stack(POSITION).tolist(), rows.stack(QUATERNION).tolist()
         moved = {foxglove.frame_of(s): rows.stack(s.shift).tolist() for s in self._scene.solids if s.moves}
         active = active_at(self._run.scenario, rows).tolist()
 
         def draw(i: int, time: int) -> None:
             at = foxglove.timestamp(time)
-            if known[i]:  # otherwise the vehicle keeps its last pose
+            if i in known:  # otherwise the vehicle keeps its last pose
                 shifts = {frame: by_row[i] for frame, by_row in moved.items()}
                 self._send("/tf", time, foxglove.frame_transforms(at, positions[i], quaternions[i], shifts))
                 self._send("/vehicle/pose", time, foxglove.pose(at, positions[i], quaternions[i]))
