@@ -99,6 +99,7 @@ def test_prebuilt_library_takes_custom_vehicle_parameters(no_compiler, tmp_path)
     slave.close()
 
 
+@pytest.mark.medium
 def test_other_thruster_count_needs_the_compiler(no_compiler, tmp_path):
     odin = load_vehicle("odin")
     given = {name: value[..., :5] for name, value in vars(odin).items() if name.startswith("thrust")}

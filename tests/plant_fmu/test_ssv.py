@@ -55,6 +55,7 @@ def trajectory(name, fmi, values):
     )  # fmt: skip
 
 
+@pytest.mark.medium
 def test_ssv_parameters_make_another_vehicle_equal(fmi, written):
     values = {p.name: p.value for p in written("bluerov2_heavy").parameters}
     itself, other = trajectory("bluerov2_heavy", fmi, {}), trajectory("odin", fmi, {})

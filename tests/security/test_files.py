@@ -101,10 +101,10 @@ def test_folder_with_a_non_utf8_name_is_rejected(tmp_path):
         pytest.skip("such names cannot be here")
     shutil.copy(written(tmp_path, pa.table(ROWS)) / RECORD, folder / RECORD)
     for act in (lambda: load_record(folder), lambda: claim(folder / "new", load_scenario("paper"))):
-        with pytest.raises(RunError, match="no UTF-8") as caught:
+        with pytest.raises(RunError, match="not UTF-8") as caught:
             act()
         str(caught.value).encode()
-    with pytest.raises(RunError, match="no UTF-8"):
+    with pytest.raises(RunError, match="not UTF-8"):
         Record([folder / RECORD])
 
 

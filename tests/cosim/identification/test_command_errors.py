@@ -66,6 +66,7 @@ def sampled(whole):
     )
 
 
+@pytest.mark.medium
 def test_samples_are_joined_by_straight_lines(sampled, vehicle):
     forces = CommandedForces(sampled, vehicle, 0.02)
     found = forces.actuation(0.0, np.ones(8)).wrench[:, 0]
@@ -89,6 +90,7 @@ def test_open_impulses_are_those_of_steps_at_any_time(whole, sampled, vehicle):
         assert ratio == pytest.approx(1.0, abs=0.15)
 
 
+@pytest.mark.medium
 def test_residuals_by_an_impulse_are_those_of_a_motion_with_it(sampled, vehicle):
     """The wrench of one period through the lag, added to what moves the FMU's equations."""
     step = integration_step([sampled])
