@@ -43,6 +43,10 @@ def add_verbs(verbs: Any) -> None:
         help="end after so many seconds without a frame (default: never)",
     )
     sitl.add_argument(
+        "--speedup", type=number(0.01, 100.0), metavar="N",
+        help="greatest number of simulated seconds per second, px4 alone; ArduPilot has its own (default: 1)",
+    )  # fmt: skip
+    sitl.add_argument(
         "--record-rate", type=number(1e-3, 1e6), default=100.0, metavar="HZ",
         help="greatest number of rows of the record per simulated second (default: 100)",
     )  # fmt: skip
@@ -85,7 +89,8 @@ def sitl(options: argparse.Namespace) -> int:
     server: JsonServer | HilServer
     link = None
     if options.backend == "px4":
-        server = HilServer(Flights(chosen, options.backend, law_of_controls), address, options.timeout, print_status)
+        flights, speedup = Flights(chosen, options.backend, law_of_controls), options.speedup or 1.0
+        server = HilServer(flights, address, options.timeout, print_status, speedup=speedup)
         print_status("waiting for PX4 on TCP {}:{}".format(*server.address))
     else:
         link = _autopilot_link(options)
@@ -107,6 +112,8 @@ def _check(options: argparse.Namespace) -> None:
 
     if options.dvl is not None and options.autopilot is None:
         raise RunError("--dvl: has no receiver; expected --autopilot ENDPOINT too")
+    if options.speedup is not None and options.backend != "px4":
+        raise RunError("--speedup: supported with --backend px4 alone; give ArduPilot its own --speedup")
     if options.autopilot is not None and options.backend == "px4":
         raise RunError("--autopilot: supported with --backend ardupilot alone")
 

@@ -77,6 +77,7 @@ _OF_SOME_VERSIONS = (*_STICK_SYSTEM, "ATC_ANGLE_MAX", "ANGLE_MAX")
 _KEPT = ("RC_OVERRIDE_TIME", "FS_PILOT_TIMEOUT")  # how long sticks act with a radio, and without one
 _LONGEST_KEPT = 1.0  # s
 _NEVER = 2.0  # of EK3_MAG_CAL
+_BY_STICKS = (0.0, 1.0, 2.0)  # of COM_OBL_RC_ACT: modes that need them; without, NAV_RCL_ACT counts in its place
 _SATURATION = "UUV_THRUST_SAT"
 
 
@@ -137,6 +138,12 @@ class Failsafes:
         if acts and all(self.values.get(name, 0.0) == 0.0 for name in acts):
             lines.append(
                 f"WARNING: nothing is known to follow if the companion dies: {', '.join(acts)} are 0 or unknown"
+            )
+        lost, sticks = self.values.get("COM_OBL_RC_ACT"), self.values.get("NAV_RCL_ACT")
+        if lost in _BY_STICKS and sticks == 0.0:
+            lines.append(
+                f"WARNING: without sticks the last forces act for ever on lost set-points: COM_OBL_RC_ACT is {lost:g} "
+                "and NAV_RCL_ACT 0; expected COM_OBL_RC_ACT 5, which holds"
             )
         part = self.values.get(_SATURATION, 1.0)
         if part < 1.0:

@@ -26,6 +26,7 @@ _POLL = 0.25  # s of the wall clock
 _ARMED = 128  # bit of HIL_ACTUATOR_CONTROLS.mode
 _SEND_TIMEOUT = 5.0  # s of the wall clock, timeout of sending a frame
 _CHANNELS = 16
+_MAX_LAG = 0.1  # s of the wall clock; a longer delay is not caught up
 
 
 class _DisconnectedError(Exception):
@@ -34,6 +35,34 @@ class _DisconnectedError(Exception):
 
 class _SilentError(Exception):
     """The autopilot has sent nothing for longer than the timeout."""
+
+
+class Pace:
+    """Keep periods of time to a clock.
+
+    Parameters
+    ----------
+    period : float
+        By the clock [s].
+    clock, sleep : callable, optional
+        As `time.monotonic` and `time.sleep`, which they are by default.
+    """
+
+    def __init__(
+        self,
+        period: float,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._period, self._clock, self._sleep = period, clock, sleep
+        self._due = clock()
+
+    def wait(self) -> None:
+        """Wait until the next period begins; delays of more than 0.1 s are not caught up."""
+        now = self._clock()
+        self._due = max(self._due + self._period, now - _MAX_LAG)
+        if self._due > now:
+            self._sleep(self._due - now)
 
 
 class HilServer:
@@ -54,6 +83,8 @@ class HilServer:
         Function that shows a line of progress to the user.
     origin : (float, float)
         Latitude and longitude of position 0 [deg].
+    speedup : float, optional
+        Greatest number of simulated seconds per second of the wall clock; default: no limit.
 
     Attributes
     ----------
@@ -75,8 +106,9 @@ class HilServer:
         timeout: float | None = None,
         report: Callable[[str], None] | None = None,
         origin: tuple[float, float] = ORIGIN,
+        speedup: float | None = None,
     ) -> None:
-        self._mavlink = dialect()
+        self._mavlink, self._speedup = dialect(), speedup
         self._flights, self._timeout, self._report, self._origin = flights, timeout, report or log.info, origin
         self.counts = Counts()
         self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
@@ -135,7 +167,10 @@ class HilServer:
         motion = at_rest(flight.motion())
         frame = 0  # number of frames on PX4's clock, which is never reset
         controls: Iterator[tuple[bool, list[float]]] = iter(())
+        pace = None if self._speedup is None else Pace(1.0 / (RATE * self._speedup))
         while not flight.done:
+            if pace is not None:
+                pace.wait()
             self._send(connection, codec, motion, frame)
             frame += 1
             while (answer := next(controls, None)) is None:

@@ -515,6 +515,17 @@ def test_px4_integer_parameters_are_decoded_from_bits():
     assert failsafes.values == {"NAV_RCL_ACT": 3.0}
 
 
+@pytest.mark.parametrize(("lost", "sticks", "warns"), [(0, 0, True), (2, 0, True), (5, 0, False), (0, 2, False)])
+def test_a_px4_without_sticks_that_keeps_its_last_forces_for_ever_is_warned_of(lost, sticks, warns):
+    """As a PX4 did: NAV_RCL_ACT counts where COM_OBL_RC_ACT names a mode that needs sticks."""
+    failsafes = Failsafes("px4")
+    failsafes.take(decoded(value_of("COM_OF_LOSS_T", 1.0)))
+    for name, value in (("COM_OBL_RC_ACT", lost), ("NAV_RCL_ACT", sticks)):
+        (bits,) = struct.unpack("<f", struct.pack("<i", value))
+        failsafes.take(decoded(value_of(name, bits, kind=6)))
+    assert any("the last forces act for ever" in line for line in failsafes.text()) == warns
+
+
 def test_a_px4_that_does_not_give_the_full_force_is_warned_of():
     """And no value of COM_OBL_RC_ACT means that nothing follows: PX4's 0 is its mode Position."""
     failsafes = Failsafes("px4")

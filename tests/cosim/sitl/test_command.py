@@ -19,6 +19,7 @@ from tests.cosim.sitl.stand_in import NEUTRAL, StandIn
     ("arguments", "words"),
     [
         (["--vehicle", "odin"], "cosim: vehicle 'odin' has no table [autopilot], expected"),
+        (["--speedup", "2"], "cosim: --speedup: supported with --backend px4 alone"),
         (["--host", "0.0.0.0"], "can be seen from other machines; --allow-remote lets it"),
         (["--host", "no such host"], "cosim: --host 'no such host': is not known"),
         (["--host", "192.0.2.1", "--allow-remote"], "cosim: UDP 192.0.2.1:9002: "),
@@ -34,7 +35,14 @@ def test_user_errors_are_one_line(arguments, words, capsys):
 
 @pytest.mark.parametrize(
     "arguments",
-    [["--port", "0"], ["--port", "65536"], ["--timeout", "0"], ["--timeout", "nan"], ["--record-rate", "-1"]],
+    [
+        ["--port", "0"],
+        ["--port", "65536"],
+        ["--timeout", "0"],
+        ["--timeout", "nan"],
+        ["--record-rate", "-1"],
+        ["--speedup", "0"],
+    ],
 )
 def test_invalid_numbers_are_rejected(arguments, capsys):
     with pytest.raises(SystemExit):
