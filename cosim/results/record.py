@@ -22,7 +22,7 @@ RECORD = "record.parquet"
 PARTS = "record.parts"  # folder of the parts of a run that is under way or was killed
 _DIGITS = 9  # greatest number of digits of a format number
 _BLOCK = 10_000  # rows that are read at once
-_SMALL = 2**23  # numbers; a record of at most so many is read as a whole
+_SMALL = 2**22  # numbers; a record of at most so many is read as a whole
 _KEPT = 24  # signals of a larger record that are kept in memory
 
 
