@@ -22,7 +22,7 @@ RECORD = "record.parquet"
 PARTS = "record.parts"  # folder of the parts of a run that is under way or was killed
 _DIGITS = 9  # greatest number of digits of a format number
 _BLOCK = 10_000  # rows that are read at once
-_SMALL = 2**23  # numbers; a record of at most so many is read as a whole
+_SMALL = 2**22  # numbers; a record of at most so many is read as a whole
 _KEPT = 24  # signals of a larger record that are kept in memory
 
 
@@ -158,8 +158,10 @@ class Record(Rows):
         columns, rows = [], 0
         for file in self._files:
             with _opened(file) as parquet:
-                schema = parquet.schema_arrow
-                rows += parquet.metadata.num_rows
+                schema, metadata = parquet.schema_arrow, parquet.metadata
+                rows += metadata.num_rows
+                if metadata.num_rows != sum(metadata.row_group(i).num_rows for i in range(metadata.num_row_groups)):
+                    raise RunError(f"{file}: cannot be read: its groups have another number of rows than the file")
                 _require_numbers(file, schema, rows)
                 if (format_number := _format_of(schema)) is not None:
                     require_format(file, format_number)
@@ -180,11 +182,13 @@ class Record(Rows):
         if name not in self.units:
             raise KeyError(name)
         if name not in self._kept:
-            names = list(self.units) if self._small else [name]
-            parts = [_read(file, names) for file in self._files]
-            self._kept.update(
-                {n: np.concatenate([np.empty(0), *(c for part in parts for c in part[n])]) for n in names}
-            )
+            columns = self.columns if self._small else self._columns_of([name])
+            whole, first = np.empty((len(columns), self._count)), 0
+            for batch in self._batches(columns):  # a table of the whole would take the memory twice
+                for row, column in zip(whole, columns, strict=True):
+                    row[first : first + len(batch)] = batch[column.name]
+                first += len(batch)
+            self._kept.update(zip((column.name for column in columns), whole, strict=True))
         self._kept.move_to_end(name)
         while len(self._kept) > _KEPT and not self._small:
             self._kept.popitem(last=False)
@@ -195,7 +199,10 @@ class Record(Rows):
         if self._small:
             yield from super().blocks(names)
             return
-        columns = self._columns_of(names)
+        yield from self._batches(self._columns_of(names))
+
+    def _batches(self, columns: Sequence[Column]) -> Iterator[Rows]:
+        """Yield all rows in order, from the files."""
         for file in self._files:
             with _opened(file) as parquet:
                 yield from _batches(parquet, columns, range(parquet.num_row_groups))
@@ -248,13 +255,6 @@ def load_record(folder: Path) -> Record:
 def _column_of(field: pa.Field) -> Column:
     about = field.metadata or {}
     return Column(field.name, about.get(b"unit", b"").decode(), about.get(b"description", b"").decode())
-
-
-def _read(file: Path, names: list[str]) -> dict[str, list[Array]]:
-    """Read the chunks of each signal."""
-    with _opened(file) as parquet:  # pq.read_table has three times the overhead
-        table = parquet.read(names)
-        return {name: [_numbers(chunk) for chunk in table[name].chunks] for name in names}  # not to_numpy, as above
 
 
 def _batches(parquet: Any, columns: Sequence[Column], groups: Sequence[int]) -> Iterator[Rows]:

@@ -18,7 +18,8 @@ from cosim.simulation.signals import Array, Column
 
 _WHOLE = "whole"  # name of the complete record while it is written in the folder of the parts
 _PART_SECONDS = 1.0  # s of wall-clock time, after which a part is written even if it is small
-_PART_NUMBERS = 2**23  # greatest number of values in a part, 64 MiB, unless `rows_per_part` is given
+_PART_NUMBERS = 2**21  # greatest number of values in a part, 16 MiB, unless `rows_per_part` is given
+_GROUP_NUMBERS = 2**22  # greatest number of values in a row group
 _GROUP = 10_000  # greatest number of rows in the first row groups
 _DOUBLED = 100  # groups after which their size doubles, since a reader needs a kilobyte per group and signal
 _BLOCK = 250  # rows that are buffered before they are transposed to columns: they fit into processor caches
@@ -37,7 +38,7 @@ class Recorder:
         Columns of the rows.
     rows_per_part : int, optional
         Greatest number of rows in a part. A part is written at about so many rows, or after a second of the wall
-        clock. Default: as many as take 64 MiB.
+        clock. Default: as many as take 16 MiB.
 
     Attributes
     ----------
@@ -56,7 +57,7 @@ class Recorder:
         self._rows = [row.data for row in self._block]  # memoryviews: copying takes half the time of arrays
         self._filled = 0
         self._group = min(_GROUP, self._rows_per_part) // block * block  # rows of a row group
-        self._largest = max(self._group, (self._rows_per_part - block) // 2 // block * block)  # bound of `_group`
+        self._largest = max(self._group, _GROUP_NUMBERS // len(columns) // block * block)  # bound of `_group`
         self._groups = 0  # number of complete groups
         self._columns: Array = np.empty((len(columns), self._group))
         self._transposed = 0  # number of rows of the present group, in `_columns`
@@ -104,8 +105,11 @@ class Recorder:
         self._transpose_block()
         if self._transposed == self._group:
             self._end_group()
-        if time.monotonic() > self._due or _rows(self._unsaved) + self._group > self._rows_per_part:
+        if time.monotonic() > self._due or self._unsaved_rows() + len(self._block) > self._rows_per_part:
             self._save()
+
+    def _unsaved_rows(self) -> int:
+        return _rows(self._unsaved) + self._transposed - self._saved
 
     def _transpose_block(self) -> None:
         if self._transposed + self._filled > self._group:

@@ -24,7 +24,7 @@ from cosim.simulation.signals import Array
 from plant_fmu.toml_tables import hint
 
 _ROWS = 2**15  # rows of a Parquet file that are read at once
-_BLOCK = 4 << 20  # bytes of a CSV file that are read at once
+_BLOCK = 1 << 19  # bytes of a CSV file that are read at once; the reader is up to 32 such blocks ahead
 _MISSING = ["", "nan", "NaN", "NAN", "null", "NULL", "None", "N/A", "n/a", "inf", "-inf"]
 
 

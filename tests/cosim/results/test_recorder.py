@@ -140,13 +140,14 @@ def test_a_long_record_has_larger_row_groups_and_few(tmp_path, monkeypatch):
     monkeypatch.setattr("cosim.results.recorder.time.monotonic", lambda: 0.0)
     monkeypatch.setattr("cosim.results.recorder._DOUBLED", 4)
     monkeypatch.setattr("cosim.results.recorder._GROUP", 250)
+    monkeypatch.setattr("cosim.results.recorder._GROUP_NUMBERS", 1250 * len(COLUMNS))
     recorder = Recorder(tmp_path, COLUMNS, rows_per_part=3000)
     for k in range(12_345):
         recorder.observe(k, np.array([k, 2.0 * k]))
     recorder.close()
     groups = pq.ParquetFile(tmp_path / RECORD).metadata
     rows = [groups.row_group(i).num_rows for i in range(groups.num_row_groups)]
-    assert rows == [250] * 4 + [500] * 4 + [1000] * 4 + [1250] * 4 + [345]  # two of the largest are no more than a part
+    assert rows == [250] * 4 + [500] * 4 + [1000] * 4 + [1250] * 4 + [345]
     assert load_record(tmp_path)["x"].tolist() == [2.0 * k for k in range(12_345)]
 
 
