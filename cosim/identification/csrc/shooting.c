@@ -7,6 +7,8 @@
 #include "instance.h"
 #include "shooting.h"
 
+#include <stdint.h>
+
 typedef double Row __attribute__((vector_size(16 * sizeof(double)))); /* N_RIGID numbers, for vectors of the processor */
 
 static const double FASTEST = 1e3; /* m/s, rad/s: faster than any vehicle */
@@ -59,14 +61,21 @@ static void relative_to_water(const Shooter *s, const double rate[N_RIGID], cons
     }
 }
 
+/* Returns the index of a number from the first one of an array, which it need not be in. */
+static intptr_t index_from(const double *number, const double *first)
+{
+    return ((intptr_t)number - (intptr_t)first) / (intptr_t)sizeof *number;
+}
+
 /* Adds the tangent of the wrench along a parameter that acts by the motion through the water alone. Returns false, and adds
  * nothing, for any other. */
 static int add_by_motion(const Shooter *s, const double *parameter, const double nu_r[6], const double nu_r_rate[6],
                          double dwrench[6])
 {
     const Parameters *dp = &s->seed.plant.parameters;
-    const ptrdiff_t linear = parameter - dp->linear_damping, quadratic = parameter - dp->quadratic_damping;
-    const ptrdiff_t mass = parameter - &dp->added_mass[0][0];
+    const intptr_t linear = index_from(parameter, dp->linear_damping);
+    const intptr_t quadratic = index_from(parameter, dp->quadratic_damping);
+    const intptr_t mass = index_from(parameter, &dp->added_mass[0][0]);
 
     if (linear >= 0 && linear < 6)
         dwrench[linear] -= nu_r[linear];
@@ -74,7 +83,7 @@ static int add_by_motion(const Shooter *s, const double *parameter, const double
         dwrench[quadratic] -= fabs(nu_r[quadratic]) * nu_r[quadratic];
     else if (mass >= 0 && mass < 36) { /* -A v_r' - C_A(v_r) v_r */
         static const double still[6] = {0.0};
-        const ptrdiff_t i = mass / 6, j = mass % 6;
+        const intptr_t i = mass / 6, j = mass % 6;
         double momentum[6] = {0.0};
         momentum[i] = nu_r[j];
         momentum[j] = nu_r[i];

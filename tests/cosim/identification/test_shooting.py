@@ -9,7 +9,8 @@ from plant_fmu import Plant, load_vehicle
 
 BODY = {
     "current.x": 0.1, "current.y": -0.2, "added_mass[1,5]": 0.4, "added_mass[2,4]": -0.3, "linear_damping[6]": 0.2,
-    "quadratic_damping[3]": 150.0, "buoyancy": 131.0, "r_B.z": -0.015, "r_G.x": 0.01, "mass": 13.0, "inertia.xz": 0.02,
+    "added_mass[3,3]": 20.0, "quadratic_damping[3]": 150.0, "buoyancy": 131.0, "r_B.z": -0.015, "r_G.x": 0.01,
+    "mass": 13.0, "inertia.xz": 0.02,
 }  # fmt: skip
 STEP, STEPS = 0.02, 100
 
