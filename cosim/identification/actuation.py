@@ -19,7 +19,10 @@ Array = NDArray[np.float64]
 
 _LEAST_LAG = 1e-4  # s; a shorter one is none
 _TAIL = 3.0  # time constants, after which an impulse has passed the lag
-_DIPOLE = 4.0  # a part of a force, less in the first half of a time and more in the second: of first moment 1
+_DIPOLE = 4.0  # forces of -4 and 4 in the halves of a period have first moment 1 about its middle, per period squared
+
+# numbers that say how commands change between two samples, in the order of `Actuation.by_changes`
+CHANGES = (*(f"{what} of {axis}" for what in ("lateness", "spread") for axis in "XYZKMN"), "smoothness")
 
 
 @dataclass(frozen=True)
@@ -30,7 +33,7 @@ class Actuation:
     by_lag: Array  # (steps, 2, 6) N/s, N m/s, by the time constant of all thrusters
     by_scale: Array  # (thrusters, steps, 2, 6) N, N m, by a factor of each thruster
     by_loss: Array  # (thrusters, steps, 2, 6) N, N m, by the part that each thruster lacks backward
-    by_changes: Array  # (13, steps, 2, 6) N, N m, by how commands change between samples
+    by_changes: Array  # (c, steps, 2, 6) N, N m, by each of `CHANGES`; c is 0 where every change is logged
     lag: float  # s, time constant of all thrusters
 
 
@@ -40,11 +43,11 @@ class CommandedForces:
     Parameters
     ----------
     log : Log
-        Of the run.
+        Log of the run.
     vehicle : Vehicle
-        Its limits, dead bands and curves are those of the commands.
+        Vehicle with the limits, dead bands and curves of the commands.
     step : float
-        Of the grid, which begins with the first command [s].
+        Step of the grid, which begins with the first command [s].
 
     Raises
     ------
@@ -67,7 +70,7 @@ class CommandedForces:
 
         self._mean = self._means(forces)
         self._mean_backward = self._means(np.minimum(forces[:, : vehicle.n_thrusters], 0.0))
-        self._mean_changes = [np.zeros((self.steps, vehicle.n_thrusters))] * 3
+        self._mean_changes: list[Array] = []  # of lateness, spread and smoothness, for the whole forces
         if log.sampled:
             changes = np.diff(forces[:, : vehicle.n_thrusters], axis=0, append=forces[-1:, : vehicle.n_thrusters])
             middles = self._times + 0.5 * np.diff(self._times, append=self._times[-1])
@@ -107,11 +110,10 @@ class CommandedForces:
         losses : ndarray, shape (thrusters,), optional
             Part of its force that each thruster lacks backward; default: none.
         changes : ndarray, shape (13,), optional
-            When each axis of the thrusters' wrench changes between two samples: how much later than in the middle, in
-            the time between them; and how much more the wrench has changed in the second half than a straight line
-            says, as first moment about the middle, in the change times the time squared. Last, how much more smoothly
-            than by lines all axes change: as behind a filter of that variance, in the time squared by twelve. Default:
-            as the lines say.
+            Values of `CHANGES`, for commands that are samples; default: 0, straight lines. Lateness is the delay of an
+            axis' change behind the middle between two samples [periods]. Spread is the first moment, about the middle,
+            of what changes later than a straight line [change times period squared]. Smoothness is the variance of a
+            filter that all axes pass [period squared by 12].
 
         Returns
         -------
@@ -124,7 +126,7 @@ class CommandedForces:
         backward, _ = _lagged(self._mean_backward, lag, self.step)
         matrix = (self._matrix * scales).T
         wrench = force @ matrix
-        by_changes = np.zeros((13, *wrench.shape))
+        by_changes = np.zeros((len(CHANGES) if self._sampled else 0, *wrench.shape))
         if self._sampled:
             moved: list[Array] = []
             for mean in self._mean_changes:
@@ -133,8 +135,8 @@ class CommandedForces:
             late, spread, by_changes[12] = moved
             by_changes[range(6), ..., range(6)] = np.moveaxis(late, 2, 0)
             by_changes[range(6, 12), ..., range(6)] = np.moveaxis(spread, 2, 0)
-        if changes is not None:
-            wrench += np.einsum("i,iksj->ksj", changes, by_changes)
+            if changes is not None:
+                wrench += np.einsum("i,iksj->ksj", changes, by_changes)
         wrench[:, 0] += self._mean[:, n:]
         by_scale = self._matrix.T[:, None, None, :] * np.moveaxis(force, 2, 0)[..., None]
         by_loss = -matrix[:, None, None, :] * np.moveaxis(backward, 2, 0)[..., None]
@@ -171,15 +173,15 @@ def error_wrenches(impulses: Impulses, lag: float, step: float, begin: float, st
     Parameters
     ----------
     impulses : Impulses
-        Of the run. Each bin has twelve errors: six of its impulse, and six that move impulse within it.
+        Errors of the run's commands. Each bin has twelve: six of its impulse, and six that move impulse within it.
     lag : float
         Time constant of the thrusters [s].
     step : float
-        Of the window's grid [s].
+        Step of the window's grid [s].
     begin : float
-        Of the window, since the first command [s].
+        Begin of the window, since the first command [s].
     steps : int
-        Of the window.
+        Number of steps of the window.
 
     Returns
     -------
@@ -215,18 +217,18 @@ def _lagged(forces: Array, lag: float, step: float) -> tuple[Array, Array]:
     Parameters
     ----------
     forces : ndarray, shape (steps, n)
-        To which they head over each step [N]. Before the first step they are at rest with it.
+        Commanded forces of each step [N]. Before the first step the thrusters give its forces.
     lag : float
         Time constant [s].
     step : float
-        Of the grid [s].
+        Step of the grid [s].
 
     Returns
     -------
     forces : ndarray, shape (steps, 2, n)
         Mean of each step, and change from its begin to its end [N].
     by_lag : ndarray, shape (steps, 2, n)
-        Their derivatives [N/s].
+        Derivatives of these by the lag [N/s].
     """
     zero = np.zeros((1, forces.shape[1]))
     if lag < _LEAST_LAG:

@@ -20,8 +20,8 @@ BIN = 0.05  # s; errors of shorter periods are taken together
 _SHIFTED = 0.25, 0.5  # part of an error that goes from the first half to the second: of one period, of several
 _AROUND = 0.5  # s, to either side, over which squared changes are averaged
 _SIZES = np.concatenate([[0.0], np.geomspace(0.02, 10.0, 80)])  # of the errors, in those of steps at any time
-_UPDATES, _SOME = 3, 4  # of the noise of each topic, by every fourth window
-_LEAST_PART = 0.05  # of the noise that differences of samples say
+_UPDATES, _EVERY = 3, 4  # updates of the noise of each topic; every fourth window is used for them
+_LEAST_PART = 0.05  # least part of the noise from differences of samples that a topic has
 _LEAST = 1e-2  # of the noise's variance: smaller ones hardly change a weight
 
 
@@ -57,11 +57,11 @@ def open_impulses(times: Array, forces: Array, matrix: Array) -> Impulses:
     Parameters
     ----------
     times : ndarray, shape (n,)
-        Of the samples [s].
+        Times of the samples [s].
     forces : ndarray, shape (n, m)
-        [N, N m].
+        Sampled forces [N, N m].
     matrix : ndarray, shape (6, m)
-        Their wrench.
+        Wrench of each force of 1.
     """
     periods = np.diff(times)
     changes = np.diff(forces @ matrix.T, axis=0)
@@ -109,9 +109,9 @@ def most_likely_size(residuals: Sequence[Array], by_impulses: Sequence[Array]) -
     Parameters
     ----------
     residuals : sequence of ndarray, shape (rows,)
-        Of each window, in standard deviations.
+        Residuals of each window, in standard deviations.
     by_impulses : sequence of ndarray, shape (rows, n)
-        Their derivatives by the impulses.
+        Derivatives of these by the impulses.
     """
     lost = np.zeros(len(_SIZES))
     for residual, by in zip(residuals, by_impulses, strict=True):
@@ -126,16 +126,16 @@ def most_likely_size(residuals: Sequence[Array], by_impulses: Sequence[Array]) -
 def noise_parts(
     residuals: Sequence[Array], whiteners: Sequence[Whitener], topics: Sequence[NDArray[np.str_]]
 ) -> dict[str, float]:
-    """Return the part of its noise that each topic has, in one step towards the greatest likelihood (Harville 1977).
+    """Return the factor of each topic's noise, in one step towards the greatest likelihood (Harville 1977).
 
     Parameters
     ----------
     residuals : sequence of ndarray, shape (rows,)
-        Of each window, in standard deviations, without what the start explains.
+        Residuals of each window, in standard deviations, without what its start explains.
     whiteners : sequence of Whitener
-        Of the covariance of each window.
+        Inverse root of the covariance of each window.
     topics : sequence of ndarray, shape (rows,)
-        Of which topic each row is.
+        Name of each row's topic.
     """
     squares, freedom = dict[str, float](), dict[str, float]()
     for residual, white, own in zip(residuals, whiteners, topics, strict=True):
@@ -157,25 +157,25 @@ def most_likely_errors(
     Parameters
     ----------
     residuals, by_impulses : sequence of ndarray, shape (rows,) and (rows, n)
-        As `most_likely_size` takes them, by the noise that is known.
+        Arguments of `most_likely_size`, in standard deviations of the noise that `known` says.
     topics : sequence of ndarray, shape (rows,)
-        Of which topic each row is.
+        Name of each row's topic.
     known : mapping of str to float
-        The part of its noise that each topic has, by its name; 1 where it is not named.
+        Part of the noise from its samples' differences that each topic has, by name; 1 for topics without one.
 
     Returns
     -------
     float
         The factor.
     dict of str to float
-        The part of its noise that each topic has, at the most 1.
+        Part of that noise that each topic has, at most 1.
     """
     parts = {str(name): known.get(str(name), 1.0) for own in topics for name in np.unique(own)}
     residuals, by_impulses = [x.copy() for x in residuals], [x.copy() for x in by_impulses]
     for _ in range(_UPDATES):
-        size = most_likely_size(residuals[::_SOME], by_impulses[::_SOME])
-        whiteners = [whitener(by, size) for by in by_impulses[::_SOME]]
-        for name, part in noise_parts(residuals[::_SOME], whiteners, topics[::_SOME]).items():
+        size = most_likely_size(residuals[::_EVERY], by_impulses[::_EVERY])
+        whiteners = [whitener(by, size) for by in by_impulses[::_EVERY]]
+        for name, part in noise_parts(residuals[::_EVERY], whiteners, topics[::_EVERY]).items():
             new = float(np.clip(parts[name] * part, _LEAST_PART, 1.0))
             for residual, by, own in zip(residuals, by_impulses, topics, strict=True):
                 residual[own == name] *= parts[name] / new

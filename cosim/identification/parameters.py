@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
-from cosim.identification.actuation import Actuation, CommandedForces
+from cosim.identification.actuation import CHANGES, Actuation, CommandedForces
 from cosim.identification.log import TOPICS, Log
 from cosim.identification.measurements import Errors
 from plant_fmu.vehicle import Vehicle
@@ -67,10 +67,10 @@ def free_parameters(vehicle: Vehicle, keys: Sequence[str]) -> list[Parameter]:
     Parameters
     ----------
     vehicle : Vehicle
-        Where the search starts, and about which its numbers are known before.
+        Vehicle at which the search starts, with the means of the priors.
     keys : sequence of str
-        Of the vehicle's file, such as ``hydrodynamics.added_mass``; one element of it by its place, from 1, such as
-        ``hydrodynamics.added_mass.2.6``; of a matrix its ``diagonal``. ``thrusters.matrix`` is a factor for each
+        Keys of the vehicle's file, such as ``hydrodynamics.added_mass``; one element by its place, from 1, such as
+        ``hydrodynamics.added_mass.2.6``; the ``diagonal`` of a matrix. ``thrusters.matrix`` is a factor for each
         thruster.
 
     Returns
@@ -102,10 +102,10 @@ def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
     Parameters
     ----------
     names : sequence of str
-        Of `NUISANCES`: a current and a constant force of each run, north and east; the delay of each topic behind the
-        commands; the lever arm and the scale error of the DVL; the gyro's biases of each run; the part of its force
-        that each thruster lacks backward; of runs whose commands are samples, when between two samples each axis of
-        the wrench changes. `RANDOM_FORCE` makes no parameter.
+        Names from `NUISANCES`: a current and a constant force of each run, north and east; the delay of each topic
+        behind the commands; the lever arm and the scale error of the DVL; the gyro's biases of each run; the part of
+        its force that each thruster lacks backward; for runs whose commands are samples, when each axis of the wrench
+        changes between two samples. `RANDOM_FORCE` makes no parameter.
     logs : sequence of Log
         The runs.
 
@@ -122,7 +122,7 @@ def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
     places = {
         "delay": [name for name in TOPICS if any(log.topic(name) for log in logs)],
         "asymmetry": [f"{i + 1}" for i in range(logs[0].thrust.shape[1])],
-        "phase": [*(f"{said} of {axis}" for said in ("lateness", "spread") for axis in _SIX), "smoothness"],
+        "phase": list(CHANGES),
     }
     made: list[Parameter] = []
     if odd := [name for name in names if name not in (*NUISANCES, RANDOM_FORCE)]:
@@ -135,7 +135,7 @@ def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
             said = "" if run is None else f" of run {run + 1}"
             for index, axis in enumerate(places.get(name, list(axes))):
                 if name == "phase":
-                    unit, deviation = _CHANGES[axis.split(" ")[0]]
+                    unit, deviation = _CHANGE_PRIORS[axis.split(" ")[0]]
                 plant = f"current.{axis}" if name == "current" else axis if name == "delay" else ""
                 made.append(Parameter(
                     f"{label} {axis}".strip() + said, unit, name, 0.0, deviation, plant=plant, index=index, run=run
@@ -149,11 +149,11 @@ def with_values(vehicle: Vehicle, parameters: Sequence[Parameter], values: Array
     Parameters
     ----------
     vehicle : Vehicle
-        Whose other numbers stay.
+        Vehicle whose other numbers stay.
     parameters : sequence of Parameter
-        As `free_parameters` has them; nuisances are passed over.
-    values : ndarray
-        In their order.
+        Free numbers; nuisances among them are ignored.
+    values : ndarray, shape (p,)
+        Values of the free numbers.
 
     Returns
     -------
@@ -199,18 +199,18 @@ def setting_of(
     Parameters
     ----------
     parameters : sequence of Parameter
-        What is free.
-    values : ndarray
-        In their order.
+        Free numbers.
+    values : ndarray, shape (p,)
+        Values of the free numbers.
     run : int
-        To which some nuisances belong.
+        Index of the run, to which some nuisances belong.
     forces : CommandedForces
-        Of the run.
+        Forces that the run's commands ask for.
     lag : float
         Time constant of the thrusters where it is not free [s].
     """
     plant: dict[str, float] = {}
-    scales, losses, changes = np.ones(forces.thrusters), np.zeros(forces.thrusters), np.zeros(13)
+    scales, losses, changes = np.ones(forces.thrusters), np.zeros(forces.thrusters), np.zeros(len(CHANGES))
     delays = dict[str, float]()
     force, lever, bias, scale = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
     for p, x in zip(parameters, values, strict=True):
@@ -314,7 +314,7 @@ _NUISANCES: dict[str, tuple[str, str, float, str]] = {  # name, unit, deviation 
     "asymmetry": ("loss backward of thruster", "", 0.1, ""),
     "phase": ("changes between samples:", "", 1.0, ""),
 }
-_CHANGES = {  # unit and deviation: those of steps at a time uniform in a period
+_CHANGE_PRIORS = {  # unit and deviation of the prior: those of a step at a time uniform in a period
     "lateness": ("periods", 0.29), "spread": ("periods2", 0.037), "smoothness": ("periods2/12", 1.0),
 }  # fmt: skip
 _KEYS = {

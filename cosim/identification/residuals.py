@@ -67,9 +67,9 @@ class Residuals:
     windows : sequence of Window
         What is predicted.
     step : float
-        Of the integration and of the windows' grid [s].
+        Step of the integration and of the windows' grid [s].
     random_force : bool
-        Whether a constant force of each window is eliminated beside its start: normal, of mean zero.
+        True to eliminate a constant force of each window, normal and of mean zero, beside its start.
     """
 
     def __init__(
@@ -96,9 +96,9 @@ class Residuals:
         self._found: dict[int, _Start] = {}
         self._tried: dict[int, _Start] = {}
         self.weights: list[Array] = [np.ones(len(topic_names(window))) for window in windows]
-        self.command_error: float | None = None  # size of what sampled commands leave open; None: nothing, or not known
+        self.command_error: float | None = None  # factor of the errors of sampled commands; None where it is unknown
         self.whiteners: list[Whitener | None] = [None] * len(windows)
-        self._noise_parts: dict[str, float] = {}  # of topics whose noise is less than said
+        self._noise_parts: dict[str, float] = {}  # part of the noise of its samples that a topic has, by its name
 
     def settings(self, values: Array) -> list[Setting]:
         """Return the settings of each run by the free numbers."""
@@ -112,11 +112,11 @@ class Residuals:
         i : int
             The window.
         settings : sequence of Setting
-            Of each run.
+            Settings of each run.
         start : ndarray, shape (13,)
             Where it begins; with a random force (16,), that force last [N, NED].
         full : bool
-            Whether the derivatives by the free numbers are asked for.
+            True to compute the derivatives by the free numbers.
 
         Returns
         -------
@@ -220,7 +220,7 @@ class Residuals:
             self.whiteners[i] = whitener(by, self.command_error)
 
     def _per_noise(self, window: Window) -> Array:
-        """Return for each row by how much less than said its topic's noise is."""
+        """Return the factor of each row by which the noise of its topic is less than that of its samples."""
         return np.array([1.0 / self._noise_parts.get(name, 1.0) for name in topic_names(window)])
 
     def _by_impulse(self, i: int, settings: Sequence[Setting], start: Array) -> Array:

@@ -139,5 +139,5 @@ def _fault(log: Log, vehicle: Vehicle, window: Window, length: float) -> str:
 
 
 def topic_names(window: Window) -> NDArray[np.str_]:
-    """Return of which topic each residual of a window is."""
+    """Return the name of the topic of each residual of a window."""
     return np.repeat([t.name for t in window.topics], [len(t.times) * len(t.components) for t in window.topics])
