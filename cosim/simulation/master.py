@@ -28,14 +28,13 @@ from cosim.simulation.commands.commands import Command
 from cosim.simulation.commands.sources import CommandSource
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.lyapunov_signals import LyapunovSignals
+from cosim.simulation.pace import Pace
 from cosim.simulation.sensor_navigation import SensorNavigation, make_sensing
 from cosim.simulation.signals import Array, Signals
 from cosim.simulation.stepped_plant import SteppedPlant
 from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant
 
-_MAX_SLEEP = 3600.0  # s of the wall clock, longest sleep of a paced run between two steps
-_MAX_LAG = 0.1  # s of the wall clock: lag that a paced run catches up; beyond it the schedule shifts
 _ARMING_PERIOD = 0.005  # s of the wall clock, between polls of the commands while the run waits for arming
 _ROUNDING = 1e-6  # tolerance of times, as a part of a step
 _DOWN: Array = np.array([0.0, 0.0, 1.0])
@@ -202,17 +201,15 @@ class Master:
         step, last = self.scenario.time.step, self.scenario.steps
         row = self.row
         waited = self._await_arming(commands, awaiting)
-        started = time.perf_counter()
+        pace = None if rate is None else Pace(step / rate)
         for k in range(last + 1):
             self.step(k, commands if k or not waited else None)
             for observer in observers:
                 observer.observe(k, row)
             if self.command_handler is not None and self.command_handler.reset:
                 return
-            if rate is not None:
-                ahead = started + (k + 1) * step / rate - time.perf_counter()
-                time.sleep(min(max(0.0, ahead), _MAX_SLEEP))
-                started -= min(0.0, ahead + _MAX_LAG)  # a longer delay, such as loading, is not caught up
+            if pace is not None:
+                pace.wait()
 
     def step(self, k: int, commands: CommandSource | None = None) -> None:
         """Do step `k`; call it once for each step, in order, from 0. The last step does not advance the plant.

@@ -11,6 +11,7 @@ from typing import Any
 from cosim.errors import RunError
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.options import ORIGIN
+from cosim.simulation.pace import Pace
 from cosim.sitl.flight import Flight
 from cosim.sitl.flights import Counts, Flights, Outcome
 from cosim.sitl.hil_messages import RATE, hil_messages
@@ -26,7 +27,6 @@ _POLL = 0.25  # s of the wall clock
 _ARMED = 128  # bit of HIL_ACTUATOR_CONTROLS.mode
 _SEND_TIMEOUT = 5.0  # s of the wall clock, timeout of sending a frame
 _CHANNELS = 16
-_MAX_LAG = 0.1  # s of the wall clock; a longer delay is not caught up
 
 
 class _DisconnectedError(Exception):
@@ -35,34 +35,6 @@ class _DisconnectedError(Exception):
 
 class _SilentError(Exception):
     """The autopilot has sent nothing for longer than the timeout."""
-
-
-class Pace:
-    """Keep periods of time to a clock.
-
-    Parameters
-    ----------
-    period : float
-        By the clock [s].
-    clock, sleep : callable, optional
-        As `time.monotonic` and `time.sleep`, which they are by default.
-    """
-
-    def __init__(
-        self,
-        period: float,
-        clock: Callable[[], float] = time.monotonic,
-        sleep: Callable[[float], None] = time.sleep,
-    ) -> None:
-        self._period, self._clock, self._sleep = period, clock, sleep
-        self._due = clock()
-
-    def wait(self) -> None:
-        """Wait until the next period begins; delays of more than 0.1 s are not caught up."""
-        now = self._clock()
-        self._due = max(self._due + self._period, now - _MAX_LAG)
-        if self._due > now:
-            self._sleep(self._due - now)
 
 
 class HilServer:

@@ -12,7 +12,7 @@ from cosim.errors import RunError
 from cosim.mavlink.wire.dialect import dialect
 from cosim.results.record import load_record
 from cosim.sitl.flights import FlightOptions, Flights
-from cosim.sitl.hil import LEFT, HilServer, Pace
+from cosim.sitl.hil import LEFT, HilServer
 from cosim.sitl.hil_messages import FIELD_NED, RATE, hil_messages, pressure_at
 from cosim.sitl.law import law_of_controls
 from cosim.sitl.motion import Motion
@@ -220,22 +220,6 @@ def test_garbage_between_frames_is_ignored(serve_px4):
         record = load_record(outcome.runs[0].folder)
         found.append(record.stack(list(record.units)))
     assert np.array_equal(found[0], found[1]) and np.array_equal(found[0], found[2])
-
-
-def test_frames_keep_to_the_clock_and_a_long_delay_is_not_caught_up():
-    now = [5.0]
-    pace = Pace(0.002, clock=lambda: now[0], sleep=lambda time: now.__setitem__(0, now[0] + time))
-    for _ in range(250):
-        pace.wait()
-    assert now[0] == pytest.approx(5.5)
-    now[0] += 0.05  # a short one is
-    for _ in range(100):
-        pace.wait()
-    assert now[0] == pytest.approx(5.7)
-    now[0] += 3.0
-    for _ in range(100):
-        pace.wait()
-    assert now[0] == pytest.approx(8.8, abs=0.003)
 
 
 @pytest.mark.medium
