@@ -59,7 +59,7 @@ def library_of(text: str) -> ctypes.PyDLL:
     for folder in (PREBUILT / _platform(), _cache()):
         path = folder / f"{name}{_SUFFIX}"
         if _is_trusted(folder) and is_whole(path):
-            with contextlib.suppress(OSError):  # such as one for another C library
+            with contextlib.suppress(OSError):  # the library may be for another C library
                 return ctypes.PyDLL(str(path))
     return ctypes.PyDLL(str(_compiled(text, name)))
 
