@@ -18,8 +18,8 @@ from fuzzy_arbiter import Arbiter, ArbiterError, System
 from fuzzy_arbiter.formats import FORMATS, reads
 from plant_fmu.toml_tables import hint
 
-MAX_TEXT = 200_000  # characters of a file of rules
-MAX_INPUTS = 32  # inputs of a file of rules
+MAX_TEXT = 200_000  # greatest number of characters of a file of rules
+MAX_INPUTS = 32  # greatest number of inputs of a file of rules
 
 Kind = Literal["given", "time", "depth", "speed", "membership", "clearance", "closing_speed", "approach_time"]
 VEHICLE_SIGNALS: dict[str, str] = {"time": "s", "depth": "m", "speed": "m/s"}  # signals of the vehicle, and their units
