@@ -49,7 +49,7 @@ def system_of(tokens: list[Token], fuzzylite: bool, settings: dict[str, Any]) ->
     Raises
     ------
     FormatError, DefinitionError
-        As of `fuzzy_arbiter.formats.reads`.
+        If the text or the definition is invalid, as in `fuzzy_arbiter.formats.reads`.
     """
     return _Reader(tokens, fuzzylite=fuzzylite).system(settings)
 
