@@ -26,7 +26,7 @@ import platformdirs
 from controller.compiling.compiler import FLAGS, compile_file
 
 log = logging.getLogger(__name__)
-first_use = logging.getLogger("controller.compiling.first_use")  # at INFO, before something is compiled
+first_use = logging.getLogger("controller.compiling.first_use")  # logs at INFO before something is compiled
 first_use.propagate = False  # only for listeners by its name
 
 PREBUILT = Path(__file__).parents[1] / "prebuilt"  # one folder a platform in a wheel; missing in a checkout

@@ -87,7 +87,7 @@ def _text(path: Path) -> str:
             return file.read(4 * MAX_TEXT + 1).decode("utf-8").removeprefix("\ufeff").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         raise ScenarioError(f"arbiter.file: {path}: byte {error.start} is no UTF-8, expected text") from error
-    except (OSError, ValueError) as error:  # the latter for a name with a null in it
+    except (OSError, ValueError) as error:  # ValueError: a name with a null character
         raise ScenarioError(f"arbiter.file: {path}: {getattr(error, 'strerror', None) or error}") from error
 
 

@@ -168,7 +168,7 @@ class CriterionEntry:
     """A criterion for which regions are weighed."""
 
     name: str
-    order: int | None = None  # the least comes first; default: its index in the list, from 1
+    order: int | None = None  # rank, the least of which comes first; default: its index in the list, from 1
     colour: str = ""  # #RRGGBB; default: an unused one
     membership: dict[str, Any] = field(default_factory=dict)  # terms by quantity; default: the arbiter's ramp
 

@@ -46,7 +46,7 @@ def centroids(cuts: Array, shape: Outline) -> Array:
 
 def _band(a: float, b: float, below: Array | None, cut: Array) -> tuple[Array, Array]:
     """Return area and moment of the band under a line from a to b between two heights, over a piece of the width 1."""
-    low, high = min(a, b), max(a, b)  # as if it rose; a fall is seen from the other end
+    low, high = min(a, b), max(a, b)  # a falling line is treated as the mirrored rising one
     h1 = np.minimum(cut, high)
     if below is None:
         if low == 0.0:  # half of all lines: nothing below them, and they begin at 0

@@ -31,7 +31,7 @@ from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.hierarchy import DEGREE
 
 SMOOTHSTEP = (0.0, 0.0, 3.0, -2.0)  # coefficients of 3 h^2 - 2 h^3, which stays within [0, 1]
-_BLOCK = 8192  # samples evaluated at a time; longer arrays leave the caches and are allocated anew each time
+_BLOCK = 8192  # number of samples evaluated at a time; longer arrays leave the caches and are allocated anew each time
 
 
 class NoClosedFormError(EngineError):
@@ -165,7 +165,7 @@ class ClosedEngine(Engine):
             return np.stack([np.max(clauses, axis=0) for clauses in least])
         unclaimed = np.ones(len(inputs))
         rest = np.empty(len(inputs))
-        for m in degrees:  # which become the cuts
+        for m in degrees:  # the degrees become the cuts
             np.subtract(1.0, m, out=rest)
             np.minimum(m, unclaimed, out=m)
             np.minimum(unclaimed, rest, out=unclaimed)

@@ -24,7 +24,7 @@ from fuzzy_arbiter.engines.plain import beyond_plain
 from fuzzy_arbiter.errors import EngineError
 
 LEAST_AREA = float(np.finfo(np.float64).eps)  # scikit-fuzzy divides by no area less than this
-_BLOCK = 4096  # samples that are evaluated together, so that they stay in the processor's cache
+_BLOCK = 4096  # number of samples that are evaluated together, so that they stay in the processor's cache
 _ROUNDING = 4 * LEAST_AREA  # tolerance of degrees
 
 

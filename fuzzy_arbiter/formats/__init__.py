@@ -158,7 +158,7 @@ def load(path: str | Path, block: str | None = None) -> System:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise FormatError(f"{path}: byte {error.start} is no UTF-8, expected text in UTF-8") from None
-    except (OSError, ValueError) as error:  # the latter for a name with a null in it
+    except (OSError, ValueError) as error:  # ValueError: a name with a null character
         raise FormatError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     try:
         return reads(text, format, block)

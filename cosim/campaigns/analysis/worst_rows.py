@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim.campaigns.store.results import Results
 
-LISTED = 10  # rows that summaries and pages list
+LISTED = 10  # greatest number of rows that summaries and pages list
 ORDER = (
     "First what violated a hard region, the deepest first (a flight that the plant stopped counts as one, as deep as "
     "it had come), then what never reached the goal, then the rest, the slowest first."

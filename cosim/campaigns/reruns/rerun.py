@@ -25,7 +25,7 @@ class Rerun:
     key: int  # key of the row
     differing: dict[str, tuple[Any, Any]]  # stored value and that of the rerun, by column, where they differ
     other_code: bool  # True if the row was flown by other code
-    run: Run | None  # with full record; None if the row was refused or stopped
+    run: Run | None  # run with full record; None if the row was refused or stopped
     # stored value and that of `run`, by column, where they differ by more than rounding
     apart: dict[str, tuple[Any, Any]]
     stopped: str | None  # error of the plant that stopped the flight, as in the row
