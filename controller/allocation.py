@@ -11,7 +11,7 @@ from controller.errors import LawError
 
 Array = NDArray[np.float64]
 
-_ROUNDING = 1e-12  # force that counts as 0, as a part of the greatest force
+_ROUNDING = 1e-12  # force that counts as 0, as a fraction of the greatest force
 
 
 def _greatest(forces: Array) -> float:
@@ -65,7 +65,7 @@ def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: A
     lower, upper : ndarray, shape (n,)
         Limits of each thruster [N].
     direction : bool
-        True to scale all forces together, False to clip each on its own.
+        True to scale all forces together; False to clip each on its own.
     tau : ndarray, shape (6,)
         Wrench [N, N m], body frame.
     forces : ndarray, shape (n,)

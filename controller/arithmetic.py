@@ -12,7 +12,13 @@ _QUARTER = 1.5707963267948966  # pi / 2
 # pi / 2 and ln 2 as sums: whole multiples of the first number of each are exact
 _SHORT_QUARTER, _REST_OF_QUARTER = 1.57079632673412561417, 6.07710050650619224932e-11
 _LN_2, _REST_OF_LN_2 = 0.693147180369123816490, 1.90821492927058770002e-10
-_ARCTANGENTS = (0.0, 0.24497866312686414, 0.4636476090008061, 0.6435011087932844, 0.7853981633974483)  # at 0, 1/4 .. 1
+_ARCTANGENTS = (
+    0.0,
+    0.24497866312686414,
+    0.4636476090008061,
+    0.6435011087932844,
+    0.7853981633974483,
+)  # arctangents of 0, 1/4, .. 1
 
 
 def square(x: float) -> float:
@@ -71,7 +77,7 @@ def arctangent(y: float, x: float) -> float:
         return math.nan
     greater, less = max(abs(x), abs(y)), min(abs(x), abs(y))
     tangent = less / greater if greater > 0.0 else 0.0
-    if math.isnan(tangent):  # of two infinite ones
+    if math.isnan(tangent):  # both coordinates are infinite
         tangent = 1.0
     near = int(4.0 * tangent + 0.5)
     rest = (tangent - 0.25 * near) / (1.0 + 0.25 * near * tangent)

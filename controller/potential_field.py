@@ -20,7 +20,7 @@ from controller.quaternion import Vector3
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, evaluate_packed
 
-_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
+_ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 
 
 class Field(NamedTuple):

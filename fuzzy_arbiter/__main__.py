@@ -151,7 +151,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        Default: those of the process.
+        Words of the command line; default: those of the process.
 
     Returns
     -------
@@ -173,7 +173,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fault(str(error))
     except ImportError as error:
         return _fault(f"{error.name} is not installed")
-    except OSError as error:  # such as a full disk behind the output
+    except OSError as error:  # for example a full disk behind the output
         _drop_output()
         return _fault(f"{error.filename or 'standard output'}: {error.strerror or error}")
     except KeyboardInterrupt:

@@ -131,7 +131,7 @@ class Arbiter:
             kind = type(inputs)
             plain = inputs if kind is list or kind is tuple else self._samples.plain(inputs)
             if plain is not None:
-                weights = self._shortcut(plain)  # type: ignore[arg-type]  # which checks it
+                weights = self._shortcut(plain)  # type: ignore[arg-type]  # the function checks it
                 if weights is not None:
                     return tuple.__new__(self._result, weights)
         return tuple.__new__(self._result, self._engine.weights(self._samples.one(inputs)))  # type: ignore[arg-type]

@@ -21,8 +21,8 @@ from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from fuzzy_arbiter.terms.term import Term
 from fuzzy_arbiter.terms.values import Formula, Value, invertible
 
-Conjunction = str  # one of norms.T_NORMS, which are those for implication, too
-Disjunction = str  # one of norms.S_NORMS
+Conjunction = str  # name of one of norms.T_NORMS, which are also those for implication
+Disjunction = str  # name of one of norms.S_NORMS
 Implication = str
 Defuzzifier = Literal["centroid", "bisector", "mom", "som", "lom", "average", "sum"]
 WEIGHTED = ("average", "sum")  # defuzzifiers that take each term's value times its strength
@@ -74,7 +74,7 @@ class Variable:
         if len(bounds) != 2 or bounds[0] is None or bounds[1] is None:
             raise DefinitionError(f"{what}: universe is {shown(self.universe)}, expected two finite numbers")
         low, high = bounds[0], bounds[1]
-        # of values the universe is no more than what they are held in
+        # terms that are values may have a universe of a single value: it only bounds the result
         if not (low < high or (low == high and isinstance(self, Output) and self.weighted)):
             raise DefinitionError(f"{what}: universe is [{low}, {high}], expected the first below the second")
         if finite(high - low) is None:
@@ -141,12 +141,12 @@ class Output(Variable):
         largest of the places where they are greatest; for terms that are values (Sugeno), or that only rise or only
         fall (Tsukamoto), the mean of the values, weighted by strength, or their sum.
     aggregation : str
-        Operator that joins the rules' conclusions, of `fuzzy_arbiter.terms.norms.AGGREGATIONS`. Of values it joins the
-        strengths of those rules that conclude one term.
+        Operator that joins the rules' conclusions, one of `fuzzy_arbiter.terms.norms.AGGREGATIONS`. For values, it
+        joins the strengths of the rules that conclude one term.
     lock_range : bool
-        Whether the value is held within the universe.
+        True if the value is held within the universe.
     lock_previous : bool
-        Whether, in a batch, an output for which no rule fires keeps the value of the row before.
+        True if, in a batch, an output for which no rule fires keeps the value of the row before.
 
     Raises
     ------
@@ -214,7 +214,7 @@ class Output(Variable):
 
     @property
     def weighted(self) -> bool:
-        """Whether its terms are values, weighted by strength, and not sets that are joined."""
+        """True if its terms are values, weighted by strength, and not sets that are joined."""
         return self.defuzzifier in WEIGHTED
 
 
@@ -222,7 +222,7 @@ class Output(Variable):
 class System:
     """A fuzzy system: rules, and outputs that join what these conclude and make one number of it.
 
-    By default of Mamdani's kind: clipped output terms, joined by their maximum, of which the centroid is taken.
+    The default is Mamdani's kind: output terms are clipped and joined by their maximum, whose centroid is the value.
 
     Attributes
     ----------
@@ -239,7 +239,7 @@ class System:
     disjunction : str
         Degree of *or*: ``max``, ``probor``, which is a + b - a b, or another of `fuzzy_arbiter.terms.norms.S_NORMS`.
     implication : str
-        Bound of an output's term by a rule's strength: ``min`` clips it, ``prod`` scales it; or another of the first.
+        Bound of an output's term by a rule's strength: ``min`` clips it, ``prod`` scales it; or another T-norm.
     normalization : {"none", "range", "sum", "max"}
         Normalization of the centroids: ``none`` leaves them; ``range`` maps those of the least and of the greatest term
         alone to 0 and 1; ``sum`` and ``max`` then divide by all weights' sum or greatest.
@@ -248,7 +248,7 @@ class System:
     points : int
         Points of an output's universe, 3 to 1 000 000 000, for those engines and formats that sample it.
     weights_of : tuple of str
-        Names of the criteria whose weights the outputs are, which results carry; empty if they carry the outputs' own.
+        Names that results carry, those of the criteria whose weights the outputs are; empty for the outputs' own names.
 
     Raises
     ------

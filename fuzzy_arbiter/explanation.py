@@ -33,7 +33,7 @@ class FiredRule:
     label : str
         Label of the rule; ``R1`` for the first.
     text : str
-        The rule.
+        Text of the rule.
     strength : float
         Degree of its condition times its weight.
     conclusions : dict from str to str
@@ -47,7 +47,7 @@ class FiredRule:
 
     @property
     def fired(self) -> bool:
-        """Whether the strength is above 0."""
+        """True if the strength is above 0."""
         return self.strength > 0.0
 
 
@@ -74,7 +74,7 @@ class OutputDecision:
     margin : float
         Strength of the deciding rule less that of the runner-up; 0 is a tie.
     default_used : bool
-        Whether no rule fired, so that the centroid is the output's default, or NaN if it has none.
+        True if no rule fired, so that the centroid is the output's default, or NaN if it has none.
     """
 
     name: str
@@ -172,7 +172,7 @@ def explain(engine: Engine, inputs: Sequence[float]) -> Explanation:
     Returns
     -------
     Explanation
-        Data; its `str` is a text for people.
+        Explanation as data; its `str` is a text for people.
     """
     system, firing = engine.system, engine.firing
     weights, centroids = engine.weights(inputs), engine.centroids(inputs)
@@ -197,7 +197,7 @@ def _decided(
 ) -> OutputDecision:
     output = system.outputs[k]
     on = [rule for rule in rules if rule.fired and output.name in rule.conclusions]
-    first = max(on, key=_strength, default=None)  # of equal ones the first
+    first = max(on, key=_strength, default=None)  # the first of equally strong ones
     others = [
         rule for rule in on if first is not None and rule.conclusions[output.name] != first.conclusions[output.name]
     ]

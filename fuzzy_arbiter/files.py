@@ -36,7 +36,7 @@ def write_atomic(path: str | Path, data: bytes) -> None:
         with open(out.with_name(f".{out.name}-{secrets.token_hex(4)}"), "xb") as scratch:
             scratch.write(data)
         os.replace(scratch.name, out)
-    except (OSError, ValueError) as error:  # the latter of a name with a null in it
+    except (OSError, ValueError) as error:  # ValueError: a name with a null character
         raise FormatError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     finally:
         if scratch:

@@ -23,7 +23,7 @@ from fuzzy_arbiter.verification.questions import Effort, Questions, greatest_ter
 from fuzzy_arbiter.verification.search import Goal
 
 Setting = float | Mapping[str, float]
-EFFORT = 100_000_000  # statements of the search for the row at rest, less than a second
+EFFORT = 100_000_000  # greatest number of statements of the search for the row at rest, less than a second
 
 
 class HysteresisArbiter:
@@ -120,7 +120,7 @@ class HysteresisArbiter:
 
     @property
     def active(self) -> dict[str, bool]:
-        """Whether each criterion's latch is closed, by the input's name."""
+        """True for each criterion whose latch is closed, by the input's name."""
         return dict(zip(self._names, self._closed, strict=True))
 
     def __call__(self, inputs: Sample, time: float | None = None) -> Result[float]:

@@ -11,7 +11,7 @@ from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.shapes import Membership
 from fuzzy_arbiter.terms.norms import HEDGES
 
-MAX_NESTING = 100  # nested parentheses and negations
+MAX_NESTING = 100  # greatest number of nested parentheses and negations
 KEYWORDS = ("if", "then", "and", "or", "not", "is", "with", "any")
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -58,7 +58,7 @@ class Proposition:
     """
 
     __slots__ = ()
-    nesting: int = 0  # nested parentheses and negations in the text
+    nesting: int = 0  # number of nested parentheses and negations in the text
 
     def __and__(self, other: Proposition) -> And:
         return And((self, other))

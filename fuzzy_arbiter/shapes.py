@@ -25,7 +25,7 @@ class Membership(ABC):
     Attributes
     ----------
     polynomial : bool
-        Whether it is a polynomial between its breaks, so that it can be integrated exactly.
+        True if it is a polynomial between its breaks, so that it can be integrated exactly.
     """
 
     __slots__ = ()
@@ -167,7 +167,7 @@ class Shape(Membership):
             np.copyto(degrees, y[0], where=places <= x[0])
             np.copyto(degrees, y[1], where=places >= x[1])
             return degrees
-        right = np.clip(np.searchsorted(x, places), 1, len(x) - 1)  # of x[right - 1] < place <= x[right]
+        right = np.clip(np.searchsorted(x, places), 1, len(x) - 1)  # index with x[right - 1] < place <= x[right]
         left = right - 1
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # at jumps, which are set below
             share = (places - x[left]) / (x[right] - x[left])
@@ -185,7 +185,7 @@ class Shape(Membership):
 
     @property
     def jumps(self) -> bool:
-        """Whether there is a jump."""
+        """True if there is a jump."""
         return any(a == b for (a, _), (b, _) in zip(self.points, self.points[1:], strict=False))
 
     def complement(self) -> Shape:

@@ -153,7 +153,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        Default: those of the process.
+        Words of the command line; default: those of the process.
 
     Returns
     -------
@@ -169,7 +169,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _run(_parser().parse_args(arguments))
         finally:
             sys.stdout.flush()
-    except ModuleNotFoundError as error:  # of this product itself: its version goes into an FMU
+    except ModuleNotFoundError as error:  # this package is not installed: its version goes into an FMU
         print(_missing(error), file=sys.stderr)
         return FAULT
     except PlantFmuError as error:
@@ -178,7 +178,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         _drop_output()
         return NO_READER
-    except OSError as error:  # such as a full disk behind the output
+    except OSError as error:  # for example a full disk behind the output
         _drop_output()
         _report(f"{error.filename or 'standard output'}: {error.strerror or error}")
         return FAULT

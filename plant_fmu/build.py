@@ -110,14 +110,14 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
     Returns
     -------
     Path
-        The file; its name has a digest of its sources and compiler. Without a compiler, an FMU that
+        Path of the FMU; its name has a digest of its sources and compiler. Without a compiler, an FMU that
         another compiler made is used. The file is in the user's cache folder or, where that cannot be made,
         in a temporary folder of the process.
 
     Raises
     ------
     BuildError
-        As `build_fmu`.
+        If there is no compiler, it fails, or the file cannot be written, as in `build_fmu`.
     """
     require_version(fmi)
     name = f"{what.name}-fmi{fmi}-{_digest(what, fmi)[:16]}"

@@ -31,5 +31,5 @@ class Component:
 
     @property
     def has_states(self) -> bool:
-        """Whether it has continuous states."""
+        """True if it has continuous states."""
         return any(v.role == "state" for v in self.variables)

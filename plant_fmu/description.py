@@ -208,7 +208,7 @@ def documentation(vehicle: Vehicle) -> str:
     Parameters
     ----------
     vehicle : Vehicle
-        The vehicle.
+        Vehicle of the FMU.
 
     Returns
     -------

@@ -10,9 +10,9 @@ from xml.etree import ElementTree as ET
 from plant_fmu.errors import FmuFileError
 
 MAX_REFERENCE = 2**32 - 1  # greatest value reference: 32 bits in FMI 2.0 and 3.0
-MAX_NAME = 10_000  # characters of a variable's name
-MAX_INDICATORS = 1_000_000  # event indicators, for which an importer allocates memory
-MAX_ENTRIES = 100_000_000  # entries of an array, for which an importer allocates memory
+MAX_NAME = 10_000  # greatest number of characters of a variable's name
+MAX_INDICATORS = 1_000_000  # greatest number of event indicators, for which an importer allocates memory
+MAX_ENTRIES = 100_000_000  # greatest number of entries of an array, for which an importer allocates memory
 
 # part of the path of the library that is loaded
 _IDENTIFIER = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+ -]{0,199}")

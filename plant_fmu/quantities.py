@@ -31,7 +31,7 @@ UNITS: dict[str, dict[str, int]] = {
     "N.m.s/rad": {"kg": 1, "m": 2, "s": -1, "rad": -1},
     "N.s2/m2": {"kg": 1, "m": -1},
     "N.m.s2/rad2": {"kg": 1, "m": 2, "rad": -2},
-    # of controllers
+    # units of control laws
     "m2": {"m": 2},
     "m2/s": {"m": 2, "s": -1},
     "N/m": {"kg": 1, "s": -2},

@@ -18,13 +18,13 @@ from plant_fmu.errors import TableError
 
 T = TypeVar("T")
 
-MAX_FILE = 4_000_000  # bytes of a file; the longest in the package has a thousandth of that
-MAX_DEPTH = 20  # levels of nested tables and lists
-MAX_DIGITS = 400  # digits of a whole number, more than any float has
+MAX_FILE = 4_000_000  # greatest number of bytes of a file; the longest in the package has a thousandth of that
+MAX_DEPTH = 20  # greatest number of levels of nested tables and lists
+MAX_DIGITS = 400  # greatest number of digits of a whole number, more than any float has
 
-_LONGEST_NAME = 100  # characters that are compared with known names
+_LONGEST_NAME = 100  # number of characters that are compared with known names
 
-_LISTED = 30  # names that a message lists at most
+_LISTED = 30  # greatest number of names that a message lists
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -87,7 +87,7 @@ def decode(table: dict[str, Any], kind: type[T], where: str = "") -> T:
     Returns
     -------
     kind
-        The value.
+        Value with the content of the table.
 
     Raises
     ------

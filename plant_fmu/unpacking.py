@@ -17,19 +17,19 @@ from plant_fmu.errors import FmuFileError
 
 DESCRIPTION = "modelDescription.xml"
 
-MAX_SIZE = 2**30  # bytes of an FMU's files together, and
-MAX_FILES = 100_000  # their number, above which it is refused unread
-MAX_RATIO = 200  # ratio of those bytes to the FMU's own: libraries and descriptions compress to a tenth or so,
-FREE_SIZE = 2**26  # bytes, below which the ratio does not matter
-MAX_READ = 2**24  # bytes that are read at once: as the list of the files is, before any check
-MAX_NAME = 1000  # characters of a file's name
-MAX_XML = 2**26  # bytes of a description,
-MAX_ELEMENTS = 2_000_000  # elements of a description,
-MAX_DEPTH = 100  # and levels of their nesting
+MAX_SIZE = 2**30  # greatest number of bytes of an FMU's files together
+MAX_FILES = 100_000  # greatest number of files of an FMU
+MAX_RATIO = 200  # greatest ratio of those bytes to the FMU's own: libraries and descriptions compress to about a tenth
+FREE_SIZE = 2**26  # number of bytes below which that ratio does not matter
+MAX_READ = 2**24  # greatest number of bytes that are read at once, as is the list of the files before any check
+MAX_NAME = 1000  # greatest number of characters of a file's name
+MAX_XML = 2**26  # greatest number of bytes of a description
+MAX_ELEMENTS = 2_000_000  # greatest number of elements of a description
+MAX_DEPTH = 100  # greatest number of levels of nested elements
 
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # methods that FMI allows; others have no bound when unpacked
 _DESCRIPTIONS = (DESCRIPTION, "sources/buildDescription.xml")  # files that FMPy parses
-_PIECE = 2**20  # bytes that are parsed at once
+_PIECE = 2**20  # number of bytes that are parsed at once
 
 
 class _Source(io.BufferedReader):
@@ -79,7 +79,7 @@ def unpack(path: Path, folder: Path, platforms: Collection[str]) -> ET.Element:
     Parameters
     ----------
     path : Path
-        The FMU.
+        Path of the FMU.
     folder : Path
         Empty folder of this user alone.
     platforms : collection of str
@@ -93,7 +93,7 @@ def unpack(path: Path, folder: Path, platforms: Collection[str]) -> ET.Element:
     Raises
     ------
     FmuFileError
-        As `open_fmu` and `read_descriptions`.
+        If the file is unsafe to extract, or a description is invalid, as in `open_fmu` and `read_descriptions`.
     """
     with open_fmu(path) as archive:
         root = read_descriptions(path, archive)

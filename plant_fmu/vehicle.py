@@ -22,7 +22,7 @@ Rows = tuple[tuple[float, ...], ...]
 Matrix = tuple[float | tuple[float, ...], ...]  # rows, or a diagonal
 
 GREATEST = 1e15  # bound of every number of a vehicle, so that derived numbers are finite
-MAX_THRUSTERS = 100  # thrusters of a vehicle
+MAX_THRUSTERS = 100  # greatest number of thrusters of a vehicle
 
 # a name becomes C text and a file's name: neither may be a word that C99 or Windows keep for themselves
 _RESERVED = re.compile(
@@ -89,7 +89,7 @@ class Thrusters:
     force_max: float | tuple[float, ...]  # N, greatest force
     time_constant: float | tuple[float, ...] = 0.0  # s, time constant of the lag
     rate_limit: float | tuple[float, ...] = 0.0  # N/s, greatest change of the force; 0: none
-    dead_band: float | tuple[float, ...] = 0.0  # part of the command's range that gives no force
+    dead_band: float | tuple[float, ...] = 0.0  # fraction of the command's range that gives no force
     curve: float | tuple[float, ...] = 0.0  # 0: force linear in the command; 1: quadratic; between: a mixture
 
 
@@ -143,7 +143,7 @@ class Vehicle:
     thrust_max: NDArray[np.float64]  # (n,) N, greatest force of each thruster
     thrust_time_constant: NDArray[np.float64]  # (n,) s, time constant of the lag
     thrust_rate_limit: NDArray[np.float64]  # (n,) N/s, greatest change of the force; 0 for none
-    thrust_dead_band: NDArray[np.float64]  # (n,) [-] part of the command's range that gives no force
+    thrust_dead_band: NDArray[np.float64]  # (n,) [-] fraction of the command's range that gives no force
     thrust_curve: NDArray[np.float64]  # (n,) [-] 0: force linear in the command; 1: quadratic
     hull_radius: float  # m, radius of the sphere that meets surface and bottom
     autopilot: Autopilot | None = None  # map from servo outputs to thrusters; a channel and a sign for each

@@ -27,7 +27,7 @@ def of_vehicle(
     Parameters
     ----------
     vehicle : Vehicle
-        The vehicle.
+        Vehicle of the FMU.
     start : mapping from str to float, optional
         Start values of parameters and states, by name, over those of the vehicle.
     stop_time, step : float, optional

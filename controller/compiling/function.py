@@ -23,7 +23,7 @@ from controller.translator.types import Type, type_of
 INTERPRETED = "SUBREACH_INTERPRETED"  # environment variable: if set, Python runs all functions, without a compiler
 Described = dict[int, tuple[Any, Type, list[int]]]  # arguments with their types and words, by their ids
 
-_MAX_CACHED = 8  # sets of arguments in the cache
+_MAX_CACHED = 8  # greatest number of sets of arguments in the cache
 _NONE = (None,) * 7
 _CALLBACK = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)
 
@@ -143,7 +143,7 @@ class CompiledFunction:
 
     def __init__(self, function: Any) -> None:
         self._function = function
-        self._bound: dict[tuple[int, ...], BoundCall] = {}  # by the ids of arguments, which are theirs while kept
+        self._bound: dict[tuple[int, ...], BoundCall] = {}  # calls by the ids of their arguments, which they keep alive
         self._known: Described = {}
         self._last: tuple[Any, ...] = (_nothing, *_NONE)  # the last call, and the seven arguments it is for
 

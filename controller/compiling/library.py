@@ -26,7 +26,7 @@ import platformdirs
 from controller.compiling.compiler import FLAGS, compile_file
 
 log = logging.getLogger(__name__)
-first_use = logging.getLogger("controller.compiling.first_use")  # at INFO, before something is compiled
+first_use = logging.getLogger("controller.compiling.first_use")  # logs at INFO before something is compiled
 first_use.propagate = False  # only for listeners by its name
 
 PREBUILT = Path(__file__).parents[1] / "prebuilt"  # one folder a platform in a wheel; missing in a checkout
@@ -59,7 +59,7 @@ def library_of(text: str) -> ctypes.PyDLL:
     for folder in (PREBUILT / _platform(), _cache()):
         path = folder / f"{name}{_SUFFIX}"
         if _is_trusted(folder) and is_whole(path):
-            with contextlib.suppress(OSError):  # such as one for another C library
+            with contextlib.suppress(OSError):  # the library may be for another C library
                 return ctypes.PyDLL(str(path))
     return ctypes.PyDLL(str(_compiled(text, name)))
 

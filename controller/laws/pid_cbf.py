@@ -64,7 +64,7 @@ from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions
 from controller.stack_array import zeros
 
-_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
+_ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 _PRICE = 1e-6  # price of slack: squared force that costs as much as the square of slack times mass
 _ABOVE_ZERO = ("k_p1", "observer", "pull_in", "brake")  # gains that must not be 0
 

@@ -43,12 +43,12 @@ from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-_GATE = 4.0  # standard deviations of an innovation, beyond which a sample is rejected
-_UNKNOWN = 10.0  # standard deviations of a sample, beyond which the sample is nearer to the velocity than the estimate
-_REJECTED_IN_A_ROW = 3  # samples: where one in fifty is an outlier, as many in a row are rare
-CONFIRMED = 3.0  # accepted samples, after which a sample that contradicts them is an outlier
-_RESETS = 4.0  # resets of the covariance without a confirmed sample in between, after which the filter starts again
-_STEEP = 0.1  # cosine of the pitch, squared, below which a compass is not used
+_GATE = 4.0  # number of standard deviations of an innovation beyond which a sample is rejected
+_UNKNOWN = 10.0  # number of standard deviations beyond which a sample is nearer to the velocity than the estimate
+_REJECTED_IN_A_ROW = 3  # number of successive rejected samples that is rare where one in fifty is an outlier
+CONFIRMED = 3.0  # number of accepted samples after which a sample that contradicts them is an outlier
+_RESETS = 4.0  # number of resets of the covariance without a confirmed sample in between before the filter starts again
+_STEEP = 0.1  # squared cosine of the pitch below which a compass is not used
 _HALF_TURN, _TURN = 3.141592653589793, 6.283185307179586  # rad
 _LEAST_SCALE = 1e-3  # least noise of a sensor, in its unit, which keeps the covariance positive
 

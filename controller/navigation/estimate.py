@@ -16,14 +16,14 @@ from controller.navigation.measurements import N_SENSORS, SensorModel
 
 Array = NDArray[np.float64]
 
-# first of each kind among the errors
+# index of the first error of each kind
 POSITION, VELOCITY, ATTITUDE, GYRO_BIAS, ACCELERATION_BIAS = 0, 3, 6, 9, 12
 HEADING_BIAS, DEPTH_BIAS, VELOCITY_SCALE, N_ERRORS = 15, 16, 17, 18
 
 # standard deviations at the start, when only samples of unknown age are known
-_FIRST_POSITION, _FIRST_VELOCITY = 0.1, 0.3  # m beside the noise of a fix, m/s
+_FIRST_POSITION, _FIRST_VELOCITY = 0.1, 0.3  # m in addition to the noise of a fix; m/s
 _FIRST_TILT, _FIRST_HEADING = 0.05, 0.3  # rad; an acceleration looks like a tilt
-_REMEMBERED = 128  # IMU samples in the history, for late measurements
+_REMEMBERED = 128  # number of IMU samples in the history, for late measurements
 
 
 class NavigationMemory(NamedTuple):

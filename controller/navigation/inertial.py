@@ -29,7 +29,7 @@ from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-_DRIFT = 1e-3  # 1/sqrt(s), random walk of a constant error, as a part of its standard deviation
+_DRIFT = 1e-3  # 1/sqrt(s), random walk of a constant error, as a fraction of its standard deviation
 
 
 def propagate(memory: NavigationMemory, force: Array, omega: Array, sensors: SensorModel, period: float) -> None:

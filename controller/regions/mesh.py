@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from controller.quaternion import rotation_matrix
 from controller.regions.shape import Array, Bounds
 
-AROUND = 32  # corners of a circle
-_SPLITS = 2  # times that each triangle of the icosahedron is split to become a ball
+AROUND = 32  # number of corners of a circle
+_SPLITS = 2  # number of times that each triangle of the icosahedron is split to become a ball
 _SAME_PLACE = 1e-8  # m, grid on which corners count as one
 _GOLDEN = (1.0 + math.sqrt(5.0)) / 2.0
 

@@ -68,7 +68,7 @@ def constraints(numbers: Sequence[Number]) -> Iterator[tuple[str, int, int, str]
     groups = groupby(enumerate(numbers), lambda item: (item[1][1:4] == PART, re.split(r"[.\[]", item[1].name + ".")[0]))
     parts = [(name, [i for i, _ in group]) for (is_part, name), group in groups if is_part]
     lone = [name for name, places in parts if len(places) == 1]
-    if lone:  # such as a sine and a cosine
+    if lone:  # for example a sine and a cosine
         first = next(places[0] for name, places in parts if len(places) == 1)
         yield "unit", first, len(lone), f"{' and '.join(lone)} are of no angle"
     for name, places in parts:

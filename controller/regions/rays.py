@@ -14,9 +14,9 @@ from controller.regions.shapes.pipe import Pipe
 from controller.regions.shapes.prism import Prism
 from controller.stack_array import zeros
 
-TOUCHING = 1e-4  # m, the clearance at which a ray has met a surface
-MAX_STEPS = 64  # steps along a ray, for each region
-_PARALLEL = 1e-100  # part of a direction below which it is 0: its square, or a division by it, would leave the range
+TOUCHING = 1e-4  # m, clearance at which a ray has met a surface
+MAX_STEPS = 64  # greatest number of steps along a ray, for each region
+_PARALLEL = 1e-100  # component of a direction that counts as 0: its square, or a division by it, leaves the range
 
 _ELLIPSOID = Ellipsoid.kind
 _PIPE = Pipe.kind

@@ -98,7 +98,8 @@ def greatest_gradient(mass: Array, gains: Gains) -> float:
 
     Arguments as `least_of_potential_test`.
 
-    By the Schur complement: the translation's part of sigma M sigma, plus the effect of the coupling to rotation.
+    It follows from the Schur complement: the translation's part of sigma M sigma, plus the effect of the coupling to
+    rotation.
     """
     sigma = np.diag([gains.sigma_p] * 3 + [gains.sigma_a] * 3)
     crossing = sigma @ mass @ sigma
@@ -123,7 +124,7 @@ def damping_fit(
 ) -> Fit:
     """Return (45), first condition: lambda_min[D] + lambda_min[K_v] against sigma c_0.
 
-    Of sigma c_0 the one term with de_p/dt alone, from the translational mass: the other terms of
+    The right side is the one term of sigma c_0 with de_p/dt alone, from the translational mass: the other terms of
     (43) come on top unless they happen to cancel it, so this condition is necessary for the full one in general.
     (The term with D's linear part is no multiple of |nu|^2 at all; (43) holds for it only together with the errors.)
 

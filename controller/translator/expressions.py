@@ -100,7 +100,7 @@ class Expressions(Operands):
             if not a.simple:
                 a = self.temporary(a.type, a.code)
             result, factor, n = "", bracketed(a), exponent.value
-            while n:  # by squaring
+            while n:  # repeated squaring
                 if n & 1:
                     result = f"{result} * {factor}" if result else factor
                 n >>= 1

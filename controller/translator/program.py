@@ -19,7 +19,7 @@ _HEAD = """\
 #include <string.h>
 """
 
-# by name, in the order in which one may call another; of equals, and of what is no number, Python takes the first
+# helpers by name, in the order in which one may call another; among equal or NaN arguments Python takes the first
 _HELPERS = {
     "min_f64": "static inline double min_f64(double a, double b) { return b < a ? b : a; }\n",
     "max_f64": "static inline double max_f64(double a, double b) { return b > a ? b : a; }\n",

@@ -95,7 +95,7 @@ def type_of(value: Any) -> Type:
         return Record(type(value), items) if hasattr(value, "_fields") else Tuple(items)
     elif isinstance(value, float):
         return DOUBLE
-    elif isinstance(value, int | np.int64):  # and truth values: each takes a word
+    elif isinstance(value, int | np.int64):  # truth values too: each takes a word
         return INT
     kind = f"an array of {value.dtype}" if isinstance(value, np.ndarray) else type(value).__name__
     raise TypeError(f"argument is {kind}, expected a number, a contiguous array of numbers, or a tuple of such")

@@ -27,7 +27,7 @@ from plant_fmu.toml_tables import hint
 LAW, WHOLE = "deployable", "whole"
 NUMBERS = "ablation.json"
 PAGE = "ablation.html"
-_ZERO = 1e-9  # for a bound that must be above 0
+_ZERO = 1e-9  # value of a bound that must be above 0, which disables the estimate
 
 
 class Variant(NamedTuple):
@@ -58,8 +58,8 @@ class Ablation:
     """Folder and results of an ablation."""
 
     folder: Path
-    campaigns: dict[str, Campaign]  # by variant, the whole law first
-    numbers: dict[str, Any]
+    campaigns: dict[str, Campaign]  # campaign of each variant, the whole law first
+    numbers: dict[str, Any]  # content of ``ablation.json``
 
 
 def ablate(
@@ -76,11 +76,11 @@ def ablate(
     Parameters
     ----------
     scenes : Path
-        A file with one JSON object per line, ``-`` for standard input.
+        File of the scenes with one JSON object per line; ``-`` for standard input.
     out : Path
         A folder that does not exist, is empty, or holds an ablation of the same scenes, which is continued.
     variants : sequence of str
-        Names from `VARIANTS`.
+        Names of the variants to fly, from `VARIANTS`.
     conditions : Conditions, optional
         Conditions of the flights; the arbiter is the variant's.
     settings : sequence of str
@@ -88,12 +88,12 @@ def ablate(
     workers : int
         Number of processes.
     progress : bool
-        Show a bar for each variant, if there is a terminal.
+        True to show a bar for each variant, if there is a terminal.
 
     Returns
     -------
     Ablation
-        With a campaign for each variant.
+        Folder and numbers, with a campaign for each variant.
 
     Raises
     ------

@@ -55,27 +55,27 @@ def run_campaign(
     Parameters
     ----------
     scenes : Path or SceneStore
-        A file with one JSON object per line, ``-`` for standard input; or scenes that are read already.
+        File of the scenes with one JSON object per line, ``-`` for standard input; or a store of scenes read before.
     law : str
-        One of those in `controller.LAWS`.
+        Name of the law, a key of `controller.LAWS`.
     out : Path
         A folder that does not exist, is empty, or holds the same campaign. A complete one gets its summary again, a
         partial one is continued.
     conditions : Conditions, optional
         Conditions of the flights; default: those of the score.
     gains : NamedTuple, optional
-        Of the law; default: its own.
+        Gains of the law; default: its own defaults.
     workers : int
         Number of processes. The rows do not depend on it, except for `worst_step_time`.
     executor : concurrent.futures.Executor, optional
-        Flies the scenes, instead of processes started here.
+        Executor that flies the scenes, instead of processes started here.
     progress : bool
-        Show a bar, if there is a terminal.
+        True to show a bar, if there is a terminal.
 
     Returns
     -------
     Campaign
-        With a row for each scene.
+        Folder, rows and summary, with a row for each scene.
 
     Raises
     ------

@@ -41,8 +41,8 @@ class Comparison:
     """
 
     folder: Path
-    campaigns: dict[str, Campaign]  # by law
-    numbers: dict[str, Any]
+    campaigns: dict[str, Campaign]  # campaign of each law
+    numbers: dict[str, Any]  # content of ``compare.json``
 
 
 def compare(
@@ -59,25 +59,25 @@ def compare(
     Parameters
     ----------
     scenes : Path
-        A file with one JSON object per line, ``-`` for standard input.
+        File of the scenes with one JSON object per line; ``-`` for standard input.
     laws : sequence of str
-        Two or more of those in `controller.LAWS`.
+        Names of two or more laws, keys of `controller.LAWS`.
     out : Path
         A folder that does not exist, is empty, or holds a comparison of the same scenes. It has the folder of a
         campaign for each law, which is continued.
     conditions : Conditions, optional
         Conditions of the flights; default: those of the score.
     gains : mapping from str to NamedTuple, optional
-        By law; default: its own.
+        Gains of each law by its name; default: the law's own defaults.
     workers : int
         Number of processes.
     progress : bool
-        Show a bar for each law, if there is a terminal.
+        True to show a bar for each law, if there is a terminal.
 
     Returns
     -------
     Comparison
-        With a campaign for each law.
+        Folder and numbers, with a campaign for each law.
 
     Raises
     ------
@@ -134,9 +134,9 @@ def medians_where_completed(one: str, results: Results, other: str, others: Resu
     Parameters
     ----------
     one, other : str
-        The laws.
+        Names of the laws.
     results, others : Results
-        Of the same scenes.
+        Rows of the two laws, of the same scenes in the same order.
 
     Returns
     -------
@@ -163,15 +163,15 @@ def paired_differences(one: str, results: Results, other: str, others: Results) 
     Parameters
     ----------
     one, other : str
-        The laws.
+        Names of the laws.
     results, others : Results
-        Of the same scenes.
+        Rows of the two laws, of the same scenes in the same order.
 
     Returns
     -------
     dict
-        Result of `paired` for the completed scenes, and over those that both complete the medians of the differences,
-        the first less the second, of reach time [s] and effort [N s].
+        Result of `paired` for the completed scenes. Over the scenes that both laws complete, also the medians of the
+        differences, first law less second, of reach time [s] and effort [N s].
     """
     mine, theirs = completed(results), completed(others)
     both = mine & theirs

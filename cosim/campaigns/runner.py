@@ -26,7 +26,7 @@ from cosim.run.progress import ProgressBar
 
 log = logging.getLogger(__name__)
 
-_MAX_WARNINGS = 3  # refused rows that are logged one by one
+_MAX_WARNINGS = 3  # number of refused rows that are logged one by one
 
 
 @dataclass(frozen=True)
@@ -50,22 +50,22 @@ def carry_out(
     Parameters
     ----------
     work : Work
-        The work of the campaign.
+        Rows of the campaign, and the task that flies them.
     out : Path
         A folder that does not exist, is empty, or holds the same campaign, complete or partial.
     workers : int
         Number of processes, 1 for this one only; or number of batches that the executor flies at the same time.
     executor : concurrent.futures.Executor, optional
-        Flies the rows, instead of processes started here.
+        Executor that flies the rows, instead of processes started here.
     progress : bool
-        Show a bar, if there is a terminal.
+        True to show a bar, if there is a terminal.
     conclude : callable
-        Writes further results while the folder is locked.
+        Function that writes further results, given all rows, while the folder is locked.
 
     Returns
     -------
     Done
-        With all rows of the work.
+        All rows, and the number of rows flown by this call.
 
     Raises
     ------

@@ -55,7 +55,7 @@ def run_sweep(
     scenario : Scenario
         The base scenario.
     design : Design
-        The values that vary.
+        Values of the keys that vary, row by row.
     out : Path
         A folder that does not exist, is empty, or holds the same sweep. A complete one gets its summary again, a
         partial one is continued.
@@ -64,15 +64,15 @@ def run_sweep(
     workers : int
         Number of processes, which does not change the rows. With an executor: number of batches at the same time.
     executor : concurrent.futures.Executor, optional
-        Flies the rows, instead of processes started here, such as ``Client(...).get_executor()`` of Dask. It is not
-        closed. Its threads take turns.
+        Executor that flies the rows, instead of processes started here, such as ``Client(...).get_executor()`` of
+        Dask. It is not closed. Its threads take turns.
     progress : bool
-        Show a bar, if there is a terminal.
+        True to show a bar, if there is a terminal.
 
     Returns
     -------
     Sweep
-        With all rows.
+        Folder, rows and summary, with all rows of the design.
 
     Raises
     ------

@@ -49,12 +49,12 @@ def contents_of(run: Run) -> Contents:
     Parameters
     ----------
     run : Run
-        A completed, interrupted or killed run.
+        Completed, interrupted or killed run.
 
     Returns
     -------
     Contents
-        Contents as plain text, without any escapes.
+        Contents as plain text without escapes.
     """
     commands, repeats = _repeating(run)
     return Contents(
@@ -136,7 +136,7 @@ class _Violation:
     """Finds the time of a region's least clearance and the duration of its violations, block by block."""
 
     def __init__(self) -> None:
-        self._least, self.worst_at = math.inf, math.nan  # s
+        self._least, self.worst_at = math.inf, math.nan  # m or rad, s
         self._spans, self._ended = Spans(), 0.0
 
     def add(self, time: Array, clearance: Array) -> None:
@@ -178,7 +178,7 @@ def _criteria(run: Run) -> Table | None:
         rows.append((*row, *([costs.get(criterion.name, "–")] if costs else [])))
     head = ["By priority", "Asks", "Led for [s]", "From and to [s]"]
     widths = [0.9, 1.6, 0.7, 2.2]
-    if costs:  # of a metre in its soft regions, half a metre deep: they decide the side of the path
+    if costs:  # cost of a metre in its soft regions, half a metre deep, which decides the side of the path
         head, widths = [*head, "Path's cost of a metre [m]"], [*widths, 0.8]
     return Table("Criteria", tuple(head), tuple(rows), tuple(widths))
 

@@ -26,14 +26,14 @@ def write_report(run: Run, formats: Collection[str] = ("html",)) -> list[Path]:
     Parameters
     ----------
     run : Run
-        A completed, interrupted or killed run.
+        Completed, interrupted or killed run.
     formats : collection of str
         Formats from `FORMATS`: ``html`` is ``report.html`` with its figures as SVG, ``png`` the figures as SVG and PNG.
 
     Returns
     -------
     list of Path
-        The written files, the figures last.
+        Written files, the figures last.
     """
     # importing Matplotlib takes as long as all other imports together
     from cosim.report.figures.sampled_rows import make_figure_data

@@ -18,8 +18,8 @@ from fuzzy_arbiter import Arbiter, ArbiterError, System
 from fuzzy_arbiter.formats import FORMATS, reads
 from plant_fmu.toml_tables import hint
 
-MAX_TEXT = 200_000  # characters of a file of rules
-MAX_INPUTS = 32  # inputs of a file of rules
+MAX_TEXT = 200_000  # greatest number of characters of a file of rules
+MAX_INPUTS = 32  # greatest number of inputs of a file of rules
 
 Kind = Literal["given", "time", "depth", "speed", "membership", "clearance", "closing_speed", "approach_time"]
 VEHICLE_SIGNALS: dict[str, str] = {"time": "s", "depth": "m", "speed": "m/s"}  # signals of the vehicle, and their units
@@ -87,7 +87,7 @@ def _text(path: Path) -> str:
             return file.read(4 * MAX_TEXT + 1).decode("utf-8").removeprefix("\ufeff").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         raise ScenarioError(f"arbiter.file: {path}: byte {error.start} is no UTF-8, expected text") from error
-    except (OSError, ValueError) as error:  # the latter for a name with a null in it
+    except (OSError, ValueError) as error:  # ValueError: a name with a null character
         raise ScenarioError(f"arbiter.file: {path}: {getattr(error, 'strerror', None) or error}") from error
 
 

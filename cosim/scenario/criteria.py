@@ -59,7 +59,7 @@ class CriterionSetup:
 
     name: str
     colour: str  # #RRGGBB
-    reasons: tuple[Reason, ...]  # the greatest membership is used
+    reasons: tuple[Reason, ...]  # membership functions, the greatest of which counts
 
     @property
     def fuzzy(self) -> Criterion:

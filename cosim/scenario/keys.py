@@ -22,7 +22,7 @@ class Key(NamedTuple):
     default: str = ""  # default in words, unless the tables have it as a value
 
 
-# by the path to the key; regions[] means each region
+# keys by their path; regions[] means each region
 KEYS = {
     "vehicle": Key("", "a shipped vehicle, or a TOML file beside the file that names it", " (with `--set`: here)"),
     "title": Key("", "one line for the report, at most 200 characters", default="the name"),

@@ -59,7 +59,7 @@ def with_custom_law(law: Law, scenario: Scenario) -> Scenario:
     Parameters
     ----------
     law : Law
-        The custom law.
+        Custom law.
     scenario : Scenario
         Scenario with any law.
 

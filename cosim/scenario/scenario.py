@@ -86,8 +86,8 @@ class Scenario:
     vehicle_file: Path | None  # file of the vehicle; None for a shipped one
     time: Time
     steps: int  # number of plant steps
-    control_every: int  # plant steps between two control steps
-    arbiter_every: int  # plant steps between two evaluations of the arbiter
+    control_every: int  # number of plant steps between two control steps
+    arbiter_every: int  # number of plant steps between two evaluations of the arbiter
     plant: PlantSetup
     initial: Initial
     law: LawSetup
@@ -102,15 +102,15 @@ class Scenario:
     master: MasterSetup
     record: RecordSetup
     commands: Commands
-    report_failures: bool  # the law receives them when they happen
-    goal: Shape  # the primary region, kept within, at time 0
+    report_failures: bool  # True: the law receives failures when they happen
+    goal: Shape  # primary region, kept within, at its position at time 0
     goal_velocity: Vector3  # m/s, NED
-    goal_streamed: bool  # moved from outside during the run
-    goal_then: tuple[Vector3, ...]  # m, NED: next positions of its centre, in turn
+    goal_streamed: bool  # True: the goal is moved from outside during the run
+    goal_then: tuple[Vector3, ...]  # m, NED: next positions of the goal's centre, in turn
     goal_stay: float  # s, time within the goal before it moves to the next position
     regions: tuple[SecondaryRegion, ...]
     intersection: tuple[int, ...]  # indices of the regions whose overlap the summary reports
-    compare: str  # the claims with which the report compares the run
+    compare: str  # name of the claims with which the report compares the run
     table: dict[str, Any]  # table of the file with defaults filled in
 
     def toml(self, vehicle: str | None = None, commented: bool = False) -> str:
@@ -119,9 +119,9 @@ class Scenario:
         Parameters
         ----------
         vehicle : str, optional
-            Another name for the vehicle's file.
+            Other name for the vehicle's file.
         commented : bool
-            Add a comment with unit and meaning to each key.
+            True to add a comment with unit and meaning to each key.
 
         Returns
         -------
@@ -144,7 +144,7 @@ class Scenario:
         Returns
         -------
         Scenario
-            The checked scenario; its title lists the changes.
+            Checked scenario, whose title lists the changes.
 
         Raises
         ------
@@ -188,7 +188,7 @@ class Scenario:
 
     @property
     def has_paper_criteria(self) -> bool:
-        """Whether criteria and rules are the paper's, with one ramp for all criteria."""
+        """True if criteria and rules are the paper's, with one ramp for all criteria."""
         return not self.arbiter.file and self.arbiter.rules == "ordered" and self.criteria == PAPER
 
     @property
@@ -198,7 +198,7 @@ class Scenario:
 
     @property
     def has_goal(self) -> bool:
-        """Whether there is a goal: an imported log may have none."""
+        """True if there is a goal; an imported log may have none."""
         return bool(self.table["goal"])
 
     @property
@@ -235,12 +235,12 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = (), impor
     overrides : sequence of str
         Changes ``key=value``, with dots between the keys and a TOML value; regions by index or by name.
     imported : bool
-        Allow the scenario of a run that was imported from a log, which cannot be run.
+        True to accept the scenario of a run that was imported from a log, which cannot be run.
 
     Returns
     -------
     Scenario
-        The checked scenario.
+        Checked scenario.
 
     Raises
     ------
@@ -296,12 +296,12 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
     name : str
         Name of the scenario.
     vehicle : Vehicle, optional
-        The vehicle, if it is loaded already.
+        Vehicle, if it is loaded already.
 
     Returns
     -------
     Scenario
-        The checked scenario.
+        Checked scenario.
 
     Raises
     ------

@@ -53,7 +53,7 @@ _CONSTANT = SensorModel(
     depth_bias=0.02, velocity_scale=0.005, acceleration_bias=0.02, angular_velocity_bias=0.0017, heading_bias=0.0175
 )
 _STREAM = 2  # second part of the generator's seed, which separates its stream from that of the noise
-_ROUNDING = 1e-6  # tolerance of times, as a part of a step
+_ROUNDING = 1e-6  # tolerance of times, as a fraction of a step
 
 
 def sensor_parameters(seed: int, over: Mapping[str, float]) -> dict[str, float]:

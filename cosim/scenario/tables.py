@@ -77,7 +77,7 @@ class Failure:
 
     @property
     def is_total(self) -> bool:
-        """Whether it no longer follows its command at all."""
+        """True if it no longer follows its command at all."""
         return self.stuck or self.effectiveness == 0.0
 
 
@@ -107,7 +107,7 @@ class Sensing:
 
     @property
     def exact(self) -> bool:
-        """Whether law and arbiter receive the true state."""
+        """True if law and arbiter receive the true state."""
         noisy = self.position_noise > 0.0 or self.velocity_noise > 0.0 or self.through == "sensors"
         return not noisy and (self.dead_for == 0.0 or self.dead_from == math.inf)
 
@@ -168,7 +168,7 @@ class CriterionEntry:
     """A criterion for which regions are weighed."""
 
     name: str
-    order: int | None = None  # the least comes first; default: its index in the list, from 1
+    order: int | None = None  # rank, the least of which comes first; default: its index in the list, from 1
     colour: str = ""  # #RRGGBB; default: an unused one
     membership: dict[str, Any] = field(default_factory=dict)  # terms by quantity; default: the arbiter's ramp
 
@@ -191,8 +191,8 @@ class RegionEntry:
     gain: float
     shape: dict[str, Any]
     velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
-    streamed: bool = False  # moved from outside during the run
-    hard: bool = True  # must not be violated, for laws that distinguish hard and soft regions
+    streamed: bool = False  # True: moved from outside during the run
+    hard: bool = True  # True: must not be violated, for laws that distinguish hard and soft regions
     deviation: float | tuple[float, float, float] = 0.0  # m, standard deviation of its position: one number, or NED
     priority: float = 1.0  # factor of its violation in the score; laws do not receive it
 
@@ -258,7 +258,7 @@ class LawSetup:
 
     @property
     def own(self) -> bool:
-        """Whether it is a custom law, whose code is not in the file."""
+        """True if it is a custom law, whose code is not in the file."""
         return is_custom_law(self.name)
 
 
@@ -268,11 +268,11 @@ class SecondaryRegion:
 
     region: Region
     criterion: str  # name of a criterion of the scenario
-    streamed: bool = False  # moved from outside during the run
+    streamed: bool = False  # True: moved from outside during the run
     is_dynamic: bool = False  # slot for an obstacle that commands may add during the run
     priority: float = 1.0  # factor of its violation in the score
 
     @property
     def moves(self) -> bool:
-        """Whether it may move away from its position in the scenario."""
+        """True if it may move away from its position in the scenario."""
         return self.streamed or any(self.region.velocity)

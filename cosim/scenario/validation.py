@@ -41,11 +41,11 @@ from plant_fmu.toml_tables import decode, hint
 from plant_fmu.variables import variables
 from plant_fmu.vehicle import Vehicle
 
-ROUNDING = 1e-6  # tolerance of a multiple of the step, as a part of the step
-MAX_STEPS = 100_000_000  # plant steps of a run
-MAX_POINTS = 100_001  # samples of the arbiter's output universe
-MAX_TEXT = 200  # characters of a text
-MAX_OBSTACLES = 100  # obstacle slots
+ROUNDING = 1e-6  # tolerance of a multiple of the step, as a fraction of the step
+MAX_STEPS = 100_000_000  # greatest number of plant steps of a run
+MAX_POINTS = 100_001  # greatest number of samples of the arbiter's output universe
+MAX_TEXT = 200  # greatest number of characters of a text
+MAX_OBSTACLES = 100  # greatest number of obstacle slots
 REGION_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,39}")  # valid in column names and labels of figures
 
 # parameters of the FMU for which a scenario has other keys
@@ -62,8 +62,8 @@ class GoalMotion:
     """Keys of the goal beside those of its shape."""
 
     velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
-    streamed: bool = False  # moved from outside during the run
-    then: tuple[Vector3, ...] = ()  # m, NED: next positions of its centre, in turn
+    streamed: bool = False  # True: moved from outside during the run
+    then: tuple[Vector3, ...] = ()  # m, NED: next positions of the goal's centre, in turn
     stay: float = 5.0  # s, time within the goal before it moves to the next position
 
 

@@ -22,11 +22,11 @@ class Actuators:
     Parameters
     ----------
     scenario : Scenario
-        The scenario of the run.
+        Scenario of the run.
     plant : SteppedPlant
-        Receives the inputs, and the parameters of thrusters that fail or are limited.
+        Plant that receives the inputs, and the parameters of thrusters that fail or are limited.
     signals : Signals
-        Their row holds the commanded wrench and the inputs.
+        Signals whose row holds the commanded wrench and the inputs.
 
     Attributes
     ----------

@@ -30,7 +30,7 @@ class PackedInputs(NamedTuple):
 
     memberships: PackedMemberships
     kinds: NDArray[np.int64]  # (m,) in the order of `_KINDS`
-    places: NDArray[np.int64]  # (m,) criterion, or region: 0 the goal
+    places: NDArray[np.int64]  # (m,) index of the criterion, or of the region with 0 for the goal
     upper: Array  # (m,) upper end of the universe, also the value of an input that is infinite or NaN
     offsets: NDArray[np.int64]  # (m + 1,) into `times` and `values`
     times: Array  # s: times of the points of given signals, one signal behind the other
@@ -42,9 +42,9 @@ class PackedInputs(NamedTuple):
 class ArbiterSignals(NamedTuple):
     """Output of `compute_inputs` for the goal and n regions."""
 
-    memberships: Array  # (criteria,)
-    inputs: Array  # (m,)
-    goal_clearance: Array  # (1,) m
+    memberships: Array  # (criteria,) in [0, 1]
+    inputs: Array  # (m,) value of each input of the rules, in its unit
+    goal_clearance: Array  # (1,) m, clearance of the goal
     closing_speeds: Array  # (n + 1,) m/s or rad/s, the goal's first; above 0 where the clearance shrinks
     approach_times: Array  # (n,) s, 0 where violated, inf where the clearance does not shrink
 

@@ -30,7 +30,7 @@ class Arbitration:
     arbiter : Arbiter
         Arbiter with the scenario's rules.
     measured : VehicleState
-        The state that the law receives.
+        State that the law receives.
     now : ndarray, shape (1,)
         Time [s].
     clearances : ndarray, shape (n,)
@@ -43,7 +43,7 @@ class Arbitration:
     Attributes
     ----------
     state : VehicleState
-        The state that the arbiter uses.
+        State that the arbiter uses.
     region_weights : ndarray, shape (n,)
         Weight of the criterion of each region.
     """

@@ -24,9 +24,9 @@ _LARGEST = 709.78  # largest argument at which exp is finite
 class PackedCurves(NamedTuple):
     """The curves of r terms, in pieces; a ramp has no pieces."""
 
-    offsets: NDArray[np.int64]  # (r + 1,) into the pieces
-    ends: Array  # m, rad or s: where each piece ends, the last of a term at infinity
-    starts: NDArray[np.int64]  # (pieces + 1,) into the programs
+    offsets: NDArray[np.int64]  # (r + 1,) index of each term's first piece, and the number of pieces
+    ends: Array  # (pieces,) m, rad or s: end of each piece, that of a term's last one at infinity
+    starts: NDArray[np.int64]  # (pieces + 1,) index of each piece's first word, and the number of words
     words: NDArray[np.int64]  # (words,) indices into `_WORDS`
     numbers: Array  # (words,) value of each word that is a number
 

@@ -20,7 +20,7 @@ from cosim.scenario.tables import PARKED_POSITION, Vector3
 from cosim.simulation.signals import Array
 
 _AT_REST = (0.0, 0.0, 0.0)
-_ROUNDING = 1e-6  # tolerance of times, as a part of a step
+_ROUNDING = 1e-6  # tolerance of times, as a fraction of a step
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class RegionEnvironment:
     def __init__(self, scenario: Scenario) -> None:
         secondary = [region.region for region in scenario.regions]
         self.regions = pack(secondary)
-        self._deviations = self.regions.deviations.copy()  # m, as the scenario has them
+        self._deviations = self.regions.deviations.copy()  # m, standard deviations as in the scenario
         self._goal_region, self._middle = scenario.goal_region, shape_center(scenario.goal)
         self._target = self._reached = self._new_target(None, self._middle)
         self._then = [np.subtract(place, self._middle) for place in scenario.goal_then]

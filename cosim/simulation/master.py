@@ -36,7 +36,7 @@ from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant
 
 _ARMING_PERIOD = 0.005  # s of the wall clock, between polls of the commands while the run waits for arming
-_ROUNDING = 1e-6  # tolerance of times, as a part of a step
+_ROUNDING = 1e-6  # tolerance of times, as a fraction of a step
 _DOWN: Array = np.array([0.0, 0.0, 1.0])
 _FIRST_APPLIED = "thruster_force[1]"  # outputs before it are read before doStep, it and the later ones after
 
@@ -55,20 +55,20 @@ class Master:
     Parameters
     ----------
     scenario : Scenario
-        The scenario of the run.
+        Scenario of the run.
     law : Law, optional
-        The control law; default: the scenario's.
+        Control law; default: the scenario's.
     plant : SteppedPlant, optional
-        The plant, which the master closes; default: the FMU of the scenario's vehicle.
+        Plant, which the master closes; default: the FMU of the scenario's vehicle.
 
     Attributes
     ----------
     signals : Signals
-        The row that each step fills.
+        Row that each step fills.
     true_state, state : VehicleState
         The plant's state, and the measured one that law and arbiter receive; the same object where sensing is exact.
     navigator : Navigator or None
-        The filter that estimates the state, where sensing is through sensors.
+        Filter that estimates the state; None unless sensing is through sensors.
 
     Raises
     ------

@@ -26,10 +26,10 @@ class PackedMemberships(NamedTuple):
     quantities: NDArray[np.int64]  # (r,) 0 its clearance, 1 the time to contact
     ramps: Array  # (r,) m or rad, clearance where the membership reaches 0; NaN: points or a curve define it
     follows: NDArray[np.bool_]  # (r,) True if the ramp is the arbiter's
-    offsets: NDArray[np.int64]  # (r + 1,) into the points
-    places: Array  # m, rad or s: abscissae of the points, one row behind the other
-    degrees: Array  # memberships at the points
-    curves: PackedCurves  # the curved terms, which have no points
+    offsets: NDArray[np.int64]  # (r + 1,) index of each row's first point, and the number of points
+    places: Array  # (points,) m, rad or s: abscissae of the points, one row behind the other
+    degrees: Array  # (points,) memberships at the points
+    curves: PackedCurves  # curved terms, which have no points
     by_time: bool  # True if a row needs the time to contact
 
 
@@ -41,7 +41,7 @@ def pack_memberships(
     Parameters
     ----------
     regions : sequence of SecondaryRegion
-        Regions; may be empty.
+        Regions of the scenario, none or more.
     criteria : sequence of CriterionSetup
         Criteria of these regions, in their order.
     width : float

@@ -13,7 +13,7 @@ from cosim.simulation.sensor import Sensor
 from cosim.simulation.signals import Signals
 from cosim.simulation.stepped_plant import SteppedPlant
 
-_ROUNDING = 1e-6  # tolerance of times, as a part of a step
+_ROUNDING = 1e-6  # tolerance of times, as a fraction of a step
 FIRST, FIRST_TIME = "measured.depth", f"measured.time.{SENSORS[0]}"  # outputs of the plant, the others follow
 
 
@@ -27,7 +27,7 @@ class SensorNavigation:
     plant : SteppedPlant
         Plant with the sensors.
     signals : Signals
-        Their row holds the plant's outputs.
+        Signals whose row holds the plant's outputs.
     given : VehicleState
         Receives the estimate.
     """
@@ -62,11 +62,11 @@ def make_sensing(
     Parameters
     ----------
     scenario : Scenario
-        Scenario; its key `sensing` is used.
+        Scenario with the key `sensing`.
     plant : SteppedPlant
         Plant with the sensors.
     signals : Signals
-        Their row holds the returned state.
+        Signals whose row holds the returned state.
     true_state : VehicleState
         Views of the true state.
 

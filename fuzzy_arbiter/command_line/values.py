@@ -84,9 +84,9 @@ def evaluated(arbiter: Arbiter, inputs: Sequence[float] | Mapping[str, float], a
     arbiter : Arbiter
         Arbiter to evaluate.
     inputs : sequence or mapping of float
-        The sample.
+        Sample of the inputs.
     as_json : bool
-        One object instead of a line for each output.
+        True for one JSON object instead of a line for each output.
 
     Returns
     -------
@@ -107,16 +107,16 @@ def evaluated_table(arbiter: Arbiter, text: str, where: str, as_json: bool) -> s
     arbiter : Arbiter
         Arbiter to evaluate.
     text : str
-        The table; its first line names the columns, of which those that are no inputs are passed over.
+        Table in CSV; its first line names the columns. Columns that are no inputs are ignored.
     where : str
         Name of the table for errors.
     as_json : bool
-        A list of objects instead of a table.
+        True for a JSON list of objects instead of a table.
 
     Returns
     -------
     str
-        A column for each output, a row for each row; what is undefined is nan, in JSON null.
+        Table with a column for each output and a row for each row; undefined weights are nan, in JSON null.
 
     Raises
     ------

@@ -46,7 +46,7 @@ def centroids(cuts: Array, shape: Outline) -> Array:
 
 def _band(a: float, b: float, below: Array | None, cut: Array) -> tuple[Array, Array]:
     """Return area and moment of the band under a line from a to b between two heights, over a piece of the width 1."""
-    low, high = min(a, b), max(a, b)  # as if it rose; a fall is seen from the other end
+    low, high = min(a, b), max(a, b)  # a falling line is treated as the mirrored rising one
     h1 = np.minimum(cut, high)
     if below is None:
         if low == 0.0:  # half of all lines: nothing below them, and they begin at 0
@@ -64,7 +64,7 @@ def _band(a: float, b: float, below: Array | None, cut: Array) -> tuple[Array, A
         h0, h1 = y0 - below, y1 - below
     if low == high:
         return h1, h1 / 2
-    with np.errstate(over="ignore"):  # of heights above a line that hardly rises, which are clipped
+    with np.errstate(over="ignore"):  # heights above a line that hardly rises may overflow, and are clipped
         s0, s1 = ((y - low) / (high - low) for y in (y0, y1))
     for share in (s0, s1):
         np.minimum(np.maximum(share, 0.0, out=share), 1.0, out=share)

@@ -31,7 +31,7 @@ from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.hierarchy import DEGREE
 
 SMOOTHSTEP = (0.0, 0.0, 3.0, -2.0)  # coefficients of 3 h^2 - 2 h^3, which stays within [0, 1]
-_BLOCK = 8192  # samples evaluated at a time; longer arrays leave the caches and are allocated anew each time
+_BLOCK = 8192  # number of samples evaluated at a time; longer arrays leave the caches and are allocated anew each time
 
 
 class NoClosedFormError(EngineError):
@@ -56,11 +56,11 @@ class ClosedEngine(Engine):
     clauses : tuple of tuple of frozenset
         Clauses of each output: h is the greatest over its clauses of the least degree of a clause's literals.
     ladder : tuple, or None
-        The literals m_1, m_2, .. if the rules are those of prioritised criteria.
+        Literals m_1, m_2, .. if the rules are those of prioritised criteria, else None.
     raw, scaled : tuple of tuple of Piece
-        C(h) of each output, and the weight it becomes.
+        C(h) of each output, and the weight that it becomes.
     clips : bool
-        Whether such weights are then clipped to [0, 1]: between h = 0 and 1 a C(h) may lie beyond C(0) and C(1).
+        True if such weights are then clipped to [0, 1]: between h = 0 and 1 a C(h) may lie beyond C(0) and C(1).
 
     Raises
     ------
@@ -99,23 +99,23 @@ class ClosedEngine(Engine):
         return _values(self.raw[k], cuts[1])
 
     def centroids(self, inputs: Sequence[float]) -> list[float]:
-        """Return the raw value of each output for one sample; as of `Engine`."""
+        """Return the raw value of each output for one sample; see `Engine`."""
         return [_value(forms, h) for forms, h in zip(self.raw, self._highs(inputs), strict=True)]
 
     def centroids_of_many(self, inputs: Array) -> Array:
-        """Return the raw value of each output for many samples; as of `Engine`."""
+        """Return the raw value of each output for many samples; see `Engine`."""
         highs = self._highs_of_many(inputs)
         return np.stack([_values(forms, h) for forms, h in zip(self.raw, highs, strict=True)], axis=1)
 
     def weights(self, inputs: Sequence[float]) -> tuple[float, ...]:
-        """Return the normalized value of each output for one sample; as of `Engine`."""
+        """Return the normalized value of each output for one sample; see `Engine`."""
         result = [_value(forms, h) for forms, h in zip(self.scaled, self._highs(inputs), strict=True)]
         if self.clips:
             result = [min(max(weight, 0.0), 1.0) for weight in result]
         return normalize_weights(result, self.system.normalization)
 
     def weights_of_many(self, inputs: Array) -> Array:
-        """Return the normalized value of each output for many samples; as of `Engine`."""
+        """Return the normalized value of each output for many samples; see `Engine`."""
         result = np.empty((len(inputs), len(self.system.outputs)))
         for start in range(0, len(inputs), _BLOCK):
             block = inputs[start : start + _BLOCK]
@@ -130,7 +130,7 @@ class ClosedEngine(Engine):
         return normalize_weights_of_many(result, self.system.normalization)
 
     def shortcut(self) -> Shortcut | None:
-        """Return a faster function for the weights where the inputs are the criteria's degrees; as of `Engine`."""
+        """Return a faster function for the weights where the inputs are the criteria's degrees; see `Engine`."""
         whole = self.clips or self.system.normalization not in ("range", "none")  # more to be done with the weights
         if self._plain and not whole and self._cubic is not None and self._cubic[:2] == (0.0, 0.0):
             return _smooth_ladder(len(self.system.inputs), *self._cubic[2:])
@@ -165,7 +165,7 @@ class ClosedEngine(Engine):
             return np.stack([np.max(clauses, axis=0) for clauses in least])
         unclaimed = np.ones(len(inputs))
         rest = np.empty(len(inputs))
-        for m in degrees:  # which become the cuts
+        for m in degrees:  # the degrees become the cuts
             np.subtract(1.0, m, out=rest)
             np.minimum(m, unclaimed, out=m)
             np.minimum(unclaimed, rest, out=unclaimed)

@@ -17,7 +17,7 @@ from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.terms.values import Constant, Value
 
 Shortcut = Callable[[Sequence[float]], list[float] | None]
-_BLOCK = 8192  # samples that are evaluated together, so that they stay in the processor's cache
+_BLOCK = 8192  # number of samples that are evaluated together, so that they stay in the processor's cache
 _EACH_BY_ITSELF = ("range", "none")  # normalizations that use one output at a time
 
 

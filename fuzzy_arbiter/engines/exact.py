@@ -18,7 +18,7 @@ from fuzzy_arbiter.engines.sweep import LARGER, TINY, Outline, centroid, outline
 from fuzzy_arbiter.engines.weighted import Weighted
 
 EXACTLY = "exact integrals, to rounding"
-_BLOCK = 8192  # samples evaluated at a time
+_BLOCK = 8192  # number of samples evaluated at a time
 
 
 class ExactEngine(Engine):

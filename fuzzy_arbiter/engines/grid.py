@@ -24,7 +24,7 @@ from fuzzy_arbiter.engines.plain import beyond_plain
 from fuzzy_arbiter.errors import EngineError
 
 LEAST_AREA = float(np.finfo(np.float64).eps)  # scikit-fuzzy divides by no area less than this
-_BLOCK = 4096  # samples that are evaluated together, so that they stay in the processor's cache
+_BLOCK = 4096  # number of samples that are evaluated together, so that they stay in the processor's cache
 _ROUNDING = 4 * LEAST_AREA  # tolerance of degrees
 
 
@@ -34,7 +34,7 @@ class GridEngine(Engine):
     For the two triangles of section VI, with D the distance of two points as a part of the universe, the centroid is at
     most D^2/6 of the universe off the exact one, and a range-normalized weight D^2/2: 1.7e-5 and 5e-5 at 101 points.
 
-    As sampling does it, a jump of an output's term becomes a slope over one cell, and a knot between two points is cut
+    As in sampling, a jump of an output's term becomes a slope over one cell, and a knot between two points is cut
     off. Terms of inputs are not sampled. Areas below 2.2e-16 count as that much, as they do in scikit-fuzzy.
 
     Raises
@@ -88,7 +88,7 @@ class GridEngine(Engine):
         low = self.system.outputs[k].universe[0]
         for first in range(0, len(result), _BLOCK):
             block = cuts[:, first : first + _BLOCK]
-            if block.shape[1] == 1:  # of which NumPy takes sums in another order
+            if block.shape[1] == 1:  # NumPy sums a single column in another order
                 result[first] = self.centroid(k, block[:, 0].tolist())
                 continue
             area, moment = _integrals(self._pieces[k], block)
@@ -196,7 +196,7 @@ def _bends(output: Output, grid: Array, samples: Array) -> list[int]:
     """Return the grid's ends and the grid places where a sampled term bends by more than rounding."""
     last = len(grid) - 1
     knots = [x for term in output.terms for x, _ in term.straight.points]
-    # of a cell with a knot both ends may bend; of a jump at a grid place the cells on both sides
+    # the term may bend at both ends of a cell with a knot, and on both sides of a jump at a grid place
     nearest = {int(i) + side for i in np.searchsorted(grid, knots) for side in (-1, 0, 1)}
     candidates = [*sorted(i for i in nearest if 0 < i < last), last]
     found = [0]
@@ -226,7 +226,7 @@ def _piece(grid: Array, samples: Array, a: int, b: int) -> _Piece:
     return _Piece(start, width, b - a, tuple(padded), tuple(own), tuple(foreign))
 
 
-@np.errstate(over="ignore")  # of a share on a line that hardly rises, which is beyond the piece in any case
+@np.errstate(over="ignore")  # a share on a line that hardly rises may overflow: it is beyond the piece in any case
 def _integrals(pieces: Sequence[_Piece], cuts: Array) -> tuple[Array, Array]:
     """Return area and moment about the universe's least place for cuts of shape (terms, n)."""
     n = cuts.shape[1]

@@ -38,7 +38,7 @@ def ladder(system: System, clauses: Sequence[Sequence[Clause]]) -> tuple[Literal
     """
     complements = _complements(system)
     steps: list[Literal] = []
-    above: set[Literal] = set()  # that the ones before do not hold
+    above: set[Literal] = set()  # literals by which the criteria before do not hold
     for forms in clauses:
         if len(forms) != 1 or not above < forms[0] or len(forms[0]) != len(above) + 1:
             return None

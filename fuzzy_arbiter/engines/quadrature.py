@@ -20,16 +20,16 @@ from fuzzy_arbiter.shapes import Array, Membership
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
 
-BOUND = 1e-9  # bound of a centroid's error, as a part of the universe's width
-_TOLERANCE = 1e-13  # tolerance of each part, as a part of the area
+BOUND = 1e-9  # bound of a centroid's error, as a fraction of the universe's width
+_TOLERANCE = 1e-13  # tolerance of each part, as a fraction of the area
 _NODES, _WEIGHTS = (x.reshape(-1, 1) for x in np.polynomial.legendre.leggauss(16))
-_SCAN = 16  # places in each smooth part of the terms, between which bends are searched
-_BESIDE = 1e-9  # distance of the first and the last of these places from the part's ends, as a part of its width
+_SCAN = 16  # number of places in each smooth part of the terms, between which bends are searched
+_BESIDE = 1e-9  # distance of the first and the last of these places from the part's ends, as a fraction of its width
 _HALVINGS = 45  # greatest number of halvings of a part
 _MAX_PARTS = 20_000  # greatest number of parts
 # a slot meets its cut; it and its cut sum to 1; it and those before it sum to 1; it passes those before it
 _CUT, _REST, _FULL, _PASSED = -1, -2, -3, -4
-_NEAR = 1e-11  # tolerance of a bend's place, as a part of the universe: the error of the integral is its square
+_NEAR = 1e-11  # tolerance of a bend's place, as a fraction of the universe: the error of the integral is its square
 _EQUAL = 1.0 - 1e-12  # heights count as equal if their quotient is above this
 
 
@@ -39,7 +39,7 @@ class Parts(NamedTuple):
     starts: Array
     ends: Array
     areas: Array
-    moments: Array  # about the universe's start
+    moments: Array  # moment of each part about the universe's start
 
 
 class Quadrature:
@@ -55,7 +55,7 @@ class Quadrature:
     Attributes
     ----------
     exact : bool
-        Whether the integrals are exact to rounding: the joined terms are polynomials between their bends.
+        True if the integrals are exact to rounding: the joined terms are polynomials between their bends.
     """
 
     def __init__(self, output: Output, slots: Sequence[Slot]) -> None:

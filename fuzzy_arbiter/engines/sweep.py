@@ -128,7 +128,7 @@ def clipped(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, order
             t = order[first + i]
             if cuts[t] > below:
                 a, b = left[first + t], right[first + t]
-                low, high = min(a, b), max(a, b)  # as if it rose; a fall is seen from the other end
+                low, high = min(a, b), max(a, b)  # a falling line is treated as the mirrored rising one
                 y0 = max(min(cuts[t], low), below)
                 y1 = max(min(cuts[t], high), below)
                 h0, h1 = y0 - below, y1 - below

@@ -85,7 +85,7 @@ def _number(shape: object, inputs: Sequence[str], outputs: Sequence[str]) -> Cal
     if isinstance(shape, Value):
         of = shape.number(inputs, outputs)
         return lambda cut, sample: of(sample)
-    return lambda cut, sample: place_of(shape, cut)  # type: ignore[arg-type]  # which the output has checked
+    return lambda cut, sample: place_of(shape, cut)  # type: ignore[arg-type]  # the output has checked the shape
 
 
 def _array(shape: object, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Array, Array], Array]:

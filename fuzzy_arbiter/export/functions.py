@@ -61,7 +61,7 @@ _C_HEDGES = {
     "cubed": "a * a * a",
     "cube_root": "pow(a, 1.0 / 3.0)",
 }
-# of C's math.h
+# functions of C's math.h
 _C_MATH = frozenset((*_PYTHON_OF_ONE, "fmod"))
 _CALL = re.compile(r"\b([a-z_][a-z_0-9]*)\(")
 

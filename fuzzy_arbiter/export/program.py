@@ -31,8 +31,8 @@ from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
 from fuzzy_arbiter.terms.values import Formula, Value
 
 _JOINS = {name: norm.code for name, norm in {**T_NORMS, **AGGREGATIONS}.items()}
-_DEEPEST = 20  # nested parentheses; parsers accept some hundred
-_LONGEST = 16  # branches of one choice, likewise
+_DEEPEST = 20  # greatest number of nested parentheses; parsers accept some hundred
+_LONGEST = 16  # greatest number of branches of one choice; parsers accept some hundred
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class Sweep:
     name: str
     k: int
     cuts: tuple[str, ...]
-    scales: bool  # whether a cut scales its term in the place of clipping it
+    scales: bool  # True if a cut scales its term, False if it clips it
 
 
 @dataclass(frozen=True, slots=True)
@@ -361,7 +361,7 @@ def _swept(engine: Engine) -> Iterator[Statement]:
         scales = any(slot.implication == "prod" for slot in engine.firing.slots[k - 1])
         fired = _valued(output, k, cuts, system) if output.weighted else (Sweep(f"y{k}", k, tuple(cuts), scales),)
         yield Choose(((any_fires, fired), ("", (default,))))
-        if output.weighted:  # which may be no number
+        if output.weighted:  # the value may be NaN
             yield Choose(((f"not (fabs(y{k}) < INFINITY)", (default,)),))
         if output.lock_range:
             low, high = output.universe

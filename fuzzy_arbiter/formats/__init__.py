@@ -20,7 +20,7 @@ __all__ = ["FORMATS", "FormatName", "fold_normalization", "load", "reads", "save
 
 FormatName = Literal["json", "toml", "fcl", "fis", "fll"]
 FORMATS: tuple[str, ...] = get_args(FormatName)
-MAX_FILE = 4_000_000  # bytes
+MAX_FILE = 4_000_000  # greatest number of bytes of a file
 
 _READ: dict[str, Callable[[str], System]] = {
     "json": json_toml.read_json,
@@ -158,7 +158,7 @@ def load(path: str | Path, block: str | None = None) -> System:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise FormatError(f"{path}: byte {error.start} is no UTF-8, expected text in UTF-8") from None
-    except (OSError, ValueError) as error:  # the latter for a name with a null in it
+    except (OSError, ValueError) as error:  # ValueError: a name with a null character
         raise FormatError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     try:
         return reads(text, format, block)

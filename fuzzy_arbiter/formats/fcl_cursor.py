@@ -90,7 +90,7 @@ class Cursor:
 
     def range(self) -> tuple[float, float]:
         """Take the two limits after the word of a range, in the units of the variable."""
-        self.accept(":=")  # which some texts of the standard leave out
+        self.accept(":=")  # some texts of the standard leave it out
         self.take("(")
         low = self.number("the least value")
         self.take("..")
@@ -146,7 +146,7 @@ class Cursor:
             self.take(",")
             points.append((place, self.number("a degree")))
             self.take(")")
-            self.accept(",")  # which examples of the standard have
+            self.accept(",")  # examples of the standard have it
         if not points:
             self.unexpected("points such as (0, 0) (5, 1), a number or a function such as GAUSS")
         return Shape(tuple(points)), [x for x, _ in points]

@@ -49,7 +49,7 @@ def system_of(tokens: list[Token], fuzzylite: bool, settings: dict[str, Any]) ->
     Raises
     ------
     FormatError, DefinitionError
-        As of `fuzzy_arbiter.formats.reads`.
+        If the text or the definition is invalid, as in `fuzzy_arbiter.formats.reads`.
     """
     return _Reader(tokens, fuzzylite=fuzzylite).system(settings)
 
@@ -152,7 +152,7 @@ class _Reader(Cursor):
         shapes = [term.shape for term in draft.terms or ()]
         values = any(isinstance(shape, Constant | Linear) for shape in shapes)
         sets = any(not isinstance(shape, Value) for shape in shapes)
-        method: Any = draft.method or ("average" if values and not sets else "centroid")  # as jFuzzyLogic takes it
+        method: Any = draft.method or ("average" if values and not sets else "centroid")  # the default of jFuzzyLogic
         weighted = method in WEIGHTED
         own = draft.accumulation or accumulation or ("sum" if weighted and self.fuzzylite else "max")
         with located(f"line {draft.line}"):
@@ -165,7 +165,7 @@ class _Reader(Cursor):
         if draft.terms is None:
             refuse(draft.line, f"{name!r} has no {section}")
         universe = draft.universe or universe_of(draft.places)
-        if universe is None and weighted:  # which does not matter to values
+        if universe is None and weighted:  # values do not depend on the universe
             low, high = min(draft.places, default=0.0), max(draft.places, default=0.0)
             universe = (low - 1.0, high + 1.0)
         if universe is None:
@@ -289,10 +289,10 @@ class _Reader(Cursor):
         start = self.at
         while self.here.text != ";" and self.here.kind != "end":
             if self.at > start and self.here.line > self.tokens[self.at - 1].line and self.next_statement():
-                self.fuzzylite = True  # which ends a rule with its line
+                self.fuzzylite = True  # fuzzylite ends a rule with its line
                 break
             self.at += 1
-        # as names, except the words of rules, for the language has no others
+        # read as names, except the words of rules, since the language has no other words
         words = [
             token if token.text.lower() in _RULE_WORDS else self.as_name(token)
             for token in self.tokens[start : self.at]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from fuzzy_arbiter.formats.notation import refuse
 from fuzzy_arbiter.terms.norms import S_NORMS, T_NORMS
 
-# of IEC 61131-7 and of jFuzzyLogic's grammar
+# words of IEC 61131-7 and of jFuzzyLogic's grammar
 _WORDS = (
     "abs accu act and asum bdif bsum coa cog cogf cogs cos cosine default defuzzify dmax dmin dsigm einstein "
     "end_defuzzify end_function_block end_fuzzify end_option end_options end_ruleblock end_var exp function "
@@ -26,7 +26,7 @@ CONJUNCTIONS = {
     "DPROD": "drastic_product",
     "HPROD": "hamacher_product",
     "NMIN": "nilpotent_minimum",
-}  # of AND, and of ACT
+}  # words of AND and of ACT
 DISJUNCTIONS = {
     **{norm.fcl: name for name, norm in S_NORMS.items()},
     "DSUM": "drastic_sum",
@@ -70,7 +70,7 @@ class Token(NamedTuple):
     kind: str
     text: str
     line: int
-    spaced: bool = False  # whether a space or a comment stands before it
+    spaced: bool = False  # True if a space or a comment is before it
 
 
 def cut(text: str) -> tuple[list[Token], list[tuple[int, str]]]:
@@ -79,7 +79,7 @@ def cut(text: str) -> tuple[list[Token], list[tuple[int, str]]]:
     Returns
     -------
     list of Token
-        Without spaces and comments; the last one is the end.
+        Tokens without spaces and comments; the last one is the end.
     list of (int, str)
         Line and text of each comment, without its signs.
 
@@ -118,7 +118,7 @@ def block_name(tokens: Sequence[Token]) -> str:
     Returns
     -------
     str
-        Empty if there is none.
+        Name of the block; empty if there is none.
     """
     words: list[str] = []
     for token in tokens:

@@ -202,7 +202,7 @@ def _outputs(
         section = sections[f"Output{k}"]
         locks = section.flag("LockRange"), section.flag("LockPrevious")
         with located(f"line {section.line}"):
-            outputs.append(Output(*parts, section.default(), own, join, *locks))  # type: ignore[arg-type]  # of its words
+            outputs.append(Output(*parts, section.default(), own, join, *locks))  # type: ignore[arg-type]  # words from a table
     return outputs
 
 

@@ -25,7 +25,7 @@ DEFUZZIFIERS = {
 }
 METHODS = {"AndMethod": T_WORDS, "OrMethod": S_WORDS, "ImpMethod": T_WORDS, "AggMethod": JOINS}
 
-# straight functions: the fuzzylite type that they are, and how many numbers
+# straight functions: their type in fuzzylite, and their number of parameters
 STRAIGHT = {
     "trimf": ("Triangle", 3),
     "trapmf": ("Trapezoid", 4),

@@ -27,7 +27,7 @@ def read_json(text: str) -> System:
     Parameters
     ----------
     text : str
-        One object.
+        Text of one JSON object.
 
     Returns
     -------
@@ -91,7 +91,7 @@ def write_json(system: System) -> str:
     Returns
     -------
     str
-        Indented, with the points of a term on one line.
+        Indented JSON text, with the points of a term on one line.
     """
     lines = [f"  {_text(key)}: {_text(value)}," for key, value in _settings(system)]
     for key, variables in (("inputs", system.inputs), ("outputs", system.outputs)):
@@ -120,7 +120,7 @@ def write_toml(system: System) -> str:
     str
         TOML text with a table for each variable, and the points of a term on one line.
     """
-    # by hand, for tomli_w writes each number of a list on its own line: 14 lines for a triangle
+    # formatted here, since tomli_w writes each number of a list on its own line: 14 lines for a triangle
     lines = [f"{key} = {_text(value)}" for key, value in _settings(system)]
     lines += ["rules = [", *(f"  {_rule(rule, ' = ', str)}," for rule in system.rules), "]"]
     for key, variables in (("inputs", system.inputs), ("outputs", system.outputs)):

@@ -42,7 +42,7 @@ def surface(
     at : mapping from str to float, optional
         Values of the others, which the picture shows; default: the middle of each universe.
     ax : Axes, optional
-        Default: those of a new figure; with ``projection="3d"`` a relief is drawn.
+        Axes to draw into; default: those of a new figure. With ``projection="3d"`` a relief is drawn.
     points : int
         Number of points along each axis.
 
@@ -109,7 +109,7 @@ def decisions(
     at : mapping from str to float, optional
         Values of the others, which the picture shows; default: the middle of each universe.
     ax : Axes, optional
-        Default: those of a new figure.
+        Axes to draw into; default: those of a new figure.
     points : int
         Number of points along each axis.
 

@@ -49,7 +49,7 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
     at : float, optional
         Place at which the terms' degrees are marked.
     ax : Axes, optional
-        Default: those of a new figure.
+        Axes to draw into; default: those of a new figure.
 
     Returns
     -------
@@ -134,7 +134,7 @@ def profile(
     at : mapping from str to float, optional
         Values of the others, which the picture shows; default: the middle of each universe.
     ax : Axes, optional
-        Default: those of a new figure.
+        Axes to draw into; default: those of a new figure.
 
     Returns
     -------

@@ -17,7 +17,7 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 DASHES = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (1, 2)))
 HATCHES = ("////", "....", "\\\\\\\\", "xx", "----", "||||")
 INK, FAINT = "#333333", "#999999"
-_LETTERS = 14  # letters of a legend or title in an inch of the axes
+_LETTERS = 14  # number of letters of a legend or title in an inch of the axes
 
 
 def require_matplotlib() -> None:
@@ -26,7 +26,7 @@ def require_matplotlib() -> None:
     Raises
     ------
     PictureError
-        If it is not; the message names the extra that installs it.
+        If Matplotlib is not installed; the message names the extra that installs it.
     """
     if find_spec("matplotlib") is None:
         raise PictureError("pictures: Matplotlib is not installed, expected the extra fuzzy-arbiter[plot]")
@@ -45,7 +45,7 @@ def new_axes(width: float, height: float, **keywords: Any) -> Axes:
     Returns
     -------
     Axes
-        Alone in the figure.
+        Axes, the only ones of their figure.
     """
     require_matplotlib()
     from matplotlib.figure import Figure
@@ -124,7 +124,7 @@ def legend_above(ax: Axes, names: Sequence[str], title: str = "") -> None:
     ax : Axes
         Axes with labelled lines.
     names : sequence of str
-        Their labels.
+        Labels of these lines.
     title : str
         Title of the legend.
     """

@@ -80,13 +80,13 @@ class Curve(Membership):
         object.__setattr__(self, "_jumps", tuple(x for i, x in enumerate(self.ends[:-1]) if self._jump(i, x)))
 
     @property
-    def polynomial(self) -> bool:  # type: ignore[override]  # by kind
-        """Whether its pieces are polynomials."""
+    def polynomial(self) -> bool:  # type: ignore[override]  # depends on the kind
+        """True if its pieces are polynomials."""
         return KINDS[self.kind].polynomial
 
     @property
     def jumps(self) -> bool:
-        """Whether there is a jump."""
+        """True if there is a jump."""
         return bool(self._jumps)
 
     def _side(self, i: int, x: float) -> float:

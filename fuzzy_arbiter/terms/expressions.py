@@ -162,7 +162,7 @@ def _said(node: Node) -> tuple[str, int]:
     if word == "~":
         return f"-{_within(texts[0], binds)}", binds
     left, right = texts
-    # of equal ones the left is first, but for powers
+    # operators of equal precedence are evaluated from the left, except powers
     first, second = (
         (_within(left, binds + 1), _within(right, binds))
         if word == "^"

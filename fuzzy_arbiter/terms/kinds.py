@@ -29,7 +29,7 @@ class CurveKind:
     fll, fis, fcl : Word, optional
         Word of fuzzylite, of MATLAB or fuzzylite, and of jFuzzyLogic; empty if there is none.
     polynomial : bool
-        Whether the pieces are polynomials.
+        True if the pieces are polynomials.
     inverse : callable, optional
         Function for a kind that only rises or only falls: from the parameters to pieces over the degree ``w``, which
         give the place.

@@ -18,7 +18,7 @@ class Term:
     Attributes
     ----------
     name : str
-        The word.
+        Name of the term.
     shape : Membership or Value
         A `Shape` of points, a curve such as ``curve("gaussian", 5, 2)``, or, of an output whose terms are values, a
         `Constant`, a `Linear` or a `Formula`.

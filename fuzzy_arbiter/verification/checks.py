@@ -31,7 +31,7 @@ from fuzzy_arbiter.verification.report import Check, Finding, Row, Severity, Ver
 from fuzzy_arbiter.verification.rules import labels, redundant, unused
 from fuzzy_arbiter.verification.search import Answer, Goal
 
-EFFORT = 4_000_000_000  # statements, some seconds; forty prioritised criteria need 1/500 of it
+EFFORT = 4_000_000_000  # number of statements, some seconds; forty prioritised criteria need 1/500 of it
 MAX_ROWS = 256
 NAMED_ROWS = 8
 _ALL = "for all real inputs"
@@ -46,12 +46,12 @@ def verify(system: System, effort: int = EFFORT) -> Verification:
     system : System
         System to verify.
     effort : int
-        Most statements to evaluate; a check that needs more is undecided.
+        Greatest number of statements to evaluate; a check that needs more is undecided.
 
     Returns
     -------
     Verification
-        Data; its `str` is a text for people.
+        Verification as data; its `str` is a text for people.
 
     Raises
     ------

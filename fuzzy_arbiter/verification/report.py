@@ -60,7 +60,7 @@ class Row:
     Attributes
     ----------
     terms : tuple of str, length inputs
-        The terms.
+        Term of each input.
     concluded : tuple of tuple of str, length outputs
         Terms that each output is in, at any strength.
     rules : tuple of str
@@ -112,37 +112,37 @@ class Verification:
 
     @property
     def complete(self) -> bool | None:
-        """Whether in each crisp row every output has a rule that fires."""
+        """True if in each crisp row every output has a rule that fires."""
         return self._holds("complete")
 
     @property
     def consistent(self) -> bool | None:
-        """Whether in no crisp row rules of weight 1 put one output into two terms."""
+        """True if in no crisp row rules of weight 1 put one output into two terms."""
         return self._holds("consistent")
 
     @property
     def exclusive(self) -> bool | None:
-        """Whether in no crisp row two outputs are above 1/2 in their greatest terms."""
+        """True if in no crisp row two outputs are above 1/2 in their greatest terms."""
         return self._holds("exclusive")
 
     @property
     def graded_complete(self) -> bool | None:
-        """Whether for all real inputs every output has a rule that fires."""
+        """True if for all real inputs every output has a rule that fires."""
         return self._holds("graded_complete")
 
     @property
     def graded_consistent(self) -> bool | None:
-        """Whether for no real inputs one output is above 1/2 in two terms."""
+        """True if for no real inputs one output is above 1/2 in two terms."""
         return self._holds("graded_consistent")
 
     @property
     def graded_exclusive(self) -> bool | None:
-        """Whether for no real inputs two outputs are above 1/2 in their greatest terms."""
+        """True if for no real inputs two outputs are above 1/2 in their greatest terms."""
         return self._holds("graded_exclusive")
 
     @property
     def ok(self) -> bool:
-        """Whether there is no fault, and that was decided."""
+        """True if all checks were decided and none found a fault."""
         decided = (self.complete, self.consistent, self.graded_complete)
         return None not in decided and all(finding.severity != "fault" for finding in self.findings)
 

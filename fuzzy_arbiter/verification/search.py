@@ -20,7 +20,7 @@ from fuzzy_arbiter.engines.firing import Logic
 from fuzzy_arbiter.propositions import Is, Proposition
 from fuzzy_arbiter.verification.cells import Domain, Ranks
 
-CHUNK = 8192  # combinations evaluated together
+CHUNK = 8192  # number of combinations evaluated together
 Bounds = tuple[Ranks, Ranks]
 Group = tuple[tuple[Proposition, int], ...]
 Box = dict[str, int]
@@ -57,7 +57,7 @@ class Answer:
     boxes : tuple of dict from str to int
         Pattern of each input that matters; the goal is met whatever the others are.
     all_found : bool
-        Whether the search went through all combinations, so that there are no more boxes.
+        True if the search went through all combinations, so that there are no more boxes.
     combinations : int
         Number of combinations of the goal's inputs.
     """
@@ -112,7 +112,7 @@ class Search:
         self.combinations = math.prod(map(len, self._patterns))
 
     def run(self, limit: int, wanted: int = 1) -> tuple[list[Answer], int]:
-        """Search.
+        """Search for boxes that meet the goals.
 
         Parameters
         ----------
@@ -153,7 +153,7 @@ class Search:
                 patterns = np.arange(len(self._patterns[boxes.shape[1]]), dtype=np.int32)
                 grown = np.repeat(boxes, len(patterns), axis=0)
                 stack.append(np.column_stack((grown, np.tile(patterns, len(boxes)))))
-        done = not stack  # of a goal that has all it wanted, boxes were left out
+        done = not stack  # for a goal that has all wanted boxes, others were left out
         answers = [Answer(tuple(boxes), done and len(boxes) < wanted, self.combinations) for boxes in found]
         return answers, seen * self._cost
 

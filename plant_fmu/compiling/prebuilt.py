@@ -110,12 +110,12 @@ def write_prebuilt(structure: Component, fmi: int, platforms: str, folder: Path)
     platforms : str
         Platforms: ``all``, by the compiler of the ziglang package, or ``native``, by any compiler.
     folder : Path
-        Folder of the file.
+        Folder into which the file is written.
 
     Returns
     -------
     Path
-        The file, with the libraries of these platforms.
+        Path of the file with the libraries of these platforms.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def general_component(component: Component) -> Component:
 
 
 def _stand_in(i: int) -> float:
-    return math.ldexp(1.0 + i / 2**20, -1000)  # of the size 1e-301: no quantity is as small
+    return math.ldexp(1.0 + i / 2**20, -1000)  # about 1e-301: no quantity is as small
 
 
 def file_name(general: Component, fmi: int) -> str:

@@ -30,7 +30,7 @@ def c_sources(component: Component, fmi: int) -> dict[str, bytes]:
     Parameters
     ----------
     component : Component
-        The component.
+        Component of the FMU.
     fmi : int
         FMI version, 2 or 3.
 
@@ -62,7 +62,7 @@ def compiled_files(component: Component, fmi: int) -> list[str]:
     Parameters
     ----------
     component : Component
-        The component.
+        Component of the FMU.
     fmi : int
         FMI version, 2 or 3.
 
@@ -80,7 +80,7 @@ def header(component: Component, token: str) -> str:
     Parameters
     ----------
     component : Component
-        The component.
+        Component of the FMU.
     token : str
         The FMU's guid (FMI 2.0) or instantiation token (FMI 3.0).
 

@@ -1,4 +1,4 @@
-"""WebAssembly: a component as of fmi-ls-wasm, or a module with FMI's functions that any host can call."""
+"""WebAssembly: a component of fmi-ls-wasm, or a module with FMI's functions that any host can call."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def module(component: Component, token: str, beside: Mapping[str, bytes] | None 
     Parameters
     ----------
     component : Component
-        The component.
+        Component of the FMU.
     token : str
         Token of the FMI 3.0 description that belongs to it.
     beside : mapping of str to bytes, optional
@@ -70,7 +70,7 @@ def component_binary(component: Component, token: str) -> bytes:
     Parameters
     ----------
     component : Component
-        The component.
+        Component of the FMU.
     token : str
         Token of the FMI 3.0 description that belongs to it.
 
@@ -106,7 +106,7 @@ def members(component: Component, token: str) -> dict[str, bytes]:
     Parameters
     ----------
     component : Component
-        The component.
+        Component of the FMU.
     token : str
         Token of the FMI 3.0 description that belongs to it.
 
@@ -118,7 +118,7 @@ def members(component: Component, token: str) -> dict[str, bytes]:
     Raises
     ------
     BuildError
-        As `component_binary`.
+        If the ziglang package or wasm-tools is not installed, or fails.
     """
     manifest = xml_text(
         ET.Element(

@@ -23,7 +23,7 @@ def contents(vehicle: Vehicle, fmi: int, rows: Sequence[Variable] | None = None)
     Parameters
     ----------
     vehicle : Vehicle
-        The vehicle.
+        Vehicle of the FMU.
     fmi : int
         FMI version, 2 or 3.
     rows : sequence of Variable, optional

@@ -36,7 +36,7 @@ def layered_files(vehicle: Vehicle, rows: Sequence[Variable] | None = None) -> d
     Parameters
     ----------
     vehicle : Vehicle
-        The vehicle.
+        Vehicle of the FMU.
     rows : sequence of Variable, optional
         Variables of its FMU, where they start at other values than the vehicle's own.
 

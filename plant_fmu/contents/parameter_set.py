@@ -23,7 +23,7 @@ def ssv(vehicle: Vehicle, rows: Sequence[Variable] | None = None) -> str:
     Parameters
     ----------
     vehicle : Vehicle
-        The vehicle.
+        Vehicle of the FMU.
     rows : sequence of Variable, optional
         Variables of its FMU, where they start at other values than the vehicle's own.
 

@@ -42,9 +42,9 @@ _TABLE = {
     "M": "0+--+0000-++-+-0",
     "N": "00+--00++--+0+-0",
 }
-_FORCE = 0.25  # commanded force, as a part of the greatest that the thrusters give
+_FORCE = 0.25  # commanded force, as a fraction of the greatest that the thrusters give
 _ANGULAR_ACCELERATION = 0.6  # rad/s2, effect of a commanded moment on a vehicle at rest
-_FULL_AHEAD, _BEYOND = 6, 1.2  # a second in which the command is beyond the thrusters' limits
+_FULL_AHEAD, _BEYOND = 6, 1.2  # second in which the command is beyond the thrusters' limits; by which factor
 
 RATE_LIMITED_LAG = 1e-3  # s, the least time constant of a thruster with a rate limit, as the plant defines it
 

@@ -28,7 +28,7 @@ _DESCRIPTIONS = {
     "measured.time": "Time of each sensor's sample",
 }
 _POSE = ("position", "quaternion", "attitude")
-# of thruster i: variables name[i], and what they are called within its terminal
+# variables name[i] of thruster i, and their names within its terminal
 _THRUSTER = {"thrust": "command", "thruster_force": "force", "thrust_saturated": "saturated"}
 
 

@@ -28,7 +28,7 @@ class FmuVariable:
 
     @property
     def is_real(self) -> bool:
-        """Whether it is a double precision number."""
+        """True if it is a double precision number."""
         return self.kind in ("Real", "Float64")
 
 

@@ -10,9 +10,9 @@ from typing import Literal
 from plant_fmu.errors import TaskError
 
 Status = Literal["ok", "failed", "not installed", "does not apply"]
-Jacobian = dict[str, dict[str, float]]  # by name: [state whose derivative is taken][state or input]
+Jacobian = dict[str, dict[str, float]]  # derivatives by names: [state whose derivative is taken][state or input]
 
-MAX_STEPS = 100_000_000  # steps of a task
+MAX_STEPS = 100_000_000  # greatest number of steps of a task
 
 _ROUNDING = 1e-9  # relative tolerance of a stop time against a whole number of steps
 

@@ -17,7 +17,7 @@ def image(figure: Figure, suffix: str) -> bytes:
     Parameters
     ----------
     figure : Figure
-        The picture.
+        Picture to encode.
     suffix : {"png", "svg", "pdf"}
         Format of the file.
 

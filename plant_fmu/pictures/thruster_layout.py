@@ -33,8 +33,8 @@ class _View:
 class _Push:
     """Thrusters of one place and one direction in a view."""
 
-    place: Array  # (2,) m
-    arrow: Array  # (2,) m
+    place: Array  # (2,) m, place in the view
+    arrow: Array  # (2,) m, arrow in the direction of the force
     towards: float  # 1 towards the viewer, -1 away, 0 across
     numbers: str
 
@@ -50,9 +50,9 @@ _VIEWS = (
 )
 _AXES = ("x forward", "y to starboard", "z down")
 _PUSH, _HULL, _WEIGHT, _LIFT = "#0072b2", "#999999", "#d55e00", "#009e73"
-_FLAT = 0.2  # part of a unit force in the plane of a view, below which it is drawn as a dot or a cross
-_SAME = 1e-3  # part of the vehicle's reach: points at a smaller distance are one place
-# parts of that reach: half a view, an arrow, the distance to a number, a letter
+_FLAT = 0.2  # component of a unit force in the plane of a view below which it is drawn as a dot or a cross
+_SAME = 1e-3  # distance within which points are one place, as a fraction of the vehicle's reach
+# fractions of that reach: half a view, an arrow, the distance to a number, a letter
 _ROOM, _ARROW, _BESIDE, _LETTER = 1.7, 0.42, 0.17, 0.06
 _AROUND = 16  # possible places of the numbers about an end of an arrow
 _NOTE = (

@@ -33,14 +33,14 @@ _MARGIN, _LETTER = 0.15, 8.0  # inches; points
 class Row:
     """Variables of one kind in one line of the map."""
 
-    text: str  # such as position.{x, y, z}
+    text: str  # names in one text, for example position.{x, y, z}
     count: int
     units: str  # units and remarks
 
 
 @dataclass(frozen=True)
 class _Box:
-    role: str  # gives the colour
+    role: str  # role of the variables, which determines the colour
     title: str
     rows: list[Row]
 

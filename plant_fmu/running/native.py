@@ -24,9 +24,9 @@ class Native(NamedTuple):
     get_values: int  # fmi3GetFloat64
     do_step: int  # fmi3DoStep
     input_references: NDArray[np.uint32]  # (n,) value references of the inputs
-    inputs: NDArray[np.float64]  # (n,) sent by set_values
+    inputs: NDArray[np.float64]  # (n,) values sent by set_values
     output_references: NDArray[np.uint32]  # (m,) value references of the outputs
-    outputs: NDArray[np.float64]  # (m,) filled by get_values
+    outputs: NDArray[np.float64]  # (m,) values filled in by get_values
     results: NDArray[np.int64]  # (4,) results of fmi3DoStep by pointer, each at the first byte of its element
 
 

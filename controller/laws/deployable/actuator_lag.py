@@ -25,7 +25,7 @@ from controller.laws.deployable.model import Thrusters
 
 Array = NDArray[np.float64]
 
-_GREATEST_TURN = 0.5  # rad, of the attitude ahead
+_GREATEST_TURN = 0.5  # rad, greatest turn of the predicted attitude
 
 
 def update_forces(estimate: Estimate, thrusters: Thrusters, period: float) -> None:
@@ -64,7 +64,7 @@ def _between(least: float, middle: float, most: float, lags: Array, lag: float) 
 
 def _of_lag(lag: float, period: float) -> tuple[float, float]:
     """Return the fraction of a force that remains after a period [s] with a lag [s], and its mean over the period."""
-    if lag < 0.03 * period:  # exp(-33) is nothing
+    if lag < 0.03 * period:  # exp(-33) is negligible
         return 0.0, lag / period
     remains = exponential(-period / lag)
     return remains, lag / period * (1.0 - remains)
@@ -97,7 +97,7 @@ def predict_state(
     Parameters
     ----------
     predicted : PredictedState
-        Updated.
+        Predicted state, updated in place.
     position, velocity : ndarray, shape (3,)
         Position [m] and velocity [m/s], NED.
     quaternion : ndarray, shape (4,)

@@ -27,21 +27,21 @@ from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
+_ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 _RETURN = 0.2  # 1/s, rate of return to the preferred attitude
-_CURRENT_STEP = 0.01  # m/s, of the difference quotient
-_TURN = 4.0  # 1/s, rate of turning until a region has its comfort
+_CURRENT_STEP = 0.01  # m/s, step of the current in a difference quotient
+_TURN = 4.0  # 1/s, turning rate per radian by which the clearance of a region of attitude is below `comfort`
 
 
 class Attitude(NamedTuple):
     """State of the attitude loop."""
 
-    preferred: Array  # (4,) attitude where no region requires another, from body to world
-    desired: Array  # (4,) setpoint of the loop
-    last_omega: Array  # (3,) rad/s
-    by_current: Array  # (3, 2) N s, derivative of the modelled moment by the current
-    measured_moment: Array  # (3,) N m, of thrusters and weight, over the last period, body axes
-    started: Array  # (1,) 1 once last_omega is measured
+    preferred: Array  # (4,) from body to world: attitude where no region requires another
+    desired: Array  # (4,) from body to world: setpoint of the loop
+    last_omega: Array  # (3,) rad/s, body rates of the last step
+    by_current: Array  # (3, 2) N s, derivative of the modelled moment by the current, north and east
+    measured_moment: Array  # (3,) N m, body axes: moment of thrusters and weight over the last period
+    started: Array  # (1,) 1 once `last_omega` is measured, 0 before
 
 
 def empty_attitude(preferred: Array) -> Attitude:
@@ -62,7 +62,7 @@ def measure_moment(
     Parameters
     ----------
     attitude : Attitude
-        `measured_moment` is updated.
+        State of the loop; `measured_moment` and `by_current` are updated.
     dynamics : Dynamics
         Dynamics of the vehicle.
     R : ndarray, shape (3, 3)
@@ -77,7 +77,7 @@ def measure_moment(
     Returns
     -------
     bool
-        False until rates were measured twice.
+        True if the moment is measured; False until the rates were measured twice.
     """
     started = bool(attitude.started[0] > 0.0)
     mean, water, known, other, rate = zeros(3), zeros(3), zeros(6), zeros(6), zeros(6)
@@ -117,13 +117,13 @@ def update_desired(
     Parameters
     ----------
     attitude : Attitude
-        `desired` is updated.
+        State of the loop; `desired` is updated.
     regions : PackedRegions
         Regions; only those of attitude apply, hard or soft.
     position : ndarray, shape (3,)
         Position of the vehicle [m, NED].
     gains : DeployableGains
-        Comfort, tilt, turning rate.
+        Gains `comfort`, `tilt` and `turning_rate`.
     period : float
         Control period [s].
     """
@@ -141,7 +141,7 @@ def update_desired(
             limited = True
             if size > 0.0:
                 _add_scaled(_TURN * (gains.comfort - clearance) / size, gradient, omega)
-            elif clearance < 0.0:  # half a turn away all axes are equivalent: about the vertical
+            elif clearance < 0.0:  # half a turn away all axes are equivalent: turn about the vertical
                 k[0], k[1], k[2] = down_parts(attitude.desired)
                 _add_scaled(_TURN * (gains.comfort - clearance), k, omega)
     if not limited and error[0] > 1.0 - 1e-15:

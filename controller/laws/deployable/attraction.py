@@ -13,14 +13,14 @@ from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-_AHEAD = 0.4  # m along the path, lookahead distance
-_SLOWEST_CORNER = 0.25  # of the full speed, at a corner of 180 degrees
+_AHEAD = 0.4  # m, lookahead distance along the path
+_SLOWEST_CORNER = 0.25  # speed at a corner of 180 degrees, as a fraction of the full speed
 
 
 def approach_speed(distance: float, deceleration: float, slope: float) -> float:
     """Return the greatest speed [m/s] from which the vehicle can stop within a distance [m].
 
-    sqrt(2 a d), rounded off near 0, so that it grows with `slope` [1/s] there; the deceleration along it is below a.
+    It is sqrt(2 a d), smoothed near 0, where it grows with `slope` [1/s]; the deceleration along it is below a.
     """
     if distance <= 0.0:
         return slope * distance

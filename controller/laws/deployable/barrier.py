@@ -38,32 +38,32 @@ from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
-_FLAT = (Box.kind, Prism.kind, DepthBand.kind, HalfSpace.kind)
+_ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
+_FLAT = (Box.kind, Prism.kind, DepthBand.kind, HalfSpace.kind)  # kinds with flat faces
 _IMPULSE = 0.5  # s, assumed duration of the desired acceleration in the search for faces ahead
 _LN_10 = 2.302585092994046
-_AHEAD = 1e-4  # s, of the difference quotient of a gradient: relative error 1e-4, rounding included
-_FIRM = (3.0, 3.0)  # decades: price of slack against missing the desired force, at weight 0, and added at weight 1
-_LEAP = 0.5  # cosine of the turn of a gradient within `_AHEAD`, below which it is a jump
-_MARGIN_OF_ATTITUDE = 0.02  # rad
+_AHEAD = 1e-4  # s, step of the difference quotient of a gradient: relative error 1e-4, rounding included
+_FIRM = (3.0, 3.0)  # decades by which slack costs more than missing the desired force: at weight 0; added at weight 1
+_LEAP = 0.5  # cosine of a gradient's turn within `_AHEAD` below which the turn counts as a jump
+_MARGIN_OF_ATTITUDE = 0.02  # rad, margin of regions of attitude
 KEPT = 0.01  # m/s2, slack up to which a barrier counts as kept
-_BOUND_LEAP = 0.05  # m, more than the motion of the vehicle can lower the bound in a step
+_BOUND_LEAP = 0.05  # m, fall of the bound in a step that counts as a jump: more than the vehicle's motion can cause
 
 
 class RegionObservation(NamedTuple):
     """Regions evaluated at the estimated pose, now and `_AHEAD` later."""
 
-    values: Array  # (n,)
-    gradients: Array  # (n, 3)
-    rotation_gradients: Array  # (n, 3)
-    clearances: Array  # (n,)
-    later_shifts: Array  # (n, 3) m, of the regions
-    later_values: Array  # (n,)
+    values: Array  # (n,) g, above 0 where a region is violated
+    gradients: Array  # (n, 3) derivative of g by the position, NED
+    rotation_gradients: Array  # (n, 3) derivative of g by a rotation about the body axes
+    clearances: Array  # (n,) m, or rad for regions of attitude
+    later_shifts: Array  # (n, 3) m, NED: shifts of the regions `_AHEAD` later
+    later_values: Array  # (n,) the same quantities `_AHEAD` later
     later_gradients: Array  # (n, 3)
     later_rotation_gradients: Array  # (n, 3)
     later_clearances: Array  # (n,)
-    bound: Array  # (1,) m, of `write_rows`: lower bound of the clearances, if no barrier yields
-    asked: Array  # (n,) m/s2, rad/s2: last right side of each region's barrier
+    bound: Array  # (1,) m: lower bound of the clearances by `write_rows`, if no barrier yields
+    asked: Array  # (n,) m/s2, rad/s2: right side of each region's barrier in the last step
 
 
 class Motion(NamedTuple):
@@ -73,12 +73,12 @@ class Motion(NamedTuple):
     velocity: Array  # (6,) m/s over ground, rad/s
     free_acceleration: Array  # (6,) m/s2, rad/s2: acceleration without thrust
     thruster_acceleration: Array  # (6, m) m/s2, rad/s2: acceleration by one newton of each thruster
-    mass: float  # kg
-    inertia: float  # kg m2, mean
-    braking: float  # m/s2 that is always available
+    mass: float  # kg, with added mass, mean over the axes
+    inertia: float  # kg m2, with added inertia, mean over the axes
+    braking: float  # m/s2, deceleration that is always available
     position_spread: float  # m, uncertainty of the position between two steps
-    position_variance: Array  # (3,) m2, NED, of the estimate
-    attitude_deviation: float  # rad, of the estimate, standard deviation
+    position_variance: Array  # (3,) m2, NED: variance of the estimated position
+    attitude_deviation: float  # rad, standard deviation of the estimated attitude
 
 
 def empty_observation(n: int) -> RegionObservation:
@@ -197,9 +197,9 @@ def write_rows(
     Parameters
     ----------
     work : Workspace
-        Receives rows, right sides and prices.
+        Receives rows, right sides and inverse prices of slack.
     observation : RegionObservation
-        From `observe_regions`.
+        Regions as evaluated by `observe_regions`.
     regions : PackedRegions
         The n regions.
     weights : ndarray, shape (n,)
@@ -207,7 +207,7 @@ def write_rows(
     motion : Motion
         Motion of the vehicle.
     lower, upper : ndarray, shape (m,)
-        Limits of the forces [N].
+        Limits of the thruster forces [N].
     share : float
         Below 1 while barriers yield: fraction by which each right side moves from its last value to the new one.
     gains : DeployableGains
@@ -216,7 +216,7 @@ def write_rows(
     Returns
     -------
     int
-        Rows written, (1 + FACES) n at most.
+        Number of rows written, at most (1 + FACES) n.
     """
     rows, n, later_gradient, relative, path_velocity = 0, zeros(6), zeros(6), zeros(6), zeros(3)
     wanted, bound = zeros(3), 0.0
@@ -230,7 +230,7 @@ def write_rows(
         braking = gains.turning_deceleration if of_attitude else motion.braking
         margin = _margin(n, motion, regions.deviations[i], of_attitude, gains)
         scale = square(motion.mass)
-        if of_attitude:  # by the slopes over position [rad2/m2] and attitude [1]
+        if of_attitude:  # weighted by the squared gradients over position [rad2/m2] and attitude [1]
             scale *= square(n[0]) + square(n[1]) + square(n[2])
             scale += square(motion.inertia) * (square(n[3]) + square(n[4]) + square(n[5]))
         price = exponential(_LN_10 * (-_FIRM[0] - _FIRM[1] * weights[i])) / max(scale, 1e-9)
@@ -253,7 +253,7 @@ def write_rows(
                     break
                 copy(later_gradient, n[:3])
                 margin = _margin(n, motion, regions.deviations[i], of_attitude, gains)
-                turning = 0.0  # flat
+                turning = 0.0  # the gradient of a flat face is constant
 
             # h, its rate, and its second derivative without thrust
             h, rate, falling = distance - margin, 0.0, 0.0
@@ -290,17 +290,17 @@ def add_row(
     Parameters
     ----------
     work : Workspace
-        Receives row, right side and price.
+        Receives row, right side and inverse price of slack.
     rows : int
         Present number of rows.
     n : ndarray, shape (6,)
-        Slope of a clearance over the pose.
+        Gradient of a clearance over the pose: per metre, NED, and per radian, body axes.
     thruster_acceleration : ndarray, shape (6, m)
-        A: acceleration of one newton of each thruster [m/s2, rad/s2].
+        A, acceleration by one newton of each thruster [m/s2, rad/s2].
     right, price : float
-        Right side, and price of slack.
+        Right side of the constraint, and inverse price of its slack.
     lower, upper : ndarray, shape (m,)
-        Limits of u [N].
+        Limits of the thruster forces u [N].
     """
     least = 0.0
     for j in range(lower.size):

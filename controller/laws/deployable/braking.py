@@ -13,7 +13,7 @@ from controller.law import VehicleModel
 
 Array = NDArray[np.float64]
 
-_NEGLIGIBLE = 1e-6  # of the greatest limit
+_NEGLIGIBLE = 1e-6  # force that counts as zero, as a fraction of the greatest limit
 
 
 def least_forces(vehicle: VehicleModel) -> Array:
@@ -31,7 +31,7 @@ def least_forces(vehicle: VehicleModel) -> Array:
     Returns
     -------
     ndarray, shape (m + 1,)
-        Forces [N] with thruster j lost; the last with all working.
+        Forces [N]: element j with thruster j lost, the last with all working.
 
     Raises
     ------

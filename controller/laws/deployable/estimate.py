@@ -18,24 +18,27 @@ Array = NDArray[np.float64]
 # index of the first state of each kind
 POSITION, VELOCITY, CURRENT, NET_WEIGHT, MOMENTS, HEIGHT, LAG, EFFECTIVENESS = 0, 3, 6, 8, 9, 12, 13, 14
 
-_LIGHT = 50.0  # kg, mass above which numbers in N are scaled
-_FIRST_VELOCITY = 0.3  # m/s, standard deviation at the start of an unmeasured velocity
-_FIRST_CURRENT, _FIRST_RESTORING = 0.3, 15.0  # m/s, N: standard deviations at the start
+_LIGHT = 50.0  # kg, mass above which deviations, drifts and bounds of W - B grow with the mass
+_FIRST_VELOCITY = 0.3  # m/s, initial standard deviation of an unmeasured velocity
+_FIRST_CURRENT, _FIRST_RESTORING = 0.3, 15.0  # m/s, N: initial standard deviations of current and W - B
 _GRAVITY = 9.81  # m/s2
-_FIRST_HEIGHT, _FIRST_ARM = 0.05, 0.15  # m, standard deviations at the start; the second of the weight's moments
-_FIRST_EFFECTIVENESS, _FIRST_COMMON = 0.12, 0.12  # of each thruster, and of all together
-_FIRST_LAG = 0.3  # s, and its standard deviation, if the vehicle has none
+_FIRST_HEIGHT, _FIRST_ARM = (
+    0.05,
+    0.15,
+)  # m, initial standard deviations: center of gravity; arm of the restoring moments
+_FIRST_EFFECTIVENESS, _FIRST_COMMON = 0.12, 0.12  # initial standard deviations: of each thruster alone; common to all
+_FIRST_LAG = 0.3  # s, initial lag and its standard deviation if the vehicle's own is 0
 _KNOWN_LAG = 1e-6  # s, standard deviation of a lag that is not estimated
-_GREATEST_EFFECTIVENESS = 1.1
+_GREATEST_EFFECTIVENESS = 1.1  # upper bound of an estimated effectiveness
 
 
 class Estimate(NamedTuple):
     """State and covariance of the filter, and the parts that other modules read."""
 
-    first_state: Array  # (14 + m,) before the first measurement
-    first_covariance: Array  # (14 + m, 14 + m) likewise
-    state: Array  # (14 + m,) as in `observer`; SI, NED, body axes
-    covariance: Array  # (14 + m, 14 + m)
+    first_state: Array  # (14 + m,) state before the first measurement
+    first_covariance: Array  # (14 + m, 14 + m) covariance before the first measurement
+    state: Array  # (14 + m,) in the order of `observer`; SI, NED, moments in body axes
+    covariance: Array  # (14 + m, 14 + m) covariance of the state
     position: Array  # (3,) m, NED
     velocity: Array  # (3,) m/s over ground, NED
     water_velocity: Array  # (3,) m/s, NED; its down component is 0
@@ -44,27 +47,29 @@ class Estimate(NamedTuple):
     acceleration: Array  # (3,) m/s2 over ground, NED, predicted for the last period
     time_since_measurement: Array  # (1,) s since the last valid measurement; negative before the first
     time_since_valid: Array  # (2,) s since the last valid position, and velocity
-    repeated: Array  # (2,) 1 if the last position, and velocity, repeated the one before to the bit
-    slow: Array  # (2,) 1 if they repeat while the vehicle moves: the sensor is slower than the steps
+    repeated: Array  # (2,) 1 if the last position, or velocity, equals the one before bit for bit
+    slow: Array  # (2,) 1 if position, or velocity, repeats while the vehicle moves: its sensor is slower than the steps
     longest_gap: Array  # (1,) s, longest recent time without a measurement
-    weight: Array  # (1,) of positions and velocities as evidence of failures: below 1 for lasting errors
-    last_measured: Array  # (6,) position and velocity, as last measured
+    weight: Array  # (1,) weight of positions and velocities as evidence of failures: below 1 for lasting errors
+    last_measured: Array  # (6,) last measured position [m, NED] and velocity [m/s, body axes]
     mass_scale: Array  # (1,) mass over 50 kg, at least 1: a heavier vehicle's W - B is less well known
-    lags: Array  # (3,) s, the estimated lag between a standard deviation less and more
-    bracket: Array  # (2, m) N, forces behind the least and the greatest of them
-    by_lag: Array  # (m,) N/s, secant of the acting forces over the lag, between those
+    lags: (
+        Array  # (3,) s: estimated lag less a standard deviation; estimated lag; estimated lag plus a standard deviation
+    )
+    bracket: Array  # (2, m) N, acting forces for the least and the greatest of `lags`
+    by_lag: Array  # (m,) N/s, secant of the acting forces between the least and the greatest of `lags`
     curvature: Array  # (m,) N, difference of the acting forces from that secant
-    transition: Array  # (3, 14 + m) of the velocity over a period
+    transition: Array  # (3, 14 + m) derivative of the next velocity by the state
     product: Array  # (3, 14 + m) transition times covariance
-    row: Array  # (14 + m,) of a measurement
-    gain: Array  # (14 + m,) of a measurement
-    deviation: Array  # (2 m, 14 + m) of the true state from the estimate, if thruster j is lost; m + j: is stuck
-    supposed: Array  # (2, m) effectiveness, and force [N] without it, at which each is stuck by its hypothesis
+    row: Array  # (14 + m,) derivative of a measured number by the state
+    gain: Array  # (14 + m,) Kalman gain of a measured number
+    deviation: Array  # (2 m, 14 + m) true state less estimate by each hypothesis: j, thruster j is lost; m + j, stuck
+    supposed: Array  # (2, m) hypothesis of a stuck thruster: its effectiveness; its force [N] at effectiveness 1
     missing: Array  # (m,) N, difference of a stuck thruster's force from the expected one
     direct: Array  # (2 m,) direct effect of the missing force on the last measured number
-    evidence: (
-        Array  # (2, 2 m) of the last measurements: innovations times deviations, deviations squared; over variances
-    )
+    # (2, 2 m) of the last measurements for each hypothesis, divided by variances: innovations times expected
+    # deviations; expected deviations squared
+    evidence: Array
 
 
 def make_estimate(vehicle: VehicleModel) -> Estimate:

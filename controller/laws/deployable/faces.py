@@ -18,11 +18,11 @@ from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-_SMOOTH = (Sphere.kind, Ellipsoid.kind)  # without kinks outside
+_SMOOTH = (Sphere.kind, Ellipsoid.kind)  # kinds whose clearance has no kink outside
 _HALF_SPACE = HalfSpace.kind
-FACES = 2  # faces searched for beside the nearest
-_LOOKS = 16  # evaluations along a line at most
-_HALVINGS = 6  # bisections of the interval in which it leaves the region
+FACES = 2  # greatest number of faces besides the nearest that have barriers
+_LINE_SAMPLES = 16  # greatest number of evaluations along a line
+_HALVINGS = 6  # bisections of the interval in which the line leaves the region
 
 
 def has_faces(kind: int, sign: float) -> bool:
@@ -59,7 +59,7 @@ def face_ahead(
     Returns
     -------
     float
-        Distance from the vehicle to the plane of the face [m], infinite if there is none.
+        Distance from the vehicle to the plane of the face [m]; infinite if there is no such face.
     """
     approach_speed, speed = 0.0, 0.0
     for axis in range(3):
@@ -75,7 +75,7 @@ def face_ahead(
     while clearance > 0.0:
         if beyond >= reach:
             return np.inf
-        within, beyond = beyond, min(beyond + max(clearance, reach / _LOOKS), reach)
+        within, beyond = beyond, min(beyond + max(clearance, reach / _LINE_SAMPLES), reach)
         clearance = _clearance_along(regions, i, position, velocity, beyond / speed, point, gradient)
     for _ in range(_HALVINGS):
         middle = 0.5 * (within + beyond)

@@ -32,23 +32,23 @@ from controller.laws.deployable.model import Thrusters
 Array = NDArray[np.float64]
 
 _MOST_A_STEP = 3.0  # limit of the log-likelihood ratio per step, so that no single outlier decides
-_LOSS = 0.6  # fraction of force lost by the hypothesis: close enough to both a half and all
+_LOSS = 0.6  # fraction of force that the hypothesis of a loss assumes lost: close enough to both a half and all
 _USEFUL = 0.15  # effectiveness below which a thruster is isolated
-_SPREADS = 3.0  # standard deviations below that
-_LEAD = 8.0  # of the log-likelihood ratio of the likeliest thruster over the next
-_STUCK_SPREAD = 0.5  # standard deviation of the force at which a thruster is stuck, relative to it
-_CERTAIN = 40.0  # lead above which the isolation is not tentative
+_SPREADS = 3.0  # number of standard deviations by which an estimate must be below that
+_LEAD = 8.0  # least lead of the log-likelihood ratio of the likeliest thruster over the next
+_STUCK_SPREAD = 0.5  # standard deviation of a stuck thruster's force, as a fraction of that force
+_CERTAIN = 40.0  # lead from which an isolation is not tentative
 _TRIAL = 5.0  # s from the last isolation or trial to a thruster's first trial
-_RARER = 8  # factor of that time for each further trial
+_RARER = 8  # factor by which that time grows with each trial
 
 
 class FaultState(NamedTuple):
     """The hypotheses, two for each thruster."""
 
     ratio: Array  # (2 m,) summed log-likelihood ratio: thruster j is lost; m + j: is stuck
-    sums: Array  # (2, 2 m) of the evidence since the supposed time of the failure
-    tentative: NDArray[np.int64]  # (m,) 1 of a thruster isolated tentatively, more of one isolated for good
-    trials: NDArray[np.int64]  # (m,) of each thruster
+    sums: Array  # (2, 2 m) sums of `Estimate.evidence` since the supposed time of the failure
+    tentative: NDArray[np.int64]  # (m,) 0 not isolated, 1 isolated tentatively, above 1 isolated for good
+    trials: NDArray[np.int64]  # (m,) number of trials of each thruster after an isolation
     waited: Array  # (1,) s since the last isolation or trial
 
 
@@ -64,13 +64,13 @@ def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thruste
     Parameters
     ----------
     fault_state : FaultState
-        Updated in place.
+        Hypotheses about the thrusters, updated in place.
     estimate : Estimate
         Estimate with the evidence of the last measurements. Its state changes if a thruster has failed.
     thrusters : Thrusters
-        Their `health` and `stuck` change if one is isolated; the caller calls `model.reallocate`.
+        Thrusters; `health` and `stuck` change if one is isolated. The caller then calls `model.reallocate`.
     gains : DeployableGains
-        The threshold.
+        Gain `failure_threshold`.
 
     Returns
     -------
@@ -127,10 +127,10 @@ def try_again(
 
     Parameters
     ----------
-    fault_state, estimate, thrusters
-        As for `detect_fault`.
+    fault_state, estimate, thrusters : FaultState, Estimate, Thrusters
+        Hypotheses, estimate and thrusters, updated in place if a thruster is tried.
     reported : ndarray, shape (m,)
-        Health of the thrusters as reported: one that is reported as failed is not tried.
+        Reported health of the thrusters: 0 failed, 1 working. A thruster that is reported as failed is not tried.
     quiet : bool
         True if no barrier was active in the last step.
     period : float

@@ -37,7 +37,8 @@ class DeployableGains(NamedTuple):
     # estimates
     position_noise: float = 0.02  # m, standard deviation of one measurement
     velocity_noise: float = 0.01  # m/s
-    # of a vehicle of up to 50 kg; of a heavier one greater in proportion to its mass, moment_bound to its square
+    # restoring_drift, restoring_bound and moment_bound are for a vehicle of up to 50 kg. For a heavier one, the
+    # first two grow in proportion to its mass, moment_bound to the mass squared
     restoring_drift: float = 0.3  # N/sqrt(s), how fast W - B may change
     current_drift: float = 0.01  # m/s/sqrt(s)
     restoring_bound: float = 50.0  # N, of |W - B|

@@ -22,11 +22,12 @@ from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-_FARTHEST = 1e6  # m, of a plausible position
+_FARTHEST = 1e6  # m, bound of each coordinate of a plausible position
 _JUMP = 0.5  # fraction of an estimated position's standard deviation that is noise
-_STEADY = 0.01  # m/s, standard deviation of a velocity above which its error lasts, and its noise is increased
-_FASTEST = 100.0  # m/s, rad/s
-_RESTING, _PUSHED = 0.02, 0.05  # m/s, m/s2, sums over the axes: below, the vehicle rests; above, it starts to move
+_STEADY = 0.01  # m/s, standard deviation above which a velocity's error is lasting, so that its noise is increased
+_FASTEST = 100.0  # m/s, rad/s: bound of plausible velocities and body rates
+# sums over the axes: velocity [m/s] below which the vehicle rests; acceleration [m/s2] above which it starts to move
+_RESTING, _PUSHED = 0.02, 0.05
 
 
 def smooth_weights(weights: Array, smoothed: Array, hard: NDArray[np.bool_], share: float) -> None:

@@ -55,13 +55,15 @@ from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_at
 from controller.stack_array import zeros
 
-_STALE = 0.15  # s without a measurement, after which the speed is reduced
-_TRUSTED_SPREAD = 0.3  # m, `SPREADS` deviations above which the speed is reduced; at twice as much it is 0
-_SEED = 1
-_ON_THE_WAY = 0.3  # m/s, desired speed from which soft regions do not push back at all
-_SHALLOWEST = 1e-3  # m, least depth in the goal region at which they do so in full again
-_LEAST_EFFECTIVENESS = 0.5  # below it, the desired force is reduced in proportion
-_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
+_STALE = 0.15  # s without a measurement after which the speed is reduced
+_TRUSTED_SPREAD = (
+    0.3  # m, position uncertainty (`SPREADS` deviations) above which the speed is reduced; 0 at twice that
+)
+_SEED = 1  # seed of the path planner's random numbers
+_ON_THE_WAY = 0.3  # m/s, desired speed from which soft regions do not push the vehicle back at all
+_SHALLOWEST = 1e-3  # m, lower bound of the depth in the goal region at which they push back in full again
+_LEAST_EFFECTIVENESS = 0.5  # effectiveness below which the desired force of a thruster is reduced in proportion
+_ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 
 
 def step(

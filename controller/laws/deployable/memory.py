@@ -22,8 +22,8 @@ Array = NDArray[np.float64]
 class DeployableMemory(NamedTuple):
     """State between steps, as arrays, for the translation to C."""
 
-    period: Array  # (1,) s
-    estimate: Array  # (4,) phi_hat [N, N m]
+    period: Array  # (1,) s, control period
+    estimate: Array  # (4,) phi_hat of (12) [N, N m]
     report: Array  # (r,) diagnostics of the last step
     dynamics: Dynamics
     thrusters: Thrusters
@@ -36,13 +36,13 @@ class DeployableMemory(NamedTuple):
     predicted: PredictedState
     expected: Array  # (6,) m, NED, and m/s, body: predicted position and velocity at the next step; NaN if unknown
     quaternion: Array  # (4,) from body to world, measured, or propagated by the model
-    omega: Array  # (3,) rad/s, likewise
-    deviation: Array  # (12,) of the measured state, as in `VehicleState`
-    position_variance: Array  # (3,) m2, NED, of the estimated position
-    promised: Array  # (2,) m, NaN if none: promised lower bound of the clearances; bound of the last step
-    weights: Array  # (2, n) of the arbiter, sanitized; those of hard regions smoothed in two stages; NaN at first
+    omega: Array  # (3,) rad/s, body rates, measured, or propagated by the model
+    deviation: Array  # (12,) standard deviations of the measured state, as in `VehicleState`
+    position_variance: Array  # (3,) m2, NED: variance of the estimated position
+    promised: Array  # (2,) m: promised lower bound of the clearances; bound of the last step; NaN without a bound
+    weights: Array  # (2, n) sanitized weights of the arbiter, smoothed in two stages for hard regions; NaN at first
     reported: Array  # (m,) health of the thrusters as last reported
-    filtered_acceleration: Array  # (3,) m/s2, NED, desired of the thrusters, low-pass filtered
-    thruster_acceleration: Array  # (6, m) m/s2, rad/s2: by one newton of each thruster
-    acceleration_ahead: Array  # (6, m) the same, at the attitude ahead of the lag
+    filtered_acceleration: Array  # (3,) m/s2, NED: desired acceleration by the thrusters, low-pass filtered
+    thruster_acceleration: Array  # (6, m) m/s2, rad/s2: acceleration by one newton of each thruster
+    acceleration_ahead: Array  # (6, m) m/s2, rad/s2: the same at the predicted attitude
     given_limits: Array  # (2, m) N, true force of each thruster at its lower and upper limit

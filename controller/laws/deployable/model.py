@@ -20,7 +20,7 @@ class Dynamics(NamedTuple):
     """Constants of the vehicle, derived from its nominal parameters."""
 
     mass: Array  # (6, 6) kg, kg m, kg m2: M, rigid body and added, center of gravity at the origin
-    inverse_mass: Array  # (6, 6) SI
+    inverse_mass: Array  # (6, 6) 1/kg, 1/(kg m), 1/(kg m2): M^-1
     linear_damping: Array  # (6,) N s/m, N m s/rad
     quadratic_damping: Array  # (6,) N s2/m2, N m s2/rad2
     translational_mass: Array  # (1,) kg, mean over the three axes
@@ -32,20 +32,20 @@ class Thrusters(NamedTuple):
     """Thrusters and their allocation; a failed thruster has a column of zeros and limits of zero."""
 
     nominal_matrix: Array  # (6, m) thruster matrix of the vehicle
-    matrix: Array  # (6, m) of the working thrusters
-    lower: Array  # (m,) N
-    upper: Array  # (m,) N
-    nominal_lower: Array  # (m,) N, limits of the vehicle
-    nominal_upper: Array  # (m,) N
+    matrix: Array  # (6, m) thruster matrix with the columns of failed thrusters zero
+    lower: Array  # (m,) N, present lower limits
+    upper: Array  # (m,) N, present upper limits
+    nominal_lower: Array  # (m,) N, lower limits of the vehicle
+    nominal_upper: Array  # (m,) N, upper limits of the vehicle
     inverse: Array  # (m, m) H^-1 with H = B^T Q B + regularisation
-    allocator: Array  # (m, 6) H^-1 B^T Q: from wrench to nearest forces
-    metric: Array  # (6,) Q: cost of an error of the wrench, 1/N2, 1/(N m)2
+    allocator: Array  # (m, 6) H^-1 B^T Q: maps a wrench to the forces nearest to it
+    metric: Array  # (6,) 1/N2, 1/(N m)2: Q, cost of an error of the wrench
     health: Array  # (m,) 1 working, 0 failed
     stuck: Array  # (m,) N, constant force of a stuck thruster; NaN for all others
     effectiveness: Array  # (m,) estimated ratio of each thruster's force to the commanded one
-    forces: Array  # (m,) N, commanded in the last period
-    acting: Array  # (m,) N, mean over that period behind the lag
-    acting_now: Array  # (m,) N, at its end
+    forces: Array  # (m,) N, commanded forces of the last period
+    acting: Array  # (m,) N, mean forces behind the lag over that period
+    acting_now: Array  # (m,) N, forces behind the lag at its end
 
 
 def make_dynamics(vehicle: VehicleModel, braking: Array) -> Dynamics:
@@ -93,7 +93,7 @@ def make_thrusters(vehicle: VehicleModel) -> Thrusters:
     """
     B = vehicle.thruster_matrix
     m = B.shape[1]
-    arm = np.sqrt(np.sum(B[3:] ** 2) / np.sum(B[:3] ** 2))  # m, typical
+    arm = np.sqrt(np.sum(B[3:] ** 2) / np.sum(B[:3] ** 2))  # m, typical lever arm of a thruster
     thrusters = Thrusters(
         nominal_matrix=B.copy(),
         matrix=B.copy(),

@@ -37,14 +37,14 @@ Array = NDArray[np.float64]
 
 _UNMODELLED = 0.03  # m/s2/sqrt(Hz), acceleration noise of the model
 _SLOWEST = 0.15  # m/s against the water, least speed at which drag is linearized
-_GATE = 6.0  # standard deviations beyond which a measurement is rejected
+_GATE = 6.0  # number of standard deviations beyond which a measurement is rejected
 _ANGULAR = 0.019  # rad/s2/sqrt(Hz), angular acceleration noise of the model
 _GAP_MEMORY = 1.0  # s, time constant at which the longest gap decays
 _RIPPLE = 0.05  # standard deviation of a thruster's force in one period, relative to it
 _WEAR = 0.01  # 1/sqrt(s), drift of an effectiveness
-_LAG_DRIFT = 0.003  # s/sqrt(s)
+_LAG_DRIFT = 0.003  # s/sqrt(s), drift of the lag
 _CURVED = 0.9  # s, correlation time of the error of the lag's secant, which scales it as noise
-_OUTLIER = 3.0  # standard deviations, to which an innovation is limited by a greater variance
+_OUTLIER = 3.0  # standard deviations to which an innovation is limited, by increasing its variance
 
 
 def predict(
@@ -194,7 +194,9 @@ def correct_by_moment(
         expected = row[MOMENTS + a] * x[MOMENTS + a] + row[MOMENTS + b] * x[MOMENTS + b] + row[HEIGHT] * x[HEIGHT]
         row[CURRENT], row[CURRENT + 1] = by_current[i, 0], by_current[i, 1]
         variance = square(_ANGULAR * dynamics.mass[3 + i, 3 + i]) / period
-        variance += 2.0 * square(rate_deviation[i] * dynamics.mass[3 + i, 3 + i] / period)  # of the change of two
+        variance += 2.0 * square(
+            rate_deviation[i] * dynamics.mass[3 + i, 3 + i] / period
+        )  # variance of the difference of two rates
         m = thrusters.acting.size
         for j in range(m):
             estimate.direct[m + j] = thrusters.matrix[3 + i, j] * estimate.missing[j]
@@ -217,7 +219,7 @@ def correct(estimate: Estimate, first: int, measured: Array, noise: float, gains
     estimate : Estimate
         Estimate, corrected in place.
     first : int
-        `POSITION` or `VELOCITY`.
+        Index of the first corrected state: `POSITION` or `VELOCITY`.
     measured : ndarray, shape (3,)
         Measurement [m] or [m/s], NED; NaN if not measured.
     noise : float
@@ -228,7 +230,7 @@ def correct(estimate: Estimate, first: int, measured: Array, noise: float, gains
     Returns
     -------
     bool
-        False, without a change, if all components are NaN, or one is outside the gate.
+        True if the estimate was corrected; False if all components are NaN, or one is outside the gate.
     """
     P, x, known = estimate.covariance, estimate.state, False
     for axis in range(3):

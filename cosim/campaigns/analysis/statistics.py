@@ -16,12 +16,12 @@ from cosim.simulation.signals import Array
 
 Facts = NDArray[np.bool_]
 
-CONFIDENCE = 0.95
+CONFIDENCE = 0.95  # confidence level of all intervals
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 CHANCE = 0.01  # significance level of effects and rank correlations
 _BINS = 6  # greatest number of bins; fewer distinct values have one bin each
-_LEAST_ROWS = 16  # for an effect: two bins of eight
-_RESAMPLES = 2000  # of a bootstrap
+_LEAST_ROWS = 16  # least number of rows for an effect: two bins of eight
+_RESAMPLES = 2000  # number of resamples of a bootstrap
 _ROUNDING = 1e-14  # relative range within which an outcome counts as constant
 
 
@@ -36,7 +36,8 @@ def rate(happened: Facts) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``rows`` in which it happened, ``share``, and ``low`` and ``high`` of the interval; None without rows.
+        Number of ``rows`` in which it happened, their ``share``, and ``low`` and ``high`` of its interval; the last
+        three are None without rows.
     """
     n, k = len(happened), int(happened.sum())
     if not n:
@@ -53,12 +54,12 @@ def quantiles(values: Array) -> dict[str, float | None]:
     Parameters
     ----------
     values : ndarray, shape (n,)
-        NaN for missing numbers.
+        Numbers, NaN where missing.
 
     Returns
     -------
     dict of str to float or None
-        By quantile, such as ``"0.5"``; None without finite numbers.
+        Value of each quantile, with keys such as ``"0.5"``; None without finite numbers.
     """
     values = values[np.isfinite(values)]
     found = np.quantile(values, QUANTILES) if values.size else [None] * len(QUANTILES)
@@ -68,10 +69,10 @@ def quantiles(values: Array) -> dict[str, float | None]:
 class Bin(NamedTuple):
     """Rows with neighbouring values of a key."""
 
-    low: float  # least of the values
-    high: float  # greatest
-    middle: float  # median
-    rows: Facts  # (n,) mask
+    low: float  # least value
+    high: float  # greatest value
+    middle: float  # median of the values
+    rows: Facts  # (n,) mask of the rows in the bin
 
 
 def bins(values: Array) -> Iterator[Bin]:
@@ -80,12 +81,12 @@ def bins(values: Array) -> Iterator[Bin]:
     Parameters
     ----------
     values : ndarray, shape (n,)
-        Finite.
+        Finite values of the key in each row.
 
     Yields
     ------
     Bin
-        From low to high; none is empty.
+        Bins from low to high values; none is empty.
     """
     of = _bin_numbers(values, _BINS)
     for i in np.unique(of):
@@ -113,9 +114,9 @@ def effect(values: Array, outcome: Array) -> dict[str, float] | None:
     Parameters
     ----------
     values : ndarray, shape (n,)
-        Of the key, finite. Keys must vary independently.
+        Finite values of the key. Keys must vary independently.
     outcome : ndarray, shape (n,)
-        Finite, or 0 and 1.
+        Finite values of the outcome; 0 and 1 for a Boolean one.
 
     Returns
     -------
@@ -177,12 +178,12 @@ def median_difference(differences: Array) -> dict[str, Any]:
     Parameters
     ----------
     differences : ndarray, shape (n,)
-        Finite.
+        Finite differences between the numbers of two laws in the same row.
 
     Returns
     -------
     dict
-        ``pairs``, ``median``, ``low`` and ``high``; None if there are too few.
+        Number of ``pairs``, their ``median``, and ``low`` and ``high`` of its interval; None with too few pairs.
     """
     n = len(differences)
     if not n:
@@ -205,8 +206,8 @@ def mean_ratio(one: Array, other: Array) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``pairs``, the means ``one`` and ``other``, their ``ratio``, and ``low`` and ``high`` of its interval by the
-        bootstrap over rows, by percentiles; None without rows, or if the other mean is 0.
+        Number of ``pairs``, the means ``one`` and ``other``, their ``ratio``, and ``low`` and ``high`` of its interval
+        by the bootstrap over rows, by percentiles; None without rows. The last three are None if the other mean is 0.
     """
     there = np.isfinite(one) & np.isfinite(other)
     one, other = one[there], other[there]

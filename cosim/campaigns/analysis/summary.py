@@ -17,7 +17,7 @@ from cosim.simulation.signals import Array
 SPREADS = ("reach_time", "min_clearance", "effort", "thrust_variation")  # columns with quantiles
 OF_ALL = ("min_clearance",)  # columns with quantiles over all scenes; the others over those that were reached
 _REASONS = 5  # greatest number of listed reasons for refusing scenes
-MEDIANS = ("reach_time", "effort", "thrust_variation", "min_clearance", "worst_step_time")
+MEDIANS = ("reach_time", "effort", "thrust_variation", "min_clearance", "worst_step_time")  # columns with medians
 
 
 def summarize_campaign(plan: Plan, results: Results, folder: Path) -> dict[str, Any]:
@@ -28,16 +28,16 @@ def summarize_campaign(plan: Plan, results: Results, folder: Path) -> dict[str, 
     plan : Plan
         Plan of the campaign.
     results : Results
-        Its rows.
+        Rows of the campaign.
     folder : Path
-        Its folder, for the commands that repeat scenes.
+        Folder of the campaign, for the commands that repeat scenes.
 
     Returns
     -------
     dict
-        For JSON: counts; rates with 95 % intervals by Wilson; quantiles and medians over the scenes that were reached
-        (None without any), of the clearance over all; the same by kind of scene, if there are several; the seeds that
-        failed, the worst scenes, and the plan. Units as in the columns of the results.
+        Table for JSON: counts; rates with 95 % intervals by Wilson; quantiles and medians over the reached scenes (None
+        without any), quantiles of the clearance over all; rates and quantiles by kind of scene, if there are several;
+        the seeds that failed; the worst scenes; and the plan. Units are those of the columns of the results.
     """
     reached, violation, seeds = results["reached"], results["violation"], results["seed"]
     stopped = ~np.isnan(results.number("stopped_at"))
@@ -76,7 +76,7 @@ def rates_of(results: Results) -> dict[str, Facts]:
 
 
 def _spread(results: Results, of: Facts) -> dict[str, Any]:
-    """Return rates and quantiles of the scenes `of`."""
+    """Return rates and quantiles over a mask `of` of scenes, shape (scenes,)."""
     reached = results["reached"]
     return {
         "rates": {name: rate(happened[of]) for name, happened in rates_of(results).items()},

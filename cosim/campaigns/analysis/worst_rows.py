@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim.campaigns.store.results import Results
 
-LISTED = 10  # rows that summaries and pages list
+LISTED = 10  # greatest number of rows that summaries and pages list
 ORDER = (
     "First what violated a hard region, the deepest first (a flight that the plant stopped counts as one, as deep as "
     "it had come), then what never reached the goal, then the rest, the slowest first."
@@ -25,8 +25,8 @@ def violated_column(results: Results) -> str:
 class Worst(NamedTuple):
     """A row with the reason why it is among the worst."""
 
-    key: int
-    why: str
+    key: int  # key of the row
+    why: str  # reason, such as "not reached"
 
 
 def worst_rows(results: Results, count: int = LISTED) -> list[Worst]:
@@ -35,14 +35,14 @@ def worst_rows(results: Results, count: int = LISTED) -> list[Worst]:
     Parameters
     ----------
     results : Results
-        Of the campaign.
+        Rows of the campaign.
     count : int
         Greatest number of rows.
 
     Returns
     -------
     list of Worst
-        In the order that `ORDER` describes; equally bad rows in the order of their keys.
+        Rows in the order that `ORDER` describes; equally bad rows in the order of their keys.
     """
     names = results.schema.names
     keys, reached = results[names[0]], results.fact("reached")
@@ -75,14 +75,14 @@ def worst_table(results: Results, folder: Path) -> list[dict[str, Any]]:
     Parameters
     ----------
     results : Results
-        Of the campaign.
+        Rows of the campaign.
     folder : Path
         The campaign's folder.
 
     Returns
     -------
     list of dict
-        ``row``, ``why`` and ``command``.
+        For each row its key ``row``, the reason ``why``, and the ``command`` that repeats it.
     """
     return [{"row": key, "why": why, "command": rerun_command(folder, key)} for key, why in worst_rows(results)]
 

@@ -29,12 +29,12 @@ from cosim.errors import RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
 
-RANDOM = "random"  # folder of as many random rows
-LISTED = 10  # worst rows that are listed
+RANDOM = "random"  # folder of the campaign with as many random rows
+LISTED = 10  # greatest number of worst rows that are listed
 _COLUMNS = {"clearance": "min_clearance", "violation": "weighted_violation", "arrival": "reach_time"}
 _REFUSED = 1e9  # cost of a row that was not flown, which the search avoids
 _STOPPED = -1e-6  # m, greatest clearance of a flight that the plant stopped, which counts as a violation
-_APART = 0.1  # least distance of listed rows: root mean square over the coordinates
+_APART = 0.1  # least distance between listed rows: root mean square over the coordinates
 
 Search = SceneSearch | ScenarioSearch
 
@@ -46,7 +46,7 @@ class Falsification:
     folder: Path
     results: Results
     summary: dict[str, Any]
-    flown: int  # rows flown by this call; the rest was in the folder
+    flown: int  # number of rows flown by this call; the others were in the folder
 
 
 class _Flights:
@@ -85,14 +85,14 @@ def run_falsification(work: Search, out: Path, workers: int = 1, progress: bool 
     Parameters
     ----------
     work : SceneSearch or ScenarioSearch
-        The search.
+        Search with its objective and budget.
     out : Path
         A folder that does not exist, is empty, or holds the same search: a complete one, whose summary is written
         again, or a part, which is continued.
     workers : int
-        Number of processes; rows are the same for any number.
+        Number of processes. The rows do not depend on it.
     progress : bool
-        Show a bar, if there is a terminal.
+        True to show a bar, if there is a terminal.
 
     Returns
     -------

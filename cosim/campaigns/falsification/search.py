@@ -14,7 +14,7 @@ from plant_fmu.installing import install_hint
 
 Evaluate = Callable[[NDArray[np.float64]], NDArray[np.float64]]  # points (n, dimension) → costs (n,)
 
-_FIRST = 0.1  # fraction of the budget that is drawn uniformly, as starts of wide searches
+_FIRST = 0.1  # fraction of the budget for uniformly drawn points, the starts of wide searches
 _WIDE, _NARROW = 0.1, 0.02  # initial standard deviations of a search in each coordinate
 _PATIENCE = 10  # generations without a lesser cost, after which a search ends
 
@@ -34,7 +34,7 @@ def minimize(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> None
     dimension : int
         Number of coordinates.
     budget : int
-        Number of points.
+        Number of points to evaluate.
     seed : int
         Seed of the search; equal seeds and costs give equal points.
 

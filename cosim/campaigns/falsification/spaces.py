@@ -13,11 +13,11 @@ from cosim.campaigns.scenes.conflicts import CONFLICTS, draw_conflict
 from cosim.campaigns.scenes.generator import MOST_OBSTACLES, draw_scene
 
 FAMILIES = (*MOST_OBSTACLES, *CONFLICTS)
-_CHANCES = 2**31  # seeds, of noise and of obstacles that are drawn again
-_CONFLICTS = 64  # conflicts that are drawn to find the number of their coordinates
-_OF_AN_OBSTACLE = 5  # coordinates: radius, position along the straight line, three of the distance from it
+_CHANCES = 2**31  # number of seeds of noise, and of obstacles that are drawn again
+_CONFLICTS = 64  # number of conflicts that are drawn to find the number of their coordinates
+_OF_AN_OBSTACLE = 5  # coordinates of an obstacle: radius, position along the straight line, three of its offset from it
 
-Point = NDArray[np.float64]  # (dimension,) each from 0 to 1
+Point = NDArray[np.float64]  # (dimension,) coordinates from 0 to 1
 
 
 class Shares:
@@ -35,7 +35,7 @@ class Shares:
 
     def __init__(self, shares: Point, rest: np.random.Generator, limit: float = np.inf) -> None:
         self._shares, self._rest, self._limit = shares, rest, limit
-        self.drawn = 0  # numbers
+        self.drawn = 0  # number of numbers drawn so far
 
     def uniform(self, low: Any = 0.0, high: Any = 1.0, size: int | None = None) -> Any:
         """Draw uniformly between two bounds, or two lists of bounds; or `size` numbers."""
@@ -78,7 +78,7 @@ class SceneSpace:
     Parameters
     ----------
     family : str
-        One of `FAMILIES`.
+        Name of the family, one of `FAMILIES`.
     limit : float, optional
         Greatest distance of a normal number from its mean [standard deviations]. Noise, and obstacles that are drawn
         again, then depend on the scene's seed. Without a limit they depend on the last coordinate, so that a flight

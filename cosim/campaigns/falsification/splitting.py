@@ -17,10 +17,10 @@ _KEPT = 0.5  # fraction of the particles that are beyond the next level
 _MOVES = 2  # proposed moves of every copied particle
 _CHANGED = 0.5  # fraction of the coordinates that a move changes
 _ACCEPTED = 0.3  # desired acceptance rate of the moves, to which the step is adapted
-_GAIN = 2.0  # of that adaptation
-_SHORTEST = 0.02  # least step
-_TAIL = 0.025  # of the interval, on each side
-LEAST_BUDGET = 100  # points
+_GAIN = 2.0  # gain of that adaptation
+_SHORTEST = 0.02  # least step of a move [standard deviations]
+_TAIL = 0.025  # probability outside the interval on each side
+LEAST_BUDGET = 100  # least number of points
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,10 @@ class Estimate:
     """A probability with its interval."""
 
     probability: float  # 0 if no point was in the event
-    low: float  # of the 95 % interval; 0 if no point was in the event
-    high: float
+    low: float  # lower end of the 95 % interval; 0 if no point was in the event
+    high: float  # upper end of the 95 % interval
     levels: tuple[tuple[float, float], ...]  # cost, and probability that it is not exceeded
-    families: int  # first particles that the last ones descend from: few give a poor estimate
+    families: int  # number of first particles from which the last ones descend: few give a poor estimate
 
 
 def estimate_probability(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> Estimate:
@@ -53,9 +53,9 @@ def estimate_probability(evaluate: Evaluate, dimension: int, budget: int, seed: 
     dimension : int
         Number of coordinates.
     budget : int
-        Most points, `LEAST_BUDGET` or more.
+        Greatest number of points, at least `LEAST_BUDGET`.
     seed : int
-        Seed of particles and moves.
+        Seed of the random particles and moves.
 
     Returns
     -------

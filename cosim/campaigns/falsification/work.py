@@ -31,7 +31,7 @@ from plant_fmu.toml_tables import hint
 Objective = Literal["clearance", "violation", "arrival"]
 OBJECTIVES: tuple[Objective, ...] = get_args(Objective)
 _LIMIT = 3.0  # standard deviations of a normal number within which a search stays
-_MOST = 1_000_000  # rows
+_MOST = 1_000_000  # greatest number of rows
 
 
 @dataclass(frozen=True)
@@ -41,14 +41,14 @@ class SearchSettings:
     Parameters
     ----------
     objective : str
-        ``"clearance"``, the least one; ``"violation"``, the greatest one weighted by priority; ``"arrival"``, the
-        latest one, where no arrival is the worst.
+        Outcome to be found: ``"clearance"``, the least one; ``"violation"``, the greatest one weighted by priority;
+        ``"arrival"``, the latest one, where no arrival is the worst.
     budget : int
         Number of rows.
     seed : int
         Seed of the search.
     rare_event : bool
-        Estimate the probability of a violation, instead of a search for the worst.
+        True to estimate the probability of a violation, instead of a search for the worst row.
 
     Raises
     ------
@@ -83,11 +83,11 @@ class SceneSearch:
     Parameters
     ----------
     family : str
-        One of `cosim.campaigns.falsification.spaces.FAMILIES`.
+        Name of the family, one of `cosim.campaigns.falsification.spaces.FAMILIES`.
     task : SceneTask
         Law and conditions of the flights.
     settings : SearchSettings
-        Objective and budget.
+        Objective, budget and seed of the search.
 
     Raises
     ------
@@ -132,7 +132,7 @@ class SceneSearch:
         return table_of([refused_row(row, reason, self._lines[row].decode().strip())])
 
     def fly_random(self, out: Path, workers: int, progress: bool) -> Results:
-        """Fly as many random scenes of the generator."""
+        """Fly random scenes of the generator, as many as the budget."""
         with TemporaryDirectory() as folder:
             scenes = Path(folder) / "scenes.jsonl"
             scenes.write_text("\n".join(generate_scenes(len(self), self.settings.seed, self.family)))
@@ -146,11 +146,11 @@ class ScenarioSearch(SweepWork):
     Parameters
     ----------
     scenario : Scenario
-        The scenario.
+        Scenario whose keys vary.
     vary : sequence of Vary
         Keys and ranges of their values.
     settings : SearchSettings
-        Objective and budget.
+        Objective, budget and seed of the search.
 
     Raises
     ------
@@ -179,5 +179,5 @@ class ScenarioSearch(SweepWork):
         return SweepBatch(rows, self._values[rows], self.design.seeds(rows))
 
     def fly_random(self, out: Path, workers: int, progress: bool) -> Results:
-        """Fly as many rows with uniformly drawn values."""
+        """Fly rows with uniformly drawn values, as many as the budget."""
         return run_sweep(self._scenario, self.design, out, workers=workers, progress=progress).results

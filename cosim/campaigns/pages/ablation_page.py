@@ -30,14 +30,14 @@ def write_ablation_page(folder: Path, replays: int) -> Path:
     Parameters
     ----------
     folder : Path
-        Of a complete ablation.
+        Folder of a complete ablation.
     replays : int
         Number of scenes that all variants fly again step by step.
 
     Returns
     -------
     Path
-        The page.
+        Path of the page.
 
     Raises
     ------

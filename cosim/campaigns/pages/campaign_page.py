@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from cosim.report.figures.style import NamedFigure
 
 PAGE = "campaign.html"
-FACTS = ("completed", "reached", "violation")  # in the order of the page
-_DRAWN = ("completed", "violation")  # drawn over the features of scenes
+FACTS = ("completed", "reached", "violation")  # rates on the page, in this order
+_DRAWN = ("completed", "violation")  # rates that are drawn over the features of scenes
 
 
 def write_campaign_page(folder: Path, replays: int) -> Path:
@@ -43,14 +43,14 @@ def write_campaign_page(folder: Path, replays: int) -> Path:
     Parameters
     ----------
     folder : Path
-        Of a complete campaign.
+        Folder of a complete campaign.
     replays : int
         Number of worst scenes that are flown again step by step, each with its own page.
 
     Returns
     -------
     Path
-        The page.
+        Path of the page.
 
     Raises
     ------
@@ -82,12 +82,12 @@ def campaign_lines(summary: dict[str, Any]) -> Iterator[str]:
     Parameters
     ----------
     summary : dict
-        From `cosim.campaigns.analysis.summary.summarize_campaign`.
+        Summary from `cosim.campaigns.analysis.summary.summarize_campaign`.
 
     Yields
     ------
     str
-        Without a newline.
+        Line without a newline.
     """
     s = summary
     yield f"{s['law']}: {s['reached']} of {s['scenes']} scenes reached, {s['violations']} with a violation"
@@ -107,14 +107,15 @@ def spreads_of(results: Results, groups: Mapping[str, Any]) -> dict[str, dict[st
     Parameters
     ----------
     results : Results
-        Of a campaign.
-    groups : mapping from str to ndarray of bool
-        Masks of scenes.
+        Rows of a campaign.
+    groups : mapping from str to ndarray of bool, shape (scenes,)
+        Mask of the scenes of each group.
 
     Returns
     -------
-    dict
-        Reach times are NaN if the goal was not reached; columns not in `OF_ALL` are over reached scenes.
+    dict of str to dict of str to ndarray
+        Values by column, then by group. Reach times are NaN where the goal was not reached; the other columns that are
+        not in `OF_ALL` hold reached scenes only.
     """
     reached, found = results["reached"], {}
     for name in SPREADS:

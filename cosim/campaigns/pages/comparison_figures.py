@@ -12,7 +12,7 @@ from cosim.campaigns.store.results import Results
 from cosim.report.figures.style import BLACK, BLUE, GREEN, ORANGE, RED
 
 _MOST = 1500  # greatest number of scenes that are drawn
-_NEVER = 1.12  # position of missing numbers, relative to the greatest number
+_NEVER = 1.12  # position of missing numbers, as a multiple of the range of the numbers
 
 
 def side_by_side(one: str, results: Results, other: str, others: Results, columns: Sequence[tuple[str, str]]) -> Figure:
@@ -21,16 +21,16 @@ def side_by_side(one: str, results: Results, other: str, others: Results, column
     Parameters
     ----------
     one, other : str
-        The laws.
+        Names of the laws.
     results, others : Results
-        Of the same scenes.
+        Rows of the two laws, of the same scenes in the same order.
     columns : sequence of (str, str)
-        Columns and their labels, with a panel each.
+        Columns and their labels; each has a panel.
 
     Returns
     -------
     Figure
-        With the line of equal numbers.
+        Figure with the line on which both numbers are equal.
     """
     some = np.unique(np.linspace(0, len(results) - 1, min(len(results), _MOST)).astype(int))
     mine, theirs = (rows["reached"] & ~rows["violation"] for rows in (results, others))

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 NUMBERS = "compare.json"
 PAGE = "compare.html"
-_LISTED = 3  # worst scenes that are listed for each law, unless more have replays
+_LISTED = 3  # number of worst scenes listed for each law, unless more have replays
 _SEEN = ("reach_time", "min_clearance")  # columns that are drawn scene by scene
 
 
@@ -37,14 +37,14 @@ def write_comparison_page(folder: Path, replays: int) -> Path:
     Parameters
     ----------
     folder : Path
-        Of a complete comparison.
+        Folder of a complete comparison.
     replays : int
         Number of worst scenes of each law that all laws fly again step by step.
 
     Returns
     -------
     Path
-        The page.
+        Path of the page.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The page that a search for the worst, or for the rate of what is rare, ends with."""
+"""The page of a search for the worst rows, or of an estimate of a rare event's probability."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ def write_falsification_page(folder: Path, replays: int) -> Path:
     Parameters
     ----------
     folder : Path
-        Of a search that is complete.
+        Folder of a complete search.
     replays : int
-        Worst rows, of those that are listed, that are flown again step by step, each with a page of its own.
+        Number of listed worst rows that are flown again step by step, each with its own page.
 
     Returns
     -------
     Path
-        The page.
+        Path of the page.
 
     Raises
     ------
     RunError
         If the folder holds no such search, or cannot be written.
     KeyboardInterrupt
-        After Ctrl-C; the page is there, without the replays.
+        After Ctrl-C; the page is written without the replays.
     """
     require_complete(folder)
     summary = read_json(folder / SUMMARY)
@@ -61,17 +61,17 @@ def write_falsification_page(folder: Path, replays: int) -> Path:
 
 
 def falsification_lines(summary: dict[str, Any]) -> Iterator[str]:
-    """Yield the lines that summarize a search on a terminal.
+    """Yield the lines about a search for a terminal.
 
     Parameters
     ----------
     summary : dict
-        Of `cosim.campaigns.falsification.falsification.run_falsification`.
+        Summary from `cosim.campaigns.falsification.falsification.run_falsification`.
 
     Yields
     ------
     str
-        Without its end.
+        Line without a newline.
     """
     s = summary
     if s["estimate"]:

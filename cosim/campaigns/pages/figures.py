@@ -15,8 +15,8 @@ from cosim.campaigns.pages.sections import LABELS
 from cosim.report.figures.style import BLACK, BLUE, CYCLE, GREEN, ORANGE, RED, NamedFigure, legend_columns
 from cosim.simulation.signals import Array
 
-WIDTH = 5.6  # in, of a figure: readable on a phone too
-_ACROSS = 2  # panels per row
+WIDTH = 5.6  # in, width of a figure, which is readable on a phone too
+_ACROSS = 2  # number of panels per row
 _MOST_KEYS = 8  # greatest number of keys that are drawn
 _POINTS = 700  # greatest number of points in a panel
 _TICKS = 5  # greatest number of intervals across a panel, so that labels of five digits fit
@@ -31,18 +31,18 @@ _MARKS = {"completed": "D", "reached": "o", "settled": "D", "violation": "s", "v
 class Rated(NamedTuple):
     """A line of a forest plot."""
 
-    fact: str
-    group: str  # "" if there is only one
-    rows: int  # of the group
-    rate: dict[str, Any]
+    fact: str  # name of the outcome, one of `FACT_COLOURS`
+    group: str  # name of the group of rows; "" if there is only one
+    rows: int  # number of rows in the group
+    rate: dict[str, Any]  # result of `cosim.campaigns.analysis.statistics.rate`
 
 
 class Key(NamedTuple):
     """A key that varies over the rows."""
 
-    label: str  # with unit
-    values: Array  # (n,)
-    log: bool = False  # drawn on a logarithmic scale
+    label: str  # label of the axis, with unit
+    values: Array  # (n,) value in each row
+    log: bool = False  # True: drawn on a logarithmic scale
 
 
 def forest(lines: Sequence[Rated]) -> Figure:
@@ -51,12 +51,12 @@ def forest(lines: Sequence[Rated]) -> Figure:
     Parameters
     ----------
     lines : sequence of Rated
-        Those of one fact one after the other.
+        Lines, those of one fact one after the other.
 
     Returns
     -------
     Figure
-        Shares from 0 to 100 %.
+        Figure with shares from 0 to 100 %.
     """
     heads = len({line.fact for line in lines if line.group})
     figure = Figure(figsize=(WIDTH, 0.75 + 0.27 * (len(lines) + heads)), layout="constrained")
@@ -101,14 +101,14 @@ def distributions(columns: Mapping[str, Mapping[str, Array]], addition: str) -> 
     Parameters
     ----------
     columns : mapping from str to mapping from str to ndarray, shape (n,)
-        By column, then by group; NaN for missing numbers.
+        Numbers by column, then by group; NaN where missing.
     addition : str
-        Addition to the caption.
+        Sentences that are added to the caption.
 
     Yields
     ------
     NamedFigure
-        ``distributions``; nothing without numbers. Missing numbers keep a curve below 100 %.
+        Figure ``distributions``; none without finite numbers. Missing numbers keep a curve below 100 %.
     """
     there = {name: of for name, of in columns.items() if any(np.isfinite(values).any() for values in of.values())}
     if not there:
@@ -141,7 +141,7 @@ def shares_up_to(values: Array) -> tuple[Array, Array]:
     Parameters
     ----------
     values : ndarray, shape (n,)
-        NaN for missing numbers, which count in the total.
+        Numbers; NaN where missing, which counts in the total.
 
     Returns
     -------
@@ -158,14 +158,14 @@ def binned_rates(keys: Sequence[Key], facts: Mapping[str, Facts]) -> Figure:
     Parameters
     ----------
     keys : sequence of Key
-        The first ones are drawn.
+        Keys, the first eight of which are drawn.
     facts : mapping from str to ndarray of bool, shape (n,)
-        By name, one of `FACT_COLOURS`.
+        Outcome of each row by the outcome's name, one of `FACT_COLOURS`.
 
     Returns
     -------
     Figure
-        A panel for each key.
+        Figure with a panel for each key.
     """
     figure, panels = _panels(min(len(keys), _MOST_KEYS), 2.1)
     for axes, key in zip(panels, keys, strict=False):
@@ -190,18 +190,18 @@ def scatter(keys: Sequence[Key], values: Array, label: str, reached: Facts, viol
     Parameters
     ----------
     keys : sequence of Key
-        The first ones are drawn.
+        Keys, the first eight of which are drawn.
     values : ndarray, shape (n,)
-        The numbers; rows with NaN or infinity are skipped.
+        Numbers to be drawn; rows with NaN or infinity are skipped.
     label : str
-        Of the values, with unit.
+        Label of the numbers, with unit.
     reached, violated : ndarray of bool, shape (n,)
         Outcomes of the rows.
 
     Returns
     -------
     Figure
-        A panel for each key, with at most 700 rows.
+        Figure with a panel for each key, each with at most 700 rows.
     """
     some = np.flatnonzero(np.isfinite(values))
     if len(some) > _POINTS:

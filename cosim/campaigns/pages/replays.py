@@ -21,15 +21,15 @@ from cosim.run.run import run_scenario
 from plant_fmu import PlantError
 
 WORST = "worst"  # folder of the replays
-_FLOWN = "flown.json"  # beside a replay: remarks on differing flights
+_FLOWN = "flown.json"  # file beside a replay with remarks on differing flights
 
 
 @dataclass(frozen=True)
 class Replay:
     """The replay of a row, or remarks why there is none."""
 
-    page: str | None  # relative to the folder
-    remarks: tuple[str, ...]  # such as differences between flight and row
+    page: str | None  # path of the replay's page, relative to the folder
+    remarks: tuple[str, ...]  # remarks, such as differences between flight and row
 
     def cell(self) -> Html:
         """Format it as a cell of a table."""
@@ -52,17 +52,17 @@ def write_page_with_replays(
     Parameters
     ----------
     path : Path
-        Of the page; the replays go into a folder beside it.
+        Path of the page; the replays are written into the folder ``worst`` beside it.
     numbers : Path
         File with the numbers of the page, for error messages.
     page : callable
-        Makes the page, given the replays by key.
+        Function that makes the page, given the replays by key of the row.
     keys : iterable of int
-        Rows to fly again.
+        Keys of the rows to fly again.
     folders : sequence of Path
-        As for `replay_of`.
+        Folders of campaigns that flew the same scenes by several laws, or the folder of a single campaign.
     title : callable
-        Makes the title of a key's replay.
+        Function that makes the title of a replay, given the key of its row.
 
     Raises
     ------
@@ -89,18 +89,18 @@ def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Repla
     Parameters
     ----------
     out : Path
-        Folder of the page, below ``worst``.
+        Folder into which the replay is written, as ``worst/KEY``.
     key : int
-        Of the row.
+        Key of the row.
     folders : sequence of Path
-        Of campaigns that have flown the same scene by several laws, or of a single one.
+        Folders of campaigns that flew the same scene by several laws, or the folder of a single campaign.
     title : str
-        Of the page.
+        Title of the replay's page.
 
     Returns
     -------
     Replay
-        With a page if one of the flights can be shown.
+        Replay with a page if one of the flights can be shown, and with remarks.
 
     Raises
     ------

@@ -40,9 +40,9 @@ class Group(NamedTuple):
     """Rates and quantiles of a group of rows."""
 
     name: str
-    rows: int
-    rates: Mapping[str, dict[str, Any]]
-    quantiles: Mapping[str, Mapping[str, float | None]]
+    rows: int  # number of rows
+    rates: Mapping[str, dict[str, Any]]  # rate of each outcome
+    quantiles: Mapping[str, Mapping[str, float | None]]  # quantiles of each column
 
 
 def rates_table(page: Page, unit: str, groups: Sequence[Group], facts: Sequence[str]) -> None:
@@ -51,13 +51,13 @@ def rates_table(page: Page, unit: str, groups: Sequence[Group], facts: Sequence[
     Parameters
     ----------
     page : Page
-        The page.
+        Page to which the section is added.
     unit : str
-        Word for rows, in the plural.
+        Word for rows in the plural, such as ``"scenes"``.
     groups : sequence of Group
-        Rows of the table.
+        Groups, a row of the table each.
     facts : sequence of str
-        Columns of the table.
+        Names of the rates, a column of the table each.
     """
     page.table(
         ["", unit, *(_WORDS.get(fact, fact) for fact in facts)],
@@ -71,9 +71,9 @@ def quantiles_table(page: Page, groups: Sequence[Group]) -> None:
     Parameters
     ----------
     page : Page
-        The page.
+        Page to which the section is added.
     groups : sequence of Group
-        All with the same numbers.
+        Groups with quantiles of the same columns.
     """
     there = [name for name in groups[0].quantiles if any(g.quantiles[name]["0.5"] is not None for g in groups)]
     names = ["median" if q == 0.5 else f"{100 * q:g} %" for q in QUANTILES]
@@ -99,13 +99,13 @@ def worst_section(
     Parameters
     ----------
     page : Page
-        The page.
+        Page to which the section is added.
     folder : Path
-        Of the campaign.
+        Folder of the campaign.
     unit : str
-        Word for a row.
+        Word for a row, such as ``"scene"``.
     worst : sequence of Worst
-        The rows.
+        Worst rows, the worst first.
     shown : mapping from int to Replay
         Existing replays by key.
     kinds : mapping from int to str
@@ -141,13 +141,13 @@ def refused_section(page: Page, unit: str, refused: int, reasons: Mapping[str, s
     Parameters
     ----------
     page : Page
-        The page.
+        Page to which the section is added.
     unit : str
-        Word for a row.
+        Word for a row, such as ``"scene"``.
     refused : int
         Number of refused rows.
     reasons : mapping from str to str
-        Reasons of the first ones, by key.
+        Reasons for refusing the first of them, by key.
     """
     if refused:
         page.heading(f"Refused {unit}s")
@@ -162,9 +162,9 @@ def basis(page: Page, summary: Mapping[str, Any]) -> None:
     Parameters
     ----------
     page : Page
-        The page.
+        Page to which the section is added.
     summary : mapping from str to object
-        Of a campaign or sweep.
+        Summary of a campaign, sweep or comparison.
     """
     versions = ", ".join(f"{name} {version}" for name, version in summary["versions"].items())
     page.paragraph(f"Code {summary['code_sha256'][:12]}…; {versions}.", faint=True)

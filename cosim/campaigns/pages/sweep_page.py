@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 PAGE = "sweep.html"
 _LEAST_SHARE, _LEAST_RHO = 0.01, 0.1  # least effects and rank correlations in the table
-_SHOWN, _VALUES = 8, 12  # greatest number of keys in figures and table; of written values of a list
+_SHOWN, _VALUES = 8, 12  # greatest numbers of keys in figures and table, and of values listed for a key
 
 
 def write_sweep_page(folder: Path, replays: int) -> Path:
@@ -46,14 +46,14 @@ def write_sweep_page(folder: Path, replays: int) -> Path:
     Parameters
     ----------
     folder : Path
-        Of a complete sweep.
+        Folder of a complete sweep.
     replays : int
         Number of worst rows that are flown again step by step, each with its own page.
 
     Returns
     -------
     Path
-        The page.
+        Path of the page.
 
     Raises
     ------
@@ -86,12 +86,12 @@ def sweep_lines(summary: dict[str, Any]) -> Iterator[str]:
     Parameters
     ----------
     summary : dict
-        From `summarize_sweep`.
+        Summary from `summarize_sweep`.
 
     Yields
     ------
     str
-        Without a newline.
+        Line without a newline.
     """
     s = summary
     yield f"{s['name']}: {s['flown']} of {s['rows']} rows flown, {s['refused']} refused, {s['stopped']} stopped early"

@@ -36,7 +36,7 @@ from cosim.scenario.scenario import VEHICLE_COPY, Scenario, load_scenario
 from plant_fmu import PlantFmuError
 from plant_fmu.toml_tables import decode
 
-Outcome = dict[str, Any]  # some columns of a row
+Outcome = dict[str, Any]  # values of some columns of a row
 _ROUNDING = 1e-6  # relative and absolute tolerance between two flights of one scenario
 
 
@@ -44,9 +44,9 @@ _ROUNDING = 1e-6  # relative and absolute tolerance between two flights of one s
 class Repeat:
     """Task, batch and scenario that repeat a row."""
 
-    stored: dict[str, Any]  # the row
-    task: Task
-    batch: Any  # of that row alone
+    stored: dict[str, Any]  # stored row
+    task: Task  # task that flies the row
+    batch: Any  # batch with this row alone
     scenario: Scenario | None  # equivalent to the row; None if the row was refused
     outcome: Callable[[Scenario, Record, dict[str, Any]], Outcome]  # columns of the row from a recorded run
 
@@ -67,14 +67,14 @@ def repeat_of(folder: Path, key: int) -> Repeat:
     Parameters
     ----------
     folder : Path
-        Of a campaign.
+        Folder of a complete campaign.
     key : int
         Number of the row in a sweep, seed of the scene in a campaign of scenes.
 
     Returns
     -------
     Repeat
-        Of that row.
+        Task, batch and scenario of that row.
 
     Raises
     ------
@@ -110,19 +110,19 @@ def complete_results(folder: Path, schema: Any) -> Results:
     Parameters
     ----------
     folder : Path
-        Of the campaign.
+        Folder of the campaign.
     schema : pyarrow.Schema
         Expected schema of the rows.
 
     Returns
     -------
     Results
-        All rows.
+        All rows of the campaign.
 
     Raises
     ------
     RunError
-        If it is not complete, or they cannot be read.
+        If the campaign is not complete, or its rows cannot be read.
     """
     require_complete(folder)
     return Results(folder / RESULTS, schema)

@@ -22,11 +22,12 @@ _OF_THE_CLOCK = ("worst_step_time",)  # columns of wall-clock times, which diffe
 class Rerun:
     """Result of a rerun."""
 
-    key: int  # of the row
-    differing: dict[str, tuple[Any, Any]]  # by column: stored value and that of the rerun
+    key: int  # key of the row
+    differing: dict[str, tuple[Any, Any]]  # stored value and that of the rerun, by column, where they differ
     other_code: bool  # True if the row was flown by other code
-    run: Run | None  # with full record; None if the row was refused or stopped
-    apart: dict[str, tuple[Any, Any]]  # by column: stored value and that of `run`, if they differ by more than rounding
+    run: Run | None  # run with full record; None if the row was refused or stopped
+    # stored value and that of `run`, by column, where they differ by more than rounding
+    apart: dict[str, tuple[Any, Any]]
     stopped: str | None  # error of the plant that stopped the flight, as in the row
 
 
@@ -36,13 +37,13 @@ def rerun(folder: Path, key: int, out: Path | None = None, progress: bool = Fals
     Parameters
     ----------
     folder : Path
-        Of a campaign.
+        Folder of a complete campaign.
     key : int
         Number of the row in a sweep, seed of the scene in a campaign of scenes.
     out : Path, optional
-        The run folder; it must not exist, or be empty. Default: a new one below ``runs``.
+        Folder of the run, new or empty. Default: a new one below ``runs``.
     progress : bool
-        Show a bar of the run, if there is a terminal.
+        True to show a bar of the run, if there is a terminal.
 
     Returns
     -------

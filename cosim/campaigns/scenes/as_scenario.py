@@ -13,7 +13,7 @@ from cosim.campaigns.scenes.scene import Scene, plant_values, scene_regions
 from cosim.scenario.scenario import Scenario, validate_scenario
 from plant_fmu.vehicle import load_vehicle
 
-VEHICLE = "odin"  # of scenes without a vehicle
+VEHICLE = "odin"  # vehicle of scenes that name none
 _OF_THE_SCENARIO = ("substep", "current", "position")  # values of the plant with other keys in a scenario
 
 
@@ -23,18 +23,18 @@ def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions
     Parameters
     ----------
     scene : Scene or ScenarioScene
-        The scene.
+        Scene to convert.
     law : str
-        One of those in `controller.LAWS`.
+        Name of the law, a key of `controller.LAWS`.
     gains : NamedTuple
-        Of the law.
+        Gains of the law.
     conditions : Conditions
         Conditions of the flight.
 
     Returns
     -------
     Scenario
-        The scenario that `SceneFlyer` flies.
+        Scenario that `SceneFlyer` flies.
 
     Raises
     ------

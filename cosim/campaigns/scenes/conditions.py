@@ -22,14 +22,14 @@ class Conditions:
     A scene that is a scenario has its own duration, periods and ramp.
     """
 
-    duration: float = 120.0  # s
-    control: float = 0.02  # s
-    plant_steps: int = 2  # plant steps per control step, with one integration step each
+    duration: float = 120.0  # s, duration of a flight
+    control: float = 0.02  # s, control period
+    plant_steps: int = 2  # number of plant steps per control step, each with one integration step
     settled: float = 10.0  # s, least time in the goal region at the end
     ramp: float = 0.2  # m, width of the arbiter's memberships
-    report_failures: bool = False
+    report_failures: bool = False  # True: failing thrusters are reported to the law
     sensing: Literal["state", "sensors"] = "state"  # source of the law's state, as `Sensing.through`
-    outages: tuple[Outage, ...] = ()  # of sensors
+    outages: tuple[Outage, ...] = ()  # outages of sensors
     arbiter: RuleVariant = "ordered"  # rule variant, as `ArbiterSetup.rules`
     arbiter_file: str = ""  # name of a rule file instead; its inputs are named like criteria or signals
     arbiter_text: str = ""  # content of the file

@@ -19,11 +19,15 @@ Generator = np.random.Generator
 Table = dict[str, Any]
 Kinds = dict[str, Callable[[Generator], tuple[Table, list[Table]]]]
 
-_LAGS = {"odin": 0.0, "bluerov2_heavy": 0.15, "rexrov": None}  # s, of the thrusters; None: that of the vehicle's file
+_LAGS = {
+    "odin": 0.0,
+    "bluerov2_heavy": 0.15,
+    "rexrov": None,
+}  # s, lag of the thrusters; None: that of the vehicle's file
 _PRIORITY = 4.0  # ratio of priorities of successive criteria
-_NET_WEIGHT = 50.0  # N, greatest net weight; for heavy vehicles
-_MOST_OF_WEIGHT = 0.025  # of their weight
-_CURRENT = 0.4  # m/s, greatest
+_NET_WEIGHT = 50.0  # N, greatest net weight
+_MOST_OF_WEIGHT = 0.025  # greatest net weight of a heavy vehicle, as a fraction of its weight
+_CURRENT = 0.4  # m/s, greatest speed of the current
 _CRITERIA = ("obstacle", "shape", "depth", "visibility")
 
 
@@ -33,9 +37,9 @@ def make_conflict(seed: int, family: str = "conflict") -> Table:
     Parameters
     ----------
     seed : int
-        0 or above.
+        Seed of the scene, 0 or above.
     family : {"conflict", "tour"}
-        A tour is a conflict with goals in turn.
+        Family of the scene; a tour is a conflict with goals in turn.
 
     Returns
     -------
@@ -55,17 +59,17 @@ def draw_conflict(rng: Any, seed: int, family: str = "conflict") -> Table:
     seed : int
         Seed of the scene, 0 or above.
     family : {"conflict", "tour"}
-        As for `make_conflict`.
+        Family of the scene; a tour is a conflict with goals in turn.
 
     Returns
     -------
     dict
-        As for `make_conflict`.
+        Seed, kind with the vehicle's name, and table of the scenario without a law.
     """
     _, kinds, duration = CONFLICTS[family]
     vehicle = load_vehicle(list(_LAGS)[int(rng.integers(len(_LAGS)))])
     kind = list(kinds)[int(rng.integers(len(kinds)))]
-    order = rng.permutation(len(_CRITERIA)).tolist()  # place of each criterion
+    order = rng.permutation(len(_CRITERIA)).tolist()  # position of each criterion in the order, from 0
     goal, regions = kinds[kind](rng)
     heading, speed = rng.uniform(-np.pi, np.pi), rng.uniform(0.0, _CURRENT)
     criteria: list[Table] = [{"name": name, "order": 1 + place} for name, place in zip(_CRITERIA, order, strict=True)]
@@ -143,8 +147,8 @@ def _closing(rng: Generator, axis: int, middle: float) -> tuple[Table, list[Tabl
     """Make two hard faces that approach each other along an axis until they overlap."""
     one, other = _two(rng)
     apart, overlap, duration = rng.uniform(3.0, 4.0), rng.uniform(0.2, 0.8), rng.uniform(35.0, 50.0)
-    fast = (apart + overlap) / duration  # m/s, of both together
-    share = rng.uniform()  # fraction of it for the first face
+    fast = (apart + overlap) / duration  # m/s, closing speed of both faces
+    share = rng.uniform()  # fraction of it by which the first face moves
     velocities = np.zeros((2, 3))
     velocities[0, axis], velocities[1, axis] = share * fast, (share - 1.0) * fast
     regions = [
@@ -259,7 +263,7 @@ def _views_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
     A path outside of the pillar loses the view; one inside of it violates the region around the structure. A greatest
     depth excludes the deeper places.
     """
-    x, y, z = 4.0, 4.0, 4.2  # of the structure
+    x, y, z = 4.0, 4.0, 4.2  # m, NED: centre of the structure
     off, pillar, radius = rng.uniform(1.7, 2.2), rng.uniform(1.8, 2.2), rng.uniform(0.5, 0.9)
     angles = rng.uniform(0.7, 1.0, 3) * [-1.0, 1.0, -1.0]  # rad, about the structure, from east
     places = [(x + off * np.sin(a), y - off * np.cos(a), z + rng.uniform(-0.6, 0.4)) for a in angles]
@@ -276,9 +280,9 @@ def _views_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
 class _Family(NamedTuple):
     """Generators of the conflicts of a family."""
 
-    stream: int  # of random numbers
-    kinds: Kinds
-    duration: float  # s
+    stream: int  # first number of the random generator's seed
+    kinds: Kinds  # generator of each kind of conflict
+    duration: float  # s, duration of a flight
 
 
 _KINDS: Kinds = {

@@ -21,8 +21,8 @@ from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu import Plant
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
-_LEVEL = (1.0, 0.0, 0.0, 0.0)
-_ROUNDING = 1e-9  # of a count of steps
+_LEVEL = (1.0, 0.0, 0.0, 0.0)  # attitude without rotation, from body to world
+_ROUNDING = 1e-9  # tolerance of a count of steps
 
 
 class Score(NamedTuple):
@@ -33,7 +33,7 @@ class Score(NamedTuple):
     min_clearance: float  # m, least over all hard regions and plant steps, with the start; negative: violated
     effort: float  # N s, sum over thrusters of the integral of the given force's magnitude
     thrust_variation: float  # N, sum over thrusters of the absolute changes of the commanded force, from 0 on
-    worst_step: float  # s of the wall clock, longest time of law and allocation in a step
+    worst_step: float  # s, wall-clock time: longest time of law and allocation in a step
     failed_step: int  # plant step in which the FMU failed, -1 for none
     bound_excess: float = -math.inf  # m, greatest excess of the law's bound over a clearance; -inf: it has no bound
     weighted_violation: float = 0.0  # m s, sum over regions of priority times the integral of the violation depth
@@ -45,11 +45,11 @@ class SceneFlyer:
     Parameters
     ----------
     law : str
-        One of those in `controller.LAWS`.
+        Name of the law, a key of `controller.LAWS`.
     conditions : Conditions
         Conditions of all flights.
     gains : NamedTuple, optional
-        Of the law; default: its own defaults.
+        Gains of the law; default: its own defaults.
 
     Raises
     ------
@@ -90,14 +90,14 @@ class SceneFlyer:
         Parameters
         ----------
         scene : Scene or ScenarioScene
-            The scene.
+            Scene to fly.
         trace : bool
-            Return a trace, see `cosim.batch.flight_config`.
+            True to return a trace, see `cosim.batch.flight_config`.
 
         Returns
         -------
         Score, ndarray
-            The score, and the trace, shape (0, 0) without one.
+            Score of the flight; trace, shape (0, 0) without one.
 
         Raises
         ------

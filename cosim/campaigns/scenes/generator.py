@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from cosim.campaigns.scenes.conflicts import make_conflict
 from cosim.campaigns.scenes.trials import make_trial
 
-MOST_OBSTACLES = {"plain": 6, "hard": 14}
+MOST_OBSTACLES = {"plain": 6, "hard": 14}  # greatest number of obstacles of each kind of scene
 _GOAL_RADIUS = 0.5  # m
 _FREE = 0.6  # m, least distance of an obstacle from the start and from the goal region
 
@@ -52,7 +52,7 @@ def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[
     Yields
     ------
     str
-        A line of JSON for `cosim.campaigns.scenes.scene_file.read_scenes`.
+        Scene as a line of JSON for `cosim.campaigns.scenes.scene_file.read_scenes`.
 
     Examples
     --------
@@ -72,14 +72,14 @@ def make_scene(seed: int, kind: str = "plain") -> dict[str, Any]:
     Parameters
     ----------
     seed : int
-        0 or above.
+        Seed of the scene, 0 or above.
     kind : {"plain", "hard"}
-        A hard one has drift, noise and a failing thruster.
+        Kind of the scene; a hard one has drift, noise and a failing thruster.
 
     Returns
     -------
     dict
-        Table for JSON; SI units, NED.
+        Table of the scene for JSON; SI units, NED.
     """
     rng = np.random.default_rng([20261121, seed, int(kind == "hard")])
     return draw_scene(rng, itertools.repeat(rng), seed, kind)
@@ -97,12 +97,12 @@ def draw_scene(rng: Draws, of_obstacles: Iterable[Draws], seed: int, kind: str) 
     seed : int
         Seed of the scene, 0 or above.
     kind : {"plain", "hard"}
-        A hard one has drift, noise and a failing thruster.
+        Kind of the scene; a hard one has drift, noise and a failing thruster.
 
     Returns
     -------
     dict
-        Table for JSON; SI units, NED.
+        Table of the scene for JSON; SI units, NED.
     """
     hard = kind == "hard"
     start = np.array([0.0, 0.0, rng.uniform(1.5, 4.0)])

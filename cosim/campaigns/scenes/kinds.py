@@ -30,8 +30,8 @@ FEATURES = {  # units of the features
 class SceneKinds:
     """Kinds and features of a campaign's scenes."""
 
-    kinds: NDArray[np.str_]  # (scenes,) such as "drift, noise, failure"
-    features: dict[str, Array]  # (scenes,) each, by the keys of FEATURES
+    kinds: NDArray[np.str_]  # (scenes,) kind of each scene, such as "drift, noise, failure"
+    features: dict[str, Array]  # (scenes,) values of each feature, by the keys of FEATURES
 
     def groups(self) -> Iterator[tuple[str, NDArray[np.bool_]]]:
         """Yield each kind with the mask of its scenes; nothing if all are of one kind."""
@@ -52,12 +52,12 @@ def scene_kinds(results: Results) -> SceneKinds:
     Returns
     -------
     SceneKinds
-        In the order of the rows.
+        Kinds and features in the order of the rows.
 
     Raises
     ------
     RunError
-        If they cannot be read, or a line is not a scene.
+        If the rows cannot be read, or a line is not a scene.
     """
     kinds: list[str] = []
     numbers: list[tuple[float, ...]] = []

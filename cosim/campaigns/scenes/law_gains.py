@@ -11,17 +11,17 @@ from plant_fmu.toml_tables import hint
 
 
 def law_named(name: str) -> Any:
-    """Return a law's class.
+    """Return the class of a law.
 
     Parameters
     ----------
     name : str
-        One of those in `controller.LAWS`.
+        Name of the law, a key of `controller.LAWS`.
 
     Returns
     -------
     type of CompiledLaw
-        Its ``gains_type`` has the law's defaults.
+        Class of the law, whose ``gains_type`` has the defaults of the gains.
 
     Raises
     ------
@@ -39,14 +39,14 @@ def gains_from(law: str, settings: Sequence[str] = ()) -> Any:
     Parameters
     ----------
     law : str
-        One of those in `controller.LAWS`.
+        Name of the law, a key of `controller.LAWS`.
     settings : sequence of str
-        ``key=value``, numbers.
+        Settings ``key=value`` with numbers as values.
 
     Returns
     -------
     NamedTuple
-        Of the law's ``gains_type``, not validated.
+        Gains, an instance of the law's ``gains_type``; their values are not validated.
 
     Raises
     ------
@@ -73,9 +73,14 @@ def gains_by_law(laws: Sequence[str], settings: Sequence[str] = ()) -> dict[str,
     Parameters
     ----------
     laws : sequence of str
-        Of those in `controller.LAWS`.
+        Names of the laws, keys of `controller.LAWS`.
     settings : sequence of str
-        ``law.key=value``, numbers.
+        Settings ``law.key=value`` with numbers as values.
+
+    Returns
+    -------
+    dict of str to NamedTuple
+        Gains of each law; their values are not validated.
 
     Raises
     ------

@@ -16,10 +16,10 @@ class Plan:
     law: str
     gains: dict[str, float]
     conditions: Conditions
-    scenes: int
-    scenes_sha256: str
-    code_sha256: str  # of the sources of all packages, so that rows of different code are not mixed
-    versions: dict[str, str]
+    scenes: int  # number of scenes
+    scenes_sha256: str  # digest of the scenes
+    code_sha256: str  # digest of the sources of all packages, so that rows of different code are not mixed
+    versions: dict[str, str]  # versions of Python and of libraries
 
     def table(self) -> dict[str, Any]:
         """Return the plan as a table for JSON."""
@@ -33,9 +33,9 @@ def plan_of(law: str, gains: Any, conditions: Conditions, scenes: int, digest: s
     Parameters
     ----------
     law : str
-        One of those in `controller.LAWS`.
+        Name of the law, a key of `controller.LAWS`.
     gains : NamedTuple
-        Of the law.
+        Gains of the law.
     conditions : Conditions
         Conditions of the flights.
     scenes : int
@@ -46,6 +46,6 @@ def plan_of(law: str, gains: Any, conditions: Conditions, scenes: int, digest: s
     Returns
     -------
     Plan
-        Equal plans give the same rows on the same machine.
+        Plan of the campaign; equal plans give the same rows on the same machine.
     """
     return Plan(law, gains._asdict(), conditions, scenes, digest, code_digest(), versions())

@@ -72,7 +72,7 @@ def row_of(seed: int, score: Score, plant_step: float, scene: str = "") -> Row:
     Parameters
     ----------
     seed : int
-        Of the scene.
+        Seed of the scene.
     score : Score
         Score of the flight.
     plant_step : float
@@ -83,7 +83,7 @@ def row_of(seed: int, score: Score, plant_step: float, scene: str = "") -> Row:
     Returns
     -------
     Row
-        A NaN clearance and a stopped flight count as violations, since they are not known to be safe.
+        Row of the scene. A NaN clearance and a stopped flight count as violations: they are not known to be safe.
     """
     stopped = score.failed_step >= 0
     return Row(

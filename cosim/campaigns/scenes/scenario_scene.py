@@ -13,7 +13,7 @@ from cosim.errors import RunError, ScenarioError
 from cosim.scenario.scenario import Scenario, validate_scenario
 from plant_fmu import PlantFmuError
 
-_MOST = 60  # characters of a kind
+_MOST = 60  # greatest number of characters of a kind
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class ScenarioScene:
     """
 
     seed: int
-    kind: str  # scenes of a kind are summarized together
+    kind: str  # name under which scenes are summarized together
     scenario: dict[str, Any]  # table of the scenario, without a law
 
     def with_law(self, law: str, gains: dict[str, float], changes: dict[str, Any]) -> Scenario:

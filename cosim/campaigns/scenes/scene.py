@@ -38,15 +38,15 @@ class Noise:
 
     position: float = 0.0  # m
     velocity: float = 0.0  # m/s
-    seed: int | None = None  # None: the scene's
+    seed: int | None = None  # seed of the noise; None: that of the scene
 
 
 @dataclass(frozen=True)
 class Failure:
     """A thruster that gives no force from some time on."""
 
-    index: int  # from 1
-    time: float  # s
+    index: int  # number of the thruster, from 1
+    time: float  # s, time of the failure
 
 
 @dataclass(frozen=True)
@@ -67,10 +67,10 @@ class Scene:
     start: Vector3  # m, NED
     goal: SphereSpec
     obstacles: tuple[Obstacle, ...]
-    depth_band: tuple[float, float]  # m
+    depth_band: tuple[float, float]  # m, least and greatest depth
     current: Vector3  # m/s, NED
     weight_minus_buoyancy: float  # N
-    righting_moment: float  # N m, z_G W - z_B B
+    righting_moment: float  # N m: z_G W - z_B B
     noise: Noise = Noise()
     failed_thruster: Failure | None = None
 
@@ -98,16 +98,16 @@ def plant_values(scene: Scene, vehicle: Vehicle, substep: float) -> dict[str, fl
     Parameters
     ----------
     scene : Scene
-        The scene.
+        Scene with start, current and restoring forces.
     vehicle : Vehicle
-        Its weight and centre of gravity are used.
+        Vehicle, whose weight and centre of gravity are used.
     substep : float
         Greatest integration step [s].
 
     Returns
     -------
     dict of str to float
-        By the names of the FMU's variables.
+        Values by the names of the FMU's variables.
 
     Raises
     ------

@@ -14,7 +14,7 @@ from cosim.errors import ScenarioError
 from plant_fmu import PlantFmuError
 from plant_fmu.toml_tables import decode
 
-_LONGEST = 1_000_000  # bytes of a line, since a pipe may send an endless one
+_LONGEST = 1_000_000  # greatest number of bytes of a line, since a pipe may send an endless one
 
 
 def decode_scene(line: bytes) -> AnyScene:
@@ -23,17 +23,17 @@ def decode_scene(line: bytes) -> AnyScene:
     Parameters
     ----------
     line : bytes
-        One JSON object.
+        Text of one JSON object.
 
     Returns
     -------
     Scene or ScenarioScene
-        With valid numbers; the latter if the line has a ``scenario``.
+        Scene with valid numbers; a `ScenarioScene` if the line has a ``scenario``.
 
     Raises
     ------
     ScenarioError
-        If it is not a scene; it names the key.
+        If the line is not a scene; the message names the key.
     """
     try:
         table = msgspec.json.decode(line)
@@ -55,17 +55,17 @@ def read_scenes(path: Path) -> Iterator[AnyScene]:
     Parameters
     ----------
     path : Path
-        The file.
+        File of the scenes.
 
     Yields
     ------
     Scene or ScenarioScene
-        In the file's order.
+        Scenes in the order of the file.
 
     Raises
     ------
     ScenarioError
-        If the file cannot be read, or a line is not a scene; it names the line and the key.
+        If the file cannot be read, or a line is not a scene; the message names the line and the key.
 
     Examples
     --------
@@ -88,19 +88,19 @@ def scenes_in(file: IO[bytes], name: str) -> Iterator[AnyScene]:
     Parameters
     ----------
     file : file object
-        With one JSON object per line; blank lines are skipped. It may be an endless pipe.
+        Open binary file with one JSON object per line; blank lines are skipped. It may be an endless pipe.
     name : str
         Name of the source, for messages.
 
     Yields
     ------
     Scene or ScenarioScene
-        In their order.
+        Scenes in the order of the file.
 
     Raises
     ------
     ScenarioError
-        At a line that is not a scene; it names the line and the key.
+        At a line that is not a scene; the message names the line and the key.
     """
     for number, line in enumerate(iter(lambda: file.readline(_LONGEST + 1), b""), 1):
         if len(line) > _LONGEST:

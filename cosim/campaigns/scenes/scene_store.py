@@ -24,14 +24,14 @@ class SceneStore:
     Parameters
     ----------
     path : Path
-        A file with one JSON object per line; ``-`` for standard input.
+        File of the scenes with one JSON object per line; ``-`` for standard input.
 
     Attributes
     ----------
     seeds : list of int
-        In rising order.
+        Seeds of the scenes, in rising order.
     digest : str
-        SHA-256 over the scenes in their order, independent of blanks in the file.
+        SHA-256 of the scenes in the order of the file, independent of blanks.
 
     Raises
     ------
@@ -57,7 +57,7 @@ class SceneStore:
             raise
 
     def _read(self, file: IO[bytes], name: str) -> None:
-        self._places: dict[int, tuple[int, int]] = {}  # by seed: offset and length
+        self._places: dict[int, tuple[int, int]] = {}  # offset and length of each scene's line by seed [bytes]
         digest, offset = hashlib.sha256(), 0
         for scene in scenes_in(file, name):
             if scene.seed in self._places:

@@ -19,7 +19,7 @@ Table = dict[str, Any]
 VEHICLES = ("odin", "bluerov2_heavy", "rexrov")
 _START, _GOAL = np.array([0.0, 0.0, 4.0]), np.array([10.0, 0.0, 4.0])
 _GOAL_RADIUS = 0.5  # m
-_FREE = 0.8  # m, from obstacles to start and goal
+_FREE = 0.8  # m, least distance of an obstacle from the start and from the goal region
 
 
 def make_trial(seed: int) -> Table:
@@ -28,12 +28,12 @@ def make_trial(seed: int) -> Table:
     Parameters
     ----------
     seed : int
-        0 or above.
+        Seed of the scene, 0 or above.
 
     Returns
     -------
     dict
-        Seed, kind, which names the tested part, and table of the scenario without a law.
+        Seed; kind, which names the tested part; and table of the scenario without a law.
     """
     rng = np.random.default_rng([20261125, seed])
     vehicle = load_vehicle(VEHICLES[int(rng.integers(len(VEHICLES)))])

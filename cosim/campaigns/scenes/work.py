@@ -38,12 +38,12 @@ class SceneBatches:
     Parameters
     ----------
     task : SceneTask
-        Law, gains and conditions.
+        Law, gains and conditions of the flights.
 
     Raises
     ------
     RunError, LawError, BuildError, PlantError
-        As `SceneFlyer`.
+        Errors of `SceneFlyer`: an unknown law, refused gains, or no FMU of the vehicle.
     """
 
     def __init__(self, task: SceneTask) -> None:
@@ -73,9 +73,9 @@ class SceneWork:
     Parameters
     ----------
     store : SceneStore
-        The scenes.
+        Scenes of the campaign.
     task : SceneTask
-        Law, gains and conditions.
+        Law, gains and conditions of the flights.
     """
 
     unit, schema = "scene", SCHEMA

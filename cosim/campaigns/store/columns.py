@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-_TYPES = {"f": pa.float64(), "i": pa.int64(), "b": pa.bool_()}  # by NumPy's kind
+_TYPES = {"f": pa.float64(), "i": pa.int64(), "b": pa.bool_()}  # type of a column by NumPy's kind of its values
 
 
 def of_numbers(values: NDArray[Any], absent: NDArray[np.bool_] | None = None) -> Any:
@@ -22,14 +22,14 @@ def of_numbers(values: NDArray[Any], absent: NDArray[np.bool_] | None = None) ->
     Parameters
     ----------
     values : ndarray of float64, int64 or bool, shape (n,)
-        Of the rows.
+        Values of the rows.
     absent : ndarray of bool, shape (n,), optional
-        Mask of nulls.
+        True for rows whose value is null.
 
     Returns
     -------
     pyarrow.Array
-        Of n values.
+        Column of n values.
     """
     facts = values.dtype.kind == "b"
     content = _bits(values) if facts else pa.py_buffer(np.ascontiguousarray(values))
@@ -42,12 +42,12 @@ def of_texts(texts: Sequence[str | None]) -> Any:
     Parameters
     ----------
     texts : sequence of str or None
-        Of the rows; None for null.
+        Texts of the rows; None for null.
 
     Returns
     -------
     pyarrow.Array
-        Of strings.
+        Column of strings.
     """
     content = [(text or "").encode() for text in texts]
     ends = np.cumsum([0, *map(len, content)], dtype=np.int32)
@@ -62,12 +62,12 @@ def to_array(column: Any) -> NDArray[Any]:
     Parameters
     ----------
     column : pyarrow.ChunkedArray
-        Of numbers, Booleans or texts.
+        Column of numbers, Booleans or texts.
 
     Returns
     -------
     ndarray, shape (n,)
-        NaN or None for null.
+        Values of the rows; NaN for a null among numbers with fractions, None for any other null.
     """
     if column.type == pa.string():
         return np.array(column.to_pylist(), dtype=object)

@@ -37,7 +37,7 @@ class CampaignFolder:
     path : Path
         A folder that does not exist, is empty, or holds the same campaign.
     work : Work
-        The work of the campaign.
+        Rows of the campaign, with plan and schema.
 
     Raises
     ------
@@ -80,7 +80,7 @@ class CampaignFolder:
 
     @property
     def complete(self) -> bool:
-        """Whether all rows are joined."""
+        """True if all rows are joined in one file."""
         return (self.path / RESULTS).exists()
 
     def results(self) -> Results:
@@ -89,7 +89,7 @@ class CampaignFolder:
         Raises
         ------
         RunError
-            If they cannot be read.
+            If the rows cannot be read.
         """
         return Results(self.path / RESULTS, self._schema)
 
@@ -157,7 +157,7 @@ def read_plan(path: Path) -> dict[str, Any]:
     Raises
     ------
     RunError
-        If it holds no readable plan.
+        If the folder holds no readable plan.
     """
     if not (path / PLAN).exists():
         raise RunError(f"{path}: holds no campaign ({PLAN} is missing)")

@@ -21,8 +21,8 @@ from cosim.io.atomic_file import atomic_file
 log = logging.getLogger(__name__)
 
 MERGED = 64  # number of parts of about one size that are merged
-_CHUNK = 8192  # rows that are read at once from a part
-_GROUP = 65536  # rows of a row group
+_CHUNK = 8192  # number of rows that are read at once from a part
+_GROUP = 65536  # least number of rows of a row group, except the last
 _NAME = re.compile(r"[0-9]{8,}-[0-9]{8,}\.parquet")
 
 
@@ -35,9 +35,9 @@ class Parts:
     Parameters
     ----------
     folder : Path
-        Is created.
+        Folder of the parts; it is created.
     schema : pyarrow.Schema
-        Its first column is the key of a row.
+        Schema of the rows, whose first column is their key.
     """
 
     def __init__(self, folder: Path, schema: Any) -> None:
@@ -88,12 +88,12 @@ class Parts:
         Parameters
         ----------
         table : pyarrow.Table
-            The rows of a batch, in order of key.
+            Rows of a batch, in order of key.
 
         Raises
         ------
         OSError
-            If it cannot be written; the incomplete file is removed.
+            If the part cannot be written; the incomplete file is removed.
         """
         file = self._folder / f"{self._next:08}-{self._next:08}.parquet"
         write_tables(file, [table], self._schema)
@@ -126,7 +126,7 @@ class Parts:
         Raises
         ------
         OSError
-            If it cannot be written.
+            If the file cannot be written.
         """
         write_tables(path, in_order(self._files, self._schema), self._schema)
 
@@ -191,16 +191,16 @@ def write_tables(path: Path, tables: Any, schema: Any) -> None:
     Parameters
     ----------
     path : Path
-        The file; an existing one is replaced.
+        Path of the file; an existing one is replaced.
     tables : iterable of pyarrow.Table
-        Of the schema.
+        Tables of this schema.
     schema : pyarrow.Schema
-        Of the file.
+        Schema of the file.
 
     Raises
     ------
     OSError
-        If it cannot be written; the incomplete file is removed.
+        If the file cannot be written; the incomplete file is removed.
     """
     with atomic_file(path) as file, pq.ParquetWriter(file, schema, compression="zstd") as writer:
         for table in _grouped(tables):
@@ -227,14 +227,14 @@ def in_order(files: Sequence[Path], schema: Any) -> Iterator[Any]:
     Parameters
     ----------
     files : sequence of Path
-        Parquet files.
+        Parquet files, each in order of key.
     schema : pyarrow.Schema
-        Its first column is the key.
+        Schema of the rows, whose first column is their key.
 
     Yields
     ------
     pyarrow.Table
-        Some rows, with keys above those before.
+        Rows with greater keys than those of the tables before.
     """
     key = schema.names[0]
     closed = sorted(((_least(file), file) for file in files), reverse=True)

@@ -15,8 +15,8 @@ import cosim
 import fuzzy_arbiter
 import plant_fmu
 
-_SOURCES = (".py", ".c", ".h", ".toml")
-_LIBRARIES = ("subreach", "numpy", "pyarrow", "scipy")
+_SOURCES = (".py", ".c", ".h", ".toml")  # suffixes of files that count as sources
+_LIBRARIES = ("subreach", "numpy", "pyarrow", "scipy")  # packages whose versions are part of a plan
 SCENES, SWEEP = "scenes", "sweep"  # kinds of campaigns
 _NAMED = 3  # greatest number of differences in a message
 
@@ -46,12 +46,12 @@ def difference(one: dict[str, Any], other: dict[str, Any]) -> str:
     Parameters
     ----------
     one, other : dict
-        Tables of the plan in a folder, and of the present one.
+        Table of the plan in a folder, and table of the present plan.
 
     Returns
     -------
     str
-        Such as ``"gains.k_p1 is 18.8, now 10.0"``; only kind or law if these differ; "" if the plans are equal.
+        Text such as ``"gains.k_p1 is 18.8, now 10.0"``; only kind or law if these differ; "" if the plans are equal.
     """
     alone = next((key for key in ("kind", "law") if one.get(key) != other.get(key)), None)
     keys = [alone] if alone else sorted(one.keys() | other.keys())

@@ -18,7 +18,7 @@ from cosim.campaigns.store.parts import check_schema
 from cosim.errors import RunError
 from cosim.simulation.signals import Array
 
-_PIECE = 1000  # rows
+_PIECE = 1000  # number of rows that are read at once
 
 
 class Results:
@@ -27,14 +27,14 @@ class Results:
     Parameters
     ----------
     path : Path
-        A Parquet file, in order of key.
+        Parquet file with the rows in order of key.
     schema : pyarrow.Schema, optional
-        Expected schema.
+        Expected schema of the rows.
 
     Raises
     ------
     RunError
-        If it cannot be read, or has other columns.
+        If the file cannot be read, or has other columns.
     """
 
     def __init__(self, path: Path, schema: Any = None) -> None:

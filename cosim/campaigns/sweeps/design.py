@@ -19,8 +19,8 @@ from cosim.errors import RunError
 
 Kind = Literal["grid", "random", "sobol", "lhs", "paired"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-MOST = 10_000_000  # rows
-_MOST_SOBOL = 21201  # keys
+MOST = 10_000_000  # greatest number of rows
+_MOST_SOBOL = 21201  # greatest number of keys of a Sobol' sequence
 _SEEDS = 2**31  # number of FMI integers from 0
 
 
@@ -28,12 +28,12 @@ _SEEDS = 2**31  # number of FMI integers from 0
 class Vary:
     """The values of a key: a range, or a list."""
 
-    key: str
-    low: float = math.nan
-    high: float = math.nan
-    points: int | None = None  # of a range, on a grid
-    log: bool = False  # True: a logarithmic range
-    values: tuple[float, ...] = ()  # a list, instead of a range
+    key: str  # key of the scenario
+    low: float = math.nan  # lower end of a range
+    high: float = math.nan  # upper end of a range
+    points: int | None = None  # number of values of a range on a grid
+    log: bool = False  # True if the range is logarithmic
+    values: tuple[float, ...] = ()  # list of values, instead of a range
 
     def at(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the values at each `share` of the range or list, from 0 to 1; the ends are exact."""
@@ -60,7 +60,7 @@ class Vary:
 
     @property
     def whole(self) -> bool:
-        """Whether all values are whole numbers; False for a range without points."""
+        """True if all values are whole numbers; False for a range without points."""
         return bool(self.steps) and bool(np.all(np.mod(self.on_grid(np.arange(self.steps)), 1.0) == 0.0))
 
     def table(self) -> dict[str, Any]:
@@ -78,14 +78,15 @@ class Design:
     Parameters
     ----------
     vary : sequence of Vary
-        The keys, at least one.
+        Keys with their ranges or lists, at least one.
     kind : str
-        ``"grid"``, all combinations, the last key fastest; ``"random"``, independent rows; ``"sobol"``, a scrambled
-        Sobol' sequence; ``"lhs"``, a Latin hypercube; or ``"paired"``, the values of all lists with the same index.
+        Kind of the design: ``"grid"``, all combinations, the last key fastest; ``"random"``, independent rows;
+        ``"sobol"``, a scrambled Sobol' sequence; ``"lhs"``, a Latin hypercube; or ``"paired"``, the values of all lists
+        with the same index.
     samples : int, optional
         Number of rows; None on a grid or in pairs, where the points or the lists' length determine it.
     seed : int
-        Of the values, and of the seeds of the rows.
+        Seed of the random values, and of the seeds of the rows.
 
     Raises
     ------
@@ -160,12 +161,12 @@ class Design:
         Parameters
         ----------
         rows : ndarray of int, shape (n,)
-            In rising order.
+            Numbers of the rows, in rising order.
 
         Returns
         -------
         ndarray, shape (n, keys)
-            The values of a row do not depend on the other rows.
+            Values of the keys in these rows. The values of a row do not depend on the other rows.
         """
         if self.kind == "grid":
             places = np.unravel_index(rows, [vary.steps for vary in self.vary])
@@ -225,12 +226,12 @@ def design_of(table: dict[str, Any]) -> Design:
     Parameters
     ----------
     table : dict
-        Part of the plan of a sweep.
+        Table of the design, as in the plan of a sweep.
 
     Returns
     -------
     Design
-        Equal to the original one.
+        Design equal to the one that made the table.
 
     Raises
     ------
@@ -257,13 +258,13 @@ def vary_from(texts: Sequence[str]) -> tuple[Vary, ...]:
     Parameters
     ----------
     texts : sequence of str
-        ``key=low:high``, ``key=low:high:points``, each with ``:log`` at the end for a logarithmic range, or
+        Texts ``key=low:high`` or ``key=low:high:points``, each with ``:log`` at the end for a logarithmic range; or
         ``key=a,b,c``.
 
     Returns
     -------
     tuple of Vary
-        In their order.
+        Keys with their ranges or lists, in the order of the texts.
 
     Raises
     ------
@@ -286,22 +287,22 @@ def vary_from(texts: Sequence[str]) -> tuple[Vary, ...]:
 
 
 def vary_vehicles(path: Path) -> tuple[Vary, ...]:
-    """Return what varies between vehicles, from the file that ``cosim identify`` writes.
+    """Read the parameters that vary between vehicles from a file of ``cosim identify``.
 
     Parameters
     ----------
     path : Path
-        One JSON object a line, whose ``parameters`` are those of the vehicle's FMU, the same on each line.
+        File with one JSON object per line, whose ``parameters`` are those of the vehicle's FMU, the same on each line.
 
     Returns
     -------
     tuple of Vary
-        Lists for the design ``"paired"``.
+        Lists of the parameters' values, for the design ``"paired"``.
 
     Raises
     ------
     RunError
-        If it cannot be read, or a line has other parameters than the first.
+        If the file cannot be read, or a line has other parameters than the first.
     """
     lists: dict[str, list[float]] = {}
     try:

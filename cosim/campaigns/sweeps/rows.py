@@ -26,15 +26,16 @@ from cosim.results.run_result import SCENARIO
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario
 from plant_fmu.toml_tables import hint
 
+# class of each engine, as "module:class"
 ENGINES = {"fused": "cosim.batch.fused:FusedFlyer", "lanes": "cosim.batch.lanes:LanesFlyer"}
 
 
 class SweepBatch(NamedTuple):
     """Some rows of a sweep."""
 
-    rows: Rows  # (n,)
-    values: NDArray[np.float64]  # (n, keys)
-    seeds: Rows  # (n,)
+    rows: Rows  # (n,) numbers of the rows
+    values: NDArray[np.float64]  # (n, keys) values of the keys
+    seeds: Rows  # (n,) seeds of the rows
 
 
 def schema_of(keys: tuple[str, ...]) -> Any:
@@ -43,12 +44,12 @@ def schema_of(keys: tuple[str, ...]) -> Any:
     Parameters
     ----------
     keys : tuple of str
-        The keys that vary.
+        Keys that vary.
 
     Returns
     -------
     pyarrow.Schema
-        Number of the row, values of the keys, seed, outcomes or null, reason for refusing it.
+        Columns: number of the row, values of the keys, seed, outcomes or null, reason for refusing the row.
 
     Raises
     ------
@@ -79,16 +80,16 @@ def table_of(keys: tuple[str, ...], batch: SweepBatch, flown: BatchResult) -> An
     Parameters
     ----------
     keys : tuple of str
-        The keys that vary.
+        Keys that vary.
     batch : SweepBatch
-        The batch.
+        Rows that were flown.
     flown : BatchResult
-        Its outcomes.
+        Outcomes of these rows.
 
     Returns
     -------
     pyarrow.Table
-        Of `schema_of`; null for NaN outcomes, and for all outcomes of a refused row.
+        Table with the schema of `schema_of`; null for NaN outcomes, and for all outcomes of a refused row.
     """
     refused = np.zeros(len(batch.rows), dtype=bool)
     refused[list(flown.refused)] = True
@@ -106,8 +107,8 @@ class SweepTask:
     """The data that all rows of a sweep share."""
 
     variation: Variation = field(compare=False)
-    engine: str  # module:class
-    mark: str = field(default_factory=lambda: secrets.token_hex(16))  # identity across processes
+    engine: str  # class of the engine, as "module:class"
+    mark: str = field(default_factory=lambda: secrets.token_hex(16))  # random identity of the task across processes
 
     def flyer(self) -> SweepFlyer:
         """Create a flyer."""
@@ -120,7 +121,7 @@ class SweepFlyer:
     Parameters
     ----------
     task : SweepTask
-        Variation and engine.
+        Variation of the scenario, and engine.
 
     Raises
     ------
@@ -148,11 +149,11 @@ class SweepWork:
     Parameters
     ----------
     scenario : Scenario
-        The base scenario.
+        Base scenario.
     design : Design
-        The keys that vary.
+        Keys that vary, with their values in each row.
     engine : str
-        One of `ENGINES`.
+        Name of the engine, one of `ENGINES`.
 
     Raises
     ------

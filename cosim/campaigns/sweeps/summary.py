@@ -27,18 +27,19 @@ def summarize_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str
     Parameters
     ----------
     work : SweepWork
-        The work of the sweep.
+        Rows of the sweep, with design and engine.
     results : Results
-        Its rows.
+        Outcomes of the rows.
     folder : Path
-        Its folder, for the commands that repeat rows.
+        Folder of the sweep, for the commands that repeat rows.
 
     Returns
     -------
     dict
-        For JSON: counts, and reasons for refusing the first rows; rates with 95 % intervals by Wilson, of the rows that
-        were flown; quantiles (None without numbers); the worst rows; for every key and outcome the `effect`, and the
-        rank correlation by Spearman, None if one is constant; and the plan. Units as in the columns of the results.
+        Table for JSON: counts, and reasons for refusing the first rows; rates with 95 % intervals by Wilson over the
+        flown rows; quantiles (None without numbers); the worst rows; for every key and outcome the `effect` and the
+        rank correlation by Spearman, None if one is constant; and the plan. Units are those of the columns of the
+        results.
     """
     flown, base = results.absent("refused"), work.variation.base
     return {

@@ -9,21 +9,21 @@ import numpy as np
 
 from cosim.campaigns.workers.work import Rows
 
-FIRST = 1  # rows of the first batch, before the time of a row is known
-TARGET = 1.0  # s of work in a batch; one process submits and writes all batches, for any number of workers
-LEAST = 0.05  # s of work in the last batches, which are small so that all workers end together
+FIRST = 1  # number of rows of the first batch, before the time of a row is known
+TARGET = 1.0  # s, desired time of a batch; one process submits and writes all batches, for any number of workers
+LEAST = 0.05  # s, time of the last batches, which are small so that all workers end together
 GROWTH = 4  # greatest ratio of a batch's size to the one before: the time of first batches includes compiling
 EVEN = 16  # batches with more rows are a multiple of this, for engines that fly rows in parallel lanes
-GREATEST = 65536  # rows of a batch
+GREATEST = 65536  # greatest number of rows of a batch
 
 
 @dataclass(frozen=True)
 class Batch:
     """Rows that one worker flies together."""
 
-    rows: Rows
+    rows: Rows  # (n,) numbers of the rows
     crash_count: int = 0  # number of worker crashes during this batch
-    alone: bool = False  # True: no other batch is under way meanwhile, so that a crash is certainly by this one
+    alone: bool = False  # True if no other batch is flown at the same time, so that a crash is certainly by this one
 
     def halves(self, crash_count: int) -> tuple[Batch, Batch]:
         """Split the batch into halves, each of which begins with `crash_count`."""
@@ -37,7 +37,7 @@ class Batches:
     Parameters
     ----------
     rows : ndarray of int, shape (n,)
-        Rows that are left, in rising order.
+        Numbers of the rows that are left, in rising order.
     """
 
     def __init__(self, rows: Rows) -> None:
@@ -45,20 +45,20 @@ class Batches:
         self._at = 0
         self._back: list[Batch] = []
         self._size = FIRST
-        self._row_time = math.inf  # s
+        self._row_time = math.inf  # s, measured time of a row
 
     def take(self, width: int) -> Batch | None:
-        """Return the next batch; None if no rows are left.
+        """Take the next batch.
 
         Parameters
         ----------
         width : int
-            Number of batches under way at the same time.
+            Number of batches that are flown at the same time.
 
         Returns
         -------
         Batch or None
-            Batches that were put back come first.
+            Next batch, None if no rows are left; batches that were put back come first.
         """
         if self._back:
             return self._back.pop()

@@ -16,12 +16,12 @@ from cosim.campaigns.workers.worker_pools import Flight, WorkerCrash, interrupts
 from cosim.errors import RunError
 from plant_fmu.installing import install_hint
 
-_QUEUED = 2  # batches per worker thread, so that no thread waits for work
+_QUEUED = 2  # number of batches submitted per worker thread, so that no thread waits for work
 _COUNT_PERIOD = 5.0  # s between counts of the workers, which may join and leave
-_WORKER_TIMEOUT = 30.0  # s, for the first worker, and for a cluster without workers
-_SCHEDULER_TIMEOUT = 10.0  # s
-_RELEASE_TIMEOUT = 2.0  # s, for a worker to end its present batch
-# for local clusters: by default their self-monitoring takes a tenth of two cores
+_WORKER_TIMEOUT = 30.0  # s, wait for the first worker, and for a new one in a cluster without workers
+_SCHEDULER_TIMEOUT = 10.0  # s, wait for the scheduler of a cluster
+_RELEASE_TIMEOUT = 2.0  # s, wait for a worker to end its present batch
+# settings of local clusters, whose self-monitoring takes a tenth of two cores by default
 _LOW_OVERHEAD: dict[str, Any] = {
     "distributed.worker.profile.enabled": False,
     "distributed.worker.memory.monitor-interval": "1s",
@@ -153,14 +153,14 @@ def cluster_executor(scheduler: str | None, workers: int) -> Iterator[Executor]:
     Parameters
     ----------
     scheduler : str or None
-        Address such as ``tcp://10.0.0.1:8786``; None for a local cluster.
+        Address of the scheduler, such as ``tcp://10.0.0.1:8786``; None for a local cluster.
     workers : int
         Number of processes of a local cluster, with one thread each.
 
     Yields
     ------
     concurrent.futures.Executor
-        Closed at the end of the block, with a local cluster.
+        Executor of the cluster; it is closed at the end of the block, with a local cluster.
 
     Raises
     ------

@@ -44,14 +44,14 @@ def fly(task: Task, batch: Any) -> tuple[Any, float]:
     Parameters
     ----------
     task : Task
-        The task of the work.
+        Task that flies the batch.
     batch : object
-        A batch of the work.
+        Batch, as made by `Work.batch`.
 
     Returns
     -------
     pyarrow.Table, float
-        The batch's rows, and the time that they took [s].
+        Rows of the batch, and the time that the flights took [s].
     """
     with _held.lock:
         flyer = _held.of(task)

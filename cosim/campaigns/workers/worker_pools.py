@@ -16,10 +16,10 @@ from cosim.campaigns.workers.work import Task
 from cosim.campaigns.workers.worker import begin_worker, fly, prepare
 from cosim.errors import RunError
 
-FATAL = 3  # crashes after which a batch is halved
-_QUEUED = 2  # batches per worker, so that no worker waits for work
+FATAL = 3  # number of crashes after which a batch is halved
+_QUEUED = 2  # number of batches submitted per worker, so that no worker waits for work
 
-Flight = Future[tuple[Any, float]]  # table, s
+Flight = Future[tuple[Any, float]]  # table with the rows of a batch, and the time that they took [s]
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class _Worker:
 
     pool: ProcessPoolExecutor
     under_way: list[Flight] = field(default_factory=list)  # in order of submission: the first is being flown
-    crashed_flight: Flight | None = None  # the one during which the process crashed
+    crashed_flight: Flight | None = None  # flight during which the process crashed
 
     def attribute_crash(self) -> None:
         """Attribute a crash to the first flight that has not finished."""
@@ -163,7 +163,7 @@ class ExternalExecutor:
     Parameters
     ----------
     executor : Executor
-        Its threads take turns. A crash of its processes ends the campaign, which can be continued later.
+        Executor, whose threads take turns. A crash of its processes ends the campaign, which can be continued later.
     workers : int
         Number of batches that it flies at the same time.
     """

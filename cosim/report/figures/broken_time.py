@@ -13,11 +13,11 @@ from cosim.results.record import Rows
 from cosim.simulation.signals import Array
 
 # the vehicle rests within these distances of its final pose
-_NEAR = 0.02  # part of the path's extent
+_NEAR = 0.02  # distance, as a fraction of the path's extent
 _TURNED = 0.05  # difference of an element of the quaternion
 _MARGIN = 1.05  # time of the break, relative to the time from which the vehicle rests
-_LATEST = 2.0 / 3.0  # part of the run before which the break must be
-_TAIL = 0.15  # part of the axis that shows the rest
+_LATEST = 2.0 / 3.0  # latest time of the break, as a fraction of the run
+_TAIL = 0.15  # fraction of the axis that shows the time at rest
 
 
 def rests_from(record: Rows) -> float | None:
@@ -26,7 +26,7 @@ def rests_from(record: Rows) -> float | None:
     Returns
     -------
     float or None
-        The time, a little later for a margin; None if the vehicle moves in the last third of the run, or a pose is
+        Time, a little later for a margin; None if the vehicle moves in the last third of the run, or a pose is
         missing.
     """
     time = record["time"]

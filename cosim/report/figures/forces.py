@@ -28,7 +28,7 @@ def norms_of(record: Rows) -> dict[str, Array]:
     Returns
     -------
     dict
-        Norm by label: ``acting`` and ``asked for``.
+        Norms by label, ``acting`` and ``asked for``.
     """
     of = {"acting": "actuation", "asked for": "command"}
     forces = {words: record.stack([f"{name}.{axis}" for axis in "XYZ"]) for words, name in of.items()}
@@ -76,7 +76,7 @@ def thrusts_of(scenario: Scenario, record: Rows) -> Array:
     Parameters
     ----------
     scenario : Scenario
-        The scenario of the run.
+        Scenario of the run.
     record : Rows
         Rows of the run, or a part of them.
 

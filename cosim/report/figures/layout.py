@@ -20,7 +20,7 @@ LEGEND_ROW = 0.19  # inches, height of a row
 _GAP = 0.14  # inches between axes
 _LABEL = 0.17  # inches from the figure's edge to the centre of an axis label
 _MAX_LETTERS = 34  # greatest number of letters of a name in a legend
-_LETTERS, _MARK = 104, 7  # widths in letters of a legend: of the figure, and of a line with its gap
+_LETTERS, _MARK = 104, 7  # widths in letters of a legend: width of the figure; width of a line with its gap
 
 # names are given by users: their $ and _ are not mathematics
 FIGURE_STYLE: Any = STYLE | {"text.parse_math": False, "xtick.labelsize": 8, "ytick.labelsize": 8}
@@ -53,7 +53,7 @@ def panels(
     titles : float
         Height of titles above the axes [inch].
     sharey : bool
-        Axes of a row share their y axis.
+        True if axes of a row share their y axis.
 
     Returns
     -------

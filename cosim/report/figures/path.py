@@ -37,9 +37,9 @@ from cosim.report.figures.trajectory import SampledPath, sample_path
 from cosim.scenario.colours import GOAL_COLOUR
 from cosim.simulation.signals import Array
 
-SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # north and depth, looking west
-ABOVE = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # north and east
-_TALLEST = 7.6  # inches, of both planes together
+SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # view of north and depth, looking west
+ABOVE = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # view of north and east
+_TALLEST = 7.6  # inches, greatest height of both planes together
 _FAINT = 0.35  # opacity of a region where it began or ended
 _GAP = 0.34  # inches between the planes
 _NAMED = 8  # greatest number of regions that are labelled in space

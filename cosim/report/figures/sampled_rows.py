@@ -20,7 +20,7 @@ from cosim.simulation.signals import Array
 
 _WHOLE = 200_000  # greatest number of rows of a record that is used as a whole
 _MOST = 80_000  # greatest number of rows with extremes
-_EVEN = 2_000  # evenly spaced rows
+_EVEN = 2_000  # number of evenly spaced rows
 _CHANGES = 100  # greatest number of changes by commands in a block of rows; in all a hundred times as many
 _DRAWN = (
     "time", "position.", "quaternion.", "velocity.", "attitude.", "membership.", "weight.", "estimate.", "command.",
@@ -32,9 +32,9 @@ _EXTREME = ("attitude.", "membership.", "weight.", "estimate.", "lyapunov.")
 def make_figure_data(run: Run) -> FigureData:
     """Select the rows from which the figures of a run are drawn.
 
-    Of a long record these are the rows with the minimum and maximum of each drawn signal in each of some hundred parts
-    of the run and of the enlarged spans; rows evenly spaced in time and along the path; and rows at which commands
-    changed a signal.
+    From a long record, these are the rows with the minimum and maximum of each drawn signal in each of some hundred
+    parts of the run and of the enlarged spans; rows evenly spaced in time and along the path; and rows at which
+    commands changed a signal.
 
     Returns
     -------

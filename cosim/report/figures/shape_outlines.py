@@ -22,8 +22,8 @@ _CORNERS = np.array([[i, j, k] for i in (-1.0, 1.0) for j in (-1.0, 1.0) for k i
 _BOX_EDGES = [(a, b) for a in range(8) for b in range(a) if (_CORNERS[a] != _CORNERS[b]).sum() == 1]
 _SHARP = np.cos(np.radians(31.0))  # cosine of the angle between faces from which on their edge is drawn
 _BESIDE = 1e-3  # distance of test points from a shape's outline, relative to the shape's size
-_GRID = 12  # points of the test grid per side
-_PIECES = 4  # pieces of an edge of an outline whose visibility is tested
+_GRID = 12  # number of points of the test grid per side
+_PIECES = 4  # number of pieces of an outline's edge whose visibility is tested
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ def lines_of_shape(shape: Shape, low: Array, high: Array, view: Array) -> ShapeL
     Parameters
     ----------
     shape : Shape
-        A shape in space.
+        Shape in space.
     low, high : ndarray, shape (3,)
         Corners of a box [m, NED], at which infinite shapes are cut.
     view : ndarray, shape (2, 3)
@@ -112,7 +112,7 @@ def _clip(corners: Array, point: Array, normal: Array) -> Array:
         a + (b - a) * (da / (da - db))
         for a, da in zip(corners[behind], out[behind], strict=True)
         for b, db in zip(corners[before], out[before], strict=True)
-    ]  # of all pairs: points within a face do not change the hull
+    ]  # intersections of all pairs: points within a face do not change the hull
     return np.vstack([corners[behind], *crossing]) if behind.any() else np.empty((0, 3))
 
 

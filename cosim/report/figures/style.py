@@ -41,7 +41,7 @@ STYLE: Any = {
 
 DPI = 160  # resolution of figures as PNG
 
-_LEGEND_WIDTH, _LEGEND_MARK = 100, 7  # widths in letters: of a figure, and of a line or marker
+_LEGEND_WIDTH, _LEGEND_MARK = 100, 7  # widths in letters: width of a figure; width of a line or marker
 POINTS = 1000  # number of points of a drawn curve, about the resolution of a figure's width
 
 

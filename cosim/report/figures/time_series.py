@@ -113,7 +113,7 @@ def error_of(scenario: Scenario, record: Rows) -> tuple[str, Array]:
     Parameters
     ----------
     scenario : Scenario
-        The scenario of the run.
+        Scenario of the run.
     record : Rows
         Rows of the run, or a part of them.
 

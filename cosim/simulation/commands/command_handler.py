@@ -57,18 +57,18 @@ class CommandHandler:
     actuators : Actuators
         Actuators whose limits the commands change.
     state : VehicleState
-        The state that the law receives.
+        State that the law receives.
     out : ndarray, shape (7,)
         Receives armed, mode, item of the mission (-1 for none), and the target's centre [m, NED] and radius [m].
 
     Attributes
     ----------
     settings : LiveSettings
-        The present settings.
+        Present settings.
     armed : bool
-        Whether the thrusters may work.
+        True if the thrusters may work.
     mode : Mode
-        The present mode.
+        Present mode.
     heading : float or None
         Desired heading [rad], None until one is commanded.
     control_regained, turned, changed : bool
@@ -94,7 +94,7 @@ class CommandHandler:
         # greatest wrench along and about each axis, which a full stick commands
         self._greatest_wrench = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
         self._manual: Array = np.zeros(6)
-        self._by_gain = True  # whether the pilot's gain scales the sticks
+        self._by_gain = True  # True if the pilot's gain scales the sticks
         self._attitude: SetAttitude | None = None
         self._stabilizer = StickStabilizer(vehicle, state, scenario.time.control, self._greatest_wrench)
         self._mission = MissionExecutor()
@@ -102,12 +102,12 @@ class CommandHandler:
 
     @property
     def automatic_control(self) -> bool:
-        """Whether the law computes the forces; otherwise `wrench` does."""
+        """True if the law computes the forces; otherwise `wrench` does."""
         return self.armed and self.mode not in STICK_MODES and not self._commanded_force
 
     @property
     def _commanded_force(self) -> bool:
-        """Whether an attitude with a force is commanded in the law's place."""
+        """True if an attitude with a force is commanded in the law's place."""
         return self.mode == "reach" and self._attitude is not None and self._attitude.force is not None
 
     def wrench(self) -> Array:
@@ -129,7 +129,7 @@ class CommandHandler:
         Parameters
         ----------
         command : Command
-            The command.
+            Command to apply.
         time : float
             Time of the step [s].
         """

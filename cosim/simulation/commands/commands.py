@@ -71,7 +71,7 @@ class ManualControl(_Command, frozen=True):
     """Control manually: a fraction, from -1 to 1, of the greatest wrench along and about each body axis."""
 
     wrench: Vector6  # fractions, [-]
-    by_gain: bool = True  # the pilot's gain scales them
+    by_gain: bool = True  # True: the pilot's gain scales the fractions
 
 
 class SetAttitude(_Command, frozen=True):

@@ -27,7 +27,7 @@ class MissionExecutor:
         """Replace the mission; the new one has not begun."""
         self.items, self.at = items, -1
         self._jumps: dict[int, int] = {}  # number of jumps made, by item
-        self._since = math.inf  # s, within the region of the present item
+        self._since = math.inf  # s, time since which the vehicle is within the region of the present item
 
     def begin(self, item: int) -> None:
         """Continue with an item, and reset the counts of jumps.

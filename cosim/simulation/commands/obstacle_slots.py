@@ -15,7 +15,7 @@ class ObstacleSlots:
     """
 
     def __init__(self, count: int) -> None:
-        self._taken: dict[int, int] = {}  # by the number of the obstacle
+        self._taken: dict[int, int] = {}  # slot of each obstacle by its number
         self._free = list(range(count))
 
     def assign(self, number: int) -> int:

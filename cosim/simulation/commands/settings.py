@@ -87,7 +87,7 @@ class LiveSettings:
             least = 0.0 if name.startswith("thrust_max") else least
             greatest = 0.0 if name.startswith("thrust_min") else greatest
             self._add(key, variable.quantity.unit, value, least, greatest)
-        self.of_plant = keys  # the FMU's parameter behind a key
+        self.of_plant = keys  # parameter of the FMU for each key
 
     def __iter__(self) -> Iterator[Setting]:
         """Iterate over all settings, always in the same order."""

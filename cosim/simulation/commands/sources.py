@@ -27,7 +27,7 @@ class CommandSource(Protocol):
 
     @property
     def exhausted(self) -> bool:
-        """Whether the source will return no more commands."""
+        """True if the source will return no more commands."""
         ...
 
 
@@ -111,7 +111,7 @@ def read_log(file: Path) -> list[tuple[int, Command]]:
     Raises
     ------
     RunError
-        If it cannot be read, or a line is not a command.
+        If the log cannot be read, or a line is not a command.
     """
     try:
         content = file.read_bytes()
@@ -147,7 +147,7 @@ class ScheduledCommands:
 
     @property
     def exhausted(self) -> bool:
-        """Whether no command is left."""
+        """True if no command is left."""
         return not self._entries
 
     def take(self, k: int) -> Sequence[Command]:
@@ -164,12 +164,12 @@ class ReplayedCommands(ScheduledCommands):
     Parameters
     ----------
     file : Path
-        The log, as for `read_log`.
+        Log of the commands, as for `read_log`.
 
     Raises
     ------
     RunError
-        If it cannot be read, or a line is not a command.
+        If the log cannot be read, or a line is not a command.
     """
 
     def __init__(self, file: Path) -> None:
@@ -184,9 +184,9 @@ class LoggedCommands:
     source : CommandSource
         Source of the commands.
     file : Path
-        The log; made when the first command is taken.
+        Log of the commands, created when the first command is taken.
     report : callable, optional
-        Called with the step and its commands once they are written.
+        Function that is called with the step and its commands once they are written.
     """
 
     def __init__(
@@ -196,7 +196,7 @@ class LoggedCommands:
 
     @property
     def exhausted(self) -> bool:
-        """Whether the source will return no more commands."""
+        """True if the source will return no more commands."""
         return self._source.exhausted
 
     def take(self, k: int) -> Sequence[Command]:

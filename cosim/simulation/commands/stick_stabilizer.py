@@ -27,12 +27,12 @@ _NORTH, _EAST, _DOWN = np.eye(3)
 class StickStabilizer:
     """Computes a wrench from sticks: surge and sway command forces, the others angles and rates.
 
-    Its model has the vehicle's mass and inertia, like a tuned autopilot, but no hydrodynamic damping or current.
+    The model has the vehicle's mass and inertia, like a tuned autopilot, but no hydrodynamic damping or current.
 
     Parameters
     ----------
     vehicle : Vehicle
-        The vehicle.
+        Vehicle whose mass and inertia the model has.
     state : VehicleState
         The state that the law receives; read at each step.
     period : float
@@ -51,7 +51,7 @@ class StickStabilizer:
         """Keep the present heading and depth from now on, and no other attitude."""
         self.attitude: Array | None = None  # quaternion that is kept in place of the sticks' attitude
         self._heading, self._depth = self._yaw(), float(self._state.position[2])
-        self._integral = 0.0  # N
+        self._integral = 0.0  # N, integral part of the force down
 
     def wrench(self, sticks: Array, gain: float, keep_depth: bool, rate_down: float | None = None) -> Array:
         """Return the wrench of a control period.
@@ -61,9 +61,9 @@ class StickStabilizer:
         sticks : ndarray, shape (6,)
             Stick positions for X, Y, Z, K, M, N, from -1 to 1.
         gain : float
-            The pilot's gain, 0 to 1.
+            Pilot's gain, 0 to 1.
         keep_depth : bool
-            True: the vertical stick commands a vertical speed, and the depth is kept once it is released. False: it
+            True if the vertical stick commands a vertical speed, and the depth is kept once it is released; False if it
             commands a force.
         rate_down : float, optional
             Desired rate of the depth [m/s], in place of the vertical stick.

@@ -22,35 +22,34 @@ from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-_SAMPLES = (
-    64,
-    512,
-)  # evaluations of the regions along a path at most: in a call, and before the rest counts as blocked
-_STRIDE = (0.08, 3.0)  # m, least and greatest distance between two
-_TRUST = 0.7  # stride as a fraction of the clearance beyond the desired one
-_INSIDE = 200.0  # m of path, cost of a metre inside a hard region at depth
-_EDGE = 0.1  # m or more; proportional at less depth, so that the cost does not depend on where strides end
-_NEAR = 3.0  # m of path, cost of a metre on the surface
-_ENTERED = 0.5  # m of depth, equivalent cost of being in a soft region at a depth of
-_SHALLOW = 0.2  # m or more; proportional at less depth
-_STAY = 3.0  # m of path, equivalent cost of the stay at its end
-_LOOKS = 4  # evaluations of a stay that moves with the goal, the first of them now
-_LATER = (1.0, 3.0)  # s from now, of the second; and the ratio of the times of each later one to that before
-_AWAY = 0.05  # m outside a soft region, within which a stay counts as inside: keeps the end off its surface
+# greatest number of evaluations of the regions along a path: in one call; in total, after which the rest is blocked
+_SAMPLES = (64, 512)
+_STRIDE = (0.08, 3.0)  # m, least and greatest distance between two evaluations
+_TRUST = 0.7  # ratio of a stride to the clearance beyond the desired one
+_INSIDE = 200.0  # penalty per metre of path that is closer to a hard region than the margin
+_EDGE = 0.1  # m below the margin from which that penalty is full; proportional before, so that it does not jump
+_NEAR = 3.0  # penalty per metre of path on the surface of a hard region; 0 at the desired clearance
+_ENTERED = 0.5  # m, added to the depth in a soft region as the penalty for being inside at all
+_SHALLOW = 0.2  # m, depth from which that is added in full; proportional at less depth
+_STAY = 3.0  # m, length of path that the stay at its end counts for
+_STAY_SAMPLES = 4  # number of evaluations of a stay that moves with the goal, the first for the present time
+_FIRST_LATER = 1.0  # s from now, time of the second evaluation
+_LATER_RATIO = 3.0  # ratio of the time of each further evaluation to the one before
+_AWAY = 0.05  # m, distance from a soft region within which a stay counts as inside: keeps the end off its surface
 _COARSE = 0.25  # m, least distance between two evaluations near the surface of a soft region
 _SPHERE = Sphere.kind
-_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on do not depend on position alone
+_ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 
 
 class PathCost(NamedTuple):
     """The cost of a path, complete or not yet."""
 
-    start: Array  # (3,) m, NED: of the path, when the evaluation began
-    drift: Array  # (3,) m/s, NED: of its end, with the goal
-    counts: NDArray[np.int64]  # (2,) next leg to evaluate, evaluations so far
-    travelled: Array  # (2,) m: along previous legs, and along this leg
-    cost: Array  # (3,) m: so far; part by hard regions; part by soft regions on the way
-    clear_until: Array  # (n,) m of path before which each region needs no evaluation
+    start: Array  # (3,) m, NED: start of the path when the evaluation began
+    drift: Array  # (3,) m/s, NED: velocity of the path's end, which moves with the goal
+    counts: NDArray[np.int64]  # (2,) index of the next leg to evaluate; number of evaluations so far
+    travelled: Array  # (2,) m: length of the evaluated legs; evaluated length of the present leg
+    cost: Array  # (3,) m: cost so far; its part by hard regions; its part by soft regions on the way
+    clear_until: Array  # (n,) m: length of path before which each region needs no evaluation
 
 
 def empty_cost(n_regions: int) -> PathCost:
@@ -84,14 +83,14 @@ def add_cost(cost: PathCost, path: Array, count: int, regions: PackedRegions, li
     regions : PackedRegions
         The n regions.
     limits : PathLimits
-        Clearance, margin, speed.
+        Clearance, margin and speed.
     most : float
         Cost [m] above which the evaluation stops.
 
     Returns
     -------
     bool
-        False while strides are left.
+        True if the evaluation is complete or stopped, False while strides are left.
     """
     place = zeros(3)
     for _ in range(_SAMPLES[0]):
@@ -132,15 +131,15 @@ def _add_stride(cost: PathCost, stride: float, soft: float, penalty: float) -> N
 def _evaluate_place(
     cost: PathCost, place: Array, regions: PackedRegions, limits: PathLimits
 ) -> tuple[float, float, float]:
-    """Return the least clearance of hard regions [m], the cost of soft ones per metre, and the longest stride [m]."""
+    """Return the least clearance of hard regions [m], the penalty of soft ones per metre, and the stride limit [m]."""
     travelled = cost.travelled[0] + cost.travelled[1]
     later = travelled / limits.speed  # s
-    far = limits.clearance + _STRIDE[1] / _TRUST  # m, of clearance, beyond which it does not matter
+    far = limits.clearance + _STRIDE[1] / _TRUST  # m, clearance beyond which a hard region has no effect
     free, soft, reach, point, room = far, 0.0, _STRIDE[1], zeros(3), zeros(3)
     for i in range(regions.kinds.size):
         if travelled < cost.clear_until[i] or regions.kinds[i] >= _ATTITUDE:
             continue
-        own = 0.0  # m/s, of the region
+        own = 0.0  # m/s, speed of the region, summed over the axes
         for axis in range(3):
             point[axis] = place[axis] - regions.velocities[i, axis] * later
             own += abs(regions.velocities[i, axis])
@@ -184,12 +183,12 @@ def _near_cost(free: float, limits: PathLimits) -> float:
 def _stay_cost(end: Array, drift: Array, regions: PackedRegions, limits: PathLimits) -> float:
     """Return the cost per metre of a stay at the end of a path [m, NED].
 
-    An end that drifts [m/s, NED] with the goal is also evaluated where it will be later, and near hard regions: they
-    may come in its way. The cost is the mean.
+    An end that drifts [m/s, NED] with the goal is also evaluated at later positions, and against hard regions, which
+    it may meet there. The cost is the mean over these times.
     """
     drifts = drift[0] != 0.0 or drift[1] != 0.0 or drift[2] != 0.0
-    looks, later, total, place, room = _LOOKS if drifts else 1, 0.0, 0.0, zeros(3), zeros(3)
-    for _ in range(looks):
+    samples, later, total, place, room = _STAY_SAMPLES if drifts else 1, 0.0, 0.0, zeros(3), zeros(3)
+    for _ in range(samples):
         free = limits.clearance
         for i in range(regions.kinds.size):
             if regions.kinds[i] >= _ATTITUDE or (regions.hard[i] and not drifts):
@@ -202,5 +201,5 @@ def _stay_cost(end: Array, drift: Array, regions: PackedRegions, limits: PathLim
             else:
                 total += regions.crossing_costs[i] * _depth_cost(-clearance, _AWAY)
         total += _near_cost(free, limits)
-        later = max(_LATER[0], _LATER[1] * later)
-    return total / looks
+        later = max(_FIRST_LATER, _LATER_RATIO * later)
+    return total / samples

@@ -32,34 +32,34 @@ from controller.stack_array import zeros
 Array = NDArray[np.float64]
 
 _LN_30 = 3.4011973816621555
-CORNERS = 8  # at most
-_BETTER = 0.03  # m, and
-_BETTER_PART = 0.01  # of its cost, that a candidate must save to replace the path
-_BLOCKED = 0.3  # of its length, cost of passing regions above which the trees search for another path
-_HARD, _ALL, _COSTLY = 0, 1, 2  # closed regions: the hard ones; also all soft ones; also the costlier soft ones
-_LOOKS = (100, 800)  # calls of the search before other regions are closed: at first, and at most
-_PASSED = 0.25  # m from a corner, within which it counts as passed
-_CLIMBS = 12  # towards the inside of the goal region
-_PAYS = 0.05  # m, least gain in depth per metre of a climb; along the gradient it is 1
+CORNERS = 8  # greatest number of corners of a path
+_BETTER = 0.03  # m, constant part of the cost that a candidate must save to replace the path
+_BETTER_PART = 0.01  # proportional part of that, as a fraction of the path's cost
+_BLOCKED = 0.3  # cost by regions, as a fraction of the path's length, above which the trees search for another path
+_HARD, _ALL, _COSTLY = 0, 1, 2  # regions closed to the search: hard ones alone; and all soft ones; and costlier ones
+_SEARCH_CALLS = (100, 800)  # calls of the search with one choice of closed regions: at first; greatest number
+_PASSED = 0.25  # m, distance from a corner within which it counts as passed
+_CLIMBS = 12  # greatest number of steps from a point into the goal region
+_PAYS = 0.05  # least gain in depth per metre of such a step; a step along the gradient gains 1
 _DEEP_ENOUGH = 1e-3  # m, tolerance of the depth of an end
-_BEGIN, _PATH, _CANDIDATE = 0, 1, 2  # phases: subject of the next evaluation
-_USED = -1  # points of a found path that was the last candidate
-_LESS = 0.5  # m, by which the room for corners is smaller than that for nodes of the trees
+_BEGIN, _PATH, _CANDIDATE = 0, 1, 2  # phases: no evaluation under way; the path is evaluated; the candidate is
+_USED = -1  # value of `counts[2]` while the found path is the candidate
+_LESS = 0.5  # m by which random corners stay closer to start and end than random nodes of the trees
 
 
 class PathPlan(NamedTuple):
     """State of the planner: the path, and a candidate."""
 
     path: Array  # (CORNERS + 1, 3) m, NED: corners, then the end; the end moves with the goal
-    candidate: Array  # (CORNERS + 1, 3)
-    found: Array  # (CORNERS + 1, 3), by the search
-    counts: NDArray[np.int64]  # (3,) points of path, candidate and found, the end included; 0: none yet
-    cost: Array  # (3,) m: of the path; part by hard regions; part by soft regions on the way
-    new_cost: PathCost  # of path or candidate, as evaluated in this phase
+    candidate: Array  # (CORNERS + 1, 3) m, NED: path that may replace it
+    found: Array  # (CORNERS + 1, 3) m, NED: path found by the search
+    counts: NDArray[np.int64]  # (3,) number of points of path, candidate and found, the end included; 0: none yet
+    cost: Array  # (3,) m: cost of the path; its part by hard regions; its part by soft regions on the way
+    new_cost: PathCost  # evaluation under way, of path or candidate
     search: Search
     closed: NDArray[np.bool_]  # (n,) True for regions that the search keeps out of
-    turn: NDArray[np.int64]  # (3,) closed: `_HARD`, `_ALL` or `_COSTLY`; calls of the search left, and in total
-    random_numbers: Array  # (5,) in [0, 1)
+    turn: NDArray[np.int64]  # (3,) closed regions: `_HARD`, `_ALL` or `_COSTLY`; calls left with them; calls in total
+    random_numbers: Array  # (5,) numbers in [0, 1) for one call of the search
     phase: NDArray[np.int64]  # (1,) `_BEGIN`, `_PATH` or `_CANDIDATE`
     random: NDArray[np.uint64]  # (1,) state of the generator
 
@@ -160,18 +160,18 @@ def _choose_closed(
 ) -> None:
     """Choose the regions that the trees keep out of; a change of the choice restarts the trees.
 
-    While hard regions block the path, only these. Else also the costlier soft ones, and all, in turns that grow longer;
-    but none that contains start or end of the path.
+    While hard regions block the path, only these are closed. Otherwise the costlier soft ones, or all, are closed too,
+    in turns that grow longer. A soft region near or around start or end of the path stays open.
     """
     turn, room = plan.turn[0], zeros(3)
     if blocked:
         turn = _HARD
     elif turn == _HARD:
-        turn, plan.turn[2] = _COSTLY, _LOOKS[0]
+        turn, plan.turn[2] = _COSTLY, _SEARCH_CALLS[0]
     elif plan.turn[1] == 0:
         turn = _ALL if turn == _COSTLY else _COSTLY
         if turn == _COSTLY:
-            plan.turn[2] = min(2 * plan.turn[2], _LOOKS[1])
+            plan.turn[2] = min(2 * plan.turn[2], _SEARCH_CALLS[1])
     if turn != plan.turn[0]:
         plan.turn[0], plan.turn[1] = turn, plan.turn[2]
         plan.search.of_goal.size[0] = plan.search.of_vehicle.size[0] = 0
@@ -256,7 +256,7 @@ def search_path(
     Parameters
     ----------
     plan : PathPlan
-        Updated.
+        State of the planner, updated in place.
     start : ndarray, shape (3,)
         Position of the vehicle [m, NED].
     goal, regions : PackedRegions
@@ -266,7 +266,7 @@ def search_path(
     period : float
         Control period [s].
     periods : ndarray, shape (2,)
-        Periods at most; the second number receives the periods that it took.
+        Greatest number of periods; the second element receives the number of periods that it took.
     """
     periods[1] = 0
     while periods[1] < periods[0]:

@@ -24,20 +24,20 @@ from controller.stack_array import zeros
 Array = NDArray[np.float64]
 
 _SPHERE = Sphere.kind
-_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on do not depend on position alone
-_NODES = 512  # of a tree, after which it restarts
-_CHAIN = 64  # points of a path before it is shortened, at most
-_REACH = (1.5, 0.1)  # m, longest edge; or fraction of the distance from start to end, if that is longer
-ROOM = (3.0, 32.0)  # m beyond start and end, in which nodes are drawn: at first, and at most
-_GROWS = 1.003  # factor of that room per call
+_ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
+_NODES = 512  # number of nodes at which a tree restarts
+_CHAIN = 64  # greatest number of points of a path before it is shortened
+_REACH = (1.5, 0.1)  # longest edge: length [m]; fraction of the distance from start to end, if that is longer
+ROOM = (3.0, 32.0)  # m beyond start and end within which random nodes lie: at first; greatest
+_GROWS = 1.003  # factor by which that distance grows with each call
 _STRIDE = 0.05  # m, least distance between two evaluations along a line
-_LOOKS = 32  # evaluations along a line at most
-_ANCESTORS = 2  # ancestors tested beside the parent of a new node
-_SLACK = 0.005  # m
-_MOVED = 0.3  # m, by which start or end may move before the root of its tree does
+_LINE_SAMPLES = 32  # greatest number of evaluations along a line
+_ANCESTORS = 2  # number of ancestors tested as parents of a new node, besides the nearest node
+_SLACK = 0.005  # m by which edges from a root may be closer to hard regions than the root
+_MOVED = 0.3  # m, motion of start or end above which its tree gets a new root; also the shortest edge before a wall
 _TO_OTHER = 0.2  # probability that a tree grows towards the root of the other one
-_NEAR_A_NODE = 0.4  # and towards a point near one of its nodes, for narrow passages
-_ALL = 1.0 - 1e-9  # fraction of a length that is all of it, with rounding
+_NEAR_A_NODE = 0.4  # probability that it grows towards a point near one of its nodes, for narrow passages
+_ALL = 1.0 - 1e-9  # fraction of a line that counts as all of it, to allow for rounding
 _BEFORE_A_WALL = 0.8  # fraction of the free length of a blocked line at which a node is placed
 
 
@@ -46,8 +46,8 @@ class PathLimits(NamedTuple):
 
     clearance: float  # m, desired clearance of hard regions
     margin: float  # m, least clearance of hard regions
-    speed: float  # m/s, of the vehicle
-    depth: float  # m, in the goal region at which it ends
+    speed: float  # m/s, speed of the vehicle
+    depth: float  # m, depth in the goal region at which the path ends
 
 
 def line_margin(limits: PathLimits) -> float:
@@ -59,18 +59,18 @@ class Tree(NamedTuple):
     """Nodes, each with its parent."""
 
     nodes: Array  # (_NODES, 3) m, NED
-    parents: NDArray[np.int64]  # (_NODES,), -1 of the root
+    parents: NDArray[np.int64]  # (_NODES,) index of each node's parent; -1 for the root
     size: NDArray[np.int64]  # (1,) number of nodes
-    root: NDArray[np.int64]  # (1,)
+    root: NDArray[np.int64]  # (1,) index of the root
 
 
 class Search(NamedTuple):
     """State of the search."""
 
-    of_goal: Tree
-    of_vehicle: Tree
+    of_goal: Tree  # root at the end of the path
+    of_vehicle: Tree  # root at the vehicle
     turn: NDArray[np.int64]  # (1,) 0: the tree of the goal grows next, 1: that of the vehicle
-    room: Array  # (1,) m beyond start and end, in which nodes are drawn
+    room: Array  # (1,) m beyond start and end within which random nodes lie
     chain: Array  # (_CHAIN, 3) m, NED: the last path found, before it is shortened
 
 
@@ -118,13 +118,13 @@ def free_length(start: Array, end: Array, regions: PackedRegions, margin: float)
     Returns
     -------
     float
-        Length [m]: the whole if the line is free; -1 if its start is not. It is at most the part that `_LOOKS`
-        evaluations cover.
+        Length [m]: the whole if the line is free; -1 if its start is not. It is at most the part that
+        `_LINE_SAMPLES` evaluations cover.
     """
     point, room = zeros(3), zeros(3)
     length = length3(end[0] - start[0], end[1] - start[1], end[2] - start[2])
     s, free = 0.0, -1.0
-    for _ in range(_LOOKS):
+    for _ in range(_LINE_SAMPLES):
         for axis in range(3):
             point[axis] = start[axis] + (end[axis] - start[axis]) * (s / length if length > 0.0 else 0.0)
         least = clearance_of_all(point, regions, room)
@@ -207,7 +207,7 @@ def look_for_path(
 def _draw_target(
     tree: Tree, start: Array, end: Array, other: Array, room: float, reach: float, random_numbers: Array, target: Array
 ) -> None:
-    """Write a point towards which a tree grows: the root of the other one, one near any of its nodes, or any point."""
+    """Write the point towards which a tree grows: the other tree's root, a point near a node, or any point."""
     if random_numbers[3] < _TO_OTHER:
         copy(other, target)
     elif random_numbers[3] < _TO_OTHER + _NEAR_A_NODE:
