@@ -22,7 +22,7 @@ LEFT = "ended: the autopilot left"
 SYSTEM_ID, COMPONENT_ID = 254, 25  # identity of the simulator, unlike those of vehicles and ground stations
 
 _GPS_EVERY, _HEARTBEAT_EVERY = RATE // 10, RATE
-_POLL = 0.25  # s of the wall clock
+_POLL = 0.25  # s of the wall clock, between two checks of the timeout
 _ARMED = 128  # bit of HIL_ACTUATOR_CONTROLS.mode
 _SEND_TIMEOUT = 5.0  # s of the wall clock, timeout of sending a frame
 _CHANNELS = 16
@@ -43,9 +43,9 @@ class Pace:
     Parameters
     ----------
     period : float
-        By the clock [s].
+        Period by `clock` [s].
     clock, sleep : callable, optional
-        As `time.monotonic` and `time.sleep`, which they are by default.
+        Functions that return the time [s] and wait [s]; default: `time.monotonic` and `time.sleep`.
     """
 
     def __init__(
