@@ -36,7 +36,7 @@ from cosim.errors import ScenarioError
 BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy, "mavlink": mavlink, "sitl": sitl, "view": view}
 TABLES = {"all": everything, "scaling": scaling}
 REPEATS = 5
-BUDGET = 0.2  # s
+BUDGET = 0.2  # s, default time of a repeat
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -141,7 +141,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Parameters
     ----------
     arguments : sequence of str, optional
-        Default: those of the process.
+        Command-line arguments; default: those of the process.
     """
     parser = _parser()
     options = parser.parse_args(arguments)

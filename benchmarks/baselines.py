@@ -1,10 +1,10 @@
 """The search for the gains of the laws for comparison, the same for all of them: random draws that race the best.
 
 Gains are drawn log-uniformly, half of them from `RANGES`, the others around the best so far; those without a range
-keep the values of their source. Each draw flies plain and hard scenes by turns, 300 of each from seed 10000 on. Safety
-counts first: better is fewer violations over both, then more reached, then the lower median reach time. A draw flies
-the scenes first in which the best fails, and is given up as soon as it falls behind the best over the scenes flown: a
-draw that fails in all of these cannot be safer. The other laws begin with what was found for `pd`.
+keep their defaults. Each draw flies plain and hard scenes alternately, 300 of each from seed 10000 on. Safety counts
+first: better is fewer violations over both, then more goals reached, then the lower median reach time. A draw first
+flies the scenes in which the best fails, and stops as soon as it falls behind the best over the scenes flown: a draw
+that fails in all of these cannot be safer. The first draws of the other laws use the gains found for `pd`.
 """
 
 from __future__ import annotations
@@ -26,20 +26,21 @@ from cosim.campaigns.scenes.flyer import SceneFlyer, Score
 from cosim.campaigns.scenes.generator import make_scene
 from cosim.campaigns.scenes.scene import Scene
 
-KINDS = ("plain", "hard")  # of scenes
+KINDS = ("plain", "hard")  # kinds of scenes, flown alternately
 FIRST_SEED = 10_000
-SCENES = 600  # plain and hard by turns
-DURATION = 60.0  # s of a scene in the search; good gains have long reached the goal by then
-# scenes flown by the end of each heat, and by which factor the median reach time may be above that of the best there
+SCENES = 600  # number of scenes, plain and hard ones together
+DURATION = 60.0  # s, duration of a scene in the search; good gains reach the goal much earlier
+# for each heat: scenes flown by its end, and greatest allowed ratio of the median reach time to that of the best
 HEATS = ((4, 1.3), (10, 1.15), (40, 1.08), (120, 1.03), (SCENES // 2, 1.0), (SCENES, 1.0))
-FIRST_HEAT = 40  # scenes that the first batch flies, before there is a best
-BATCH = 10  # draws that race the same best
+FIRST_HEAT = 40  # number of scenes that the first batch flies, before there is a best
+BATCH = 10  # number of draws that race the same best
+# for each phase: fraction of the draws, and greatest factor between their gains and those of the best
 PHASES = (
     (0.5, math.inf),
     (0.25, 1.5),
     (0.25, 1.15),
-)  # share of the draws, and within which factor of the best they are
-DRAWS = 120
+)
+DRAWS = 120  # default number of draws for a law
 
 _FIELD = {
     "k_p1": (20.0, 600.0),
@@ -63,45 +64,45 @@ RANGES: dict[str, dict[str, tuple[float, float]]] = {
         "margin": (0.02, 0.3),
     },
 }
-# what a law's first batch has from the gains of `pd`, as they stand; the k_p1 of `unarbitrated` has another unit
+# gains of `pd` that the first batch of a law uses unchanged; the k_p1 of `unarbitrated` has another unit
 FROM_PD: dict[str, tuple[str, ...]] = {
     "pd": (),
     "sun_cheah": tuple(_FIELD),
     "unarbitrated": tuple(name for name in _FIELD if name != "k_p1"),
     "antonelli": tuple(_FIELD),
-    "pid_cbf": tuple(name for name in _FIELD if name != "repulsion"),  # which its barriers make needless
+    "pid_cbf": tuple(name for name in _FIELD if name != "repulsion"),  # its barriers replace the repulsion
 }
 
 
 class Outcome(NamedTuple):
     """Outcome of gains over some scenes; `rank` orders outcomes, the least is the best."""
 
-    scenes: int
-    violations: int
-    reached: int
-    reach_time: float  # s, median over scenes reached without violation
-    effort: float  # N s, median over the same
+    scenes: int  # number of scenes
+    violations: int  # number of scenes with a violation
+    reached: int  # number of scenes whose goal was reached
+    reach_time: float  # s, median over the scenes reached without violation
+    effort: float  # N s, median over the scenes reached without violation
 
     @property
     def rank(self) -> tuple[int, int, float]:
-        """The key: violations, then scenes not reached, then the reach time."""
+        """Sort key: violations, then goals not reached, then the reach time [s]."""
         return self.violations, self.scenes - self.reached, self.reach_time
 
 
 class Candidate(NamedTuple):
-    """Gains and how they flew so far."""
+    """Gains with their scores in the scenes flown so far."""
 
     gains: Any
-    scores: dict[int, Score]  # by scene
+    scores: dict[int, Score]  # scores by index of the scene
 
     @property
     def outcome(self) -> Outcome:
-        """Outcome of its scores."""
+        """Outcome over the scenes flown so far."""
         return outcome(self.scores.values())
 
     @property
     def failures(self) -> list[int]:
-        """The scenes that it violates or does not reach."""
+        """Indices of the scenes with a violation or without reaching the goal."""
         return [i for i, score in self.scores.items() if not (score.reached and is_clean(score))]
 
 
@@ -132,13 +133,13 @@ def draws(law: str, count: int, rng: np.random.Generator, best: Any = None, near
     law : str
         One of `RANGES`.
     count : int
-        How many.
+        Number of draws.
     rng : Generator
         Source of the random numbers.
     best : NamedTuple, optional
         Gains to draw around.
     near : float
-        Within which factor of `best`, either way, and within the ranges.
+        Greatest factor between a drawn gain and that of `best`, up or down; the ranges apply as well.
 
     Returns
     -------
@@ -166,25 +167,25 @@ def draw_gains(
 
 
 def search(law: str, count: int, seed: int, workers: int, pd: PdGains | None = None) -> Candidate:
-    """Return the best gains of a law.
+    """Search for the best gains of a law.
 
     Parameters
     ----------
     law : str
         One of `RANGES`.
     count : int
-        Draws, 1 or more.
+        Number of draws, 1 or more.
     seed : int
-        Of the draws.
+        Seed of the draws.
     workers : int
-        Processes; they change nothing in what is found.
+        Number of processes; it does not change the result.
     pd : PdGains, optional
-        What the law's first batch has by `FROM_PD`; default: the defaults of `pd`.
+        Gains of `pd` for the law's first batch, see `FROM_PD`; default: the defaults of `pd`.
 
     Returns
     -------
     Candidate
-        The gains, and their scores over all scenes, of `DURATION` each.
+        Best gains, and their scores over all scenes, each of duration `DURATION`.
     """
     rng = np.random.default_rng(seed)
     (size, _), *batches = _batches(count)
@@ -205,7 +206,7 @@ def search(law: str, count: int, seed: int, workers: int, pd: PdGains | None = N
 
 
 def _batches(count: int) -> list[tuple[int, float]]:
-    """Return the size of each batch, and within which factor of the best its draws are."""
+    """Return the size of each batch, and the greatest factor between its draws and the best."""
     found = []
     for share, near in PHASES:
         phase = math.ceil(share * count)
@@ -229,19 +230,19 @@ def race(
     Parameters
     ----------
     gains : NamedTuple
-        The gains.
+        Gains to fly.
     best : Candidate
-        The best so far, flown in all scenes.
+        Best gains so far, flown in all scenes.
     fly_on : callable
-        Flies a candidate in some more scenes.
+        Function that flies a candidate in further scenes.
     heats : sequence of (int, float)
-        Scenes flown by the end of each heat, all by the end of the last, and by which factor the median reach time
-        may be above that of the best there.
+        For each heat: number of scenes flown by its end, all of them by the end of the last heat, and greatest allowed
+        ratio of the median reach time to that of the best.
 
     Returns
     -------
     Candidate
-        The gains, flown in all scenes, or in those until they fell behind.
+        Gains with their scores, in all scenes or in those until they fell behind.
     """
     failures = best.failures
     order = failures + [i for i in range(heats[-1][0]) if i not in failures]
@@ -282,18 +283,18 @@ def format_outcome(found: Outcome) -> str:
 
 
 def main(laws: Iterable[str], count: int, seed: int, workers: int) -> None:
-    """Search for the gains of some laws, print them, and fly them in full; with no draws, fly the gains that they have.
+    """Search for the gains of some laws, print them, and fly all scenes with them.
 
     Parameters
     ----------
     laws : iterable of str
-        Of `RANGES`.
+        Names of laws in `RANGES`.
     count : int
-        Draws, or 0.
+        Number of draws for each law; 0 to fly the default gains without a search.
     seed : int
-        Of the draws.
+        Seed of the draws.
     workers : int
-        Processes.
+        Number of processes.
     """
     pd = PdGains()
     for law in laws:

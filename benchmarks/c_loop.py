@@ -1,4 +1,4 @@
-"""The loop of loop.c over the plant's FMU: the least time that a master can take."""
+"""Loop of loop.c over the plant's FMU: the least time that a master can take."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from plant_fmu.compiling.compiler import compile_library, find_compiler
 from plant_fmu.compiling.platforms import native_platform
 
 
-class _Slave(ctypes.Structure):
+class _CoSimulationInstance(ctypes.Structure):
     """The structure of the same name in loop.c."""
 
     _fields_ = (
@@ -30,7 +30,7 @@ class _Slave(ctypes.Structure):
     )
 
 
-class _Opened:
+class _FmuInstance:
     """An instance of an FMU in FMPy, with the value references of its inputs, outputs and flags in `groups`."""
 
     def __init__(self, path: Path) -> None:
@@ -59,15 +59,15 @@ class _Opened:
 
 
 @contextlib.contextmanager
-def _instance(path: Path) -> Iterator[_Opened]:
-    opened = _Opened(path)
+def _instance(path: Path) -> Iterator[_FmuInstance]:
+    instance = _FmuInstance(path)
     try:
-        yield opened
+        yield instance
     finally:
         with contextlib.suppress(FMICallException):
-            opened.fmu.terminate()
-        opened.fmu.freeInstance()
-        shutil.rmtree(opened.folder, ignore_errors=True)
+            instance.fmu.terminate()
+        instance.fmu.freeInstance()
+        shutil.rmtree(instance.folder, ignore_errors=True)
 
 
 def _compile(folder: Path) -> ctypes.CDLL:
@@ -86,33 +86,33 @@ def _compile(folder: Path) -> ctypes.CDLL:
 def c_loop(
     path: Path, start: dict[str, float], step: float, *, step_only: bool = False
 ) -> Iterator[Callable[[int], None]]:
-    """Yield a function that takes so many steps in C.
+    """Yield a function that runs a given number of steps in C.
 
     Parameters
     ----------
     path : Path
-        An FMU with real inputs, and real and Boolean outputs.
+        Path of an FMU with real inputs, and real and Boolean outputs.
     start : dict from str to float
-        Start values.
+        Start values by names of variables, in SI units.
     step : float
         Communication step [s].
     step_only : bool
         True to set no inputs and read no outputs.
     """
-    with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch, _instance(path) as opened:
+    with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch, _instance(path) as instance:
         loop = _compile(Path(scratch))
-        opened.initialise(start)
-        two, groups = opened.fmi == 2, opened.groups
+        instance.initialise(start)
+        two, groups = instance.fmi == 2, instance.groups
         functions = ("SetReal", "DoStep", "GetReal", "GetBoolean") if two else (
             "SetFloat64", "DoStep", "GetFloat64", "GetBoolean"
         )  # fmt: skip
-        pointers = [ctypes.cast(opened.fmu.dll[f"fmi{opened.fmi}{name}"], ctypes.c_void_p) for name in functions]
+        pointers = [ctypes.cast(instance.fmu.dll[f"fmi{instance.fmi}{name}"], ctypes.c_void_p) for name in functions]
         references = [(ctypes.c_uint * len(group))(*group) for group in groups]
-        inputs = (ctypes.c_double * len(groups[0]))(*opened.get(groups[0]))
+        inputs = (ctypes.c_double * len(groups[0]))(*instance.get(groups[0]))
         outputs = (ctypes.c_double * len(groups[1]))()
         flags = ((ctypes.c_int if two else ctypes.c_bool) * len(groups[2]))()
-        slave = _Slave(
-            opened.fmu.component, *pointers, *references, *map(len, groups), inputs, outputs,
+        bound = _CoSimulationInstance(
+            instance.fmu.component, *pointers, *references, *map(len, groups), inputs, outputs,
             ctypes.cast(flags, ctypes.c_void_p),
         )  # fmt: skip
         run = loop.loop_fmi2 if two else loop.loop_fmi3
@@ -120,7 +120,7 @@ def c_loop(
 
         def work(count: int) -> None:
             nonlocal first
-            if run(ctypes.byref(slave), first, count, step, step_only) != count:
+            if run(ctypes.byref(bound), first, count, step, step_only) != count:
                 raise RuntimeError(f"{path}: a step failed in the loop in C")
             first += count
 

@@ -26,9 +26,9 @@ class Contest:
     pairs : tuple of (str, str), optional
         Pairs of this project's entry and a peer, "" for none; default: each with each.
     count, repeats : int, optional
-        Items a repeat, and the greatest number of repeats, where the items are long.
+        Items per repeat, and greatest number of repeats, if the items are long.
     pinned : bool
-        True to keep all on one processor; not where an item is the work of several processes.
+        True to keep all on one processor; False if an item is the work of several processes.
     """
 
     title: str
@@ -60,7 +60,7 @@ def _row(our: str, peer: str, timings: Mapping[str, Timing | str]) -> Row:
 
 
 def entered(entry: Entry, stack: ExitStack) -> Contestant | str:
-    """Return the contestant that an entry makes, or the reason why it makes none."""
+    """Return the contestant of an entry, or the reason why it cannot be made."""
     try:
         return entry(stack)
     except NotMeasuredError as why:

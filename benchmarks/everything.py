@@ -27,7 +27,7 @@ def measure(subjects: list[str], budget: float, repeats: int, environment: Envir
     Parameters
     ----------
     subjects : list of str
-        Subjects, of `SUBJECTS`.
+        Names of subjects in `SUBJECTS`.
     budget : float
         Time of a repeat of each contestant [s].
     repeats : int
@@ -38,7 +38,7 @@ def measure(subjects: list[str], budget: float, repeats: int, environment: Envir
     Returns
     -------
     list of Table
-        One for each contest.
+        A table for each contest.
     """
     tables = []
     for subject in subjects:

@@ -17,8 +17,8 @@ from plant_fmu.build import cached_fmu
 
 STEPS = 20_000
 RATIO = "how many times as long as the loop in C"
-STEP = 0.01  # s
-INPUTS = {"thrust[1]": 3.0, "thrust[6]": -2.0, "wrench.Y": 1.0}  # N
+STEP = 0.01  # s, communication step
+INPUTS = {"thrust[1]": 3.0, "thrust[6]": -2.0, "wrench.Y": 1.0}  # N, inputs by name
 _SLOWER = 50  # divisor of the steps of slower contestants
 
 
@@ -28,12 +28,12 @@ def measure(steps: int, repeats: int) -> list[Row]:
     Parameters
     ----------
     steps, repeats : int
-        Steps a repeat, and repeats.
+        Steps per repeat, and number of repeats.
 
     Returns
     -------
     list of Row
-        For the table, with ratios to the loop in C over the same FMU.
+        Rows with ratios to the loop in C over the same FMU.
     """
     rows: list[Row] = []
     for fmi in (3, 2):
@@ -82,7 +82,7 @@ def _pythonfmu(steps: int, repeats: int) -> Timing | str:
 
 
 def export_numpy_plant(folder: Path) -> Path | None:
-    """Export the same plant with pythonfmu.
+    """Export the plant in NumPy with pythonfmu.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def export_numpy_plant(folder: Path) -> Path | None:
     Returns
     -------
     Path, optional
-        The FMU; None if pythonfmu is not installed.
+        Path of the FMU; None if pythonfmu is not installed.
     """
     if importlib.util.find_spec("pythonfmu") is None:
         return None

@@ -26,12 +26,12 @@ from fuzzy_arbiter import SECTION_VI, Arbiter, Criterion, Output, System, Variab
 
 STEPS = 20_000
 RATIO = "how many times as long as scikit-fuzzy as its examples use it"
-POINTS = 101
-# a Python that has pyfuzzylite or simpful, if neither this one nor the peers' environment has; pyfuzzylite needs a
-# NumPy before 2
+POINTS = 101  # number of points of scikit-fuzzy's universes
+# environment variable with the path of a Python with pyfuzzylite or simpful, for libraries that neither this Python nor
+# the peers' environment has; pyfuzzylite needs a NumPy before 2
 OTHER_PYTHON = "FUZZY_LIBRARIES_PYTHON"
-_MODULES = {"pyfuzzylite": "fuzzylite", "simpful": "simpful"}
-_ROWS = 5  # of a batch, for each step
+_MODULES = {"pyfuzzylite": "fuzzylite", "simpful": "simpful"}  # importable module of each distribution
+_ROWS = 5  # rows of a batch per step
 _SLOWER = 50  # divisor of the calls of slower contestants
 
 
@@ -41,12 +41,12 @@ def measure(steps: int, repeats: int) -> list[Row]:
     Parameters
     ----------
     steps, repeats : int
-        Evaluations a repeat, and repeats; a batch has five times as many rows.
+        Evaluations per repeat, and number of repeats; a batch has five times as many rows.
 
     Returns
     -------
     list of Row
-        For the table.
+        Rows with ratios to scikit-fuzzy.
     """
     timings: dict[str, Timing | str] = {}
     add, few = timings.__setitem__, max(1, steps // _SLOWER)
@@ -81,7 +81,7 @@ def measure(steps: int, repeats: int) -> list[Row]:
 
 
 def interpreter(library: str) -> str | None:
-    """Return a Python that has a library: this one, one of the peers', or that which an environment variable names."""
+    """Return a Python that has a library: this one, one of the peers', or that of an environment variable; or None."""
     if importlib.util.find_spec(_MODULES[library]) is not None:
         return sys.executable
     if (python := installed_python(library)) is not None:
@@ -137,7 +137,7 @@ def _tipping() -> Arbiter:
 
 
 def _looped(arbiter: Arbiter, rows: np.ndarray[Any, np.dtype[np.float64]], repeats: int) -> Timing | str:
-    """Time the compiled function where compiled code calls it, as a campaign does."""
+    """Time the compiled function when called from compiled code, as in a campaign."""
     if importlib.util.find_spec("numba") is None:
         return "Numba is not installed"
     import numba
@@ -159,7 +159,7 @@ def _stock(function: Callable[[dict[str, Any]], Callable[[int], object]], count:
 
 
 def _calls(arbiter: Arbiter, calls: int, repeats: int, form: Callable[[list[float]], Any] | None = list) -> Timing:
-    """Time calls with samples in a form; with none, by keywords."""
+    """Time calls with samples converted by `form`; with None, with keyword arguments."""
     rows = itertools.islice(_inputs(len(arbiter.system.inputs)), 10_000)
     inputs = itertools.cycle([(_named if form is None else form)(row) for row in rows])
     if form is None:

@@ -10,7 +10,7 @@ from typing import Any
 
 from cosim.mavlink.wire.dialect import dialect
 
-_PREPARED = 4096  # datagrams that a flood repeats: making them takes longer than sending them
+_PREPARED = 4096  # number of datagrams that a flood repeats, since making them takes longer than sending them
 
 
 def hostile_datagrams(count: int, seed: int) -> Iterator[bytes]:

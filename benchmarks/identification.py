@@ -48,8 +48,8 @@ from plant_fmu import Plant, Vehicle, load_vehicle
 
 Array = NDArray[np.float64]
 
-VEHICLE, DEPTH, BOX = "bluerov2_heavy", 5.0, (10.0, 10.0, 4.0)  # m: depth of the box's center, and its sizes
-# what is freed beside the default, and which nuisances are estimated
+VEHICLE, DEPTH, BOX = "bluerov2_heavy", 5.0, (10.0, 10.0, 4.0)  # m, depth of the center of the box, and its sizes
+# nuisance: keys that are free in addition to the default, and nuisances that are estimated
 ESTIMATED: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "none": ((), DEFAULT_NUISANCES), "force": ((), (*DEFAULT_NUISANCES, RANDOM_FORCE)), "bias": ((), DEFAULT_NUISANCES),
     "scale": ((), DEFAULT_NUISANCES), "thrusters": (("thrusters.matrix",), DEFAULT_NUISANCES),
@@ -59,7 +59,7 @@ ESTIMATED: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 
 
 def draw_truth(parameters: list[Parameter], vehicle: Vehicle, rng: np.random.Generator) -> Array:
-    """Return the true numbers of one vehicle."""
+    """Draw the true values of a vehicle's parameters, shape (p,)."""
     body = np.diag(vehicle.mass_matrix)
     values = []
     for p in parameters:
@@ -80,16 +80,16 @@ def draw_truth(parameters: list[Parameter], vehicle: Vehicle, rng: np.random.Gen
 
 
 class Disturbed:
-    """A plant with what no model of it has: a random force, and thrusters that give other forces than they should.
+    """A plant with unmodeled effects: a random force, and factors on the thrusters' forces.
 
     Parameters
     ----------
     plant : Plant
-        The vehicle.
+        Plant of the vehicle.
     force : ndarray, shape (steps, 6)
-        Added to the wrench of each step [N, N m].
+        Wrench to add in each step [N, N m], body frame; the last row holds from then on.
     forward, backward : ndarray, shape (thrusters,)
-        Factors of positive and of negative forces.
+        Factors on positive and on negative forces.
     """
 
     def __init__(self, plant: Plant, force: Array, forward: Array, backward: Array) -> None:
@@ -99,7 +99,7 @@ class Disturbed:
         return getattr(self._plant, name)
 
     def step(self, step: float) -> None:
-        """Go on under the disturbed inputs."""
+        """Advance by one step [s] with the disturbed inputs."""
         values, n = self._plant.inputs.values, len(self._factors[0])
         values[:n] *= np.where(values[:n] < 0.0, self._factors[1], self._factors[0])
         values[n:] += self._force[min(self._k, len(self._force) - 1)]
@@ -108,7 +108,7 @@ class Disturbed:
 
 
 def random_force(steps: int, rng: np.random.Generator) -> Array:
-    """Return a force of 0.2 to 0.5 N in each direction that changes within 5 to 10 s, shape (steps, 6)."""
+    """Draw a force of 0.2 to 0.5 N along each axis that changes within 5 to 10 s, shape (steps, 6) [N, N m]."""
     found = np.zeros((steps, 6))
     keep = np.exp(-ROW / rng.uniform(5.0, 10.0))
     size = rng.uniform(0.2, 0.5)
@@ -131,12 +131,12 @@ def dive(duration: float) -> list[tuple[int, Command]]:
 
 
 def fly(scenario: Scenario, commands: Any, nuisance: str, noise: float, rng: np.random.Generator) -> tuple[Log, float]:
-    """Return the log of a run, and how far it went from the center of its box [m]."""
+    """Simulate a run; return its log, and the greatest distance from the center of the box along an axis [m]."""
     n, steps = scenario.vehicle.n_thrusters, scenario.steps + 1
     force = random_force(steps, rng) if nuisance == "force" else np.zeros((1, 6))
     forward = rng.uniform(0.9, 1.1, n) if nuisance in ("thrusters", "asymmetric") else np.ones(n)
     backward = forward * rng.uniform(0.85, 0.95) if nuisance == "asymmetric" else forward
-    own = scenario.vehicle  # commands stay within its limits; what thrusters give by them may go beyond
+    own = scenario.vehicle  # its limits bound the commands; the disturbed forces may exceed them
     plant = Plant(dataclasses.replace(own, thrust_min=1.2 * own.thrust_min, thrust_max=1.2 * own.thrust_max))
     flown = rehearse(scenario, commands, Disturbed(plant, force, forward, backward))
     states, times = flown.states, flown.times
@@ -164,7 +164,10 @@ def fly(scenario: Scenario, commands: Any, nuisance: str, noise: float, rng: np.
 
 
 def relative_errors(parameters: list[Parameter], truth: Array, found: Array) -> dict[str, list[float]]:
-    """Return errors by group: parts of the numbers, of off-diagonal added mass parts of the geometric mean, and N."""
+    """Return absolute errors by group of parameters: relative ones, but in SI units for buoyancy and its center.
+
+    Errors of off-diagonal added mass are relative to the geometric mean of its diagonal elements.
+    """
     diagonal = {int(p.name.split(".")[2]): x for p, x in zip(parameters, truth, strict=True) if _is_diagonal(p)}
     groups: dict[str, list[float]] = {}
     for p, x, y in zip(parameters, truth, found, strict=True):
@@ -188,7 +191,7 @@ def _is_diagonal(p: Parameter) -> bool:
 
 
 def jacobian_times(log: Log, vehicle: Vehicle, parameters: list[Parameter], done: Fit) -> tuple[float, float]:
-    """Return the process time of the exact Jacobian of a window of 20 s, and of one by forward differences [s]."""
+    """Return the process times of a 20 s window's Jacobian [s]: exact, and by forward differences."""
     windows = cut_windows([log], vehicle, integration_step([log]), 20.0)[0][:1]
     problem = Residuals([log], vehicle, parameters, windows, integration_step([log]))
     settings = problem.settings(done.values)
@@ -207,7 +210,7 @@ def jacobian_times(log: Log, vehicle: Vehicle, parameters: list[Parameter], done
 def measure(
     nuisance: str, estimated: bool, seed: int, text: str, commands: Any, noise: float
 ) -> tuple[dict[str, Any], tuple[Log, list[Parameter], Fit]]:
-    """Fly one vehicle and identify it; return its line, and what came of it."""
+    """Simulate a vehicle and identify it; return its line of results, and its log, parameters and fit."""
     vehicle = load_vehicle(VEHICLE)
     free, beside = ESTIMATED[nuisance if estimated else "none"]
     truths = free_parameters(vehicle, DEFAULT_FREE)
@@ -240,14 +243,14 @@ def measure(
 
 
 def shorten(line: dict[str, Any]) -> dict[str, Any]:
-    """Return the line of a vehicle with medians and counts in the place of lists."""
+    """Return a vehicle's line of results with medians and counts instead of lists."""
     return {name: x for name, x in line.items() if name not in ("nominal", "half", "errors", "cause")} | {
         "covered": f"{sum(line['covered'])} of {len(line['covered'])}", "median errors": _medians(line["errors"]),
     }  # fmt: skip
 
 
 def summarize(lines: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return the line of all vehicles with one nuisance."""
+    """Return the summary of the lines of all vehicles with one nuisance."""
     groups: dict[str, list[float]] = {}
     for line in lines:
         for name, values in line["errors"].items():
@@ -278,7 +281,7 @@ def _medians(groups: dict[str, list[float]]) -> dict[str, float]:
 
 
 def main() -> None:
-    """Print one JSON line for each vehicle, and one of all with each nuisance."""
+    """Print a JSON line for each vehicle, and a summary for each nuisance."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("vehicles", type=int)
     parser.add_argument("--seed", type=int, default=0)

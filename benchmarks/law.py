@@ -21,13 +21,13 @@ from plant_fmu.vehicle import load_vehicle
 
 STEPS = 2_000
 RATIO = "how many times as long as the paper's law"
-OBSTACLES = (1, 6, 14, 40)
-_PERIOD = 0.02  # s
-_SPEED = 0.6  # m/s
+OBSTACLES = (1, 6, 14, 40)  # numbers of obstacles
+_PERIOD = 0.02  # s, control period
+_SPEED = 0.6  # m/s, speed of the vehicle along its path
 
 
 def _scenery(obstacles: int) -> tuple[PackedRegions, PackedRegions]:
-    """Return goal and regions as in a scored scene: balls across the way, and a depth band."""
+    """Return goal and regions as in a scored scene: spheres across the path, and a depth band."""
     rng = np.random.default_rng(obstacles)
     balls = []
     while len(balls) < obstacles:
@@ -39,25 +39,25 @@ def _scenery(obstacles: int) -> tuple[PackedRegions, PackedRegions]:
 
 
 class _Track(NamedTuple):
-    """The inputs of a law step by step, and the arrays that it reads them from."""
+    """The inputs of a law at each step, and the state that it reads them from."""
 
     state: VehicleState
-    places: Any  # (k, 3) m
-    velocities: Any  # (k, 3) m/s, as measured there
+    places: Any  # (k, 3) m, NED, measured positions
+    velocities: Any  # (k, 3) m/s, body frame, measured velocities
 
 
-def _steps(track: _Track, law: int, words: int, room: Any, clock: Any, times: Any) -> None:
-    """Run a law's steps along its path, and write the time of each [s]; `law` is called with its `words` by address."""
+def _steps(track: _Track, law: int, words: int, work: Any, clock: Any, times: Any) -> None:
+    """Run a law's steps along its path, and write the time of each [s]; call `law`, an address, with its `words`."""
     state = track.state
     for k in range(track.places.shape[0]):
         for axis in range(3):
             state.position[axis] = track.places[k, axis]
             state.velocity_body[axis] = track.velocities[k, axis]
-        before = seconds(clock, room)
+        before = seconds(clock, work)
         call_c(law, (POINTER,), words)
-        times[k, 0] = seconds(clock, room) - before
-        before = seconds(clock, room)
-        times[k, 1] = seconds(clock, room) - before  # time to read the clock
+        times[k, 0] = seconds(clock, work) - before
+        before = seconds(clock, work)
+        times[k, 1] = seconds(clock, work) - before  # time to read the clock
 
 
 class LawSteps:
@@ -66,7 +66,7 @@ class LawSteps:
     Parameters
     ----------
     law : str
-        One of those in `controller.LAWS`.
+        Name of a law in `controller.LAWS`.
     obstacles : int
         Number of obstacles on the path.
     """
@@ -86,20 +86,20 @@ class LawSteps:
         gains, n, m = kind.gains_type(), regions.kinds.size, vehicle.thruster_matrix.shape[1]
         forces, level = np.zeros(m if kind.output == "thrusters" else 6), np.array([1.0, 0.0, 0.0, 0.0])
         state = VehicleState(np.zeros(3), level, np.zeros(6), np.ones(m))
-        rng, times, room = np.random.default_rng(0), np.zeros((count, 2)), np.zeros(2, np.int64)
+        rng, times, work = np.random.default_rng(0), np.zeros((count, 2)), np.zeros(2, np.int64)
         gone = np.arange(count) * _PERIOD * _SPEED
         along = np.abs((gone + 8.0) % 16.0 - 8.0)
         places = np.c_[along, 0.1 * np.sin(along), np.full(count, 3.0)] + 0.02 * rng.normal(size=(count, 3))
         velocities = np.c_[np.where(gone % 16.0 < 8.0, _SPEED, -_SPEED), np.zeros((count, 2))]
         velocities += 0.01 * rng.normal(size=(count, 3))
         law = kind.for_vehicle(vehicle, gains, level, _PERIOD, n).bound(state, goal, regions, np.ones(n), forces)
-        BoundCall(_steps, (_Track(state, places, velocities), law.address, law.words, room, self._clock, times)).call()
+        BoundCall(_steps, (_Track(state, places, velocities), law.address, law.words, work, self._clock, times)).call()
         taken: NDArray[np.float64] = times[:, 0] - np.median(times[:, 1])
         return taken
 
 
 def _process_clock() -> Any:
-    """Return the numbers of a clock that stops while other processes run; without one, of the usual clock."""
+    """Return the numbers of a clock of this process's time; where the system has none, of the usual clock."""
     clock = Clock().numbers
     if hasattr(time, "CLOCK_PROCESS_CPUTIME_ID") and clock[1] >= 0:
         clock[1] = time.CLOCK_PROCESS_CPUTIME_ID
@@ -112,12 +112,12 @@ def measure(steps: int, repeats: int) -> list[Row]:
     Parameters
     ----------
     steps, repeats : int
-        Steps a repeat, and repeats: each restarts the law.
+        Steps per repeat, and number of repeats; each repeat restarts the law.
 
     Returns
     -------
     list of Row
-        For the table: least, median and most of all steps.
+        Rows with the times of all steps, and ratios to the paper's law.
     """
     rows = []
     for obstacles in OBSTACLES:

@@ -22,7 +22,7 @@ from cosim.scenario.scenario import load_scenario
 ROWS = (1_000_000, 10_000_000)
 SCENARIO = "paper"
 
-_REPEATED = 20_000  # rows of the short run, at the most
+_REPEATED = 20_000  # greatest number of rows of the short run
 _EXPORTS = ("csv", "npz", "mat", "mcap", "rrd", "tlog")
 WORK = {
     "record": ("write",),
@@ -37,24 +37,24 @@ WORK = {
 
 @dataclass(frozen=True)
 class Taken:
-    """Time and memory of a verb, or the reason why it was not run."""
+    """Time and memory of a verb, or the reason why it failed."""
 
-    peak: float  # MB of memory, the whole process
-    seconds: float
-    error: str
+    peak: float  # MB, peak memory of the whole process
+    seconds: float  # duration of the work
+    error: str  # reason of the failure; empty without one
 
 
 def write_long_run(folder: Path, rows: int, scenario: str = SCENARIO) -> None:
-    """Write the folder of a run of so many rows: those of a short run repeated, with increasing times.
+    """Write the folder of a long run: the rows of a short run repeated, with increasing times.
 
     Parameters
     ----------
     folder : Path
         Folder to make; it must not exist.
     rows : int
-        Rows of the record.
+        Number of rows of the record.
     scenario : str
-        Scenario of the rows.
+        Name of the scenario whose rows are repeated.
     """
     step = load_scenario(scenario).time.step
     lasting = [f"time.duration={(rows - 1) * step!r}", "arbiter.engine=closed"]
@@ -77,16 +77,16 @@ def write_long_run(folder: Path, rows: int, scenario: str = SCENARIO) -> None:
 
 
 def print_table(rows: Sequence[int], work: Sequence[str], scenario: str, folder: Path | None) -> None:
-    """Measure verbs on runs of so many rows each, and print a line for each.
+    """Measure verbs on runs of given lengths, and print a line for each verb.
 
     Parameters
     ----------
     rows : sequence of int
-        Rows of the runs.
+        Number of rows of each run.
     work : sequence of str
-        Verbs, of `WORK`.
+        Names of verbs in `WORK`.
     scenario : str
-        Scenario whose rows are repeated.
+        Name of the scenario whose rows are repeated.
     folder : Path or None
         Folder of the runs and the verbs' output; None for the folder of temporary files.
     """

@@ -15,14 +15,14 @@ typedef struct {
     const double *inputs;
     double *outputs;
     void *flags; /* int in FMI 2.0, bool in 3.0 */
-} Slave;
+} CoSimulationInstance;
 
 #if defined(_WIN32)
 __declspec(dllexport)
 #else
 __attribute__((visibility("default")))
 #endif
-long loop_fmi2(const Slave *s, long first, long steps, double h, int step_only)
+long loop_fmi2(const CoSimulationInstance *s, long first, long steps, double h, int step_only)
 {
     fmi2SetRealTYPE *set_reals = (fmi2SetRealTYPE *)s->set_reals;
     fmi2DoStepTYPE *do_step = (fmi2DoStepTYPE *)s->do_step;
@@ -46,7 +46,7 @@ __declspec(dllexport)
 #else
 __attribute__((visibility("default")))
 #endif
-long loop_fmi3(const Slave *s, long first, long steps, double h, int step_only)
+long loop_fmi3(const CoSimulationInstance *s, long first, long steps, double h, int step_only)
 {
     fmi3SetFloat64TYPE *set_reals = (fmi3SetFloat64TYPE *)s->set_reals;
     fmi3DoStepTYPE *do_step = (fmi3DoStepTYPE *)s->do_step;

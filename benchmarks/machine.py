@@ -1,4 +1,4 @@
-"""The machine of the figures, and its load."""
+"""The machine on which times are measured, and its load."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
 
-CALM = 0.6  # load average above which figures are not reliable
+CALM = 0.6  # load average above which times are not reliable
 _PACKAGES = ("numpy", "fmpy", "scikit-fuzzy", "pymavlink")
 
 
@@ -27,7 +27,7 @@ def processor() -> str:
 
 
 def load() -> float:
-    """Return the load average over the last minute; NaN where the system does not report it."""
+    """Return the load average over the last minute; NaN if the system does not report it."""
     try:
         return os.getloadavg()[0]
     except (AttributeError, OSError):
@@ -54,7 +54,7 @@ def description(repeats: int) -> list[str]:
 
 @contextlib.contextmanager
 def pinned() -> Iterator[None]:
-    """Keep this process, and those that it starts, on one processor in this block, where the system can."""
+    """Keep this process, and those that it starts, on one processor in this block, if the system supports it."""
     if not hasattr(os, "sched_setaffinity"):
         yield
         return

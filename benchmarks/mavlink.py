@@ -38,12 +38,12 @@ from cosim.simulation.signals import Array
 
 STEPS = 20_000
 RATIO = "how many times as long as what it is compared with"
-DATAGRAMS_PER_STEP = 10  # of STEPS, in a flood
-_SENT = (0, 1, 2, 24, 29, 30, 31, 32, 33, 36, 42, 62, 65, 74, 85, 137, 245)  # ids of messages, one of each a round
-_ROUNDS = 50  # /s of the wall clock
-_MESSAGES = _ROUNDS * len(_SENT)
-_SOURCE = (1, 1)
-_PACE = 1000.0  # steps/s, of the runs in real time: those of the scenario
+DATAGRAMS_PER_STEP = 10  # datagrams of a flood per step
+_SENT = (0, 1, 2, 24, 29, 30, 31, 32, 33, 36, 42, 62, 65, 74, 85, 137, 245)  # ids of the messages of a round
+_ROUNDS = 50  # rounds per second of the wall clock
+_MESSAGES = _ROUNDS * len(_SENT)  # messages per second
+_SOURCE = (1, 1)  # system id and component id of the sender
+_PACE = 1000.0  # steps/s, rate of the scenario in real time
 
 
 class Seventeen:
@@ -71,7 +71,7 @@ class Seventeen:
         self._row = row
 
     def receive(self, link: MessageSink, message: Any, now: float) -> None:
-        """Answer, as to a request for a parameter."""
+        """Send a message in answer to a received one."""
         self._send(_SENT[0])
 
     def tick(self, now: float) -> None:
@@ -87,7 +87,7 @@ class Seventeen:
             self._context.send(message)
 
     def close(self, now: float) -> None:
-        """Store the processor time of the thread."""
+        """Store the fraction of a processor that the thread has used."""
         self.busy = time.thread_time() / (now - self._began)
 
 
@@ -97,14 +97,14 @@ def measure(steps: int, repeats: int, datagrams: int | None = None) -> list[Row]
     Parameters
     ----------
     steps, repeats : int
-        Steps a repeat, and repeats.
+        Steps per repeat, and number of repeats.
     datagrams : int, optional
-        Hostile ones a flood; default: ten a step.
+        Hostile datagrams per flood; default: ten per step.
 
     Returns
     -------
     list of Row
-        For the table.
+        Rows of all parts, with ratios within each.
     """
     count = datagrams or DATAGRAMS_PER_STEP * steps
     return [
@@ -148,7 +148,7 @@ def _messages(calls: int, repeats: int) -> list[Row]:
 
 
 def _beside_traffic(steps: int, repeats: int) -> list[Row]:
-    """Time stretches of one run at full speed, in turn without and with a link, so that both have the same noise."""
+    """Time parts of one run at full speed, in turn without and with a link, so that load affects both alike."""
     alone, beside, busy = [], [], []
     with _endless() as master, _sink() as port:
         k = 0
@@ -157,7 +157,7 @@ def _beside_traffic(steps: int, repeats: int) -> list[Row]:
             links = LinkThread(vehicle, [_link(port)], master.scenario.time.step) if i % 2 else None
             taken = _stretch(master, range(k, k + steps), links)
             k += steps
-            if i > 1:  # the first of each compiles, and fills the caches
+            if i > 1:  # the first of each kind compiles, and fills the caches
                 (beside if i % 2 else alone).append(taken)
                 busy += [vehicle.busy] if i % 2 else []
     first, second = "step: no link", f"step: {_MESSAGES} messages/s"
@@ -170,7 +170,7 @@ def _beside_traffic(steps: int, repeats: int) -> list[Row]:
 
 
 def _stretch(master: Master, steps: range, links: LinkThread | None) -> float:
-    """Return seconds a step, with links if there are some."""
+    """Run steps, with links unless None, and return the time per step [s]."""
     if links is not None:
         links.start()
     before = time.perf_counter()
@@ -226,7 +226,7 @@ def _under_flood(datagrams: int, steps: int, repeats: int) -> list[Row]:
                 all_times.append(times)
                 errors += failures
                 if case == "flood":
-                    grown = max(grown, _resident() - before if repeat else 0.0)  # the first one fills caches
+                    grown = max(grown, _resident() - before if repeat else 0.0)  # the first repeat fills the caches
                     looked.append(_total_count(link.counts) / datagrams)
         timings: dict[str, Timing | str] = {}
         for case, all_times in found.items():
@@ -240,14 +240,14 @@ def _under_flood(datagrams: int, steps: int, repeats: int) -> list[Row]:
 
 
 def _flooded(datagrams: int, steps: int, pace: float | None, seed: int, *, at_us: bool) -> tuple[Array, Link, int]:
-    """Step beside a link for as long as a flood takes, if there is one, or for so many steps.
+    """Run steps beside a link while a flood lasts, or without a flood for a number of steps.
 
-    With `at_us` false the flood goes to a port without a reader: it costs the machine the same time, the link none.
+    With `at_us` False the flood goes to a port without a reader: it costs the machine the same time, the link none.
 
     Returns
     -------
     (array, Link, int)
-        Seconds of each step from when it was due, the link, and errors in its thread.
+        Time of each step from its due time to its end [s], the link, and the number of errors in its thread.
     """
     channel = UdpIn("127.0.0.1", 0)
     link = Link("flooded", channel, Gate(Counts(), _SOURCE), _SOURCE)
@@ -277,15 +277,18 @@ def _flooded(datagrams: int, steps: int, pace: float | None, seed: int, *, at_us
 
 @contextlib.contextmanager
 def _attacker(port: int, datagrams: int, seed: int) -> Iterator[Callable[[int, int], bool]]:
-    """Yield a predicate on step and count: True while another process floods a port, else for so many steps."""
+    """Yield a function of step and count that returns True while another process floods a port.
+
+    Without datagrams it returns True for `count` steps.
+    """
     if not datagrams:
         yield lambda k, steps: k < steps
         return
     command = [sys.executable, "-m", "benchmarks.hostile", str(port), str(datagrams), str(seed)]
     with subprocess.Popen(command, cwd=Path(__file__).parents[1], stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
-        process.stdout.readline()  # it has prepared, and begins
-        yield lambda k, steps: (k + 1) % 16 > 0 or process.poll() is None  # some steps in any case
+        process.stdout.readline()  # the process has prepared its datagrams, and begins
+        yield lambda k, steps: (k + 1) % 16 > 0 or process.poll() is None  # poll every 16 steps
 
 
 def _total_count(counts: Counts) -> int:
@@ -293,7 +296,7 @@ def _total_count(counts: Counts) -> int:
 
 
 def _resident() -> float:
-    """Return the memory of this process [bytes]; 0 where the system does not report it."""
+    """Return the resident memory of this process [bytes]; 0 if the system does not report it."""
     try:
         pages = int(Path("/proc/self/statm").read_text().split()[1])
     except OSError:

@@ -29,16 +29,19 @@ from cosim.simulation.master import Master
 
 Array = NDArray[np.float64]
 
-TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0)  # s, at which errors are evaluated
-_FROM = 5.0  # s, from which on innovations count
-_CONSTANT = (
+TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0)  # s, times at which errors are evaluated
+_FROM = 5.0  # s, time from which on innovations count
+_CONSTANT = (  # constant errors of the sensors, in the order of the filter's constants
     *(f"imu.angular_velocity_bias.{axis}" for axis in "pqr"), *(f"imu.acceleration_bias.{axis}" for axis in "xyz"),
     "compass.bias", "depth_sensor.bias", "dvl.scale_error",
 )  # fmt: skip
 
 
 def error_of(master: Master, constants: Array) -> Array:
-    """Return the errors of the filter, shape (18,), true less estimated, in the order of its covariance."""
+    """Return the errors of the filter, true less estimated, shape (18,), in the order of its covariance.
+
+    They are position [m], velocity [m/s] and rotation [rad], all NED, and the constant errors of the sensors.
+    """
     assert master.navigator is not None
     memory, true_state = master.navigator.memory, master.true_state
     R = rotation_matrix(true_state.quaternion)
@@ -49,7 +52,7 @@ def error_of(master: Master, constants: Array) -> Array:
 
 
 def flight(seed: int, duration: float) -> tuple[Array, Array]:
-    """Fly a hard scene; return NEES over 18 at `TIMES`, NaN before the filter started, and sums of innovations."""
+    """Fly a hard scene; return NEES / 18 at `TIMES`, NaN before the filter's start, and sums of innovations."""
     scene = decode_scene(next(iter(generate_scenes(1, seed, "hard"))).encode())
     gains = LAWS["deployable"].gains_type()
     scenario = scene_scenario(scene, "deployable", gains, Conditions(duration=duration, sensing="sensors"))
@@ -86,7 +89,7 @@ def rows(count: int, seed: int, duration: float) -> Iterator[dict[str, float | s
 
 
 def main() -> None:
-    """Fly, and print a row of JSON each."""
+    """Run the flights, and print each row as JSON."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", type=int)
     parser.add_argument("--seed", type=int, default=0)

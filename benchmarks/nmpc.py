@@ -30,37 +30,38 @@ from controller.regions import DepthBand, Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, place_clearance
 
-PERIOD = 0.1  # s between plans
-ITERATIONS = 15  # of the solver, at most
-SPHERES = {"obstacles": 8, "hard": 2, "soft": 0}  # the nearest, and the two planes of a band of depth, of a plan
-SHAPES = {"obstacles": 0, "hard": 2, "soft": 3}  # of a plan among regions of other shapes
+PERIOD = 0.1  # s, time between plans
+ITERATIONS = 15  # greatest number of the solver's iterations
+# numbers of constraints of a plan among spheres: the nearest spheres, and the two planes of a depth band
+SPHERES = {"obstacles": 8, "hard": 2, "soft": 0}
+SHAPES = {"obstacles": 0, "hard": 2, "soft": 3}  # numbers of constraints of a plan among regions of other shapes
 _FREE = (0.0, 0.0, 0.0, -1e3)  # a plane that is always satisfied
 _OBSERVE, _ROTATION = CompiledFunction(observe), CompiledFunction(write_rotation)
 
 
 class NmpcGains(NamedTuple):
-    """Numbers of the controller; all but the last five are what `benchmarks.nmpc_search` found."""
+    """Numbers of the controller; all but the last five are from `benchmarks.nmpc_search`."""
 
-    stages: float = 12.0
-    interval: float = 0.3627  # s, of a stage
-    margin: float = 0.05005  # m
-    w_u: float = 0.115  # of the forces, in shares of the greatest
-    w_m: float = 10.58  # of moments that the attitude's loop asks for and do not get, in shares of the greatest
-    w_v: float = 211.6  # s2/m2, of the last velocity
-    observer: float = 6.281  # rad/s
-    w_p: float = 10.0  # 1/m, of the distance to the set point
-    w_s: float = 100.0  # 1/m, of the depth within soft regions
-    k_p2: float = 4.5  # 1/s2, section VII for the inertia of ODIN
-    k_v2: float = 5.0  # 1/s, the same
-    lag: float = 0.0  # s, of the thrusters
+    stages: float = 12.0  # number of stages of the horizon
+    interval: float = 0.3627  # s, duration of a stage
+    margin: float = 0.05005  # m, distance to keep from regions
+    w_u: float = 0.115  # weight of the forces, as fractions of the greatest forces
+    w_m: float = 10.58  # weight of the attitude loop's moments that the plan lacks, as fractions of the greatest ones
+    w_v: float = 211.6  # s2/m2, weight of the velocity at the end of the horizon
+    observer: float = 6.281  # rad/s, bandwidth of the observer
+    w_p: float = 10.0  # 1/m, weight of the distance to the goal
+    w_s: float = 100.0  # 1/m, weight of the depth within soft regions
+    k_p2: float = 4.5  # 1/s2, attitude gain by section VII for the inertia of ODIN
+    k_v2: float = 5.0  # 1/s, gain of the angular velocity by section VII
+    lag: float = 0.0  # s, time constant of the thrusters
 
 
 class _Step:
-    """The law's function, which the loop calls back: the observer at each step, a plan at some."""
+    """The law's function: it runs the observer at each step, and makes a plan every `PERIOD`."""
 
     process: PeerProcess | None = None
-    times: ClassVar[list[float]] = []  # s, of all plans
-    failures = 0  # plans that did not converge
+    times: ClassVar[list[float]] = []  # s, computation times of all plans
+    failures = 0  # number of plans that did not converge
 
     def __call__(
         self,
@@ -77,7 +78,7 @@ class _Step:
         _OBSERVE(observer.memory, state, memory.R, observer.gains)
         if memory.steps[0] % memory.plan_every == 0:
             forces[:] = self._plan(state, goal, regions, gains, memory)
-        given = observer.memory.thrusters.forces  # by the thrusters, behind their lag
+        given = observer.memory.thrusters.forces  # forces of the thrusters behind their lag [N]
         given += (1.0 - memory.left) * (forces - given)
         memory.steps[0] += 1
 
@@ -90,7 +91,7 @@ class _Step:
         mass, R, lag, velocity = known.dynamics.mass, memory.R, gains.lag, known.velocity
         inertia, body = mass[3:, 3:], R.T @ velocity[:3]
         lost = inertia @ known.disturbance[3:] - np.cross(body, mass[:3, :3] @ body)  # Munk moment
-        # the state a lag later, by the forces that the thrusters give
+        # predict the state over the lag of the thrusters, with their present forces
         wrench = np.array(memory.vehicle["thrusters"]) @ known.thrusters.forces
         drag = (memory.vehicle["linear"] + memory.vehicle["quadratic"] * np.abs(body)) * body
         later = velocity + lag * known.disturbance
@@ -123,22 +124,22 @@ class _Step:
 
 
 def constraints(regions: PackedRegions, path: Array, interval: float) -> dict[str, Any]:
-    """Return the constraints that regions are for a plan.
+    """Return the constraints of a plan that stand for regions.
 
     Parameters
     ----------
     regions : PackedRegions
-        Where they are now.
+        Regions at their present positions.
     path : ndarray, shape (stages, 3)
-        Where the vehicle is expected at the end of each interval [m, NED].
+        Expected positions of the vehicle at the end of each interval [m, NED].
     interval : float
-        [s].
+        Duration of a stage [s].
 
     Returns
     -------
     dict
-        ``spheres``, each with centre [m], radius [m] and velocity [m/s]; planes of ``hard`` and ``soft`` regions, each
-        with a row for each stage: a normal, and the least coordinate along it [m].
+        ``spheres``, each with centre [m, NED], radius [m] and velocity [m/s, NED]; planes of ``hard`` and ``soft``
+        regions, each with a row for each stage: a unit normal [NED], and the least coordinate along it [m].
     """
     spheres: list[list[float]] = []
     planes: dict[bool, list[Any]] = {True: [], False: []}
@@ -170,11 +171,11 @@ class _Memory(NamedTuple):
     estimate: Array
     report: Array
     observer: PidCbfLaw
-    R: Array  # (3, 3), from body to world
-    path: Array  # (stages, 3) m, where the vehicle is expected at each stage of the next plan
-    vehicle: dict[str, Any]  # for the planner
-    plan_every: int
-    left: float  # share of a step of the commands that the thrusters do not follow within a period
+    R: Array  # (3, 3) rotation matrix from body to world
+    path: Array  # (stages, 3) m, NED, expected positions of the vehicle at the stages of the next plan
+    vehicle: dict[str, Any]  # vehicle as the planner receives it
+    plan_every: int  # number of steps between plans
+    left: float  # remaining fraction of a force error after a period, by the lag of the thrusters
     steps: list[int]
 
 
@@ -190,7 +191,7 @@ class NmpcLaw(CompiledLaw):
     def for_vehicle(
         cls, vehicle: VehicleModel, gains: NmpcGains, desired_quaternion: Array, period: float, n_regions: int
     ) -> NmpcLaw:
-        """Return the law, as `CompiledLaw.for_vehicle`."""
+        """Return the law for a vehicle, like `CompiledLaw.for_vehicle`."""
         law = cls()
         observing = PidCbfGains(observer=gains.observer)
         observer = PidCbfLaw(vehicle, observing, desired_quaternion, period, n_regions)
@@ -229,7 +230,7 @@ class Planners:
     Parameters
     ----------
     environment : Environment
-        That has CasADi.
+        Environment of the peers, with CasADi.
     """
 
     def __init__(self, environment: Environment) -> None:
@@ -238,12 +239,12 @@ class Planners:
         self._peers: dict[tuple[int, bool], PeerProcess] = {}
 
     def choose(self, stages: int, spheres: bool) -> None:
-        """Let `NmpcLaw` plan with a number of stages, among spheres, or among shapes.
+        """Select the planner of `NmpcLaw`: its number of stages, and constraints for spheres or for other shapes.
 
         Raises
         ------
         NotMeasuredError
-            If CasADi is not installed, or cannot begin.
+            If CasADi is not installed, or the planner cannot start.
         """
         if (stages, spheres) not in self._peers:
             setup = {"stages": stages, "period": PERIOD, "iterations": ITERATIONS} | (SPHERES if spheres else SHAPES)

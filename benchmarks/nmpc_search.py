@@ -1,7 +1,7 @@
 """Flights by the predictive controller, and the search for its numbers: that of the other laws, among fewer scenes.
 
-Draws race the best as in `benchmarks.baselines`, safety first. Every flight is a line of a file; a flight that the file
-has is not flown again, so that an interrupted search or campaign goes on.
+Draws race the best as in `benchmarks.baselines`, safety first. Every flight is a line of a file; a flight that is
+already in the file is not repeated, so that an interrupted search or campaign can continue.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from cosim.campaigns.scenes.scene import Scene
 from plant_fmu.vehicle import load_vehicle
 
 FLOWN = (*KINDS, "conflict")  # kinds of scenes
-COUNT = 100  # scenes of a kind
-DURATION = 30.0  # s of a flight; a scene that is not settled then is flown again, for longer
-LONGER = {"search": 60.0, "campaign": 120.0}  # s
+COUNT = 100  # default number of scenes of a kind
+DURATION = 30.0  # s, duration of a flight; a scene that is not reached in it is flown again, for longer
+LONGER = {"search": 60.0, "campaign": 120.0}  # s, duration of the second flight
 RANGES = {
     "interval": (0.15, 0.6),
     "margin": (0.03, 0.2),
@@ -38,30 +38,30 @@ RANGES = {
     "w_v": (5.0, 500.0),
     "observer": (0.5, 8.0),
 }
-STAGES = (8.0, 12.0)
-SCENES = 30  # plain and hard by turns
-HEATS = ((4, 1.3), (10, 1.15), (SCENES, 1.0))
-PHASES = ((0.5, math.inf), (0.25, 1.5), (0.25, 1.15))  # share of the draws, and within which factor of the best
+STAGES = (8.0, 12.0)  # candidate numbers of stages
+SCENES = 30  # number of scenes, plain and hard ones together
+HEATS = ((4, 1.3), (10, 1.15), (SCENES, 1.0))  # like those of `benchmarks.baselines`
+PHASES = ((0.5, math.inf), (0.25, 1.5), (0.25, 1.15))  # fraction of the draws, greatest factor from the best
 DRAWS = 24
 
 
 class Flight(NamedTuple):
-    """A flight, and how long its plans took."""
+    """Score of a flight, with the computation times of its plans."""
 
     score: Score
-    times: list[float]  # ms
-    failures: int  # plans that did not converge
+    times: list[float]  # ms, computation times of the plans
+    failures: int  # number of plans that did not converge
 
 
 class Flights:
-    """Fly scenes by the controller, each once.
+    """Fly scenes with the controller, each once.
 
     Parameters
     ----------
     environment : Environment
-        That has CasADi.
+        Environment of the peers, with CasADi.
     path : Path, optional
-        File of flights, a line of JSON each, to which new ones are added.
+        File of flights, one line of JSON each; flights in it are not repeated, new ones are appended.
     """
 
     def __init__(self, environment: Environment, path: Path | None = None) -> None:
@@ -73,7 +73,7 @@ class Flights:
                 self._known[_key(flown)] = Flight(Score(*flown["score"]), flown["times"], flown["failures"])
 
     def fly(self, gains: NmpcGains, kind: str, seed: int, longer: float) -> Flight:
-        """Fly a scene for `DURATION`, and if it is not settled then, from its start for `longer` [s]."""
+        """Fly a scene for `DURATION`; if its goal is not reached, fly it again for `longer` [s]."""
         flown = self._fly(gains, kind, seed, DURATION)
         settled = flown.score.reached or kind not in KINDS  # other scenes have a duration of their own
         return flown if settled else self._fly(gains, kind, seed, longer)
@@ -114,21 +114,22 @@ def _key(what: dict[str, Any]) -> str:
 
 
 def search(flights: Flights, count: int, seed: int) -> Candidate:
-    """Return the best numbers of the controller.
+    """Search for the best numbers of the controller.
 
     Parameters
     ----------
     flights : Flights
-        That fly them.
+        Flights by the controller.
     count : int
-        Draws, of which half are from `RANGES` and `STAGES`, a quarter each within 1.5 and 1.15 of the best so far.
+        Number of draws: half of them from `RANGES` and `STAGES`, a quarter each within factors of 1.5 and 1.15 of the
+        best so far.
     seed : int
-        Of the draws.
+        Seed of the draws.
 
     Returns
     -------
     Candidate
-        The numbers, and their scores over `SCENES`.
+        Best numbers, and their scores over all scenes.
     """
     rng = np.random.default_rng(seed)
 
@@ -161,17 +162,17 @@ def main(
     Parameters
     ----------
     kinds : iterable of str
-        Of scenes.
+        Kinds of scenes, from `FLOWN`.
     seed : int
-        Of the first scene, or of the draws.
+        Seed of the first scene, or of the draws.
     count : int
-        Scenes of a kind.
+        Number of scenes of each kind.
     draws : int
-        Of the search; with 0 the scenes are flown.
+        Number of draws of the search; 0 to fly the scenes instead.
     python : str, optional
-        That has CasADi; default: the benchmarks' own.
+        Path of a Python with CasADi; default: that of the benchmarks' own environment.
     out : Path, optional
-        File of the flights, to which new ones are added.
+        File of flights, as for `Flights`.
     """
     flights = Flights(Environment(python), out)
     try:

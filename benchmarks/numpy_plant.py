@@ -11,7 +11,7 @@ STATES = [
     *(f"quaternion.e{i}" for i in range(4)),
     *(f"velocity.{a}" for a in "uvwpqr"),
 ]
-SUBSTEP = 0.005  # s, as in the FMU
+SUBSTEP = 0.005  # s, greatest integration step, that of the FMU
 
 
 class NumpyPlant(Fmi2Slave):
@@ -45,7 +45,7 @@ class NumpyPlant(Fmi2Slave):
         self.register_variable(kind(name, causality=Fmi2Causality.output, variability=variability, getter=getter))
 
     def do_step(self, current_time, step_size):
-        """Advance by whole substeps, the commands being held."""
+        """Advance by whole substeps with constant commands."""
         n = max(1, int(np.ceil(step_size / SUBSTEP - 1e-9)))
         tau = self.body.tau(self.thrust, self.wrench)
         for _ in range(n):

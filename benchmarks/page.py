@@ -14,7 +14,7 @@ from benchmarks.timing import Timing
 
 PAGE = Path(__file__).parents[1] / "docs" / "performance.md"
 PARTS = ("all", "scaling")
-_WIDTH = 120
+_WIDTH = 120  # greatest number of characters in a line
 _PART = "<!-- figures: {} -->\n{}<!-- end of figures -->"
 
 
@@ -28,14 +28,14 @@ def rewrite(text: str, figures: list[dict[str, Any]]) -> str:
     Parameters
     ----------
     text : str
-        The page, with the marks of each part.
+        Text of the page, with the marks of each part.
     figures : list of dict
-        Figures as of `benchmarks.table.as_json`.
+        Figures from `benchmarks.table.as_json`.
 
     Returns
     -------
     str
-        The page; only the tables are new.
+        Text of the page with new tables.
 
     Raises
     ------

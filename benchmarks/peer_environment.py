@@ -1,4 +1,4 @@
-"""The environment of the peers: their own virtual environments, made once."""
+"""The virtual environments of the peers, made once."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from benchmarks.timing import NotMeasuredError
 
 FOLDER = "benchmark-peers"
 _INSTALLED = "installed.json"
-_TIMEOUT = 900.0  # s
+_TIMEOUT = 900.0  # s, longest installation of a peer
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Peer:
     more : tuple of str
         Further requirements, which the distribution does not declare.
     environment : str
-        The virtual environment that it is in; most share one.
+        Name of its virtual environment; most peers share one.
     """
 
     name: str
@@ -64,7 +64,7 @@ def folder() -> Path:
 
 
 def install(again: bool = False) -> dict[str, str]:
-    """Install each peer for which that was not tried before, one by one.
+    """Install all peers whose installation was not tried before, one by one.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ class Environment:
         return self._python or str(_python_in(folder() / PEERS[name].environment))
 
     def version(self, name: str) -> str:
-        """Return the version of a peer, or the reason why it has none."""
+        """Return the version of a peer, or the reason after "not installed: "."""
         if name not in self._state:
             self._state[name] = _version(self._python or sys.executable, name)
         return self._state[name]

@@ -15,7 +15,7 @@ from benchmarks.peer_environment import Environment
 from benchmarks.timing import NotMeasuredError
 
 _SERVE = Path(__file__).parent / "peers" / "serve.py"
-_TAIL = 300  # last characters of its output
+_TAIL = 300  # number of the last characters of a peer's error output that a reason contains
 
 
 class PeerProcess:
@@ -25,12 +25,12 @@ class PeerProcess:
     ----------
     process : Popen
         Process of ``serve.py``.
-    said : Path
+    stderr : Path
         File of its error output.
     """
 
-    def __init__(self, process: subprocess.Popen[str], said: Path) -> None:
-        self._process, self._said = process, said
+    def __init__(self, process: subprocess.Popen[str], stderr: Path) -> None:
+        self._process, self._stderr = process, stderr
 
     def seconds(self, count: int) -> float:
         """Run `count` items, and return their time [s]."""
@@ -49,7 +49,7 @@ class PeerProcess:
             process.stdin.flush()
         line_received = process.stdout.readline()
         if not line_received:
-            raise NotMeasuredError(f"ended with code {process.wait()}: {self._said.read_text()[-_TAIL:].strip()}")
+            raise NotMeasuredError(f"ended with code {process.wait()}: {self._stderr.read_text()[-_TAIL:].strip()}")
         answer: dict[str, Any] = json.loads(line_received)
         if "error" in answer:
             raise NotMeasuredError(" ".join(answer["error"].split())[:_TAIL])
@@ -71,27 +71,27 @@ def peer(
     module, function : str
         Function in a module of `benchmarks.peers`.
     setup : dict
-        Plain values for the function.
+        Argument of the function, as values for JSON.
 
     Raises
     ------
     NotMeasuredError
-        If it is not installed, or cannot start.
+        If the peer is not installed, or cannot start.
     """
     python = environment.python(package)
     with tempfile.TemporaryDirectory(prefix="peer-", ignore_cleanup_errors=True) as scratch:
-        said = Path(scratch) / "said"
-        # no folder of this project or of the user is on its path
+        stderr = Path(scratch) / "stderr"
+        # keep folders of this project and of the user off the peer's path
         apart = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
         apart |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), scratch)  # its temporary files are removed too
-        with said.open("w") as errors:
+        with stderr.open("w") as errors:
             process = subprocess.Popen(
                 [python, str(_SERVE), module, function],
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, text=True, env=apart, cwd=scratch,
             )  # fmt: skip
         with process:
             try:
-                contestant = PeerProcess(process, said)
+                contestant = PeerProcess(process, stderr)
                 contestant.ask(json.dumps(setup))
                 yield contestant
             finally:

@@ -20,12 +20,12 @@ from cosim.simulation.master import Master
 
 RATIO = "how many times as long as the first of its table"
 REPEATS = 5
-OBSTACLES = (1, 3, 10, 30, 100)
-HORIZONS = (10.0, 30.0, 100.0, 300.0)  # s
-VEHICLES = (1, 8, 64, 512)
-ROWS = {"fused": 1_000, "lanes": 10_000}  # of a sweep
+OBSTACLES = (1, 3, 10, 30, 100)  # numbers of obstacles
+HORIZONS = (10.0, 30.0, 100.0, 300.0)  # s, durations of runs
+VEHICLES = (1, 8, 64, 512)  # numbers of vehicles in a batch
+ROWS = {"fused": 1_000, "lanes": 10_000}  # number of rows of a sweep, by engine
 LAWS = ("ismail_dunnigan", "deployable")
-_SWEEPS = 3  # repeats at most
+_SWEEPS = 3  # greatest number of repeats of a sweep
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,11 @@ class Curve:
     title : str
         Description of an item.
     of : str
-        Name of one unit of the size.
+        Name of one unit of the size, such as ``obstacle``.
     entries : mapping from float to Entry
-        By size.
+        Entries by size.
     count : int, optional
-        Items a repeat, where the items are long.
+        Items per repeat, if the items are long.
     """
 
     title: str
@@ -109,7 +109,7 @@ def measure(subjects: list[str], budget: float, repeats: int) -> list[Table]:
     Parameters
     ----------
     subjects : list of str
-        Subjects, of `SUBJECTS`.
+        Names of subjects in `SUBJECTS`.
     budget : float
         Time of a repeat of each size [s].
     repeats : int
@@ -118,7 +118,7 @@ def measure(subjects: list[str], budget: float, repeats: int) -> list[Table]:
     Returns
     -------
     list of Table
-        One for each curve.
+        A table for each curve.
     """
     tables = []
     for subject in subjects:
@@ -183,7 +183,7 @@ def _named(engine: str) -> str:
 
 
 def _with_obstacles(n: int) -> tuple[str, ...]:
-    """Return the changes that put so many balls of the criterion "obstacle" beside the path, and remove the regions."""
+    """Return the changes that replace all regions by n spheres of the criterion "obstacle" beside the path."""
     balls = []
     for i in range(n):
         centre = [8.0 * (i + 1) / (n + 1), 3.0 if i % 2 else -3.0, 3.0]

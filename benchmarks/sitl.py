@@ -27,12 +27,12 @@ def measure(steps: int, repeats: int) -> list[Row]:
     Parameters
     ----------
     steps, repeats : int
-        Frames a repeat, and repeats.
+        Frames per repeat, and number of repeats.
 
     Returns
     -------
     list of Row
-        For the table.
+        Rows with ratios to the plant's step.
     """
     timings: dict[str, Timing | str] = {}
     with tempfile.TemporaryDirectory() as folder:
@@ -65,9 +65,9 @@ def lockstep(steps: int, repeats: int, record_rate: float = 100.0) -> Timing:
     Parameters
     ----------
     steps, repeats : int
-        Frames a flight, and flights.
+        Frames per flight, and number of flights.
     record_rate : float
-        Rows of the record a simulated second.
+        Rows of the record per simulated second [Hz].
 
     Returns
     -------

@@ -8,9 +8,10 @@ import sys
 import time
 
 RATE = 1200  # Hz, ArduPilot's default
-WARMING = 100  # frames before the timing starts
-HEAD = struct.Struct("<HHI")
+WARMING = 100  # number of frames before the timing starts
+HEAD = struct.Struct("<HHI")  # head of a packet: MAGIC, rate [Hz], number of the frame
 MAGIC = 18458
+# pulses of 16 outputs [us]
 PULSES = struct.pack("<16H", *[1500] * 4, *[1700] * 4, *[0] * 8)
 
 

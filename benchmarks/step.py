@@ -27,12 +27,12 @@ def measure(steps: int, repeats: int) -> list[Row]:
     Parameters
     ----------
     steps, repeats : int
-        Steps a repeat, and repeats.
+        Steps per repeat, and number of repeats.
 
     Returns
     -------
     list of Row
-        For the table.
+        Rows with ratios to the plant's step.
     """
     timings: dict[str, Timing] = {}
     rng = np.random.default_rng(0)
@@ -76,7 +76,7 @@ def _law_alone(master: Master) -> Callable[[], None]:
 
 
 def _whole(engine: str, steps: int, repeats: int, *, record: bool) -> Timing:
-    """Time whole runs, stepped as `cosim run` does."""
+    """Time whole runs by `Master.run`, as in `cosim run`; return the time of a step."""
     scenario = load_scenario("paper", [f"arbiter.engine={engine}", f"time.duration={steps / 1000}"])
     found = []
     for _ in range(repeats):

@@ -24,9 +24,8 @@ class Row:
     base, base_timing : str, Timing or str, optional
         Name and timing of the base; without them there is no ratio.
     duel : bool
-        True if the base is a peer that took turns with it. Then the ratio is the peer's time over this one's,
-        and each repeat has one of its own, so that they have a range. Else it is this one's time over the
-        base's.
+        True if the base is a peer that took turns with the row's contestant. Then the ratio is the peer's time over
+        that of the row, and has a range over the repeats. Else it is the row's time over the base's.
     """
 
     name: str
@@ -58,11 +57,11 @@ class Table:
 
     title: str  # description of an item
     rows: tuple[Row, ...]
-    notes: tuple[str, ...] = ()  # below it
+    notes: tuple[str, ...] = ()  # lines below the rows
 
 
 def compared(timings: dict[str, Timing | str], base: str | None = None) -> list[Row]:
-    """Return rows with ratios to one among them, by default the first."""
+    """Return rows with ratios to the row `base`, by default the first."""
     base = base or next(iter(timings))
     return [Row(name, timing, base, timings[base]) for name, timing in timings.items()]
 

@@ -23,14 +23,14 @@ from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
 CASES = ("healthy", "worn", "rolled", "lost", "two lost", "part lost", "stuck")
-_FAILURES = {"lost": 1, "part lost": 1, "stuck": 1, "two lost": 2}
-_INPUTS = 20  # place of the first thruster's command in a row of the trace
-_WINDOW = 25  # control steps, half a second
-_FAILED = 14  # place of `law.failed_thruster` among the law's reports
+_FAILURES = {"lost": 1, "part lost": 1, "stuck": 1, "two lost": 2}  # number of failures in each case
+_INPUTS = 20  # index of the first thruster's command in a row of the trace
+_WINDOW = 25  # control steps of the average: half a second
+_FAILED = 14  # index of `law.failed_thruster` among the law's diagnostics
 
 
 def scene(vehicle: Vehicle, case: str, seed: int, lag: float | None, weight: float, tilt: float) -> dict[str, Any]:
-    """Return a random scenario: spheres, a depth band, a current, noise, W - B up to a weight [N], and the case."""
+    """Draw a scenario: spheres, a depth band, a current, noise, |W - B| up to `weight` [N], and failures of a case."""
     rng, m = np.random.default_rng([seed, 7]), vehicle.n_thrusters
     start = np.array([0.0, 0.0, rng.uniform(3.0, 5.0)])
     away, heading = rng.uniform(8.0, 20.0), rng.uniform(-0.5, 0.5)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-_MOST = 10**9  # items a batch
+_MOST = 10**9  # greatest number of items of a repeat
 
 
 class NotMeasuredError(Exception):
@@ -17,23 +17,23 @@ class NotMeasuredError(Exception):
 
 @dataclass(frozen=True)
 class Timing:
-    """Seconds an item (a step, a call, a run), one figure for each repeat."""
+    """Times of an item (a step, a call, a run), one sample for each repeat."""
 
-    samples: tuple[float, ...]
+    samples: tuple[float, ...]  # s
 
     @property
     def least(self) -> float:
-        """The least [s]."""
+        """Least time of an item [s]."""
         return min(self.samples)
 
     @property
     def median(self) -> float:
-        """The median [s]."""
+        """Median time of an item [s]."""
         return statistics.median(self.samples)
 
     @property
     def most(self) -> float:
-        """The greatest [s]."""
+        """Greatest time of an item [s]."""
         return max(self.samples)
 
 
@@ -51,7 +51,7 @@ class Own:
     Parameters
     ----------
     work : callable
-        Does the given number of items.
+        Function that runs a given number of items.
     """
 
     def __init__(self, work: Callable[[int], object]) -> None:
@@ -75,18 +75,18 @@ def each(work: Callable[[], object]) -> Callable[[int], None]:
 
 
 def timed(contestant: Contestant, count: int, repeats: int) -> Timing:
-    """Time so many items a repeat, after one more repeat that compiles and warms the caches."""
+    """Time `count` items per repeat, after one more repeat that compiles and warms the caches."""
     contestant.seconds(count)
     return Timing(tuple(contestant.seconds(count) / count for _ in range(repeats)))
 
 
 def time_batches(batch: Callable[[], object], items: int, repeats: int) -> Timing:
-    """Time a function that does `items` items a call."""
+    """Time a function that runs `items` items per call."""
     return timed(Own(lambda _: batch()), items, repeats)
 
 
 def time_calls(work: Callable[[], object], calls: int, repeats: int) -> Timing:
-    """Time a function that does one item a call."""
+    """Time a function that runs one item per call."""
     return timed(Own(each(work)), calls, repeats)
 
 
@@ -104,7 +104,7 @@ def take_turns(
     repeats : int
         Number of repeats.
     count : int, optional
-        Items a repeat, in place of the budget; then there is no warm-up.
+        Items per repeat, instead of the budget; then there is no warm-up.
 
     Returns
     -------
@@ -128,7 +128,7 @@ def take_turns(
 
 
 def count_for(contestant: Contestant, budget: float) -> int:
-    """Return the number of items that take a contestant at least `budget` [s]; it is warm afterwards."""
+    """Return the number of items that take a contestant at least `budget` [s], and warm its caches by the way."""
     contestant.seconds(1)
     count = 1
     while (taken := contestant.seconds(count)) < budget and count < _MOST:
@@ -146,7 +146,7 @@ def growth(sizes: Sequence[float], costs: Sequence[float]) -> float:
 
 
 def straight(sizes: Sequence[float], costs: Sequence[float]) -> tuple[float, float, float]:
-    """Return a and b of cost = a + b size, neither below 0, by least squares of relative errors, and the greatest."""
+    """Fit cost = a + b size, a and b not negative, to relative errors; return a, b and the greatest relative error."""
     import numpy as np
     from scipy.optimize import nnls
 

@@ -1,4 +1,4 @@
-"""A vehicle's numbers as plain values, for peers that cannot read its file."""
+"""A vehicle's numbers as values for JSON, for peers that cannot read its file."""
 
 from __future__ import annotations
 

@@ -21,16 +21,16 @@ from cosim.scenario.scenario import load_scenario
 STEPS = 120_000
 RATIO = "how many times as long as a frame may take at 30 frames a second"
 
-_SCENARIO = "pipe-inspection"  # which moves to the end, with a moving region
-_STEP = 0.01  # s
-_OTHERS = (3_000, 6_000)  # steps: half a minute and a minute
-_SPEEDS = (1.0, 5.0, 20.0)
-_SIZE = (1280, 800)  # CSS pixels
-_SMOOTH = Timing((1.0 / 30.0,))
-_PATIENCE = 120.0  # s
+_SCENARIO = "pipe-inspection"  # in it the vehicle and a region move to the end
+_STEP = 0.01  # s, step of the scenario
+_OTHERS = (3_000, 6_000)  # steps of the shorter runs: half a minute and a minute
+_SPEEDS = (1.0, 5.0, 20.0)  # factors of playback
+_SIZE = (1280, 800)  # CSS pixels, size of the window
+_SMOOTH = Timing((1.0 / 30.0,))  # longest frame of a smooth animation
+_PATIENCE = 120.0  # s, timeout of the browser
 _NO_BROWSER = "needs chromium, chromedriver and selenium"
 
-# timestamp [ms] of each painted frame while the page plays, and the time of each part of it
+# script that plays the page: it returns the time stamp of each painted frame, and the time of each part of it [ms]
 _PLAY = """
 const [speed, seconds, done] = arguments;
 const { page, player } = window.subreach;
@@ -64,12 +64,12 @@ def measure(steps: int, repeats: int) -> list[Row]:
     steps : int
         Steps of the long run.
     repeats : int
-        Times that a page is written and opened, and seconds that it plays at each speed.
+        Number of times that a page is written and opened, and duration of its playback at each speed [s].
 
     Returns
     -------
     list of Row
-        For the table.
+        Rows of all pages and speeds.
     """
     with tempfile.TemporaryDirectory() as folder, _browser(Path(folder)) as browser:
         rows = []
@@ -138,7 +138,7 @@ def _opened(browser: Any, page: Path, repeats: int) -> Timing:
 
 
 def _played(browser: Any, speed: float, seconds: int) -> list[Row]:
-    """Play the open page; a sample is a second, least and most are its best and its worst one."""
+    """Play the open page for some seconds; return rows whose samples are means of the frames in each second."""
     name = f"played at {speed:g}x"
     if not browser:
         return [Row(name, _NO_BROWSER)]

@@ -1,7 +1,7 @@
 """Make flights with a real ArduSub.
 
-Plant, autopilot and companion wait for each other, so the load of the machine changes nothing. Every flight is a line
-of a file; a flight that the file has is not flown again, so that an interrupted campaign goes on.
+Plant, autopilot and companion run in lockstep, so the load of the machine does not change the results. Every flight is
+a line of a file; a flight that is already in the file is not repeated, so that an interrupted campaign can continue.
 """
 
 from __future__ import annotations
@@ -36,39 +36,40 @@ from cosim.sitl.flights import FlightOptions, Flights
 from cosim.sitl.law import law_of_pwm
 from cosim.sitl.server import JsonServer
 
-_RANDOM = "random-"  # before a seed
-RATE = 400  # Hz, frames of the autopilot: as many as its main loop has
+_RANDOM = "random-"  # prefix of random scenes, before the seed
+RATE = 400  # Hz, rate of the autopilot's frames, that of its main loop
 PARAMETERS = Path(__file__).with_name("ardusub.parm")
-FAULT_AFTER = 5.0  # s of steering, before something fails on purpose
-OF_A_FAULT = 12.0  # s of such a flight
-DURATION = {"docking": 30.0, "harbour": 30.0, "pipe-inspection": 16.0}  # s
-RANDOM_DURATION = 45.0  # s
-_LOWERED = 12.0  # s, after which the vehicle is at its start
-_LONGEST = 400.0  # s of the plant
-_PATIENCE = 120.0  # s of the wall clock without a frame
+FAULT_AFTER = 5.0  # s, duration of steering before the fault
+OF_A_FAULT = 12.0  # s, duration of a flight after its fault
+DURATION = {"docking": 30.0, "harbour": 30.0, "pipe-inspection": 16.0}  # s, durations of flights by scenario
+RANDOM_DURATION = 45.0  # s, duration of a flight in a random scene
+_LOWERED = 12.0  # s, time of the plant at which the vehicle is at its start
+_LONGEST = 400.0  # s, duration of the plant's scenario
+_PATIENCE = 120.0  # s of the wall clock without a frame, after which a flight ends
+# parameters of ArduSub for a DVL in place of GPS
 _WITHOUT_GPS = {"VISO_TYPE": 1, "EK3_SRC1_VELXY": 6, "EK3_SRC1_POSXY": 0, "EK3_SRC1_VELZ": 0, "GPS1_TYPE": 0}
-_WATER = 1023.6  # kg/m3, of ArduPilot's simulator
+_WATER = 1023.6  # kg/m3, density of the water in ArduPilot's simulator
 
 
 @dataclass(frozen=True)
 class Task:
-    """A flight that is to be made."""
+    """Definition of a flight."""
 
-    scenario: str  # a shipped name, or random-SEED
-    steer_by: str = "sticks"
-    sticks_by: str = "manual-control"
-    fault: str = ""
-    level_dive: float = 0.6  # m
-    parameters: tuple[str, ...] = ()  # NAME=VALUE, beside those of the file
+    scenario: str  # name of a shipped scenario, or random-SEED
+    steer_by: str = "sticks"  # output of the companion, one of `STEER_BY`
+    sticks_by: str = "manual-control"  # message that carries the sticks, one of `STICKS_BY`
+    fault: str = ""  # one of `FAULTS`, or empty
+    level_dive: float = 0.6  # m, depth of the dive after arming
+    parameters: tuple[str, ...] = ()  # NAME=VALUE of ArduSub, in addition to `PARAMETERS`
 
     @property
     def key(self) -> str:
-        """The flight's name in the file."""
+        """The flight's key in the file of results."""
         return json.dumps([self.scenario, self.steer_by, self.sticks_by, self.fault, self.level_dive, self.parameters])
 
     @property
     def is_random(self) -> bool:
-        """Whether it is in a random scene; those have a DVL in place of GPS."""
+        """True for a flight in a random scene; those have a DVL in place of GPS."""
         return self.scenario.startswith(_RANDOM) and self.scenario.removeprefix(_RANDOM).isdecimal()
 
     def load(self) -> Scenario:
@@ -87,18 +88,18 @@ def fly(task: Task, ardusub: Path, instance: int, folder: Path) -> dict[str, Any
     Parameters
     ----------
     task : Task
-        The flight.
+        Definition of the flight.
     ardusub : Path
-        ArduSub's program for SITL.
+        Path of ArduSub's program for SITL.
     instance : int
-        Of ArduSub: its ports are 5760 + 10 × instance and two above.
+        Number of the ArduSub instance: its ports are 5760 + 10 × instance, and those 2 and 3 above.
     folder : Path
-        For its files; what it has is removed.
+        Folder for the files of the flight; its present contents are removed.
 
     Returns
     -------
     dict
-        For JSON.
+        Result of the flight, as values for JSON.
     """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -123,7 +124,7 @@ def fly(task: Task, ardusub: Path, instance: int, folder: Path) -> dict[str, Any
         if task.fault:
             link.others = stack.enter_context(GroundLink(endpoints[1], identity=GROUND_STATION))
         flown = Flown()
-        with contextlib.suppress(RunError):  # the companion's; the plant's record stays
+        with contextlib.suppress(RunError):  # the companion has failed; the plant's record remains
             flights.fly(lambda: _steer(task, scenario, link, flown, folder), server.counts)
     result = {"key": task.key, "status": flown.status, "wall": round(time.monotonic() - begun, 1)}
     return result | judge(scenario, flown, folder / "plant")
@@ -149,7 +150,7 @@ def _running(ardusub: Path, instance: int, port: int, folder: Path, task: Task) 
 
 
 def _steer(task: Task, scenario: Scenario, link: SimulatedLink, flown: Flown, folder: Path) -> str:
-    """Wait until the vehicle is at its start, and let the companion fly it; return the status of the plant's run."""
+    """Wait until the vehicle is at its start, fly it with the companion, and return the status of the plant's run."""
     m = dialect()
     while link.clock() < _LOWERED:
         link.advance()
@@ -188,13 +189,13 @@ def make_flights(
     Parameters
     ----------
     tasks : sequence of Task
-        The flights.
+        Definitions of the flights.
     ardusub : Path
-        ArduSub's program for SITL.
+        Path of ArduSub's program for SITL.
     instance : int
-        Of ArduSub.
+        Number of the ArduSub instance, for its ports.
     out : Path, optional
-        File of the flights, to which new ones are added; those that it has are not repeated.
+        File of results, one line per flight; flights in it are not repeated, new ones are appended.
     keep : Path, optional
         Folder in which each flight's files are kept.
     """

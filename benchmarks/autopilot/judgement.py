@@ -1,4 +1,4 @@
-"""What the plant's record says of a flight: clearances by the true pose, and what followed where something failed."""
+"""Evaluation of a flight from the plant's record: clearances at the true pose, and the reaction to a fault."""
 
 from __future__ import annotations
 
@@ -15,40 +15,40 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.signals import Array
 
-_STAYED = 2.0  # s at the end, in which the goal is not left
+_STAYED = 2.0  # s, time at the end in which the vehicle must stay in the goal
 
 
 @dataclass
 class Flown:
-    """What happened in a flight, by the times of the plant [s]."""
+    """Events of a flight, with times of the plant [s]."""
 
-    states: list[tuple[float, str]] = field(default_factory=list)
-    failed_at: float = math.nan
-    status: str = ""
-    offset: list[float] = field(default_factory=lambda: [math.nan] * 3)
-    begun: float = math.nan  # of the plant's record
+    states: list[tuple[float, str]] = field(default_factory=list)  # begin [s] and name of each state of the companion
+    failed_at: float = math.nan  # s, time of the fault
+    status: str = ""  # status of the companion's run
+    offset: list[float] = field(default_factory=lambda: [math.nan] * 3)  # m, NED, of the autopilot's origin
+    begun: float = math.nan  # s, begin of the plant's record
 
     def first(self, *states: str) -> float:
-        """Return when one of some states was first entered; NaN if none was."""
+        """Return the time [s] at which one of the states was first entered; NaN if none was."""
         return next((at for at, state in self.states if state in states), math.nan)
 
 
 def judge(scenario: Scenario, flown: Flown, folder: Path) -> dict[str, Any]:
-    """Return what the plant's record says of the time since the vehicle began to dive or to be steered.
+    """Evaluate the plant's record from the begin of the dive, or of steering, to the end of the flight.
 
     Parameters
     ----------
     scenario : Scenario
-        Its regions move from the begin of steering on; in the record they do since the plant began.
+        Scenario with the regions, which move from the begin of steering on; in the record they move from its begin.
     flown : Flown
-        What happened.
+        Events of the flight.
     folder : Path
-        The plant's run.
+        Folder of the plant's run.
 
     Returns
     -------
     dict
-        For JSON.
+        Result of the flight, as values for JSON.
     """
     since, steered = flown.first("diving", "steering"), flown.first("steering")
     if not math.isfinite(steered) or not folder.exists():
@@ -95,16 +95,16 @@ def judge(scenario: Scenario, flown: Flown, folder: Path) -> dict[str, Any]:
 
 
 def clearances_at(scenario: Scenario, record: Record, time: Array) -> Array:
-    """Return the clearances of goal and regions at the poses of a record, shape (rows, n + 1).
+    """Return the clearances of goal and regions at the poses of a record [m], shape (rows, n + 1).
 
     Parameters
     ----------
     scenario : Scenario
-        With the regions, which move from time 0 on.
+        Scenario with the regions, which move from time 0 on.
     record : Record
-        Of the plant.
+        Record of the plant.
     time : ndarray, shape (rows,)
-        Of its rows [s].
+        Times of the rows since the begin of steering [s].
     """
     environment, shifts = RegionEnvironment(scenario), np.zeros((len(scenario.moving), 3))
     positions = np.stack([record[f"position.{axis}"] for axis in "xyz"], axis=1)
@@ -117,7 +117,7 @@ def clearances_at(scenario: Scenario, record: Record, time: Array) -> Array:
 
 
 def _after_fault(record: Record, at: Array, flown: Flown, scenario: Scenario, found: Array) -> dict[str, Any]:
-    """Return what happened after the fault: when steering was left, which mode followed, and how far it went."""
+    """Return the reaction to the fault: end of steering, mode, speeds, distance traveled, tilt, violated regions."""
     failed = flown.failed_at
     left = flown.first("held", "pilot")
     velocity = np.linalg.norm([record[f"velocity.{name}"] for name in "uvw"], axis=0)

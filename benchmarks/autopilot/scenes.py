@@ -12,23 +12,23 @@ from plant_fmu import load_vehicle
 GOAL_RADIUS = 0.5  # m
 VEHICLE = "bluerov2_heavy"
 _FREE = 0.6  # m, least distance of an obstacle from the start, from the dive below it, and from the goal
-_DIVE = 0.6  # m
-_OFTEN = 1000  # draws of an obstacle that finds no place
+_DIVE = 0.6  # m, depth of the dive below the start
+_MOST_DRAWS = 1000  # draws of an obstacle, after which it is left out
 
 
 def random_scene(seed: int) -> Scenario:
-    """Make the scene of a seed.
+    """Make a random scene.
 
     Parameters
     ----------
     seed : int
-        0 or above.
+        Seed of the random numbers, 0 or above.
 
     Returns
     -------
     Scenario
-        6 to 30 spheres of 0.3 m to 0.9 m, a goal 8 m to 12 m ahead, a current of up to 0.4 m/s, and a vehicle that is
-        up to 15 N too light or too heavy. Its DVL measures with a noise of 0.01 m/s, 8 times a second.
+        Scene with up to 30 spheres of radius 0.3 m to 0.9 m, a goal 8 m to 12 m ahead, a current of up to 0.4 m/s, and
+        a vehicle that is up to 15 N too light or too heavy. Its DVL measures 8 times a second with a noise of 0.01 m/s.
     """
     rng = np.random.default_rng([20261125, seed])
     start = np.array([0.0, 0.0, rng.uniform(1.5, 4.0)])
@@ -41,11 +41,11 @@ def random_scene(seed: int) -> Scenario:
          "shape": {"type": "depth_band", "depth": 3.65, "tolerance": 3.35}}
     ]  # fmt: skip
     for i in range(int(rng.integers(6, 31))):
-        for _ in range(_OFTEN):
+        for _ in range(_MOST_DRAWS):
             radius = rng.uniform(0.3, 0.9)
             center = start + rng.uniform(0.1, 0.9) * (goal - start) + rng.normal(0.0, [0.5, 1.5, 1.0])
-            room = min(*(np.linalg.norm(center - p) for p in places), np.linalg.norm(center - goal) - GOAL_RADIUS)
-            if room - radius > _FREE:
+            away = min(*(np.linalg.norm(center - p) for p in places), np.linalg.norm(center - goal) - GOAL_RADIUS)
+            if away - radius > _FREE:
                 shape = {"type": "sphere", "centre": center.tolist(), "radius": float(radius)}
                 regions.append(
                     {"name": f"rock {i + 1}", "criterion": "obstacle", "keep": "out", "gain": 100.0, "shape": shape}

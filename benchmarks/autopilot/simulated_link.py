@@ -1,4 +1,4 @@
-"""The companion's link in simulated time, and what fails on it on purpose."""
+"""The companion's link in simulated time, with faults on purpose."""
 
 from __future__ import annotations
 
@@ -15,28 +15,32 @@ from cosim.mavlink.wire.ground_end import GROUND_STATION, GroundLink, Heard
 from cosim.sitl.flights import Flights
 from cosim.sitl.server import JsonServer
 
-_DOWN, _UP = 0.010, 0.020  # s, of messages from the autopilot and to it
-_READ_EVERY = 0.004  # s
+_DOWN, _UP = 0.010, 0.020  # s, delays of messages from the autopilot and to it
+_READ_EVERY = 0.004  # s, period of reading the autopilot's port
 
 
 class SimulatedLink:
-    """The companion's link, whose time is the plant's: waiting for a message lets plant and autopilot go on.
+    """The companion's link in the plant's time: waiting for a message advances plant and autopilot.
 
     Parameters
     ----------
     flights : Flights
-        Whose plant flies.
+        Runs of the plant.
     server : JsonServer
-        Answers the autopilot's frames.
+        Server that answers the autopilot's frames.
     endpoint : str
-        Port of the autopilot.
+        Endpoint of the autopilot's MAVLink port.
 
     Attributes
     ----------
     cut : bool
-        Whether no message passes in either direction.
+        True if all messages in both directions are lost.
     lost : set of str
-        Names of messages of the autopilot, and of the companion, that do not pass.
+        Names of messages that are lost in both directions.
+    others : GroundLink, optional
+        Link of a pilot's station to the autopilot.
+    events : list of (float, callable)
+        Times [s] and functions to call at them, in the order of time.
     """
 
     def __init__(self, flights: Flights, server: JsonServer, endpoint: str) -> None:
@@ -44,7 +48,7 @@ class SimulatedLink:
         self._link = GroundLink(parse_endpoint(endpoint), identity=COMPANION)
         self.name, self.identity = endpoint, COMPANION
         self.cut, self.lost = False, set[str]()
-        self.others: GroundLink | None = None  # a pilot's station
+        self.others: GroundLink | None = None
         self._up: deque[tuple[float, Any]] = deque()
         self._down: deque[Heard] = deque()
         self._read_at = -math.inf
@@ -56,12 +60,12 @@ class SimulatedLink:
         return 0.0 if flight is None else self.waited() + flight.steps * flight.scenario.time.step
 
     def waited(self) -> float:
-        """Return how long the plant was held before its record began [s]."""
+        """Return the time for which the plant was held before its record began [s]."""
         flight = self._flights.flight
         return 0.0 if flight is None else flight.waited * flight.scenario.time.step
 
     def receive(self, timeout: float) -> Sequence[Heard]:
-        """Let time go by, and return the messages that have come meanwhile."""
+        """Advance the plant by `timeout` [s], and return the messages that have arrived."""
         until = self.clock() + timeout
         while self.clock() < until - 1e-9:
             self.advance()
@@ -89,13 +93,13 @@ class SimulatedLink:
             return
         self._read_at = now
         if self.others is not None:
-            self.others.receive(0.0)  # which connects it, too
+            self.others.receive(0.0)  # connects the link as well
         for one in self._link.receive(0.0):
             if not self.cut and one.kind not in self.lost:
                 self._down.append(one._replace(time=now + _DOWN))
 
     def close(self) -> None:
-        """Close it."""
+        """Close the link to the autopilot."""
         self._link.close()
 
 

@@ -1,1 +1,1 @@
-"""The contests with peers, a file for each subject: a function of the peers' environment that yields contests."""
+"""The contests with peers, one module per subject, with a function `contests` of the peers' environment."""

@@ -24,15 +24,15 @@ from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 
 SCENARIO = "paper"
-STEP = 0.01  # s, in which law, arbiter and plant take one step each
+STEP = 0.01  # s, common step of law, arbiter and plant
 CHANGES = (
     "arbiter.engine=closed", "law.name=ismail_dunnigan", f"plant.substep={STEP}",
     *(f"time.{key}={STEP}" for key in ("step", "control", "arbiter")),
 )  # fmt: skip
-RUN = 30.0  # s
-BATCH = 64  # flights at once
-_FLYERS = {"fused": "FusedFlyer", "lanes": "LanesFlyer"}
-# distribution, and module of `benchmarks.peers`
+RUN = 30.0  # s, duration of a run
+BATCH = 64  # default of the number of concurrent runs
+_FLYERS = {"fused": "FusedFlyer", "lanes": "LanesFlyer"}  # classes in the modules of `cosim.batch`
+# name in the table: distribution, and module of `benchmarks.peers`
 _MASTERS = {
     "FMPy, simulate_ssp": ("fmpy", "fmpy_system"),
     "Ecos": ("ecospy", "ecos_system"),
@@ -131,13 +131,13 @@ def flights(
     engine : str
         ``"fused"`` or ``"lanes"``.
     per_run : bool
-        True if an item is a run, and not a step.
+        True if an item is a run, False if it is a step.
     changes : sequence of str
         Changes of the scenario, after `CHANGES`.
     batch : int
         Least number of concurrent runs.
     whole : bool
-        True if an item is a batch.
+        True if an item is a batch; it takes precedence over `per_run`.
     """
 
     def entry(stack: ExitStack) -> Contestant:

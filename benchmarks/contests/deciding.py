@@ -16,9 +16,9 @@ from benchmarks.peer_process import peer
 from benchmarks.timing import Contestant, Own
 from fuzzy_arbiter import SECTION_VI, Arbiter
 
-POINTS = 101
+POINTS = 101  # number of points of scikit-fuzzy's universes
 LAWS = ("ismail_dunnigan", "deployable")
-OBSTACLES = 6
+OBSTACLES = 6  # number of obstacles on the path of a law
 
 
 def contests(environment: Environment) -> Iterator[Contest]:
@@ -67,9 +67,9 @@ class _Decisions:
     Parameters
     ----------
     decide : callable
-        Function of the inputs.
+        Function of the inputs to time.
     made : callable
-        Converts a row of inputs to the argument of `decide`.
+        Function that converts a row of inputs to the argument of `decide`.
     """
 
     def __init__(self, decide: Callable[[Any], object], made: Callable[[list[float]], Any] = list) -> None:

@@ -10,9 +10,9 @@ from benchmarks.peer_environment import Environment
 from benchmarks.peer_process import peer
 from benchmarks.timing import Contestant, Own, each
 
-SOURCE = (1, 1)
-ATTITUDE = (1, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
-FRAMES = 6_000
+SOURCE = (1, 1)  # system id and component id of the sender
+ATTITUDE = (1, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)  # fields of the message: ms; rad; rad/s
+FRAMES = 6_000  # frames of a run
 
 
 def contests(environment: Environment) -> Iterator[Contest]:
@@ -50,7 +50,7 @@ def _frame(_: ExitStack) -> Contestant:
 
 
 class _Lockstep:
-    """Whole runs, timed by the autopilot's stand-in."""
+    """A contestant: whole runs, timed by the stand-in for an autopilot."""
 
     def seconds(self, count: int) -> float:
         from benchmarks.sitl import lockstep

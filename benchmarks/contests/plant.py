@@ -16,9 +16,9 @@ from plant_fmu import Plant, load_vehicle
 from plant_fmu.build import cached_fmu
 
 VEHICLE = "odin"
-STEP = 0.01  # s, one integration step for all
-THRUST = [3.0, 0.0, 0.0, 0.0, 0.0, -2.0, 0.0, 0.0]  # N
-WRENCH = [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]  # N, N m
+STEP = 0.01  # s, common integration step
+THRUST = [3.0, 0.0, 0.0, 0.0, 0.0, -2.0, 0.0, 0.0]  # N, commanded force of each thruster
+WRENCH = [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]  # N, N m, body frame, external wrench
 START = {"thrust[1]": THRUST[0], "thrust[6]": THRUST[5], "wrench.Y": WRENCH[1], "substep": STEP}
 
 

@@ -55,7 +55,7 @@ def _second(stack: ExitStack) -> Contestant:
 
 
 class _Command:
-    """The project's command as a process, with caches of its own."""
+    """Process of the project's command, with caches of its own."""
 
     def __init__(self, stack: ExitStack, arguments: Sequence[str]) -> None:
         self._folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="start-")))

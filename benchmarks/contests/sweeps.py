@@ -1,4 +1,4 @@
-"""Sweeps of the closed loop by several workers, processes or a Dask cluster, which are started and have compiled."""
+"""Sweeps of the closed loop by workers, processes or a Dask cluster, that have started and compiled before."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from benchmarks.contests.closed_loop import CHANGES, RUN, SCENARIO
 from benchmarks.timing import Contestant
 from cosim.scenario.scenario import load_scenario
 
-_VARIED = ("initial.position.0=-0.2:0.2",)
-_WARMING = 64  # rows
+_VARIED = ("initial.position.0=-0.2:0.2",)  # m, varied key and its range
+_WARMING = 64  # rows per worker of the sweeps before the timing
 
 
 def sweep(pool: str, workers: int, engine: str) -> Entry:
-    """Return the entry of a sweep, whose items are runs; from the call to the summary, its folder included.
+    """Return the entry of a sweep, whose items are runs; the time includes its folder and summary.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def sweep(pool: str, workers: int, engine: str) -> Entry:
 
     def entry(stack: ExitStack) -> Contestant:
         contestant = _Sweep(stack.enter_context(_executor(pool, workers)), workers, engine, stack)
-        for _ in range(2):  # each worker has its part
+        for _ in range(2):  # so that each worker has compiled
             contestant.seconds(_WARMING * workers)
         return contestant
 

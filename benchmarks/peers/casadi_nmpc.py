@@ -30,13 +30,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-_FAR = (0.0, 0.0, -1e3, 0.1, 0.0, 0.0, 0.0)  # parked position of unused obstacles
-_NO_PLANE = (0.0, 0.0, 0.0, -1e3)  # always satisfied, and nearly free
-_SLACK = 1e4  # price of a metre, and of its square
-_LONGEST = 0.3  # s of computation for a plan
+_FAR = (0.0, 0.0, -1e3, 0.1, 0.0, 0.0, 0.0)  # m, m/s, an unused obstacle: parked center, radius, velocity
+_NO_PLANE = (0.0, 0.0, 0.0, -1e3)  # plane that is always satisfied, with nearly no cost
+_SLACK = 1e4  # 1/m, 1/m2, weight of the slack, and of its square
+_LONGEST = 0.3  # s, longest computation of a plan
 _THRUSTERS = 8
-_SMOOTH = 0.05  # m
-_ANGULAR = 1.5154  # rad/s2, scale of moments that are missing: what two thrusters of ODIN give at its inertia
+_SMOOTH = 0.05  # m, width in which the depth within soft regions is smooth
+_ANGULAR = 1.5154  # rad/s2, scale of missing moments: the acceleration of ODIN by two of its thrusters
 _WEIGHTS = ("interval", "margin", "w_p", "w_u", "w_m", "w_v", "w_s")
 
 
@@ -52,12 +52,14 @@ def controller(setup: dict[str, Any]) -> Callable[[dict[str, Any]], dict[str, An
     Returns
     -------
     callable
-        Given ``position``, ``velocity`` (world), ``R``, ``disturbance`` [m/s2], ``moment`` and ``hold`` [N m], now and
-        later, ``goal`` and ``goal_velocity``, ``spheres`` (n, 7: centre, radius, velocity), planes of regions ``hard``
-        and ``soft``, each (stages, 4: normal, least coordinate along it), ``weights``, and at the start of a flight
-        ``vehicle``, it returns ``forces`` [N], ``success``, the ``path`` (stages, 3) as expected at the next plan, and
-        ``seconds`` that the solver took. A vehicle has ``mass`` (3, 3), ``inertia`` (3,), ``linear`` and ``quadratic``
-        drag (3,), ``thrusters`` (6, 8), ``least`` and ``most`` (8,).
+        Function of a dict with ``position`` and ``velocity`` [m, m/s, NED]; ``R`` from body to world; ``disturbance``
+        [m/s2, NED]; the attitude loop's moments now, ``moment``, and later, ``hold`` [N m]; ``goal`` and
+        ``goal_velocity`` [m, m/s, NED]; ``spheres`` (n, 7: centre, radius, velocity); planes of ``hard`` and ``soft``
+        regions, each (stages, 4: normal, least coordinate along it); ``weights``; ``again``, True at the start of a
+        flight, and then ``vehicle``. It returns ``forces`` [N]; ``success``, True if the solver converged; ``path``
+        (stages, 3), expected positions at the stages of the next plan [m, NED]; ``seconds``, computation time. A
+        vehicle has ``mass`` (3, 3) [kg], ``inertia`` (3,) [kg m2], ``linear`` and ``quadratic`` drag (3,),
+        ``thrusters`` (6, 8), ``least`` and ``most`` forces (8,) [N].
     """
     program = _Program(setup)
     plan = np.zeros(0)  # the plan before
@@ -98,12 +100,12 @@ def controller(setup: dict[str, Any]) -> Callable[[dict[str, Any]], dict[str, An
 
 
 class _Program:
-    """The program, compiled, with the arrays of its arguments.
+    """The compiled nonlinear program, with the arrays of its arguments.
 
     Parameters
     ----------
     setup : dict
-        As of `controller`.
+        Setup of `controller`.
     """
 
     def __init__(self, setup: dict[str, Any]) -> None:
@@ -118,7 +120,7 @@ class _Program:
         self._p = _shared(sum(a * b for a, b in shapes.values()))
         self._parts: dict[str, Any] = {}
         first = 0
-        for name, (rows, columns) in shapes.items():  # column by column, as CasADi does
+        for name, (rows, columns) in shapes.items():  # column-major, like CasADi
             part = self._p[first : first + rows * columns]
             self._parts[name] = part.reshape(columns, rows).T
             first += rows * columns
@@ -145,8 +147,8 @@ class _Program:
         for i, argument in enumerate(arguments):
             self._buffer.set_arg(i, memoryview(argument))
         self._buffer.set_res(0, memoryview(self._found))
-        self._kept = arguments  # as long as the buffer refers to them
-        self._child: tuple[int, int, int] | None = None  # process, pipes to it and from it
+        self._kept = arguments  # the buffer refers to these arrays
+        self._child: tuple[int, int, int] | None = None  # process id, file descriptors of the pipes to and from it
 
     def set(self, **values: Any) -> None:
         """Set parameters by name."""
@@ -155,13 +157,13 @@ class _Program:
             part[...] = np.asarray(value, dtype=float).reshape(part.shape)
 
     def bound_inputs(self, least: np.ndarray, most: np.ndarray) -> None:
-        """Bound the inputs of all stages, (8,)."""
+        """Set the bounds of the inputs of all stages, shape (8,), as fractions of the greatest forces."""
         for k in range(self._stages):
             inputs = slice(k * self._width + 6, k * self._width + 6 + _THRUSTERS)
             self._low[inputs], self._high[inputs] = least, most
 
     def solve(self, guess: np.ndarray) -> tuple[np.ndarray, bool]:
-        """Return the plan found from a guess, and if the solver converged; the guess if it took too long."""
+        """Solve from a guess; return the plan, and True if the solver converged. Return the guess after a timeout."""
         self._guess[:] = guess
         self._child = self._child or self._fork()
         process, asks, answers = self._child
@@ -175,7 +177,7 @@ class _Program:
         return guess.copy(), False
 
     def _fork(self) -> tuple[int, int, int]:
-        """Start a child that solves whenever it is asked; it ends with the pipe, or by the timer's signal."""
+        """Start a child process that solves for each byte in its pipe; it ends with the pipe, or by the timer."""
         (asked, asks), (answers, answered) = os.pipe(), os.pipe()
         process = os.fork()
         if process == 0:
@@ -194,43 +196,43 @@ class _Program:
         return process, asks, answers
 
     def rest(self, position: list[float]) -> np.ndarray:
-        """Return the plan to stay."""
+        """Return the plan to rest at a position."""
         plan = np.zeros(self._guess.size)
         for k in range(self._stages + 1):
             plan[k * self._width : k * self._width + 3] = position
         return plan
 
     def shifted(self, plan: np.ndarray, share: float) -> np.ndarray:
-        """Return a plan, a share of an interval later."""
+        """Return a plan shifted in time by a fraction of an interval."""
         later = plan.copy()
         now = plan[: self._stages * self._width].reshape(self._stages, self._width)
         later[: now.size - self._width] += share * (now[1:] - now[:-1]).ravel()
         return later
 
     def first_inputs(self, plan: np.ndarray) -> np.ndarray:
-        """Return the inputs of the first stage, (8,)."""
+        """Return the inputs of the first stage, shape (8,), as fractions of the greatest forces."""
         return plan[6 : 6 + _THRUSTERS]
 
     def positions(self, plan: np.ndarray) -> np.ndarray:
-        """Return the positions after the first stage, (stages, 3)."""
+        """Return the positions after each stage, shape (stages, 3) [m, NED]."""
         return plan[[[k * self._width + axis for axis in range(3)] for k in range(1, self._stages + 1)]]
 
 
 def _shared(count: int) -> np.ndarray:
-    """Return zeros that child processes share."""
+    """Return an array of zeros in memory that child processes share."""
     return np.frombuffer(mmap.mmap(-1, 8 * count))
 
 
 def _symbols(
     known: dict[str, ca.SX], setup: dict[str, Any]
 ) -> tuple[dict[str, ca.SX], tuple[list[float], list[float]]]:
-    """Return the program, and the bounds of its constraints."""
+    """Return the symbols of the program, and the lower and upper bounds of its constraints."""
     N, n, hard = setup["stages"], setup["obstacles"], setup["hard"]
     count = hard + setup["soft"]
     variables, rows, cost, following = [], [], ca.SX(0), None
     low: list[float] = []
     high: list[float] = []
-    constraints: list[ca.SX] = []  # of the stage before
+    constraints: list[ca.SX] = []  # constraints of the previous stage
     for k in range(N + 1):
         x, s = ca.SX.sym(f"x{k}", 6), ca.SX.sym(f"s{k}")
         # fatrop finds the stages by this order: variables of a stage, its dynamics, its constraints
@@ -274,7 +276,7 @@ def _symbols(
 
 
 def _next(x: ca.SX, u: ca.SX, known: dict[str, ca.SX]) -> ca.SX:
-    """Return the state an interval later, by an exponential Rosenbrock step.
+    """Return the state after one interval, by an exponential Rosenbrock step.
 
     A midpoint step is unstable where the slope of the drag, divided by the mass, exceeds 2 / interval, as for a
     BlueROV2 from 0.3 m/s on.
@@ -294,7 +296,7 @@ def _next(x: ca.SX, u: ca.SX, known: dict[str, ca.SX]) -> ca.SX:
 
 
 def _nearest(spheres: list[list[float]], position: list[float], count: int) -> np.ndarray:
-    """Return the nearest spheres, others parked, shape (7, count)."""
+    """Return the nearest spheres, padded with parked ones, shape (7, count)."""
     balls = np.array(spheres, dtype=float).reshape(-1, 7)
     near = np.argsort(np.linalg.norm(balls[:, :3] - position, axis=1) - balls[:, 3])[:count]
     return np.vstack([balls[near], *[_FAR] * (count - len(near))]).reshape(-1, 7).T

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from importlib import metadata
 from typing import Any
 
-if sys.platform == "linux":  # its library needs TBB, and does not find where pip puts it
+if sys.platform == "linux":  # Ecos needs TBB, and does not find the library that pip installs
     for file in metadata.files("tbb") or []:
         if file.name == "libtbb.so.12":
             ctypes.CDLL(str(file.locate()), mode=ctypes.RTLD_GLOBAL)
@@ -25,18 +25,18 @@ def _opened(setup: dict[str, Any]) -> Any:
 
 
 def _step(simulation: Any, count: int) -> None:
-    if not simulation.step(count) > 0.0:  # which returns the time
+    if not simulation.step(count) > 0.0:  # it returns the time
         raise RuntimeError(EcosLib.get_last_error())
 
 
 def steps(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that takes so many steps in one call."""
+    """Return a function that runs a given number of steps in one call."""
     simulation = _opened(setup)
     return lambda count: _step(simulation, count)
 
 
 def runs(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that does so many whole runs, each of which loads and unpacks."""
+    """Return a function that makes a given number of whole runs, each with loading and unpacking."""
     whole = round(setup["duration"] / setup["step"])
 
     def work(count: int) -> None:

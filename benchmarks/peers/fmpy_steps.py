@@ -11,7 +11,7 @@ from fmpy.fmi3 import FMU3Slave
 
 
 def loop(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that takes so many steps: sets all inputs, steps, reads all outputs and flags, with lists."""
+    """Return a function that runs a given number of steps: set all inputs, step, read all outputs and flags."""
     folder = fmpy.extract(setup["fmu"], setup.get("folder"))
     description = fmpy.read_model_description(folder)
     two = description.fmiVersion.startswith("2")
@@ -55,7 +55,7 @@ def loop(setup: dict[str, Any]) -> Callable[[int], object]:
 
 
 def simulate(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that simulates so many steps in one call."""
+    """Return a function that simulates a given number of steps in one call."""
     folder = fmpy.extract(setup["fmu"], setup.get("folder"))
     description = fmpy.read_model_description(folder)
 

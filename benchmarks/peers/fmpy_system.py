@@ -1,4 +1,4 @@
-"""FMPy's `simulate_ssp`."""
+"""FMPy running a system structure by its `simulate_ssp`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from fmpy.ssp.simulation import simulate_ssp
 
-_LONG = 3000  # steps
+_LONG = 3000  # steps, least length of the timed run
 
 
 def _simulate(setup: dict[str, Any], count: int) -> None:
@@ -17,7 +17,7 @@ def _simulate(setup: dict[str, Any], count: int) -> None:
 
 
 def steps(setup: dict[str, Any]) -> Callable[[int], float]:
-    """Return a function that measures the time of so many steps [s]: in a long run, less the time to load."""
+    """Return a function that measures the time of a number of steps [s], in a long run without the time to load."""
 
     def work(count: int) -> float:
         long = max(count, _LONG)
@@ -31,7 +31,7 @@ def steps(setup: dict[str, Any]) -> Callable[[int], float]:
 
 
 def runs(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that simulates so many whole runs, each of which loads and unpacks."""
+    """Return a function that simulates a given number of whole runs, each with loading and unpacking."""
     whole = round(setup["duration"] / setup["step"])
 
     def work(count: int) -> None:

@@ -16,7 +16,7 @@ from typing import Any
 
 LIBRARIES = ("pyfuzzylite", "simpful")
 
-# ranges, and the points of each term
+# variables: range, and points (value, degree) of each term
 _DEGREE = ((0.0, 1.0), {"off": ((0.0, 1.0), (1.0, 0.0)), "on": ((0.0, 0.0), (1.0, 1.0))})
 _WEIGHT = ((0.0, 1.0), {"low": ((0.0, 1.0), (1.0, 0.0)), "high": ((0.0, 0.0), (1.0, 1.0))})
 _MARK = (
@@ -140,7 +140,7 @@ _LIBRARIES = {"pyfuzzylite": pyfuzzylite, "simpful": simpful}
 
 
 def evaluations(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that evaluates so many times, with other inputs each time."""
+    """Return a function that makes a given number of evaluations, with new inputs each time."""
     evaluate, _ = _LIBRARIES[setup["library"]](setup["system"], setup["resolution"])
     n, rng = len(SYSTEMS[setup["system"]][0]), random.Random(0)
     inputs = itertools.cycle([[rng.random() for _ in range(n)] for _ in range(1000)])
@@ -153,7 +153,7 @@ def evaluations(setup: dict[str, Any]) -> Callable[[int], object]:
 
 
 def batches(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that evaluates so many rows at once; of these libraries only pyfuzzylite can."""
+    """Return a function that evaluates a given number of rows at once, which only pyfuzzylite supports."""
     import fuzzylite
     import numpy as np
 

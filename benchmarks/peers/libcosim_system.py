@@ -10,7 +10,7 @@ from typing import Any
 from libcosimpy.CosimExecution import CosimExecution
 from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
 
-_TICKS = 10**9  # a second: it counts time in whole nanoseconds
+_TICKS = 10**9  # ticks per second: libcosim counts time in nanoseconds
 
 
 def _unpacked(setup: dict[str, Any]) -> str:
@@ -32,13 +32,13 @@ def _step(execution: Any, count: int) -> None:
 
 
 def steps(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that takes so many steps in one call."""
+    """Return a function that runs a given number of steps in one call."""
     execution = _opened(_unpacked(setup), setup)
     return lambda count: _step(execution, count)
 
 
 def runs(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that does so many whole runs, each of which loads, from files that are unpacked."""
+    """Return a function that makes a given number of whole runs, each with loading, from unpacked files."""
     folder, whole = _unpacked(setup), round(setup["duration"] / setup["step"])
 
     def work(count: int) -> None:

@@ -31,7 +31,7 @@ def _body(setup: dict[str, Any]) -> tuple[Any, Any]:
 
 
 def steps(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that takes so many steps, one call from Python each: forces set, state read."""
+    """Return a function that runs a given number of steps, one call each, and sets forces and reads the state."""
     model, data = _body(setup)
     wrench = setup["wrench"]
 
@@ -45,6 +45,6 @@ def steps(setup: dict[str, Any]) -> Callable[[int], object]:
 
 
 def loop(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that takes so many steps in one call."""
+    """Return a function that runs a given number of steps in one call."""
     model, data = _body(setup)
     return lambda count: mujoco.mj_step(model, data, nstep=count)

@@ -30,7 +30,7 @@ def rate(s: Array, tau: Array, numbers: Numbers, force: Array, out: Array) -> No
     out[4] = 0.5 * (e0 * p - e3 * q + e2 * r)
     out[5] = 0.5 * (e3 * p + e0 * q - e1 * r)
     out[6] = 0.5 * (-e2 * p + e1 * q + e0 * r)
-    # momenta of body and water, and their rates in the turning frame
+    # momenta of body and added mass, and the forces of their rotation with the body frame
     m0 = m1 = m2 = m3 = m4 = m5 = 0.0
     for j in range(6):
         x = s[7 + j]
@@ -58,10 +58,10 @@ def rate(s: Array, tau: Array, numbers: Numbers, force: Array, out: Array) -> No
 
 @numba.njit
 def step(
-    s: Array, thrust: Array, wrench: Array, B: Array, low: Array, high: Array, numbers: Numbers, h: float, room: Array
+    s: Array, thrust: Array, wrench: Array, B: Array, low: Array, high: Array, numbers: Numbers, h: float, work: Array
 ) -> None:
-    """Advance the state by one step of Runge-Kutta [s]; `room`, shape (7, 13), is scratch space."""
-    tau, k1, k2, k3, k4, there, force = room[0], room[1], room[2], room[3], room[4], room[5], room[6]
+    """Advance the state by one step of Runge-Kutta [s]; `work`, shape (7, 13), is scratch space."""
+    tau, k1, k2, k3, k4, there, force = work[0], work[1], work[2], work[3], work[4], work[5], work[6]
     for i in range(6):
         tau[i] = wrench[i]
         for j in range(thrust.size):
@@ -85,16 +85,16 @@ def step(
 
 @numba.njit
 def many(
-    s: Array, thrust: Array, wrench: Array, B: Array, low: Array, high: Array, numbers: Numbers, h: float, room: Array,
+    s: Array, thrust: Array, wrench: Array, B: Array, low: Array, high: Array, numbers: Numbers, h: float, work: Array,
     count: int,
 ) -> None:  # fmt: skip
     """Run `count` steps."""
     for _ in range(count):
-        step(s, thrust, wrench, B, low, high, numbers, h, room)
+        step(s, thrust, wrench, B, low, high, numbers, h, work)
 
 
 def arguments(setup: dict[str, Any]) -> tuple[Any, ...]:
-    """Return the arguments of `step`, the state first, of a setup."""
+    """Return the arguments of `step` for a setup."""
     v = {key: np.array(value, dtype=np.float64) for key, value in setup["vehicle"].items()}
     (x, y, z), m = v["r_G"], float(v["mass"])
     S = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
@@ -110,7 +110,7 @@ def arguments(setup: dict[str, Any]) -> tuple[Any, ...]:
 
 
 def steps(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that takes so many steps, one call from Python each."""
+    """Return a function that runs a given number of steps, one call from Python each."""
     known = arguments(setup)
 
     def work(count: int) -> None:
@@ -121,6 +121,6 @@ def steps(setup: dict[str, Any]) -> Callable[[int], object]:
 
 
 def loop(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that takes so many steps in compiled code."""
+    """Return a function that runs a given number of steps in compiled code."""
     known = arguments(setup)
     return lambda count: many(*known, count)

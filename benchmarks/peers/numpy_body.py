@@ -1,4 +1,4 @@
-"""The odin vehicle in NumPy, as people write it: Fossen's equations, a quaternion, Runge-Kutta of order four."""
+"""The odin vehicle in plain NumPy: Fossen's equations, a quaternion, Runge-Kutta of order four."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 
 def skew(a: Array) -> Array:
-    """Return the matrix of the cross product from the left."""
+    """Return the matrix S of the cross product, S b = a x b."""
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
@@ -25,17 +25,17 @@ def coriolis(momentum: Array) -> Array:
 
 
 class Body:
-    """A rigid body in still water, without thrusters' lag.
+    """A rigid body in still water, without lag of the thrusters.
 
     Parameters
     ----------
     numbers : dict
-        Those of `benchmarks.vehicle_numbers`.
+        Numbers of the vehicle, from `benchmarks.vehicle_numbers`.
 
     Attributes
     ----------
     state : ndarray, shape (13,)
-        Position, quaternion, body velocity.
+        Position [m, NED], quaternion from body to world, velocity [m/s, rad/s, body frame].
     """
 
     def __init__(self, numbers: dict[str, Any]) -> None:
@@ -51,7 +51,7 @@ class Body:
         self.state[3] = 1.0
 
     def limited(self, thrust: Array) -> Array:
-        """Return the forces of the thrusters [N]."""
+        """Return commanded forces [N], shape (n,), clipped to the thrusters' limits."""
         return np.clip(thrust, self.thrust_min, self.thrust_max)
 
     def tau(self, thrust: Array, wrench: Array) -> Array:
@@ -81,7 +81,7 @@ class Body:
 
 
 def steps(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that takes so many steps, one call each, with the thrusts converted to a wrench in each."""
+    """Return a function that runs a given number of steps, one call each, and converts thrusts to a wrench in each."""
     body, h = Body(setup["vehicle"]), setup["step"]
     thrust, wrench = np.array(setup["thrust"]), np.array(setup["wrench"])
 

@@ -1,4 +1,4 @@
-"""pymavlink making frames."""
+"""Frames made by pymavlink."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 
 def attitude(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that makes so many frames of ATTITUDE."""
+    """Return a function that makes a given number of frames of ATTITUDE."""
     codec = mavlink.MAVLink(None, *setup["source"])
     message = mavlink.MAVLink_attitude_message(*setup["fields"])
 

@@ -1,7 +1,7 @@
 """A peer as a process: ``python serve.py MODULE FUNCTION``, with its setup in JSON as the first line of the input.
 
-Each further line is a number of items, or another argument of the function, in JSON; each answer is a line of JSON:
-the time [s], or the dict that the function returned, or the reason why it failed.
+Each further line is a number of items, or another argument, in JSON. Each answer is a line of JSON: ``seconds``, the
+time of the call [s], with the dict that the function returned, if any; or ``error``, the reason why it failed.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ NAMES = ("obstacle", "shape", "depth")
 
 
 def simulation(points: int) -> Any:
-    """Return a simulation of the rules over universes of so many points."""
+    """Return a simulation of the rules over universes of a number of points."""
     universe = np.linspace(0.0, 1.0, points)
     inputs = [control.Antecedent(universe, name) for name in NAMES]
     outputs = [control.Consequent(universe, f"alpha_{i + 1}") for i in range(len(NAMES))]
@@ -35,7 +35,7 @@ def simulation(points: int) -> Any:
 
 
 def calls(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that computes so many times, with other inputs each time, since scikit-fuzzy caches results."""
+    """Return a function that makes a number of computations, with new inputs, since scikit-fuzzy caches results."""
     warnings.simplefilter("ignore", DeprecationWarning)
     system, rng = simulation(setup["points"]), np.random.default_rng(0)
 
@@ -49,7 +49,7 @@ def calls(setup: dict[str, Any]) -> Callable[[int], object]:
 
 
 def arrays(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that computes so many rows at once."""
+    """Return a function that computes a given number of rows at once."""
     warnings.simplefilter("ignore", DeprecationWarning)
     system, rng = simulation(setup["points"]), np.random.default_rng(0)
 

@@ -11,7 +11,7 @@ from python_vehicle_simulator.vehicles import remus100
 
 
 def steps(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that takes so many steps, with its own autopilot."""
+    """Return a function that runs a given number of steps, with the simulator's own autopilot."""
     vehicle = remus100("depthHeadingAutopilot", 30.0, 50.0, 1525.0, 0.5, 170.0)
     h, eta = setup["step"], np.zeros(6)
     nu, u_actual = vehicle.nu, vehicle.u_actual

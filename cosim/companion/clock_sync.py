@@ -1,4 +1,4 @@
-"""The autopilot's clock beside ours, by TIMESYNC."""
+"""Offset of the autopilot's clock from ours, estimated from TIMESYNC messages."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ import math
 from collections import deque
 from typing import Any
 
-_KEPT = 16  # answers; the quickest of them is believed
+_KEPT = 16  # number of last answers; the offset is that of the one with the shortest round trip
 _NANO = 1e9
-_SLACK = 0.005  # s, of both clocks between two answers
-_OPEN = 8  # requests whose answers still count
+_SLACK = 0.005  # s, allowed drift between the two clocks from one answer to the next
+_OPEN = 8  # number of last requests whose answers are accepted
 
 
 class ClockSync:
-    """Estimates what is to be added to the autopilot's time since boot to have ours.
+    """Estimates the offset to add to the autopilot's time since boot to obtain our time.
 
     Examples
     --------
     >>> from cosim.companion.clock_sync import ClockSync
     >>> sync = ClockSync()
     >>> sent = sync.request(100.0)
-    >>> sync.take(7_005_000_000, sent, 100.01)  # it was 7.005 s there in the middle
+    >>> sync.take(7_005_000_000, sent, 100.01)  # 7.005 s since boot in the middle of the round trip
     >>> round(sync.offset, 6)
     93.0
     """
@@ -30,16 +30,16 @@ class ClockSync:
         self._answers: deque[tuple[float, float]] = deque(maxlen=_KEPT)  # round trip [s], offset [s]
 
     def request(self, now: float) -> int:
-        """Return the field ``ts1`` of a request that is sent at our time `now` [s]."""
+        """Return the field ``ts1`` [ns] of a request that is sent at our time `now` [s]."""
         stamp = max(1, round(now * _NANO))
         self._asked.append(stamp)
         return stamp
 
     def take(self, tc1: int, ts1: int, now: float) -> None:
-        """Take an answer that came at our time `now` [s].
+        """Process an answer, with its fields in ns, that arrived at our time `now` [s].
 
-        One that was not asked for counts as nothing. One that no earlier answer can be reconciled with ends these: the
-        autopilot's clock began anew, or goes at another pace.
+        An answer without a request is ignored. An answer that contradicts the earlier ones replaces them: the
+        autopilot's clock has restarted, or runs at another rate.
         """
         if tc1 <= 0 or ts1 not in self._asked:
             return
@@ -62,5 +62,5 @@ class ClockSync:
 
 
 def timesync(mavlink: Any, ts1: int) -> Any:
-    """Return the request."""
+    """Return the TIMESYNC message of a request with time stamp `ts1` [ns]."""
     return mavlink.MAVLink_timesync_message(0, ts1)

@@ -37,48 +37,49 @@ from plant_fmu import Vehicle
 if TYPE_CHECKING:  # websockets wait until a flight is shown
     from cosim.live.view import LiveView
 
-_RELEASE = 2.0  # s at the most, that letting go takes at the end
+_RELEASE = 2.0  # s, longest time to release the sticks and change to the hold mode at the end
 _NO_COMMANDS = "a companion's page shows alone: take over at the autopilot's ground station"
-_STEADY = 0.1  # m, of drift between two sources, up to which it is their noise
-_RESERVE = 0.3  # of the thrusters' force, for moments that the autopilot gives
-_UNSEEN = 0.05  # m, by which an autopilot's position may be off without a sign of it
+_STEADY = 0.1  # m, drift between two position sources that still counts as noise
+_RESERVE = 0.3  # fraction of the thrusters' force that stays free for the autopilot's moments
+_UNDETECTED = 0.05  # m, position error of an autopilot that no measurement reveals
 
 
 # Errors of an autopilot's estimate are slow: its velocity may be off by some cm/s for a minute, its position has no
-# white noise. A velocity that is trusted more shifts the law's position by what it is off, over the filter's rate.
+# white noise. With a smaller velocity noise, the law's position would shift by (velocity error) / (rate of its filter).
 _FILTERED = {"law.gains.position_noise": 0.01, "law.gains.velocity_noise": 0.05}
-# the autopilot has the thrusters: what one of them does is not what the law asked of it
+# the autopilot allocates the forces: a thruster's force is not the one that the law commanded
 _NOT_ISOLATED = {"law.gains.failure_threshold": 0.0}
-# its attitude loop gives the moments: a law that finds out restoring moments, or the effectiveness of each thruster, by
-# what its own moments do, finds the stiffness of that loop, and works against it
+# the autopilot's attitude loop makes the moments: a law that estimates restoring moments, or the effectiveness of each
+# thruster, from the effect of its own moments would estimate the stiffness of that loop, and work against it
 _NOT_TURNED = _NOT_ISOLATED | {
     "law.gains.adaptation": 0.0,
     "law.gains.moment_bound": 1e-3,
     "law.gains.effectiveness_estimation": 0.0,
 }
-_NOT_LIFTED = {"law.gains.restoring_drift": 0.0, "law.gains.restoring_bound": 1e-3}  # its depth loop, of weight
-# its velocity loop takes care of weight, moments, current and lag: what the law would find out of them is not so
+# the depth loop compensates the weight
+_NOT_LIFTED = {"law.gains.restoring_drift": 0.0, "law.gains.restoring_bound": 1e-3}
+# the velocity loop compensates weight, moments, current and lag: estimates of them by the law would be wrong
 _NOT_ESTIMATED = _NOT_LIFTED | {"law.gains.lag_bound": 0.0, "law.gains.current_bound": 1e-3}
 
 
 def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks", profile: ProfileName = "ardusub") -> Scenario:
-    """Return a scenario as the companion flies it: a step is a control period, and the state is what is reported.
+    """Return a scenario as the companion flies it: a step is a control period, and the autopilot reports the state.
 
     Parameters
     ----------
     scenario : Scenario
-        As it is simulated.
+        Scenario as written for simulation.
     steer_by : str
-        What the autopilot gets: ``sticks``, ``wrench``, ``velocity`` or ``attitude``.
+        Output to the autopilot: ``sticks``, ``wrench``, ``velocity`` or ``attitude``.
     profile : str
-        Which autopilot it is.
+        Profile of the autopilot: ``ardusub``, ``px4`` or ``generic``.
 
     Raises
     ------
     RunError
-        If it asks for what a real vehicle cannot be made to do.
+        If it has thruster failures or records the Lyapunov function: a real vehicle offers neither.
     ScenarioError
-        If its periods do not fit.
+        If the converted scenario is invalid.
     """
     for key, asked in (("failures", scenario.failures), ("record.lyapunov", scenario.record.lyapunov)):
         if asked:
@@ -112,7 +113,7 @@ def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks", profile:
 
 
 def _speed_with_reserve(vehicle: Vehicle) -> float:
-    """Return the speed ahead [m/s] at which drag leaves the autopilot a part of the thrusters, for its moments."""
+    """Return the forward speed [m/s] whose drag takes 70 % of the thrusters' force; the rest is for moments."""
     force = (1.0 - _RESERVE) * greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)[0]
     linear, quadratic = float(vehicle.linear_damping[0]), float(vehicle.quadratic_damping[0])
     slope = linear + math.sqrt(linear**2 + 4.0 * quadratic * force)
@@ -129,23 +130,23 @@ class Companion:
     Parameters
     ----------
     scenario : Scenario
-        What is to be flown, as it is simulated.
+        Scenario to fly, as written for simulation.
     link : AutopilotLink
-        To the autopilot; it stays open.
+        Link to the autopilot; the caller closes it.
     options : CompanionOptions
-        How.
+        Outputs, alignment and limits of the flight.
 
     Attributes
     ----------
     scenario : Scenario
-        As it is flown.
+        Scenario as it is flown, converted by `scenario_to_steer`.
     session : AutopilotSession
-        With the autopilot.
+        Message exchange with the autopilot.
 
     Raises
     ------
     RunError, ScenarioError
-        As `scenario_to_steer`.
+        If `scenario_to_steer` or `AutopilotSession` raises it.
 
     Examples
     --------
@@ -173,23 +174,23 @@ class Companion:
         on_state: Callable[[State, str], None] | None = None,
         live: LiveView | None = None,
     ) -> Run:
-        """Wait until the vehicle can be steered, steer it for the scenario's time, and let go.
+        """Wait until the vehicle can be steered, steer it for the scenario's duration, and release it.
 
         Parameters
         ----------
         out : Path, optional
             The run folder, as for `run_scenario`.
         report : bool
-            Write report and figures too.
+            True to write report and figures too.
         on_state : callable, optional
-            Called with each new state, and with what it waits for.
+            Function that is called with each new state and the text of the conditions it waits for.
         live : LiveView, optional
-            Shows the flight while it goes on, from before steering begins; it takes no commands.
+            View that shows the flight, from before steering begins; it accepts no commands.
 
         Returns
         -------
         Run
-            Its status is ``completed``, or says in which state it ended and why.
+            Recorded run; its status is ``completed``, ``interrupted``, or the final state with its reason.
 
         Raises
         ------
@@ -235,7 +236,7 @@ class Companion:
     def prepare(self, on_state: Callable[[State, str], None] | None = None) -> None:
         """Exchange messages until the vehicle can be steered; RunError if that takes longer than the options allow.
 
-        `on_state` is as of `run`.
+        `on_state` is the function that `run` accepts.
         """
         session, period = self.session, self.scenario.time.step
         begun = session.clock()
@@ -262,7 +263,7 @@ class Companion:
                 master.step(k, session)
                 for observer in observers:
                     observer.observe(k, master.row)
-                master.environment.inflate_position_uncertainty(self._doubt() / SPREADS)
+                master.environment.inflate_position_uncertainty(self._position_uncertainty() / SPREADS)
                 violated = clearances[self._hard]
                 session.outside = float(max(0.0, -np.nanmin(violated))) if np.isfinite(violated).any() else 0.0
                 self._report(on_state)
@@ -279,14 +280,14 @@ class Companion:
         found = self._environment.clearances(place, self.session.reported.quaternion)
         return float(np.min(found[self._hard]))
 
-    def _doubt(self) -> float:
-        """Return by how much the position may be off [m]: as its sources have come apart, and as it was reckoned."""
+    def _position_uncertainty(self) -> float:
+        """Return the greatest expected position error [m]: undetected error, drift, and dead reckoning."""
         alignment = self.session.alignment
         drift = alignment.drift if alignment.drift > _STEADY else 0.0
-        return _UNSEEN + drift + self._options.reckoning_error * alignment.reckoned
+        return _UNDETECTED + drift + self._options.reckoning_error * alignment.reckoned
 
     def _report(self, on_state: Callable[[State, str], None] | None) -> None:
-        """Call `on_state` where the state, or what it waits for, has changed."""
+        """Call `on_state` if the state, or the text of the conditions it waits for, has changed."""
         now = self.session.supervisor.state, self.session.missing()
         if on_state is not None and now != self._reported:
             on_state(*now)

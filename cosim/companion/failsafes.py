@@ -9,8 +9,8 @@ from typing import Any
 
 from cosim.mavlink.wire.options import ProfileName
 
-_EVERY = 0.5  # s, between two requests of what has not come
-_PATIENCE = 3.0  # s after the first request, for what an autopilot does not have; an ArduSub is silent then
+_EVERY = 0.5  # s, between two requests of the missing parameters
+_PATIENCE = 3.0  # s, to wait for missing parameters; an ArduSub does not answer requests of parameters it lacks
 _MAV_PARAM_TYPE_INT32 = 6
 
 _ON_SILENCE = {0: "does nothing", 1: "warns", 2: "disarms"}
@@ -24,7 +24,7 @@ _ON_LOST_LINK = {0: "does nothing", 1: "holds", 2: "returns", 3: "lands", 5: "te
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of an autopilot, and what its values mean where they are choices."""
+    """A parameter of an autopilot, with its meaning, and that of its values if it is an enumeration."""
 
     name: str
     words: str
@@ -68,31 +68,31 @@ PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
     ),
     "generic": (),
 }
-_ACTS = {  # of which one at least must not be 0, for anything to follow when the companion dies
+_ACTS = {  # parameters of the reaction to a lost companion; at least one of them must be nonzero
     "ardusub": ("FS_PILOT_INPUT", "FS_GCS_ENABLE"),
     "px4": ("COM_OF_LOSS_T",),
 }
 _STICK_SYSTEM = ("SYSID_MYGCS", "MAV_GCS_SYSID")
-_OF_SOME_VERSIONS = (*_STICK_SYSTEM, "ATC_ANGLE_MAX", "ANGLE_MAX")
-_KEPT = ("RC_OVERRIDE_TIME", "FS_PILOT_TIMEOUT")  # how long sticks act with a radio, and without one
+_OF_SOME_VERSIONS = (*_STICK_SYSTEM, "ATC_ANGLE_MAX", "ANGLE_MAX")  # absent in some versions: no warning without them
+_KEPT = ("RC_OVERRIDE_TIME", "FS_PILOT_TIMEOUT")  # times [s] the last sticks act: with a radio, and without one
 _LONGEST_KEPT = 1.0  # s
-_NEVER = 2.0  # of EK3_MAG_CAL
-_BY_STICKS = (0.0, 1.0, 2.0)  # of COM_OBL_RC_ACT: modes that need them; without, NAV_RCL_ACT counts in its place
+_NEVER = 2.0  # value of EK3_MAG_CAL: never learn the magnetic field
+_BY_STICKS = (0.0, 1.0, 2.0)  # values of COM_OBL_RC_ACT: modes that need sticks; without them NAV_RCL_ACT applies
 _SATURATION = "UUV_THRUST_SAT"
 
 
 class Failsafes:
-    """Reads the parameters of one autopilot.
+    """Requests and collects the failsafe parameters of one autopilot.
 
     Parameters
     ----------
     profile : str
-        Which autopilot it is.
+        Profile of the autopilot: ``ardusub``, ``px4`` or ``generic``.
 
     Attributes
     ----------
     values : dict of str to float
-        That were read so far, by name.
+        Received values by parameter name.
 
     Examples
     --------
@@ -105,10 +105,10 @@ class Failsafes:
     def __init__(self, profile: ProfileName) -> None:
         self._profile: ProfileName = profile
         self.values: dict[str, float] = {}
-        self._first, self._last = math.inf, -math.inf  # s, of requests
+        self._first, self._last = math.inf, -math.inf  # our times [s] of the first and the last request
 
     def wanted(self, now: float) -> list[str]:
-        """Return the names of the parameters to request at the local time `now` [s]; most often none."""
+        """Return the names of the missing parameters to request at our time `now` [s]; at most every 0.5 s."""
         if self.is_read(now) or now - self._last < _EVERY:
             return []
         self._first = min(self._first, now)
@@ -116,10 +116,10 @@ class Failsafes:
         return self._missing()
 
     def take(self, message: Any) -> None:
-        """Take a PARAM_VALUE."""
+        """Store the value of a PARAM_VALUE."""
         name, value = message.param_id, float(message.param_value)
         if name in {parameter.name for parameter in PARAMETERS[self._profile]}:
-            if self._profile == "px4" and message.param_type == _MAV_PARAM_TYPE_INT32:  # its bits in a float's place
+            if self._profile == "px4" and message.param_type == _MAV_PARAM_TYPE_INT32:  # PX4 sends its bits in a float
                 (value,) = struct.unpack("<i", struct.pack("<f", value))
             if math.isfinite(value):
                 self.values[name] = float(value)

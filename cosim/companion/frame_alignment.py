@@ -1,6 +1,6 @@
-"""Where the autopilot's local frame lies in the scene. Nothing is steered before that is known.
+"""Offset of the autopilot's local frame in the scene. Nothing is steered before it is known.
 
-An EKF has its origin where the vehicle was when it got one, not where the scene has its own.
+An EKF places its origin where the vehicle is when the filter initializes, not at the scene's origin.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.scenario.tables import Vector3
 from cosim.simulation.signals import Array
 
-_SAMPLES = 10  # that agree, before the frame is known
-_SPREAD = 0.15  # m, standard deviation of each coordinate among them
+_SAMPLES = 10  # consecutive samples of the offset that must agree before it is known
+_SPREAD = 0.15  # m, greatest standard deviation of each coordinate among them
 _GRAVITY = 9.80665  # m/s2
-_JUMP = 0.3  # m, between two positions, beyond what the velocity explains
-_SMOOTHING = 0.1  # of a new sample in the drift
+_JUMP = 0.3  # m, change between two positions that the velocity does not explain, from which on it is a jump
+_SMOOTHING = 0.1  # weight of a new sample in the exponential mean of the drift
 
 
 @dataclass(frozen=True)
 class SceneOrigin:
-    """Where the scene's origin is, as the user says it.
+    """The user's definition of the scene's origin.
 
-    Either the scene's latitude and longitude, and the vehicle's own GLOBAL_POSITION_INT and pressure say the rest; or
-    where the autopilot's local origin was surveyed to lie in the scene.
+    Give either the latitude and longitude of the scene's origin, which the vehicle's GLOBAL_POSITION_INT and pressure
+    complete; or the surveyed position of the autopilot's local origin in the scene.
 
     Examples
     --------
@@ -38,27 +38,27 @@ class SceneOrigin:
     """
 
     geodetic: tuple[float, float] | None = None  # deg, latitude and longitude of the scene's origin
-    surveyed: Vector3 | None = None  # m, NED, of the autopilot's local origin in the scene
-    surface_pressure: float = 1013.25  # hPa, of the air
-    density: float = 1000.0  # kg/m3, of the water, as ArduSub has it unless BARO_SPEC_GRAV says otherwise
+    surveyed: Vector3 | None = None  # m, NED, position of the autopilot's local origin in the scene
+    surface_pressure: float = 1013.25  # hPa, air pressure at the surface
+    density: float = 1000.0  # kg/m3, density of the water; ArduSub's is 1000 times BARO_SPEC_GRAV, by default 1
 
 
 class FrameAlignment:
-    """Finds the frame, and watches it.
+    """Estimates the offset between the autopilot's local frame and the scene, and monitors it for jumps and drift.
 
     Parameters
     ----------
     origin : SceneOrigin
-        As the user says it.
+        The user's definition of the scene's origin.
 
     Attributes
     ----------
     offset : ndarray, shape (3,) or None
-        Of the autopilot's local origin in the scene [m, NED]; None until it is known.
+        Position of the autopilot's local origin in the scene [m, NED]; None until it is known.
     jump : float
-        Greatest leap of the position since the frame is known [m], beyond what the velocity explains.
+        Greatest jump of the position since the frame is known [m], without the motion that the velocity explains.
     reckoned : float
-        Horizontal way since the frame is known [m], where the autopilot says that it has no fix of its position.
+        Horizontal distance traveled without a position fix since the frame is known [m].
     """
 
     def __init__(self, origin: SceneOrigin) -> None:
@@ -67,13 +67,13 @@ class FrameAlignment:
         self._samples: deque[Array] = deque(maxlen=_SAMPLES)
         self.offset: Array | None = None if origin.surveyed is None else np.array(origin.surveyed, dtype=float)
         self.jump = self.reckoned = 0.0
-        self._reference: Array | None = None  # of the sample that the offset is compared with later
+        self._reference: Array | None = None  # first mean offset, which later samples are compared with
         self._drift: Array = np.zeros(3)
-        self._taken = 0, 0  # positions and samples, as the autopilot's messages are counted
+        self._taken = 0, 0  # counts of the processed messages: local position, second source
         self._before: tuple[Array, Array, float, int] | None = None
 
     def update(self, state: ReportedState, now: float) -> None:
-        """Take what the autopilot has reported since the last call; `now` is our time [s]."""
+        """Update the alignment from the messages received since the last call; `now` is our time [s]."""
         if not np.isfinite(state.position).all():
             return
         came, before = state.came, self._taken
@@ -98,7 +98,7 @@ class FrameAlignment:
 
     @property
     def drift(self) -> float:
-        """How far the local position and its second sources, globe and pressure, have come apart since then [m]."""
+        """Smoothed distance between the local position and its second sources, globe and pressure [m]."""
         return float(np.linalg.norm(self._drift))
 
     def to_scene(self, position: Array) -> Array:
@@ -121,7 +121,7 @@ class FrameAlignment:
         return f"{_SAMPLES} global positions that agree within {_SPREAD:g} m with the local ones"
 
     def restart(self) -> None:
-        """Find the frame anew, where the vehicle itself can say it; a surveyed one stays, and so does a leap in it."""
+        """Estimate the frame again from the vehicle's messages; a surveyed frame stays, with its jumps and drift."""
         if self._origin.surveyed is not None:
             return
         self.offset = self._reference = None
@@ -129,7 +129,10 @@ class FrameAlignment:
         self.jump, self.reckoned, self._drift, self._before = 0.0, 0.0, np.zeros(3), None
 
     def _sample(self, state: ReportedState) -> Array | None:
-        """Return the offset as the second sources have it now; NaN where one says nothing, None where none does."""
+        """Return the offset by the second sources, shape (3,) [m, NED]; NaN without latitude and longitude.
+
+        None if a needed coordinate is missing: all three, or for a surveyed frame the depth.
+        """
         depth = (state.pressure - self._origin.surface_pressure) * 100.0 / (self._origin.density * _GRAVITY)
         north = east = math.nan
         if self._frame is not None and state.global_position is not None:

@@ -1,4 +1,4 @@
-"""The heading that an autopilot estimates: its leaps, and the dive during which an ArduSub aligns it."""
+"""The autopilot's heading estimate: detection of its leaps, and the dive during which an ArduSub aligns it."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from cosim.simulation.signals import Array
 log = logging.getLogger(__name__)
 
 _LONGEST_GAP = 0.2  # s, between two attitudes; over longer ones their rates do not predict the turn
-_ALIGNED = "in-flight", "yaw alignment complete"  # parts of an ArduSub's text
-_GAIN, _FASTEST = 0.5, 0.25  # 1/s, from depth left to speed; m/s, greatest speed of the dive
-_NEAR, _SLOW = 0.05, 0.05  # m, m/s, within which the vehicle has reached the depth
-_ALIGNS_FOR = 6.0  # s since arming, before which the dive does not end
-_SETTLES_FOR = 1.0  # s since the last alignment, after which it ends
-_PATIENCE = 3.0  # s to wait at the depth for the text, or for the descent to begin
-_LEAST_CLEARANCE, _SPACING = 0.3, 0.1  # m, on the way down; m, between the points where it is computed
+_ALIGNED = "in-flight", "yaw alignment complete"  # parts of ArduSub's STATUSTEXT after an alignment
+_GAIN, _FASTEST = 0.5, 0.25  # 1/s, gain from remaining depth to speed; m/s, greatest speed of the dive
+_NEAR, _SLOW = 0.05, 0.05  # m, m/s, depth error and speed below which the vehicle has reached the depth
+_ALIGNS_FOR = 6.0  # s, from arming to the earliest end of the dive
+_SETTLES_FOR = 1.0  # s, from the last alignment to the end of the dive
+_PATIENCE = 3.0  # s, to wait at the depth for the text, or for the descent to begin
+_LEAST_CLEARANCE, _SPACING = 0.3, 0.1  # m, required on the path down; m, between the points where it is computed
 
 
 class HeadingWatch:
@@ -30,7 +30,7 @@ class HeadingWatch:
     Attributes
     ----------
     leap : float
-        Greatest leap [rad] since the last `restart`.
+        Greatest leap since the last `restart` [rad].
     """
 
     def __init__(self) -> None:
@@ -74,7 +74,7 @@ class LevelDive:
     clearance : callable, optional
         Returns the least clearance of hard regions [m] at a position in the autopilot's local frame.
     outside : float
-        Depth by which hard regions are violated now, less that where the dive began [m].
+        Violation of hard regions now, less that at the begin of the dive [m]; 0 or more.
     """
 
     def __init__(self, depth: float) -> None:
@@ -82,16 +82,16 @@ class LevelDive:
         self.clearance: Callable[[Array], float] | None = None
         self.outside = 0.0
         self._was_disarmed = False
-        self._armed_depth: float | None = None  # m, of where it was armed
+        self._armed_depth: float | None = None  # m, depth at arming
         self._armed_at = self._aligned_at = math.inf  # our time [s] of arming, and of the last alignment
-        self._begun: tuple[float, float] | None = None  # our time [s]; clearance then [m]
-        self._place: Array = np.zeros(2)  # m, NE, where it began
+        self._begun: tuple[float, float] | None = None  # begin of the dive: our time [s]; clearance then [m]
+        self._place: Array = np.zeros(2)  # m, NE, horizontal position at the begin of the dive
         self._arrived_at: float | None = None
         self._is_done = False
-        self._texts_read = 0  # of the autopilot's texts
+        self._texts_read = 0  # number of the autopilot's texts that were processed
 
     def update(self, state: ReportedState, now: float) -> None:
-        """Update the progress of the dive from what the autopilot reports."""
+        """Update the progress of the dive from the reported state; `now` is our time [s]."""
         texts, self._texts_read = state.texts[self._texts_read :], len(state.texts)
         if not state.is_armed:
             self._was_disarmed = state.system is not None
@@ -111,7 +111,7 @@ class LevelDive:
             self._is_done |= is_settled or (math.isinf(self._aligned_at) and now - self._arrived_at > _PATIENCE)
 
     def is_needed(self, state: ReportedState, now: float) -> bool:
-        """Return True while the vehicle is to dive. Warn, and leave the dive out, if hard regions are too near."""
+        """Return True while the vehicle must dive. Warn, and skip the dive, if hard regions are too near."""
         if self._depth <= 0.0 or self._armed_depth is None or self._is_done:
             return False
         if self._begun is None:
@@ -141,7 +141,7 @@ class LevelDive:
         return min(max(_GAIN * self._depth_left(state), 0.0), _FASTEST)
 
     def way_back(self, state: ReportedState) -> Array:
-        """Return the horizontal way to where the dive began, shape (2,) [m, NE]."""
+        """Return the horizontal vector from the vehicle to the begin of the dive, shape (2,) [m, NE]."""
         return self._place - state.position[:2]
 
     def _depth_left(self, state: ReportedState) -> float:

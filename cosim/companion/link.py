@@ -13,13 +13,13 @@ COMPANION: Identity = (255, 191)  # MAV_COMP_ID_ONBOARD_COMPUTER of the ground s
 
 
 class AutopilotLink(Protocol):
-    """Carries messages to an autopilot and from it."""
+    """Carries messages to and from an autopilot."""
 
     name: str
-    identity: tuple[int, int]  # system and component that the companion is
+    identity: tuple[int, int]  # the companion's own system id and component id
 
     def clock(self) -> float:
-        """Return the time [s]; it only goes on."""
+        """Return the time [s] of a monotonic clock."""
         ...
 
     def receive(self, timeout: float) -> Sequence[Heard]:
@@ -27,28 +27,28 @@ class AutopilotLink(Protocol):
         ...
 
     def send(self, message: Any) -> bool:
-        """Send a message; return whether it went out."""
+        """Send a message; return True if it was sent."""
         ...
 
 
 class NetworkLink(GroundLink):
-    """An endpoint, by the wall clock, or for a simulated autopilot by a faster or slower one.
+    """MAVLink over an endpoint, timed by the wall clock, or for a simulated autopilot by a faster or slower clock.
 
     Parameters
     ----------
     endpoint : Endpoint
-        A network or a serial device, of `parse_endpoint`.
+        Network address or serial device, from `parse_endpoint`.
     key : bytes, optional
-        To sign with; then only what is signed with it is heard.
+        Signing key; with it, only messages signed with the same key are received.
     identity : (int, int)
-        System and component that the companion is.
+        The companion's own system id and component id.
     speedup : float
-        Of a simulated autopilot: seconds of its clock a second of the wall's. A real one's is 1.
+        Seconds of a simulated autopilot's clock per second of the wall clock; 1 for a real one.
 
     Raises
     ------
     TelemetryError
-        If it cannot be opened.
+        If the endpoint cannot be opened.
 
     Examples
     --------
@@ -68,10 +68,10 @@ class NetworkLink(GroundLink):
         return self
 
     def clock(self) -> float:
-        """Return `time.monotonic()` [s], as many times as fast as the speedup says."""
+        """Return `time.monotonic()` times the speedup [s]."""
         return self._speedup * time.monotonic()
 
     def receive(self, timeout: float) -> list[Heard]:
-        """Return the received messages as `GroundLink.receive` does, with times of this clock."""
+        """Return the received messages, stamped with times of this clock; wait at most `timeout` [s] of it."""
         heard = super().receive(timeout / self._speedup)
         return [one._replace(time=self._speedup * one.time) for one in heard]

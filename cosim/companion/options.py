@@ -12,7 +12,7 @@ from cosim.mavlink.wire.options import ProfileName
 
 @dataclass(frozen=True)
 class CompanionOptions:
-    """How the vehicle is steered, and what it must do for that.
+    """The output that steers the vehicle, the frame's origin, and the conditions of steering.
 
     Examples
     --------
@@ -22,16 +22,16 @@ class CompanionOptions:
     """
 
     profile: ProfileName = "ardusub"
-    # sticks: surge, sway, heave, yaw in STABILIZE; wrench: all six in MANUAL; velocity; attitude, with forces
+    # sticks: surge, sway, heave, yaw in STABILIZE; wrench: all six axes in MANUAL; velocity; attitude, with forces
     steer_by: SteerBy = "sticks"
     sticks_by: SticksBy = "manual-control"
     origin: SceneOrigin = field(default_factory=SceneOrigin)
-    dry_run: bool = False  # compute and record, and send nothing
-    arm: bool = False  # arm the vehicle; otherwise that is the pilot's
-    pilot_gain: float = 0.5  # part of the greatest wrench that full sticks give; ArduSub's JS_GAIN_DEFAULT
-    velocity_lag: float = 2.0  # s, of the autopilot's velocity loop, horizontally
-    vertical_lag: float = 0.5  # s, likewise
-    reckoning_error: float = 0.03  # part of the way by which a position without a fix may be off
+    dry_run: bool = False  # True to compute and record the law, and send no commands
+    arm: bool = False  # True to arm the vehicle; False leaves arming to the pilot
+    pilot_gain: float = 0.5  # fraction of the greatest wrench that full sticks command; ArduSub's JS_GAIN_DEFAULT
+    velocity_lag: float = 2.0  # s, horizontal lag of the autopilot's velocity loop
+    vertical_lag: float = 0.5  # s, vertical lag of the autopilot's velocity loop
+    reckoning_error: float = 0.03  # position error without a fix, as a fraction of the distance traveled
     level_dive: float = 0.6  # m, depth of an ArduSub's dive after arming, before it is steered; 0 for none
-    least_battery: float = 0.0  # percent, below which it is held
-    timeout: float | None = None  # s, within which steering must begin
+    least_battery: float = 0.0  # percent, remaining charge below which the vehicle is held
+    timeout: float | None = None  # s, longest wait for the begin of steering; None: no limit

@@ -26,8 +26,8 @@ _PX4_REFUSES: dict[str, str] = {
     "wrench": "its sticks have no roll and pitch beside surge and sway; expected attitude",
     "velocity": "its uuv_pos_control keeps the depth and pushes nowhere; expected attitude",
 }
-# An ArduSub integrates the rate of the yaw stick to a heading, and controls that too. With the full rate it swings.
-_YAW_PART = 0.75
+# An ArduSub integrates the rate of the yaw stick to a heading, and controls that too. With the full rate it oscillates.
+_YAW_PART = 0.75  # fraction of the law's yaw rate that the stick commands
 _CENTERED_FOR = 0.2  # s, during which overridden channels are centered before their release
 
 
@@ -37,7 +37,7 @@ def require_taken(profile: ProfileName, steer_by: SteerBy, sticks_by: SticksBy) 
     Raises
     ------
     RunError
-        With the reason, and the accepted outputs.
+        If the autopilot does not accept the output; the message gives the reason and the accepted outputs.
     """
     if profile == "px4" and steer_by in _PX4_REFUSES:
         raise RunError(f"--steer-by {steer_by}: a PX4 does not take it: {_PX4_REFUSES[steer_by]}")
@@ -61,22 +61,23 @@ class Output:
     Parameters
     ----------
     mavlink : module
-        The dialect.
+        The MAVLink dialect.
     vehicle : Vehicle
         Vehicle, for its model and limits.
     profile : str
         Name of the autopilot's profile.
     steer_by, sticks_by : str
-        Output, and message that carries the sticks.
+        Output (``sticks``, ``wrench``, ``velocity``, ``attitude``), and message that carries the sticks.
     pilot_gain : float
         Fraction of the greatest wrench that a full stick commands.
     lags : (float, float)
-        Lags of its velocity loop [s], horizontal and vertical.
+        Lags of the autopilot's velocity loop [s], horizontal and vertical.
 
     Attributes
     ----------
     sticks, velocity, attitude : ndarray, shape (6,), (3,), (4,)
-        Last commands: -1 to 1, [m/s, NED], a quaternion; zero for unused ones.
+        Last commands: sticks X Y Z K M N, -1 to 1; velocity [m/s, NED]; quaternion from body to world, scalar first.
+        Unused ones are zero.
 
     Raises
     ------
@@ -154,7 +155,8 @@ class Output:
     def descend(self, state: ReportedState, speed: float, back: Array, period: float) -> Sequence[Any]:
         """Return the messages of a level descent at a speed [m/s], by velocity or by stick, for a `period` [s].
 
-        By velocity it stays on the spot, to which `back`, shape (2,) [m, NE], is the way; by stick the autopilot does.
+        With velocities, the descent holds the horizontal position `back`, shape (2,) [m, NE], from the vehicle. With
+        sticks, the autopilot holds its own.
         """
         self.clear()
         if self._steer_by == "velocity":
@@ -167,7 +169,7 @@ class Output:
         """Return the messages that release the sticks, `since` [s] after the start of the release.
 
         Overridden channels are centered first, since an ArduSub without a radio keeps their last values; then they are
-        released, once. A PX4 keeps the last forces until its own failsafe, so none are asked for first.
+        released, once. A PX4 keeps the last forces until its own failsafe, so zero forces are sent first.
         """
         self.clear()
         if not self._uses_sticks:
@@ -199,7 +201,10 @@ class Output:
         return attitude_target(self._mavlink, system, self.attitude, None), self._sticks(system)
 
     def _lean(self, period: float) -> Array:
-        """Return the sticks of roll and pitch, shape (2,), for which an ArduSub commands what they say now."""
+        """Return the sticks of roll and pitch, shape (2,), whose lean angles give the commands now in `sticks`.
+
+        They are zero for autopilots other than ArduSub.
+        """
         if self._profile.name != "ardusub":
             return np.zeros(2)
         return self._scale.lean_sticks(self._level_lead.angles(self.sticks[3:5], period))

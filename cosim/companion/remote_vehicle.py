@@ -17,8 +17,8 @@ from plant_fmu.running.channels import Channel, Channels
 from plant_fmu.variables import variables
 
 _NAMES = tuple(condition.name for condition in CONDITIONS)
-_SHIFT = 0.1  # s behind, beyond which a loop does not hurry after its time
-_REPORTED = (  # at the beginning of a step
+_SHIFT = 0.1  # s, delay beyond which the loop shifts its schedule instead of catching up
+_REPORTED = (  # channels that the autopilot reports, at the beginning of a step
     Channel("autopilot.age", "s", "Of the older one of position and attitude"),
     Channel("autopilot.mode", "", "Custom mode of the autopilot's heartbeat"),
     Channel("autopilot.armed", "", "The autopilot is armed"),
@@ -27,7 +27,7 @@ _REPORTED = (  # at the beginning of a step
     Channel("autopilot.drift", "m", "By which local position and globe or pressure have come apart"),
     Channel("autopilot.reckoned", "m", "Horizontal way since the frame is known, without a fix of the position"),
 )
-_SENT = (  # in the step
+_SENT = (  # channels of the companion's own state and commands, in the step
     Channel("companion.state", "", f"Of the companion: {', '.join(f'{i} {state}' for i, state in enumerate(STATES))}"),
     Channel("companion.reason", "", "Condition that ended steering, from 1 in the order of the table; 0 for none"),
     Channel("companion.lateness", "s", "By which the step began too late"),
@@ -40,22 +40,22 @@ _FIRST_SENT = "thruster_force[1]"  # outputs before it stand for the beginning o
 
 
 class RemoteVehicle:
-    """The plant of a run that is steered through a link.
+    """Plant of a run whose vehicle is behind a link.
 
-    Its outputs are what the autopilot reports, in the scene's frame; what it does not report is NaN. A step sends what
-    the law asks for, as far as the session allows it, and lasts until its time is over.
+    The outputs are the values that the autopilot reports, in the scene's frame, and NaN where it reports none. A step
+    sends the law's wrench if the session allows it, and lasts until its period is over.
 
     Parameters
     ----------
     scenario : Scenario
-        Whose vehicle it is.
+        Scenario as it is flown, with its vehicle.
     session : AutopilotSession
-        With the autopilot.
+        Message exchange with the autopilot.
 
     Attributes
     ----------
     inputs, outputs, flags : Channels
-        As of the vehicle's FMU, with what the link says among its outputs.
+        Channels of the vehicle's FMU; the outputs also contain those of the link.
     """
 
     def __init__(self, scenario: Scenario, session: AutopilotSession) -> None:
@@ -72,7 +72,7 @@ class RemoteVehicle:
         self.outputs = Channels(all_outputs, np.full(len(all_outputs), math.nan))
         self.flags = Channels(flags, np.zeros(len(flags), dtype=bool))
         self._at = {channel.name: i for i, channel in enumerate(self.outputs.channels)}
-        # a PX4's outputs say nothing of that table
+        # the vehicle's table ``autopilot`` describes an ArduSub's servo outputs, not a PX4's
         given = scenario.vehicle.autopilot if session.profile.name != "px4" else None
         self._channels = () if given is None else given.channels
         signs = () if given is None else np.broadcast_to(given.signs, len(self._channels)).tolist()
@@ -87,11 +87,11 @@ class RemoteVehicle:
         """Change nothing: parameters and start values are the real vehicle's own."""
 
     def initialise(self) -> None:
-        """Read how things stand."""
+        """Write the reported state to the outputs."""
         self._read()
 
     def step(self, step: float) -> None:
-        """Send what the inputs ask for, and listen until the step of `step` seconds is over."""
+        """Send the wrench of the inputs, and receive messages until the step of `step` seconds is over."""
         n, inputs = self._vehicle.n_thrusters, self.inputs.values
         wrench = self._vehicle.thruster_matrix @ inputs[:n] + inputs[n:]
         now = self._session.clock()
@@ -105,11 +105,11 @@ class RemoteVehicle:
         self._read()
 
     def read_flags(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        """Return the Boolean outputs: none is known."""
+        """Return the Boolean outputs; all stay False, since an autopilot reports none."""
         return self.flags.values
 
     def close(self) -> None:
-        """Leave the link to whoever opened it."""
+        """Do nothing: the caller closes the link."""
 
     def _read(self) -> None:
         session, reported = self._session, self._session.reported
@@ -143,7 +143,7 @@ class RemoteVehicle:
         self._write("stick.X", (*output.sticks, *output.velocity, *euler_of(output.attitude.tolist())))
 
     def _write_forces(self) -> None:
-        """Write what the autopilot's servo outputs ask of the thrusters [N], and the wrench that they make."""
+        """Write the thruster forces [N] of the autopilot's servo outputs, and their wrench."""
         pulses, vehicle = self._session.reported.pulses, self._vehicle
         if not self._efforts or not pulses:
             return

@@ -1,4 +1,4 @@
-"""When the law may steer, and what ends that: one table for the code, its tests and its documentation."""
+"""States of the companion and conditions that end steering: one table for code, tests and documentation."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ class Condition:
     Attributes
     ----------
     name : str
-        As it stands in status and texts.
+        Name in statuses, texts and `Observation.values`.
     limit : float
-        Beyond which `Observation`'s value of that name ends it; 0 for what is or is not.
+        Limit above which the observed value ends steering [unit]; 0 for conditions that are true or false.
     unit : str
-        Of the limit.
+        Unit of the limit.
     words : str
-        What is compared with it.
+        Description of the observed value.
     then : State
-        What follows.
+        State after the condition has ended steering.
     """
 
     name: str
@@ -73,38 +73,38 @@ CONDITIONS: tuple[Condition, ...] = (
 
 
 class Observation(NamedTuple):
-    """All that the decision rests on, at one step."""
+    """Inputs of the supervisor's decision at one step."""
 
-    now: float  # s
-    has_state: bool
-    frame_known: bool
+    now: float  # s, our time
+    has_state: bool  # True if position, attitude and failsafe parameters are known
+    frame_known: bool  # True if the offset of the autopilot's frame in the scene is known
     is_armed: bool
-    in_mode: bool  # the mode for the dive, or else for steering
-    values: dict[str, float]  # by a condition's name; above its limit, it ends steering
-    has_to_dive: bool = False
+    in_mode: bool  # True if the autopilot is in the mode for the dive, or without a dive for steering
+    values: dict[str, float]  # observed values by condition name; one above its limit ends steering
+    has_to_dive: bool = False  # True while the dive before steering is not finished
 
 
 class Supervisor:
-    """Decides the state, step by step.
+    """Decides the companion's state at each step.
 
     Parameters
     ----------
     dry_run : bool
-        Compute alone.
+        True to compute the law without sending commands.
 
     Attributes
     ----------
     state : State
-        Now.
+        Present state.
     reason : str
-        The condition that ended steering last; empty where none did.
+        Name of the condition that ended steering last; empty if none did.
     """
 
     def __init__(self, dry_run: bool = False) -> None:
         self.state: State = "waiting"
         self.reason = ""
         self._dry_run = dry_run
-        self._asked_at: float | None = None  # when the mode was asked for
+        self._asked_at: float | None = None  # s, our time of the first request of the mode
 
     @property
     def is_steering(self) -> bool:
@@ -112,16 +112,16 @@ class Supervisor:
         return self.state in ("steering", "dry_run")
 
     def asked_for_mode(self, now: float) -> None:
-        """Note that the mode is asked for, the first time."""
+        """Store the time `now` [s] of the first request of the mode."""
         if self._asked_at is None:
             self._asked_at = now
 
     def waited_for_mode(self, now: float) -> float:
-        """Return for how long the mode is asked for in vain [s]."""
+        """Return the time since the first request of a mode that is not on yet [s]; 0 without a request."""
         return 0.0 if self._asked_at is None else now - self._asked_at
 
     def resume(self) -> None:
-        """Begin anew, after a hold or a pilot; what is not in order holds again."""
+        """Start again from ``waiting`` after ``held`` or ``pilot``; conditions that still apply hold again."""
         if self.state in ("held", "pilot"):
             self.state, self.reason, self._asked_at = "waiting", "", None
 
@@ -131,7 +131,7 @@ class Supervisor:
         Parameters
         ----------
         seen : Observation
-            At its beginning.
+            Observation at the beginning of the step.
         """
         if self.state in ("diving", "engaging", "steering", "dry_run"):
             self._judge(seen)

@@ -1,4 +1,4 @@
-"""The exchange with one autopilot: what is sent in which state, and what is made of what comes."""
+"""Message exchange with one autopilot: the messages to send in each state, and the handling of received ones."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from plant_fmu import Vehicle
 
 log = logging.getLogger(__name__)
 
-_HEARTBEAT, _SYNC, _RATES, _REPEAT = 1.0, 0.5, 10.0, 0.25  # s, between two of a kind
-_PILOT_LASTS = 1.0  # s after deflected sticks of somebody else
-_FALLBACK = 1.0  # s of holding without the hold mode, after which the depth alone is to be held
+_HEARTBEAT, _SYNC, _RATES, _REPEAT = 1.0, 0.5, 10.0, 0.25  # s, periods of heartbeats, TIMESYNC, rate and mode requests
+_PILOT_LASTS = 1.0  # s, for which deflected sticks of another station count as a pilot's takeover
+_FALLBACK = 1.0  # s, in ``held`` without the hold mode, after which the depth-hold mode is requested instead
 _ROUNDING = 1e-6  # s
-_OURSELVES = 1  # parameter 1 of DO_SET_MODE: the custom mode counts
+_CUSTOM_MODE_ENABLED = 1  # MAV_MODE_FLAG, parameter 1 of DO_SET_MODE
 
 
 class AutopilotSession:
@@ -39,37 +39,39 @@ class AutopilotSession:
     Parameters
     ----------
     link : AutopilotLink
-        To the autopilot.
+        Link to the autopilot.
     vehicle : Vehicle
-        That it drives.
+        Vehicle that the autopilot controls.
     options : CompanionOptions
-        What the user says.
+        The user's options.
 
     Attributes
     ----------
     reported : ReportedState
-        What the autopilot says.
+        State that the autopilot reports.
     alignment : FrameAlignment
-        Of its frame with the scene.
+        Alignment of the autopilot's local frame with the scene.
     heading : HeadingWatch
-        Leaps of the heading.
+        Detector of leaps of the heading.
     dive : LevelDive
         Dive of an ArduSub before it is steered.
     supervisor : Supervisor
-        Who decides whether the law steers.
+        Decides whether the law steers.
     profile : Profile
-        Which autopilot it is.
+        Profile of the autopilot.
     failsafes : Failsafes
-        Its own, as its parameters say.
+        The autopilot's failsafe parameters.
     output : Output
-        What is sent, or in a dry run would be.
+        Converter of wrenches to messages; it keeps the last commands, in a dry run too.
     lateness : float
-        By which the last step began too late [s].
+        Delay of the begin of the last step [s].
+    outside : float
+        Depth by which the vehicle violates hard regions [m]; the caller sets it.
 
     Raises
     ------
     RunError
-        If the autopilot does not take what it is to be steered by.
+        If the autopilot does not accept the output.
     """
 
     exhausted = False
@@ -91,9 +93,9 @@ class AutopilotSession:
         self.dive = LevelDive(options.level_dive if options.profile == "ardusub" and not options.dry_run else 0.0)
         self.failsafes = Failsafes(options.profile)
         self.supervisor = Supervisor(options.dry_run)
-        self.lateness = self.outside = 0.0  # s; m, by which hard regions are violated
+        self.lateness = self.outside = 0.0  # s; m
         self._taken_over = self._was_in_mode = False
-        self._law_works = False  # as the master was commanded last
+        self._law_works = False  # value of the last `Arm` for the master
         self._sent_at: dict[str, float] = {}
         self._held_at, self._lets_go_until = 0.0, -math.inf
         self._rivals: set[int] = set()  # components of other stations with our system id
@@ -104,25 +106,25 @@ class AutopilotSession:
 
     @property
     def identity(self) -> tuple[int, int]:
-        """System and component that we are."""
+        """The companion's own system id and component id."""
         return self._link.identity
 
     def take(self, k: int) -> Sequence[Command]:
-        """Return the command that lets the law work, or stops it, where that has changed."""
+        """Return the command that starts or stops the law, if `supervisor.is_steering` has changed."""
         if self._law_works == self.supervisor.is_steering:
             return ()
         self._law_works = self.supervisor.is_steering
         return (Arm(self._law_works),)
 
     def exchange(self, wrench: Array, due: float, until: float) -> None:
-        """Do one step: decide, send, and listen.
+        """Run one step: update the state, send messages, and receive until the step ends.
 
         Parameters
         ----------
         wrench : ndarray, shape (6,)
-            That the law asks for [N, N m], body frame.
+            The law's wrench [N, N m], body frame.
         due, until : float
-            When the step was to begin, and when it ends [s].
+            Times of the link's clock [s]: scheduled begin and end of the step.
         """
         now = self._link.clock()
         self.lateness = max(0.0, now - due)
@@ -156,7 +158,7 @@ class AutopilotSession:
             self._take(one.system, one.component, one.message, one.time)
 
     def release(self, seconds: float) -> None:
-        """Let go: hold the place and release the sticks, for so many seconds or until the mode is on."""
+        """Request the hold mode and release the sticks, for at most `seconds` or until the mode is on."""
         state, begun = self.supervisor.state, self._link.clock()
         if state in ("diving", "engaging", "steering", "held"):
             self.supervisor.state, self.supervisor.reason = "held", self.supervisor.reason or "end"
@@ -207,7 +209,7 @@ class AutopilotSession:
         return off if math.isfinite(off) else 0.0
 
     def _gain(self) -> float:
-        """Return the autopilot's pilot gain: reported, else that of its start; NaN if neither is known."""
+        """Return the autopilot's pilot gain: the reported one, else JS_GAIN_DEFAULT; NaN if neither is known."""
         now = self.reported.pilot_gain
         return now if math.isfinite(now) else self.failsafes.values.get("JS_GAIN_DEFAULT", math.nan)
 
@@ -245,7 +247,7 @@ class AutopilotSession:
         is_known = alignment.offset is not None
         return Observation(now, has_state, is_known, reported.is_armed, in_mode, values, has_to_dive)
 
-    # ---- what is sent ----
+    # ---- sending ----
 
     def _due(self, what: str, period: float, now: float) -> bool:
         if now - self._sent_at.get(what, -math.inf) < period:
@@ -254,7 +256,7 @@ class AutopilotSession:
         return True
 
     def _ask(self, now: float) -> None:
-        """Send what goes on in every state: heartbeat, clock, and message rates."""
+        """Send the messages of every state: heartbeat, clock, and requests of parameters and message rates."""
         m = self._mavlink
         if self._due("heartbeat", _HEARTBEAT, now):
             self._link.send(
@@ -266,7 +268,7 @@ class AutopilotSession:
             return
         if self._due("sync", _SYNC, now):
             self._link.send(timesync(m, self.reported.sync.request(now)))
-        is_up = math.isfinite(self.reported.age(now))  # one that starts answers no such requests
+        is_up = math.isfinite(self.reported.age(now))  # one that starts does not answer parameter requests
         for name in self.failsafes.wanted(now) if is_up else ():
             self._link.send(m.MAVLink_param_request_read_message(self.reported.system, 1, name.encode(), -1))
         if self._due("rates", _RATES, now):
@@ -303,7 +305,7 @@ class AutopilotSession:
             self._link.send(message)
 
     def _hold(self, now: float) -> Sequence[Any]:
-        """Ask for the hold mode, or where that is refused for the depth to be held; return what releases the sticks."""
+        """Request the hold mode, or depth hold if that is refused; return the messages that release the sticks."""
         since, modes = now - self._held_at, self.profile.numbers
         if self.reported.mode == modes["hold"] and since > self.output.releases_for:
             return ()
@@ -316,7 +318,7 @@ class AutopilotSession:
         if self._due("mode", _REPEAT, now):
             number = self.profile.numbers[mode]
             first, second = (number >> 16 & 0xFF, number >> 24) if self.profile.packed else (number, 0)
-            self._command(self._mavlink.MAV_CMD_DO_SET_MODE, _OURSELVES, first, second)
+            self._command(self._mavlink.MAV_CMD_DO_SET_MODE, _CUSTOM_MODE_ENABLED, first, second)
 
     def _command(self, number: int, *parameters: float) -> None:
         filled = [*parameters, *[0.0] * (7 - len(parameters))]
@@ -331,7 +333,7 @@ class AutopilotSession:
         severity = m.MAV_SEVERITY_WARNING if reason else m.MAV_SEVERITY_NOTICE
         self._link.send(m.MAVLink_statustext_message(severity, text[:50].encode()))
 
-    # ---- what comes ----
+    # ---- receiving ----
 
     def _take(self, system: int, component: int, message: Any, at: float) -> None:
         if message.get_type() == "COMMAND_LONG":
@@ -347,7 +349,7 @@ class AutopilotSession:
         self.dive.update(self.reported, at)
 
     def _warn_of_rival(self, component: int) -> None:
-        """Warn once of another station that shares our system id: an ArduSub takes its sticks as it takes ours."""
+        """Warn once of another station that shares our system id: an ArduSub accepts its sticks as well as ours."""
         system, ours = self.identity
         if component != ours and component not in self._rivals:
             self._rivals.add(component)
@@ -359,7 +361,7 @@ class AutopilotSession:
             self._link.send(m.MAVLink_statustext_message(m.MAV_SEVERITY_WARNING, text[:50].encode()))
 
     def _commanded(self, system: int, component: int, message: Any) -> None:
-        """Follow DO_PAUSE_CONTINUE to ourselves: 0 takes over, 1 resumes."""
+        """Apply a DO_PAUSE_CONTINUE that is addressed to the companion: 0 ends steering, 1 resumes it."""
         m = self._mavlink
         if (message.target_system, message.target_component) != self._link.identity:
             return

@@ -1,4 +1,4 @@
-"""Set-points of velocity and attitude, by which an autopilot's inner loops give the acceleration of a wrench."""
+"""Set-points of velocity and attitude for which an autopilot's inner loops produce the acceleration of a wrench."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
 FASTEST = 0.5  # m/s, greatest speed of a law that steers by velocity: a velocity loop brakes later than thrusters
-_FASTEST_ASKED, _FASTEST_TURN = 0.8, 0.6  # m/s, rad/s, greatest set-points
-_OBSERVED = 1.5  # rad/s, both poles of the observer
-_HELD = 0.6  # rad/s, with which a place is held
-_RATE_LAG, _ANGLE_LAG = 0.3, 0.3  # s, of an autopilot's loops of rate and angle
+_FASTEST_ASKED, _FASTEST_TURN = 0.8, 0.6  # m/s, rad/s, greatest set-points of velocity and yaw rate
+_OBSERVED = 1.5  # rad/s, natural frequency of the observer
+_HELD = 0.6  # rad/s, natural frequency of the critically damped position hold
+_RATE_LAG, _ANGLE_LAG = 0.3, 0.3  # s, lags of an autopilot's rate loop and angle loop
 _FARTHEST, _TILT = 0.35, 0.1  # rad, greatest lead of set-points of angles; greatest roll and pitch
-_ANGLE_P, _RATE_P, _RATE_I = 6.0, 0.135, 0.09  # ATC_ANG_PIT_P [1/s], ATC_RAT_PIT_P [s], ATC_RAT_PIT_I; of roll alike
-_LEAN = 0.5  # rad, greatest lean
+_ANGLE_P, _RATE_P, _RATE_I = 6.0, 0.135, 0.09  # defaults of ATC_ANG_PIT_P [1/s], ATC_RAT_PIT_P [s], ATC_RAT_PIT_I
+_LEAN = 0.5  # rad, greatest lean angle
 _NORTH, _EAST, _DOWN = np.eye(3)
 _VELOCITY_ONLY, _YAW_RATE_IGNORED = 0b010111000111, 1 << 11  # type_mask of positions and velocities
-_RATES_IGNORED, _THRUST_IGNORED = 0b111, 1 << 6  # of attitudes
-_LOCAL_NED = 1
+_RATES_IGNORED, _THRUST_IGNORED = 0b111, 1 << 6  # type_mask of attitudes
+_LOCAL_NED = 1  # MAV_FRAME_LOCAL_NED
 
 
 class TurnLead:
@@ -96,7 +96,7 @@ class LevelLead:
         Parameters
         ----------
         velocity : ndarray, shape (3,)
-            [m/s], body frame; what is not finite counts as 0.
+            Linear velocity [m/s], body frame; components that are not finite count as 0.
         """
         speed = np.where(np.isfinite(velocity), velocity, 0.0)
         result: Array = np.cross(speed, self._added @ speed)[:2]
@@ -147,7 +147,7 @@ class VelocityLead:
         self._linear, self._quadratic = vehicle.linear_damping[:3], vehicle.quadratic_damping[:3]
         self._lag: Array = np.array([lag, lag, vertical_lag])
         self._asked: Array | None = None  # last set-point [m/s, NED]
-        self._expected: Array = np.zeros(3)  # velocity as the observer has it
+        self._expected: Array = np.zeros(3)  # velocity estimate of the observer [m/s, NED]
         self._beside: Array = np.zeros(3)  # d [m/s2]
 
     def restart(self) -> None:
@@ -160,7 +160,7 @@ class VelocityLead:
         Parameters
         ----------
         wrench : ndarray, shape (6,)
-            [N, N m], body frame; components that are not finite count as 0.
+            Wrench [N, N m], body frame; components that are not finite count as 0.
         state : ReportedState
             Present state.
         period : float
@@ -173,14 +173,14 @@ class VelocityLead:
         return self._set_point(wanted, state, period)
 
     def hold(self, back: Array, speed_down: float, state: ReportedState, period: float) -> Array:
-        """Return the velocity [m/s, NED], shape (3,), that holds a place, against a current too, at a speed down.
+        """Return the velocity [m/s, NED], shape (3,), that holds a horizontal position during a descent.
 
         Parameters
         ----------
         back : ndarray, shape (2,)
-            From the vehicle to the place, horizontally [m, NE].
+            Horizontal vector from the vehicle to the position [m, NE].
         speed_down : float
-            Velocity down that is asked for as it is [m/s].
+            Downward speed of the descent [m/s].
         state : ReportedState
             Present state.
         period : float
@@ -193,7 +193,7 @@ class VelocityLead:
         return asked
 
     def _set_point(self, wanted: Array, state: ReportedState, period: float) -> Array:
-        """Return the velocity that gives an acceleration [m/s2, NED]."""
+        """Return the velocity set-point [m/s, NED] that gives an acceleration [m/s2, NED]."""
         self._observe(state.velocity, period)
         asked: Array = state.velocity + self._lag * (wanted - self._beside)
         length = float(np.linalg.norm(asked))
@@ -215,7 +215,7 @@ class VelocityLead:
 
 
 def velocity_target(mavlink: Any, system: int, velocity: Array, yaw_rate: float | None) -> Any:
-    """Return SET_POSITION_TARGET_LOCAL_NED with a velocity [m/s, NED] and a rate of yaw [rad/s], if there is one."""
+    """Return SET_POSITION_TARGET_LOCAL_NED with a velocity [m/s, NED] and, unless None, a yaw rate [rad/s]."""
     x, y, z = velocity.tolist()
     mask = _VELOCITY_ONLY | (_YAW_RATE_IGNORED if yaw_rate is None else 0)
     zeros = (0.0,) * 3
@@ -230,7 +230,7 @@ def attitude_target(mavlink: Any, system: int, attitude: Array, force: Array | N
     Parameters
     ----------
     mavlink : module
-        The dialect.
+        The MAVLink dialect.
     system : int
         System id of the autopilot.
     attitude : ndarray, shape (4,)

@@ -1,4 +1,4 @@
-"""Sticks: their scale, and the messages that carry them."""
+"""Stick inputs: their relation to the wrench, and the messages that carry them."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ from plant_fmu import Vehicle
 SticksBy = Literal["manual-control", "rc-override"]
 STICKS_BY: tuple[SticksBy, ...] = get_args(SticksBy)
 
-PILOT_SPEED = 0.5  # m/s, depth rate of a full vertical stick in ALT_HOLD, where the autopilot does not say its own
-_FULL_YAW = math.radians(45.0)  # yaw rate of a full stick at ACRO_YAW_P 1
-_CENTI = 0.01  # m in a cm, deg in a hundredth of one
-_FULL = 1000.0
-_NEWTON, _FLAT = 3, 0.05  # steps; least command of a thruster at which its force is linearized
-_HALVINGS = 8  # of the part of a force that leaves its moments whole
-_PITCH, _ROLL = 1, 2  # enabled_extensions
-_CENTER, _SWING, _AXES = 1500, 400, 6  # us of a channel; channels
+PILOT_SPEED = 0.5  # m/s, depth rate of a full vertical stick in ALT_HOLD, unless a parameter is known
+_FULL_YAW = math.radians(45.0)  # rad/s, yaw rate of a full stick at ACRO_YAW_P 1
+_CENTI = 0.01  # m per cm, deg per hundredth of a degree
+_FULL = 1000.0  # value of a full stick in MANUAL_CONTROL
+_NEWTON, _FLAT = 3, 0.05  # Newton steps; least command of a thruster at which its force is linearized
+_HALVINGS = 8  # bisections of the fraction of the force that leaves room for the whole moments
+_PITCH, _ROLL = 1, 2  # bits of MANUAL_CONTROL.enabled_extensions
+_CENTER, _SWING, _AXES = 1500, 400, 6  # us, center and amplitude of a channel's pulse; number of channels
 _RELEASED, _LEFT_ALONE = 0, 0xFFFF  # values that release a channel, and leave it unchanged
 
 
@@ -47,7 +47,7 @@ class StickScale:
     efforts : ndarray, shape (n, 6)
         Fraction of each thruster's greatest force, for a unit wrench along or about each body axis [1/N, 1/(N m)].
     forces : ndarray, shape (6, n)
-        Wrench of each thruster's greatest force [N, N m].
+        Wrench of each thruster's greatest force [N, N m], body frame.
     mixer : ndarray, shape (n, 6)
         Command of each thruster, 1, 0 or -1, by a full stick of each axis at a gain of 1. For an autopilot that
         allocates forces itself, both have a row for each axis in place of each thruster.
@@ -80,14 +80,14 @@ class StickScale:
         """Return the sticks that command a wrench, shape (6,), X Y Z K M N from -1 to 1.
 
         An autopilot adds the commands of all sticks to a thruster; a quadratic force is that of the sum. So each
-        thruster's force is converted to its command, and the commands to sticks. Where a thruster or a stick lacks the
-        room for all of it, surge, sway and heave are shortened alike until the moments are whole: an ArduSub
-        scales forces and moments down together, and the vehicle would tilt.
+        thruster's force is converted to its command, and the commands to sticks. Where a thruster or a stick saturates,
+        surge, sway and heave are scaled down by one factor until the moments are whole: an ArduSub scales forces and
+        moments down together, and the vehicle would tilt.
 
         Parameters
         ----------
         wrench : ndarray, shape (6,)
-            [N, N m], body frame; components that are not finite count as 0.
+            Wrench [N, N m], body frame; components that are not finite count as 0.
         """
         asked = np.where(np.isfinite(wrench), wrench, 0.0)
         sticks = self._sticks_of(asked)
@@ -104,7 +104,7 @@ class StickScale:
     def _sticks_of(self, wrench: Array) -> Array:
         """Return the sticks times their gain, shape (6,), that command a wrench without limits.
 
-        Least squares of the thrusters' commands, then for squares Newton's method on the wrench that they make.
+        Fit the thrusters' commands by least squares; for quadratic forces, correct the wrench by Newton's method.
         """
         share = self.efforts @ wrench
         if not self.quadratic:
@@ -183,7 +183,7 @@ def scale_of(vehicle: Vehicle, profile: Profile, pilot_gain: float, sticks_by: S
     """
     gain = pilot_gain if sticks_by == "manual-control" else 1.0
     reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
-    if profile.name != "ardusub":  # it brings each axis to the thrusters by itself
+    if profile.name != "ardusub":  # the autopilot allocates each axis to the thrusters by itself
         share = np.diag(np.divide(1.0, reach, out=np.zeros(6), where=reach > 0.0))
         return StickScale(share, np.diag(reach), np.eye(6), gain, True, False, 0.0)
     mixer = MotorMixer(vehicle)

@@ -1,4 +1,4 @@
-"""The vehicle as its autopilot reports it: the newest of each quantity, and how old it is."""
+"""The state that an autopilot reports: the newest value of each quantity, and its age."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from controller.quaternion import from_axis_angle, multiply, rotation_matrix
 from cosim.companion.clock_sync import ClockSync
 from cosim.simulation.signals import Array
 
-RATES = {  # Hz that are asked for, by message id
-    0: 5.0,  # HEARTBEAT, with mode and arming; a PX4 refuses, and sends one a second
-    436: 10.0,  # CURRENT_MODE, PX4's
+RATES = {  # Hz, requested message rates by message id
+    0: 5.0,  # HEARTBEAT, with mode and arming; a PX4 refuses, and sends one per second
+    436: 10.0,  # CURRENT_MODE, PX4 only
     31: 50.0,  # ATTITUDE_QUATERNION
     32: 50.0,  # LOCAL_POSITION_NED
     33: 5.0,  # GLOBAL_POSITION_INT
@@ -24,17 +24,17 @@ RATES = {  # Hz that are asked for, by message id
     29: 10.0,  # SCALED_PRESSURE
     137: 10.0,  # SCALED_PRESSURE2
     132: 5.0,  # DISTANCE_SENSOR
-    193: 2.0,  # EKF_STATUS_REPORT, ArduPilot's
-    230: 2.0,  # ESTIMATOR_STATUS, PX4's
+    193: 2.0,  # EKF_STATUS_REPORT, ArduPilot only
+    230: 2.0,  # ESTIMATOR_STATUS, PX4 only
 }
-_ARMED, _CRITICAL = 128, 5  # of base_mode; MAV_STATE from which on a failsafe acts
-_LOCAL_NED, _BODY_FRD = 1, 12
-_RELATIVE, _ABSOLUTE = 8, 16  # flags of an estimate: of its horizontal position
+_ARMED, _CRITICAL = 128, 5  # bit of HEARTBEAT.base_mode; MAV_STATE_CRITICAL: from it on a failsafe is active
+_LOCAL_NED, _BODY_FRD = 1, 12  # MAV_FRAME
+_RELATIVE, _ABSOLUTE = 8, 16  # estimator flags: horizontal position is relative, absolute
 _DOWNWARDS = 25  # MAV_SENSOR_ROTATION_PITCH_270
-_DEFLECTED, _INVALID = 50, 0x7FFF  # of a stick's 1000; of no stick
+_DEFLECTED, _INVALID = 50, 0x7FFF  # MANUAL_CONTROL: least deflection of 1000 that counts; value of an unused stick
 _RESTS_IN_THE_MIDDLE = (3, 12)  # MAV_AUTOPILOT: ArduPilot and PX4
-_CENTER, _DEFLECTED_PULSE = 1500, 25  # us
-_PREDICTED = 0.1  # s, of a state's age, over which it is predicted
+_CENTER, _DEFLECTED_PULSE = 1500, 25  # us, center of a channel's pulse; least deflection that counts
+_PREDICTED = 0.1  # s, longest prediction of the state over its age
 _MILLI, _MICRO = 1e-3, 1e-6
 
 
@@ -44,32 +44,32 @@ class ReportedState:
     Parameters
     ----------
     identity : (int, int)
-        System and component that we are: whoever else sends sticks is a pilot.
+        The companion's own system id and component id; sticks from any other station are a pilot's.
 
     Attributes
     ----------
     system : int or None
-        The vehicle's system id: that of the first autopilot that was heard.
+        System id of the vehicle: of the first autopilot whose heartbeat was received; None before.
     position, velocity : ndarray, shape (3,)
-        [m, m/s], NED, in the autopilot's own local frame.
+        Position [m] and velocity [m/s], NED, in the autopilot's own local frame.
     quaternion, rates : ndarray, shape (4,), (3,)
-        From body to world, scalar first; body rates [rad/s].
+        Attitude from body to world, scalar first; body rates [rad/s].
     attitude_boot : float
         Time of this attitude since the autopilot's boot [s]; NaN before the first.
     mode, is_armed, in_failsafe : int, bool, bool
-        Of its heartbeat.
+        Custom mode; True if armed; True if the state is MAV_STATE_CRITICAL or beyond. From the last heartbeat.
     global_position : tuple of float or None
         Latitude and longitude [deg] and altitude above home [m].
     pressure : float
-        Outside [hPa]; NaN where none is reported.
+        Absolute pressure [hPa], of the second sensor if there is one; NaN if none is reported.
     is_reckoned : bool
-        The autopilot says that it has no fix of its horizontal position, and reckons it from velocities.
+        True if the autopilot has no fix of its horizontal position, and dead-reckons it.
     pilot_gain : float
-        Of an ArduSub's sticks, as it is now; NaN where none is reported.
+        Present pilot gain of an ArduSub's sticks [-]; NaN if none is reported.
     heard_at, beaten_at, pilot_at : float
-        Our time [s] at which anything came, a heartbeat, and sticks of somebody else.
+        Our times [s] of the last message, the last heartbeat, and the last deflected sticks of another station.
     sync : ClockSync
-        Of both clocks.
+        Offset between the autopilot's clock and ours.
     """
 
     def __init__(self, identity: tuple[int, int]) -> None:
@@ -85,10 +85,10 @@ class ReportedState:
         self.pressure = self.altitude = self.battery = self.pilot_gain = math.nan
         self.pulses: tuple[int, ...] = ()
         self.is_leaking = self.is_reckoned = False
-        self.resets = 0  # of the autopilot's estimate, as it counts them
+        self.resets = 0  # ODOMETRY.reset_counter of the autopilot's estimate
         self.heard_at = self.beaten_at = self.pilot_at = -math.inf
-        self.came: Counter[str] = Counter()  # messages, by name
-        self.results: dict[int, int] = {}  # of commands, by number
+        self.came: Counter[str] = Counter()  # counts of received messages, by name
+        self.results: dict[int, int] = {}  # last MAV_RESULT of each command, by MAV_CMD number
         self.texts: list[str] = []
         self.sync = ClockSync()
         self._position_boot = self.attitude_boot = math.nan
@@ -112,10 +112,10 @@ class ReportedState:
             "COMMAND_ACK": self._acknowledge,
             "TIMESYNC": lambda m, now: self.sync.take(m.tc1, m.ts1, now),
         }
-        self._second = False  # whether there is an outside sensor beside the autopilot's own
+        self._second = False  # True if SCALED_PRESSURE2 is received: the sensor outside the hull
 
     def take(self, system: int, component: int, message: Any, now: float) -> None:
-        """Take a message that came at our time `now` [s]."""
+        """Process a message that arrived at our time `now` [s]."""
         kind = message.get_type()
         if kind in ("MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"):
             if (system, component) != self._identity and _is_deflected(message, self.autopilot):
@@ -132,7 +132,8 @@ class ReportedState:
     def age(self, now: float) -> float:
         """Return the age of the older one of position and attitude [s]; infinite before both were received.
 
-        By the autopilot's own stamps where clocks are aligned, and never less than the time since it came.
+        It is computed from the autopilot's time stamps if the clocks are aligned, and is at least the time since
+        reception.
         """
         ages = []
         for boot, heard in ((self._position_boot, self._position_at), (self.attitude_boot, self._attitude_at)):
@@ -148,7 +149,7 @@ class ReportedState:
     def predict(self, now: float) -> tuple[Array, Array]:
         """Return position, shape (3,) [m, NED, local frame], and quaternion, shape (4,), predicted over their age.
 
-        Velocity and rates are taken as constant, for at most 0.1 s.
+        Velocity and rates are assumed constant, for at most 0.1 s.
         """
         lead = min(self.age(now), _PREDICTED)
         if not math.isfinite(lead):
@@ -164,7 +165,7 @@ class ReportedState:
         linear: Array = rotation_matrix(self.quaternion).T @ self.velocity
         return np.concatenate([linear, self.rates])
 
-    # ---- message by message ----
+    # ---- handlers of messages ----
 
     def _heartbeat(self, m: Any, now: float) -> None:
         self.beaten_at, self.autopilot, self.mode = now, m.autopilot, m.custom_mode
@@ -235,7 +236,7 @@ class ReportedState:
 
 
 def _is_deflected(message: Any, autopilot: int) -> bool:
-    """Return True if a stick is away from its center."""
+    """Return True if a stick is deflected from its rest position."""
     if message.get_type() == "RC_CHANNELS_OVERRIDE":
         pulses = (getattr(message, f"chan{i}_raw") for i in range(1, 7))
         return any(abs(pulse - _CENTER) > _DEFLECTED_PULSE for pulse in pulses if 0 < pulse < 0xFFFF)

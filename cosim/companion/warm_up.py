@@ -1,4 +1,4 @@
-"""A few steps without a vehicle, so that nothing is loaded or compiled for the first time while one is steered."""
+"""A few steps without a vehicle, so that all code is loaded and compiled before a vehicle is steered."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _STEPS = 3
 
 
 class _NoLink:
-    """A link to nobody, whose time goes by as it is waited for."""
+    """Link without a peer, whose clock advances by the timeouts of `receive`."""
 
     name, identity = "warm-up", (255, 191)
 
@@ -38,7 +38,7 @@ class _NoLink:
 
 
 class _ArmAtFirst:
-    """The command that lets the law work, at the first step."""
+    """Source of one command: it starts the law at the first step."""
 
     exhausted = False
 
@@ -47,14 +47,14 @@ class _ArmAtFirst:
 
 
 def warm_up(scenario: Scenario, options: CompanionOptions) -> None:
-    """Make a few steps of a scenario with a vehicle that stands where it starts.
+    """Run three steps of a scenario with a vehicle that rests at its initial position.
 
     Parameters
     ----------
     scenario : Scenario
-        As it will be steered.
+        Scenario as it will be flown, from `scenario_to_steer`.
     options : CompanionOptions
-        Likewise.
+        The user's options of the flight.
 
     Raises
     ------

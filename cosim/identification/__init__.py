@@ -1,7 +1,7 @@
 """Vehicle parameters from recorded runs.
 
-Windows of runs are predicted by the FMU's own equations, and compared with what sensors measured. Public: `identify`,
-`Identification`.
+Windows of runs are predicted by the FMU's own equations, and compared with the sensors' measurements. Public:
+`identify`, `Identification`.
 
 Imports: batch, io, plant_fmu, report, report.figures, results.
 """

@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 class Cause:
     """A group of fixed numbers, and the share of the residuals that it would explain."""
 
-    flag: str  # by which they are freed
-    share: float  # of the squares beyond those of the noise, in one Gauss-Newton step
+    flag: str  # command-line flag that frees the group
+    share: float  # explained fraction of the sum of squares beyond the noise, by one Gauss-Newton step
 
 
 def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values: Array, step: float) -> list[Cause]:
@@ -33,18 +33,18 @@ def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values
     logs : sequence of Log
         The runs.
     vehicle : Vehicle
-        Where the search started.
+        Vehicle with the start values of the search.
     fitted : Residuals
-        Of the fit: what was free, windows and weights.
+        Residuals of the fit, with its free parameters, windows and weights.
     values : ndarray, shape (p,)
-        As fitted.
+        Fitted values of the free parameters, in their units.
     step : float
-        Of the integration [s].
+        Integration step [s].
 
     Returns
     -------
     list of Cause
-        The one that explains most first; empty where no motion is predicted.
+        Causes in descending order of their shares; empty if a prediction fails or no residual exceeds the noise.
     """
     parameters, windows = fitted.parameters, fitted.windows
     kinds = {p.kind for p in parameters}
@@ -89,7 +89,7 @@ def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values
 
 
 def _left_by_random_force(forced: Residuals, fitted: Residuals, values: Array) -> float:
-    """Return the squares that are left, a Gauss-Newton step on, where each window has a constant force of its own."""
+    """Return the sum of squares after one Gauss-Newton step with a constant force in each window."""
     forced.weigh_as(fitted)
     settings = forced.settings(values)
     try:

@@ -16,12 +16,12 @@ from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-_SPAN = 0.3  # s, over which a change of velocity is taken
-_GRID = np.arange(-0.1, 0.601, 0.02)  # s
-_LAGS = (0.0, 0.1, 0.2)  # s, of the thrusters: the one that explains most counts
-_FEWEST = 50  # changes
-_DECIDED = 20.0  # twice the log-likelihood by which a topic's own delay must be better
-_SLOW = ("depth", "position")  # whose second differences are noise: they get the least delay of the others
+_SPAN = 0.3  # s, time between the two samples of a change of velocity
+_GRID = np.arange(-0.1, 0.601, 0.02)  # s, candidate delays
+_LAGS = (0.0, 0.1, 0.2)  # s, candidate lags of the thrusters; the most likely one is used
+_FEWEST = 50  # least number of changes for an estimate
+_DECIDED = 20.0  # twice the gain of log-likelihood from which on a topic gets a delay of its own
+_SLOW = ("depth", "position")  # topics whose second differences are noise: they get the least delay of the others
 
 
 def find_delays(logs: Sequence[Log], vehicle: Vehicle, step: float) -> dict[str, float]:
@@ -36,9 +36,9 @@ def find_delays(logs: Sequence[Log], vehicle: Vehicle, step: float) -> dict[str,
     logs : sequence of Log
         The runs.
     vehicle : Vehicle
-        Its thrusters.
+        Vehicle, for the directions of its thrusters.
     step : float
-        Of the grid of the commanded wrench [s].
+        Period of the grid of the commanded wrench [s].
 
     Returns
     -------
@@ -71,14 +71,14 @@ def find_delays(logs: Sequence[Log], vehicle: Vehicle, step: float) -> dict[str,
 
 
 def move_back(log: Log, delays: dict[str, float]) -> Log:
-    """Return a log whose samples are where they would be without delays.
+    """Return a log whose sample times are corrected by the delays.
 
     Parameters
     ----------
     log : Log
         The run.
     delays : dict of str to float
-        Of its topics [s].
+        Delays by topic [s]; missing ones are 0.
     """
     return replace(log, topics=tuple(
         replace(t, times=t.times - delays.get(t.name, 0.0), shift=delays.get(t.name, 0.0)) for t in log.topics
@@ -86,7 +86,7 @@ def move_back(log: Log, delays: dict[str, float]) -> Log:
 
 
 def within_margins(p: Parameter, delays: dict[str, float]) -> Parameter:
-    """Return a delay with bounds that keep samples in their windows; other numbers as they are."""
+    """Return a delay with bounds that keep samples in their windows; return other parameters unchanged."""
     if p.kind != "delay":
         return p
     late = delays.get(p.plant, 0.0)
@@ -94,7 +94,7 @@ def within_margins(p: Parameter, delays: dict[str, float]) -> Parameter:
 
 
 def _velocities(topic: Topic) -> tuple[Array, Array]:
-    """Return times and velocities of a topic: as measured, of an attitude by its differences over the span."""
+    """Return times [s], (n,), and velocities, (n, 3), of a topic; an attitude's are differences over the span."""
     if topic.name != "attitude":
         return topic.times, topic.values
     m = _pairs(topic.times)
@@ -110,12 +110,12 @@ def _pairs(times: Array) -> int:
 
 
 def _unexplained(times: Array, velocity: Array, log: Log, edges: Array, impulses: Sequence[Array]) -> Array | None:
-    """Return minus twice the log-likelihood, shape (lags, delays), but for a constant; None for too few changes."""
+    """Return minus twice the log-likelihood up to a constant, shape (lags, delays); None for too few changes."""
     m, attitude = _pairs(times), log.topic("attitude")
     if len(times) <= m or attitude is None:
         return None
     e0, e1, e2, e3 = (np.interp(times, attitude.times, x) for x in attitude.values.T)
-    down = np.column_stack([e1 * e3 - e0 * e2, e2 * e3 + e0 * e1])  # half of it, body axes x and y
+    down = np.column_stack([e1 * e3 - e0 * e2, e2 * e3 + e0 * e1])  # half the vertical's body components x and y
     drags = np.hstack([velocity, velocity * np.abs(velocity), down])
     pieces = np.diff(times)[:, None] * 0.5 * (drags[1:] + drags[:-1])
     sums = np.concatenate([np.zeros((1, pieces.shape[1])), np.cumsum(pieces, axis=0)])
@@ -126,7 +126,7 @@ def _unexplained(times: Array, velocity: Array, log: Log, edges: Array, impulses
     begin, end = times[:-m][inside], times[m:][inside]
     change = (velocity[m:] - velocity[:-m])[inside]
     known = np.column_stack([(sums[m:] - sums[:-m])[inside], end - begin])
-    apart = float(np.median(np.diff(times))) / _SPAN  # changes overlap: how much each adds
+    apart = float(np.median(np.diff(times))) / _SPAN  # independent fraction of each change, since they overlap
     left = np.empty((len(impulses), len(_GRID)))
     for i, impulse in enumerate(impulses):
         for j, delay in enumerate(_GRID):

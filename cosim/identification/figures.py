@@ -13,7 +13,7 @@ from cosim.identification.validation import Prediction
 from cosim.report.figures.style import BLACK, BLUE, ORANGE, SKY, NamedFigure
 
 _WIDTH = 7.2  # in
-_MOST = 60  # numbers in a figure
+_MOST = 60  # most parameters in a figure
 
 
 def figures_of(fit: Fit, predictions: Sequence[Prediction]) -> Iterator[NamedFigure]:

@@ -12,15 +12,15 @@ from cosim.identification.intervals import DISAGREES
 from cosim.identification.log import UNITS, Log, command_period
 from cosim.identification.parameters import NUISANCES, RANDOM_FORCE
 
-_LOST = 10.0  # chi2 by degrees of freedom, above which nothing was identified
-_ALIKE = 0.95  # correlation, beyond which runs do not separate two numbers
-_LISTED = 6
-NAMED = 0.1  # part of what is not explained, above which a cause is named
-_LATE = 0.15  # s, of samples behind the commands: a lag of the thrusters seldom looks like more
-_SLOW = 0.2  # s between changes of the commands, from which on added mass and lag are not to be trusted
-_SLOW_SAMPLES = 0.03  # s between samples of servo outputs, from which on their rate is named
-_APART = 0.9  # correlation of a delay and the lag, beyond which runs do not separate them
-_NEEDS = {  # motions that tell the numbers of a key apart
+_LOST = 10.0  # chi2 per degree of freedom, above which nothing was identified
+_ALIKE = 0.95  # magnitude of the correlation, above which runs do not separate two numbers
+_LISTED = 6  # most names in a list
+NAMED = 0.1  # share of the unexplained residuals, above which a cause is named
+_LATE = 0.15  # s, delay of samples above which a delay is named as a cause: a lag of the thrusters is seldom longer
+_SLOW = 0.2  # s, time between changes of the commands, from which on added mass and lag are not determined
+_SLOW_SAMPLES = 0.03  # s, time between samples of servo outputs, from which on a warning names their rate
+_APART = 0.9  # magnitude of the correlation of a delay and the lag, above which the fit is refused
+_NEEDS = {  # motion that determines the numbers of a key
     "hydrodynamics.added_mass": "quick changes of speed along and about the axis: steps of full stick, a second each",
     "hydrodynamics.linear_damping": "slow and fast motion along the axis, each held for some seconds",
     "hydrodynamics.quadratic_damping": "slow and fast motion along the axis, each held for some seconds",
@@ -33,7 +33,7 @@ _NEEDS = {  # motions that tell the numbers of a key apart
 
 
 def verdict(fit: Fit) -> str:
-    """Return the one sentence that says what came of it."""
+    """Return a sentence about the count of determined numbers and the quality of the fit."""
     free = fit.vehicle_part()
     determined = len(free) - len(fit.resting())
     seconds = sum(window.steps for window in fit.windows) * fit.step
@@ -45,12 +45,12 @@ def verdict(fit: Fit) -> str:
 
 
 def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
-    """Yield what a user must know before the numbers are used.
+    """Yield the warnings that a user must read before using the numbers.
 
     Parameters
     ----------
     fit : Fit
-        What came of it.
+        Result of the identification.
     logs : sequence of Log
         The runs.
     """
@@ -116,7 +116,7 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
 
 
 def slow_commands(log: Log) -> str:
-    """Return what a run's slow servo data can and cannot say; empty where its commands change quickly."""
+    """Return a warning about slowly sampled commands of a run; empty if they are fast enough."""
     if log.sampled:
         period = float(np.median(np.diff(log.times)))
         if period < _SLOW_SAMPLES:
@@ -138,7 +138,7 @@ def slow_commands(log: Log) -> str:
 
 
 def _cause(fit: Fit, slow: bool) -> str:
-    """Return the causes of a poor fit as text, by name where a number of the fit stands for one."""
+    """Return the likely causes of a poor fit as text, with the flags that would estimate them."""
     late = {name: x for name, x in fit.delays.items() if x > _LATE}
     if late and not slow and not any(p.kind == "delay" for p in fit.parameters):
         said = ", ".join(f"{name.replace('_', ' ')} {x:.2f} s" for name, x in late.items())
@@ -161,7 +161,7 @@ def _cause(fit: Fit, slow: bool) -> str:
 
 
 def _nuisance_flag(fit: Fit, *more: str) -> str:
-    """Return the flag that names the nuisances of a fit, and more of them."""
+    """Return the flag ``--nuisance`` with the nuisances of a fit and further ones."""
     kinds = {p.kind for p in fit.parameters}
     named = [name for name in NUISANCES if name in kinds]
     return " ".join(["--nuisance", *named, *([RANDOM_FORCE] if fit.forces is not None else []), *more])
@@ -182,12 +182,12 @@ def require_apart(fit: Fit) -> None:
     Parameters
     ----------
     fit : Fit
-        What came of it.
+        Result of the identification.
 
     Raises
     ------
     IdentificationError
-        If the correlation of the lag with a delay is above 0.9.
+        If the magnitude of the correlation of the lag with a delay is above 0.9.
     """
     of_kind = {kind: [i for i, p in enumerate(fit.parameters) if p.kind == kind] for kind in ("lag", "delay")}
     for lag in of_kind["lag"]:
@@ -202,13 +202,13 @@ def require_apart(fit: Fit) -> None:
 
 
 def advice(fit: Fit) -> Iterator[str]:
-    """Yield what to drive next: for the numbers that are known worst."""
+    """Yield the manoeuvres to drive next, for the numbers that are determined worst."""
     worst: dict[str, float] = {}
     for i in fit.vehicle_part():
         p = fit.parameters[i]
         key = ".".join(p.name.split(".")[:2])
         part = float(fit.intervals.prior_part[i])
-        if part > 0.1:  # of the prior's deviation
+        if part > 0.1:  # deviation of the fit by that of the prior
             worst[key] = max(worst.get(key, 0.0), part)
     for key in sorted(worst, key=lambda key: -worst[key])[:3]:
         yield f"For {key}: {_NEEDS.get(key, 'motion along and about all axes')}."

@@ -1,4 +1,4 @@
-"""The fit: prediction errors of staged windows made least, robustly, with what was known before as a prior."""
+"""The fit: robust least squares of prediction errors, in short and then long windows, with priors."""
 
 from __future__ import annotations
 
@@ -25,15 +25,16 @@ from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-LONGEST_STEP, SHORTEST_STEP = 0.03, 0.015  # s, of the integration
-STAGES = (4.0, 20.0)  # s, lengths of windows: short ones find the numbers from afar, long ones tell them apart
-_HELD, _ROUGH, _PRECISION = 0.1, 1e-2, 1e-6  # part of the cost, below which a step ends a round: first, others, last
-_FAR = 0.03  # weight of all residuals in the first round: starts as sampled are off by some 30 deviations of the noise
-_EVALUATIONS = 20  # of each round, at the most
-_ROUNDS = (3, 2)  # of each stage: fit, weigh anew; the first of all from starts as sampled
-_HUBER = 3.0  # standard deviations, beyond which a residual counts by its magnitude
-_OUTLIER = 6.0  # standard deviations, beyond which a sample is called an outlier
-_INSIDE = 0.05  # of a deviation: how far from its bound a number starts
+LONGEST_STEP, SHORTEST_STEP = 0.03, 0.015  # s, bounds of the integration step
+STAGES = (4.0, 20.0)  # s, lengths of windows: short ones converge from distant starts, long ones separate the numbers
+# relative decrease of the cost that ends a round: the first round, the others, the last one of a stage
+_HELD, _ROUGH, _PRECISION = 0.1, 1e-2, 1e-6
+_FAR = 0.03  # weight of all residuals in the first round: sampled starts are off by some 30 deviations of the noise
+_EVALUATIONS = 20  # most evaluations of a round
+_ROUNDS = (3, 2)  # rounds of each stage, with new weights between them; the very first one keeps the sampled starts
+_HUBER = 3.0  # standard deviations, from which on the cost of a residual is linear
+_OUTLIER = 6.0  # standard deviations, beyond which a component of a sample is called an outlier
+_INSIDE = 0.05  # prior deviations, least distance of a start value from its bound
 
 
 @dataclass(frozen=True)
@@ -41,29 +42,29 @@ class Fit:
     """Result of an identification."""
 
     parameters: tuple[Parameter, ...]
-    values: Array  # (p,)
+    values: Array  # (p,) fitted values of the parameters, in their units
     intervals: Intervals
-    windows: tuple[Window, ...]  # of the last stage
-    rejected: Counter[str]  # windows of the last stage, by the rule that rejected them
-    residuals: tuple[Reduced, ...]  # of each window, weighted
-    outliers: int  # samples' components
-    samples: int  # samples' components in all
-    step: float  # s, of the integration
-    delays: dict[str, float]  # s, of the topics, as found before the fit
-    causes: tuple[Cause, ...] = ()  # of a fit that disagrees with the runs, the greatest first
-    command_error: float | None = None  # size of what sampled commands leave open, in that of steps at any time
-    forces: Array | None = None  # (windows, 3) N, north, east, down, where a random force is estimated
+    windows: tuple[Window, ...]  # windows of the last stage
+    rejected: Counter[str]  # counts of rejected windows of the last stage, by the rule that rejected them
+    residuals: tuple[Reduced, ...]  # weighted residuals of each window
+    outliers: int  # number of components of samples that are outliers
+    samples: int  # number of components of all samples
+    step: float  # s, integration step
+    delays: dict[str, float]  # s, start values of the delays by topic, from `find_delays`
+    causes: tuple[Cause, ...] = ()  # causes of a poor fit, the greatest first
+    command_error: float | None = None  # size of the errors of sampled commands, in that of steps at any time
+    forces: Array | None = None  # (windows, 3) N, NED, random force of each window, if it is estimated
 
     def vehicle_part(self) -> list[int]:
-        """Return the places of the vehicle's own numbers."""
+        """Return the indices of the vehicle's own parameters."""
         return [i for i, p in enumerate(self.parameters) if not p.is_nuisance]
 
     def resting(self) -> list[int]:
-        """Return the places of the vehicle's numbers that rest on their priors."""
+        """Return the indices of the vehicle's parameters that rest on their priors."""
         return [i for i in self.vehicle_part() if self.intervals.prior_part[i] > RESTS]
 
     def alike(self, least: float) -> Iterator[tuple[str, str]]:
-        """Yield pairs of numbers, one of the vehicle's, whose correlation is beyond `least`, the most alike first."""
+        """Yield pairs of parameters with correlations above `least`, the strongest first, without nuisance pairs."""
         size = np.abs(np.triu(self.intervals.correlation, 1))
         for i, j in sorted(np.argwhere(size > least), key=lambda pair: -size[tuple(pair)]):
             one, other = self.parameters[i], self.parameters[j]
@@ -71,7 +72,7 @@ class Fit:
                 yield one.name, other.name
 
     def worst_topic(self) -> tuple[str, float]:
-        """Return the topic that is explained worst, and the root mean square of its residuals in its noise."""
+        """Return the topic with the greatest residuals, and their root mean square in standard deviations of noise."""
         sums: dict[str, list[float]] = {}
         for window, reduced in zip(self.windows, self.residuals, strict=True):
             count = 0
@@ -91,37 +92,38 @@ def fit(
     progress: Callable[[float], None] = lambda part: None,
     random_force: bool = False,
 ) -> Fit:
-    """Find the numbers under which windows of runs are predicted best.
+    """Fit the free parameters so that windows of runs are predicted best.
 
     Parameters
     ----------
     logs : sequence of Log
         The runs.
     vehicle : Vehicle
-        Where the search starts.
+        Vehicle with the start values of the search.
     parameters : sequence of Parameter
-        What is free.
+        Free parameters with their priors.
     progress : callable
-        Told what part of the work is done, 0 to 1.
+        Receives the fraction of the work done so far, 0 to 1.
     random_force : bool
-        Estimate a constant force of each window beside. Windows then stay short, since it is none over long ones.
+        True to estimate a constant force of each window as well. Windows then stay short, since the force is not
+        constant over long ones.
 
     Returns
     -------
     Fit
-        Numbers with their intervals.
+        Fitted values with their intervals.
 
     Raises
     ------
     IdentificationError
-        If no window is left, or the start predicts no motion.
+        If all windows are rejected, or the start values predict no finite motion.
     """
     with single_thread():
         return _fit(logs, vehicle, tuple(parameters), progress, random_force)
 
 
 def single_thread() -> AbstractContextManager[object]:
-    """Keep linear algebra to one thread: the matrices are small, and further threads would mostly wait."""
+    """Limit linear algebra to one thread: the matrices are small, and further threads would mostly wait."""
     limited: AbstractContextManager[object] = threadpool_limits(1)
     return limited
 
@@ -142,7 +144,7 @@ def _fit(
         ])  # fmt: skip
     found: list[Fit] = []
     stages = tuple(zip(STAGES, _ROUNDS, strict=True))
-    if random_force or any(log.sampled for log in logs):  # what long windows would tell more, noise has covered
+    if random_force or any(log.sampled for log in logs):  # noise covers the additional information of long windows
         stages = ((STAGES[0], _ROUNDS[0] + 1),)
     done, total = 0, sum(rounds for _, rounds in stages) * _EVALUATIONS
     for length, rounds in stages:
@@ -168,7 +170,7 @@ def _fit(
             except IdentificationError:
                 if not found:
                     raise
-                return found[0]  # long windows have no motion from there
+                return found[0]  # the motion over long windows does not stay finite
             done = begun + _EVALUATIONS
             if turn < rounds - 1:
                 problem.reweigh()
@@ -197,26 +199,26 @@ def _result(problem: Problem, values: Array, rejected: Counter[str], step: float
 
 
 class Problem:
-    """The residuals as `scipy.optimize.least_squares` takes them: each window's rows rotated to as few as there can be.
+    """Least-squares problem for `scipy.optimize.least_squares`, with the rows of each window reduced by QR to p + 1.
 
     Parameters
     ----------
     residuals : Residuals
-        Of all windows.
+        Residuals of all windows.
     """
 
     def __init__(self, residuals: Residuals) -> None:
         self.residuals = residuals
         self.reduced: list[Reduced] = []
         self._known: tuple[bytes, Array, Array] | None = None
-        self._least = np.inf  # cost, of those evaluated since the weights changed
+        self._least = np.inf  # least cost since the weights changed
         parameters = residuals.parameters
         self._start = np.array([p.start for p in parameters])
         self._deviation = np.array([p.deviation for p in parameters])
         self._bounds = np.array([p.least for p in parameters]), np.array([p.most for p in parameters])
 
     def solve(self, values: Array, tick: Callable[[], None], precision: float) -> Array:
-        """Return the best values from some on; IdentificationError if they predict no motion that stays finite."""
+        """Return the best values, searched from `values`; IdentificationError if these predict no finite motion."""
 
         def residual(x: Array) -> Array:
             tick()
@@ -234,13 +236,13 @@ class Problem:
         return result
 
     def reweigh(self) -> None:
-        """Weigh the residuals by Huber's function of what they are now."""
+        """Set the weights of the residuals by Huber's function of their present values."""
         for i, reduced in enumerate(self.reduced):
             size = np.abs(reduced.residual[: len(self.residuals.weights[i])] / self.residuals.weights[i])
             self.residuals.weights[i] = np.sqrt(np.minimum(1.0, _HUBER / np.maximum(size, 1e-12)))
 
     def _evaluate(self, values: Array) -> tuple[Array, Array]:
-        """Return residuals and their derivatives, those of the prior last; NaN where there is no motion."""
+        """Return residuals, (n,), and their derivatives, (n, p), the prior's last; NaN if the motion is not finite."""
         key = values.tobytes()
         if self._known is None or self._known[0] != key:
             settings = self.residuals.settings(values)
@@ -264,7 +266,7 @@ class Problem:
 
 
 def integration_step(logs: Sequence[Log]) -> float:
-    """Return a step on whose grid commands change, as far as they change at one rate.
+    """Return an integration step that divides the usual time between changes of the commands.
 
     Parameters
     ----------
@@ -274,7 +276,7 @@ def integration_step(logs: Sequence[Log]) -> float:
     Returns
     -------
     float
-        15 to 30 ms: a whole part of the usual time between changes, or a multiple of it [s].
+        Step of 15 to 30 ms [s]: the usual time between changes by a whole number, or a multiple of it.
     """
     spans = []
     for log in logs:
@@ -289,7 +291,7 @@ def integration_step(logs: Sequence[Log]) -> float:
 
 
 def _inside(parameters: Sequence[Parameter]) -> Array:
-    """Return the starts, off their bounds."""
+    """Return the start values, moved away from their bounds."""
     return np.array([
         np.clip(p.start, p.least + _INSIDE * p.deviation, p.most - _INSIDE * p.deviation) for p in parameters
     ])  # fmt: skip

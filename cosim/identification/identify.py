@@ -25,14 +25,14 @@ from plant_fmu.vehicle import Vehicle, load_vehicle
 
 @dataclass(frozen=True)
 class Identification:
-    """An identification and what its page shows."""
+    """An identification with its runs, fit and validation."""
 
-    start: str  # the shipped vehicle or the file where the search started
-    vehicle: Vehicle  # the same, loaded
-    logs: tuple[Log, ...]  # that were fitted
-    held_out: tuple[Log, ...]  # that were not
+    start: str  # name of the shipped vehicle, or path of the file, with the start values of the search
+    vehicle: Vehicle  # vehicle of `start`, loaded
+    logs: tuple[Log, ...]  # fitted runs
+    held_out: tuple[Log, ...]  # runs for validation, not fitted
     fit: Fit
-    predictions: tuple[Prediction, ...]  # of the runs held out, or of those fitted where there are none
+    predictions: tuple[Prediction, ...]  # prediction errors of the runs held out, or without them of the fitted ones
 
 
 def identify(
@@ -50,27 +50,27 @@ def identify(
     runs : sequence of Path
         Run folders.
     start : str
-        A shipped vehicle, or a vehicle's file: where the search starts, and what stays of the other numbers.
+        Name of a shipped vehicle, or path of a vehicle's file: it gives the start values and the fixed numbers.
     free : sequence of str
-        Keys of the vehicle's file, as `free_parameters` takes them.
+        Keys of the vehicle's file to identify, as for `free_parameters`.
     nuisance : sequence of str
-        As `nuisances` takes them.
+        Names of nuisances to estimate, as for `nuisances`.
     held_out : sequence of Path
-        Run folders that are predicted, and not fitted.
+        Run folders for validation: predicted, not fitted.
     progress : callable
-        Told what part of the work is done, 0 to 1.
+        Receives the fraction of the work done so far, 0 to 1.
 
     Returns
     -------
     Identification
-        With the fit.
+        Runs, fit and validation.
 
     Raises
     ------
     RunError, VehicleError, TableError
         If a run or the vehicle cannot be read.
     IdentificationError
-        If the runs do not have what it needs, or do not separate a delay from the thrusters' lag.
+        If the runs lack commands or measurements, or do not separate a delay from the thrusters' lag.
 
     Examples
     --------
@@ -106,14 +106,14 @@ def write_vehicle(done: Identification, out: Path) -> None:
     Parameters
     ----------
     done : Identification
-        What came of it.
+        Result of the identification.
     out : Path
-        The file, which ends in ``.toml``.
+        Path of the file, which ends in ``.toml``.
 
     Raises
     ------
     IdentificationError
-        If it cannot be written, or its name is none of a vehicle's file.
+        If the file cannot be written, or its name is not valid for a vehicle.
     """
     names = ", ".join(log.name for log in done.logs)
     provenance = [

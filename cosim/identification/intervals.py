@@ -1,4 +1,4 @@
-"""How sure the numbers are: intervals that do not trust the model, and what rests on what was known before."""
+"""Uncertainty of the numbers: jackknife intervals, which hold for a wrong model too, and the weight of the priors."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from cosim.identification.windows import Window
 
 Array = NDArray[np.float64]
 
-DISAGREES = 1.2  # chi2 by degrees of freedom, above which the model is called wrong
-RESTS = 0.5  # of the prior's deviation: above it, a number rests on its prior
-_BLOCK = 5.0  # s, of residuals that stay together in the jackknife
-_LONG_BLOCK = 20.0  # s, of a piece where neighboring windows are correlated: a model's error may last for seconds
-_FEWEST_RUNS = 8  # from which on whole runs are left out instead
-_COVERED = 0.95
-NORMAL = 1.96  # standard deviations: half of a 95 % interval
+DISAGREES = 1.2  # chi2 per degree of freedom, above which the model is called wrong
+RESTS = 0.5  # ratio of nominal to prior deviation, above which a number rests on its prior
+_BLOCK = 5.0  # s, length of the pieces that the jackknife leaves out
+_LONG_BLOCK = 20.0  # s, their length if neighboring windows are correlated: a model error may last for seconds
+_FEWEST_RUNS = 8  # least number of runs from which on the jackknife leaves out whole runs
+_COVERED = 0.95  # coverage of the intervals
+NORMAL = 1.96  # standard deviations, half width of a 95 % interval of a normal distribution
 
 
 @dataclass(frozen=True)
 class Intervals:
     """Uncertainty of p numbers."""
 
-    half: Array  # (p,) of the 95 % interval: of the jackknife, or nominal where that is greater
-    nominal: Array  # (p,) as white noise of the sensors alone would have it
-    covariance: Array  # (p, p) of a normal distribution with these intervals and the correlation of the fit
-    clusters: str  # what the jackknife leaves out
-    chi2: float  # by degrees of freedom
-    prior_part: Array  # (p,) nominal deviation, in deviations of the prior
+    half: Array  # (p,) half widths of the 95 % intervals: of the jackknife, or nominal ones where they are greater
+    nominal: Array  # (p,) standard deviations for white noise of the sensors and a right model
+    covariance: Array  # (p, p) covariance of a normal distribution with these intervals and the fit's correlation
+    clusters: str  # description of the pieces that the jackknife leaves out
+    chi2: float  # chi2 per degree of freedom
+    prior_part: Array  # (p,) ratios of nominal to prior deviation
 
     @property
     def correlation(self) -> Array:
@@ -53,25 +53,25 @@ def estimate_intervals(
     Parameters
     ----------
     parameters : sequence of Parameter
-        What is free, with its prior.
+        Free parameters with their priors.
     values : ndarray, shape (p,)
-        As fitted.
+        Fitted values of the parameters, in their units.
     reduced : sequence of Reduced
-        Of each window, at those values.
+        Residuals and derivatives of each window at the fitted values.
     windows : sequence of Window
         The windows.
     eliminated : int
         Number of unknowns of each window that are not parameters, such as its start.
     random_force : bool
-        True if one is estimated: forces of neighboring windows are correlated.
+        True if a random force is estimated: forces of neighboring windows are correlated.
 
     Returns
     -------
     Intervals
-        By a jackknife over pieces of 5 s, of 20 s where the model is wrong or a random force is estimated, or over runs
-        where there are eight or more: each left out in turn, in one Gauss-Newton step. Where pieces are of 20 s, each
-        number has degrees of freedom by the pieces that determine it (Bell and McCaffrey 2002, CR3). Nominal ones hold
-        for white noise and a right model alone.
+        Jackknife and nominal uncertainty. The jackknife leaves out each piece in turn, in one Gauss-Newton step. Pieces
+        are whole runs if there are eight or more; else 5 s long, or 20 s if the model is wrong or a random force is
+        estimated. If one of these two holds, each number has degrees of freedom by the pieces that determine it (Bell
+        and McCaffrey 2002, CR3). Nominal deviations hold for white noise and a right model alone.
     """
     prior = np.array([1.0 / p.deviation**2 for p in parameters])
     information = np.diag(prior) + sum(r.jacobian.T @ r.jacobian for r in reduced)
@@ -86,7 +86,7 @@ def estimate_intervals(
     half = NORMAL * nominal
     if len(pieces) > 1:
         jackknife, freedom = _jackknife(information, inverse, pieces)
-        if not are_correlated:  # nothing contradicts the nominal ones: the number of pieces suffices
+        if not are_correlated:  # residuals agree with the noise: degrees of freedom by the number of pieces suffice
             freedom = np.full_like(freedom, len(pieces) - 1.0)
         half = np.maximum(half, jackknife * student.ppf(0.5 + _COVERED / 2.0, freedom))
     scale = half / (NORMAL * nominal)
@@ -98,10 +98,10 @@ def estimate_intervals(
 
 
 def _jackknife(information: Array, inverse: Array, pieces: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
-    """Return deviations of the numbers by leaving out each piece, and their degrees of freedom.
+    """Return the standard deviations of the numbers by leaving out each piece, (p,), and degrees of freedom, (p,).
 
-    A number that few pieces determine has few: those of a chi² distribution with the mean and the variance that the
-    squared deviation has where the noise is white (Satterthwaite 1946).
+    A number that few pieces determine has few degrees of freedom. They are those of the chi² distribution that has the
+    mean and the variance of the squared deviation for white noise (Satterthwaite 1946).
     """
     own = [jacobian.T @ jacobian for jacobian, _ in pieces]
     left_out = [np.linalg.inv(information - part) for part in own]  # (p, p) each, symmetric
@@ -115,7 +115,7 @@ def _jackknife(information: Array, inverse: Array, pieces: Sequence[tuple[Array,
     across[:, range(n), range(n)] += alone.T
     trace = np.trace(across, axis1=1, axis2=2)
     squares = np.sum(np.square(across), axis=(1, 2))
-    freedom: Array = np.full(len(trace), n - 1.0)  # of numbers that no piece moves
+    freedom: Array = np.full(len(trace), n - 1.0)  # default, for numbers that no piece moves
     np.divide(np.square(trace), squares, out=freedom, where=squares > 0.0)
     return deviations, np.maximum(1.0, freedom)
 
@@ -123,7 +123,7 @@ def _jackknife(information: Array, inverse: Array, pieces: Sequence[tuple[Array,
 def _pieces(
     reduced: Sequence[Reduced], windows: Sequence[Window], are_correlated: bool
 ) -> tuple[list[tuple[Array, Array]], str]:
-    """Return rows that stay together, and what they are."""
+    """Return jacobian and residual of each piece that the jackknife leaves out, and a description of the pieces."""
     runs = len({window.run for window in windows})
     if runs >= _FEWEST_RUNS or are_correlated:
         whole = runs >= _FEWEST_RUNS

@@ -21,17 +21,18 @@ Array = NDArray[np.float64]
 TOPICS = ("velocity", "angular_velocity", "depth", "attitude", "position")
 UNITS = {"velocity": "m/s", "angular_velocity": "rad/s", "depth": "m", "attitude": "rad", "position": "m"}
 _AXES = {"velocity": "uvw", "angular_velocity": "pqr", "depth": "z", "attitude": "xyz", "position": "xyz"}
+# least standard deviations of noise that is estimated from samples, in the units of `UNITS`
 _LEAST_NOISE = {"velocity": 1e-3, "angular_velocity": 1e-3, "depth": 1e-3, "attitude": 1e-2, "position": 5e-3}
 _MOST_SAMPLES = 50.0  # Hz; faster topics are averaged over blocks
-_FEWEST = 20  # samples of a topic
-_DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # whose variance on white noise is 70 times that of the noise
+_FEWEST = 20  # least number of samples of a topic, and of commands
+_DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # fourth difference: its variance is 70 times that of white noise
 _MAD = 1.4826  # standard deviation of a normal distribution, in median absolute deviations
 
-_SAMPLED = ("pulses", "effort")  # commands that an autopilot logs slower than it changes them
+_SAMPLED = ("pulses", "effort")  # quantities of commands that an autopilot logs slower than it changes them
 
-_MEANS = ("VISO", "VISION_POSITION_DELTA")  # DVL messages that have how far it went since the last one
+_MEANS = ("VISO", "VISION_POSITION_DELTA")  # DVL messages with the displacement since the last message
 
-# of each topic the columns that may hold it, the first that do are taken; and where the times of their samples stand
+# topic: columns that may hold it, in order of preference, each with the column of its samples' times or ""
 _COLUMNS: dict[str, tuple[tuple[tuple[str, ...], str], ...]] = {
     "velocity": (
         (tuple(f"measured.velocity.{name}" for name in "uvw"), "measured.time.dvl"),
@@ -59,59 +60,60 @@ _COLUMNS: dict[str, tuple[tuple[tuple[str, ...], str], ...]] = {
 class Topic:
     """The samples of one sensor."""
 
-    name: str  # of TOPICS
+    name: str  # one of `TOPICS`
     times: Array  # (n,) s, rising
-    values: Array  # (n, m): m/s, rad/s, m, or a quaternion
-    noise: Array  # (c,) standard deviation of each component of the residual
-    shift: float = 0.0  # s, by which the stamps are moved back
-    spread: float = 0.0  # s, before and after each time: a value is the mean of two there, which averages of many equal
+    values: Array  # (n, m) in the unit of `UNITS`; attitudes are quaternions from body to world, scalar first
+    noise: Array  # (c,) standard deviation of each component of the residual, in the unit of `UNITS`
+    shift: float = 0.0  # s, delay that was subtracted from the time stamps
+    # s, for averaged samples: a value is compared with the mean of the motion at `spread` before and after its time
+    spread: float = 0.0
 
     @property
     def components(self) -> tuple[str, ...]:
-        """Names of the components of its residual."""
+        """Names of the components of the residual."""
         return tuple(_AXES[self.name])
 
     @property
     def offsets(self) -> tuple[float, ...]:
-        """Times about that of a sample whose mean it is [s]."""
+        """Offsets from a sample's time at which the motion is averaged [s]."""
         return (-self.spread, self.spread) if self.spread else (0.0,)
 
 
 @dataclass(frozen=True)
 class Log:
-    """One run."""
+    """Commands and measurements of one run."""
 
     name: str
-    times: Array  # (rows,) s, of the commands
-    thrust: Array  # (rows, thrusters) N, commanded
-    wrench: Array  # (rows, 6) N, N m, commanded beside the thrusters
+    times: Array  # (rows,) s, times of the commands
+    thrust: Array  # (rows, thrusters) N, commanded forces
+    wrench: Array  # (rows, 6) N, N m, body frame, commanded in addition to the thrusters
     topics: tuple[Topic, ...]
-    sampled: bool = False  # commands are samples, between which they change; else each is held until the next
+    sampled: bool = False  # True if commands also change between the rows; False if each is held until the next
 
     def topic(self, name: str) -> Topic | None:
-        """Return a topic by its name, None where the run has none."""
+        """Return a topic by its name, or None if the run does not have it."""
         return next((topic for topic in self.topics if topic.name == name), None)
 
 
 def make_topic(name: str, times: Array, values: Array, noise: float | None = None) -> Topic:
-    """Return a topic whose noise, where it is not known, is estimated from its samples.
+    """Return a topic from samples; estimate its noise from them if it is not given.
 
     Parameters
     ----------
     name : str
-        Of `TOPICS`.
+        One of `TOPICS`.
     times : ndarray, shape (n,)
-        [s], rising.
+        Rising times of the samples [s].
     values : ndarray, shape (n, m)
-        Without gaps.
+        Finite samples in the unit of `UNITS`; attitudes are quaternions from body to world, scalar first.
     noise : float, optional
-        Standard deviation of each component; default: that of fourth differences, by their median, and at the least
-        1 mm/s, 1 mrad/s, 1 mm, of positions 5 mm, and of attitudes, which filters smooth, 10 mrad.
+        Standard deviation of each component. Default: estimated from the median of fourth differences, but at least
+        1 mm/s, 1 mrad/s, 1 mm, 5 mm for positions, and 10 mrad for attitudes, which filters smooth.
 
     Returns
     -------
     Topic
-        The topic, averaged over blocks to 50 Hz at the most.
+        Topic, averaged over blocks to at most 50 Hz.
     """
     if name == "attitude":
         values = _continuous(values)
@@ -124,7 +126,7 @@ def make_topic(name: str, times: Array, values: Array, noise: float | None = Non
     period, spread = float(np.median(np.diff(times))), 0.0
     block = max(1, round((1.0 / _MOST_SAMPLES) / period))
     if block > 1:
-        spread = period * float(np.sqrt((block**2 - 1) / 12.0))  # their standard deviation: exact for cubic motion
+        spread = period * float(np.sqrt((block**2 - 1) / 12.0))  # deviation of a block's times: exact for cubic motion
         count = len(times) // block
         times = times[: count * block].reshape(count, block).mean(axis=1)
         values = values[: count * block].reshape(count, block, -1).mean(axis=1)
@@ -136,36 +138,36 @@ def make_topic(name: str, times: Array, values: Array, noise: float | None = Non
 
 
 def command_period(log: Log) -> float:
-    """Return the time between changes of the commands that one in twenty falls short of [s]; 0 without changes."""
+    """Return the 5 % quantile of the times between changes of the commands [s]; 0 without changes."""
     commands = np.concatenate([log.thrust, log.wrench], axis=1)
     spans = np.diff(log.times[1:][(np.diff(commands, axis=0) != 0.0).any(axis=1)])
     return float(np.quantile(spans, 0.05)) if len(spans) else 0.0
 
 
 def load_log(folder: Path, vehicle: Vehicle) -> Log:
-    """Read what a run recorded.
+    """Load commands and measurements of a run.
 
     Parameters
     ----------
     folder : Path
         The run folder.
     vehicle : Vehicle
-        Which of its columns are the thrusters' commands follows from the number of thrusters.
+        Vehicle, for the number of its thrusters.
 
     Returns
     -------
     Log
-        Topics that the run does not have are left out; positions are taken where there are no velocities.
+        Commands and recorded topics; positions only if there are no velocities.
 
     Raises
     ------
     RunError
-        If it cannot be read.
+        If the run cannot be read.
     TableError
         If its scenario cannot be read.
     IdentificationError
-        If it has no commands, no attitude, or neither velocities nor positions; if its scenario has failures of
-        thrusters, or a limit or lag of the wrench that it commands.
+        If the run has no commands, no attitude, or neither velocities nor positions; if its scenario has failures of
+        thrusters, or a limit or lag of the commanded wrench.
     """
     record = load_record(folder)
     thrusters = [f"thrust[{i + 1}]" for i in range(vehicle.n_thrusters)]
@@ -195,7 +197,7 @@ def load_log(folder: Path, vehicle: Vehicle) -> Log:
 
 
 def _with_mean(topic: Topic, facts: Sequence[TopicFacts]) -> Topic:
-    """Return a topic that knows of its values whether each is the mean of the time since the last."""
+    """Return a topic with the spread of its values, if these are means over the time since the last sample."""
     if topic.name != "velocity" or not any(f.quantity == "dvl" and f.source in _MEANS for f in facts):
         return topic
     period = float(np.median(np.diff(topic.times)))
@@ -203,7 +205,7 @@ def _with_mean(topic: Topic, facts: Sequence[TopicFacts]) -> Topic:
 
 
 def _require_steady_actuators(folder: Path, has_wrench: bool) -> None:
-    """Refuse a run of which the scenario says that commands do not come to what the prediction takes them for."""
+    """Refuse a run whose scenario has failing thrusters, or limits or lags a commanded wrench."""
     file = folder / SCENARIO
     if not file.exists():
         return
@@ -233,7 +235,7 @@ def _topics(record: Record, time: Array) -> Iterator[Topic]:
 
 
 def _samples(record: Record, time: Array, columns: Sequence[str], stamp: str) -> tuple[Array, Array]:
-    """Return the samples alone, without the rows that hold the last one, with their times."""
+    """Return times [s], (n,), and values, (n, m), of the samples, without the rows that repeat the last sample."""
     values, times = record.stack(columns), record[stamp] if stamp else time
     known = np.isfinite(values).all(axis=1) & np.isfinite(times) & (times >= time[0] - 1.0)
     values, times = values[known], times[known]
@@ -247,7 +249,7 @@ def _samples(record: Record, time: Array, columns: Sequence[str], stamp: str) ->
 
 
 def _continuous(quaternions: Array) -> Array:
-    """Return unit quaternions without the jumps of their sign."""
+    """Return unit quaternions, shape (n, 4), with signs that do not jump from one to the next."""
     units = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
     signs = np.where(np.sum(units[1:] * units[:-1], axis=1) < 0.0, -1.0, 1.0)
     result: Array = units * np.concatenate([[1.0], np.cumprod(signs)])[:, None]
@@ -255,6 +257,6 @@ def _continuous(quaternions: Array) -> Array:
 
 
 def _rotation_vectors(quaternions: Array) -> Array:
-    """Return, of each sample, twice the vector part: as rough as the angles of a small rotation."""
+    """Return twice the vector part of each quaternion, shape (n, 3) [rad]: its noise is that of small angles."""
     result: Array = 2.0 * quaternions[:, 1:]
     return result

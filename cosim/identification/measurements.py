@@ -18,9 +18,9 @@ _POSITION, _ATTITUDE, _LINEAR, _ANGULAR = slice(0, 3), slice(3, 7), slice(7, 10)
 class Errors:
     """Constant errors of the sensors."""
 
-    lever: Array  # (3,) m, from the body origin to the DVL
-    scale: float  # part of the velocity that the DVL measures too much
-    bias: Array  # (3,) rad/s, of the gyro
+    lever: Array  # (3,) m, body frame, from the body origin to the DVL
+    scale: float  # relative error of the DVL's velocity [-]; positive: it measures too much
+    bias: Array  # (3,) rad/s, body frame, bias of the gyro
 
 
 def residual(topic: Topic, states: Array, errors: Errors) -> Array:
@@ -29,11 +29,11 @@ def residual(topic: Topic, states: Array, errors: Errors) -> Array:
     Parameters
     ----------
     topic : Topic
-        With n samples of c components.
+        Topic with n samples of c components.
     states : ndarray, shape (n, 13)
-        Predicted at their times.
+        Predicted states at the times of the samples.
     errors : Errors
-        Of the sensors.
+        Constant errors of the sensors.
     """
     if topic.name == "velocity":
         found = (1.0 + errors.scale) * (states[:, _LINEAR] + np.cross(states[:, _ANGULAR], errors.lever)) - topic.values
@@ -56,13 +56,13 @@ def derivative(topic: Topic, states: Array, tangents: Array, errors: Errors) -> 
     Parameters
     ----------
     topic : Topic
-        With n samples of c components.
+        Topic with n samples of c components.
     states : ndarray, shape (n, 13)
-        Predicted at their times.
+        Predicted states at the times of the samples.
     tangents : ndarray, shape (n, d, 13)
-        Of the states.
+        Derivatives of the states along the directions.
     errors : Errors
-        Of the sensors.
+        Constant errors of the sensors.
     """
     if topic.name == "velocity":
         turned = np.cross(tangents[:, :, _ANGULAR], errors.lever)
@@ -81,20 +81,20 @@ def derivative(topic: Topic, states: Array, tangents: Array, errors: Errors) -> 
 
 
 def derivative_by_errors(topic: Topic, states: Array, errors: Errors, kind: str, axis: int) -> Array | None:
-    """Return the derivative of the residual by one constant error, shape (n, c); None where it has none.
+    """Return the derivative of the residual by one constant error, shape (n, c); None if it does not depend on it.
 
     Parameters
     ----------
     topic : Topic
-        With n samples of c components.
+        Topic with n samples of c components.
     states : ndarray, shape (n, 13)
-        Predicted at their times.
+        Predicted states at the times of the samples.
     errors : Errors
-        Of the sensors.
+        Constant errors of the sensors.
     kind : str
-        ``lever``, ``scale`` or ``bias``.
+        Error: ``lever``, ``scale`` or ``bias``.
     axis : int
-        Of lever and bias.
+        Body axis of lever or bias, from 0.
     """
     unit = np.eye(3)[axis]
     if topic.name == "velocity" and kind == "lever":
@@ -110,9 +110,9 @@ def derivative_by_errors(topic: Topic, states: Array, errors: Errors, kind: str,
 
 
 def _attitude_matrix(measured: Array, states: Array) -> tuple[Array, Array]:
-    """Return the matrix of the vector part of conj(measured) times a quaternion, and the sign of the scalar part.
+    """Return matrices, (n, 3, 4), to the vector part of conj(measured) * q, and the signs of the scalar part, (n, 1).
 
-    Twice that vector part is the rotation from the sample to the prediction, seen from the body, while it is small.
+    Twice that vector part is the rotation from the sample to the prediction [rad, body frame], while it is small.
     """
     e0, e1, e2, e3 = measured.T
     matrix = np.stack([

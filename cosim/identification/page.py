@@ -19,19 +19,19 @@ def write_page(done: Identification, out: Path) -> Path:
     Parameters
     ----------
     done : Identification
-        What came of it.
+        Result of the identification.
     out : Path
-        The vehicle's file.
+        Path of the vehicle's file.
 
     Returns
     -------
     Path
-        The page: the same name, with ``.html``.
+        Path of the page: that of the vehicle's file, with ``.html``.
 
     Raises
     ------
     IdentificationError
-        If it cannot be written.
+        If the page cannot be written.
     """
     import matplotlib as mpl
 

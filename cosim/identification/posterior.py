@@ -16,33 +16,33 @@ from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-DRAWS = 256
-_TRIES = 100  # for each vehicle that has a mass matrix
+DRAWS = 256  # number of drawn vehicles
+_TRIES = 100  # most tries per drawn vehicle, until its mass matrix is positive definite
 
 
 def write_posterior(fit: Fit, vehicle: Vehicle, out: Path, seed: int = 0) -> Path:
-    """Write vehicles drawn from an identification beside its vehicle's file, one a line.
+    """Write vehicles drawn from an identification beside its vehicle's file, one per line.
 
     Parameters
     ----------
     fit : Fit
-        The numbers, with the covariance of the jackknife.
+        Fit, for its values and the covariance of the jackknife.
     vehicle : Vehicle
-        Where the search started.
+        Vehicle with the start values of the search.
     out : Path
-        The identified vehicle's file.
+        Path of the identified vehicle's file.
     seed : int
-        Of the draws.
+        Seed of the draws.
 
     Returns
     -------
     Path
-        The same name with ``.posterior.jsonl``.
+        Path of the written file: that of the vehicle's file, with ``.posterior.jsonl``.
 
     Raises
     ------
     IdentificationError
-        If it cannot be written, or hardly any draw is a body.
+        If the file cannot be written, or hardly any draw has a positive definite mass matrix.
     """
     path = out.with_suffix(".posterior.jsonl")
     lines = [json.dumps({"draw": i, "parameters": p}) for i, p in enumerate(draw_plants(fit, vehicle, seed))]
@@ -59,18 +59,19 @@ def draw_plants(fit: Fit, vehicle: Vehicle, seed: int, count: int = DRAWS) -> li
     Parameters
     ----------
     fit : Fit
-        The numbers. 95 % of the draws of each lie within its 95 % interval; those beyond a bound are put on it.
+        Fit, for its values and covariance. 95 % of the draws lie within a number's 95 % interval; those beyond a bound
+        are clipped to it.
     vehicle : Vehicle
-        Where the search started.
+        Vehicle with the start values of the search.
     seed : int
-        Of the draws.
+        Seed of the draws.
     count : int
-        How many.
+        Number of draws.
 
     Returns
     -------
     list of dict of str to float
-        By the names of the FMU's parameters.
+        Values of each draw by the names of the FMU's parameters, in SI units.
 
     Raises
     ------

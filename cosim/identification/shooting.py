@@ -22,14 +22,14 @@ from plant_fmu.vehicle_component import of_vehicle
 Array = NDArray[np.float64]
 
 STATE_SIZE = 13  # position 3, quaternion 4, velocity 6
-_TOKEN = "shooting"  # noqa: S105 -- no secret: there is no description that the library could go with
+_TOKEN = "shooting"  # noqa: S105 -- no secret: instantiation token, which no model description needs to match
 _FMI = ("fmi3.c", "fmi3_unsupported.c")
-_FAST = ("-ffp-contract=fast",)  # other last bits than the FMU's, in three quarters of the time
-_INCLUDED = "tangent.c"  # by shooting.c
+_FAST = ("-ffp-contract=fast",)  # takes three quarters of the time; the last bits differ from the FMU's
+_INCLUDED = "tangent.c"  # source that shooting.c includes
 
 
 class _Request(ctypes.Structure):
-    """Prediction of csrc/shooting.h."""
+    """Structure Prediction of csrc/shooting.h."""
 
     _fields_ = (
         *((name, ctypes.c_int) for name in ("n_parameters", "n_steps", "n_directions", "n_inputs", "n_samples")),
@@ -44,22 +44,22 @@ class _Request(ctypes.Structure):
 
 @dataclass(frozen=True)
 class Directions:
-    """Along what a prediction is differentiated: d directions, each a change of start, parameter, wrench or force."""
+    """Directions of differentiation of a prediction: d changes of start, parameter, wrench or force."""
 
-    start: Array  # (d, 13) tangent of the start
-    parameters: Sequence[str | None]  # (d,) of the FMU
-    inputs: Sequence[int | None]  # (d,) row of `wrench`
-    force: Array  # (d, 3) N, tangent of the constant force, world frame
-    wrench: Array  # (n, steps, 2, 6) N, N m, tangents of the wrench
+    start: Array  # (d, 13) derivative of the start state along each direction
+    parameters: Sequence[str | None]  # (d,) name of the FMU's parameter that changes; None for none
+    inputs: Sequence[int | None]  # (d,) index of the change in `wrench`; None for none
+    force: Array  # (d, 3) N, NED, derivative of the constant force
+    wrench: Array  # (n, steps, 2, 6) N, N m, body frame, derivatives of the wrench: mean and change over each step
 
 
 @dataclass(frozen=True)
 class Motion:
     """A predicted motion at n sample times, and its sensitivities along d directions."""
 
-    states: Array  # (n, 13) position [m], quaternion, velocity [m/s, rad/s]
+    states: Array  # (n, 13) position [m, NED], quaternion, velocity [m/s, rad/s, body frame]
     rates: Array  # (n, 13) time derivatives of the states
-    tangents: Array  # (n, d, 13)
+    tangents: Array  # (n, d, 13) derivatives of the states along the directions
 
 
 class Shooter:
@@ -68,7 +68,7 @@ class Shooter:
     Parameters
     ----------
     vehicle : Vehicle
-        Whose numbers the parameters are that a prediction does not name.
+        Vehicle with the default values of the parameters.
 
     Raises
     ------
@@ -84,7 +84,7 @@ class Shooter:
     >>> start[3] = 1.0
     >>> shooter = Shooter(load_vehicle("bluerov2_heavy"))
     >>> motion = shooter.predict({}, start, np.zeros((50, 2, 6)), 0.02, np.array([1.0]))
-    >>> bool(motion.states[0, 2] > 0.0)  # it is heavier than its water
+    >>> bool(motion.states[0, 2] > 0.0)  # it is heavier than the water that it displaces
     True
     """
 
@@ -108,29 +108,29 @@ class Shooter:
         Parameters
         ----------
         parameters : mapping of str to float
-            Of the FMU, by name, over those of the vehicle.
+            Values by names of the FMU's parameters, in SI units; the others are the vehicle's.
         start : ndarray, shape (13,)
             Position [m, NED], quaternion, velocity [m/s, rad/s, body frame].
         wrench : ndarray, shape (steps, 2, 6)
-            Of the actuators [N, N m, body frame]: its mean over each step, and its change from begin to end.
+            Wrench of the actuators [N, N m, body frame]: its mean over each step, and its change from begin to end.
         step : float
-            [s].
+            Integration step [s].
         times : ndarray, shape (n,)
-            Of the samples [s since the start], rising.
+            Rising times of the samples since the start [s].
         directions : Directions, optional
-            Along what there are sensitivities; default: none.
+            Directions of the sensitivities; default: none.
         force : ndarray, shape (3,), optional
             Constant force on the body's origin [N, NED].
 
         Returns
         -------
         Motion
-            At the sample times.
+            States and sensitivities at the sample times.
 
         Raises
         ------
         IdentificationError
-            If the parameters are of no body, or the motion grows beyond numbers.
+            If the parameters are not those of a body, or the motion does not stay finite.
         """
         along = directions or NO_DIRECTIONS
         d, n = len(along.parameters), len(times)

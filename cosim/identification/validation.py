@@ -1,4 +1,4 @@
-"""Free-running predictions: how far a vehicle's numbers carry from a start that the samples give."""
+"""Validation: errors of free-running predictions from start states that the samples give."""
 
 from __future__ import annotations
 
@@ -17,43 +17,43 @@ from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-HORIZONS = (2.0, 5.0)  # s
+HORIZONS = (2.0, 5.0)  # s, lengths of the predictions
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """Root mean square errors of one topic over one horizon, by component."""
+    """Root mean square errors of one topic over one horizon, by component, in the topic's unit."""
 
     topic: str
     horizon: float  # s
-    windows: int
-    identified: Array  # (c,)
-    start_vehicle: Array  # (c,)
-    held: Array  # (c,), of a prediction that holds the start's velocity
+    windows: int  # number of predicted windows
+    identified: Array  # (c,) errors of the identified vehicle
+    start_vehicle: Array  # (c,) errors of the vehicle with the start values
+    held: Array  # (c,) errors of a prediction with constant velocity
 
 
 def validate(
     logs: Sequence[Log], vehicle: Vehicle, parameters: Sequence[Parameter], values: Array, step: float
 ) -> list[Prediction]:
-    """Predict runs without looking at their samples but for the start of each window.
+    """Predict windows of runs from their sampled start states alone, and compare with the samples.
 
     Parameters
     ----------
     logs : sequence of Log
-        Best of runs that the fit has not seen.
+        Runs to predict, preferably ones that were not fitted.
     vehicle : Vehicle
-        Where the search started.
+        Vehicle with the start values of the search.
     parameters : sequence of Parameter
-        What was free; nuisances of single runs are those of the first run.
-    values : ndarray
-        As fitted.
+        Free parameters of the fit; nuisances of single runs are those of the first run.
+    values : ndarray, shape (p,)
+        Fitted values of the parameters, in their units.
     step : float
-        Of the integration [s].
+        Integration step [s].
 
     Returns
     -------
     list of Prediction
-        For each horizon and topic.
+        Errors for each horizon and topic.
     """
     found = []
     starts = np.array([p.start if not p.is_nuisance else x for p, x in zip(parameters, values, strict=True)])
@@ -65,7 +65,7 @@ def validate(
             try:
                 both = [problem.raw(i, problem.settings(x), window.start, full=False)[0] for x in (values, starts)]
             except IdentificationError:
-                continue  # one of the two has no motion there
+                continue  # one of the two predictions does not stay finite
             count = 0
             for topic in window.topics:
                 size = len(topic.times) * len(topic.components)
@@ -83,7 +83,7 @@ def validate(
 
 
 def _held(window: Window, name: str) -> Array:
-    """Return the errors of holding the start's velocities, shape (n, c)."""
+    """Return the errors of a prediction with the constant velocities of the start, shape (n, c)."""
     topic = next(topic for topic in window.topics if topic.name == name)
     start, times = window.start, topic.times[:, None]
     e0, vector, speed, rate = start[3], start[4:7], start[7:10], start[10:13]
@@ -103,7 +103,7 @@ def _held(window: Window, name: str) -> Array:
 
 
 def _held_attitude(quaternion: Array, rate: Array, times: Array, measured: Array) -> Array:
-    """Return the rotation vectors from the samples to what a constant rate leads to, shape (n, 3)."""
+    """Return the rotation vectors from the samples to a prediction with constant rate, shape (n, 3) [rad]."""
     e0, vector = quaternion[0], quaternion[1:]
     angle = np.linalg.norm(rate)
     axis = rate / angle if angle > 0.0 else np.zeros(3)

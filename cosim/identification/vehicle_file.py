@@ -1,4 +1,4 @@
-"""The identified vehicle as a file that builds and flies, with provenance and intervals as comments."""
+"""File of the identified vehicle, with provenance and intervals as comments."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from cosim.identification.parameters import with_values
 from plant_fmu.toml_tables import read_toml
 from plant_fmu.vehicle import Vehicle, shipped_vehicles
 
-_WIDTH = 118  # letters of a comment's line
+_WIDTH = 118  # most characters of a comment's line
 
 
 def vehicle_text(start: str, vehicle: Vehicle, fit: Fit, name: str, provenance: Sequence[str]) -> str:
-    """Return the file of the identified vehicle.
+    """Return the text of the identified vehicle's file.
 
     Parameters
     ----------
     start : str
-        The shipped vehicle or the file where the search started; what is not identified is taken from it.
+        Name of the shipped vehicle, or path of the file, with the start values; it gives the fixed numbers.
     vehicle : Vehicle
-        The same, loaded.
+        Vehicle of `start`, loaded.
     fit : Fit
-        What was identified.
+        Result of the identification.
     name : str
-        Of the new vehicle.
+        Name of the new vehicle.
     provenance : sequence of str
-        Sentences for the comment at its top.
+        Sentences for the comment at the top of the file.
 
     Returns
     -------
     str
-        TOML, in UTF-8's letters.
+        TOML text.
     """
     found = with_values(vehicle, fit.parameters, fit.values)
     tables = _tables_of(start)
@@ -62,7 +62,7 @@ def vehicle_text(start: str, vehicle: Vehicle, fit: Fit, name: str, provenance: 
 
 
 def name_of_file(out: Path) -> str:
-    """Return the name of a vehicle in a file: that of the file; IdentificationError if that cannot be one."""
+    """Return the vehicle name that belongs to a file's name; raise IdentificationError if there is none."""
     name = re.sub(r"\W", "_", out.stem, flags=re.ASCII)[:64]
     if out.suffix != ".toml" or not name or name[0].isdigit():
         raise IdentificationError(
@@ -79,7 +79,7 @@ def _tables_of(start: str) -> dict[str, Any]:
 
 
 def _changed(fit: Fit) -> list[str]:
-    """Return the keys of the file that were free, each once."""
+    """Return the keys of the file that the fit changes, each once."""
     keys = [".".join(fit.parameters[i].name.split(".")[:2]) for i in fit.vehicle_part()]
     return list(dict.fromkeys(keys))
 

@@ -1,4 +1,4 @@
-"""Windows of runs: each is predicted from a start of its own. What no model of still thrusters explains is rejected."""
+"""Windows of runs, each predicted from a start state of its own; windows that cannot be predicted are rejected."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-MARGINS = (0.1, 0.2)  # s, at the ends of a window without samples, where delays are free
+MARGINS = (0.1, 0.2)  # s, begin and end of a window without samples, if delays are estimated
 
-_SHORTEST = 0.6  # part of a full window, below which the rest of a run is dropped
-_SETTLED = 1.0  # s, after a run's first command: forces that lag are then known by the commands since
-_MOST_GAP = 1.0  # s without a command, or without a sample of velocity, position or attitude
-_FASTEST = 3.0  # rad/s
-_STEEPEST = math.radians(80.0)  # of pitch
-_MOST_SATURATED = 0.1  # part of a window that a thruster may be commanded beyond its limits
+_SHORTEST = 0.6  # fraction of a full window, below which the rest of a run is dropped
+_SETTLED = 1.0  # s, time from a run's first command to its first window: lagged forces have then settled
+_MOST_GAP = 1.0  # s, longest gap in the commands; samples of velocity, position and attitude may pause 0.5 s longer
+_FASTEST = 3.0  # rad/s, greatest angular velocity about a body axis
+_STEEPEST = math.radians(80.0)  # rad, greatest pitch
+_MOST_SATURATED = 0.1  # greatest fraction of a window in which a thruster is commanded beyond its limits
 
 
 @dataclass(frozen=True)
 class Window:
     """A piece of a run on the grid of its commands."""
 
-    run: int
-    first: int  # step of the grid
-    steps: int
+    run: int  # index of the run
+    first: int  # first step on the grid
+    steps: int  # number of steps
     begin: float  # s, in the run's time
-    topics: tuple[Topic, ...]  # their times since the window's begin
-    start: Array  # (13,) as the samples have it
+    topics: tuple[Topic, ...]  # samples, with times since the window's begin
+    start: Array  # (13,) start state interpolated from samples: position [m], quaternion, velocity [m/s, rad/s]
 
 
 def cut_windows(
@@ -47,20 +47,20 @@ def cut_windows(
     logs : sequence of Log
         The runs.
     vehicle : Vehicle
-        Its limits say whether thrusters are saturated, its hull where the surface is.
+        Vehicle, for its thrusters' limits and the radius of its hull.
     step : float
-        Of the grid [s].
+        Period of the grid [s].
     length : float
-        Of a window [s]; the last one of a run may be shorter by two fifths.
+        Length of a window [s]; the last one of a run may be shorter by two fifths.
     margins : tuple of float
-        At begin and end, without samples [s].
+        Times without samples at begin and end of a window [s].
 
     Returns
     -------
     list of Window
-        In the order of the runs and of time.
+        Accepted windows in the order of the runs and of time.
     Counter of str
-        How many windows were rejected, by the rule that rejected them.
+        Counts of rejected windows, by the rule that rejected them.
     """
     kept: list[Window] = []
     rejected: Counter[str] = Counter()
@@ -96,7 +96,7 @@ def _window(log: Log, run: int, first: int, steps: int, step: float, margins: tu
 
 
 def _start(log: Log, time: float) -> Array:
-    """Return the state that the samples about a time have."""
+    """Return the state interpolated from the samples at a time [s], shape (13,)."""
     state = np.zeros(13)
     for topic in log.topics:
         values = np.array([np.interp(time, topic.times, x) for x in topic.values.T])
@@ -111,7 +111,7 @@ def _start(log: Log, time: float) -> Array:
 
 
 def _fault(log: Log, vehicle: Vehicle, window: Window, length: float) -> str:
-    """Return the rule that rejects a window; empty where none does."""
+    """Return the rule that rejects a window; empty if the window is accepted."""
     begin, end = window.begin, window.begin + length
     commanded = (log.times >= begin - _MOST_GAP) & (log.times < end + _MOST_GAP)
     if commanded.sum() < 2 or np.diff(log.times[commanded]).max() > _MOST_GAP:
@@ -139,5 +139,5 @@ def _fault(log: Log, vehicle: Vehicle, window: Window, length: float) -> str:
 
 
 def topic_names(window: Window) -> NDArray[np.str_]:
-    """Return the name of the topic of each residual of a window."""
+    """Return the topic's name for each residual of a window, shape (n,)."""
     return np.repeat([t.name for t in window.topics], [len(t.times) * len(t.components) for t in window.topics])

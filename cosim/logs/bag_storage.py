@@ -1,4 +1,4 @@
-"""Messages of ROS bags as their storage holds them: MCAP, SQLite, and bags of ROS 1."""
+"""Readers of stored messages from ROS bags: MCAP, SQLite, and bags of ROS 1."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from typing import Any
 from cosim.errors import ImportLogError
 from cosim.logs.format import Moved
 
-_LARGEST = 1 << 28  # bytes of a record
+_LARGEST = 1 << 28  # bytes, greatest size of an MCAP record
 _NUMBER = re.compile(r"\d+")
 _ZSTANDARD = b"\x28\xb5\x2f\xfd"  # first bytes of compressed data, RFC 8878
-# what damaged data raises in libraries
+# exceptions that damaged data raises in libraries
 DAMAGE = (
     ValueError, KeyError, IndexError, TypeError, AttributeError, EOFError, OSError, RuntimeError, AssertionError,
     MemoryError, struct.error,
@@ -27,20 +27,20 @@ SUFFIXES = (".mcap", ".db3", ".bag")
 
 @dataclass(frozen=True, slots=True)
 class StoredMessage:
-    """A message as it is stored."""
+    """A stored message, not decoded."""
 
     topic: str
-    type: str  # such as nav_msgs/msg/Odometry
-    definition: str  # of the type and those within it; empty where the storage has none
-    language: str  # of the definition: ros2msg or ros2idl
-    encoding: str  # of the data: cdr or ros1
+    type: str  # name of the message type, such as nav_msgs/msg/Odometry
+    definition: str  # text that defines the type and its nested types; empty if the storage has none
+    language: str  # language of the definition: ros2msg or ros2idl; empty without one
+    encoding: str  # encoding of the data: cdr or ros1
     data: bytes
-    time: float  # of the recorder [s]
-    part: float  # of the file read so far
+    time: float  # s, time of recording, by the recorder's clock
+    part: float  # fraction of the file read so far, 0 to 1
 
 
 def bag_files(path: Path) -> list[Path]:
-    """Return the files of a bag: itself, or those in the folder of a recorder, in the order of their numbers.
+    """Return the files of a bag: the file itself, or the files of a recorder's folder in the order of their numbers.
 
     Raises
     ------
@@ -57,11 +57,11 @@ def bag_files(path: Path) -> list[Path]:
         raise ImportLogError(f"is a folder without a bag, expected files that end in {', '.join(SUFFIXES)}")
     if len({file.suffix.lower() for file in files}) > 1:
         raise ImportLogError("is a folder of bags of two kinds, expected one bag")
-    return sorted(files, key=_place)
+    return sorted(files, key=_sort_key)
 
 
-def _place(file: Path) -> tuple[list[int], str]:
-    """Return what files of a bag are sorted by: the numbers in the name, such as of a part or a time, and the name."""
+def _sort_key(file: Path) -> tuple[list[int], str]:
+    """Return the sort key of a bag's file: the numbers in its name, such as of a part or a time, and its name."""
     return [int(number) for number in _NUMBER.findall(file.stem)], file.name
 
 
@@ -71,9 +71,9 @@ def stored_messages(path: Path, remarks: list[str], moved: Moved) -> Iterator[St
     Parameters
     ----------
     path : Path
-        A file, or a folder of files.
+        Path of a bag's file, or of a folder of such files.
     remarks : list of str
-        Receives a remark on each file that breaks off.
+        Receives a remark on each file that ends early or has damaged messages.
     moved : callable
         Receives the fraction read so far.
 
@@ -99,7 +99,7 @@ def stored_messages(path: Path, remarks: list[str], moved: Moved) -> Iterator[St
 
 
 def _failures() -> tuple[type[Exception], ...]:
-    """Return what a damaged bag raises in the libraries that read it."""
+    """Return the exceptions that a damaged bag raises in the libraries that read it."""
     from mcap.exceptions import McapError
     from rosbags.rosbag1 import ReaderError
     from zstandard import ZstdError
@@ -180,12 +180,12 @@ def _of_sqlite(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
 
 
 def _three_parts(kind: str) -> str:
-    """Return the name of a type with the middle part that early recorders leave out."""
+    """Return a type's name with its part ``msg``, which early recorders omit."""
     return kind.replace("/", "/msg/") if kind.count("/") == 1 else kind
 
 
 def _unpacked(data: bytes) -> bytes:
-    """Return the data of a message, which a recorder may compress one by one."""
+    """Return the data of a message, decompressed if the recorder has compressed each message."""
     if not data.startswith(_ZSTANDARD):
         return data
     from zstandard import ZstdDecompressor

@@ -20,18 +20,18 @@ from cosim.logs.spool import LogContents
 from cosim.logs.vehicle_messages import AUTOPILOT, NO_AUTOPILOT, VehicleMessages
 from cosim.mavlink.wire.dialect import dialect
 
-_ALL_MESSAGES = "mavlink/out"  # a topic; each message comes a second time with the topic of its kind
-# topics such as mavlink/1/1/ATTITUDE; those of its fields are longer
+_ALL_MESSAGES = "mavlink/out"  # topic of all messages; each is also recorded with the topic of its kind
+# topics of one kind of message, such as mavlink/1/1/ATTITUDE; topics of single fields are longer
 _ONE_KIND = re.compile(r"mavlink/\d+/\d+/[A-Z0-9_]+")
 
 
 def read_recording(path: Path, contents: LogContents, moved: Moved) -> None:
-    """Read a recording, or a folder with those of a dive.
+    """Read a recording, or the folder with the recordings of a dive.
 
     Parameters
     ----------
     path : Path
-        An MCAP file, or a folder of them.
+        Path of an MCAP file, or of a folder of them.
     contents : LogContents
         Receives the samples.
     moved : callable
@@ -40,7 +40,7 @@ def read_recording(path: Path, contents: LogContents, moved: Moved) -> None:
     Raises
     ------
     ImportLogError
-        If it has no MAVLink messages, or none of a vehicle.
+        If the recording has no MAVLink messages, or no heartbeat of an autopilot.
     """
     by_kind, vehicle = _find_vehicle(path)
     clock, messages = Clock(), VehicleMessages(contents, *vehicle)
@@ -65,7 +65,10 @@ def read_recording(path: Path, contents: LogContents, moved: Moved) -> None:
 
 
 def _find_vehicle(path: Path) -> tuple[bool, tuple[int, int, int]]:
-    """Return whether each kind of message has a topic, and system id, MAV_AUTOPILOT and MAV_TYPE of an autopilot."""
+    """Find the autopilot: return True if each kind of message has a topic, and the autopilot's identity.
+
+    The identity is system id, MAV_AUTOPILOT and MAV_TYPE.
+    """
     found, any_mavlink = None, False
     for stored in stored_messages(path, [], lambda part: None):
         by_kind = _ONE_KIND.fullmatch(stored.topic) is not None
@@ -94,7 +97,7 @@ def _parts(stored: StoredMessage) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def _values(kind: Any, fields: dict[str, Any]) -> dict[str, Any]:
-    """Return the values of a kind's fields; those of MAVLink 2 that are not there are 0, as on the wire."""
+    """Return the values of the fields of a kind of message; missing MAVLink 2 fields are 0, as on the wire."""
     values = {}
     for name, unit in zip(kind.fieldnames, kind.fieldtypes, strict=True):
         value = fields.get("mavtype" if name == "type" else name, 0)  # since "type" is the message's own name
@@ -103,7 +106,7 @@ def _values(kind: Any, fields: dict[str, Any]) -> dict[str, Any]:
 
 
 def _value(value: Any) -> Any:
-    """Return a number, or a list of numbers, of JSON: enumerations are there by name, flags by names or as bits."""
+    """Convert a JSON value to a number, or a list of numbers; convert names of enumerations and flags too."""
     if isinstance(value, list):
         return [_value(part) for part in value]
     if isinstance(value, dict):

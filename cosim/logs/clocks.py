@@ -1,4 +1,4 @@
-"""The clocks of a log: jumps of the writer's clock, and the vehicle's clock beside it."""
+"""The clocks of a log: jumps of the writer's clock, and the alignment of the vehicle's clock with it."""
 
 from __future__ import annotations
 
@@ -79,8 +79,9 @@ class VehicleClock:
 
     def __init__(self) -> None:
         self._last = -math.inf
-        self._restarts: list[float] = []  # on the writer's clock
-        self._offsets: list[dict[int, tuple[float, float]]] = [{}]  # by restart of the vehicle and minute
+        self._restarts: list[float] = []  # times of restarts on the writer's clock [s]
+        # for each restart: stamp and offset [s] of the message of least delay, by minute
+        self._offsets: list[dict[int, tuple[float, float]]] = [{}]
         self._lines: list[tuple[float, float]] | None = None
 
     @property

@@ -20,7 +20,7 @@ from plant_fmu.errors import TableError
 from plant_fmu.toml_tables import decode, read_toml
 
 _ORDER = re.compile(r"[XYZ]{3}|[xyz]{3}")
-_MOST_ODD = 0.1  # part of quaternions that may be of another length than 1: those are damaged, and not known
+_MOST_ODD = 0.1  # greatest fraction of quaternions of a length other than 1, which are treated as missing
 World = Literal["NED", "ENU", "NWU"]
 Body = Literal["FRD", "FLU", "RFU"]
 
@@ -38,20 +38,20 @@ class MappedQuantity:
     """Columns, unit and frame of a quantity."""
 
     columns: tuple[str, ...] = ()
-    unit: str | None = None  # default: the one of SI
-    topic: str = ""  # of a bag
+    unit: str | None = None  # default: the SI unit
+    topic: str = ""  # topic of the messages in a bag
     time: TimeColumn | None = None  # default: that of the map
-    euler: str = ""  # axes of Euler angles in the order of the columns; capital letters: about rotated body axes
+    euler: str = ""  # axes of Euler angles, in the order of the columns; capital letters: rotations about body axes
     quaternion: Literal["wxyz", "xyzw"] = "wxyz"  # order of the components
-    inverse: bool = False  # the attitude is from world to body
-    sign: Literal[1, -1] = 1  # -1 for a depth or an altitude of the opposite direction
+    inverse: bool = False  # True if the attitude is from world to body
+    sign: Literal[1, -1] = 1  # factor of the values; -1 for a depth or an altitude of the opposite direction
     world: World | None = None  # default: that of the map
     body: Body | None = None  # default: that of the map
 
 
 @dataclass(frozen=True)
 class ColumnMap:
-    """A whole column map."""
+    """A whole column map: default time, frames and the columns of each quantity."""
 
     time: TimeColumn | None = None
     world: World = "NED"

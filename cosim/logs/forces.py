@@ -17,10 +17,10 @@ from plant_fmu.autopilot import Autopilot, effort_of_pulse
 from plant_fmu.t200 import VOLTAGES, force_of_pulse
 
 CURVES = ("linear", "quadratic", "t200")
-PILOT_GAIN = 0.5  # ratio of the greatest wrench at full sticks, ArduSub's default
+PILOT_GAIN = 0.5  # fraction of the greatest wrench that full sticks command, ArduSub's default
 _MOTORS = 33  # SERVOn_FUNCTION of the first motor
 _MOST_MOTORS = 8
-_NEUTRAL = 1500.0  # us, of a T200
+_NEUTRAL = 1500.0  # us, pulse at which a T200 rests
 
 
 @dataclass(frozen=True)

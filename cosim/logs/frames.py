@@ -15,7 +15,7 @@ WORLDS = {  # matrix from the named world frame to NED
     "ENU": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
     "NWU": np.diag([1.0, -1.0, -1.0]),
 }
-BODIES = {  # from the named body frame to FRD
+BODIES = {  # matrix from the named body frame to FRD
     "FRD": np.eye(3),
     "FLU": np.diag([1.0, -1.0, -1.0]),
     "RFU": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),

@@ -1,4 +1,4 @@
-"""A log of a vehicle as a run folder, which report, replay and export read as any other."""
+"""Import of a vehicle's log as a run folder, which report, replay and export accept like any other."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from plant_fmu.errors import printable
 from plant_fmu.installing import install_hint
 
 _KEPT = ("goal", "regions", "criteria", "arbiter", "intersection", "title")  # keys of a scenario that apply to a log
-_UNREAD = 12  # kinds of messages that a report names
+_GAPS = 12  # greatest number of gaps of a topic in a report
 
 
 def import_log(
@@ -61,9 +61,10 @@ def import_log(
     Parameters
     ----------
     log : str or Path
-        ``.bin``, ``.tlog``, ``.ulg``, ``.csv``, ``.parquet``, or a bag: ``.mcap``, ``.db3``, ``.bag``, or its folder.
+        Path of a log: ``.bin``, ``.tlog``, ``.ulg``, ``.csv``, ``.parquet``, or a bag: ``.mcap``, ``.db3``, ``.bag``,
+        or its folder.
     vehicle : str or Path
-        A shipped vehicle or a TOML file, with the thrusters that the commands drive.
+        Name of a shipped vehicle or path of a TOML file, with the thrusters that the commands drive.
     out : str or Path, optional
         The run folder; it must not exist, or be empty. Default: a new one below ``runs``.
     scenario : str or Path, optional
@@ -73,13 +74,14 @@ def import_log(
     rate : float, optional
         Rows per second [Hz]. Default: the least of 5, 10, 20, 25, 50, 100 and 200 that no state or command exceeds.
     curve : str, optional
-        From pulse to force: ``linear``, ``quadratic`` or ``t200``. Default: that of the vehicle's table ``autopilot``.
+        Curve from pulse to force: ``linear``, ``quadratic`` or ``t200``. Default: that of the vehicle's table
+        ``autopilot``.
     voltage : float, optional
         Supply voltage of the thrusters [V], instead of the log's.
     report : bool
-        Write report and replay.
+        True to write report and replay.
     overwrite : bool
-        Replace a run in `out`.
+        True to replace a run in `out`.
     moved : callable
         Receives the fraction of the log read so far, 0 to 1.
 
@@ -283,7 +285,7 @@ def _facts(
 
 
 def _topic_facts(topic: Topic, start: float) -> TopicFacts:
-    gaps = tuple((begin - start, end - start) for begin, end in topic.gaps[:_UNREAD])
+    gaps = tuple((begin - start, end - start) for begin, end in topic.gaps[:_GAPS])
     return TopicFacts(
         topic.quantity, printable(topic.name), topic.count, topic.rate, topic.longest, topic.gap_count, gaps,
         topic.held, topic.burst, topic.late, topic.broken,

@@ -22,7 +22,7 @@ class Quantity:
     unit : str
         Unit of each component.
     kind : str
-        States are interpolated, commands and the voltage are held, sensors are held until the next sample.
+        ``state``: interpolated between samples; ``command``, ``sensor`` or ``voltage``: held until the next sample.
     most : float
         Greatest plausible magnitude of a component; a greater one indicates wrong units.
     frame : str

@@ -11,7 +11,7 @@ from cosim.logs.spool import BLOCK
 from cosim.logs.topics import Topic
 from cosim.simulation.signals import Array
 
-_EXACT = 1e-6  # s; the resolution of float64 is a quarter of that for seconds since 1970
+_EXACT = 1e-6  # s, tolerance of equal times; for seconds since 1970, float64 resolves a quarter of it
 
 
 class TopicReader:

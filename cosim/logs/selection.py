@@ -17,10 +17,11 @@ from cosim.logs.topics import Topic, clean
 from cosim.simulation.signals import Array
 
 RATES = (5, 10, 20, 25, 50, 100, 200)  # Hz, default rates of rows
-_MOTION = ("attitude", "position", "depth")  # a log must have at least one
+_MOTION = ("attitude", "position", "depth")  # quantities of which a log must have at least one
 _SEA_LEVEL, _SPECIFIC = 101325.0, 9800.0  # Pa, Pa/m: ArduPilot's conversion of pressure to depth
+# parameters of ArduPilot with the cutoff frequency [Hz] of the filter of a quantity
 _FILTERS = {"rates": "INS_GYRO_FILTER", "gyro": "INS_GYRO_FILTER", "acceleration": "INS_ACCEL_FILTER"}
-_EDGE = 5.0  # s, at start and end, that may be cut where part of the motion is unknown
+_EDGE = 5.0  # s, duration at start and end below which rows with partly unknown motion are cut
 
 
 def select_topics(contents: LogContents, scratch: Path) -> tuple[dict[str, Topic], VehicleClock]:
@@ -51,7 +52,7 @@ def select_topics(contents: LogContents, scratch: Path) -> tuple[dict[str, Topic
             if of == quantity and other is not source and other.count:
                 contents.unread[f"{name} ({quantity})"] += other.count
         if source is not None:
-            topics[quantity] = clean(source, _without(_filter_delay(contents, quantity), clock), None, scratch)
+            topics[quantity] = clean(source, _undelayed(_filter_delay(contents, quantity), clock), None, scratch)
     _depth_of_pressure(contents, topics, clock, scratch)
     if not any(name in topics for name in _MOTION):
         what = ", ".join(f"{name} ({QUANTITIES[name].what})" for name in _MOTION)
@@ -69,18 +70,18 @@ def select_topics(contents: LogContents, scratch: Path) -> tuple[dict[str, Topic
 
 
 def _filter_delay(contents: LogContents, quantity: str) -> float:
-    """Return by how much an ArduPilot's low-pass filter, a Butterworth of second order, delays a quantity [s]."""
+    """Return the delay of a quantity by ArduPilot's second-order Butterworth filter at low frequencies [s]."""
     cutoff = contents.parameters.get(_FILTERS.get(quantity, ""), 0.0)  # Hz
     return math.sqrt(2.0) / (2.0 * math.pi * cutoff) if contents.autopilot == "ardupilot" and cutoff > 0.0 else 0.0
 
 
-def _without(delay: float, clock: VehicleClock) -> Callable[[Array, Array], Array]:
-    """Return a function from stamps and times of writing to times [s] before a delay."""
+def _undelayed(delay: float, clock: VehicleClock) -> Callable[[Array, Array], Array]:
+    """Return a function from stamps and times of writing [s] to times [s], corrected by a delay [s]."""
     return lambda stamps, written: clock.times(stamps, written) - delay
 
 
 def span_of(topics: Mapping[str, Topic]) -> tuple[float, float]:
-    """Return start and end [s] of the rows: where all of the motion is known, unless that cuts 5 s or more."""
+    """Return start and end [s] of the rows: all of the motion is known there, unless that cuts 5 s or more."""
     motion = [topics[name] for name in _MOTION if name in topics]
     starts, ends = [topic.start for topic in motion], [topic.end for topic in motion]
     start = max(starts) if max(starts) - min(starts) < _EDGE else min(starts)

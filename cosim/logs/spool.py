@@ -27,11 +27,11 @@ class Source:
     """
 
     quantity: str
-    name: str  # of the message, topic or columns
+    name: str  # name of the message, topic or columns
     path: Path
-    size: int  # components
-    count: int = 0
-    broken: int = 0  # samples with a number that is not finite
+    size: int  # number of components
+    count: int = 0  # number of samples
+    broken: int = 0  # number of omitted samples with a number that is not finite
     _waiting: array[float] = field(default_factory=lambda: array("d"))
 
     def put(self, stamp: float, written: float, values: Sequence[float]) -> None:
@@ -138,7 +138,7 @@ class LogContents:
         return found
 
     def put(self, quantity: str, name: str, stamp: float, written: float, values: Sequence[float]) -> None:
-        """Append a sample of a quantity, as `Source.put`."""
+        """Append a sample of a quantity to its source, like `Source.put`."""
         self.source(quantity, name, len(values)).put(stamp, written, values)
 
     def best(self, quantity: str) -> Source | None:

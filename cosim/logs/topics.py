@@ -1,4 +1,4 @@
-"""Clean samples: in the order of time, without repeats of held values, bursts spread, gaps counted."""
+"""Cleaning of samples: sort out late ones and repeats of held values, spread bursts in time, count gaps."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from cosim.simulation.signals import Array
 
 Convert = Callable[[Array], Array]
 
-_EDGES = np.logspace(-6, 5, 4401)  # s, of a histogram of periods; neighbors differ by 0.6 %
-_AROUND = 8  # bins to either side of the median whose mean is the period
-_GAP_PERIODS, _LEAST_GAP = 3.0, 0.3  # a pause of more periods, and seconds, is a gap
-_LISTED = 100  # gaps that are listed
-_RUNS, _REGULAR = 10, 0.6  # least runs of equal values, and fraction of alike lengths, for values to count as held
-_LONGEST_RUN = 1000  # samples
-_QUICK, _BURSTING = 0.2, 0.3  # fraction of the mean period, and of samples closer than it, that define bursts
+_EDGES = np.logspace(-6, 5, 4401)  # s, edges of the histogram of periods; neighbors differ by 0.6 %
+_AROUND = 8  # number of bins on either side of the median whose mean is the period
+_GAP_PERIODS, _LEAST_GAP = 3.0, 0.3  # periods, s: a pause longer than both is a gap
+_LISTED = 100  # greatest number of listed gaps
+_RUNS, _REGULAR = 10, 0.6  # values are held: least number of runs of equal values; least fraction of similar lengths
+_LONGEST_RUN = 1000  # samples, length from which on runs count as equally long
+_QUICK, _BURSTING = 0.2, 0.3  # bursts: greatest distance of samples in mean periods; least fraction of such samples
 
 
 @dataclass
@@ -31,19 +31,19 @@ class Topic:
     """A cleaned quantity of a log: its file has a time [s] and the components of each sample."""
 
     quantity: str
-    name: str  # of its source
+    name: str  # name of the source
     path: Path
-    size: int
-    count: int = 0
-    start: float = 0.0  # s
-    end: float = 0.0  # s
-    period: float = 0.0  # s, median
-    held: int = 0  # repeats of a held value that were removed
-    burst: int = 0  # samples whose time was spread
-    late: int = 0  # samples out of order that were removed
-    broken: int = 0  # samples with a number that is not finite
+    size: int  # number of components
+    count: int = 0  # number of samples
+    start: float = 0.0  # s, time of the first sample
+    end: float = 0.0  # s, time of the last sample
+    period: float = 0.0  # s, median time between samples
+    held: int = 0  # number of removed repeats of held values
+    burst: int = 0  # number of samples of bursts, moved in time
+    late: int = 0  # number of removed samples out of order
+    broken: int = 0  # number of omitted samples with a number that is not finite
     gap_count: int = 0
-    gaps: list[tuple[float, float]] = field(default_factory=list)  # s, begin and end of the longest ones
+    gaps: list[tuple[float, float]] = field(default_factory=list)  # s, begin and end of the longest gaps
 
     @property
     def longest(self) -> float:
@@ -52,7 +52,7 @@ class Topic:
 
     @property
     def rate(self) -> float:
-        """Samples per second [Hz]."""
+        """Rate of the samples [Hz]; 0 if the period is unknown."""
         return 1.0 / self.period if self.period else 0.0
 
 
@@ -191,11 +191,14 @@ def _held_for(runs: NDArray[np.int64]) -> int:
         return 1
     middle = int(np.searchsorted(np.cumsum(runs), 0.5 * total))
     alike = int(runs[max(1, middle - 1) : middle + 2].sum())
-    return middle + 1 if middle >= 2 and alike >= _REGULAR * total else 1  # one more: lengths differ by one
+    return middle + 1 if middle >= 2 and alike >= _REGULAR * total else 1  # one more, since lengths differ by one
 
 
 def _fresh(values: Array, previous: Array, repeats: int, stretch: int) -> tuple[NDArray[np.bool_], int]:
-    """Return a mask of new samples, (n,), and the age of the last: new are changes, and each `stretch`-th repeat."""
+    """Return a mask of new samples, (n,), and the number of repeats before the last one.
+
+    A sample is new if its value changes, or if it is each `stretch`-th repeat.
+    """
     if stretch <= 1:
         return np.ones(len(values), bool), 0
     same = (values == np.vstack([previous, values[:-1]])).all(axis=1)
@@ -207,7 +210,7 @@ def _fresh(values: Array, previous: Array, repeats: int, stretch: int) -> tuple[
 
 
 def _spread(samples: Iterator[tuple[Array, Array]], period: float, topic: Topic) -> Iterator[tuple[Array, Array]]:
-    """Spread samples of bursts evenly in time: the last one of a burst is on time, the others were delayed."""
+    """Spread the samples of each burst evenly in time before its last one, which alone was not delayed."""
     at, values = np.empty(0), None
     before = np.nan
     for more_at, more_values in samples:

@@ -16,14 +16,14 @@ from cosim.errors import ImportLogError
 from cosim.logs.format import Moved
 
 _MAGIC = b"ULog\x01\x12\x35"
-_SYNC = bytes.fromhex("2f731320250cbb12")
+_SYNC = bytes.fromhex("2f731320250cbb12")  # body of a synchronization message
 _HEAD = struct.Struct("<HB")  # size and type of a message
-_FILE_HEAD = 16  # bytes
+_FILE_HEAD = 16  # bytes, size of the file's header
 _CHUNK = 1 << 20  # bytes that are read at once
-_BLOCK = 1 << 16  # bytes of a topic that are given at once
-_LONGEST = 10_000  # bytes of a message; a longer one is damage
-_MOST_FIELDS, _DEEPEST = 4096, 8  # of a topic, and of types in types
-_KNOWN = frozenset(b"BFIMPQARDLCSO")
+_BLOCK = 1 << 16  # bytes, least size of a yielded block of samples before the end
+_LONGEST = 10_000  # bytes, greatest size of a message; a longer one counts as damage
+_MOST_FIELDS, _DEEPEST = 4096, 8  # greatest length of an array in a message; greatest depth of nested types
+_KNOWN = frozenset(b"BFIMPQARDLCSO")  # types of messages
 _TYPES = {
     "int8_t": "i1", "uint8_t": "u1", "int16_t": "<i2", "uint16_t": "<u2", "int32_t": "<i4", "uint32_t": "<u4",
     "int64_t": "<i8", "uint64_t": "<u8", "float": "<f4", "double": "<f8", "bool": "i1", "char": "i1",
@@ -34,40 +34,40 @@ _FAULTS = (ValueError, KeyError, IndexError, struct.error, UnicodeDecodeError)
 
 @dataclass
 class _Topic:
-    """A subscription: how its samples are stored, and those that wait."""
+    """A subscription: the format of its samples, and the samples that were not yielded yet."""
 
-    name: str  # with its instance, such as vehicle_attitude[0]
+    name: str  # name of the topic with its instance, such as vehicle_attitude[0]
     dtype: np.dtype[Any]
-    longest: int  # bytes of a sample with padding
-    waiting: bytearray = field(default_factory=bytearray)
+    longest: int  # bytes, size of a sample with padding
+    waiting: bytearray = field(default_factory=bytearray)  # samples that were not yielded yet
 
     def samples(self) -> NDArray[Any]:
-        """Return the samples that wait, and forget them."""
+        """Return the waiting samples, and clear them."""
         found = np.frombuffer(bytes(self.waiting), self.dtype)
         self.waiting.clear()
         return found
 
 
 class ULogMessages:
-    """Read a ULog file from its begin to its end.
+    """Read a ULog file from begin to end.
 
     Parameters
     ----------
     path : Path
-        The file.
-    wanted : collection of str
-        Topics whose samples are given.
+        Path of the file.
+    wanted : frozenset of str
+        Names of the topics whose samples are yielded.
 
     Attributes
     ----------
     parameters : dict of str to float
-        As they were at the start of the log.
+        Parameters of the autopilot at the start of the log, by name.
     formats : set of str
         Types of messages that the file defines.
     dropouts : list of float
-        Times in which the logger lost data [s].
+        Durations in which the logger lost data [s].
     is_damaged : bool
-        Whether some bytes are no messages.
+        True if some bytes are not valid messages.
     """
 
     def __init__(self, path: Path, wanted: frozenset[str]) -> None:
@@ -76,9 +76,9 @@ class ULogMessages:
         self.dropouts: list[float] = []
         self.is_damaged = False
         self._formats: dict[str, list[tuple[str, int, str]]] = {}
-        self._topics: dict[int, _Topic | None] = {}  # by their number; None: not wanted
+        self._topics: dict[int, _Topic | None] = {}  # topics by their id in the file; None: not wanted
         self._has_begun = False
-        self._appended: list[int] = []  # bytes from the begin, where data were appended after a crash
+        self._appended: list[int] = []  # bytes, offsets in the file at which data were appended after a crash
 
     @property
     def formats(self) -> set[str]:
@@ -86,7 +86,7 @@ class ULogMessages:
         return set(self._formats)
 
     def blocks(self, moved: Moved) -> Iterator[tuple[str, NDArray[Any]]]:
-        """Yield topic with its instance, and a structured array of some of its samples, each in the order of the file.
+        """Yield blocks of samples: the topic with its instance, and a structured array in the order of the file.
 
         Parameters
         ----------
@@ -96,7 +96,7 @@ class ULogMessages:
         Raises
         ------
         ImportLogError
-            If it is no ULog file, or needs a newer reader.
+            If the file is not a ULog file, or needs a newer reader.
         """
         for kind, body in self._messages(moved):
             try:
@@ -111,7 +111,7 @@ class ULogMessages:
                 yield topic.name, topic.samples()
 
     def _take(self, kind: int, body: bytes) -> _Topic | None:
-        """Take a message; return the topic of a sample."""
+        """Process a message; return its topic if it is a sample of a wanted topic."""
         is_first, self._has_begun = not self._has_begun, True
         match chr(kind):
             case "D":
@@ -152,7 +152,7 @@ class ULogMessages:
         return _Topic(name, np.dtype(fields), longest)
 
     def _flat(self, prefix: str, kind: str, depth: int) -> Iterator[tuple[str, str]]:
-        """Yield name and type of each number of a message, those of types in it too."""
+        """Yield name and type of each number of a message, also in nested types."""
         if depth > _DEEPEST:
             raise ValueError
         for of, count, name in self._formats[kind]:
@@ -163,13 +163,13 @@ class ULogMessages:
                     yield from self._flat(f"{prefix}{name}{place}.", of, depth + 1)
 
     def _messages(self, moved: Moved) -> Iterator[tuple[int, bytes]]:
-        """Yield type and body of each message; pass over what is none, to the next mark of synchronization."""
+        """Yield type and body of each message; after invalid bytes, continue at the next synchronization mark."""
         total = max(1, self._path.stat().st_size)
         with self._path.open("rb") as file:
             if file.read(_FILE_HEAD)[:7] != _MAGIC:
                 raise ImportLogError("cannot be read as a ULog file: it does not begin as one")
-            data, at, before = b"", 0, _FILE_HEAD  # bytes of the file before `data`
-            searched = 0  # bytes of the file in which there is no mark from the present message on
+            data, at, before = b"", 0, _FILE_HEAD  # `before`: number of the file's bytes before `data`
+            searched = 0  # number of the file's bytes without a mark after the present message
             while True:
                 if len(data) - at < _LONGEST + _HEAD.size:
                     more = file.read(_CHUNK)
@@ -190,7 +190,7 @@ class ULogMessages:
                         at = possible.start() if possible else max(at + 1, len(data) - _HEAD.size + 1)
                     continue
                 if self._appended and before + end > self._appended[0] >= before + at:
-                    offset = self._appended.pop(0) - before  # a message that a crash cut
+                    offset = self._appended.pop(0) - before  # a crash has cut this message
                     at = min(offset, len(data))
                     continue
                 if end > len(data):
@@ -200,7 +200,7 @@ class ULogMessages:
 
 
 def _field(text: str) -> tuple[str, int, str]:
-    """Return type, length (0 for one number) and name of a field."""
+    """Parse the text of a field; return its type, its length (0 for one number) and its name."""
     kind, name = text.split(" ")
     of, _, count = kind.partition("[")
     number = int(count.removesuffix("]")) if count else 0

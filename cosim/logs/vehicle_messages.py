@@ -1,4 +1,4 @@
-"""MAVLink messages of a vehicle as samples of a log."""
+"""Conversion of a vehicle's MAVLink messages to samples of a log."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from cosim.logs.frames import quaternion_of_angles
 from cosim.logs.spool import LogContents
 from cosim.mavlink.wire.dialect import dialect
 
-AUTOPILOT = 1  # component id
-NO_AUTOPILOT = 8  # MAV_AUTOPILOT of what is none
+AUTOPILOT = 1  # component id of an autopilot
+NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID, of ground stations and other components
 NO_STAMP = math.nan
-_LOCAL_NED, _BODY_FRD, _DOWNWARDS = 1, 12, 25
-_INVALID_STICK = 0x7FFF
+_LOCAL_NED, _BODY_FRD, _DOWNWARDS = 1, 12, 25  # MAV_FRAME, twice; MAV_SENSOR_ROTATION_PITCH_270
+_INVALID_STICK = 0x7FFF  # value of an unused stick
 _SWIM = (0, 11, 12)  # MAV_TYPE of generic, surface boat and submarine
 _OF_OTHERS = ("MANUAL_CONTROL", "VISION_POSITION_DELTA")  # messages of the pilot's station and of a DVL's driver
-_ARDUPILOT, _PX4 = 3, 12
-_RESTS_IN_THE_MIDDLE = (_ARDUPILOT, _PX4)
-_G = 9.80665
+_ARDUPILOT, _PX4 = 3, 12  # MAV_AUTOPILOT
+_RESTS_IN_THE_MIDDLE = (_ARDUPILOT, _PX4)  # autopilots whose vertical stick rests at 500
+_G = 9.80665  # m/s2
 _FRAME = "Frame: "  # prefix of ArduSub's text with its arrangement of thrusters
 _PREFERENCES = {
     "attitude": ("ODOMETRY", "ATTITUDE_QUATERNION", "ATTITUDE"),
@@ -38,9 +38,9 @@ class VehicleMessages:
     contents : LogContents
         Receives the samples.
     system : int
-        MAVLink id of the vehicle.
+        MAVLink system id of the vehicle.
     autopilot, kind : int
-        Its MAV_AUTOPILOT and MAV_TYPE.
+        MAV_AUTOPILOT and MAV_TYPE of the vehicle.
     """
 
     def __init__(self, contents: LogContents, system: int, autopilot: int, kind: int) -> None:
@@ -50,22 +50,22 @@ class VehicleMessages:
         contents.kind = kind_of(kind)
         contents.autopilot = {_ARDUPILOT: "ardupilot", _PX4: "px4"}.get(autopilot, "")
         contents.preferences |= _PREFERENCES
-        self._takers: dict[str, Callable[[Any, float], None]] = {
+        self._handlers: dict[str, Callable[[Any, float], None]] = {
             name.removeprefix("_on_").upper(): getattr(self, name) for name in dir(self) if name.startswith("_on_")
         }
-        self.wanted = frozenset(self._takers)
+        self.wanted = frozenset(self._handlers)
 
     def take(self, system: int, component: int, message: Any, written: float) -> None:
         """Add a message of `wanted` from a system and component, written at a time [s]."""
         name = message.get_type()
         if name in _OF_OTHERS or (system, component) == (self._system, AUTOPILOT):
-            self._takers[name](message, written)
+            self._handlers[name](message, written)
         elif system != self._system:
             self._contents.unread[f"{name} of system {system}"] += 1
         else:
             self._contents.unread[f"{name} of component {component}"] += 1
 
-    # ---- message by message: each method is of the message in its name ----
+    # ---- handlers, one for each message, named after it ----
 
     def _on_attitude(self, m: Any, at: float) -> None:
         stamp = m.time_boot_ms * 1e-3
@@ -123,7 +123,7 @@ class VehicleMessages:
         self._imu("SCALED_IMU2", m.time_boot_ms * 1e-3, at, m)
 
     def _on_raw_imu(self, m: Any, at: float) -> None:
-        if self._autopilot == _ARDUPILOT:  # its raw numbers are scaled; others are in units of the chip
+        if self._autopilot == _ARDUPILOT:  # ArduPilot's are scaled to mG and mrad/s; others are in units of the chip
             self._imu("RAW_IMU", m.time_usec * 1e-6, at, m)
         else:
             self._contents.unread["RAW_IMU"] += 1
@@ -139,7 +139,7 @@ class VehicleMessages:
             self._contents.unread[f"DISTANCE_SENSOR of orientation {m.orientation}"] += 1
 
     def _on_vision_position_delta(self, m: Any, at: float) -> None:
-        if m.time_delta_usec > 0:  # the mean over these seconds, which end when the message comes
+        if m.time_delta_usec > 0:  # mean over the time before the reception
             seconds = m.time_delta_usec * 1e-6
             values = [d / seconds for d in m.position_delta]
             self._put("dvl", "VISION_POSITION_DELTA", NO_STAMP, at - 0.5 * seconds, values)

@@ -25,40 +25,40 @@ from plant_fmu.vehicle import Vehicle, load_vehicle
 
 Array = NDArray[np.float64]
 
-RETURN = 10.0  # s, between two segments: the law brings the vehicle back to the center of the box
-BEGIN = 2.0  # s, before the first one
-_SETTLE = 1.0  # s, before a segment that is tried: windows begin after that time
-_STICKS = round(PERIOD / ROW)  # rows of the record to a stick value
-_USED = 0.7  # part of the box that a segment may use with the numbers as they are known before
-_FASTEST = 2.0  # rad/s
-_STEEPEST = math.sin(math.radians(55.0))
-_SMALLER = 0.7  # part of the sticks, each time a segment leaves the limits
-_TRIES = 7
+RETURN = 10.0  # s, time between two segments, in which the law returns the vehicle to the center of the box
+BEGIN = 2.0  # s, time before the first segment
+_SETTLE = 1.0  # s, time before a candidate segment, at which windows begin
+_STICKS = round(PERIOD / ROW)  # rows of the record per stick value
+_USED = 0.7  # fraction of the box that a segment may use, with the start values of the numbers
+_FASTEST = 2.0  # rad/s, greatest angular velocity about a body axis in a segment
+_STEEPEST = math.sin(math.radians(55.0))  # sine of the greatest tilt in a segment
+_SMALLER = 0.7  # factor on the sticks each time a segment leaves the limits
+_TRIES = 7  # most reductions of the sticks
 CURRENT = 0.1  # m/s, default of the current in which vehicles stay inside the box
-_OTHERS = 8  # vehicles for which the forces are reduced, and as many random ones that show the result
+_OTHERS = 8  # number of other vehicles for which forces are reduced, and of random ones that check the result
 
 
 @dataclass(frozen=True)
 class Design:
-    """A schedule, and what is to be expected of it."""
+    """A schedule of stick inputs with the accuracy and the motion that are expected of it."""
 
-    start: str  # the shipped vehicle or file
+    start: str  # name of the shipped vehicle, or path of the vehicle's file
     vehicle: Vehicle
-    box: tuple[float, float, float]  # m: north, east, down
-    depth: float  # m, of its center
-    duration: float  # s
+    box: tuple[float, float, float]  # m, sizes of the box: north, east, down
+    depth: float  # m, depth of the center of the box
+    duration: float  # s, duration of the whole schedule
     segments: tuple[Segment, ...]
-    tried: int  # candidates
-    left_out: int  # candidates that leave the limits however small
-    commands: tuple[tuple[int, Command], ...]
+    tried: int  # number of candidates
+    left_out: int  # number of candidates that leave the limits with any sticks, or have no valid window
+    commands: tuple[tuple[int, Command], ...]  # commands with their steps
     parameters: tuple[Parameter, ...]
-    deviations: Array  # (p,) standard, expected of the numbers
+    deviations: Array  # (p,) expected standard deviations of the parameters, in their units
     rehearsal: Rehearsal
-    current: float  # m/s, of the other vehicles' water
-    excursions: tuple[float, ...]  # parts of half the box, of other vehicles in that current
+    current: float  # m/s, speed of the current of the other vehicles
+    excursions: tuple[float, ...]  # greatest distance of each other vehicle from the center, in halves of the box
 
     def vehicle_part(self) -> list[int]:
-        """Return the places of the vehicle's own numbers."""
+        """Return the indices of the vehicle's own parameters."""
         return [i for i, p in enumerate(self.parameters) if not p.is_nuisance]
 
 
@@ -73,38 +73,38 @@ def design(
     progress: Callable[[float], None] = lambda part: None,
     current: float = CURRENT,
 ) -> Design:
-    """Choose stick inputs under which the free numbers are known best.
+    """Choose stick inputs that give the most information on the free numbers.
 
     Parameters
     ----------
     start : str
-        A shipped vehicle, or a vehicle's file.
+        Name of a shipped vehicle, or path of a vehicle's file.
     box : tuple of float
         Sizes of the box north, east and down, about the start [m].
     depth : float
-        Of its center [m].
+        Depth of the center of the box [m].
     duration : float
-        Of the whole [s].
+        Duration of the whole schedule [s].
     free, nuisance : sequence of str
-        As `cosim.identification.parameters` takes them.
+        Keys and nuisances to estimate, as for `free_parameters` and `nuisances`.
     seed : int
-        Of the candidates.
+        Seed of the random candidates and vehicles.
     progress : callable
-        Gets what part of the work is done, 0 to 1.
+        Receives the fraction of the work done so far, 0 to 1.
     current : float
-        That the schedule allows for [m/s].
+        Speed of a current in which the vehicle must stay inside the box [m/s].
 
     Returns
     -------
     Design
-        With the rehearsal of the whole.
+        Schedule, with the rehearsal of the whole.
 
     Raises
     ------
     VehicleError, ScenarioError
-        If the vehicle cannot be loaded, or the box is none.
+        If the vehicle or the scenario cannot be loaded.
     IdentificationError
-        If the time or the box is too small for any segment, or for the current.
+        If the duration or the box is too small for any segment or for the current, or the box leaves the water.
     """
     with single_thread():
         return _design(start, box, depth, duration, free, nuisance, seed, progress, current)
@@ -222,18 +222,18 @@ def keep_inside(
     Parameters
     ----------
     segments : sequence of Segment
-        As chosen.
+        Chosen segments, in their order.
     scenario : Scenario
-        Of the vehicle as it is known, from the center of the box.
+        Scenario of the known vehicle, which starts at the center of the box.
     box : tuple of float
-        Its sizes [m].
+        Sizes of the box north, east and down [m].
     others : sequence of Scenario
-        As `fastest_others` makes them.
+        Scenarios of other vehicles, such as from `fastest_others`.
 
     Returns
     -------
     tuple of Segment
-        Forces are reduced a few times at most; against a current alone that may not suffice.
+        Segments after at most seven reductions; these cannot help against a current that alone leaves the box.
     """
     found = list(segments)
     for _ in range(_TRIES):
@@ -276,9 +276,9 @@ def information(logs: Sequence[Log], vehicle: Vehicle, parameters: Sequence[Para
     logs : sequence of Log
         The runs.
     vehicle : Vehicle
-        Whose numbers they are made with.
+        Vehicle with the start values of the parameters.
     parameters : sequence of Parameter
-        What is free; each window's start is eliminated.
+        Free parameters; the start of each window is eliminated.
     """
     windows, _ = cut_windows(logs, vehicle, ROW, STAGES[0])
     if not windows:
@@ -297,7 +297,7 @@ def _stick_commands(segment: Segment, step: int) -> list[tuple[int, Command]]:
 
 
 def _within(segment: Segment, trial: Scenario, box: tuple[float, float, float]) -> tuple[Segment, Rehearsal] | None:
-    """Return the segment, made so small that it stays within the limits, and what it does; None where none does."""
+    """Return the segment with sticks reduced to stay within the limits, and its rehearsal; None if that fails."""
     settle = round(_SETTLE / ROW)
     begin: list[tuple[int, Command]] = [(0, SetMode(segment.mode))]
     center, sizes = np.array(trial.initial.position), _USED * 0.5 * np.array(box)
@@ -316,14 +316,14 @@ def _within(segment: Segment, trial: Scenario, box: tuple[float, float, float]) 
 
 
 def _choose(found: Sequence[Array], parameters: Sequence[Parameter], count: int) -> list[int]:
-    """Return the chosen candidates: greedy, then exchanged one by one while that adds information."""
+    """Return the indices of the chosen candidates: greedy, then each exchanged once for a better one."""
     free = [i for i, p in enumerate(parameters) if not p.is_nuisance]
     scale = np.array([p.deviation for p in parameters])
     matrices = [matrix * np.outer(scale, scale) for matrix in found]
     total = np.eye(len(scale))
 
     def gain(matrix: Array) -> float:
-        """Return the information on the free numbers alone: the nuisances are unknown too."""
+        """Return the log-determinant of the information on the vehicle's numbers, without that on the nuisances."""
         covariance = np.linalg.inv(matrix)[np.ix_(free, free)]
         return -float(np.linalg.slogdet(covariance)[1])
 

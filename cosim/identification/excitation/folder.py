@@ -23,11 +23,11 @@ from cosim.scenario.scenario import VEHICLE_COPY
 SCENARIO, COMMANDS, STICKS, PAGE = "excite.toml", "commands.jsonl", "sticks.csv", "excite.html"
 _AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 _NORMAL = 1.96  # standard deviations: half of a 95 % interval
-_LEAST_KNOWN = 0.1  # of the prior's deviation: above it, a number is called hardly identifiable
+_LEAST_KNOWN = 0.1  # ratio of expected to prior deviation, above which a number is called hardly identifiable
 
 
 def verdict(done: Design) -> str:
-    """Return the one sentence that says what is to be expected."""
+    """Return a sentence about the number of segments and the free numbers that they determine."""
     part = _of_prior(done)
     weak = [done.parameters[i].name for i in done.vehicle_part() if part[i] > _LEAST_KNOWN]
     text = f"{len(done.segments)} segments of {SECONDS:g} s were chosen among {done.tried}, {done.duration:g} s in all"
@@ -37,7 +37,7 @@ def verdict(done: Design) -> str:
 
 
 def warnings(done: Design) -> Iterator[str]:
-    """Yield what a user must know before the sticks are played."""
+    """Yield the warnings that a user must read before playing the sticks."""
     worst = max(done.excursions)
     leaves = sum(x > 1.0 for x in done.excursions)
     said = f"{leaves} leave the box" if leaves else "none leaves the box"
@@ -48,24 +48,24 @@ def warnings(done: Design) -> Iterator[str]:
 
 
 def write_folder(done: Design, out: Path) -> Path:
-    """Write the folder.
+    """Write the folder of a design.
 
     Parameters
     ----------
     done : Design
-        What was chosen.
+        Chosen schedule.
     out : Path
-        A new folder, or an empty one.
+        Path of a new or empty folder.
 
     Returns
     -------
     Path
-        The page.
+        Path of the page.
 
     Raises
     ------
     IdentificationError
-        If it cannot be written.
+        If the folder cannot be written.
     """
     own = done.start.endswith(".toml")
     vehicle = VEHICLE_COPY if own else done.start

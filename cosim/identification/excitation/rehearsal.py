@@ -1,4 +1,4 @@
-"""A schedule of segments on the plant: what it does, and what sensors would measure of it."""
+"""Simulation of a schedule of segments on the plant: its motion, and the sensors' measurements of it."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ _STATE = (
     *(f"position.{axis}" for axis in "xyz"), *(f"quaternion.e{i}" for i in range(4)),
     *(f"velocity.{name}" for name in "uvwpqr"),
 )  # fmt: skip
-DVL_PERIOD = 0.15  # s
-NOISE = {"velocity": 0.005, "angular_velocity": 0.002, "depth": 0.003, "attitude": 0.005}  # m/s, rad/s, m, rad
+DVL_PERIOD = 0.15  # s, time between two velocities of the DVL
+# standard deviations of the sensors' noise [m/s, rad/s, m, rad]
+NOISE = {"velocity": 0.005, "angular_velocity": 0.002, "depth": 0.003, "attitude": 0.005}
 
 
 @dataclass(frozen=True)
@@ -30,11 +31,11 @@ class Rehearsal:
     """A simulated run, row by row."""
 
     times: Array  # (rows,) s
-    states: Array  # (rows, 13)
-    thrust: Array  # (rows, thrusters) N, commanded
+    states: Array  # (rows, 13) position [m, NED], quaternion, velocity [m/s, rad/s, body frame]
+    thrust: Array  # (rows, thrusters) N, commanded forces
 
     def log(self) -> Log:
-        """Return the measurements of the sensors without noise, and with its standard deviations."""
+        """Return the sensors' measurements without noise, together with the standard deviations of the noise."""
         every = max(1, round(DVL_PERIOD / float(self.times[1] - self.times[0])))
         parts = {
             "velocity": (slice(None, None, every), slice(7, 10)), "angular_velocity": (slice(None), slice(10, 13)),
@@ -50,21 +51,21 @@ class Rehearsal:
 def rehearse(
     scenario: Scenario, commands: Sequence[tuple[int, Command]], plant: SteppedPlant | None = None
 ) -> Rehearsal:
-    """Simulate a run under commands.
+    """Simulate a run with scheduled commands.
 
     Parameters
     ----------
     scenario : Scenario
-        Its commands are enabled.
+        Scenario with enabled commands.
     commands : sequence of (int, Command)
-        Each with its step, in the order of the steps.
+        Steps and commands, in the order of the steps.
     plant : SteppedPlant, optional
-        What moves; default: the FMU of the scenario's vehicle.
+        Plant to simulate; default: the FMU of the scenario's vehicle.
 
     Returns
     -------
     Rehearsal
-        A row for each step.
+        Simulated run with a row for each step.
 
     Raises
     ------

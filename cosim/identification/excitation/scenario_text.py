@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cosim.scenario.scenario import Scenario, load_scenario
 
-ROW = 0.05  # s, of the record, the law and the sticks
+ROW = 0.05  # s, period of the record's rows and of the law
 
 _TEXT = """# Stick inputs for identification, made by cosim excite. The law brings the vehicle back between segments.
 title = "Excitation of {name}"
@@ -39,31 +39,31 @@ pilot_gain = 1.0        # sticks are parts of the greatest wrench
 
 
 def scenario_text(vehicle: str, depth: float, duration: float, name: str) -> str:
-    """Return the text of the scenario.
+    """Return the TOML text of the scenario.
 
     Parameters
     ----------
     vehicle : str
-        A shipped one, or a file relative to the scenario's folder.
+        Name of a shipped vehicle, or path of a file relative to the scenario's folder.
     depth : float
-        Of the center [m].
+        Depth of the center of the box [m].
     duration : float
-        [s].
+        Duration of the scenario [s].
     name : str
-        What the title names.
+        Name of the vehicle in the title.
     """
     return _TEXT.format(name=name, vehicle=json.dumps(vehicle), duration=duration, depth=depth, row=ROW)
 
 
 def load(text: str, vehicle: str) -> Scenario:
-    """Return the scenario that a text makes, from no folder that stays.
+    """Load a scenario from its text, by a temporary file.
 
     Parameters
     ----------
     text : str
-        As `scenario_text` has it.
+        Text from `scenario_text`.
     vehicle : str
-        The vehicle in it.
+        Name or path of the vehicle in the text.
     """
     path = str(Path(vehicle).resolve()) if vehicle.endswith(".toml") else vehicle
     with tempfile.TemporaryDirectory(prefix="excite-") as folder:

@@ -1,4 +1,4 @@
-"""Candidates: pieces of stick input, multisines and steps, that the choice is made among."""
+"""Candidate segments of stick input, multisines and steps, from which a design chooses."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ Array = NDArray[np.float64]
 StickMode = Literal["manual", "stabilize", "depth_hold"]
 
 PERIOD = 0.1  # s, between two stick values
-SECONDS = 20.0  # of a segment
+SECONDS = 20.0  # s, duration of a segment
 
 _AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 _GROUPS: tuple[tuple[int, ...], ...] = (
     (0, 1, 2, 3, 4, 5), (0, 5), (1, 5), (1, 3), (0, 4), (2, 4), (3, 4, 5), (0, 1, 2), (0,), (1,), (2,),
 )  # fmt: skip
-_BANDS = ((0.05, 0.5), (0.2, 1.5))  # Hz, of a multisine
-_DWELLS = ((2.0, 4.0), (0.8, 2.5))  # s, for which a step is held
-_SINES = 7  # of each axis
-_YAW_RATE = 0.25  # part of the stick where it asks for a rate: full is 202 deg/s
-_MOMENT = 0.5  # part of the sticks where they are moments
-_SHARED = 0.7  # part of a full stick of each axis where several move together
+_BANDS = ((0.05, 0.5), (0.2, 1.5))  # Hz, frequency bands of the multisines
+_DWELLS = ((2.0, 4.0), (0.8, 2.5))  # s, shortest and longest time for which a step is held
+_SINES = 7  # most sines of each axis
+_YAW_RATE = 0.25  # factor on the yaw stick in modes where it commands a rate: a full stick is 202 deg/s
+_MOMENT = 0.5  # factor on the sticks of roll, pitch and yaw in manual mode, where they command moments
+_SHARED = 0.7  # factor on each stick in segments that move several axes
 
 
 @dataclass(frozen=True)
@@ -33,10 +33,10 @@ class Segment:
 
     title: str
     mode: StickMode
-    sticks: Array  # (n, 6) parts of X Y Z K M N, -1 to 1, each held for `PERIOD`
+    sticks: Array  # (n, 6) sticks X Y Z K M N, -1 to 1, each row held for `PERIOD`
 
     def scaled(self, part: float) -> Segment:
-        """Return it with all sticks made smaller."""
+        """Return the segment with all sticks multiplied by a factor."""
         return Segment(self.title, self.mode, part * self.sticks)
 
 
@@ -46,16 +46,16 @@ def candidates(axes: NDArray[np.bool_], rng: np.random.Generator, draws: int) ->
     Parameters
     ----------
     axes : ndarray of bool, shape (6,)
-        Which axes the thrusters move.
+        True for axes along or about which the thrusters act.
     rng : Generator
-        Of phases, levels and times.
+        Source of the random phases, levels and times.
     draws : int
-        How many of each kind.
+        Number of candidates for each group, mode and band.
 
     Yields
     ------
     Segment
-        With zero mean on each axis.
+        Candidate with zero mean on each axis.
     """
     groups = dict.fromkeys(tuple(i for i in group if axes[i]) for group in _GROUPS)
     modes: tuple[StickMode, ...] = ("manual", "stabilize", "depth_hold")
@@ -75,7 +75,7 @@ def _named(group: tuple[int, ...]) -> str:
 
 
 def _spread(values: Array, group: tuple[int, ...], mode: StickMode) -> Array:
-    """Return sticks of all axes from those of a group, as large as they can be."""
+    """Return the sticks of all axes, shape (n, 6), from those of a group, (n, axes), scaled for the mode."""
     sticks = np.zeros((len(values), 6))
     sticks[:, list(group)] = values * (1.0 if len(group) == 1 else _SHARED)
     if mode == "manual":
@@ -97,7 +97,7 @@ def _multisine(low: float, high: float, count: int, rng: np.random.Generator) ->
 
 
 def _steps(least: float, most: float, count: int, rng: np.random.Generator) -> Array:
-    """Return steps to random levels, the second half the first one turned round; shape (n, count)."""
+    """Return steps to random levels, shape (n, count); the second half is the first with opposite sign."""
     half = round(SECONDS / PERIOD) // 2
     result = np.zeros((2 * half, count))
     for axis in range(count):

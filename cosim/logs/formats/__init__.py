@@ -1,6 +1,6 @@
-"""Formats of logs, one module each, which names its `LogFormat` as ``FORMAT``.
+"""Formats of logs, one module each, whose `LogFormat` is called ``FORMAT``.
 
-A module in this folder adds a format for the suffixes that it names.
+To add a format, add a module to this folder.
 
 Imports: mavlink.wire, plant_fmu, simulation.
 """

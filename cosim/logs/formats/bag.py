@@ -21,9 +21,9 @@ from cosim.logs.spool import LogContents
 from plant_fmu.toml_tables import hint
 
 _WAITING = 4096  # messages of a quantity that are written together
-_PART = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+)\]")
-_IDL_TITLE = re.compile(r"^=+\nIDL: .*\n", re.MULTILINE)  # before each type of a definition
-_TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")  # definitions may leave these out
+_PART = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+)\]")  # a field's name or an index in a path
+_IDL_TITLE = re.compile(r"^=+\nIDL: .*\n", re.MULTILINE)  # heading of each type in a definition
+_TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")  # types that definitions may omit
 
 Getter = Callable[[Any], float]
 
@@ -39,14 +39,14 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
     nameless = next((name for name, mapped in columns.quantities.items() if not mapped.topic), None)
     if nameless is not None:
         raise ImportLogError(f"the map says no topic for [{nameless}], expected topic and columns")
-    takers: dict[str, list[_Taker]] = {}
+    readers: dict[str, list[_FieldReader]] = {}
     for name, mapped in columns.quantities.items():
-        takers.setdefault(mapped.topic, []).append(_Taker(columns, name, contents))
+        readers.setdefault(mapped.topic, []).append(_FieldReader(columns, name, contents))
     clock, decoder = Clock(), Decoder(columns.messages)
     topics: set[str] = set()
     for message in stored_messages(path, contents.remarks, moved):
         topics.add(message.topic)
-        if message.topic not in takers:
+        if message.topic not in readers:
             contents.unread[message.topic] += 1
             continue
         written = clock.time(message.time)
@@ -55,13 +55,13 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
         except (SerdeError, *DAMAGE):
             contents.unread[f"{message.topic} that cannot be decoded"] += 1
             continue
-        for taker in takers[message.topic]:
-            taker.take(decoded, written)
-    missing = sorted(set(takers) - topics)
+        for reader in readers[message.topic]:
+            reader.take(decoded, written)
+    missing = sorted(set(readers) - topics)
     if missing:
         raise ImportLogError(f"has no topic {missing[0]!r}, which the map names; {hint(missing[0], topics)}")
-    for taker in (taker for several in takers.values() for taker in several):
-        taker.flush()
+    for reader in (reader for several in readers.values() for reader in several):
+        reader.flush()
     contents.remarks += clock.remarks("the bag's writer")
 
 
@@ -114,7 +114,7 @@ class Decoder:
         return lambda data: method(data, message.type)
 
 
-class _Taker:
+class _FieldReader:
     """Read the fields of a quantity from messages."""
 
     def __init__(self, columns: ColumnMap, name: str, contents: LogContents) -> None:
@@ -127,7 +127,7 @@ class _Taker:
         self._rows: list[list[float]] = []
 
     def take(self, message: Any, written: float) -> None:
-        """Add a message."""
+        """Add a message, written at a time [s]."""
         at = written if self._stamp is None else self._clock.time(self._stamp(message))
         self._rows.append([at, *(get(message) for get in self._getters)])
         if len(self._rows) >= _WAITING:

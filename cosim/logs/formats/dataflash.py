@@ -19,15 +19,15 @@ from cosim.logs.format import LogFormat, Moved
 from cosim.logs.frames import quaternion_of_angles
 from cosim.logs.spool import LogContents
 
-_CHUNK = 1 << 20  # bytes
-_HEAD = b"\xa3\x95"
-_FMT, _FMT_SIZE = 0x80, 89
+_CHUNK = 1 << 20  # bytes that are read at once
+_HEAD = b"\xa3\x95"  # first bytes of each message
+_FMT, _FMT_SIZE = 0x80, 89  # type of the message FMT; its size [bytes]
 _NOTHING = math.nan
-_FRAMES = (
+_FRAMES = (  # names of ArduSub's FRAME_CONFIG, from 0
     "bluerov1", "vectored", "vectored_6dof", "vectored_6dof_90deg", "simplerov_3", "simplerov_4", "simplerov_5",
 )  # fmt: skip
-_OTHERS = ("ArduCopter", "ArduPlane", "ArduRover", "AntennaTracker", "Blimp")
-_OF_THE_LOG = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "VER"}
+_OTHERS = ("ArduCopter", "ArduPlane", "ArduRover", "AntennaTracker", "Blimp")  # firmware of other vehicles
+_OF_THE_LOG = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "VER"}  # messages about the log, not counted as unread
 
 Fields = dict[str, Any]
 
@@ -35,50 +35,50 @@ Fields = dict[str, Any]
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
     """Read a dataflash log, as specified by `LogFormat`; raise ImportLogError for another file."""
     contents.autopilot = "ardupilot"
-    takers = _Takers(contents)
+    handlers = _MessageHandlers(contents)
     lost, any_message = 0, False
-    for name, fields in _messages(path, takers.wanted, moved):
+    for name, fields in _messages(path, handlers.wanted, moved):
         if name is None:
             lost += 1
             continue
         any_message = True
         if fields is not None:
-            takers.take(name, fields)
+            handlers.take(name, fields)
         elif name not in _OF_THE_LOG:
             contents.unread[name] += 1
     if not any_message:
         raise ImportLogError("holds no message, expected a dataflash log of ArduPilot")
     if lost:
         contents.remarks.append(f"{lost} bytes of the log are no messages and were passed over.")
-    for _, by in takers.clock.jumps:
+    for _, by in handlers.clock.jumps:
         contents.remarks.append(f"The autopilot's clock jumps by {by:+.4g} s: it is taken as a pause of 1 s.")
-    takers.conclude()
+    handlers.conclude()
 
 
-class _Takers:
+class _MessageHandlers:
     """Add messages to the contents of a log."""
 
     def __init__(self, contents: LogContents) -> None:
         self._contents = contents
         self.clock = Clock()
         self._rate_stamp = _NOTHING
-        self._takers: dict[str, Callable[[Fields, float], None]] = {
+        self._handlers: dict[str, Callable[[Fields, float], None]] = {
             name.removeprefix("_on_").upper(): getattr(self, name) for name in dir(self) if name.startswith("_on_")
         }
-        self.wanted = frozenset(self._takers)
+        self.wanted = frozenset(self._handlers)
 
     def take(self, name: str, m: Fields) -> None:
-        """Add a message."""
+        """Add a message with its fields."""
         if name == "RATE" and self._is_stale(m["TimeUS"] * 1e-6):
             return
         at = self.clock.time(m["TimeUS"] * 1e-6) if "TimeUS" in m else _NOTHING
         try:
-            self._takers[name](m, at)
+            self._handlers[name](m, at)
         except KeyError as error:
             raise ImportLogError(f"message {name} has no field {error}, expected it as ArduPilot has it") from error
 
     def _is_stale(self, stamp: float) -> bool:
-        """Return True for a RATE of an autopilot whose rate controller rests, as in MANUAL: its last stamp repeats."""
+        """Return True for a RATE that repeats an old stamp [s], since the rate controller rests, as in MANUAL."""
         last, self._rate_stamp = self._rate_stamp, stamp
         return stamp == last or self.clock.is_behind(stamp)
 
@@ -101,7 +101,7 @@ class _Takers:
     def _put(self, quantity: str, name: str, at: float, *values: float) -> None:
         self._contents.put(quantity, name, _NOTHING, at, values)
 
-    # ---- message by message: each method is of the message in its name ----
+    # ---- handlers, one for each message, named after it ----
 
     def _on_parm(self, m: Fields, at: float) -> None:
         self._contents.parameters[str(m["Name"])] = float(m["Value"])
@@ -192,7 +192,7 @@ def _learn(fields: tuple[Any, ...], formats: dict[int, tuple[DFFormat, struct.St
     kind, size, *texts = fields
     name, letters, columns = (text.split(b"\0")[0].decode("ascii", "replace") for text in texts)
     try:
-        with contextlib.redirect_stdout(io.StringIO()):  # it prints a letter that it does not know
+        with contextlib.redirect_stdout(io.StringIO()):  # pymavlink prints an unknown letter
             form = DFFormat(kind, name, size, letters, columns)
         unpack = struct.Struct(form.msg_struct)
     except Exception as error:

@@ -15,11 +15,11 @@ from cosim.logs.vehicle_messages import AUTOPILOT, NO_AUTOPILOT, VehicleMessages
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.framing import Counts, Gate, Header, header_at
 
-_CHUNK = 1 << 20  # bytes
+_CHUNK = 1 << 20  # bytes that are read at once
 _STAMP = struct.Struct(">Q")  # us since 1970
-_LONGEST_FRAME = 300  # bytes
+_LONGEST_FRAME = 300  # bytes, bound of a stamp with its frame
 _EARLIEST, _LATEST = 9e8, 4.1e9  # s since 1970, range of valid stamps
-_HEARTBEAT = 0  # id of the message
+_HEARTBEAT = 0  # message id
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:

@@ -31,7 +31,7 @@ _TOPICS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
     "battery_status": (("voltage", ("voltage_v",)),),
     "distance_sensor": (("altitude", ("current_distance",)),),
 }
-_DOWNWARDS = 25
+_DOWNWARDS = 25  # orientation of a distance sensor: MAV_SENSOR_ROTATION_PITCH_270
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
@@ -39,7 +39,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
     log = ULogMessages(path, frozenset(_TOPICS))
     used: dict[tuple[str, str], list[str]] = {}
     names = set()
-    with np.errstate(invalid="ignore"):  # by signalling NaN of damaged samples
+    with np.errstate(invalid="ignore"):  # damaged samples may contain signaling NaN
         for name, samples in log.blocks(moved):
             names.add(name.split("[")[0])
             _take(samples, contents, name, used)
@@ -58,7 +58,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
 
 
 def _take(samples: NDArray[Any], contents: LogContents, name: str, used: dict[tuple[str, str], list[str]]) -> None:
-    """Add samples of a topic to the contents; of outputs those that had a number first."""
+    """Add samples of a topic to the contents; of outputs, only those with a number in the first block that has any."""
     fields = set(samples.dtype.names or ())
     if "timestamp" not in fields:
         return

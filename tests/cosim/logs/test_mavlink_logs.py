@@ -14,7 +14,7 @@ from scipy import signal
 import cosim
 from cosim.errors import CosimError, ImportLogError
 from cosim.io.strict_json import json_text
-from cosim.logs.formats.dataflash import _Takers
+from cosim.logs.formats.dataflash import _MessageHandlers
 from cosim.logs.selection import select_topics
 from cosim.logs.vehicle_messages import VehicleMessages
 from cosim.results.log_facts import load_log_facts
@@ -263,12 +263,12 @@ def test_dataflash_parser_matches_pymavlink():
 @pytest.mark.medium
 def test_rates_of_a_controller_that_rests_are_no_samples(contents):
     """In MANUAL an ArduSub writes RATE on and on with the stamp of its last control step; other clocks go on."""
-    takers = _Takers(contents)
+    handlers = _MessageHandlers(contents)
     for k in range(100):
         at = 10_000_000 + 40_000 * k
-        takers.take("ATT", {"TimeUS": at, "Roll": 1.0, "Pitch": 0.0, "Yaw": 0.0})
-        takers.take("RATE", {"TimeUS": min(at, 11_000_000), "R": 1.0, "P": 0.0, "Y": 0.0})
-    assert not takers.clock.jumps
+        handlers.take("ATT", {"TimeUS": at, "Roll": 1.0, "Pitch": 0.0, "Yaw": 0.0})
+        handlers.take("RATE", {"TimeUS": min(at, 11_000_000), "R": 1.0, "P": 0.0, "Y": 0.0})
+    assert not handlers.clock.jumps
     assert contents.sources["rates", "RATE"].count == 26 and contents.sources["attitude", "ATT"].count == 100
 
 
@@ -300,9 +300,9 @@ def test_rates_are_stamped_where_the_gyro_filter_had_them(contents, tmp_path, au
 
 def test_visual_odometry_is_the_mean_velocity_of_its_interval(contents):
     """Fields as ArduPilot's structure VISO has them; the interval ends at the stamp."""
-    takers = _Takers(contents)
+    handlers = _MessageHandlers(contents)
     turned = {"AngDX": 0.0, "AngDY": 0.0, "AngDZ": 0.1}
-    takers.take("VISO", {"TimeUS": 2e6, "dt": 0.2, "PosDX": 0.1, "PosDY": -0.02, "PosDZ": 0.0, "conf": 90.0} | turned)
+    handlers.take("VISO", {"TimeUS": 2e6, "dt": 0.2, "PosDX": 0.1, "PosDY": -0.02, "PosDZ": 0.0, "conf": 90.0} | turned)
     source = contents.sources["dvl", "VISO"]
     assert source.count == 1
     assert next(source.blocks())[0, 1:] == pytest.approx([1.9, 0.5, -0.1, 0.0])
