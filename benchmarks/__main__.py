@@ -110,7 +110,7 @@ def _add_autopilot(verbs: Any) -> None:
     verb.add_argument(
         "--fault", nargs="+", choices=FAULTS, default=[""], help="what fails after 5 s", metavar="WHAT"
     )  # fmt: skip
-    verb.add_argument("--level-dive", type=float, default=0.6, metavar="M", help="as for cosim companion")
+    verb.add_argument("--level-dive", type=float, default=Task.level_dive, metavar="M", help="as for cosim companion")
     verb.add_argument("--parameter", nargs="+", default=[], metavar="NAME=VALUE", help="of ArduSub, beside the file's")
     verb.add_argument("--instance", type=int, default=0, help="of ArduSub, for its ports (default: %(default)s)")
     verb.add_argument("--json", type=Path, metavar="FILE", help="of flights; those that it has are not repeated")

@@ -59,7 +59,7 @@ class Task:
     steer_by: str = "sticks"  # output of the companion, one of `STEER_BY`
     sticks_by: str = "manual-control"  # message that carries the sticks, one of `STICKS_BY`
     fault: str = ""  # one of `FAULTS`, or empty
-    level_dive: float = 0.6  # m, depth of the dive after arming
+    level_dive: float = CompanionOptions.level_dive  # m, depth of the dive after arming
     parameters: tuple[str, ...] = ()  # NAME=VALUE of ArduSub, in addition to `PARAMETERS`
 
     @property

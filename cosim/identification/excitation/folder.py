@@ -22,6 +22,7 @@ from cosim.scenario.scenario import VEHICLE_COPY
 
 SCENARIO, COMMANDS, STICKS, PAGE = "excite.toml", "commands.jsonl", "sticks.csv", "excite.html"
 _AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+_GOLDEN = 0.618033988749895  # golden ratio less 1: its multiples modulo 1 cover 0 to 1 evenly
 _NORMAL = 1.96  # standard deviations: half of a 95 % interval
 _LEAST_KNOWN = 0.1  # ratio of expected to prior deviation, above which a number is called hardly identifiable
 
@@ -98,12 +99,13 @@ def _stick_lines(done: Design) -> Iterator[str]:
     yield f"0,return,{rest}"
     for k, segment in enumerate(done.segments):
         if k:
-            yield f"{time:.1f},return,{rest}"
+            yield f"{time:.3f},return,{rest}"
             time += RETURN
-        for sticks in segment.sticks:
-            yield f"{time:.1f},{segment.mode}," + ",".join(f"{x:.4g}" for x in sticks)
+        for i, sticks in enumerate(segment.sticks):
+            at = time + PERIOD * ((i * _GOLDEN) % 1.0 - 0.5)
+            yield f"{at:.3f},{segment.mode}," + ",".join(f"{x:.4g}" for x in sticks)
             time += PERIOD
-    yield f"{time:.1f},return,{rest}"
+    yield f"{time:.3f},return,{rest}"
 
 
 def _of_prior(done: Design) -> NDArray[np.float64]:
@@ -125,9 +127,11 @@ def _page(done: Design, out: Path) -> Page:
         f"cosim identify runs/{out.name} --vehicle {done.start} --out mine.toml"
     )
     page.paragraph(
-        f"{STICKS} holds the same for a pilot or a script: stick values from −1 to 1 at {1 / PERIOD:g} Hz, at full "
-        "pilot gain. manual, stabilize and depth_hold are ArduSub's MANUAL, STABILIZE and ALT_HOLD; return means back "
-        f"to the center of the box at {done.depth:g} m, by hand or by a mode that holds position.",
+        f"{STICKS} holds the same for a pilot or a script: stick values from −1 to 1 at full pilot gain, each until the "
+        f"time of the next, {PERIOD:g} s on average. The times are uneven on purpose: even ones could keep step with a "
+        "log at an even rate, which would then miss the same part of each change of thrust. manual, stabilize and "
+        "depth_hold are ArduSub's MANUAL, STABILIZE and ALT_HOLD; return means back to the center of the box at "
+        f"{done.depth:g} m, by hand or by a mode that holds position.",
         faint=True,
     )
     with tempfile.TemporaryDirectory(prefix="excite-") as scratch, mpl.rc_context(STYLE):

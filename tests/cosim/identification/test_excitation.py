@@ -128,6 +128,9 @@ def test_identification_recovers_the_plant_from_an_excitation_run(tmp_path, monk
         rows = list(csv.DictReader(file))
     times = [float(row["time_s"]) for row in rows]
     assert times == sorted(times) and {row["mode"] for row in rows} <= {"return", "manual", "stabilize", "depth_hold"}
+    changes = np.array([time for time, row in zip(times, rows, strict=True) if row["mode"] != "return"])
+    for rate in (2.0, 4.0, 5.0, 10.0, 20.0, 25.0, 50.0):  # Hz, of logs: no step with any
+        assert np.histogram(changes * rate % 1.0, 4, (0.0, 1.0))[0] == pytest.approx(len(changes) / 4, rel=0.1), rate
     log = [json.loads(line)["command"] for line in (pool / "commands.jsonl").read_text().splitlines()]
     wrenches = [command["wrench"] for command in log if command["command"] == "manual_control"]
     played = [[float(row[a]) for a in ("surge", "sway", "heave", "roll", "pitch", "yaw")]
