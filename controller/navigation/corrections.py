@@ -44,7 +44,7 @@ from controller.stack_array import zeros
 Array = NDArray[np.float64]
 
 _GATE = 4.0  # number of standard deviations of an innovation beyond which a sample is rejected
-_UNKNOWN = 10.0  # number of standard deviations beyond which a sample is nearer to the velocity than the estimate
+_UNKNOWN = 10.0  # standard deviation of the estimated velocity, in those of a sample, beyond which the sample is better
 _REJECTED_IN_A_ROW = 3  # number of successive rejected samples that is rare where one in fifty is an outlier
 CONFIRMED = 3.0  # number of accepted samples after which a sample that contradicts them is an outlier
 _RESETS = 4.0  # number of resets of the covariance without a confirmed sample in between before the filter starts again

@@ -56,9 +56,7 @@ from controller.regions.region_set import PackedRegions, clearance_at
 from controller.stack_array import zeros
 
 _STALE = 0.15  # s without a measurement after which the speed is reduced
-_TRUSTED_SPREAD = (
-    0.3  # m, position uncertainty (`SPREADS` deviations) above which the speed is reduced; 0 at twice that
-)
+_TRUSTED_SPREAD = 0.3  # m, `SPREADS` deviations of the position above which the speed is reduced; it is 0 at twice that
 _SEED = 1  # seed of the path planner's random numbers
 _ON_THE_WAY = 0.3  # m/s, desired speed from which soft regions do not push the vehicle back at all
 _SHALLOWEST = 1e-3  # m, lower bound of the depth in the goal region at which they push back in full again
