@@ -27,12 +27,12 @@ _NORTH, _EAST, _DOWN = np.eye(3)
 class StickStabilizer:
     """Computes a wrench from sticks: surge and sway command forces, the others angles and rates.
 
-    The model has the vehicle's mass and inertia, like a tuned autopilot, but no hydrodynamic damping or current.
+    It knows the vehicle's mass and inertia, with added mass, like a tuned autopilot, but no damping and no current.
 
     Parameters
     ----------
     vehicle : Vehicle
-        Vehicle whose mass and inertia the model has.
+        Vehicle, for its mass and inertia.
     state : VehicleState
         The state that the law receives; read at each step.
     period : float
