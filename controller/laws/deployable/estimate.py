@@ -63,8 +63,8 @@ class Estimate(NamedTuple):
     supposed: Array  # (2, m) hypothesis of a stuck thruster: its effectiveness; its force [N] at effectiveness 1
     missing: Array  # (m,) N, difference of a stuck thruster's force from the expected one
     direct: Array  # (2 m,) direct effect of the missing force on the last measured number
-    # (2, 2 m) of the last measurements for each hypothesis, divided by variances: innovations times expected
-    # deviations; expected deviations squared
+    # (2, 2 m) of the last measurements, divided by variances: innovations times those that each hypothesis expects;
+    # the expected ones squared
     evidence: Array
 
 

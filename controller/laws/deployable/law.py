@@ -81,9 +81,8 @@ def step(
     # estimate
     input_validation.process_measurement(memory, state, gains)
     write_rotation(memory.quaternion, R)
-    if (
-        estimate.time_since_measurement[0] < 0.0 or estimate.time_since_measurement[0] > gains.coast
-    ):  # the estimate is too old
+    # there is no estimate, or it is too old
+    if estimate.time_since_measurement[0] < 0.0 or estimate.time_since_measurement[0] > gains.coast:
         _hold_weight(memory, R, gains, forces)
         copy(forces, thrusters.forces)
         memory.report[15], memory.report[16] = estimate.time_since_measurement[0], NO_BOUND
