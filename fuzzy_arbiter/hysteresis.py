@@ -120,7 +120,7 @@ class HysteresisArbiter:
 
     @property
     def active(self) -> dict[str, bool]:
-        """True for each criterion whose latch is closed, by the input's name."""
+        """True for each criterion whose latch is closed, else False; by the input's name."""
         return dict(zip(self._names, self._closed, strict=True))
 
     def __call__(self, inputs: Sample, time: float | None = None) -> Result[float]:

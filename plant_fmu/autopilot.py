@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-MAX_CHANNELS = 32  # number of channels of MAVLink's longer servo packet
+MAX_CHANNELS = 32  # greatest number of channels, those of MAVLink's longer servo packet
 SHORTEST, LONGEST = 800, 2200  # us, least and greatest length of a pulse that a speed controller accepts
 
 Curve = Callable[[float], float]  # from a servo output [us] to a part of the greatest force, -1 to 1; or the inverse

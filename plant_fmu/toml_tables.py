@@ -22,7 +22,7 @@ MAX_FILE = 4_000_000  # greatest number of bytes of a file; the longest in the p
 MAX_DEPTH = 20  # greatest number of levels of nested tables and lists
 MAX_DIGITS = 400  # greatest number of digits of a whole number, more than any float has
 
-_LONGEST_NAME = 100  # number of characters that are compared with known names
+_LONGEST_NAME = 100  # greatest number of characters of a name that are compared with known names
 
 _LISTED = 30  # greatest number of names that a message lists
 

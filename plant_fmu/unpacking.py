@@ -21,7 +21,7 @@ MAX_SIZE = 2**30  # greatest number of bytes of an FMU's files together
 MAX_FILES = 100_000  # greatest number of files of an FMU
 MAX_RATIO = 200  # greatest ratio of those bytes to the FMU's own: libraries and descriptions compress to about a tenth
 FREE_SIZE = 2**26  # number of bytes below which that ratio does not matter
-MAX_READ = 2**24  # greatest number of bytes that are read at once, as is the list of the files before any check
+MAX_READ = 2**24  # greatest number of bytes that are read at once; so the list of files is read, before any check
 MAX_NAME = 1000  # greatest number of characters of a file's name
 MAX_XML = 2**26  # greatest number of bytes of a description
 MAX_ELEMENTS = 2_000_000  # greatest number of elements of a description
@@ -93,7 +93,8 @@ def unpack(path: Path, folder: Path, platforms: Collection[str]) -> ET.Element:
     Raises
     ------
     FmuFileError
-        If the file is unsafe to extract, or a description is invalid, as in `open_fmu` and `read_descriptions`.
+        If the file cannot be read or is unsafe to extract, or a description is invalid, as in `open_fmu` and
+        `read_descriptions`.
     """
     with open_fmu(path) as archive:
         root = read_descriptions(path, archive)

@@ -44,7 +44,7 @@ from controller.stack_array import zeros
 Array = NDArray[np.float64]
 
 _GATE = 4.0  # number of standard deviations of an innovation beyond which a sample is rejected
-_UNKNOWN = 10.0  # number of standard deviations beyond which a sample is nearer to the velocity than the estimate
+_UNKNOWN = 10.0  # ratio of the velocity's deviation to a sample's above which the sample is nearer to the truth
 _REJECTED_IN_A_ROW = 3  # number of successive rejected samples that is rare where one in fifty is an outlier
 CONFIRMED = 3.0  # number of accepted samples after which a sample that contradicts them is an outlier
 _RESETS = 4.0  # number of resets of the covariance without a confirmed sample in between before the filter starts again
@@ -131,9 +131,8 @@ def _predict_sample(
         for k in range(3):
             unknown = max(unknown, memory.covariance[VELOCITY + k, VELOCITY + k])
             seen[k] = velocity[k]
-        if unknown > square(
-            _UNKNOWN * noise
-        ):  # an error of attitude acts on the true velocity, to which the sample is nearer
+        # an error of attitude acts on the true velocity, to which the sample is nearer
+        if unknown > square(_UNKNOWN * noise):
             for k in range(3):
                 seen[k] = 0.0
                 for i in range(3):

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 DEPTH_SENSOR, DVL, IMU, COMPASS, USBL, N_SENSORS = 0, 1, 2, 3, 4, 5  # indices in `Measurements.times`
 SENSORS = ("depth_sensor", "dvl", "imu", "compass", "usbl")
 
-# index of the first value of each sensor in `Measurements.values`
+# index of the first value of each quantity in `Measurements.values`
 DEPTH, VELOCITY, ALTITUDE, ACCELERATION, ANGULAR_VELOCITY, HEADING, POSITION, N_VALUES = 0, 1, 4, 5, 8, 11, 12, 15
 VALUES = (
     "depth", "velocity.u", "velocity.v", "velocity.w", "altitude", "acceleration.x", "acceleration.y", "acceleration.z",

@@ -45,10 +45,7 @@ Array = NDArray[np.float64]
 
 _NEVER = -1e11  # s, time before any sample
 _UNEXPLAINED = 4.0  # number of standard deviations of a fix beyond which two fixes differ by more than noise
-_FIX_DEVIATIONS, _FIX_DISTANCE = (
-    6.0,
-    0.5,
-)  # number of standard deviations, and distance [m], within which two fixes agree
+_FIX_DEVIATIONS, _FIX_DISTANCE = 6.0, 0.5  # number of standard deviations, plus m, within which two fixes agree
 _MAX_GAP = 1.0  # s between two IMU samples, beyond which the filter starts again
 _FAR = 3.0  # m, standard deviation of a coordinate beyond which it counts as unknown
 _FAST = 0.5  # m/s, standard deviation of a velocity beyond which it counts as unknown

@@ -16,7 +16,7 @@ from controller.stack_array import zeros
 
 TOUCHING = 1e-4  # m, clearance at which a ray has met a surface
 MAX_STEPS = 64  # greatest number of steps along a ray, for each region
-_PARALLEL = 1e-100  # component of a direction that counts as 0: its square, or a division by it, leaves the range
+_PARALLEL = 1e-100  # component of a direction that counts as 0: squared, or as a divisor, it may leave float64's range
 
 _ELLIPSOID = Ellipsoid.kind
 _PIPE = Pipe.kind

@@ -27,7 +27,7 @@ from plant_fmu.toml_tables import hint
 LAW, WHOLE = "deployable", "whole"
 NUMBERS = "ablation.json"
 PAGE = "ablation.html"
-_ZERO = 1e-9  # value of a bound that must be above 0, which disables the estimate
+_ZERO = 1e-9  # bound that holds an estimate at about 0; a gain of 0 is refused
 
 
 class Variant(NamedTuple):

@@ -178,7 +178,7 @@ def _criteria(run: Run) -> Table | None:
         rows.append((*row, *([costs.get(criterion.name, "–")] if costs else [])))
     head = ["By priority", "Asks", "Led for [s]", "From and to [s]"]
     widths = [0.9, 1.6, 0.7, 2.2]
-    if costs:  # cost of a metre in its soft regions, half a metre deep, which decides the side of the path
+    if costs:  # of a metre of path half a metre deep in its soft regions: they decide which way round the path goes
         head, widths = [*head, "Path's cost of a metre [m]"], [*widths, 0.8]
     return Table("Criteria", tuple(head), tuple(rows), tuple(widths))
 

@@ -11,9 +11,8 @@ from cosim.scenario.tables import Failure
 from cosim.simulation.signals import Array, Signals
 from cosim.simulation.stepped_plant import SteppedPlant
 
-MAX_WRENCH = (
-    1e5  # N, N m: bound of the wrench in runs with commands, where a far target makes some laws ask for any force
-)
+# N, N m: bound of the wrench in runs with commands, where a far target makes some laws ask for any force
+MAX_WRENCH = 1e5
 
 
 class Actuators:

@@ -62,7 +62,7 @@ def make_sensing(
     Parameters
     ----------
     scenario : Scenario
-        Scenario with the key `sensing`.
+        Scenario, whose `sensing` says how the state is measured.
     plant : SteppedPlant
         Plant with the sensors.
     signals : Signals

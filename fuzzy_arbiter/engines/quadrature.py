@@ -23,8 +23,8 @@ from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
 BOUND = 1e-9  # bound of a centroid's error, as a fraction of the universe's width
 _TOLERANCE = 1e-13  # tolerance of each part, as a fraction of the area
 _NODES, _WEIGHTS = (x.reshape(-1, 1) for x in np.polynomial.legendre.leggauss(16))
-_SCAN = 16  # number of places in each smooth part of the terms, between which bends are searched
-_BESIDE = 1e-9  # distance of the first and the last of these places from the part's ends, as a fraction of its width
+_SCAN = 16  # number of intervals in each smooth part of the terms, in which bends are searched
+_BESIDE = 1e-9  # distance of the first and the last interval from the part's ends, as a fraction of its width
 _HALVINGS = 45  # greatest number of halvings of a part
 _MAX_PARTS = 20_000  # greatest number of parts
 # a slot meets its cut; it and its cut sum to 1; it and those before it sum to 1; it passes those before it

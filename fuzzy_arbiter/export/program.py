@@ -361,7 +361,7 @@ def _swept(engine: Engine) -> Iterator[Statement]:
         scales = any(slot.implication == "prod" for slot in engine.firing.slots[k - 1])
         fired = _valued(output, k, cuts, system) if output.weighted else (Sweep(f"y{k}", k, tuple(cuts), scales),)
         yield Choose(((any_fires, fired), ("", (default,))))
-        if output.weighted:  # the value may be NaN
+        if output.weighted:  # the value may be NaN or infinite
             yield Choose(((f"not (fabs(y{k}) < INFINITY)", (default,)),))
         if output.lock_range:
             low, high = output.universe

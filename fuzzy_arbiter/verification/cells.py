@@ -54,7 +54,7 @@ class Stretch:
     start, end : float
         Ends of the stretch.
     start_in, end_in : bool
-        True if the end belongs to the stretch.
+        True if this end belongs to the stretch.
     least, greatest : float
         Bounds of the sum in it, reached or approached.
     """

@@ -31,7 +31,7 @@ from fuzzy_arbiter.verification.report import Check, Finding, Row, Severity, Ver
 from fuzzy_arbiter.verification.rules import labels, redundant, unused
 from fuzzy_arbiter.verification.search import Answer, Goal
 
-EFFORT = 4_000_000_000  # number of statements, some seconds; forty prioritised criteria need 1/500 of it
+EFFORT = 4_000_000_000  # greatest number of statements, some seconds; forty prioritised criteria need 1/500 of it
 MAX_ROWS = 256
 NAMED_ROWS = 8
 _ALL = "for all real inputs"

@@ -77,7 +77,7 @@ class Verification:
     """The properties of a system that follow from its definition alone.
 
     Crisp rows are all combinations of terms, each taken as a label. Graded inputs are all real numbers in the
-    universes; what is said of them holds in real arithmetic.
+    universes; what is said of them holds in real arithmetic. A property that is not decided is None.
 
     Attributes
     ----------
@@ -142,7 +142,10 @@ class Verification:
 
     @property
     def ok(self) -> bool:
-        """True if all checks were decided and none found a fault."""
+        """True if there is no fault, and the checks that find faults are decided.
+
+        These are `complete`, `consistent` and `graded_complete`.
+        """
         decided = (self.complete, self.consistent, self.graded_complete)
         return None not in decided and all(finding.severity != "fault" for finding in self.findings)
 

@@ -1,4 +1,4 @@
-"""WebAssembly: a component of fmi-ls-wasm, or a module with FMI's functions that any host can call."""
+"""WebAssembly: a component by the draft fmi-ls-wasm, or a module with FMI's functions that any host can call."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from plant_fmu.importers.registry import Importer
 from plant_fmu.importers.task import Result, Task
 from plant_fmu.installing import install_hint
 
-TIMEOUT = 120.0  # s, time limit of a driver
+TIMEOUT = 120.0  # s, time limit of a task in an importer
 
 _TAIL = 4096  # number of bytes at the end of the output that are searched for the error
 _NOISE = "Start attribute is required"  # FMI Library, inside libcosim, reports this for any independent variable
@@ -78,7 +78,7 @@ def run_importer(importer: Importer, fmu: FmuFile, task: Task, timeout: float = 
 
 def _run_child(folder: Path, timeout: float) -> tuple[int | None, str]:
     """Run the driver; return its exit code, None after a timeout, and the last line of its error output."""
-    home = str(Path(__file__).parents[2])  # folder of this package, which may not be installed
+    home = str(Path(__file__).parents[2])  # folder that holds this package, which need not be installed
     paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
     with open(folder / "said.txt", "wb") as sink:
         try:

@@ -41,7 +41,7 @@ class Attitude(NamedTuple):
     last_omega: Array  # (3,) rad/s, body rates of the last step
     by_current: Array  # (3, 2) N s, derivative of the modelled moment by the current, north and east
     measured_moment: Array  # (3,) N m, body axes: moment of thrusters and weight over the last period
-    started: Array  # (1,) 1 once `last_omega` is measured, 0 before
+    started: Array  # (1,) 1 if `last_omega` was measured in the last step, else 0
 
 
 def empty_attitude(preferred: Array) -> Attitude:
@@ -62,7 +62,7 @@ def measure_moment(
     Parameters
     ----------
     attitude : Attitude
-        State of the loop; `measured_moment` and `by_current` are updated.
+        State of the loop; all but the two attitudes is updated.
     dynamics : Dynamics
         Dynamics of the vehicle.
     R : ndarray, shape (3, 3)
@@ -77,7 +77,7 @@ def measure_moment(
     Returns
     -------
     bool
-        True if the moment is measured; False until the rates were measured twice.
+        True if `measured_moment` is valid; False if the rates were not measured in the last step.
     """
     started = bool(attitude.started[0] > 0.0)
     mean, water, known, other, rate = zeros(3), zeros(3), zeros(6), zeros(6), zeros(6)

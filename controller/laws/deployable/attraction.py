@@ -14,7 +14,7 @@ from controller.stack_array import zeros
 Array = NDArray[np.float64]
 
 _AHEAD = 0.4  # m, lookahead distance along the path
-_SLOWEST_CORNER = 0.25  # speed at a corner of 180 degrees, as a fraction of the full speed
+_SLOWEST_CORNER = 0.25  # speed at corners of 120 degrees and more, as a fraction of the full speed
 
 
 def approach_speed(distance: float, deceleration: float, slope: float) -> float:

@@ -63,7 +63,7 @@ class RegionObservation(NamedTuple):
     later_rotation_gradients: Array  # (n, 3)
     later_clearances: Array  # (n,)
     bound: Array  # (1,) m: lower bound of the clearances by `write_rows`, if no barrier yields
-    asked: Array  # (n,) m/s2, rad/s2: right side of each region's barrier in the last step
+    asked: Array  # (n,) m/s2, rad/s2: last right side of the barrier of each region's nearest face
 
 
 class Motion(NamedTuple):

@@ -12,7 +12,7 @@ from controller.linear_algebra import copy
 
 Array = NDArray[np.float64]
 
-NO_BOUND = -1e6  # m, reported bound without an estimate
+NO_BOUND = -1e6  # m, reported bound without an estimate, or without barriers
 
 DIAGNOSTICS = (
     Diagnostic("position.x", "m", "Estimated position, north"),

@@ -18,14 +18,12 @@ Array = NDArray[np.float64]
 # index of the first state of each kind
 POSITION, VELOCITY, CURRENT, NET_WEIGHT, MOMENTS, HEIGHT, LAG, EFFECTIVENESS = 0, 3, 6, 8, 9, 12, 13, 14
 
-_LIGHT = 50.0  # kg, mass above which deviations, drifts and bounds of W - B grow with the mass
+_LIGHT = 50.0  # kg, mass above which deviation, drift and bound of W - B, and the bound of moments, grow with the mass
 _FIRST_VELOCITY = 0.3  # m/s, initial standard deviation of an unmeasured velocity
 _FIRST_CURRENT, _FIRST_RESTORING = 0.3, 15.0  # m/s, N: initial standard deviations of current and W - B
 _GRAVITY = 9.81  # m/s2
-_FIRST_HEIGHT, _FIRST_ARM = (
-    0.05,
-    0.15,
-)  # m, initial standard deviations: center of gravity; arm of the restoring moments
+# m, initial standard deviations: height of the center of gravity; lever arm of the weight in the restoring moments
+_FIRST_HEIGHT, _FIRST_ARM = 0.05, 0.15
 _FIRST_EFFECTIVENESS, _FIRST_COMMON = 0.12, 0.12  # initial standard deviations: of each thruster alone; common to all
 _FIRST_LAG = 0.3  # s, initial lag and its standard deviation if the vehicle's own is 0
 _KNOWN_LAG = 1e-6  # s, standard deviation of a lag that is not estimated
@@ -53,10 +51,8 @@ class Estimate(NamedTuple):
     weight: Array  # (1,) weight of positions and velocities as evidence of failures: below 1 for lasting errors
     last_measured: Array  # (6,) last measured position [m, NED] and velocity [m/s, body axes]
     mass_scale: Array  # (1,) mass over 50 kg, at least 1: a heavier vehicle's W - B is less well known
-    lags: (
-        Array  # (3,) s: estimated lag less a standard deviation; estimated lag; estimated lag plus a standard deviation
-    )
-    bracket: Array  # (2, m) N, acting forces for the least and the greatest of `lags`
+    lags: Array  # (3,) s: estimated lag less a standard deviation, at least 0; the lag itself; the lag plus one
+    bracket: Array  # (2, m) N, forces at the end of the period, for the least and the greatest of `lags`
     by_lag: Array  # (m,) N/s, secant of the acting forces between the least and the greatest of `lags`
     curvature: Array  # (m,) N, difference of the acting forces from that secant
     transition: Array  # (3, 14 + m) derivative of the next velocity by the state
@@ -67,8 +63,8 @@ class Estimate(NamedTuple):
     supposed: Array  # (2, m) hypothesis of a stuck thruster: its effectiveness; its force [N] at effectiveness 1
     missing: Array  # (m,) N, difference of a stuck thruster's force from the expected one
     direct: Array  # (2 m,) direct effect of the missing force on the last measured number
-    # (2, 2 m) of the last measurements for each hypothesis, divided by variances: innovations times expected
-    # deviations; expected deviations squared
+    # (2, 2 m) of the last measurements, divided by variances: innovations times those that each hypothesis expects;
+    # the expected ones squared
     evidence: Array
 
 

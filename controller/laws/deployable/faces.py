@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 _SMOOTH = (Sphere.kind, Ellipsoid.kind)  # kinds whose clearance has no kink outside
 _HALF_SPACE = HalfSpace.kind
 FACES = 2  # greatest number of faces besides the nearest that have barriers
-_LINE_SAMPLES = 16  # greatest number of evaluations along a line
+_LINE_SAMPLES = 16  # a stride along a line, which ends with an evaluation, is at least the line's length over this
 _HALVINGS = 6  # bisections of the interval in which the line leaves the region
 
 

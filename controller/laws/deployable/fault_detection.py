@@ -47,7 +47,8 @@ class FaultState(NamedTuple):
 
     ratio: Array  # (2 m,) summed log-likelihood ratio: thruster j is lost; m + j: is stuck
     sums: Array  # (2, 2 m) sums of `Estimate.evidence` since the supposed time of the failure
-    tentative: NDArray[np.int64]  # (m,) 0 not isolated, 1 isolated tentatively, above 1 isolated for good
+    # (m,) isolations of each thruster, one by a wide lead counted twice: at 1, it is used again if another is isolated
+    tentative: NDArray[np.int64]
     trials: NDArray[np.int64]  # (m,) number of trials of each thruster after an isolation
     waited: Array  # (1,) s since the last isolation or trial
 
@@ -128,7 +129,7 @@ def try_again(
     Parameters
     ----------
     fault_state, estimate, thrusters : FaultState, Estimate, Thrusters
-        Hypotheses, estimate and thrusters, updated in place if a thruster is tried.
+        Hypotheses, estimate and thrusters, updated in place.
     reported : ndarray, shape (m,)
         Reported health of the thrusters: 0 failed, 1 working. A thruster that is reported as failed is not tried.
     quiet : bool

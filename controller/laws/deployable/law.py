@@ -56,9 +56,7 @@ from controller.regions.region_set import PackedRegions, clearance_at
 from controller.stack_array import zeros
 
 _STALE = 0.15  # s without a measurement after which the speed is reduced
-_TRUSTED_SPREAD = (
-    0.3  # m, position uncertainty (`SPREADS` deviations) above which the speed is reduced; 0 at twice that
-)
+_TRUSTED_SPREAD = 0.3  # m, `SPREADS` deviations of the position above which the speed is reduced; it is 0 at twice that
 _SEED = 1  # seed of the path planner's random numbers
 _ON_THE_WAY = 0.3  # m/s, desired speed from which soft regions do not push the vehicle back at all
 _SHALLOWEST = 1e-3  # m, lower bound of the depth in the goal region at which they push back in full again
@@ -83,9 +81,8 @@ def step(
     # estimate
     input_validation.process_measurement(memory, state, gains)
     write_rotation(memory.quaternion, R)
-    if (
-        estimate.time_since_measurement[0] < 0.0 or estimate.time_since_measurement[0] > gains.coast
-    ):  # the estimate is too old
+    # there is no estimate, or it is too old
+    if estimate.time_since_measurement[0] < 0.0 or estimate.time_since_measurement[0] > gains.coast:
         _hold_weight(memory, R, gains, forces)
         copy(forces, thrusters.forces)
         memory.report[15], memory.report[16] = estimate.time_since_measurement[0], NO_BOUND

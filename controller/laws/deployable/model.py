@@ -29,16 +29,20 @@ class Dynamics(NamedTuple):
 
 
 class Thrusters(NamedTuple):
-    """Thrusters and their allocation; a failed thruster has a column of zeros and limits of zero."""
+    """Thrusters and their allocation.
+
+    A failed thruster has a column of zeros and limits of zero; a stuck one keeps its column, and its limits are its
+    force.
+    """
 
     nominal_matrix: Array  # (6, m) thruster matrix of the vehicle
-    matrix: Array  # (6, m) thruster matrix with the columns of failed thrusters zero
+    matrix: Array  # (6, m) thruster matrix with the columns of failed thrusters zero, unless they are stuck
     lower: Array  # (m,) N, present lower limits
     upper: Array  # (m,) N, present upper limits
     nominal_lower: Array  # (m,) N, lower limits of the vehicle
     nominal_upper: Array  # (m,) N, upper limits of the vehicle
     inverse: Array  # (m, m) H^-1 with H = B^T Q B + regularisation
-    allocator: Array  # (m, 6) H^-1 B^T Q: maps a wrench to the forces nearest to it
+    allocator: Array  # (m, 6) H^-1 B^T Q: maps a wrench to its least-squares forces
     metric: Array  # (6,) 1/N2, 1/(N m)2: Q, cost of an error of the wrench
     health: Array  # (m,) 1 working, 0 failed
     stuck: Array  # (m,) N, constant force of a stuck thruster; NaN for all others

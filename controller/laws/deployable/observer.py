@@ -194,9 +194,8 @@ def correct_by_moment(
         expected = row[MOMENTS + a] * x[MOMENTS + a] + row[MOMENTS + b] * x[MOMENTS + b] + row[HEIGHT] * x[HEIGHT]
         row[CURRENT], row[CURRENT + 1] = by_current[i, 0], by_current[i, 1]
         variance = square(_ANGULAR * dynamics.mass[3 + i, 3 + i]) / period
-        variance += 2.0 * square(
-            rate_deviation[i] * dynamics.mass[3 + i, 3 + i] / period
-        )  # variance of the difference of two rates
+        # of the difference of two rates
+        variance += 2.0 * square(rate_deviation[i] * dynamics.mass[3 + i, 3 + i] / period)
         m = thrusters.acting.size
         for j in range(m):
             estimate.direct[m + j] = thrusters.matrix[3 + i, j] * estimate.missing[j]

@@ -35,7 +35,7 @@ class Shares:
 
     def __init__(self, shares: Point, rest: np.random.Generator, limit: float = np.inf) -> None:
         self._shares, self._rest, self._limit = shares, rest, limit
-        self.drawn = 0  # number of numbers drawn so far
+        self.drawn = 0  # count of numbers drawn so far
 
     def uniform(self, low: Any = 0.0, high: Any = 1.0, size: int | None = None) -> Any:
         """Draw uniformly between two bounds, or two lists of bounds; or `size` numbers."""

@@ -12,7 +12,7 @@ from cosim.campaigns.store.results import Results
 from cosim.report.figures.style import BLACK, BLUE, GREEN, ORANGE, RED
 
 _MOST = 1500  # greatest number of scenes that are drawn
-_NEVER = 1.12  # position of missing numbers, as a multiple of the range of the numbers
+_NEVER = 1.12  # distance of missing numbers from the least number, as a multiple of the range of the numbers
 
 
 def side_by_side(one: str, results: Results, other: str, others: Results, columns: Sequence[tuple[str, str]]) -> Figure:

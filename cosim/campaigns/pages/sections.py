@@ -51,7 +51,7 @@ def rates_table(page: Page, unit: str, groups: Sequence[Group], facts: Sequence[
     Parameters
     ----------
     page : Page
-        Page to which the section is added.
+        Page to which the table is added.
     unit : str
         Word for rows in the plural, such as ``"scenes"``.
     groups : sequence of Group
@@ -71,7 +71,7 @@ def quantiles_table(page: Page, groups: Sequence[Group]) -> None:
     Parameters
     ----------
     page : Page
-        Page to which the section is added.
+        Page to which the table is added.
     groups : sequence of Group
         Groups with quantiles of the same columns.
     """
@@ -162,9 +162,9 @@ def basis(page: Page, summary: Mapping[str, Any]) -> None:
     Parameters
     ----------
     page : Page
-        Page to which the section is added.
+        Page to which the versions are added.
     summary : mapping from str to object
-        Summary of a campaign, sweep or comparison.
+        Summary of a campaign, sweep or search, or the numbers of an ablation.
     """
     versions = ", ".join(f"{name} {version}" for name, version in summary["versions"].items())
     page.paragraph(f"Code {summary['code_sha256'][:12]}…; {versions}.", faint=True)

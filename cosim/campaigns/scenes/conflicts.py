@@ -19,14 +19,11 @@ Generator = np.random.Generator
 Table = dict[str, Any]
 Kinds = dict[str, Callable[[Generator], tuple[Table, list[Table]]]]
 
-_LAGS = {
-    "odin": 0.0,
-    "bluerov2_heavy": 0.15,
-    "rexrov": None,
-}  # s, lag of the thrusters; None: that of the vehicle's file
+# s, lag of each vehicle's thrusters; None: that of its file
+_LAGS = {"odin": 0.0, "bluerov2_heavy": 0.15, "rexrov": None}
 _PRIORITY = 4.0  # ratio of priorities of successive criteria
-_NET_WEIGHT = 50.0  # N, greatest net weight
-_MOST_OF_WEIGHT = 0.025  # greatest net weight of a heavy vehicle, as a fraction of its weight
+_NET_WEIGHT = 50.0  # N, greatest magnitude of the net weight of a light vehicle
+_MOST_OF_WEIGHT = 0.025  # greatest magnitude as a fraction of the weight, where that is more: of a heavy vehicle
 _CURRENT = 0.4  # m/s, greatest speed of the current
 _CRITERIA = ("obstacle", "shape", "depth", "visibility")
 

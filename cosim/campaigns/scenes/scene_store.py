@@ -57,7 +57,7 @@ class SceneStore:
             raise
 
     def _read(self, file: IO[bytes], name: str) -> None:
-        self._places: dict[int, tuple[int, int]] = {}  # offset and length of each scene's line by seed [bytes]
+        self._places: dict[int, tuple[int, int]] = {}  # offset and length [bytes] of each scene's line, by seed
         digest, offset = hashlib.sha256(), 0
         for scene in scenes_in(file, name):
             if scene.seed in self._places:

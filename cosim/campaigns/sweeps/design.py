@@ -287,7 +287,7 @@ def vary_from(texts: Sequence[str]) -> tuple[Vary, ...]:
 
 
 def vary_vehicles(path: Path) -> tuple[Vary, ...]:
-    """Read the parameters that vary between vehicles from a file of ``cosim identify``.
+    """Read the parameters that vary between vehicles from a file that ``cosim identify`` has written.
 
     Parameters
     ----------

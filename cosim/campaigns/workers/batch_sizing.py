@@ -11,7 +11,7 @@ from cosim.campaigns.workers.work import Rows
 
 FIRST = 1  # number of rows of the first batch, before the time of a row is known
 TARGET = 1.0  # s, desired time of a batch; one process submits and writes all batches, for any number of workers
-LEAST = 0.05  # s, time of the last batches, which are small so that all workers end together
+LEAST = 0.05  # s, least time of a batch; the last ones are small, so that all workers end together
 GROWTH = 4  # greatest ratio of a batch's size to the one before: the time of first batches includes compiling
 EVEN = 16  # batches with more rows are a multiple of this, for engines that fly rows in parallel lanes
 GREATEST = 65536  # greatest number of rows of a batch

@@ -26,8 +26,8 @@ def rests_from(record: Rows) -> float | None:
     Returns
     -------
     float or None
-        Time, a little later for a margin; None if the vehicle moves in the last third of the run, or a pose is
-        missing.
+        Time, a little later for a margin; None if the vehicle never moves, if it moves in the last third of the run, or
+        if a pose is missing.
     """
     time = record["time"]
     places = record.stack([f"position.{axis}" for axis in "xyz"])

@@ -14,9 +14,8 @@ from plant_fmu import Vehicle
 
 _CENTERED = 0.02  # fraction of full stick below which it counts as released
 GREATEST_TILT = math.radians(30.0)  # rad, desired roll or pitch at full stick
-YAW_RATE = math.radians(
-    202.5
-)  # rad/s of a full stick at a pilot gain of 1, as ArduSub has it: 45 deg/s by ACRO_YAW_P of 4.5
+# rad/s of a full stick at a pilot gain of 1, as ArduSub has it: 45 deg/s by ACRO_YAW_P of 4.5
+YAW_RATE = math.radians(202.5)
 CLIMB_RATE = 0.3  # m/s, vertical speed at full stick
 _FARTHEST = math.radians(20.0), 0.3  # rad, m: bounds by which desired heading and depth may lead the vehicle's
 _ATTITUDE, _DEPTH = 5.0, 1.5  # rad/s, frequencies of both loops; an ArduSub's loop of angles has 6 1/s
@@ -27,12 +26,12 @@ _NORTH, _EAST, _DOWN = np.eye(3)
 class StickStabilizer:
     """Computes a wrench from sticks: surge and sway command forces, the others angles and rates.
 
-    The model has the vehicle's mass and inertia, like a tuned autopilot, but no hydrodynamic damping or current.
+    It knows the vehicle's mass and inertia, with added mass, like a tuned autopilot, but no damping and no current.
 
     Parameters
     ----------
     vehicle : Vehicle
-        Vehicle whose mass and inertia the model has.
+        Vehicle, for its mass and inertia.
     state : VehicleState
         The state that the law receives; read at each step.
     period : float

@@ -36,11 +36,11 @@ CORNERS = 8  # greatest number of corners of a path
 _BETTER = 0.03  # m, constant part of the cost that a candidate must save to replace the path
 _BETTER_PART = 0.01  # proportional part of that, as a fraction of the path's cost
 _BLOCKED = 0.3  # cost by regions, as a fraction of the path's length, above which the trees search for another path
-_HARD, _ALL, _COSTLY = 0, 1, 2  # regions closed to the search: hard ones alone; and all soft ones; and costlier ones
+_HARD, _ALL, _COSTLY = 0, 1, 2  # regions closed to the search: hard ones; all; hard ones and the costlier soft ones
 _SEARCH_CALLS = (100, 800)  # calls of the search with one choice of closed regions: at first; greatest number
 _PASSED = 0.25  # m, distance from a corner within which it counts as passed
 _CLIMBS = 12  # greatest number of steps from a point into the goal region
-_PAYS = 0.05  # least gain in depth per metre of such a step; a step along the gradient gains 1
+_PAYS = 0.05  # least gain in depth per metre of such a step; it gains 1 where the gradient does not turn
 _DEEP_ENOUGH = 1e-3  # m, tolerance of the depth of an end
 _BEGIN, _PATH, _CANDIDATE = 0, 1, 2  # phases: no evaluation under way; the path is evaluated; the candidate is
 _USED = -1  # value of `counts[2]` while the found path is the candidate
@@ -58,7 +58,7 @@ class PathPlan(NamedTuple):
     new_cost: PathCost  # evaluation under way, of path or candidate
     search: Search
     closed: NDArray[np.bool_]  # (n,) True for regions that the search keeps out of
-    turn: NDArray[np.int64]  # (3,) closed regions: `_HARD`, `_ALL` or `_COSTLY`; calls left with them; calls in total
+    turn: NDArray[np.int64]  # (3,) closed regions: `_HARD`, `_ALL` or `_COSTLY`; calls left with them; calls for each
     random_numbers: Array  # (5,) numbers in [0, 1) for one call of the search
     phase: NDArray[np.int64]  # (1,) `_BEGIN`, `_PATH` or `_CANDIDATE`
     random: NDArray[np.uint64]  # (1,) state of the generator
