@@ -183,7 +183,7 @@ class Companion:
         report : bool
             True to write report and figures too.
         on_state : callable, optional
-            Function that is called with each new state and the text of the conditions it waits for.
+            Function of the state and the text of the conditions it waits for; called when either changes.
         live : LiveView, optional
             View that shows the flight, from before steering begins; it accepts no commands.
 
