@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 MARGINS = (0.1, 0.2)  # s, begin and end of a window without samples, if delays are estimated
 
 _SHORTEST = 0.6  # fraction of a full window, below which the rest of a run is dropped
-_SETTLED = 1.0  # s, time from a run's first command to its first window: lagged forces have then settled
+_SETTLED = 1.0  # s, from a run's first command to its first window: the commands then determine lagged forces
 _MOST_GAP = 1.0  # s, longest gap in the commands; samples of velocity, position and attitude may pause 0.5 s longer
 _FASTEST = 3.0  # rad/s, greatest angular velocity about a body axis
 _STEEPEST = math.radians(80.0)  # rad, greatest pitch

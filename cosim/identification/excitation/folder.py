@@ -127,10 +127,10 @@ def _page(done: Design, out: Path) -> Page:
         f"cosim identify runs/{out.name} --vehicle {done.start} --out mine.toml"
     )
     page.paragraph(
-        f"{STICKS} holds the same for a pilot or a script: stick values from −1 to 1 at full pilot gain, each until the "
-        f"time of the next, {PERIOD:g} s on average. The times are uneven on purpose: even ones could keep step with a "
-        "log at an even rate, which would then miss the same part of each change of thrust. manual, stabilize and "
-        "depth_hold are ArduSub's MANUAL, STABILIZE and ALT_HOLD; return means back to the center of the box at "
+        f"{STICKS} holds the same for a pilot or a script: stick values from −1 to 1 at full pilot gain, each until "
+        f"the time of the next, {PERIOD:g} s on average. The times are uneven on purpose: even ones could keep step "
+        "with a log at an even rate, which would then miss the same part of each change of thrust. manual, stabilize "
+        "and depth_hold are ArduSub's MANUAL, STABILIZE and ALT_HOLD; return means back to the center of the box at "
         f"{done.depth:g} m, by hand or by a mode that holds position.",
         faint=True,
     )
