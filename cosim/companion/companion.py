@@ -195,7 +195,7 @@ class Companion:
         Raises
         ------
         RunError
-            If steering cannot begin in time, or the folder cannot be written.
+            If steering cannot begin in time, the autopilot would ignore the sticks, or the folder cannot be written.
         BuildError, LawError, DefinitionError
             If law or arbiter cannot be set up.
         KeyboardInterrupt
