@@ -43,7 +43,7 @@ class Topic:
     late: int = 0  # number of removed samples out of order
     broken: int = 0  # number of omitted samples with a number that is not finite
     gap_count: int = 0
-    gaps: list[tuple[float, float]] = field(default_factory=list)  # s, begin and end of the longest gaps
+    gaps: list[tuple[float, float]] = field(default_factory=list)  # s, start and end of the longest gaps
 
     @property
     def longest(self) -> float:

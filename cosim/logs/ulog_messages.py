@@ -49,7 +49,7 @@ class _Topic:
 
 
 class ULogMessages:
-    """Read a ULog file from begin to end.
+    """Read a ULog file from start to end.
 
     Parameters
     ----------
