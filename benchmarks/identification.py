@@ -108,7 +108,10 @@ class Disturbed:
 
 
 def random_force(steps: int, rng: np.random.Generator) -> Array:
-    """Draw a force of 0.2 to 0.5 N along each axis that changes within 5 to 10 s, shape (steps, 6) [N, N m]."""
+    """Draw a random force along the body axes as a wrench of each step, shape (steps, 6) [N, N m].
+
+    Its standard deviation is 0.2 to 0.5 N, its correlation time 5 to 10 s.
+    """
     found = np.zeros((steps, 6))
     keep = np.exp(-ROW / rng.uniform(5.0, 10.0))
     size = rng.uniform(0.2, 0.5)
@@ -164,7 +167,7 @@ def fly(scenario: Scenario, commands: Any, nuisance: str, noise: float, rng: np.
 
 
 def relative_errors(parameters: list[Parameter], truth: Array, found: Array) -> dict[str, list[float]]:
-    """Return absolute errors by group of parameters: relative ones, but in SI units for buoyancy and its center.
+    """Return magnitudes of errors by group of parameters: relative, but in SI units for buoyancy and its center.
 
     Errors of off-diagonal added mass are relative to the geometric mean of its diagonal elements.
     """

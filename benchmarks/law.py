@@ -99,7 +99,7 @@ class LawSteps:
 
 
 def _process_clock() -> Any:
-    """Return the numbers of a clock of this process's time; where the system has none, of the usual clock."""
+    """Return the numbers of a clock of this process's CPU time; if the system has none, of the usual clock."""
     clock = Clock().numbers
     if hasattr(time, "CLOCK_PROCESS_CPUTIME_ID") and clock[1] >= 0:
         clock[1] = time.CLOCK_PROCESS_CPUTIME_ID

@@ -40,7 +40,7 @@ class Taken:
     """Time and memory of a verb, or the reason why it failed."""
 
     peak: float  # MB, peak memory of the whole process
-    seconds: float  # duration of the work
+    seconds: float  # s, duration of the work
     error: str  # reason of the failure; empty without one
 
 

@@ -46,7 +46,7 @@ class NmpcGains(NamedTuple):
     interval: float = 0.3627  # s, duration of a stage
     margin: float = 0.05005  # m, distance to keep from regions
     w_u: float = 0.115  # weight of the forces, as fractions of the greatest forces
-    w_m: float = 10.58  # weight of the attitude loop's moments that the plan lacks, as fractions of the greatest ones
+    w_m: float = 10.58  # weight of the attitude loop's moments that the plan lacks, scaled by 1.52 rad/s2 times inertia
     w_v: float = 211.6  # s2/m2, weight of the velocity at the end of the horizon
     observer: float = 6.281  # rad/s, bandwidth of the observer
     w_p: float = 10.0  # 1/m, weight of the distance to the goal

@@ -28,7 +28,7 @@ from plant_fmu.vehicle import load_vehicle
 
 FLOWN = (*KINDS, "conflict")  # kinds of scenes
 COUNT = 100  # default number of scenes of a kind
-DURATION = 30.0  # s, duration of a flight; a scene that is not reached in it is flown again, for longer
+DURATION = 30.0  # s, duration of a flight; a plain or hard scene not reached in it is flown again, for longer
 LONGER = {"search": 60.0, "campaign": 120.0}  # s, duration of the second flight
 RANGES = {
     "interval": (0.15, 0.6),
@@ -73,7 +73,7 @@ class Flights:
                 self._known[_key(flown)] = Flight(Score(*flown["score"]), flown["times"], flown["failures"])
 
     def fly(self, gains: NmpcGains, kind: str, seed: int, longer: float) -> Flight:
-        """Fly a scene for `DURATION`; if its goal is not reached, fly it again for `longer` [s]."""
+        """Fly a scene for `DURATION`; fly a plain or hard one whose goal is not reached again, for `longer` [s]."""
         flown = self._fly(gains, kind, seed, DURATION)
         settled = flown.score.reached or kind not in KINDS  # other scenes have a duration of their own
         return flown if settled else self._fly(gains, kind, seed, longer)

@@ -128,7 +128,7 @@ def take_turns(
 
 
 def count_for(contestant: Contestant, budget: float) -> int:
-    """Return the number of items that take a contestant at least `budget` [s], and warm its caches by the way."""
+    """Return the number of items that take a contestant at least `budget` [s]; its caches are warm afterwards."""
     contestant.seconds(1)
     count = 1
     while (taken := contestant.seconds(count)) < budget and count < _MOST:
@@ -146,7 +146,7 @@ def growth(sizes: Sequence[float], costs: Sequence[float]) -> float:
 
 
 def straight(sizes: Sequence[float], costs: Sequence[float]) -> tuple[float, float, float]:
-    """Fit cost = a + b size, a and b not negative, to relative errors; return a, b and the greatest relative error."""
+    """Fit cost = a + b size, a, b >= 0, by least squares of relative errors; return a, b and the greatest error."""
     import numpy as np
     from scipy.optimize import nnls
 

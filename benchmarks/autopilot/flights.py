@@ -124,7 +124,7 @@ def fly(task: Task, ardusub: Path, instance: int, folder: Path) -> dict[str, Any
         if task.fault:
             link.others = stack.enter_context(GroundLink(endpoints[1], identity=GROUND_STATION))
         flown = Flown()
-        with contextlib.suppress(RunError):  # the companion has failed; the plant's record remains
+        with contextlib.suppress(RunError):  # a flight that fails; the plant's record remains
             flights.fly(lambda: _steer(task, scenario, link, flown, folder), server.counts)
     result = {"key": task.key, "status": flown.status, "wall": round(time.monotonic() - begun, 1)}
     return result | judge(scenario, flown, folder / "plant")

@@ -22,11 +22,11 @@ _STAYED = 2.0  # s, time at the end in which the vehicle must stay in the goal
 class Flown:
     """Events of a flight, with times of the plant [s]."""
 
-    states: list[tuple[float, str]] = field(default_factory=list)  # begin [s] and name of each state of the companion
+    states: list[tuple[float, str]] = field(default_factory=list)  # start [s] and name of each state of the companion
     failed_at: float = math.nan  # s, time of the fault
     status: str = ""  # status of the companion's run
-    offset: list[float] = field(default_factory=lambda: [math.nan] * 3)  # m, NED, of the autopilot's origin
-    begun: float = math.nan  # s, begin of the plant's record
+    offset: list[float] = field(default_factory=lambda: [math.nan] * 3)  # m, NED, autopilot's local origin
+    begun: float = math.nan  # s, start of the plant's record
 
     def first(self, *states: str) -> float:
         """Return the time [s] at which one of the states was first entered; NaN if none was."""
@@ -34,12 +34,12 @@ class Flown:
 
 
 def judge(scenario: Scenario, flown: Flown, folder: Path) -> dict[str, Any]:
-    """Evaluate the plant's record from the begin of the dive, or of steering, to the end of the flight.
+    """Evaluate the plant's record from the start of the dive, or of steering, to the end of the flight.
 
     Parameters
     ----------
     scenario : Scenario
-        Scenario with the regions, which move from the begin of steering on; in the record they move from its begin.
+        Scenario with the regions, which move from the start of steering on; in the record, from the record's start.
     flown : Flown
         Events of the flight.
     folder : Path
@@ -104,7 +104,7 @@ def clearances_at(scenario: Scenario, record: Record, time: Array) -> Array:
     record : Record
         Record of the plant.
     time : ndarray, shape (rows,)
-        Times of the rows since the begin of steering [s].
+        Times of the rows since the start of steering [s].
     """
     environment, shifts = RegionEnvironment(scenario), np.zeros((len(scenario.moving), 3))
     positions = np.stack([record[f"position.{axis}"] for axis in "xyz"], axis=1)

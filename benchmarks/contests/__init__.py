@@ -1,1 +1,4 @@
-"""The contests with peers, one module per subject, with a function `contests` of the peers' environment."""
+"""The contests with peers, one module per subject.
+
+A module has a function `contests` of the peers' environment; `sweeps` has an entry for `benchmarks.scaling`.
+"""

@@ -30,7 +30,7 @@ CHANGES = (
     *(f"time.{key}={STEP}" for key in ("step", "control", "arbiter")),
 )  # fmt: skip
 RUN = 30.0  # s, duration of a run
-BATCH = 64  # default of the number of concurrent runs
+BATCH = 64  # default number of concurrent runs
 _FLYERS = {"fused": "FusedFlyer", "lanes": "LanesFlyer"}  # classes in the modules of `cosim.batch`
 # name in the table: distribution, and module of `benchmarks.peers`
 _MASTERS = {

@@ -16,7 +16,7 @@ from benchmarks.timing import Contestant
 from cosim.scenario.scenario import load_scenario
 
 _VARIED = ("initial.position.0=-0.2:0.2",)  # m, varied key and its range
-_WARMING = 64  # rows per worker of the sweeps before the timing
+_WARMING = 64  # rows per worker, of each of two sweeps before the timing
 
 
 def sweep(pool: str, workers: int, engine: str) -> Entry:

@@ -36,7 +36,7 @@ _SLACK = 1e4  # 1/m, 1/m2, weight of the slack, and of its square
 _LONGEST = 0.3  # s, longest computation of a plan
 _THRUSTERS = 8
 _SMOOTH = 0.05  # m, width in which the depth within soft regions is smooth
-_ANGULAR = 1.5154  # rad/s2, scale of missing moments: the acceleration of ODIN by two of its thrusters
+_ANGULAR = 1.5154  # rad/s2, scale of missing moments: ODIN's acceleration by 27 N, one thruster, at an arm of 0.449 m
 _WEIGHTS = ("interval", "margin", "w_p", "w_u", "w_m", "w_v", "w_s")
 
 

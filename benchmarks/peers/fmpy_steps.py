@@ -11,7 +11,7 @@ from fmpy.fmi3 import FMU3Slave
 
 
 def loop(setup: dict[str, Any]) -> Callable[[int], object]:
-    """Return a function that runs a given number of steps: set all inputs, step, read all outputs and flags."""
+    """Return a function that runs a given number of steps: set inputs by lists, step, read outputs and flags."""
     folder = fmpy.extract(setup["fmu"], setup.get("folder"))
     description = fmpy.read_model_description(folder)
     two = description.fmiVersion.startswith("2")

@@ -1,7 +1,8 @@
 """A peer as a process: ``python serve.py MODULE FUNCTION``, with its setup in JSON as the first line of the input.
 
 Each further line is a number of items, or another argument, in JSON. Each answer is a line of JSON: ``seconds``, the
-time of the call [s], with the dict that the function returned, if any; or ``error``, the reason why it failed.
+time of the call, or that which the function returned [s], with the dict that it returned, if any; or ``error``, the
+reason why it failed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Offset of the autopilot's clock from ours, estimated from TIMESYNC messages."""
+"""Offset between the autopilot's clock and ours, estimated from TIMESYNC messages."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 _KEPT = 16  # number of last answers; the offset is that of the one with the shortest round trip
 _NANO = 1e9
-_SLACK = 0.005  # s, allowed drift between the two clocks from one answer to the next
+_SLACK = 0.005  # s, allowed drift of the two clocks between the fastest kept answer and a new one
 _OPEN = 8  # number of last requests whose answers are accepted
 
 
@@ -38,8 +38,9 @@ class ClockSync:
     def take(self, tc1: int, ts1: int, now: float) -> None:
         """Process an answer, with its fields in ns, that arrived at our time `now` [s].
 
-        An answer without a request is ignored. An answer that contradicts the earlier ones replaces them: the
-        autopilot's clock has restarted, or runs at another rate.
+        An answer without an open request is ignored. If the offset differs from that of the fastest kept answer by more
+        than their round trips explain, the answer replaces all earlier ones: the autopilot's clock has restarted, or
+        runs at another rate.
         """
         if tc1 <= 0 or ts1 not in self._asked:
             return

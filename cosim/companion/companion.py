@@ -183,7 +183,7 @@ class Companion:
         report : bool
             True to write report and figures too.
         on_state : callable, optional
-            Function that is called with each new state and the text of the conditions it waits for.
+            Function of the state and the text of the conditions it waits for; called when either changes.
         live : LiveView, optional
             View that shows the flight, from before steering begins; it accepts no commands.
 
@@ -195,7 +195,7 @@ class Companion:
         Raises
         ------
         RunError
-            If steering cannot begin in time, or the folder cannot be written.
+            If steering cannot begin in time, the autopilot would ignore the sticks, or the folder cannot be written.
         BuildError, LawError, DefinitionError
             If law or arbiter cannot be set up.
         KeyboardInterrupt

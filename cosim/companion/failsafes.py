@@ -10,7 +10,7 @@ from typing import Any
 from cosim.mavlink.wire.options import ProfileName
 
 _EVERY = 0.5  # s, between two requests of the missing parameters
-_PATIENCE = 3.0  # s, to wait for missing parameters; an ArduSub does not answer requests of parameters it lacks
+_PATIENCE = 3.0  # s, from the first request on; an ArduSub does not answer requests of parameters that it lacks
 _MAV_PARAM_TYPE_INT32 = 6
 
 _ON_SILENCE = {0: "does nothing", 1: "warns", 2: "disarms"}
@@ -108,7 +108,7 @@ class Failsafes:
         self._first, self._last = math.inf, -math.inf  # our times [s] of the first and the last request
 
     def wanted(self, now: float) -> list[str]:
-        """Return the names of the missing parameters to request at our time `now` [s]; at most every 0.5 s."""
+        """Return the names of missing parameters to request at our time `now` [s]; none for 0.5 s after a request."""
         if self.is_read(now) or now - self._last < _EVERY:
             return []
         self._first = min(self._first, now)
@@ -116,7 +116,7 @@ class Failsafes:
         return self._missing()
 
     def take(self, message: Any) -> None:
-        """Store the value of a PARAM_VALUE."""
+        """Store the value of a PARAM_VALUE, if it is a finite one of the profile's parameters."""
         name, value = message.param_id, float(message.param_value)
         if name in {parameter.name for parameter in PARAMETERS[self._profile]}:
             if self._profile == "px4" and message.param_type == _MAV_PARAM_TYPE_INT32:  # PX4 sends its bits in a float

@@ -1,6 +1,6 @@
 """Offset of the autopilot's local frame in the scene. Nothing is steered before it is known.
 
-An EKF places its origin where the vehicle is when the filter initializes, not at the scene's origin.
+An EKF has its origin where the vehicle was when the filter set it, not at the scene's origin.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from cosim.simulation.signals import Array
 _SAMPLES = 10  # consecutive samples of the offset that must agree before it is known
 _SPREAD = 0.15  # m, greatest standard deviation of each coordinate among them
 _GRAVITY = 9.80665  # m/s2
-_JUMP = 0.3  # m, change between two positions that the velocity does not explain, from which on it is a jump
+_JUMP = 0.3  # m, change between two positions that the velocity does not explain, above which it is a jump
 _SMOOTHING = 0.1  # weight of a new sample in the exponential mean of the drift
 
 
@@ -27,8 +27,8 @@ _SMOOTHING = 0.1  # weight of a new sample in the exponential mean of the drift
 class SceneOrigin:
     """The user's definition of the scene's origin.
 
-    Give either the latitude and longitude of the scene's origin, which the vehicle's GLOBAL_POSITION_INT and pressure
-    complete; or the surveyed position of the autopilot's local origin in the scene.
+    Give either the latitude and longitude of the scene's origin, and the offset is computed from the vehicle's
+    GLOBAL_POSITION_INT and pressure; or the surveyed position of the autopilot's local origin in the scene.
 
     Examples
     --------
@@ -98,7 +98,7 @@ class FrameAlignment:
 
     @property
     def drift(self) -> float:
-        """Smoothed distance between the local position and its second sources, globe and pressure [m]."""
+        """Smoothed change of the offset by the second sources, globe and pressure, since it was first known [m]."""
         return float(np.linalg.norm(self._drift))
 
     def to_scene(self, position: Array) -> Array:
@@ -129,9 +129,10 @@ class FrameAlignment:
         self.jump, self.reckoned, self._drift, self._before = 0.0, 0.0, np.zeros(3), None
 
     def _sample(self, state: ReportedState) -> Array | None:
-        """Return the offset by the second sources, shape (3,) [m, NED]; NaN without latitude and longitude.
+        """Return the offset by the second sources, globe and pressure, shape (3,) [m, NED].
 
-        None if a needed coordinate is missing: all three, or for a surveyed frame the depth.
+        A surveyed frame needs its depth alone; north and east are NaN without a global position. None if a needed
+        coordinate is missing.
         """
         depth = (state.pressure - self._origin.surface_pressure) * 100.0 / (self._origin.density * _GRAVITY)
         north = east = math.nan

@@ -19,7 +19,7 @@ _ALIGNED = "in-flight", "yaw alignment complete"  # parts of ArduSub's STATUSTEX
 _GAIN, _FASTEST = 0.5, 0.25  # 1/s, gain from remaining depth to speed; m/s, greatest speed of the dive
 _NEAR, _SLOW = 0.05, 0.05  # m, m/s, depth error and speed below which the vehicle has reached the depth
 _ALIGNS_FOR = 6.0  # s, from arming to the earliest end of the dive
-_SETTLES_FOR = 1.0  # s, from the last alignment to the end of the dive
+_SETTLES_FOR = 1.0  # s, from the last alignment to the earliest end of the dive
 _PATIENCE = 3.0  # s, to wait at the depth for the text, or for the descent to begin
 _LEAST_CLEARANCE, _SPACING = 0.3, 0.1  # m, required on the path down; m, between the points where it is computed
 
@@ -74,7 +74,7 @@ class LevelDive:
     clearance : callable, optional
         Returns the least clearance of hard regions [m] at a position in the autopilot's local frame.
     outside : float
-        Violation of hard regions now, less that at the begin of the dive [m]; 0 or more.
+        Violation of hard regions now, less that at the start of the dive [m]; 0 or more.
     """
 
     def __init__(self, depth: float) -> None:
@@ -84,8 +84,8 @@ class LevelDive:
         self._was_disarmed = False
         self._armed_depth: float | None = None  # m, depth at arming
         self._armed_at = self._aligned_at = math.inf  # our time [s] of arming, and of the last alignment
-        self._begun: tuple[float, float] | None = None  # begin of the dive: our time [s]; clearance then [m]
-        self._place: Array = np.zeros(2)  # m, NE, horizontal position at the begin of the dive
+        self._begun: tuple[float, float] | None = None  # start of the dive: our time [s]; clearance then [m]
+        self._place: Array = np.zeros(2)  # m, NE, horizontal position at the start of the dive
         self._arrived_at: float | None = None
         self._is_done = False
         self._texts_read = 0  # number of the autopilot's texts that were processed
@@ -141,7 +141,7 @@ class LevelDive:
         return min(max(_GAIN * self._depth_left(state), 0.0), _FASTEST)
 
     def way_back(self, state: ReportedState) -> Array:
-        """Return the horizontal vector from the vehicle to the begin of the dive, shape (2,) [m, NE]."""
+        """Return the horizontal vector from the vehicle to where the dive began, shape (2,) [m, NE]."""
         return self._place - state.position[:2]
 
     def _depth_left(self, state: ReportedState) -> float:

@@ -26,7 +26,7 @@ class CompanionOptions:
     steer_by: SteerBy = "sticks"
     sticks_by: SticksBy = "manual-control"
     origin: SceneOrigin = field(default_factory=SceneOrigin)
-    dry_run: bool = False  # True to compute and record the law, and send no commands
+    dry_run: bool = False  # True to compute and record the law, and send no sticks, set-points, modes or arming
     arm: bool = False  # True to arm the vehicle; False leaves arming to the pilot
     pilot_gain: float = 0.5  # fraction of the greatest wrench that full sticks command; ArduSub's JS_GAIN_DEFAULT
     velocity_lag: float = 2.0  # s, horizontal lag of the autopilot's velocity loop
@@ -34,4 +34,4 @@ class CompanionOptions:
     reckoning_error: float = 0.03  # position error without a fix, as a fraction of the distance traveled
     level_dive: float = 0.6  # m, depth of an ArduSub's dive after arming, before it is steered; 0 for none
     least_battery: float = 0.0  # percent, remaining charge below which the vehicle is held
-    timeout: float | None = None  # s, longest wait for the begin of steering; None: no limit
+    timeout: float | None = None  # s, longest wait until steering begins; None: no limit

@@ -155,8 +155,8 @@ class Output:
     def descend(self, state: ReportedState, speed: float, back: Array, period: float) -> Sequence[Any]:
         """Return the messages of a level descent at a speed [m/s], by velocity or by stick, for a `period` [s].
 
-        With velocities, the descent holds the horizontal position `back`, shape (2,) [m, NE], from the vehicle. With
-        sticks, the autopilot holds its own.
+        With velocities, the descent holds a horizontal position; `back`, shape (2,) [m, NE], is the vector to it. With
+        a stick, the autopilot holds the position by itself.
         """
         self.clear()
         if self._steer_by == "velocity":

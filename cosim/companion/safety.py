@@ -76,7 +76,7 @@ class Observation(NamedTuple):
     """Inputs of the supervisor's decision at one step."""
 
     now: float  # s, our time
-    has_state: bool  # True if position, attitude and failsafe parameters are known
+    has_state: bool  # True if position and attitude are known, and the wait for failsafe parameters is over
     frame_known: bool  # True if the offset of the autopilot's frame in the scene is known
     is_armed: bool
     in_mode: bool  # True if the autopilot is in the mode for the dive, or without a dive for steering
@@ -90,7 +90,7 @@ class Supervisor:
     Parameters
     ----------
     dry_run : bool
-        True to compute the law without sending commands.
+        True to compute the law without steering.
 
     Attributes
     ----------
@@ -121,7 +121,10 @@ class Supervisor:
         return 0.0 if self._asked_at is None else now - self._asked_at
 
     def resume(self) -> None:
-        """Start again from ``waiting`` after ``held`` or ``pilot``; conditions that still apply hold again."""
+        """Start again from ``waiting``, after ``held`` or ``pilot``.
+
+        A condition that still applies ends steering again.
+        """
         if self.state in ("held", "pilot"):
             self.state, self.reason, self._asked_at = "waiting", "", None
 

@@ -64,7 +64,7 @@ class AutopilotSession:
     output : Output
         Converter of wrenches to messages; it keeps the last commands, in a dry run too.
     lateness : float
-        Delay of the begin of the last step [s].
+        Delay of the start of the last step [s].
     outside : float
         Depth by which the vehicle violates hard regions [m]; the caller sets it.
 
@@ -124,7 +124,7 @@ class AutopilotSession:
         wrench : ndarray, shape (6,)
             The law's wrench [N, N m], body frame.
         due, until : float
-            Times of the link's clock [s]: scheduled begin and end of the step.
+            Times of the link's clock [s]: scheduled start and end of the step.
         """
         now = self._link.clock()
         self.lateness = max(0.0, now - due)
@@ -158,7 +158,10 @@ class AutopilotSession:
             self._take(one.system, one.component, one.message, one.time)
 
     def release(self, seconds: float) -> None:
-        """Request the hold mode and release the sticks, for at most `seconds` or until the mode is on."""
+        """Release the sticks, and request the hold mode until it is on or `seconds` are over.
+
+        In the state ``pilot``, only finish the release; without steering, do nothing.
+        """
         state, begun = self.supervisor.state, self._link.clock()
         if state in ("diving", "engaging", "steering", "held"):
             self.supervisor.state, self.supervisor.reason = "held", self.supervisor.reason or "end"

@@ -175,12 +175,14 @@ class VelocityLead:
     def hold(self, back: Array, speed_down: float, state: ReportedState, period: float) -> Array:
         """Return the velocity [m/s, NED], shape (3,), that holds a horizontal position during a descent.
 
+        The observer makes up for a current.
+
         Parameters
         ----------
         back : ndarray, shape (2,)
             Horizontal vector from the vehicle to the position [m, NE].
         speed_down : float
-            Downward speed of the descent [m/s].
+            Downward speed of the descent [m/s]; commanded as it is.
         state : ReportedState
             Present state.
         period : float

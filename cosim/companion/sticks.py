@@ -27,7 +27,7 @@ from plant_fmu import Vehicle
 SticksBy = Literal["manual-control", "rc-override"]
 STICKS_BY: tuple[SticksBy, ...] = get_args(SticksBy)
 
-PILOT_SPEED = 0.5  # m/s, depth rate of a full vertical stick in ALT_HOLD, unless a parameter is known
+PILOT_SPEED = 0.5  # m/s, depth rate of a full vertical stick in ALT_HOLD, if PILOT_SPEED_UP is not known
 _FULL_YAW = math.radians(45.0)  # rad/s, yaw rate of a full stick at ACRO_YAW_P 1
 _CENTI = 0.01  # m per cm, deg per hundredth of a degree
 _FULL = 1000.0  # value of a full stick in MANUAL_CONTROL
@@ -183,7 +183,7 @@ def scale_of(vehicle: Vehicle, profile: Profile, pilot_gain: float, sticks_by: S
     """
     gain = pilot_gain if sticks_by == "manual-control" else 1.0
     reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
-    if profile.name != "ardusub":  # the autopilot allocates each axis to the thrusters by itself
+    if profile.name != "ardusub":  # the autopilot allocates the axes to the thrusters itself
         share = np.diag(np.divide(1.0, reach, out=np.zeros(6), where=reach > 0.0))
         return StickScale(share, np.diag(reach), np.eye(6), gain, True, False, 0.0)
     mixer = MotorMixer(vehicle)

@@ -31,9 +31,9 @@ _ARMED, _CRITICAL = 128, 5  # bit of HEARTBEAT.base_mode; MAV_STATE_CRITICAL: fr
 _LOCAL_NED, _BODY_FRD = 1, 12  # MAV_FRAME
 _RELATIVE, _ABSOLUTE = 8, 16  # estimator flags: horizontal position is relative, absolute
 _DOWNWARDS = 25  # MAV_SENSOR_ROTATION_PITCH_270
-_DEFLECTED, _INVALID = 50, 0x7FFF  # MANUAL_CONTROL: least deflection of 1000 that counts; value of an unused stick
+_DEFLECTED, _INVALID = 50, 0x7FFF  # MANUAL_CONTROL: deflection, of 1000, above which a stick counts; unused stick
 _RESTS_IN_THE_MIDDLE = (3, 12)  # MAV_AUTOPILOT: ArduPilot and PX4
-_CENTER, _DEFLECTED_PULSE = 1500, 25  # us, center of a channel's pulse; least deflection that counts
+_CENTER, _DEFLECTED_PULSE = 1500, 25  # us, center of a channel's pulse; deflection above which it counts
 _PREDICTED = 0.1  # s, longest prediction of the state over its age
 _MILLI, _MICRO = 1e-3, 1e-6
 
@@ -57,7 +57,8 @@ class ReportedState:
     attitude_boot : float
         Time of this attitude since the autopilot's boot [s]; NaN before the first.
     mode, is_armed, in_failsafe : int, bool, bool
-        Custom mode; True if armed; True if the state is MAV_STATE_CRITICAL or beyond. From the last heartbeat.
+        Custom mode, also from CURRENT_MODE; True if armed; True if the state is MAV_STATE_CRITICAL or beyond. From the
+        last heartbeat.
     global_position : tuple of float or None
         Latitude and longitude [deg] and altitude above home [m].
     pressure : float
@@ -67,7 +68,8 @@ class ReportedState:
     pilot_gain : float
         Present pilot gain of an ArduSub's sticks [-]; NaN if none is reported.
     heard_at, beaten_at, pilot_at : float
-        Our times [s] of the last message, the last heartbeat, and the last deflected sticks of another station.
+        Our times [s] of the autopilot's last processed message, its last heartbeat, and the last deflected sticks of
+        another station.
     sync : ClockSync
         Offset between the autopilot's clock and ours.
     """

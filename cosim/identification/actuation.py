@@ -27,7 +27,7 @@ CHANGES = (*(f"{what} of {axis}" for what in ("lateness", "spread") for axis in 
 
 @dataclass(frozen=True)
 class Actuation:
-    """Wrenches that are linear over each step of a grid: mean and change from begin to end, and their derivatives."""
+    """Wrenches that are linear over each step of a grid: mean and change from start to end, and their derivatives."""
 
     wrench: Array  # (steps, 2, 6) N, N m
     by_lag: Array  # (steps, 2, 6) N/s, N m/s, by the time constant of all thrusters
@@ -186,7 +186,7 @@ def error_wrenches(impulses: Impulses, lag: float, step: float, begin: float, st
     Returns
     -------
     ndarray
-        Mean over each step, and change from its begin to its end [N, N m], of one standard deviation.
+        Mean over each step, and change from its start to its end [N, N m], of one standard deviation.
     """
     before = int(np.ceil((_TAIL * lag + 2.0 * BIN) / step))  # steps before the window
     grid: Any = begin + step * np.arange(-before, steps + 1)
@@ -226,7 +226,7 @@ def _lagged(forces: Array, lag: float, step: float) -> tuple[Array, Array]:
     Returns
     -------
     forces : ndarray, shape (steps, 2, n)
-        Mean of each step, and change from its begin to its end [N].
+        Mean of each step, and change from its start to its end [N].
     by_lag : ndarray, shape (steps, 2, n)
         Derivatives of these by the lag [N/s].
     """

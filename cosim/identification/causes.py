@@ -44,7 +44,7 @@ def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values
     Returns
     -------
     list of Cause
-        Causes in descending order of their shares; empty if a prediction fails or no residual exceeds the noise.
+        Causes in descending order of their shares; empty if a prediction fails, or the sum of squares is that of noise.
     """
     parameters, windows = fitted.parameters, fitted.windows
     kinds = {p.kind for p in parameters}
@@ -89,7 +89,7 @@ def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values
 
 
 def _left_by_random_force(forced: Residuals, fitted: Residuals, values: Array) -> float:
-    """Return the sum of squares after one Gauss-Newton step with a constant force in each window."""
+    """Return the sum of squares after one Gauss-Newton step with a constant force in each window; inf if that fails."""
     forced.weigh_as(fitted)
     settings = forced.settings(values)
     try:

@@ -208,7 +208,7 @@ def advice(fit: Fit) -> Iterator[str]:
         p = fit.parameters[i]
         key = ".".join(p.name.split(".")[:2])
         part = float(fit.intervals.prior_part[i])
-        if part > 0.1:  # deviation of the fit by that of the prior
+        if part > 0.1:  # ratio of nominal to prior deviation
             worst[key] = max(worst.get(key, 0.0), part)
     for key in sorted(worst, key=lambda key: -worst[key])[:3]:
         yield f"For {key}: {_NEEDS.get(key, 'motion along and about all axes')}."

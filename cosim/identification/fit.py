@@ -52,7 +52,7 @@ class Fit:
     step: float  # s, integration step
     delays: dict[str, float]  # s, start values of the delays by topic, from `find_delays`
     causes: tuple[Cause, ...] = ()  # causes of a poor fit, the greatest first
-    command_error: float | None = None  # size of the errors of sampled commands, in that of steps at any time
+    command_error: float | None = None  # errors of sampled commands, relative to those of steps at random times
     forces: Array | None = None  # (windows, 3) N, NED, random force of each window, if it is estimated
 
     def vehicle_part(self) -> list[int]:
@@ -64,7 +64,7 @@ class Fit:
         return [i for i in self.vehicle_part() if self.intervals.prior_part[i] > RESTS]
 
     def alike(self, least: float) -> Iterator[tuple[str, str]]:
-        """Yield pairs of parameters with correlations above `least`, the strongest first, without nuisance pairs."""
+        """Yield pairs whose correlation exceeds `least` in magnitude, the greatest first; no pairs of nuisances."""
         size = np.abs(np.triu(self.intervals.correlation, 1))
         for i, j in sorted(np.argwhere(size > least), key=lambda pair: -size[tuple(pair)]):
             one, other = self.parameters[i], self.parameters[j]
@@ -199,7 +199,7 @@ def _result(problem: Problem, values: Array, rejected: Counter[str], step: float
 
 
 class Problem:
-    """Least-squares problem for `scipy.optimize.least_squares`, with the rows of each window reduced by QR to p + 1.
+    """Least-squares problem for `scipy.optimize.least_squares`, with each window's rows reduced by QR to p + 1 at most.
 
     Parameters
     ----------
@@ -266,7 +266,7 @@ class Problem:
 
 
 def integration_step(logs: Sequence[Log]) -> float:
-    """Return an integration step that divides the usual time between changes of the commands.
+    """Return an integration step that divides the usual time between changes of the commands, or is a multiple of it.
 
     Parameters
     ----------
@@ -276,7 +276,7 @@ def integration_step(logs: Sequence[Log]) -> float:
     Returns
     -------
     float
-        Step of 15 to 30 ms [s]: the usual time between changes by a whole number, or a multiple of it.
+        Step of 15 to 30 ms [s]: the usual time between changes, divided or multiplied by a whole number.
     """
     spans = []
     for log in logs:

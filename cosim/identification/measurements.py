@@ -110,9 +110,9 @@ def derivative_by_errors(topic: Topic, states: Array, errors: Errors, kind: str,
 
 
 def _attitude_matrix(measured: Array, states: Array) -> tuple[Array, Array]:
-    """Return matrices, (n, 3, 4), to the vector part of conj(measured) * q, and the signs of the scalar part, (n, 1).
+    """Return matrices, (n, 3, 4), from q to the vector part of conj(measured) q, and signs of its scalar part, (n, 1).
 
-    Twice that vector part is the rotation from the sample to the prediction [rad, body frame], while it is small.
+    Twice that vector part is the rotation from the sample to the prediction [rad, body frame], if it is small.
     """
     e0, e1, e2, e3 = measured.T
     matrix = np.stack([

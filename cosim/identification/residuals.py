@@ -41,7 +41,7 @@ class Reduced:
 
     residual: Array  # (rows,) at the best start, in standard deviations, weighted
     jacobian: Array  # (rows, parameters)
-    times: Array  # (rows,) s since the window's begin
+    times: Array  # (rows,) s since the window's start
 
 
 @dataclass

@@ -112,7 +112,7 @@ class Shooter:
         start : ndarray, shape (13,)
             Position [m, NED], quaternion, velocity [m/s, rad/s, body frame].
         wrench : ndarray, shape (steps, 2, 6)
-            Wrench of the actuators [N, N m, body frame]: its mean over each step, and its change from begin to end.
+            Wrench of the actuators [N, N m, body frame]: its mean over each step, and its change from start to end.
         step : float
             Integration step [s].
         times : ndarray, shape (n,)

@@ -44,7 +44,7 @@ def validate(
     vehicle : Vehicle
         Vehicle with the start values of the search.
     parameters : sequence of Parameter
-        Free parameters of the fit; nuisances of single runs are those of the first run.
+        Free parameters of the fit. Nuisances of single runs apply by index: those of fitted run i to run i of `logs`.
     values : ndarray, shape (p,)
         Fitted values of the parameters, in their units.
     step : float

@@ -15,10 +15,10 @@ from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-MARGINS = (0.1, 0.2)  # s, begin and end of a window without samples, if delays are estimated
+MARGINS = (0.1, 0.2)  # s, times without samples at start and end of a window, if delays are estimated
 
 _SHORTEST = 0.6  # fraction of a full window, below which the rest of a run is dropped
-_SETTLED = 1.0  # s, time from a run's first command to its first window: lagged forces have then settled
+_SETTLED = 1.0  # s, from a run's first command to its first window: the commands then determine lagged forces
 _MOST_GAP = 1.0  # s, longest gap in the commands; samples of velocity, position and attitude may pause 0.5 s longer
 _FASTEST = 3.0  # rad/s, greatest angular velocity about a body axis
 _STEEPEST = math.radians(80.0)  # rad, greatest pitch
@@ -32,8 +32,8 @@ class Window:
     run: int  # index of the run
     first: int  # first step on the grid
     steps: int  # number of steps
-    begin: float  # s, in the run's time
-    topics: tuple[Topic, ...]  # samples, with times since the window's begin
+    begin: float  # s, start of the window in the run's time
+    topics: tuple[Topic, ...]  # samples, with times since the window's start
     start: Array  # (13,) start state interpolated from samples: position [m], quaternion, velocity [m/s, rad/s]
 
 
@@ -53,7 +53,7 @@ def cut_windows(
     length : float
         Length of a window [s]; the last one of a run may be shorter by two fifths.
     margins : tuple of float
-        Times without samples at begin and end of a window [s].
+        Times without samples at start and end of a window [s].
 
     Returns
     -------

@@ -33,7 +33,7 @@ class StoredMessage:
     type: str  # name of the message type, such as nav_msgs/msg/Odometry
     definition: str  # text that defines the type and its nested types; empty if the storage has none
     language: str  # language of the definition: ros2msg or ros2idl; empty without one
-    encoding: str  # encoding of the data: cdr or ros1
+    encoding: str  # encoding of the data, such as cdr, ros1 or json
     data: bytes
     time: float  # s, time of recording, by the recorder's clock
     part: float  # fraction of the file read so far, 0 to 1
@@ -73,7 +73,7 @@ def stored_messages(path: Path, remarks: list[str], moved: Moved) -> Iterator[St
     path : Path
         Path of a bag's file, or of a folder of such files.
     remarks : list of str
-        Receives a remark on each file that ends early or has damaged messages.
+        Receives a remark on each file that ends early or has damaged parts.
     moved : callable
         Receives the fraction read so far.
 

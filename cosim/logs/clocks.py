@@ -80,7 +80,7 @@ class VehicleClock:
     def __init__(self) -> None:
         self._last = -math.inf
         self._restarts: list[float] = []  # times of restarts on the writer's clock [s]
-        # for each restart: stamp and offset [s] of the message of least delay, by minute
+        # before the first restart and after each: stamp and offset [s] of the message of least delay, by minute
         self._offsets: list[dict[int, tuple[float, float]]] = [{}]
         self._lines: list[tuple[float, float]] | None = None
 

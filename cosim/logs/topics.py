@@ -1,4 +1,4 @@
-"""Cleaning of samples: sort out late ones and repeats of held values, spread bursts in time, count gaps."""
+"""Cleaning of samples: remove late ones and repeats of held values, spread bursts in time, count gaps."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _EDGES = np.logspace(-6, 5, 4401)  # s, edges of the histogram of periods; neigh
 _AROUND = 8  # number of bins on either side of the median whose mean is the period
 _GAP_PERIODS, _LEAST_GAP = 3.0, 0.3  # periods, s: a pause longer than both is a gap
 _LISTED = 100  # greatest number of listed gaps
-_RUNS, _REGULAR = 10, 0.6  # values are held: least number of runs of equal values; least fraction of similar lengths
+_RUNS, _REGULAR = 10, 0.6  # held values have at least so many runs of equal ones, and this fraction of similar lengths
 _LONGEST_RUN = 1000  # samples, length from which on runs count as equally long
 _QUICK, _BURSTING = 0.2, 0.3  # bursts: greatest distance of samples in mean periods; least fraction of such samples
 
@@ -43,7 +43,7 @@ class Topic:
     late: int = 0  # number of removed samples out of order
     broken: int = 0  # number of omitted samples with a number that is not finite
     gap_count: int = 0
-    gaps: list[tuple[float, float]] = field(default_factory=list)  # s, begin and end of the longest gaps
+    gaps: list[tuple[float, float]] = field(default_factory=list)  # s, start and end of the longest gaps
 
     @property
     def longest(self) -> float:
@@ -195,9 +195,9 @@ def _held_for(runs: NDArray[np.int64]) -> int:
 
 
 def _fresh(values: Array, previous: Array, repeats: int, stretch: int) -> tuple[NDArray[np.bool_], int]:
-    """Return a mask of new samples, (n,), and the number of repeats before the last one.
+    """Return a mask of new samples, (n,), and the number of repeats of the last value so far.
 
-    A sample is new if its value changes, or if it is each `stretch`-th repeat.
+    A sample is new if its value changes, and at every `stretch`-th repeat.
     """
     if stretch <= 1:
         return np.ones(len(values), bool), 0

@@ -49,7 +49,7 @@ class _Topic:
 
 
 class ULogMessages:
-    """Read a ULog file from begin to end.
+    """Read a ULog file from start to end.
 
     Parameters
     ----------
@@ -163,13 +163,13 @@ class ULogMessages:
                     yield from self._flat(f"{prefix}{name}{place}.", of, depth + 1)
 
     def _messages(self, moved: Moved) -> Iterator[tuple[int, bytes]]:
-        """Yield type and body of each message; after invalid bytes, continue at the next synchronization mark."""
+        """Yield type and body of each message; after invalid bytes, go on at a sync mark or a likely head."""
         total = max(1, self._path.stat().st_size)
         with self._path.open("rb") as file:
             if file.read(_FILE_HEAD)[:7] != _MAGIC:
                 raise ImportLogError("cannot be read as a ULog file: it does not begin as one")
             data, at, before = b"", 0, _FILE_HEAD  # `before`: number of the file's bytes before `data`
-            searched = 0  # number of the file's bytes without a mark after the present message
+            searched = 0  # offset in the file before which no mark follows the present message
             while True:
                 if len(data) - at < _LONGEST + _HEAD.size:
                     more = file.read(_CHUNK)

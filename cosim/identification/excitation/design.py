@@ -27,13 +27,13 @@ Array = NDArray[np.float64]
 
 RETURN = 10.0  # s, time between two segments, in which the law returns the vehicle to the center of the box
 BEGIN = 2.0  # s, time before the first segment
-_SETTLE = 1.0  # s, time before a candidate segment, at which windows begin
+_SETTLE = 1.0  # s, time before a candidate segment; windows begin with the segment
 _STICKS = round(PERIOD / ROW)  # rows of the record per stick value
 _USED = 0.7  # fraction of the box that a segment may use, with the start values of the numbers
 _FASTEST = 2.0  # rad/s, greatest angular velocity about a body axis in a segment
 _STEEPEST = math.sin(math.radians(55.0))  # sine of the greatest tilt in a segment
 _SMALLER = 0.7  # factor on the sticks each time a segment leaves the limits
-_TRIES = 7  # most reductions of the sticks
+_TRIES = 7  # most simulations of a segment or schedule, each with sticks reduced by that factor
 CURRENT = 0.1  # m/s, default of the current in which vehicles stay inside the box
 _OTHERS = 8  # number of other vehicles for which forces are reduced, and of random ones that check the result
 
@@ -49,12 +49,12 @@ class Design:
     duration: float  # s, duration of the whole schedule
     segments: tuple[Segment, ...]
     tried: int  # number of candidates
-    left_out: int  # number of candidates that leave the limits with any sticks, or have no valid window
+    left_out: int  # number of candidates that leave the limits even with reduced sticks, or have no window
     commands: tuple[tuple[int, Command], ...]  # commands with their steps
     parameters: tuple[Parameter, ...]
     deviations: Array  # (p,) expected standard deviations of the parameters, in their units
     rehearsal: Rehearsal
-    current: float  # m/s, speed of the current of the other vehicles
+    current: float  # m/s, speed of the current in which the other vehicles move
     excursions: tuple[float, ...]  # greatest distance of each other vehicle from the center, in halves of the box
 
     def vehicle_part(self) -> list[int]:
@@ -92,7 +92,7 @@ def design(
     progress : callable
         Receives the fraction of the work done so far, 0 to 1.
     current : float
-        Speed of a current in which the vehicle must stay inside the box [m/s].
+        Speed of a current [m/s], in which vehicles with less damping and added mass should stay inside the box too.
 
     Returns
     -------
@@ -233,7 +233,7 @@ def keep_inside(
     Returns
     -------
     tuple of Segment
-        Segments after at most seven reductions; these cannot help against a current that alone leaves the box.
+        Segments after at most seven reductions. A vehicle may still leave the box, by the current alone.
     """
     found = list(segments)
     for _ in range(_TRIES):
@@ -323,7 +323,7 @@ def _choose(found: Sequence[Array], parameters: Sequence[Parameter], count: int)
     total = np.eye(len(scale))
 
     def gain(matrix: Array) -> float:
-        """Return the log-determinant of the information on the vehicle's numbers, without that on the nuisances."""
+        """Return the log-determinant of the information on the vehicle's numbers; nuisances are unknown too."""
         covariance = np.linalg.inv(matrix)[np.ix_(free, free)]
         return -float(np.linalg.slogdet(covariance)[1])
 

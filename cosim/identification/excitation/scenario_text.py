@@ -50,7 +50,7 @@ def scenario_text(vehicle: str, depth: float, duration: float, name: str) -> str
     duration : float
         Duration of the scenario [s].
     name : str
-        Name of the vehicle in the title.
+        Name in the title, such as the vehicle's.
     """
     return _TEXT.format(name=name, vehicle=json.dumps(vehicle), duration=duration, depth=depth, row=ROW)
 

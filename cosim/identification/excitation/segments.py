@@ -50,7 +50,7 @@ def candidates(axes: NDArray[np.bool_], rng: np.random.Generator, draws: int) ->
     rng : Generator
         Source of the random phases, levels and times.
     draws : int
-        Number of candidates for each group, mode and band.
+        Number of candidates for each group, mode, and band of multisines or dwell of steps.
 
     Yields
     ------
