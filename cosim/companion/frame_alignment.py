@@ -77,8 +77,10 @@ class FrameAlignment:
         if not np.isfinite(state.position).all():
             return
         came, before = state.came, self._taken
-        second = "GLOBAL_POSITION_INT" if self._frame is not None else "SCALED_PRESSURE"
-        self._taken = came["LOCAL_POSITION_NED"] + came["ODOMETRY"], came[second]
+        # the pressure is that of SCALED_PRESSURE2 once one was received
+        pressure = came["SCALED_PRESSURE2"] or came["SCALED_PRESSURE"]
+        second = came["GLOBAL_POSITION_INT"] if self._frame is not None else pressure
+        self._taken = came["LOCAL_POSITION_NED"] + came["ODOMETRY"], second
         if self.offset is not None and self._taken[0] != before[0]:
             self._watch(state, now)
         sample = self._sample(state) if self._taken[1] != before[1] else None

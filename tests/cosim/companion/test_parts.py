@@ -87,6 +87,15 @@ def test_frame_offset_is_derived_from_global_position_and_pressure():
     assert alignment.to_scene(state.position) == pytest.approx(true, abs=0.02)
 
 
+def test_depth_that_drifts_from_the_second_pressure_is_seen_in_a_surveyed_frame():
+    """SCALED_PRESSURE2 may be the only pressure."""
+    alignment, state = FrameAlignment(SceneOrigin(surveyed=(0.0, 0.0, 0.0))), None
+    for k in range(600):
+        state = reported((0.0, 0.0, 2.0 + min(0.01 * k, 2.0)), depth=2.0, heard=0.1 * k, state=state)
+        alignment.update(state, 0.1 * k)
+    assert alignment.drift == pytest.approx(2.0, abs=0.1)
+
+
 def test_inconsistent_positions_give_no_frame_offset():
     origin, rng = (55.9097, -3.3203), np.random.default_rng(1)
     alignment, frame, state = FrameAlignment(SceneOrigin(geodetic=origin)), LocalFrame(*origin), None
