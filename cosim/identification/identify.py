@@ -16,6 +16,7 @@ from cosim.identification.parameters import (
     RANDOM_FORCE,
     free_parameters,
     nuisances,
+    with_mean_nuisances,
 )
 from cosim.identification.validation import Prediction, validate
 from cosim.identification.vehicle_file import name_of_file, vehicle_text
@@ -96,7 +97,10 @@ def identify(
             raise
         raise IdentificationError(f"{error}. {' '.join(slow)}") from error
     findings.require_apart(found)
-    predictions = validate(others or logs, vehicle, parameters, found.values, found.step)
+    if others:
+        predictions = validate(others, vehicle, *with_mean_nuisances(parameters, found.values), found.step)
+    else:
+        predictions = validate(logs, vehicle, parameters, found.values, found.step)
     return Identification(start, vehicle, logs, others, found, tuple(predictions))
 
 

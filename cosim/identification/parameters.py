@@ -241,6 +241,27 @@ def setting_of(
     return Setting(plant, actuation, force, Errors(lever, scale, bias), delays)
 
 
+def with_mean_nuisances(parameters: Sequence[Parameter], values: Array) -> tuple[list[Parameter], Array]:
+    """Return parameters and values for runs that were not fitted.
+
+    The nuisances of single runs, such as the current, are unknown there: their mean over the fitted runs takes the
+    place of them.
+
+    Parameters
+    ----------
+    parameters : sequence of Parameter
+        Free parameters of a fit.
+    values : ndarray, shape (p,)
+        Fitted values of the parameters, in their units.
+    """
+    groups: dict[Parameter, list[float]] = {}
+    for p, x in zip(parameters, values, strict=True):
+        groups.setdefault(
+            p if p.run is None else replace(p, name=p.name.partition(" of run ")[0], run=None), []
+        ).append(float(x))
+    return list(groups), np.array([np.mean(x) for x in groups.values()])
+
+
 def _place_of(name: str) -> tuple[str, tuple[int, ...]]:
     """Return the vehicle's number that a parameter of the FMU is, and where in it."""
     if match := re.fullmatch(r"(\w+)\[([\d,]+)\]", name):

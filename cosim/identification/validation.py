@@ -44,7 +44,8 @@ def validate(
     vehicle : Vehicle
         Vehicle with the start values of the search.
     parameters : sequence of Parameter
-        Free parameters of the fit. Nuisances of single runs apply by index: those of fitted run i to run i of `logs`.
+        Free parameters of the fit. Nuisances of single runs belong to the runs of `logs` by their index; for other runs
+        `with_mean_nuisances` gives parameters and values.
     values : ndarray, shape (p,)
         Fitted values of the parameters, in their units.
     step : float

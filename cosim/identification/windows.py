@@ -19,7 +19,8 @@ MARGINS = (0.1, 0.2)  # s, times without samples at start and end of a window, i
 
 _SHORTEST = 0.6  # fraction of a full window, below which the rest of a run is dropped
 _SETTLED = 1.0  # s, from a run's first command to its first window: the commands then determine lagged forces
-_MOST_GAP = 1.0  # s, longest gap in the commands; samples of velocity, position and attitude may pause 0.5 s longer
+_IDLE = "no thruster works before or after it: the vehicle may be held"
+_MOST_GAP, _MOST_PAUSE = 1.0, 1.5  # s, longest gap in the commands; in samples of velocity, position and attitude
 _FASTEST = 3.0  # rad/s, greatest angular velocity about a body axis
 _STEEPEST = math.radians(80.0)  # rad, greatest pitch
 _MOST_SATURATED = 0.1  # greatest fraction of a window in which a thruster is commanded beyond its limits
@@ -65,7 +66,11 @@ def cut_windows(
     kept: list[Window] = []
     rejected: Counter[str] = Counter()
     for run, log in enumerate(logs):
-        for first, steps in _pieces(log, step, length):
+        begin, end = _working_time(log)
+        idle = int((begin - log.times[0]) / length) + int((log.times[-1] - end) / length)
+        if idle:
+            rejected[_IDLE] += idle
+        for first, steps in _pieces(log, begin, end, step, length):
             window = _window(log, run, first, steps, step, margins)
             reason = _fault(log, vehicle, window, steps * step)
             if reason:
@@ -75,11 +80,21 @@ def cut_windows(
     return kept, rejected
 
 
-def _pieces(log: Log, step: float, length: float) -> Iterator[tuple[int, int]]:
-    """Yield first step and number of steps of windows of about one length."""
-    total = math.floor((log.times[-1] - log.times[0]) / step)
+def _working_time(log: Log) -> tuple[float, float]:
+    """Return the times [s] of a run's first and last command that is not zero; its start and end if all are zero."""
+    working = np.flatnonzero((log.thrust != 0.0).any(axis=1) | (log.wrench != 0.0).any(axis=1))
+    if not len(working):
+        return float(log.times[0]), float(log.times[-1])
+    # a sampled command may have begun after the sample before, and ended before the sample after
+    first, last = max(working[0] - 1, 0), min(working[-1] + 1, len(log.times) - 1)
+    return float(log.times[first]), float(log.times[last])
+
+
+def _pieces(log: Log, begin: float, end: float, step: float, length: float) -> Iterator[tuple[int, int]]:
+    """Yield first step and number of steps of windows of about one length between two times [s]."""
+    total = math.floor((end - log.times[0]) / step)
     steps = max(1, round(length / step))
-    for first in range(math.ceil(_SETTLED / step), total, steps):
+    for first in range(math.ceil((begin - log.times[0] + _SETTLED) / step), total, steps):
         count = min(steps, total - first)
         if count >= _SHORTEST * steps:
             yield first, count
@@ -119,8 +134,8 @@ def _fault(log: Log, vehicle: Vehicle, window: Window, length: float) -> str:
     for topic in window.topics:
         if topic.name in ("velocity", "position", "attitude"):
             times = np.concatenate([[0.0], topic.times, [length]])
-            if np.diff(times).max() > _MOST_GAP + 0.5:
-                return f"a gap of more than {_MOST_GAP:g} s in the {topic.name}"
+            if np.diff(times).max() > _MOST_PAUSE:
+                return f"a gap of more than {_MOST_PAUSE:g} s in the {topic.name}"
         if not len(topic.times):
             return f"no samples of {topic.name.replace('_', ' ')}"
         if topic.name == "angular_velocity" and np.abs(topic.values).max() > _FASTEST:

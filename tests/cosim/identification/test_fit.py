@@ -12,7 +12,7 @@ from cosim.identification.delays import find_delays
 from cosim.identification.findings import require_apart, slow_commands, warnings
 from cosim.identification.fit import fit, integration_step
 from cosim.identification.log import Log, command_period, make_topic
-from cosim.identification.parameters import DEFAULT_FREE, free_parameters, nuisances, with_values
+from cosim.identification.parameters import DEFAULT_FREE, free_parameters, nuisances, with_mean_nuisances, with_values
 from cosim.identification.validation import validate
 from cosim.identification.windows import cut_windows
 from plant_fmu import Plant, load_vehicle
@@ -264,6 +264,31 @@ def test_windows_that_tumble_or_have_gaps_are_rejected(log, vehicle):
     with pytest.raises(IdentificationError, match="no window is left"):
         fit([dataclasses.replace(tumbling, topics=(dataclasses.replace(rates, values=rates.values + 9.0),))], vehicle,
             free_parameters(vehicle, FREE))  # fmt: skip
+
+
+def test_time_before_the_first_and_after_the_last_command_is_left_out(log, vehicle):
+    """A vehicle that is held there moves as no model says."""
+    step = integration_step([log])
+    late = (log.times >= 13.0) & (log.times < 33.0)
+    thrust, wrench = (np.where(late[:, None], x, 0.0) for x in (log.thrust, log.wrench))
+    windows, rejected = cut_windows([dataclasses.replace(log, thrust=thrust, wrench=wrench)], vehicle, step, 4.0)
+    assert 13.0 <= windows[0].begin < 14.5 and windows[-1].begin + 0.6 * 4.0 < 33.5
+    assert rejected == {
+        "no thruster works before or after it: the vehicle may be held": 3 + int((log.times[-1] - 33) / 4)
+    }
+    still = dataclasses.replace(log, thrust=0.0 * log.thrust, wrench=0.0 * log.wrench)
+    assert len(cut_windows([still], vehicle, step, 4.0)[0]) == len(cut_windows([log], vehicle, step, 4.0)[0])
+
+
+def test_held_out_runs_have_the_mean_nuisances(log):
+    """Currents of fitted runs belong to no other run."""
+    free = nuisances(("current", "scale"), [log, log])
+    values = np.array([0.1 if "x of run 1" in p.name else -0.3 if "x of run 2" in p.name else 0.02 for p in free])
+    shared, means = with_mean_nuisances(free, values)
+    assert {p.name: x for p, x in zip(shared, means, strict=True)} == pytest.approx({
+        "current x": -0.1, "current y": 0.02, "DVL scale error": 0.02,
+    })  # fmt: skip
+    assert all(p.run is None for p in shared)
 
 
 def test_integration_grid_matches_the_command_period(log):
