@@ -592,3 +592,22 @@ def test_distant_regions_are_not_reevaluated(monkeypatch):
         regions = pack([Region("ball", Sphere((3.0, 0.2 + aside, 2.5), 0.3), "out", hard=hard)])
         assert cost_of(way, 1, regions)[0] == pytest.approx([6.0, 0.0, 0.0])
         assert least <= len(evaluated) <= most
+
+
+def test_trees_grow_faster_once_the_path_has_been_blocked_for_a_second():
+    """A goal that walls enclose: no path is found, so that every node stays."""
+    sides = [((1.0, 0.0, 0.0), (0.4, 3.0, 3.0)), ((0.0, 1.0, 0.0), (3.0, 0.4, 3.0)), ((0.0, 0.0, 1.0), (3.0, 3.0, 0.4))]
+    center = np.array([8.0, 0.5, 9.5])
+    walls = [
+        Region(f"wall {i} {sign}", Box(tuple(center + 1.3 * sign * np.array(normal)), size), "out")
+        for i, (normal, size) in enumerate(sides)
+        for sign in (-1.0, 1.0)
+    ]
+    plan, packed = empty_plan(len(walls), 1), pack(walls)
+    goal = pack([Region("goal", Sphere(tuple(center), 0.4), "in")])
+    nodes = []
+    for _ in range(100):
+        improve_path(plan, np.array([0.0, 0.0, 9.0]), goal, packed, GAINS, 0.02)
+        nodes.append(int(plan.search.of_goal.size[0] + plan.search.of_vehicle.size[0]))
+    grown = np.diff(nodes)
+    assert grown[:48].max() == 1 and 2.0 < grown[52:].mean() < grown[52:].max() <= 8

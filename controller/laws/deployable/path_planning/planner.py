@@ -38,6 +38,8 @@ _BETTER_PART = 0.01  # proportional part of that, as a fraction of the path's co
 _BLOCKED = 0.3  # cost by regions, as a fraction of the path's length, above which the trees search for another path
 _HARD, _ALL, _COSTLY = 0, 1, 2  # regions closed to the search: hard ones; all; hard ones and the costlier soft ones
 _SEARCH_CALLS = (100, 800)  # calls of the search with one choice of closed regions: at first; greatest number
+_BLOCKED_LONG = 1.0  # s, time for which the path has been blocked, after which the trees grow by more nodes a period
+_MORE_CALLS = 8  # calls of the search a period from then on: the vehicle goes astray meanwhile
 _PASSED = 0.25  # m, distance from a corner within which it counts as passed
 _CLIMBS = 12  # greatest number of steps from a point into the goal region
 _PAYS = 0.05  # least gain in depth per metre of such a step; it gains 1 where the gradient does not turn
@@ -61,6 +63,7 @@ class PathPlan(NamedTuple):
     turn: NDArray[np.int64]  # (3,) closed regions: `_HARD`, `_ALL` or `_COSTLY`; calls left with them; calls for each
     random_numbers: Array  # (5,) numbers in [0, 1) for one call of the search
     phase: NDArray[np.int64]  # (1,) `_BEGIN`, `_PATH` or `_CANDIDATE`
+    blocked: NDArray[np.int64]  # (1,) number of periods for which the path has been blocked
     random: NDArray[np.uint64]  # (1,) state of the generator
 
 
@@ -80,6 +83,7 @@ def empty_plan(n_regions: int, seed: int) -> PathPlan:
         turn=np.zeros(3, dtype=np.int64),
         random_numbers=np.zeros(5),
         phase=np.zeros(1, dtype=np.int64),
+        blocked=np.zeros(1, dtype=np.int64),
         random=state,
     )
 
@@ -135,6 +139,7 @@ def improve_path(
     _follow(plan, start, goal, limits, period)
     _evaluate(plan, start, goal, regions, limits)
     blocked = is_blocked(plan, start)
+    plan.blocked[0] = plan.blocked[0] + 1 if blocked else 0
     if not blocked and plan.cost[2] <= _BLOCKED * _length(plan.path, plan.counts[0], start):
         plan.search.room[0], plan.turn[0] = ROOM[0], _HARD
     elif plan.counts[2] == 0:
@@ -144,9 +149,12 @@ def improve_path(
             regions.kinds, regions.signs, regions.offsets, regions.numbers, regions.shifts, regions.velocities,
             regions.gains, plan.closed, regions.deviations, regions.crossing_costs,
         )  # fmt: skip
-        for i in range(random_numbers.size):
-            random_numbers[i] = uniform(plan.random)
-        plan.counts[2] = look_for_path(plan.search, start, end, random_numbers, closed, limits, plan.found)
+        for _ in range(_MORE_CALLS if plan.blocked[0] * period > _BLOCKED_LONG else 1):
+            for i in range(random_numbers.size):
+                random_numbers[i] = uniform(plan.random)
+            plan.counts[2] = look_for_path(plan.search, start, end, random_numbers, closed, limits, plan.found)
+            if plan.counts[2] > 0:
+                break
 
 
 def go_straight(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits) -> None:
