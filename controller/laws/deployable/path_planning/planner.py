@@ -40,6 +40,7 @@ _HARD, _ALL, _COSTLY = 0, 1, 2  # regions closed to the search: hard ones; all; 
 _SEARCH_CALLS = (100, 800)  # calls of the search with one choice of closed regions: at first; greatest number
 _BLOCKED_LONG = 1.0  # s, time for which the path has been blocked, after which the trees grow by more nodes a period
 _MORE_CALLS = 8  # calls of the search a period from then on: the vehicle goes astray meanwhile
+_SECOND_LOOK = 2.0  # s, time for which new trees then look for other paths, since the first one found may be a detour
 _PASSED = 0.25  # m, distance from a corner within which it counts as passed
 _CLIMBS = 12  # greatest number of steps from a point into the goal region
 _PAYS = 0.05  # least gain in depth per metre of such a step; it gains 1 where the gradient does not turn
@@ -63,7 +64,8 @@ class PathPlan(NamedTuple):
     turn: NDArray[np.int64]  # (3,) closed regions: `_HARD`, `_ALL` or `_COSTLY`; calls left with them; calls for each
     random_numbers: Array  # (5,) numbers in [0, 1) for one call of the search
     phase: NDArray[np.int64]  # (1,) `_BEGIN`, `_PATH` or `_CANDIDATE`
-    blocked: NDArray[np.int64]  # (1,) number of periods for which the path has been blocked
+    # (1,) number of periods for which the path has been blocked; if negative, of those left of the second look
+    blocked: NDArray[np.int64]
     random: NDArray[np.uint64]  # (1,) state of the generator
 
 
@@ -139,22 +141,41 @@ def improve_path(
     _follow(plan, start, goal, limits, period)
     _evaluate(plan, start, goal, regions, limits)
     blocked = is_blocked(plan, start)
-    plan.blocked[0] = plan.blocked[0] + 1 if blocked else 0
-    if not blocked and plan.cost[2] <= _BLOCKED * _length(plan.path, plan.counts[0], start):
+    looks_again = _count_blocked(plan, blocked, period)
+    if not (blocked or looks_again) and plan.cost[2] <= _BLOCKED * _length(plan.path, plan.counts[0], start):
         plan.search.room[0], plan.turn[0] = ROOM[0], _HARD
     elif plan.counts[2] == 0:
         end, random_numbers = plan.path[plan.counts[0] - 1], plan.random_numbers
-        _choose_closed(plan, blocked, start, end, regions, limits.margin)
+        _choose_closed(plan, blocked or looks_again, start, end, regions, limits.margin)
         closed = PackedRegions(
             regions.kinds, regions.signs, regions.offsets, regions.numbers, regions.shifts, regions.velocities,
             regions.gains, plan.closed, regions.deviations, regions.crossing_costs,
         )  # fmt: skip
-        for _ in range(_MORE_CALLS if plan.blocked[0] * period > _BLOCKED_LONG else 1):
+        for _ in range(_MORE_CALLS if looks_again or plan.blocked[0] * period > _BLOCKED_LONG else 1):
             for i in range(random_numbers.size):
                 random_numbers[i] = uniform(plan.random)
             plan.counts[2] = look_for_path(plan.search, start, end, random_numbers, closed, limits, plan.found)
             if plan.counts[2] > 0:
+                if looks_again:
+                    _restart_trees(plan.search)
                 break
+
+
+def _count_blocked(plan: PathPlan, blocked: bool, period: float) -> bool:
+    """Count the periods for which the path has been blocked; return True during a second look for other paths."""
+    if blocked:
+        plan.blocked[0] = max(plan.blocked[0], 0) + 1
+    elif plan.blocked[0] * period > _BLOCKED_LONG:
+        plan.blocked[0] = -int(_SECOND_LOOK / period)
+        _restart_trees(plan.search)
+    else:
+        plan.blocked[0] = min(plan.blocked[0], -1) + 1
+    return bool(plan.blocked[0] < 0)
+
+
+def _restart_trees(search: Search) -> None:
+    search.of_goal.size[0] = search.of_vehicle.size[0] = 0
+    search.room[0] = ROOM[0]
 
 
 def go_straight(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits) -> None:
@@ -182,8 +203,7 @@ def _choose_closed(
             plan.turn[2] = min(2 * plan.turn[2], _SEARCH_CALLS[1])
     if turn != plan.turn[0]:
         plan.turn[0], plan.turn[1] = turn, plan.turn[2]
-        plan.search.of_goal.size[0] = plan.search.of_vehicle.size[0] = 0
-        plan.search.room[0] = ROOM[0]
+        _restart_trees(plan.search)
     plan.turn[1] -= 1
     soft, mean = 0, 0.0
     for i in range(regions.kinds.size):
