@@ -19,6 +19,7 @@ MARGINS = (0.1, 0.2)  # s, times without samples at start and end of a window, i
 
 _SHORTEST = 0.6  # fraction of a full window, below which the rest of a run is dropped
 _SETTLED = 1.0  # s, from a run's first command to its first window: the commands then determine lagged forces
+_RESTS = 0.01  # fraction of a thruster's greatest command, up to which it rests: its neutral pulse may be a little off
 _IDLE = "no thruster works before or after it: the vehicle may be held"
 _MOST_GAP, _MOST_PAUSE = 1.0, 1.5  # s, longest gap in the commands; in samples of velocity, position and attitude
 _FASTEST = 3.0  # rad/s, greatest angular velocity about a body axis
@@ -81,8 +82,9 @@ def cut_windows(
 
 
 def _working_time(log: Log) -> tuple[float, float]:
-    """Return the times [s] of a run's first and last command that is not zero; its start and end if all are zero."""
-    working = np.flatnonzero((log.thrust != 0.0).any(axis=1) | (log.wrench != 0.0).any(axis=1))
+    """Return the times [s] of a run's first and last command above its noise; its start and end if all are zero."""
+    commands = np.abs(np.concatenate([log.thrust, log.wrench], axis=1))
+    working = np.flatnonzero((commands > _RESTS * commands.max(axis=0)).any(axis=1))
     if not len(working):
         return float(log.times[0]), float(log.times[-1])
     # a sampled command may have begun after the sample before, and ended before the sample after

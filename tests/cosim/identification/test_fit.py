@@ -270,7 +270,7 @@ def test_time_before_the_first_and_after_the_last_command_is_left_out(log, vehic
     """A vehicle that is held there moves as no model says."""
     step = integration_step([log])
     late = (log.times >= 13.0) & (log.times < 33.0)
-    thrust, wrench = (np.where(late[:, None], x, 0.0) for x in (log.thrust, log.wrench))
+    thrust, wrench = (np.where(late[:, None], x, 0.002 * x) for x in (log.thrust, log.wrench))
     windows, rejected = cut_windows([dataclasses.replace(log, thrust=thrust, wrench=wrench)], vehicle, step, 4.0)
     assert 13.0 <= windows[0].begin < 14.5 and windows[-1].begin + 0.6 * 4.0 < 33.5
     assert rejected == {
