@@ -143,6 +143,7 @@ class CompiledLaw:
     output: ClassVar[Output]
     function: ClassVar[Any]  # plain Python in the translator's subset, or anything that can be called
     gains_type: ClassVar[type[Any]]  # a NamedTuple of floats with defaults
+    above_zero: ClassVar[tuple[str, ...]] = ()  # gains that must not be 0
     diagnostics: tuple[Diagnostic, ...] = ()
     gains: Any
     memory: Any
@@ -179,7 +180,7 @@ class CompiledLaw:
         LawError
             If gains, attitude or period are invalid.
         """
-        raise NotImplementedError
+        return cls(vehicle, gains, desired_quaternion, period, n_regions)  # type: ignore[call-arg]
 
     @classmethod
     def validate(cls, gains: G) -> G:
@@ -200,7 +201,7 @@ class CompiledLaw:
         LawError
             If the law cannot work with them.
         """
-        raise NotImplementedError
+        return validate_gains(gains, cls.above_zero)
 
     def set_attitude(self, quaternion: Array) -> None:
         """Set the desired attitude from the next step on.
@@ -289,7 +290,6 @@ class WrenchLaw(CompiledLaw):
     """
 
     output: ClassVar[Output] = "wrench"
-    above_zero: ClassVar[tuple[str, ...]]  # gains that must not be 0
     make_memory: ClassVar[Callable[..., Any]]  # takes attitude (4,), period (1,) [s], and number of regions
 
     @classmethod
@@ -298,11 +298,6 @@ class WrenchLaw(CompiledLaw):
     ) -> WrenchLaw:
         """Return the law, as `CompiledLaw.for_vehicle`; the vehicle is not used."""
         return cls(gains, desired_quaternion, period, n_regions)
-
-    @classmethod
-    def validate(cls, gains: G) -> G:
-        """Validate gains, and return them."""
-        return validate_gains(gains, cls.above_zero)
 
     def __init__(self, gains: Any, desired_quaternion: Array, period: float, n_regions: int) -> None:
         self.gains, self.n_regions = self.validate(gains), n_regions

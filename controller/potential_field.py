@@ -72,9 +72,7 @@ def evaluate_field(
     field : Field
         Receives everything but `error`.
     """
-    p, e = state.position, state.quaternion
-    evaluate_packed(goal, p, e, field.goal_value, field.goal_gradient, field.goal_turning, field.goal_clearance)
-    evaluate_packed(regions, p, e, field.values, field.gradients, field.rotation_gradients, field.clearances)
+    evaluate_regions(state, goal, regions, field)
     field.push[:] = 0.0
     for i in range(field.values.size):
         if regions.kinds[i] >= _ATTITUDE:
@@ -82,6 +80,13 @@ def evaluate_field(
         add_along(
             field.gradients[i], -repulsion * regions.gains[i] * positive_part(reach - field.clearances[i]), field.push
         )
+
+
+def evaluate_regions(state: VehicleState, goal: PackedRegions, regions: PackedRegions, field: Field) -> None:
+    """Evaluate all regions at a pose, and write everything but `error` and `push`."""
+    p, e = state.position, state.quaternion
+    evaluate_packed(goal, p, e, field.goal_value, field.goal_gradient, field.goal_turning, field.goal_clearance)
+    evaluate_packed(regions, p, e, field.values, field.gradients, field.rotation_gradients, field.clearances)
 
 
 def add_along(gradient: Array, length: float, total: Array) -> None:

@@ -7,6 +7,8 @@ printed matrix is the transpose.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,7 +38,7 @@ def skew(a: Array) -> Array:
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
-def rotation_rows(e: Array) -> tuple[Vector3, Vector3, Vector3]:
+def rotation_rows(e: Array | Sequence[float]) -> tuple[Vector3, Vector3, Vector3]:
     """Return the rows of R, from body to world, of a unit quaternion `e`: (3)."""
     e0, e1, e2, e3 = e[0], e[1], e[2], e[3]
     return (

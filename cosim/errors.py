@@ -1,13 +1,13 @@
 """Errors of this package."""
 
+from plant_fmu.errors import one_line
+
 
 class CosimError(Exception):
     """Base of all errors of this package; its text is one line meant for the user."""
 
     def __str__(self) -> str:
         """Return the text on one line."""
-        from plant_fmu.errors import one_line  # imported here, since it imports the plant, which is slow to load
-
         return one_line(super().__str__())
 
 

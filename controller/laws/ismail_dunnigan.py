@@ -9,7 +9,8 @@ import numpy as np
 from controller import paper_law
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.paper_law import Gains
-from controller.regions.region_set import PackedRegions, evaluate_packed
+from controller.potential_field import Field, empty_field, evaluate_regions
+from controller.regions.region_set import PackedRegions
 
 
 class IsmailDunniganMemory(NamedTuple):
@@ -19,14 +20,7 @@ class IsmailDunniganMemory(NamedTuple):
     period: Array  # (1,) s
     estimate: Array  # (4,) phi-hat [N, N m]
     report: Array  # (0,)
-    goal_value: Array  # (1,) f
-    goal_gradient: Array  # (1, 3) df/dp, NED
-    goal_turning: Array  # (1, 3) df/dtheta, body frame; not used
-    goal_clearance: Array  # (1,) m or rad
-    values: Array  # (n,) g_i
-    gradients: Array  # (n, 3) dg_i/dp, NED
-    rotation_gradients: Array  # (n, 3) dg_i/dtheta, body frame; not used
-    clearances: Array  # (n,) m or rad
+    field: Field  # regions; its error and push are not used
     alphas: Array  # (n,) gains of the regions times their weights
 
 
@@ -40,20 +34,19 @@ def step(
     forces: Array,
 ) -> None:
     """Write the forces as `CompiledLaw.step`, by the paper's law."""
-    p, e = state.position, state.quaternion
+    field = memory.field
     # regions push by force alone (22): their derivatives by attitude are not used
-    evaluate_packed(goal, p, e, memory.goal_value, memory.goal_gradient, memory.goal_turning, memory.goal_clearance)
-    evaluate_packed(regions, p, e, memory.values, memory.gradients, memory.rotation_gradients, memory.clearances)
+    evaluate_regions(state, goal, regions, field)
     for i in range(weights.size):
         memory.alphas[i] = regions.gains[i] * weights[i]
     paper_law.step(
         state.quaternion,
         state.velocity_body,
         memory.desired_quaternion,
-        memory.goal_value[0],
-        memory.goal_gradient[0],
-        memory.values,
-        memory.gradients,
+        field.goal_value[0],
+        field.goal_gradient[0],
+        field.values,
+        field.gradients,
         memory.alphas,
         gains,
         memory.period[0],
@@ -69,14 +62,7 @@ def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> Ism
         period=period,
         estimate=np.zeros(4),
         report=np.zeros(0),
-        goal_value=np.zeros(1),
-        goal_gradient=np.zeros((1, 3)),
-        goal_turning=np.zeros((1, 3)),
-        goal_clearance=np.zeros(1),
-        values=np.zeros(n_regions),
-        gradients=np.zeros((n_regions, 3)),
-        rotation_gradients=np.zeros((n_regions, 3)),
-        clearances=np.zeros(n_regions),
+        field=empty_field(n_regions),
         alphas=np.zeros(n_regions),
     )
 

@@ -30,7 +30,7 @@ None of these sources was at hand. Model, gradients and program are those of the
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -42,7 +42,6 @@ from controller.law import (
     Output,
     VehicleModel,
     VehicleState,
-    validate_gains,
     validate_period,
     validate_quaternion,
 )
@@ -66,7 +65,6 @@ from controller.stack_array import zeros
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 _PRICE = 1e-6  # price of slack: squared force that costs as much as the square of slack times mass
-_ABOVE_ZERO = ("k_p1", "observer", "pull_in", "brake")  # gains that must not be 0
 
 
 class PidCbfGains(NamedTuple):
@@ -251,6 +249,7 @@ class PidCbfLaw(CompiledLaw):
     output: ClassVar[Output] = "thrusters"
     function = staticmethod(step)
     gains_type = PidCbfGains
+    above_zero = ("k_p1", "observer", "pull_in", "brake")
 
     def __init__(
         self, vehicle: VehicleModel, gains: PidCbfGains, desired_quaternion: Array, period: float, n_regions: int
@@ -274,18 +273,6 @@ class PidCbfLaw(CompiledLaw):
             thrusters=model.make_thrusters(vehicle),
             program=quadratic_program.empty_workspace(n_regions, m),
         )
-
-    @classmethod
-    def for_vehicle(
-        cls, vehicle: VehicleModel, gains: Any, desired_quaternion: Array, period: float, n_regions: int
-    ) -> PidCbfLaw:
-        """Return the law for a vehicle, as `CompiledLaw.for_vehicle`."""
-        return cls(vehicle, gains, desired_quaternion, period, n_regions)
-
-    @classmethod
-    def validate(cls, gains: Any) -> Any:
-        """Validate gains, and return them."""
-        return validate_gains(gains, _ABOVE_ZERO)
 
 
 LAW = PidCbfLaw

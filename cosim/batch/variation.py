@@ -8,10 +8,8 @@ from typing import Any
 
 from controller import ControllerError
 from cosim.errors import ScenarioError
-from cosim.scenario.changes import join_keys, value_at
-from cosim.scenario.key_names import PARAMETERS
+from cosim.scenario.changes import join_keys, value_at, with_values
 from cosim.scenario.scenario import Scenario, validate_scenario
-from cosim.scenario.toml_file import place_of
 from plant_fmu.errors import PlantFmuError
 
 _SEEDS = ("sensing.seed", "plant.parameters.seed")  # keys that get the seed of a row
@@ -91,14 +89,8 @@ class Variation:
         ScenarioError
             If a value is invalid; it names the key.
         """
-        table = _copy(self.base.table)
         changes = dict(self._changes(values, seed))
-        for key, value in changes.items():
-            if key.startswith(PARAMETERS):
-                table["plant"]["parameters"][key.removeprefix(PARAMETERS)] = value
-            else:
-                at, last = place_of(table, key)
-                at[last] = value
+        table = with_values(self.base.table, changes)
         table["changed"] = join_keys(table["changed"], (k for k, value in changes.items() if value != self.number(k)))
         try:
             return validate_scenario(table, self.base.name, self.base.vehicle)
@@ -143,10 +135,3 @@ def _convert(like: float | int, value: float, key: str) -> float | int:
     if not (math.isfinite(value) and value == round(value)):
         raise ScenarioError(f"{key} is {value}, expected a whole number")
     return round(value)
-
-
-def _copy(value: Any) -> Any:
-    """Copy a table, with lists instead of tuples."""
-    if isinstance(value, dict):
-        return {key: _copy(item) for key, item in value.items()}
-    return [_copy(item) for item in value] if isinstance(value, list | tuple) else value

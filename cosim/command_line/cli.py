@@ -31,6 +31,7 @@ from cosim.command_line import (
     watch,
 )
 from cosim.command_line.process import FAULT, print_status, run_guarded, signals_held
+from plant_fmu.errors import one_line, printable
 
 _EPILOG = """examples:
   cosim run paper
@@ -71,8 +72,6 @@ class _Parser(argparse.ArgumentParser):
         print(self.format_help(), end="", file=file)
 
     def error(self, message: str) -> NoReturn:
-        from plant_fmu.errors import one_line
-
         verb = self.prog.removeprefix("cosim").strip()
         shown = one_line(message)
         print_status(f"{verb}: {shown}; see cosim {verb} --help" if verb else f"{shown}; see cosim --help")
@@ -83,8 +82,6 @@ class _Lines(logging.Formatter):
     """Formats each message as one line, with a traceback below it."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:
-        from plant_fmu.errors import printable
-
         return printable(super().formatMessage(record))
 
 

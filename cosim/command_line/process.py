@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator
 from threading import current_thread, main_thread
 from types import FrameType
 
+from plant_fmu.errors import one_line
+
 FAULT, INTERRUPTED, NO_READER = 2, 130, 141  # exit statuses; the last two as in shells for SIGINT and SIGPIPE
 
 _KILLS = ("SIGTERM", "SIGHUP")  # the second when the terminal closes; Windows does not have it
@@ -45,8 +47,6 @@ def run_guarded(run: Callable[[], int]) -> int:
     except OSError as error:
         unread = isinstance(error, BrokenPipeError) and _is_unread()
         if not unread:
-            from plant_fmu.errors import one_line
-
             what = error.strerror or error
             print_status(one_line(f"{error.filename}: {what}" if error.filename else what))
         _drop_output()

@@ -67,9 +67,8 @@ class ReportedState:
         True if the autopilot has no fix of its horizontal position, and dead-reckons it.
     pilot_gain : float
         Present pilot gain of an ArduSub's sticks [-]; NaN if none is reported.
-    heard_at, beaten_at, pilot_at : float
-        Our times [s] of the autopilot's last processed message, its last heartbeat, and the last deflected sticks of
-        another station.
+    heard_at, pilot_at : float
+        Our times [s] of the autopilot's last processed message, and of the last deflected sticks of another station.
     sync : ClockSync
         Offset between the autopilot's clock and ours.
     """
@@ -88,7 +87,7 @@ class ReportedState:
         self.pulses: tuple[int, ...] = ()
         self.is_leaking = self.is_reckoned = False
         self.resets = 0  # ODOMETRY.reset_counter of the autopilot's estimate
-        self.heard_at = self.beaten_at = self.pilot_at = -math.inf
+        self.heard_at = self.pilot_at = -math.inf
         self.came: Counter[str] = Counter()  # counts of received messages, by name
         self.results: dict[int, int] = {}  # last MAV_RESULT of each command, by MAV_CMD number
         self.texts: list[str] = []
@@ -170,7 +169,7 @@ class ReportedState:
     # ---- handlers of messages ----
 
     def _heartbeat(self, m: Any, now: float) -> None:
-        self.beaten_at, self.autopilot, self.mode = now, m.autopilot, m.custom_mode
+        self.autopilot, self.mode = m.autopilot, m.custom_mode
         self.is_armed, self.in_failsafe = bool(m.base_mode & _ARMED), m.system_status >= _CRITICAL
 
     def _current_mode(self, m: Any, now: float) -> None:

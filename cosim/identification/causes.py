@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
 from cosim.identification.log import Log
-from cosim.identification.parameters import NUISANCES, RANDOM_FORCE, free_parameters, nuisances
-from cosim.identification.residuals import Residuals
+from cosim.identification.parameters import NUISANCES, RANDOM_FORCE, Parameter, free_parameters, nuisances
+from cosim.identification.residuals import Reduced, Residuals
 from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -63,10 +63,7 @@ def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values
         reduced = [problem.reduced(i, settings, at) for i in range(len(windows))]
     except IdentificationError:
         return []
-    deviation, start = (np.array([getattr(p, name) for p in every]) for name in ("deviation", "start"))
-    information = np.diag(deviation**-2.0) + sum(r.jacobian.T @ r.jacobian for r in reduced)
-    score = (at - start) / deviation**2 + sum(r.jacobian.T @ r.residual for r in reduced)
-    squares = sum(float(r.residual @ r.residual) for r in reduced)
+    information, score, squares = _normal_equations(every, reduced, at)
     excess = squares - sum(len(r.residual) for r in reduced)
     if excess <= 0.0:
         return []
@@ -96,9 +93,15 @@ def _left_by_random_force(forced: Residuals, fitted: Residuals, values: Array) -
         reduced = [forced.reduced(i, settings, values) for i in range(len(forced.windows))]
     except IdentificationError:
         return np.inf
-    information = np.diag([p.deviation**-2.0 for p in forced.parameters])
-    information = information + sum(r.jacobian.T @ r.jacobian for r in reduced)
-    score = np.array([(x - p.start) / p.deviation**2 for p, x in zip(forced.parameters, values, strict=True)])
-    score = score + sum(r.jacobian.T @ r.residual for r in reduced)
-    squares = sum(float(r.residual @ r.residual) for r in reduced)
+    information, score, squares = _normal_equations(forced.parameters, reduced, values)
     return squares - float(score @ np.linalg.solve(information, score))
+
+
+def _normal_equations(
+    parameters: Sequence[Parameter], reduced: Sequence[Reduced], values: Array
+) -> tuple[Array, Array, float]:
+    """Return information, score and sum of squares of one Gauss-Newton step."""
+    deviation, start = (np.array([getattr(p, name) for p in parameters]) for name in ("deviation", "start"))
+    information = np.diag(deviation**-2.0) + sum(r.jacobian.T @ r.jacobian for r in reduced)
+    score = (values - start) / deviation**2 + sum(r.jacobian.T @ r.residual for r in reduced)
+    return information, score, sum(float(r.residual @ r.residual) for r in reduced)

@@ -29,7 +29,6 @@ RANDOM_FORCE = "random_force"  # a nuisance that is eliminated from each window,
 DEFAULT_NUISANCES = ("current", "lever", "bias", "scale", "phase")
 
 _ELEMENT = re.compile(r"(?P<key>[a-z_]+\.[a-z_]+)(?:\.(?P<row>\d+)(?:\.(?P<column>\d+))?|\.(?P<part>diagonal))?")
-_SIX = "XYZKMN"
 _COUPLING = 0.3  # standard deviation of an off-diagonal element, in geometric means of its diagonal elements
 _RELATIVE = 1.0  # of damping and added mass: the start is known to about a factor of two
 _LEAST_LINEAR, _LEAST_QUADRATIC = (10.0, 0.5), (50.0, 1.0)  # the least deviations, along and about the axes

@@ -20,7 +20,7 @@ DRAWS = 256  # number of drawn vehicles
 _TRIES = 100  # most tries per drawn vehicle, until its mass matrix is positive definite
 
 
-def write_posterior(fit: Fit, vehicle: Vehicle, out: Path, seed: int = 0) -> Path:
+def write_posterior(fit: Fit, vehicle: Vehicle, out: Path) -> Path:
     """Write vehicles drawn from an identification beside its vehicle's file, one per line.
 
     Parameters
@@ -31,8 +31,6 @@ def write_posterior(fit: Fit, vehicle: Vehicle, out: Path, seed: int = 0) -> Pat
         Vehicle with the start values of the search.
     out : Path
         Path of the identified vehicle's file.
-    seed : int
-        Seed of the draws.
 
     Returns
     -------
@@ -45,7 +43,7 @@ def write_posterior(fit: Fit, vehicle: Vehicle, out: Path, seed: int = 0) -> Pat
         If the file cannot be written, or hardly any draw has a positive definite mass matrix.
     """
     path = out.with_suffix(".posterior.jsonl")
-    lines = [json.dumps({"draw": i, "parameters": p}) for i, p in enumerate(draw_plants(fit, vehicle, seed))]
+    lines = [json.dumps({"draw": i, "parameters": p}) for i, p in enumerate(draw_plants(fit, vehicle, seed=0))]
     try:
         write_atomic(path, "".join(f"{line}\n" for line in lines))
     except OSError as error:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from controller import LAWS
@@ -18,6 +18,24 @@ from plant_fmu.vehicle import Vehicle
 _UNLISTED_TABLES = ("title", "changed", "compare", "intersection", "record", "commands")
 _UNLISTED_KEYS = ("sensing.seed", "plant.parameters.seed", "arbiter.text")
 _MAX_LISTED = 3  # changes that a title spells out
+
+
+def with_values(table: dict[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a deep copy of a scenario's table, with lists for tuples, and with other values at some keys."""
+    changed: dict[str, Any] = _copy(table)
+    for key, value in values.items():
+        if key.startswith(PARAMETERS):
+            changed["plant"]["parameters"][key.removeprefix(PARAMETERS)] = value
+        else:
+            at, last = place_of(changed, key)
+            at[last] = value
+    return changed
+
+
+def _copy(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _copy(item) for key, item in value.items()}
+    return [_copy(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def changed_keys(before: dict[str, Any], after: dict[str, Any], vehicle: Vehicle) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from cosim.errors import ScenarioError
+from plant_fmu.errors import TableError, printable
 
 _SHOWN = 80  # greatest number of characters quoted in a message
 
@@ -67,7 +68,6 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
     TableError
         If a file cannot be read.
     """
-    from plant_fmu.errors import printable
     from plant_fmu.toml_tables import hint, read_toml  # imports NumPy and FMPy, which `cosim list` does not need
 
     path = Path(name_or_file)
@@ -149,7 +149,6 @@ def override(table: dict[str, Any], text: str) -> None:
     ScenarioError
         If the table has no place for such a key.
     """
-    from plant_fmu.errors import TableError
     from plant_fmu.toml_tables import MAX_DEPTH, require_modest
 
     key, equals, value_text = text.partition("=")

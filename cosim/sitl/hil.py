@@ -53,8 +53,6 @@ class HilServer:
         Seconds of the wall clock without data, after which the session ends; default: no limit.
     report : callable, optional
         Function that shows a line of progress to the user.
-    origin : (float, float)
-        Latitude and longitude of position 0 [deg].
     speedup : float, optional
         Greatest number of simulated seconds per second of the wall clock; default: no limit.
 
@@ -77,11 +75,10 @@ class HilServer:
         address: tuple[str, int],
         timeout: float | None = None,
         report: Callable[[str], None] | None = None,
-        origin: tuple[float, float] = ORIGIN,
         speedup: float | None = None,
     ) -> None:
         self._mavlink, self._speedup = dialect(), speedup
-        self._flights, self._timeout, self._report, self._origin = flights, timeout, report or log.info, origin
+        self._flights, self._timeout, self._report = flights, timeout, report or log.info
         self.counts = Counts()
         self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
@@ -164,7 +161,7 @@ class HilServer:
     def _send(self, connection: socket.socket, codec: Any, motion: Motion, frame: int) -> None:
         m = self._mavlink
         time_us = (frame + 1) * 1_000_000 // RATE
-        messages = hil_messages(m, motion, time_us, self._origin, frame % _GPS_EVERY == 0)
+        messages = hil_messages(m, motion, time_us, ORIGIN, frame % _GPS_EVERY == 0)
         if frame % _HEARTBEAT_EVERY == 0:
             messages.insert(0, m.MAVLink_heartbeat_message(m.MAV_TYPE_GENERIC, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
         data = b""

@@ -9,15 +9,11 @@ from scipy.spatial.transform import Rotation
 from controller import Gains, IsmailDunniganLaw, LawError, VehicleState
 from controller.paper_law import primary_error, primary_potential, secondary_error, secondary_potential, step
 from controller.regions import Region, Sphere, pack
+from tests.controller.test_baseline_laws import random_unit
 
 GAINS = Gains()
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 rng = np.random.default_rng(11)
-
-
-def random_unit():
-    e = rng.normal(size=4)
-    return e / np.linalg.norm(e)
 
 
 def evaluate_law(e, nu, goal, regions, alphas, e_d=None, gains=GAINS, period=0.001, phi=(0.0, 0.0, 0.0, 0.0)):
@@ -61,7 +57,7 @@ def textbook(e, e_d, nu, f, df, gs, dgs, alphas, phi):
 
 def test_wrench_and_adaptation_are_the_equations():
     for _ in range(50):
-        e, e_d, nu, phi = random_unit(), random_unit(), rng.normal(size=6), rng.normal(size=4)
+        e, e_d, nu, phi = random_unit(rng), random_unit(rng), rng.normal(size=6), rng.normal(size=4)
         f, df = rng.normal() * 5, rng.normal(size=3)
         gs, dgs, alphas = rng.normal(size=4), rng.normal(size=(4, 3)), rng.uniform(0, 100, 4)
         tau, estimate = evaluate_law(e, nu, (f, df), (gs, dgs), alphas, e_d, period=0.01, phi=phi)
@@ -75,7 +71,7 @@ def test_force_in_the_world_does_not_depend_on_attitude():
     f, df, gs, dgs, alphas = 3.0, rng.normal(size=3), [0.4, 0.2], rng.normal(size=(2, 3)), np.array([90.0, 20.0])
     forces = []
     for _ in range(5):
-        e = random_unit()
+        e = random_unit(rng)
         tau, _ = evaluate_law(e, np.zeros(6), (f, df), (gs, dgs), alphas)
         forces.append(Rotation.from_quat(np.roll(e, -1)).as_matrix() @ tau[:3])
     assert np.ptp(forces, axis=0) == pytest.approx(np.zeros(3), abs=1e-10)

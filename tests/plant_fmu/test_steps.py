@@ -4,14 +4,10 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
+from tests.plant_fmu.conftest import STATES
 from tests.plant_fmu.test_limits import begin
 
 MOVING = {"velocity.u": 0.8, "velocity.v": -0.5, "velocity.r": 0.4, "thrust_time_constant[1]": 0.0}
-STATE = [
-    *(f"position.{a}" for a in "xyz"),
-    *(f"quaternion.e{i}" for i in range(4)),
-    *(f"velocity.{a}" for a in "uvwpqr"),
-]
 
 
 def after_one(make_slave, start, length, substep):
@@ -19,7 +15,7 @@ def after_one(make_slave, start, length, substep):
     slave.set_values(MOVING | {"substep": substep})
     begin(slave, start)
     slave.fmu.doStep(start, length)
-    return slave.get(*STATE)
+    return slave.get(*STATES)
 
 
 @pytest.mark.parametrize("start", [0.0, 1e6, -1e6])

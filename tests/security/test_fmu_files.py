@@ -311,8 +311,6 @@ def test_no_binary_of_another_folder_is_loaded(tmp_path):
 
 # ---- any bytes ----
 
-PIECES = ["", "<", ">", '"', "&", "1e999", "-1", "nan", "\0", "<a/>", "\udc80"]
-
 
 def read_or_refused(path):
     said = ""

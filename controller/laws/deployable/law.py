@@ -340,13 +340,6 @@ class DeployableLaw(CompiledLaw):
         )
 
     @classmethod
-    def for_vehicle(
-        cls, vehicle: VehicleModel, gains: Any, desired_quaternion: Array, period: float, n_regions: int
-    ) -> DeployableLaw:
-        """Return the law for a vehicle, as `CompiledLaw.for_vehicle`."""
-        return cls(vehicle, gains, desired_quaternion, period, n_regions)
-
-    @classmethod
     def validate(cls, gains: Any) -> Any:
         """Validate the gains, and return them."""
         return check_gains(gains)

@@ -64,6 +64,11 @@ def load(text: str, vehicle: str) -> Scenario:
         Text from `scenario_text`.
     vehicle : str
         Name or path of the vehicle in the text.
+
+    Returns
+    -------
+    Scenario
+        Scenario of the text; a vehicle's path is relative to the working folder.
     """
     path = str(Path(vehicle).resolve()) if vehicle.endswith(".toml") else vehicle
     with tempfile.TemporaryDirectory(prefix="excite-") as folder:

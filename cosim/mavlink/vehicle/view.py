@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from functools import cached_property
 
+from controller.quaternion import rotation_rows
 from cosim.mavlink.vehicle.layout import Layout
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import MODES, Mode
@@ -85,12 +86,7 @@ class View:
     @cached_property
     def _rotation(self) -> tuple[Vector3, Vector3, Vector3]:
         """R from body to world, (3), as floats, which are faster here than arrays."""
-        e0, e1, e2, e3 = self.quaternion
-        return (
-            (1.0 - 2.0 * (e2 * e2 + e3 * e3), 2.0 * (e1 * e2 - e0 * e3), 2.0 * (e1 * e3 + e0 * e2)),
-            (2.0 * (e1 * e2 + e0 * e3), 1.0 - 2.0 * (e1 * e1 + e3 * e3), 2.0 * (e2 * e3 - e0 * e1)),
-            (2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), 1.0 - 2.0 * (e1 * e1 + e2 * e2)),
-        )
+        return rotation_rows(self.quaternion)
 
     def to_world(self, vector_body: Vector3) -> Vector3:
         """Rotate a vector from the body frame to the world, NED."""

@@ -6,7 +6,6 @@ is only used to compute others is not offered: the page writes numbers, and comp
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,10 +16,9 @@ from numpy.typing import NDArray
 from controller import ControllerError
 from cosim.errors import ScenarioError
 from cosim.replay.interactive.flight import Flight
-from cosim.scenario.changes import value_at
+from cosim.scenario.changes import value_at, with_values
 from cosim.scenario.key_names import PARAMETERS, key_name
 from cosim.scenario.scenario import Scenario, validate_scenario
-from cosim.scenario.toml_file import place_of
 from cosim.ssp.memory import Memory
 from plant_fmu import PlantFmuError
 from plant_fmu.variables import variables
@@ -107,15 +105,8 @@ def changed_scenario(scenario: Scenario, changes: Mapping[str, float]) -> Scenar
     ScenarioError
         If the changed scenario is invalid.
     """
-    table = copy_table(scenario.table)
-    for key, value in changes.items():
-        if key.startswith(PARAMETERS):
-            table["plant"]["parameters"][key.removeprefix(PARAMETERS)] = value
-        else:
-            at, last = place_of(table, key)
-            at[last] = value
     try:
-        return validate_scenario(table, scenario.name, scenario.vehicle)
+        return validate_scenario(with_values(scenario.table, changes), scenario.name, scenario.vehicle)
     except (PlantFmuError, ControllerError) as error:
         raise ScenarioError(str(error)) from error
 
@@ -224,10 +215,3 @@ def _numbers(value: Any) -> Iterator[Any]:
 def _equal(one: np.ndarray, other: np.ndarray) -> NDArray[np.bool_]:
     same = np.asarray(one == other)
     return np.asarray(same | (np.isnan(one) & np.isnan(other))) if one.dtype == np.float64 else same
-
-
-def copy_table(value: Any) -> Any:
-    """Return a deep copy of a scenario's table, with lists in place of tuples."""
-    if isinstance(value, dict):
-        return {key: copy_table(item) for key, item in value.items()}
-    return [copy_table(item) for item in value] if isinstance(value, list | tuple) else copy.copy(value)

@@ -22,6 +22,7 @@ from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.start_values import start_values
 from cosim.simulation.signals import Array
+from cosim.ssp.memory import arrays_of
 from plant_fmu.running.native import Native
 from plant_fmu.variables import variables
 
@@ -111,7 +112,7 @@ class Flight:
 
     def arrays(self) -> Iterator[Array]:
         """Yield every array of loop and law, in an order that is the same for scenarios of one kind."""
-        yield from _arrays((self.fly, self.decide))
+        yield from arrays_of((self.fly, self.decide))
 
     def _plant(self, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Native:
         """Return the plant's C functions with buffers for some variables, at their start values."""
@@ -132,11 +133,3 @@ class Flight:
 
 def _empty_allocator() -> Allocator:
     return Allocator(np.zeros((1, 0, 6)), np.zeros((1, 0)), np.zeros((1, 0)), False)
-
-
-def _arrays(value: Any) -> Iterator[Array]:
-    if isinstance(value, tuple):
-        for item in value:
-            yield from _arrays(item)
-    elif isinstance(value, np.ndarray):
-        yield value

@@ -6,10 +6,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cosim.replay.interactive.adjustable import Slot, copy_table
-from cosim.scenario.key_names import PARAMETERS
+from cosim.replay.interactive.adjustable import Slot
+from cosim.scenario.changes import with_values
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario
-from cosim.scenario.toml_file import place_of
 from cosim.scenario.toml_text import scenario_text
 
 _MARK = 730000000.5  # first of a row of placeholders for the page's numbers, of equal length as text
@@ -34,18 +33,12 @@ def scenario_template(scenario: Scenario, slots: Sequence[Slot]) -> ScenarioTemp
     slots : sequence of Slot
         Numbers that the page may change.
     """
-    table = copy_table(scenario.table)
+    marks = {repr(_MARK + i): slot.key for i, slot in enumerate(slots)}
+    table = with_values(scenario.table, {key: float(mark) for mark, key in marks.items()})
     if not table["failures"]:
         del table["failures"]
     if scenario.vehicle_file:
         table["vehicle"] = VEHICLE_COPY
-    marks = {repr(_MARK + i): slot.key for i, slot in enumerate(slots)}
-    for mark, key in marks.items():
-        if key.startswith(PARAMETERS):
-            table["plant"]["parameters"][key.removeprefix(PARAMETERS)] = float(mark)
-        else:
-            at, last = place_of(table, key)
-            at[last] = float(mark)
     table["title"] = _TITLE
     marks[f'"{_TITLE}"'] = "title"
     parts = re.split(f"({'|'.join(map(re.escape, marks))})", scenario_text(table, {}))

@@ -18,6 +18,7 @@ WIDTH = 6.8  # inches, width of every figure
 LEFT, RIGHT, BOTTOM, TOP = 0.80, 0.14, 0.46, 0.10  # inches around the axes
 LEGEND_ROW = 0.19  # inches, height of a row
 _GAP = 0.14  # inches between axes
+_MARGIN = 0.06  # margin beyond signals, as a fraction of their span
 _LABEL = 0.17  # inches from the figure's edge to the centre of an axis label
 _MAX_LETTERS = 34  # greatest number of letters of a name in a legend
 _LETTERS, _MARK = 104, 7  # widths in letters of a legend: width of the figure; width of a line with its gap
@@ -38,9 +39,8 @@ def panels(
     widths: Sequence[float] = (1.0,),
     labels: Sequence[str] = (),
     titles: float = 0.0,
-    sharey: bool = True,
 ) -> tuple[Figure, Any]:
-    """Create a figure and its axes; axes of a column share their x axis.
+    """Create a figure and its axes; axes of a column share their x axis, and those of a row their y axis.
 
     Parameters
     ----------
@@ -52,8 +52,6 @@ def panels(
         Labels of the legend above all axes.
     titles : float
         Height of titles above the axes [inch].
-    sharey : bool
-        True if axes of a row share their y axis.
 
     Returns
     -------
@@ -70,7 +68,7 @@ def panels(
         y -= height
         x = LEFT
         for j, width in enumerate(wide):
-            beside = axes[i, 0] if j and sharey else None
+            beside = axes[i, 0] if j else None
             box = (x / WIDTH, y / total, width / WIDTH, height / total)
             ax = figure.add_axes(box, sharex=axes[0, j] if i else None, sharey=beside)
             plain_numbers(ax)
@@ -127,7 +125,7 @@ def _power(value: float, _: object = None) -> str:
     return f"{'−' if value < 0.0 else ''}{number}"
 
 
-def limits_of(signals: Sequence[Array], *, least: float = 0.0, room: float = 0.06) -> tuple[float, float]:
+def limits_of(signals: Sequence[Array], *, least: float = 0.0) -> tuple[float, float]:
     """Return limits of an axis that contain all values of signals.
 
     Parameters
@@ -136,8 +134,6 @@ def limits_of(signals: Sequence[Array], *, least: float = 0.0, room: float = 0.0
         Signals of any shape; NaN and infinity are ignored.
     least : float
         Least span of the axis.
-    room : float
-        Margin beyond the signals, as a fraction of their span.
 
     Returns
     -------
@@ -148,7 +144,7 @@ def limits_of(signals: Sequence[Array], *, least: float = 0.0, room: float = 0.0
     shown = np.concatenate([f for f in finite if f.size] or [np.array([-1.0, 1.0])])
     low, high = float(shown.min()), float(shown.max())
     spread = max(high - low, least, 1e-9 * max(abs(low), abs(high)), 1e-12)
-    extra = (spread - (high - low)) / 2.0 + room * spread
+    extra = (spread - (high - low)) / 2.0 + _MARGIN * spread
     return low - extra, high + extra
 
 

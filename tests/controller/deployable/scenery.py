@@ -4,6 +4,7 @@ import numpy as np
 
 from controller import LAWS, VehicleState
 from controller.laws.deployable.model import (
+    Dynamics,
     Loads,
     free_acceleration,
     make_dynamics,
@@ -64,6 +65,16 @@ class Sea:
             self.quaternion += h * rate(self.quaternion, self.omega)
             self.quaternion /= np.linalg.norm(self.quaternion)
             self.omega += h * (free + pushed)[3:]
+
+
+def askew(rng):
+    """Return a model of which nothing is symmetric."""
+    root = rng.normal(size=(6, 6))
+    mass = root @ root.T + np.diag([90.0, 80.0, 70.0, 9.0, 8.0, 7.0])
+    damping, braking = rng.uniform(1.0, 30.0, (2, 6)), rng.uniform(0.1, 0.4, 9)
+    return Dynamics(
+        mass, np.linalg.inv(mass), *damping, np.array([np.trace(mass[:3, :3]) / 3.0]), np.array([70.0]), braking
+    )
 
 
 def law_for(regions, gains=None, period=0.02):

@@ -8,18 +8,13 @@ from scipy.spatial.transform import Rotation
 from controller.laws.deployable import attitude as loop
 from controller.laws.deployable.estimate import make_estimate
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.model import Dynamics
 from controller.regions import Orientation, Region, Sphere, Visibility, pack
-from tests.controller.deployable.scenery import ODIN
+from tests.controller.deployable.scenery import ODIN, askew
+from tests.controller.test_baseline_laws import random_unit
 
 PERIOD = 0.02
 GAINS = DeployableGains()
 NOWHERE = np.zeros(3)
-
-
-def turned(rng):
-    e = rng.normal(size=4)
-    return e / np.linalg.norm(e)
 
 
 def rotation(e):
@@ -30,17 +25,8 @@ def down(e):
     return rotation(e).as_matrix()[2]
 
 
-def askew(rng):
-    root = rng.normal(size=(6, 6))
-    mass = root @ root.T + np.diag([90.0, 80.0, 70.0, 9.0, 8.0, 7.0])
-    damping = rng.uniform(1.0, 30.0, (2, 6))
-    return Dynamics(
-        mass, np.linalg.inv(mass), *damping, np.array([np.trace(mass[:3, :3]) / 3.0]), np.array([70.0]), np.ones(9)
-    )
-
-
 def loop_of(rng):
-    attitude = loop.empty_attitude(turned(rng))
+    attitude = loop.empty_attitude(random_unit(rng))
     attitude.last_omega[:] = rng.normal(size=3)
     return attitude
 
@@ -60,7 +46,7 @@ def test_measured_moment_is_the_residual_of_the_equation_of_motion():
     """M nu_r' = wrench without thrust + thrust and weight: the lower half of it, by plain matrices."""
     rng = np.random.default_rng(1)
     for _ in range(30):
-        attitude, dynamics, R = loop_of(rng), askew(rng), rotation(turned(rng)).as_matrix()
+        attitude, dynamics, R = loop_of(rng), askew(rng), rotation(random_unit(rng)).as_matrix()
         estimate, omega = seen_by(rng), rng.normal(size=3) * 0.5
         mean, before = 0.5 * (omega + attitude.last_omega), attitude.last_omega.copy()
         assert not loop.measure_moment(attitude, dynamics, R, before, estimate, PERIOD)  # the first rates that it sees
@@ -85,7 +71,7 @@ def test_measured_moment_is_the_residual_of_the_equation_of_motion():
 def test_desired_moment_takes_the_shortest_rotation_with_feedforward():
     rng, out, w = np.random.default_rng(4), np.empty(3), GAINS.attitude_bandwidth
     for _ in range(20):
-        attitude, dynamics, e, omega = loop_of(rng), askew(rng), turned(rng), rng.normal(size=3)
+        attitude, dynamics, e, omega = loop_of(rng), askew(rng), random_unit(rng), rng.normal(size=3)
         off = (rotation(attitude.desired).inv() * rotation(e)).as_rotvec()  # at most half a turn
         off *= np.sin(np.linalg.norm(off) / 2.0) / np.linalg.norm(off)
         free = rng.normal(size=6)
@@ -106,7 +92,7 @@ def apart(e, expected):
 
 def test_attitude_integration_matches_the_exponential_map():
     rng = np.random.default_rng(5)
-    e, omega = turned(rng), rng.normal(size=3)
+    e, omega = random_unit(rng), rng.normal(size=3)
     before = rotation(e).as_matrix()
     loop.integrate_attitude(e, omega, 1e-3, e)
     S = np.array([[0, -omega[2], omega[1]], [omega[2], 0, -omega[0]], [-omega[1], omega[0], 0]])
@@ -129,7 +115,7 @@ def test_held_attitude_returns_at_one_fifth_per_second():
 def test_held_attitude_is_constant_bit_for_bit():
     rng = np.random.default_rng(10)
     for _ in range(50):
-        attitude = loop.empty_attitude(turned(rng))
+        attitude = loop.empty_attitude(random_unit(rng))
         loop.update_desired(attitude, pack([]), NOWHERE, GAINS, PERIOD)
         assert np.array_equal(attitude.desired, attitude.preferred)
 
@@ -159,9 +145,9 @@ def test_desired_attitude_moves_into_attitude_regions():
     gains, position = GAINS._replace(tilt=np.pi, turning_rate=1e3), np.array([0.3, -0.2, 0.1])
     for _ in range(20):
         attitude = loop_of(rng)
-        attitude.desired[:] = turned(rng)
+        attitude.desired[:] = random_unit(rng)
         regions = [
-            Region("face", Orientation(tuple(turned(rng)), 0.3), "in"),
+            Region("face", Orientation(tuple(random_unit(rng)), 0.3), "in"),
             Region("see", Visibility((2.0, 1.0, 0.5), (1.0, 0.2, -0.1), 0.4, (0.2, 0.1, 0.3)), "in"),
         ]
         expected = after(attitude.desired, asked_turn(attitude, regions, position), 1e-4)
@@ -195,7 +181,7 @@ def test_at_maximum_tilt_the_rotation_is_about_the_vertical():
         axis *= GAINS.tilt / np.linalg.norm(axis)
         x, y, z, w = (Rotation.from_rotvec([0, 0, rng.uniform(-2, 2)]) * Rotation.from_rotvec([*axis, 0.0])).as_quat()
         attitude.desired[:] = w, x, y, z
-        region = Region("tilt", Orientation(tuple(turned(rng)), 0.1), "in")
+        region = Region("tilt", Orientation(tuple(random_unit(rng)), 0.1), "in")
         turn = asked_turn(attitude, [region], NOWHERE)
         turn *= min(1.0, GAINS.turning_rate / np.linalg.norm(turn))
         free = after(attitude.desired, turn)

@@ -13,7 +13,6 @@ from controller.laws.deployable.barrier import empty_observation, observe_region
 from controller.laws.deployable.estimate import POSITION, VELOCITY, initialize, make_estimate
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.model import (
-    Dynamics,
     Loads,
     available_braking,
     free_acceleration,
@@ -24,22 +23,13 @@ from controller.laws.deployable.model import (
 )
 from controller.laws.deployable.path_planning.planner import CORNERS, empty_plan
 from controller.regions import HalfSpace, Orientation, Region, Sphere, pack
-from tests.controller.deployable.scenery import LEVEL, ODIN, law_for
+from tests.controller.deployable.scenery import LEVEL, ODIN, askew, law_for
 
 GAINS = DeployableGains()
 
 
 TURNED = Rotation.from_euler("zyx", [0.7, -0.3, 0.2]).as_matrix()
 ATTITUDE = Rotation.from_matrix(TURNED).as_quat()[[3, 0, 1, 2]]
-
-
-def askew(rng):
-    root = rng.normal(size=(6, 6))
-    mass = root @ root.T + np.diag([90.0, 80.0, 70.0, 9.0, 8.0, 7.0])
-    damping, braking = rng.uniform(1.0, 30.0, (2, 6)), rng.uniform(0.1, 0.4, 9)
-    return Dynamics(
-        mass, np.linalg.inv(mass), *damping, np.array([np.trace(mass[:3, :3]) / 3.0]), np.array([70.0]), braking
-    )
 
 
 def approach(distance, a, slope):

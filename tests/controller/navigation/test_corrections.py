@@ -10,14 +10,11 @@ from controller.navigation.corrections import correct_by_sensor
 from controller.navigation.estimate import N_ERRORS, empty_memory, set_first_covariance
 from controller.navigation.inertial import propagate
 from controller.navigation.measurements import COMPASS, DEPTH_SENSOR, DVL, USBL, SensorModel, empty_measurements
+from tests.controller.navigation.test_inertial import rotation
 
 SENSORS = SensorModel()
 PLACES = {DEPTH_SENSOR: slice(0, 1), DVL: slice(1, 4), COMPASS: slice(11, 12), USBL: slice(12, 15)}
 NOISE = {DEPTH_SENSOR: 0.002, DVL: 0.005, COMPASS: 0.0035, USBL: 0.15}
-
-
-def rotation(quaternion):
-    return Rotation.from_quat(np.asarray(quaternion)[[1, 2, 3, 0]])
 
 
 def ideal_measurement(memory, sensor):

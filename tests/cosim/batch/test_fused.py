@@ -13,6 +13,7 @@ from cosim.results.recorder import Recorder
 from cosim.results.summary import summarise
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
+from tests.cosim.simulation.keep import kept_rows
 
 CLOSED = 'arbiter.engine="closed"'
 BRISK = [CLOSED, "time.duration=12.0", "time.step=0.01", "time.control=0.02", "time.arbiter=0.01"]
@@ -24,23 +25,9 @@ def scenario_of(law, *more):
     return load_scenario("paper", [CLOSED, f"law.name={law}", f"actuation.through={through}", *more])
 
 
-class Rows:
-    def __init__(self):
-        self.rows = []
-
-    def observe(self, k, row):
-        self.rows.append(row.copy())
-
-
-def recorded(scenario):
-    rows = Rows()
-    with Master(scenario) as master:
-        master.run([rows])
-        return np.array(rows.rows), master.signals
-
-
 def assert_same_flight(scenario):
-    rows, signals = recorded(scenario)
+    kept = kept_rows(scenario)
+    rows, signals = kept.rows, kept.signals
     with FusedFlyer(Variation(scenario, [])) as flyer:
         _, trace = flyer.fly_one(scenario, trace=True)
     decided = rows[:-1][:: scenario.control_every]

@@ -4,7 +4,7 @@ import numpy as np
 
 from cosim.logs.frames import quaternions_of_angles
 
-NEUTRAL, SPAN = 1500.0, 400.0
+NEUTRAL = 1500.0
 
 
 class Dive:

@@ -1,4 +1,4 @@
-"""Stop the link threads of each test, even if the test fails."""
+"""Stations, and link threads that stop with their test, even if it fails."""
 
 import importlib.util
 
@@ -17,3 +17,14 @@ def links_end(monkeypatch):
     yield
     for links in begun:
         links.close()
+
+
+@pytest.fixture
+def station():
+    """An autopilot as an ArduSub, whose station has seen one snapshot."""
+    from tests.cosim.mavlink.station import Station
+
+    station = Station("ardusub")
+    station.look(0.0)
+    station.wire.clear()
+    return station

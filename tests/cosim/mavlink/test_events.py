@@ -9,14 +9,6 @@ from tests.cosim.mavlink.station import Station
 BEAT = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
 
 
-@pytest.fixture
-def station():
-    station = Station("ardusub")
-    station.look(0.0)
-    station.wire.clear()
-    return station
-
-
 def clearances(goal=-3.0, first=2.0, band=2.0):
     return {"goal.clearance": (goal, first, 2.0, band, 1e5, 1e5)}
 

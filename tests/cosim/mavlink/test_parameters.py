@@ -23,14 +23,6 @@ REAL32, INT32 = 9, 6
 LIST = mavlink.MAVLink_param_request_list_message(1, 1)
 
 
-@pytest.fixture
-def station():
-    station = Station("ardusub")
-    station.look()
-    station.wire.clear()
-    return station
-
-
 def read(station, name, index=-1):
     return station.send(mavlink.MAVLink_param_request_read_message(1, 1, name.encode(), index))
 

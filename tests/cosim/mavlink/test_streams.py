@@ -7,19 +7,11 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.messages import MESSAGES
 from cosim.mavlink.messages.streams import GREATEST_LOAD
-from tests.cosim.mavlink.station import NAN, Station
+from tests.cosim.mavlink.station import NAN
 
 ACCEPTED, _, DENIED, _, FAILED = range(5)
 SET, GET, ONCE = 511, 510, 512
 ATTITUDE = 30
-
-
-@pytest.fixture
-def station():
-    station = Station("ardusub")
-    station.look(0.0)
-    station.wire.clear()
-    return station
 
 
 def run(station, seconds, step=0.01, **values):

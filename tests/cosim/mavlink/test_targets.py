@@ -27,13 +27,6 @@ EAST = {"attitude.yaw": math.pi / 2, "quaternion.e0": (math.sqrt(0.5), 0.0, 0.0,
 REPOSITION, YAW = 192, 115
 
 
-@pytest.fixture
-def station():
-    station = Station("ardusub")
-    station.look()
-    return station
-
-
 def local(frame=1, mask=POSITION, place=(3.0, 4.0, 5.0), speed=(0.0, 0.0, 0.0), yaw=0.0):
     return mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, frame, mask, *place, *speed, 0, 0, 0, yaw, 0)
 

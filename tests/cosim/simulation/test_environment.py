@@ -7,7 +7,7 @@ from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.master import Master
-from tests.cosim.simulation.test_master import Keep
+from tests.cosim.simulation.keep import Keep
 
 PERIODS = ["time.step=0.01", "time.control=0.01", "time.arbiter=0.01", "time.duration=1.0"]
 SHORT = ["arbiter.engine=closed", "law.gains.k_p1=0.001", *PERIODS]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.master import Master
+from tests.cosim.simulation.keep import kept_rows
 from tests.cosim.ssp.jacobi import jacobi as by_parts
 
 ALL_SHAPES = Path(__file__).parents[1] / "ssp" / "all-shapes.toml"
@@ -17,31 +17,16 @@ SHORT = [
 ]  # fmt: skip
 
 
-class Rows:
-    def __init__(self):
-        self.rows = []
-
-    def observe(self, k, row):
-        self.rows.append(row.copy())
-
-
-def rows_of(scenario):
-    rows = Rows()
-    with Master(scenario) as master:
-        master.run([rows])
-        return np.array(rows.rows), master.signals
-
-
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("scenario", [("paper", SHORT), (ALL_SHAPES, [])], ids=["paper", "all shapes"])
 def test_jacobi_exchanges_values_at_the_end_of_each_step(scenario):
     name, settings = scenario
     loaded = load_scenario(name, [*settings, "master.order=jacobi"])
-    rows, signals = rows_of(loaded)
-    at = signals.index("position.x")
-    np.testing.assert_array_equal(rows[:, at : at + 13], by_parts(loaded))
-    at = signals.index("weight.obstacle")
-    assert rows[:, at : at + 3].max() > 0.5
+    kept = kept_rows(loaded)
+    at = kept.signals.index("position.x")
+    np.testing.assert_array_equal(kept.rows[:, at : at + 13], by_parts(loaded))
+    at = kept.signals.index("weight.obstacle")
+    assert kept.rows[:, at : at + 3].max() > 0.5
 
 
 def test_jacobi_and_gauss_seidel_converge_with_the_step():
@@ -49,9 +34,9 @@ def test_jacobi_and_gauss_seidel_converge_with_the_step():
         given = [*SHORT[:2], *(f"time.{key}={step}" for key in ("step", "control", "arbiter")), SHORT[-1]]
         ends = []
         for order in ("gauss-seidel", "jacobi"):
-            rows, signals = rows_of(load_scenario("paper", [*given, f'master.order="{order}"']))
-            at = signals.index("position.x")
-            ends.append(rows[-1, at : at + 3])
+            kept = kept_rows(load_scenario("paper", [*given, f'master.order="{order}"']))
+            at = kept.signals.index("position.x")
+            ends.append(kept.rows[-1, at : at + 3])
         return np.linalg.norm(ends[0] - ends[1])
 
     coarse, fine = apart(0.02), apart(0.005)

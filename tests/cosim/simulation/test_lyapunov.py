@@ -11,27 +11,14 @@ from cosim.scenario.scenario import load_scenario
 from cosim.simulation.lyapunov_signals import FORMS
 from cosim.simulation.master import Master
 from cosim.simulation.signals import Column
+from tests.cosim.simulation.keep import kept_rows
 
 QUICK = ("arbiter.engine=closed", "record.lyapunov=true")
 ALONE = ("regions=[]", "intersection=[]")
 
 
-class Keep:
-    def __init__(self, master):
-        self.rows, self.signals = [], master.signals
-
-    def observe(self, k, row):
-        self.rows.append(row.copy())
-
-    def __getitem__(self, name):
-        return np.array(self.rows)[:, self.signals.index(name)]
-
-
 def run(*overrides, name="paper"):
-    with Master(load_scenario(name, [*QUICK, *overrides])) as master:
-        kept = Keep(master)
-        master.run([kept])
-    return kept
+    return kept_rows(load_scenario(name, [*QUICK, *overrides]))
 
 
 def defect(kept, form, step):

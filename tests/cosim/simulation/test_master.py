@@ -8,27 +8,13 @@ import pytest
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 from plant_fmu import PlantError
+from tests.cosim.simulation.keep import kept_rows
 
 SHORT = ["arbiter.engine=closed", "time.duration=0.5"]
 
 
-class Keep:
-    def __init__(self, master):
-        self.rows, self.signals = [], master.signals
-
-    def observe(self, k, row):
-        assert k == len(self.rows)
-        self.rows.append(row.copy())
-
-    def __getitem__(self, name):
-        return np.array(self.rows)[:, self.signals.index(name)]
-
-
 def run(name="paper-limited", *overrides):
-    with Master(load_scenario(name, [*SHORT, *overrides])) as master:
-        kept = Keep(master)
-        master.run([kept])
-    return kept
+    return kept_rows(load_scenario(name, [*SHORT, *overrides]))
 
 
 def test_time_is_a_count_of_steps():

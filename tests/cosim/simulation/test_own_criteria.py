@@ -16,6 +16,7 @@ from cosim.simulation.master import Master
 from fuzzy_arbiter import Arbiter, Criterion
 from fuzzy_arbiter.formats import load
 from tests.cosim.scenario.test_criteria import RULES, SCENARIO
+from tests.cosim.simulation.keep import kept_rows
 
 FOUR = "inspection-visibility"
 PAST_THE_PILLAR = "law.gains.path_planning=0"  # close, since no path makes way for it
@@ -40,24 +41,9 @@ def swept(own):
     return own
 
 
-class Rows:
-    def __init__(self, scenario):
-        self.rows = []
-        with Master(scenario) as master:
-            master.run([self])
-            self._at = master.signals.index
-        self.rows = np.array(self.rows)
-
-    def observe(self, k, row):
-        self.rows.append(row.copy())
-
-    def __getitem__(self, name):
-        return self.rows[:, self._at(name)]
-
-
 @functools.lru_cache
 def flown(*changes):
-    return Rows(load_scenario(FOUR, list(changes)))
+    return kept_rows(load_scenario(FOUR, list(changes)))
 
 
 def test_weights_are_those_of_numpy_and_scikit_fuzzy():
@@ -93,7 +79,7 @@ def test_weights_are_those_of_numpy_and_scikit_fuzzy():
 
 
 def assert_same_to_the_last_bit(scenario):
-    run = Rows(scenario)
+    run = kept_rows(scenario)
     with FusedFlyer(Variation(scenario, ())) as flyer:
         _, trace = flyer.fly_one(scenario, trace=True)
     n, decisions = len(scenario.criteria), slice(0, scenario.steps, scenario.control_every)
@@ -133,7 +119,7 @@ def test_fused_loop_with_curves_equals_the_master():
         "criteria.visibility.membership={clearance={formula='1 / (1 + exp(20 * (x + 0.15)))'}}",
     ]
     run = assert_same_to_the_last_bit(load_scenario(FOUR, ["time.duration=14.0", PAST_THE_PILLAR, *NOISY, *changes]))
-    clean = Rows(load_scenario(FOUR, ["time.duration=4.0", *changes]))
+    clean = kept_rows(load_scenario(FOUR, ["time.duration=4.0", *changes]))
     every = slice(0, None, 38)  # rows at which the arbiter decides
     riser = np.hypot(clean["position.x"] - 7.4, clean["position.y"] - 2.2) - 1.0
     np.testing.assert_allclose(clean["membership.shape"][every], np.exp(-(riser**2) / 0.18)[every], atol=1e-4)
@@ -199,7 +185,7 @@ def test_visibility_criterion_changes_the_motion():
     """With the criterion the joint enters the view within six seconds, without its gain never."""
     seen = flown("time.duration=14.0")
     assert (seen["view.clearance"][600:] > 0.0).all()
-    assert (Rows(load_scenario(FOUR, ["time.duration=14.0", "regions.view.gain=0"]))["view.clearance"] < -0.4).all()
+    assert (flown("time.duration=14.0", "regions.view.gain=0")["view.clearance"] < -0.4).all()
 
 
 @pytest.mark.slow

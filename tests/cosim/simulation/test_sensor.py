@@ -9,7 +9,7 @@ import pytest
 from controller import LAWS, IsmailDunniganLaw
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
-from tests.cosim.simulation.test_master import Keep
+from tests.cosim.simulation.keep import kept_rows
 
 PERIODS = ["time.step=0.01", "time.control=0.01", "time.arbiter=0.01", "time.duration=2.0"]
 THRUSTERS = ["arbiter.engine=closed", "actuation.through=thrusters", *PERIODS]
@@ -18,10 +18,7 @@ DEAD = ["sensing.dead_from=0.5", "sensing.dead_for=0.3"]
 
 
 def run(*overrides, name="paper"):
-    with Master(load_scenario(name, [*THRUSTERS, *overrides])) as master:
-        kept = Keep(master)
-        master.run([kept])
-    return kept
+    return kept_rows(load_scenario(name, [*THRUSTERS, *overrides]))
 
 
 def stack(kept, *names):

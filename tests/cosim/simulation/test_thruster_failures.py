@@ -4,25 +4,15 @@ import numpy as np
 import pytest
 
 from cosim import load_scenario
-from cosim.simulation.master import Master
+from tests.cosim.simulation.keep import kept_rows
 
 GIVEN = ["actuation.through=thrusters", "time.duration=3.0", "law.name=pd"]
 
 
 def flown(failures, *more):
     """Return what each thruster was commanded and what it gave, a row a step."""
-    rows = []
-
-    class Watch:
-        def observe(self, k, row):
-            rows.append(row.copy())
-
-    with Master(load_scenario("paper", [*GIVEN, f"failures={failures}", *more])) as master:
-        names = [column.name for column in master.signals.columns]
-        master.run([Watch()])
-    table = np.array(rows)
-    columns = [[names.index(f"{kind}[{j + 1}]") for j in range(8)] for kind in ("thrust", "thruster_force")]
-    return table[:, columns[0]], table[:, columns[1]]
+    kept = kept_rows(load_scenario("paper", [*GIVEN, f"failures={failures}", *more]))
+    return [np.column_stack([kept[f"{kind}[{j + 1}]"] for j in range(8)]) for kind in ("thrust", "thruster_force")]
 
 
 @pytest.mark.medium

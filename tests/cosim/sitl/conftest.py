@@ -36,10 +36,11 @@ def serve(tmp_path):
     """Return a function that begins to serve; each server has a folder of its own."""
     begun = []
 
-    def begin(*overrides, vehicle="bluerov2_heavy", timeout=30.0, record_rate=2000.0, **more):
+    def begin(*overrides, kind=JsonServer, of=("ardupilot", law_of_pwm), vehicle="bluerov2_heavy", timeout=30.0,
+              record_rate=2000.0, **more):  # fmt: skip
         out = tmp_path / f"run{len(begun)}"
         options = FlightOptions("sitl", overrides, vehicle, out, record_rate, report=False, **more)
-        served = Served(JsonServer(Flights(options, "ardupilot", law_of_pwm), ("127.0.0.1", 0), timeout))
+        served = Served(kind(Flights(options, *of), ("127.0.0.1", 0), timeout))
         begun.append(served)
         served.start()
         return served

@@ -1,5 +1,6 @@
 """PX4's simulator interface, against a stand-in that packs and reads MAVLink 2 by hand."""
 
+import functools
 import itertools
 import math
 import socket
@@ -11,12 +12,10 @@ import pytest
 from cosim.errors import RunError
 from cosim.mavlink.wire.dialect import dialect
 from cosim.results.record import load_record
-from cosim.sitl.flights import FlightOptions, Flights
 from cosim.sitl.hil import LEFT, HilServer
 from cosim.sitl.hil_messages import FIELD_NED, RATE, hil_messages, pressure_at
 from cosim.sitl.law import law_of_controls
 from cosim.sitl.motion import Motion
-from tests.cosim.sitl.conftest import Served
 
 # id: extra byte of the checksum, and the payload's fields as they go over the wire
 MESSAGES = {
@@ -98,19 +97,8 @@ class Px4:
 
 
 @pytest.fixture
-def serve_px4(tmp_path):
-    begun = []
-
-    def begin(*overrides, timeout=30.0, vehicle="bluerov2_heavy"):
-        options = FlightOptions("sitl", overrides, vehicle, tmp_path / f"px4-{len(begun)}", 1000.0, report=False)
-        served = Served(HilServer(Flights(options, "px4", law_of_controls), ("127.0.0.1", 0), timeout))
-        begun.append(served)
-        served.start()
-        return served
-
-    yield begin
-    for served in begun:
-        served.join(60.0)
+def serve_px4(serve):
+    return functools.partial(serve, kind=HilServer, of=("px4", law_of_controls), record_rate=1000.0)
 
 
 def down(u):

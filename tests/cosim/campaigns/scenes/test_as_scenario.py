@@ -8,8 +8,7 @@ from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.flyer import SceneFlyer
 from cosim.campaigns.scenes.scene import Failure, Noise, Obstacle, Scene, SphereSpec
 from cosim.scenario.tables import Outage
-from cosim.simulation.master import Master
-from tests.cosim.simulation.test_master import Keep
+from tests.cosim.simulation.keep import kept_rows
 
 SCENE = Scene(
     seed=42,
@@ -40,9 +39,7 @@ def test_master_and_compiled_loop_give_the_same_run(law, changes):
     with SceneFlyer(law, conditions) as flyer:
         score, trace = flyer.fly(SCENE, trace=True)
         scenario = scene_scenario(SCENE, law, flyer.gains, conditions)
-    with Master(scenario) as master:
-        kept = Keep(master)
-        master.run([kept])
+    kept = kept_rows(scenario)
     path = np.column_stack([kept[f"position.{a}"] for a in "xyz"])
     told = np.column_stack([kept[f"sensed.{a}"] for a in "xyz"])
     thrusts = np.column_stack([kept[f"thrust[{i + 1}]"] for i in range(8)])
@@ -50,5 +47,5 @@ def test_master_and_compiled_loop_give_the_same_run(law, changes):
     assert trace[:, 1:4] == pytest.approx(path[:-1:2], abs=1e-9)
     assert trace[:, 14:17] == pytest.approx(told[:-1:2], abs=1e-9, nan_ok=True)
     assert trace[:, 20:28] == pytest.approx(thrusts[:-1:2], abs=1e-6)
-    clearances = np.column_stack([kept[f"{r.region.name}.clearance"] for r in master.scenario.regions])
+    clearances = np.column_stack([kept[f"{r.region.name}.clearance"] for r in scenario.regions])
     assert score.min_clearance == pytest.approx(clearances[1:].min(), abs=1e-9)

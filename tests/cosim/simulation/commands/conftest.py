@@ -5,6 +5,7 @@ import pytest
 
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
+from tests.cosim.simulation.keep import Keep
 
 
 class Script:
@@ -19,25 +20,12 @@ class Script:
         return self._commands.pop(k, [])
 
 
-class Rows:
-    """Observer that keeps every row."""
-
-    def __init__(self):
-        self.rows = []
-
-    def observe(self, k, row):
-        self.rows.append(row.copy())
-
-
-class Commanded:
+class Commanded(Keep):
     """What a run under commands left, by column."""
 
-    def __init__(self, master, rows):
-        self.rows, self._at = np.array(rows), master.signals.index
+    def __init__(self, master):
+        super().__init__(master)
         self.master = master
-
-    def __getitem__(self, name):
-        return self.rows[:, self._at(name)]
 
     def stack(self, *names):
         return np.stack([self[name] for name in names], axis=1)
@@ -52,8 +40,9 @@ def fly():
     def run(script, *overrides, name="pipe-inspection", awaiting=None):
         scenario = load_scenario(name, ["commands.enabled=true", *overrides])
         with Master(scenario) as master:
-            rows = Rows()
-            master.run([rows], commands=script if hasattr(script, "take") else Script(script), awaiting=awaiting)
-            return Commanded(master, rows.rows)
+            kept = Commanded(master)
+            master.run([kept], commands=script if hasattr(script, "take") else Script(script), awaiting=awaiting)
+            kept.rows = np.array(kept.rows)
+            return kept
 
     return run
