@@ -190,7 +190,8 @@ def _result(problem: Problem, values: Array, rejected: Counter[str], step: float
     parameters, windows, reduced = problem.residuals.parameters, problem.residuals.windows, problem.reduced
     plain = [r.residual[: len(w)] / w for r, w in zip(reduced, problem.residuals.weights, strict=True)]
     forced = problem.residuals.force_deviation is not None
-    intervals = estimate_intervals(parameters, values, reduced, windows, problem.residuals.eliminated, forced)
+    correlated = forced or problem.residuals.command_error is not None
+    intervals = estimate_intervals(parameters, values, reduced, windows, problem.residuals.eliminated, correlated)
     return Fit(
         parameters, values, intervals, tuple(windows), rejected, tuple(reduced),
         sum(int((np.abs(r) > _OUTLIER).sum()) for r in plain), sum(map(len, plain)), step, delays,

@@ -46,7 +46,7 @@ class Intervals:
 
 def estimate_intervals(
     parameters: Sequence[Parameter], values: Array, reduced: Sequence[Reduced], windows: Sequence[Window],
-    eliminated: int, random_force: bool,
+    eliminated: int, correlated: bool,
 ) -> Intervals:  # fmt: skip
     """Return the uncertainty of a fit.
 
@@ -62,15 +62,16 @@ def estimate_intervals(
         The windows.
     eliminated : int
         Number of unknowns of each window that are not parameters, such as its start.
-    random_force : bool
-        True if a random force is estimated: forces of neighboring windows are correlated.
+    correlated : bool
+        True if errors of neighboring windows are correlated: those of a random force, and of sampled commands, which an
+        autopilot changes between samples by the vehicle's motion.
 
     Returns
     -------
     Intervals
         Jackknife and nominal uncertainty. The jackknife leaves out each piece in turn, in one Gauss-Newton step. Pieces
-        are whole runs if there are eight or more; else 5 s long, or 20 s if the model is wrong or a random force is
-        estimated. If one of these two holds, each number has degrees of freedom by the pieces that determine it (Bell
+        are whole runs if there are eight or more; else 5 s long, or 20 s if the model is wrong or errors are
+        correlated. If one of these two holds, each number has degrees of freedom by the pieces that determine it (Bell
         and McCaffrey 2002, CR3). Nominal deviations hold for white noise and a right model alone.
     """
     prior = np.array([1.0 / p.deviation**2 for p in parameters])
@@ -81,7 +82,7 @@ def estimate_intervals(
     inverse: Any = np.linalg.inv(information)
     nominal = np.sqrt(np.diag(inverse))
 
-    are_correlated = random_force or chi2 > DISAGREES
+    are_correlated = correlated or chi2 > DISAGREES
     pieces, clusters = _pieces(reduced, windows, are_correlated)
     half = NORMAL * nominal
     if len(pieces) > 1:
