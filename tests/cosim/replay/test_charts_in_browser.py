@@ -84,7 +84,7 @@ def test_click_in_a_chart_seeks(browser, shown, docking):
     plot = browser.js("return window.subreach.charts[0].plot")
     ActionChains(browser.driver).move_to_element(plot).click().perform()
     browser.settle()
-    assert 15.0 < browser.t < 45.0
+    assert 10.0 < browser.t < 45.0  # the axis is shorter where the vehicle rests
     assert browser.drawn["time"] == browser.t
 
 

@@ -44,7 +44,7 @@ def test_path_fills_the_view(name, size, browser, shown, request):
     way = run.record.stack([f"position.{axis}" for axis in "xyz"])[::50]
     seen, (width, height) = np.array(browser.js(SEEN, way.tolist())), browser.js(CANVAS)
     assert (seen > 0.0).all() and (seen < [width, height]).all()
-    assert np.hypot(*np.ptp(seen, axis=0)) > 0.35 * np.hypot(width, height)
+    assert np.hypot(*np.ptp(seen, axis=0)) > 0.3 * np.hypot(width, height)  # the regions need room, too
 
 
 def test_labels_do_not_cover_the_vehicle(browser, shown, docking, paper):
