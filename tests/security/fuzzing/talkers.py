@@ -178,8 +178,8 @@ def to_simulator(seeds: Seeds) -> Case:
 
     def read(content: bytes) -> None:
         codec.robust_parsing = True
-        for controls in server._controls(codec, content):
-            law.set_outputs(controls)
+        for _, outputs in server._controls(codec, content):
+            law.set_outputs(outputs)
 
     return Case((frames,), read)
 
