@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
@@ -230,3 +231,24 @@ def telemetry_log(seeds: Seeds) -> Case:
 def dataflash_log(seeds: Seeds) -> Case:
     data = (LOGS / "small.BIN").read_bytes()[:60_000]  # of a vehicle with six thrusters, which it now does not say
     return _log(seeds, "it.bin", data.replace(b"FRAME_CONFIG", b"FRAME_CONFIX").replace(b"SERVO", b"SERVX"))
+
+
+@reader(
+    "log of PX4", "bytes",
+    *(f"cosim.logs.ulog_messages:{name}" for name in ("ULogMessages._messages", "ULogMessages._take", "_Topic.samples")),
+)  # fmt: skip
+def ulog(seeds: Seeds) -> Case:
+    from tests.cosim.logs.test_px4_logs import Dive, write_ulog
+
+    path = seeds.folder() / "it.ulg"
+    write_ulog(path, Dive(np.arange(0.0, 4.0, 0.05)))
+    return _log(seeds, "it.ulg", path.read_bytes())
+
+
+@reader("recording of BlueOS", "bytes", "cosim.logs.blueos:_parts")
+def recording(seeds: Seeds) -> Case:
+    from tests.cosim.logs.test_blueos import write_recording
+
+    path = seeds.folder() / "it.mcap"
+    write_recording(path, 5.0)
+    return _log(seeds, "it.mcap", path.read_bytes())

@@ -104,7 +104,7 @@ def part(seeds: Seeds) -> Case:
     return Case(case.contents, read, str(folder))
 
 
-@reader("run", "parquet", "cosim.results.record:_opened", "cosim.results.run_result:_lines")
+@reader("run", "parquet", "cosim.results.record:_opened", "cosim.results.run_result:open_run")
 def run(seeds: Seeds) -> Case:
     """Make every output of a run, for any numbers."""
     folder, flown = seeds.folder(seeds.run), load_run(seeds.run)

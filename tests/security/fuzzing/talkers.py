@@ -40,7 +40,7 @@ from tests.security.fuzzing.registry import Case, Seeds, reader
 # ---- the live page -------------------------------------------------------------------------------------------------
 
 
-@reader("command of a viewer", "json", "cosim.live.command_desk:CommandDesk.take")
+@reader("command of a viewer", "json", "cosim.live.command_desk:CommandDesk.submit")
 def command(seeds: Seeds) -> Case:
     scenario = load_scenario("paper", ["commands.enabled=true", "commands.obstacles=2"])
     queue = CommandQueue()
@@ -130,7 +130,7 @@ def _frames() -> bytes:
     return b"".join(message.pack(codec) for message in messages)
 
 
-_FRAMING = ("cosim.mavlink.wire.framing:Gate._judged", "cosim.mavlink.wire.framing:header_at")
+_FRAMING = ("cosim.mavlink.wire.framing:Gate._verified", "cosim.mavlink.wire.framing:header_at")
 
 
 @reader("MAVLink frames, to a vehicle", "bytes", *_FRAMING, "cosim.mavlink.services.ftp:FileServer._request")
