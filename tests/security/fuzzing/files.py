@@ -234,9 +234,12 @@ def dataflash_log(seeds: Seeds) -> Case:
 
 
 @reader(
-    "log of PX4", "bytes",
-    *(f"cosim.logs.ulog_messages:{name}" for name in ("ULogMessages._messages", "ULogMessages._take", "_Topic.samples")),
-)  # fmt: skip
+    "log of PX4",
+    "bytes",
+    "cosim.logs.ulog_messages:ULogMessages._messages",
+    "cosim.logs.ulog_messages:ULogMessages._take",
+    "cosim.logs.ulog_messages:_Topic.samples",
+)
 def ulog(seeds: Seeds) -> Case:
     from tests.cosim.logs.test_px4_logs import Dive, write_ulog
 
