@@ -24,7 +24,7 @@ from tests.plant_fmu.test_sources import trajectory
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs
 PACKAGES = ("controller", "cosim", "plant_fmu")
 BESIDE = ("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "README.md", "hatch_build.py", "pyproject.toml")
-MOST = 4e6  # bytes
+MOST = 4.2e6  # bytes, of a wheel with the libraries of all platforms
 
 
 @pytest.fixture(scope="session")
