@@ -64,8 +64,7 @@ class PathPlan(NamedTuple):
     turn: NDArray[np.int64]  # (3,) closed regions: `_HARD`, `_ALL` or `_COSTLY`; calls left with them; calls for each
     random_numbers: Array  # (5,) numbers in [0, 1) for one call of the search
     phase: NDArray[np.int64]  # (1,) `_BEGIN`, `_PATH` or `_CANDIDATE`
-    # (1,) number of periods for which the path has been blocked; if negative, of those left of the second look
-    blocked: NDArray[np.int64]
+    blocked: NDArray[np.int64]  # (2,) number of periods: for which the path has been blocked; left of a second look
     random: NDArray[np.uint64]  # (1,) state of the generator
 
 
@@ -85,7 +84,7 @@ def empty_plan(n_regions: int, seed: int) -> PathPlan:
         turn=np.zeros(3, dtype=np.int64),
         random_numbers=np.zeros(5),
         phase=np.zeros(1, dtype=np.int64),
-        blocked=np.zeros(1, dtype=np.int64),
+        blocked=np.zeros(2, dtype=np.int64),
         random=state,
     )
 
@@ -164,13 +163,14 @@ def improve_path(
 def _count_blocked(plan: PathPlan, blocked: bool, period: float) -> bool:
     """Count the periods for which the path has been blocked; return True during a second look for other paths."""
     if blocked:
-        plan.blocked[0] = max(plan.blocked[0], 0) + 1
+        plan.blocked[0] += 1
+        plan.blocked[1] = 0
     elif plan.blocked[0] * period > _BLOCKED_LONG:
-        plan.blocked[0] = -int(_SECOND_LOOK / period)
+        plan.blocked[0], plan.blocked[1] = 0, int(_SECOND_LOOK / period)
         _restart_trees(plan.search)
     else:
-        plan.blocked[0] = min(plan.blocked[0], -1) + 1
-    return bool(plan.blocked[0] < 0)
+        plan.blocked[0], plan.blocked[1] = 0, max(plan.blocked[1] - 1, 0)
+    return bool(plan.blocked[1] > 0)
 
 
 def _restart_trees(search: Search) -> None:
