@@ -252,12 +252,18 @@ def with_mean_nuisances(parameters: Sequence[Parameter], values: Array) -> tuple
         Free parameters of a fit.
     values : ndarray, shape (p,)
         Fitted values of the parameters, in their units.
+
+    Returns
+    -------
+    list of Parameter
+        Parameters of all runs: those of the fit, and one for the nuisances of single runs that share a name.
+    ndarray, shape (k,)
+        Values of these parameters.
     """
     groups: dict[Parameter, list[float]] = {}
     for p, x in zip(parameters, values, strict=True):
-        groups.setdefault(
-            p if p.run is None else replace(p, name=p.name.partition(" of run ")[0], run=None), []
-        ).append(float(x))
+        shared = p if p.run is None else replace(p, name=p.name.partition(" of run ")[0], run=None)
+        groups.setdefault(shared, []).append(float(x))
     return list(groups), np.array([np.mean(x) for x in groups.values()])
 
 
