@@ -23,7 +23,7 @@ REPEATS = 5
 OBSTACLES = (1, 3, 10, 30, 100)  # numbers of obstacles
 HORIZONS = (10.0, 30.0, 100.0, 300.0)  # s, durations of runs
 VEHICLES = (1, 8, 64, 512)  # numbers of vehicles in a batch
-ROWS = {"fused": 1_000, "lanes": 10_000}  # number of rows of a sweep, by engine
+ROWS = 1_000  # number of rows of a sweep
 LAWS = ("ismail_dunnigan", "deployable")
 _SWEEPS = 3  # greatest number of repeats of a sweep
 
@@ -133,41 +133,35 @@ def obstacles() -> Iterator[Curve]:
     for law in LAWS:
         entries: dict[float, Entry] = {n: lambda _, law=law, n=n: LawSteps(law, int(n)) for n in OBSTACLES}
         yield Curve(f"A step of the law {law!r}", "obstacle", entries)
-    for engine in ("fused", "lanes"):
-        entries = {n: flights(engine, per_run=False, changes=_with_obstacles(int(n))) for n in OBSTACLES}
-        yield Curve(f"A step of the closed loop, {_named(engine)}", "obstacle", entries)
+    entries = {n: flights(per_run=False, changes=_with_obstacles(int(n))) for n in OBSTACLES}
+    yield Curve("A step of the closed loop, fused loop", "obstacle", entries)
 
 
 def horizon() -> Iterator[Curve]:
     """Yield the growth of a run with the simulated time."""
     yield Curve("A run, master without record", "second", {t: _run(t) for t in HORIZONS}, count=1)
-    for engine in ("fused", "lanes"):
-        entries: dict[float, Entry] = {
-            t: flights(engine, per_run=True, changes=(f"time.duration={t}",)) for t in HORIZONS
-        }
-        yield Curve(f"A run, {_named(engine)}", "second", entries)
+    entries: dict[float, Entry] = {t: flights(changes=(f"time.duration={t}",)) for t in HORIZONS}
+    yield Curve("A run, fused loop", "second", entries)
 
 
 def vehicles() -> Iterator[Curve]:
     """Yield the growth of a batch with the vehicles in it."""
-    for engine in ("fused", "lanes"):
-        entries: dict[float, Entry] = {n: flights(engine, per_run=True, batch=int(n), whole=True) for n in VEHICLES}
-        yield Curve(f"A batch of runs of {RUN:g} s, {_named(engine)}", "vehicle", entries)
+    entries: dict[float, Entry] = {n: flights(batch=int(n), whole=True) for n in VEHICLES}
+    yield Curve(f"A batch of runs of {RUN:g} s, fused loop", "vehicle", entries)
 
 
 def workers() -> Iterator[SweepComparison]:
     """Yield the sweeps with one and two workers, in processes or in Dask."""
-    for engine, rows in ROWS.items():
-        entries = {
-            f"{n} {worker}": sweep(pool, n, engine)
-            for pool, n, worker in (
-                ("processes", 1, "process"),
-                ("processes", 2, "processes"),
-                ("Dask", 1, "in Dask"),
-                ("Dask", 2, "in Dask"),
-            )
-        }
-        yield SweepComparison(f"A run of {RUN:g} s in a sweep of {rows}, {_named(engine)}", entries, rows)
+    entries = {
+        f"{n} {worker}": sweep(pool, n)
+        for pool, n, worker in (
+            ("processes", 1, "process"),
+            ("processes", 2, "processes"),
+            ("Dask", 1, "in Dask"),
+            ("Dask", 2, "in Dask"),
+        )
+    }
+    yield SweepComparison(f"A run of {RUN:g} s in a sweep of {ROWS}, fused loop", entries, ROWS)
 
 
 SUBJECTS: dict[str, Callable[[], Iterator[Curve] | Iterator[SweepComparison]]] = {
@@ -176,10 +170,6 @@ SUBJECTS: dict[str, Callable[[], Iterator[Curve] | Iterator[SweepComparison]]] =
     "vehicles": vehicles,
     "workers": workers,
 }
-
-
-def _named(engine: str) -> str:
-    return {"fused": "fused loop", "lanes": "lanes"}[engine]
 
 
 def _with_obstacles(n: int) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 import re
 
+import pyarrow.parquet as pq
 import pytest
 
 from tests.copies import ROOT, copy_of_the_packages, python
@@ -96,25 +97,6 @@ gain = 10.0
 shape = { type = "torus", centre = [0.0, 1.0, 2.0], axis = [0.0, 0.0, 1.0], radius = 1.05, tube = 0.2 }
 """
 
-SWEEP = """
-import numpy as np
-from cosim.batch.fused import FusedFlyer
-from cosim.batch.lanes import LanesFlyer
-from cosim.batch.variation import Variation
-from cosim.scenario.scenario import load_scenario
-
-variation = Variation(load_scenario("struck.toml"), ("initial.position.1",))
-values, seeds = np.array([[-0.05], [0.0], [-1.0]]), np.zeros(3, int)
-flown = []
-for flyer in (FusedFlyer, LanesFlyer):
-    with flyer(variation) as fleet:
-        flown.append(fleet.fly(values, seeds).outcomes)
-fused, lanes = flown
-assert fused["violated"].tolist() == [True, True, False], fused
-assert lanes["violated"].tolist() == fused["violated"].tolist()
-np.testing.assert_allclose(lanes["min_clearance"], fused["min_clearance"], atol=1e-9)
-"""
-
 
 def of_page(name, language):
     (code,) = re.findall(rf"<!-- file: {re.escape(name)} -->\n```{language}\n(.*?)```", PAGE, re.DOTALL)
@@ -155,17 +137,11 @@ def test_report_replay_exports_and_check_draw_the_torus(copy):
 
 
 @pytest.mark.slow
-def test_c_refuses_the_torus_by_name_until_it_has_its_c_file(copy):
-    package = ["-m", "cosim", "package", "struck.toml", "--to", "ssp", "--out", "struck.ssp"]
-    named = "region 'ring': shape 'torus' has no C code"
-    packaged, swept = python(copy, *package), python(copy, "-c", SWEEP)
-    assert packaged.returncode == 2 and named in packaged.stderr and packaged.stderr.count("\n") == 1
-    assert swept.returncode != 0 and named in swept.stderr
-    beside = copy / "controller" / "regions" / "shapes" / "torus.c"
-    beside.write_text(of_page("torus.c", "c"))
-    try:
-        packaged, swept = python(copy, *package), python(copy, "-c", SWEEP)
-    finally:
-        beside.unlink()
-    assert packaged.returncode == 0, packaged.stderr
-    assert swept.returncode == 0, swept.stderr
+def test_torus_is_packaged_and_swept(copy):
+    done = python(copy, "-m", "cosim", "package", "struck.toml", "--to", "ssp", "--out", "struck.ssp")
+    assert done.returncode == 0, done.stderr
+    vary = ["--vary", "initial.position.1=-0.05,0,-1", "--design", "grid", "--out", "swept", "--replays", "0"]
+    done = python(copy, "-m", "cosim", "sweep", "struck.toml", *vary)
+    assert done.returncode == 0, done.stderr
+    rows = pq.read_table(copy / "swept" / "results.parquet").to_pylist()
+    assert [row["violated"] for row in rows] == [True, True, False]

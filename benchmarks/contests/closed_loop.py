@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 import subprocess
 import sys
@@ -11,7 +10,6 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,6 +17,8 @@ from benchmarks.contest import Contest, Entry
 from benchmarks.peer_environment import Environment
 from benchmarks.peer_process import peer
 from benchmarks.timing import Contestant, NotMeasuredError, Own
+from cosim.batch.fused import FusedFlyer
+from cosim.batch.variation import Variation
 from cosim.results.recorder import Recorder
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
@@ -31,7 +31,6 @@ CHANGES = (
 )  # fmt: skip
 RUN = 30.0  # s, duration of a run
 BATCH = 64  # default number of concurrent runs
-_FLYERS = {"fused": "FusedFlyer", "lanes": "LanesFlyer"}  # classes in the modules of `cosim.batch`
 # name in the table: distribution, and module of `benchmarks.peers`
 _MASTERS = {
     "FMPy, simulate_ssp": ("fmpy", "fmpy_system"),
@@ -50,14 +49,13 @@ def contests(environment: Environment) -> Iterator[Contest]:
             {
                 "master, no record": _master(record=False),
                 "master, every step recorded": _master(record=True),
-                "fused loop": flights("fused", per_run=False),
-                "lanes": flights("lanes", per_run=False),
+                "fused loop": flights(per_run=False),
             },
             peers,
         )
         yield Contest(
             f"A run of {RUN:g} s of it, from loading or resetting to the outcome",
-            {"fused loop": flights("fused"), "lanes": flights("lanes")},
+            {"fused loop": flights()},
             {f"{name}, loaded anew": _system(environment, package, *where, "runs") for name, where in _MASTERS.items()},
         )
 
@@ -121,15 +119,11 @@ def _master(*, record: bool) -> Entry:
     return entry
 
 
-def flights(
-    engine: str, *, per_run: bool = True, changes: Sequence[str] = (), batch: int = BATCH, whole: bool = False
-) -> Entry:
-    """Return the entry of an engine that runs the scenario from many starts.
+def flights(*, per_run: bool = True, changes: Sequence[str] = (), batch: int = BATCH, whole: bool = False) -> Entry:
+    """Return the entry of the fused loop, which runs the scenario from many starts.
 
     Parameters
     ----------
-    engine : str
-        ``"fused"`` or ``"lanes"``.
     per_run : bool
         True if an item is a run, False if it is a step.
     changes : sequence of str
@@ -141,32 +135,27 @@ def flights(
     """
 
     def entry(stack: ExitStack) -> Contestant:
-        try:
-            kind = getattr(importlib.import_module(f"cosim.batch.{engine}"), _FLYERS[engine])
-            from cosim.batch.variation import Variation
-        except (ImportError, AttributeError) as error:
-            raise NotMeasuredError(f"not there: {error}") from error
         scenario = load_scenario(SCENARIO, [*CHANGES, f"time.duration={RUN}", *changes])
-        flyer = stack.enter_context(kind(Variation(scenario, ["initial.position.0"])))
+        flyer = stack.enter_context(FusedFlyer(Variation(scenario, ["initial.position.0"])))
         return _Flights(flyer, batch, 1.0 / batch if whole else 1.0 if per_run else float(scenario.steps))
 
     return entry
 
 
 class _Flights:
-    """Runs by an engine, each from its own start; times are scaled to the number of items.
+    """Runs, each from its own start; times are scaled to the number of items.
 
     Parameters
     ----------
-    flyer : FusedFlyer or LanesFlyer
-        Engine that flies the runs.
+    flyer : FusedFlyer
+        Flies the runs.
     batch : int
         Least number of concurrent runs.
     items : float
         Items in a run.
     """
 
-    def __init__(self, flyer: Any, batch: int, items: float) -> None:
+    def __init__(self, flyer: FusedFlyer, batch: int, items: float) -> None:
         self._flyer, self._batch, self._items = flyer, batch, items
 
     def seconds(self, count: int) -> float:

@@ -19,7 +19,7 @@ _VARIED = ("initial.position.0=-0.2:0.2",)  # m, varied key and its range
 _WARMING = 64  # rows per worker, of each of two sweeps before the timing
 
 
-def sweep(pool: str, workers: int, engine: str) -> Entry:
+def sweep(pool: str, workers: int) -> Entry:
     """Return the entry of a sweep, whose items are runs; the time includes its folder and summary.
 
     Parameters
@@ -28,12 +28,10 @@ def sweep(pool: str, workers: int, engine: str) -> Entry:
         ``"processes"`` or ``"Dask"``.
     workers : int
         Number of workers.
-    engine : str
-        ``"fused"`` or ``"lanes"``.
     """
 
     def entry(stack: ExitStack) -> Contestant:
-        contestant = _Sweep(stack.enter_context(_executor(pool, workers)), workers, engine, stack)
+        contestant = _Sweep(stack.enter_context(_executor(pool, workers)), workers, stack)
         for _ in range(2):  # so that each worker has compiled
             contestant.seconds(_WARMING * workers)
         return contestant
@@ -53,8 +51,8 @@ def _executor(pool: str, workers: int) -> Executor:
 class _Sweep:
     """Sweeps, each into a folder of its own."""
 
-    def __init__(self, executor: Executor, workers: int, engine: str, stack: ExitStack) -> None:
-        self._executor, self._workers, self._engine = executor, workers, engine
+    def __init__(self, executor: Executor, workers: int, stack: ExitStack) -> None:
+        self._executor, self._workers = executor, workers
         self._scenario = load_scenario(SCENARIO, [*CHANGES, f"time.duration={RUN}"])
         self._folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="benchmark-")))
         self._numbers = itertools.count()
@@ -67,5 +65,5 @@ class _Sweep:
         design = Design(vary_from(_VARIED), "random", count, 0)
         before = time.perf_counter()
         out = self._folder / str(next(self._numbers))
-        run_sweep(self._scenario, design, out, self._engine, self._workers, self._executor)
+        run_sweep(self._scenario, design, out, workers=self._workers, executor=self._executor)
         return time.perf_counter() - before

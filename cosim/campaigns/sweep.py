@@ -60,7 +60,7 @@ def run_sweep(
         A folder that does not exist, is empty, or holds the same sweep. A complete one gets its summary again, a
         partial one is continued.
     engine : str
-        ``"fused"``, the compiled loop around the FMU; or ``"lanes"``, several vehicles in parallel without an FMU.
+        ``"fused"``, the compiled loop around the FMU.
     workers : int
         Number of processes, which does not change the rows. With an executor: number of batches at the same time.
     executor : concurrent.futures.Executor, optional

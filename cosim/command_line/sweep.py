@@ -49,10 +49,7 @@ def add_verbs(verbs: Any) -> None:
         "--out", type=Path, required=True, metavar="DIR",
         help="a new folder, or one that this command began: it goes on with what is left",
     )  # fmt: skip
-    sweep.add_argument(
-        "--engine", default="fused", metavar="fused|lanes",
-        help="fused: the compiled loop around the FMU (default); lanes: several vehicles side by side, without one",
-    )  # fmt: skip
+    sweep.add_argument("--engine", default="fused", help=argparse.SUPPRESS)
     sweep.add_argument("--workers", type=WORKERS, metavar="N", help="processes (default: 1; with --dask: one a core)")
     where = sweep.add_mutually_exclusive_group()
     where.add_argument("--dask", action="store_true", help="start a Dask cluster on this machine")

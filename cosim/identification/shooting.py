@@ -4,17 +4,26 @@ from __future__ import annotations
 
 import ctypes
 import functools
-from collections.abc import Mapping, Sequence
+import hashlib
+import os
+import subprocess
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import platformdirs
 from numpy.typing import NDArray
 
-from cosim.batch.lanes_library import machine_library
+from controller.compiling.library import is_whole, keep
 from cosim.errors import IdentificationError
+from plant_fmu.compiling.compiler import FLAGS, compile_library, find_compiler
+from plant_fmu.compiling.platforms import native_platform
 from plant_fmu.compiling.sources import c_sources, header
+from plant_fmu.errors import BuildError
 from plant_fmu.variables import variables
 from plant_fmu.vehicle import Vehicle
 from plant_fmu.vehicle_component import of_vehicle
@@ -174,4 +183,44 @@ def _library(vehicle: Vehicle) -> ctypes.CDLL:
     files |= {file.name: file.read_bytes() for file in own.iterdir() if file.name.endswith((".c", ".h"))}
     files[component.header] = header(component, _TOKEN).encode()
     sources = [name for name in files if name.endswith(".c") and name != _INCLUDED]
-    return machine_library("shooting", vehicle.name, files, sources, _FAST)
+    return load_tuned_library(vehicle.name, files, sources, _FAST)
+
+
+def load_tuned_library(
+    name: str, files: Mapping[str, bytes], sources: Iterable[str], flags: Sequence[str]
+) -> ctypes.CDLL:
+    """Load a library of C files for this machine's processor; compile it if it is not in the user's cache."""
+    compiler = find_compiler()
+    flags = (*_tuned(compiler), *flags)
+    made_from = hashlib.sha256(
+        repr((native_platform().name, compiler, FLAGS, flags, _machine(compiler, flags))).encode()
+    )
+    for file, text in sorted(files.items()):
+        made_from.update(f"\n{file} {len(text)}\n".encode() + text)
+    name = f"{name}-{made_from.hexdigest()[:16]}{native_platform().suffix}"
+    path = Path(platformdirs.user_cache_dir("subreach")) / "shooting" / name
+    if is_whole(path):
+        return ctypes.CDLL(str(path))
+    with tempfile.TemporaryDirectory(prefix="shooting-", ignore_cleanup_errors=True) as scratch:
+        folder = Path(scratch)
+        for file, text in files.items():
+            (folder / file).write_bytes(text)
+        built = folder / name
+        compile_library(compiler, native_platform(), [folder / file for file in sorted(sources)], [], built, flags)
+        return ctypes.CDLL(str(keep(built, path.parent)))
+
+
+def _tuned(compiler: Sequence[str]) -> tuple[str, ...]:
+    """Return the compiler flags that enable all instructions of this machine's processor."""
+    return ("-mcpu=native",) if "ziglang" in compiler else ("-march=native",)
+
+
+def _machine(compiler: Sequence[str], flags: Sequence[str]) -> str:
+    """Return the macros that the compiler predefines, which identify it and the processor's instructions."""
+    try:
+        said = subprocess.run(  # noqa: S603 -- the compiler that the user has, and flags of ours
+            [*compiler, *flags, "-dM", "-E", "-x", "c", os.devnull], capture_output=True, text=True, check=True
+        )
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise BuildError(f"C compiler {compiler[0]}: {error}") from error
+    return said.stdout

@@ -18,7 +18,7 @@ PROCESSES = {
     "controller/compiling/compiler.py",
     "plant_fmu/compiling/compiler.py",
     "plant_fmu/importers/process.py",
-    "cosim/batch/lanes_library.py",
+    "cosim/identification/shooting.py",
 }
 XML = {"plant_fmu/unpacking.py"}
 ZIPS = {

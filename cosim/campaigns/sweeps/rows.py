@@ -27,7 +27,7 @@ from cosim.scenario.scenario import VEHICLE_COPY, Scenario
 from plant_fmu.toml_tables import hint
 
 # class of each engine, as "module:class"
-ENGINES = {"fused": "cosim.batch.fused:FusedFlyer", "lanes": "cosim.batch.lanes:LanesFlyer"}
+ENGINES = {"fused": "cosim.batch.fused:FusedFlyer"}
 
 
 class SweepBatch(NamedTuple):

@@ -13,7 +13,6 @@ FIRST = 1  # number of rows of the first batch, before the time of a row is know
 TARGET = 1.0  # s, desired time of a batch; one process submits and writes all batches, for any number of workers
 LEAST = 0.05  # s, least time of a batch; the last ones are small, so that all workers end together
 GROWTH = 4  # greatest ratio of a batch's size to the one before: the time of first batches includes compiling
-EVEN = 16  # batches with more rows are a multiple of this, for engines that fly rows in parallel lanes
 GREATEST = 65536  # greatest number of rows of a batch
 
 
@@ -67,8 +66,6 @@ class Batches:
             return None
         fair = max(math.ceil(LEAST / self._row_time), left // (2 * width)) if self._row_time < math.inf else FIRST
         size = min(self._size, fair)
-        if size > EVEN:
-            size -= size % EVEN
         batch = Batch(self._rows[self._at : self._at + size])
         self._at += len(batch.rows)
         return batch

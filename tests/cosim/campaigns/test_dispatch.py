@@ -126,7 +126,7 @@ def test_batch_size_adapts_to_row_duration():
         batch = batches.take(4)
         sizes.append(len(batch.rows))
         batches.measured(len(batch.rows), 0.001 * len(batch.rows))
-    assert sizes[0] == 1 and sizes[-1] == 992  # a second, in sixteens
+    assert sizes[0] == 1 and sizes[-1] == 1000  # a second
     assert all(after <= 4 * before for before, after in zip(sizes, sizes[1:], strict=False))
 
 
@@ -156,7 +156,7 @@ def test_final_batches_are_balanced_with_a_minimum_size():
     sizes = []
     while (batch := batches.take(4)) is not None:
         sizes.append(len(batch.rows))
-    assert sum(sizes) == 1000 and sizes[0] == 112 and min(sizes[:-1]) >= 48  # 50 ms, but for sixteens
+    assert sum(sizes) == 1000 and sizes[0] == 125 and min(sizes[:-1]) >= 50  # 50 ms
     assert sizes == sorted(sizes, reverse=True)
 
 

@@ -82,11 +82,10 @@ def test_scenario_file_with_custom_law_is_loadable_but_not_runnable(scenario, na
     assert run_scenario(again, tmp_path / "again", report=False, law=named).summary["law"] == NAME
 
 
-@pytest.mark.parametrize("engine", ["fused", "lanes"])
-def test_sweep_rejects_custom_law(scenario, named, engine, tmp_path):
+def test_sweep_rejects_custom_law(scenario, named, tmp_path):
     design = Design(vary_from(["initial.position.1=-1:1"]), samples=2)
     with pytest.raises(RunError, match=r"law\.name is "):
-        run_sweep(with_custom_law(named, scenario), design, tmp_path / "sweep", engine)
+        run_sweep(with_custom_law(named, scenario), design, tmp_path / "sweep")
 
 
 def test_invalid_output_of_a_custom_law_leaves_a_readable_run(scenario, tmp_path):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from cosim.batch.fused import FusedFlyer
-from cosim.batch.lanes import LanesFlyer
 from cosim.batch.variation import Variation
 from cosim.errors import RunError
 from cosim.results.record import load_record
@@ -165,15 +164,6 @@ def test_record_holds_the_arbiter_inputs(own, tmp_path):
     np.testing.assert_allclose(inputs[2][::2], np.interp(record["time"], [0, 10, 20], [1.0, 0.6, 0.1])[::2], atol=1e-12)
     again = run_scenario(load_scenario(tmp_path / "run" / "scenario.toml"), tmp_path / "again", report=False)
     assert (again.folder / "record.parquet").read_bytes() == (tmp_path / "run" / "record.parquet").read_bytes()
-
-
-def test_lanes_reject_custom_criteria_and_arbiter_files(own):
-    for scenario, words in (
-        (load_scenario(FOUR, ["law.name=ismail_dunnigan"]), "criteria is"),
-        (load_scenario(own, ["law.name=ismail_dunnigan"]), "arbiter.file is 'mine.toml'"),
-    ):
-        with pytest.raises(RunError, match=f"{words}.*for lanes; the fused loop flies it"):
-            LanesFlyer(Variation(scenario, ()))
 
 
 def test_fused_loop_rejects_sampling_engines(own):
