@@ -11,15 +11,4 @@ double elementary_cos_turns(double turns); /* the cosine of a part of a turn in 
 double elementary_atan2(double y, double x); /* of finite numbers */
 double elementary_hypot(double x, double y); /* of numbers whose squares do not overflow */
 
-static inline Real real_expm1(Real x)
-{
-#ifdef LANES
-    for (int i = 0; i < LANES; i++)
-        x[i] = elementary_expm1(x[i]);
-    return x;
-#else
-    return elementary_expm1(x);
-#endif
-}
-
 #endif

@@ -61,7 +61,7 @@ void actuators_tangent(const Parameters *p, const Parameters *dp, const Inputs *
                        const Actuators *now, const Actuators *dnow, Actuators *drate, Actuators *dforce, double dtau[6])
 {
     Actuators target, dtarget;
-    Mask thrust_cut[N_THRUSTERS], wrench_cut;
+    int thrust_cut[N_THRUSTERS], wrench_cut;
     double force[N_THRUSTERS];
 
     actuators_target(p, inputs, &target, thrust_cut, &wrench_cut);

@@ -265,7 +265,7 @@ static int settle_alone(Model *m)
 {
     const Actuators before = m->state.actuators;
     Actuators target;
-    Mask thrust_cut[N_THRUSTERS], wrench_cut;
+    int thrust_cut[N_THRUSTERS], wrench_cut;
 
     actuators_target(&m->plant.parameters, &m->inputs, &target, thrust_cut, &wrench_cut);
     actuators_settle(&m->plant, &before, &target, &m->state.actuators);
@@ -289,7 +289,7 @@ int model_settle(Model *m)
 static int advance_alone(Model *m, double end, double *failed)
 {
     const double hair = 1e-9 * (end - m->time); /* no segment is shorter */
-    Mask thrust_cut[N_THRUSTERS], wrench_cut;
+    int thrust_cut[N_THRUSTERS], wrench_cut;
     Actuators target;
 
     tick_alone(m);

@@ -35,8 +35,8 @@ typedef struct { /* values that change only at ticks */
 } Held;
 
 typedef struct {
-    Mask thrust_cut[N_THRUSTERS]; /* the command exceeds its limits */
-    Mask wrench_cut;
+    int thrust_cut[N_THRUSTERS]; /* the command exceeds its limits */
+    int wrench_cut;
     int bottom_touched;
 } Flags;
 

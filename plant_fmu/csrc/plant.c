@@ -9,10 +9,10 @@ static const double RK4_TURN_LIMIT = 1.0; /* rad in h: unstable beyond 2.83, ina
 
 /* ---- attitude ---------------------------------------------------------------------------------------------- */
 
-void plant_rotation(const Real e[4], Real R[3][3])
+void plant_rotation(const double e[4], double R[3][3])
 {
-    const Real square = e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3];
-    const Real s = choose(square > LEAST_QUATERNION * LEAST_QUATERNION, 2.0 / square, splat(0.0));
+    const double square = e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3];
+    const double s = square > LEAST_QUATERNION * LEAST_QUATERNION ? 2.0 / square : 0.0;
 
     R[0][0] = 1.0 - s * (e[2] * e[2] + e[3] * e[3]);
     R[0][1] = s * (e[1] * e[2] - e[0] * e[3]);
@@ -25,12 +25,12 @@ void plant_rotation(const Real e[4], Real R[3][3])
     R[2][2] = 1.0 - s * (e[1] * e[1] + e[2] * e[2]);
 }
 
-Mask plant_normalise(Real rigid[N_RIGID])
+int plant_normalise(double rigid[N_RIGID])
 {
-    Real *e = rigid + 3;
-    const Real norm = real_sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3]);
-    const Mask has_direction = (norm > LEAST_QUATERNION) & (norm < 1.0 / LEAST_QUATERNION);
-    const Real divisor = choose(has_direction, norm, splat(1.0));
+    double *e = rigid + 3;
+    const double norm = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3]);
+    const int has_direction = norm > LEAST_QUATERNION && norm < 1.0 / LEAST_QUATERNION;
+    const double divisor = has_direction ? norm : 1.0;
 
     for (int i = 0; i < 4; i++)
         e[i] /= divisor;
@@ -42,17 +42,16 @@ Mask plant_normalise(Real rigid[N_RIGID])
 /* Adds the effects of water that moves at v_c. In body axes R^T v_c changes at R^T v_c' - w x R^T v_c. Writes the relative
  * velocity v_r and the momentum M_RB v + M_A v_r; adds to the wrench the part of -M_A v_r' that is not in v', and the
  * difference of v_r x M_A v_r from v x M_A v_r. */
-static void add_current_effects(const Plant *plant, const Drift *drift, double time, const Real rigid[N_RIGID],
-                         const Real R[3][3], const Real velocity_world[3], Real nu_r[6], Real momentum[6], Real wrench[6])
+static void add_current_effects(const Plant *plant, const Drift *drift, double time, const double rigid[N_RIGID],
+                         const double R[3][3], const double velocity_world[3], double nu_r[6], double momentum[6], double wrench[6])
 {
     const Parameters *p = &plant->parameters;
-    const Real(*added_mass)[6] = plant->derived.added_mass;
-    const Real zero = splat(0.0);
-    Real water[3], water_rate[3], nu_c[6], nu_c_rate[6], turning[3], added[6], lost[6], moment[3];
+    const double(*added_mass)[6] = plant->derived.added_mass;
+    double water[3], water_rate[3], nu_c[6], nu_c_rate[6], turning[3], added[6], lost[6], moment[3];
 
     environment_current(p, drift, time, rigid[2], water);
     for (int i = 0; i < 3; i++)
-        water_rate[i] = drift->slope[i] + choose(rigid[2] > 0.0, p->current_shear[i] * velocity_world[2], zero);
+        water_rate[i] = drift->slope[i] + (rigid[2] > 0.0 ? p->current_shear[i] * velocity_world[2] : 0.0);
     if (plant->external.acts)
         for (int i = 0; i < 3; i++) {
             water[i] += plant->external.current_rate[i] * (time - plant->external.since);
@@ -64,7 +63,7 @@ static void add_current_effects(const Plant *plant, const Drift *drift, double t
     for (int i = 0; i < 3; i++) {
         nu_r[i] -= nu_c[i];
         nu_c_rate[i] -= turning[i];
-        nu_c[3 + i] = nu_c_rate[3 + i] = zero;
+        nu_c[3 + i] = nu_c_rate[3 + i] = 0.0;
     }
     multiply6(added_mass, nu_c, lost);
     multiply6(added_mass, nu_r, added);
@@ -79,9 +78,9 @@ static void add_current_effects(const Plant *plant, const Drift *drift, double t
 }
 
 /* Adds the external wrench of other components. */
-static void add_external(const External *external, const Real R[3][3], Real wrench[6])
+static void add_external(const External *external, const double R[3][3], double wrench[6])
 {
-    Real force[3], moment[3], lever[3];
+    double force[3], moment[3], lever[3];
 
     to_body(R, external->force, force);
     to_body(R, external->moment, moment);
@@ -92,35 +91,35 @@ static void add_external(const External *external, const Real R[3][3], Real wren
     }
 }
 
-void plant_derivative(const Plant *plant, const Drift *drift, double time, const Real rigid[N_RIGID],
-                      const Real tau[6], Real rate[N_RIGID])
+void plant_derivative(const Plant *plant, const Drift *drift, double time, const double rigid[N_RIGID],
+                      const double tau[6], double rate[N_RIGID])
 {
     const Parameters *p = &plant->parameters;
-    const Real *e = rigid + 3, *nu = rigid + 7, *omega = rigid + 10;
-    Real R[3][3], nu_r[6], momentum[6], wrench[6];
+    const double *e = rigid + 3, *nu = rigid + 7, *omega = rigid + 10;
+    double R[3][3], nu_r[6], momentum[6], wrench[6];
 
     /* kinematics (10): p' = R v, e' = E(e) w / 2 */
     plant_rotation(e, R);
-    to_world((const Real(*)[3])R, nu, rate);
+    to_world((const double(*)[3])R, nu, rate);
     quaternion_rate(e, omega, rate + 3);
 
     memcpy(nu_r, nu, sizeof nu_r);
     memcpy(wrench, tau, sizeof wrench);
     multiply6(plant->derived.mass_matrix, nu, momentum);
     if (plant->derived.water_moves)
-        add_current_effects(plant, drift, time, rigid, (const Real(*)[3])R, rate, nu_r, momentum, wrench);
+        add_current_effects(plant, drift, time, rigid, (const double(*)[3])R, rate, nu_r, momentum, wrench);
 
     /* C(v) v of the body and of the water that moves along, in the Kirchhoff form: its matrix [0, -S(a); -S(a), -S(b)],
      * with a and b the linear and the angular momentum, is skew (Property 2), so that it does no work */
-    Real force[3], moment_v[3], moment_omega[3];
+    double force[3], moment_v[3], moment_omega[3];
     cross(omega, momentum, force);
     cross(nu, momentum, moment_v);
     cross(omega, momentum + 3, moment_omega);
 
     /* restoring (12): weight at r_G and buoyancy at r_B along k = R^T e3 */
-    const Real *k = R[2];
-    Real buoyancy = p->buoyancy, lever[3], moment[3];
-    if (any(p->free_surface))
+    const double *k = R[2];
+    double buoyancy = p->buoyancy, lever[3], moment[3];
+    if (p->free_surface)
         buoyancy *= environment_submerged(p, rigid[2] + dot3(k, p->r_B));
     for (int i = 0; i < 3; i++)
         lever[i] = p->r_G[i] * p->weight - p->r_B[i] * buoyancy;
@@ -131,19 +130,19 @@ void plant_derivative(const Plant *plant, const Drift *drift, double time, const
         wrench[3 + i] += moment[i] - (moment_v[i] + moment_omega[i]);
     }
     for (int i = 0; i < 6; i++)
-        wrench[i] -= (p->linear_damping[i] + p->quadratic_damping[i] * real_fabs(nu_r[i])) * nu_r[i];
+        wrench[i] -= (p->linear_damping[i] + p->quadratic_damping[i] * fabs(nu_r[i])) * nu_r[i];
 
-    const Real sunk = environment_sunk(p, rigid[2]);
-    if (any(sunk > 0.0)) {
-        Real contact_world[3], contact[3];
+    const double sunk = environment_sunk(p, rigid[2]);
+    if (sunk > 0.0) {
+        double contact_world[3], contact[3];
         environment_contact(plant, sunk, rate, contact_world);
-        to_body((const Real(*)[3])R, contact_world, contact);
+        to_body((const double(*)[3])R, contact_world, contact);
         for (int i = 0; i < 3; i++)
             wrench[i] += contact[i];
     }
 
     if (plant->external.acts)
-        add_external(&plant->external, (const Real(*)[3])R, wrench);
+        add_external(&plant->external, (const double(*)[3])R, wrench);
 
     multiply6(plant->derived.mass_inverse, wrench, rate + 7);
 }
@@ -151,73 +150,72 @@ void plant_derivative(const Plant *plant, const Drift *drift, double time, const
 /* ---- what steps can follow ---------------------------------------------------------------------------------- */
 
 /* Returns an upper bound of the fastest present decay rate of a velocity by damping and bottom, 1/s. */
-static Real damping_rate(const Plant *plant, const Drift *drift, double time, const Real rigid[N_RIGID])
+static double damping_rate(const Plant *plant, const Drift *drift, double time, const double rigid[N_RIGID])
 {
     const Parameters *p = &plant->parameters;
-    Real R[3][3], water[3], current[3], root[6], bound = splat(0.0);
+    double R[3][3], water[3], current[3], root[6], bound = 0.0;
 
     plant_rotation(rigid + 3, R);
     environment_current(p, drift, time, rigid[2], water);
-    to_body((const Real(*)[3])R, water, current);
+    to_body((const double(*)[3])R, water, current);
     for (int i = 0; i < 6; i++) {
-        const Real nu_r = i < 3 ? rigid[7 + i] - current[i] : rigid[7 + i];
-        root[i] = real_sqrt(p->linear_damping[i] + 2.0 * p->quadratic_damping[i] * real_fabs(nu_r));
+        const double nu_r = i < 3 ? rigid[7 + i] - current[i] : rigid[7 + i];
+        root[i] = sqrt(p->linear_damping[i] + 2.0 * p->quadratic_damping[i] * fabs(nu_r));
     }
     /* eigenvalues of M^-1 D are those of D^1/2 M^-1 D^1/2, at most its greatest row sum */
     for (int i = 0; i < 6; i++) {
-        Real sum = splat(0.0);
+        double sum = 0.0;
         for (int j = 0; j < 6; j++)
-            sum += real_fabs(plant->derived.mass_inverse[i][j]) * root[j];
-        bound = choose(root[i] * sum <= bound, bound, root[i] * sum); /* NaN propagates */
+            sum += fabs(plant->derived.mass_inverse[i][j]) * root[j];
+        bound = root[i] * sum <= bound ? bound : root[i] * sum; /* NaN propagates */
     }
-    const Real stopping = 2.0 / plant->derived.contact_time;
-    return bound + choose(environment_sunk(p, rigid[2]) > 0.0, stopping, splat(0.0));
+    return bound + (environment_sunk(p, rigid[2]) > 0.0 ? 2.0 / plant->derived.contact_time : 0.0);
 }
 
 /* Returns true if steps of h are well within the limit of damping_rate, by a bound without roots and attitude: the trace
  * of D^1/2 M^-1 D^1/2. No row sum of a positive matrix of six rows exceeds its trace by more than (1 + sqrt 6) / 2. */
-static Mask follows_easily(const Plant *plant, const Drift *drift, double time, double h, const Real rigid[N_RIGID])
+static int follows_easily(const Plant *plant, const Drift *drift, double time, double h, const double rigid[N_RIGID])
 {
     const Parameters *p = &plant->parameters;
-    Real water[3], current = splat(0.0), trace = splat(0.0);
+    double water[3], current = 0.0, trace = 0.0;
 
     if (plant->derived.water_moves) {
         environment_current(p, drift, time, rigid[2], water);
-        current = real_fabs(water[0]) + real_fabs(water[1]) + real_fabs(water[2]);
+        current = fabs(water[0]) + fabs(water[1]) + fabs(water[2]);
     }
     for (int i = 0; i < 6; i++) {
-        const Real speed = i < 3 ? real_fabs(rigid[7 + i]) + current : real_fabs(rigid[7 + i]);
+        const double speed = i < 3 ? fabs(rigid[7 + i]) + current : fabs(rigid[7 + i]);
         trace += plant->derived.mass_inverse[i][i] * (p->linear_damping[i] + 2.0 * p->quadratic_damping[i] * speed);
     }
-    return (1.75 * h * trace < RK4_STABILITY_LIMIT) & (environment_sunk(p, rigid[2]) <= 0.0);
+    return 1.75 * h * trace < RK4_STABILITY_LIMIT && environment_sunk(p, rigid[2]) <= 0.0;
 }
 
 /* Returns true if steps of h are stable for the present damping, oscillation and turning. */
-static Mask follows(const Plant *plant, const Drift *drift, double time, double h, const Real rigid[N_RIGID])
+static int follows(const Plant *plant, const Drift *drift, double time, double h, const double rigid[N_RIGID])
 {
-    const Real *omega = rigid + 10;
-    const Mask turning = h * (real_sqrt(dot3(omega, omega)) + plant->derived.swing) < RK4_TURN_LIMIT;
+    const double *omega = rigid + 10;
 
-    if (all(turning & follows_easily(plant, drift, time, h, rigid)))
-        return turning;
-    return turning & (h * damping_rate(plant, drift, time, rigid) < RK4_STABILITY_LIMIT);
+    if (!(h * (sqrt(dot3(omega, omega)) + plant->derived.swing) < RK4_TURN_LIMIT))
+        return 0;
+    return follows_easily(plant, drift, time, h, rigid) ||
+           h * damping_rate(plant, drift, time, rigid) < RK4_STABILITY_LIMIT;
 }
 
 /* ---- stepping ---------------------------------------------------------------------------------------------- */
 
-static void move(const Real from[N_RIGID], const Real rate[N_RIGID], double h, Real to[N_RIGID])
+static void move(const double from[N_RIGID], const double rate[N_RIGID], double h, double to[N_RIGID])
 {
     for (int i = 0; i < N_RIGID; i++)
         to[i] = from[i] + h * rate[i];
 }
 
 /* Makes one Runge-Kutta step of order four. Checks stability at its end; the caller has checked its start. */
-static Mask step(const Plant *plant, const Drift *drift, double time, const Actuators *target, double h, State *state)
+static int step(const Plant *plant, const Drift *drift, double time, const Actuators *target, double h, State *state)
 {
     const Parameters *p = &plant->parameters;
     Actuators middle;
-    Real tau_start[6], tau_middle[6], tau_end[6];
-    Real k1[N_RIGID], k2[N_RIGID], k3[N_RIGID], k4[N_RIGID], trial[N_RIGID];
+    double tau_start[6], tau_middle[6], tau_end[6];
+    double k1[N_RIGID], k2[N_RIGID], k3[N_RIGID], k4[N_RIGID], trial[N_RIGID];
 
     /* lags do not depend on the body, so their stages are exact, and stable for any time constant; for one much below h
      * the step sees Simpson's mean of them, late by up to h/6 */
@@ -239,26 +237,24 @@ static Mask step(const Plant *plant, const Drift *drift, double time, const Actu
     move(state->rigid, k2, 0.5 * h, trial);
     plant_derivative(plant, drift, time + 0.5 * h, trial, tau_middle, k3);
     move(state->rigid, k3, h, trial);
-    const Mask followed = follows(plant, drift, time + h, h, trial); /* a step may end at rest by chance, but not all its stages */
-    if (!any(followed))
-        return followed;
+    if (!follows(plant, drift, time + h, h, trial)) /* a step may end at rest by chance, but not all its stages */
+        return 0;
     plant_derivative(plant, drift, time + h, trial, tau_end, k4);
 
     for (int i = 0; i < N_RIGID; i++)
         state->rigid[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
-    const Mask has_attitude = plant_normalise(state->rigid);
-    return followed & has_attitude & follows(plant, drift, time + h, h, state->rigid);
+    return plant_normalise(state->rigid) && follows(plant, drift, time + h, h, state->rigid);
 }
 
-Mask plant_advance(const Plant *plant, const Drift *drift, double start, double end, double substep,
+int plant_advance(const Plant *plant, const Drift *drift, double start, double end, double substep,
                    const Actuators *target, State *state, double *h)
 {
     const double rounding = 1e-9 + 1e-15 * fabs(end) / substep;
     const int n = (int)fmax(1.0, ceil((end - start) / substep - rounding));
 
     *h = (end - start) / n;
-    Mask followed = follows(plant, drift, start, *h, state->rigid);
-    for (int i = 0; i < n && any(followed); i++)
-        followed &= step(plant, drift, start + i * *h, target, *h, state);
+    int followed = follows(plant, drift, start, *h, state->rigid);
+    for (int i = 0; i < n && followed; i++)
+        followed = step(plant, drift, start + i * *h, target, *h, state);
     return followed;
 }

@@ -6,14 +6,14 @@
  *     M_RB v' + C_RB(v) v + M_A v_r' + C_A(v_r) v_r + D_l v_r + D_q |v_r| v_r + g(eta) = tau            (11)
  *
  * with v_r = v - [R^T v_c; 0], the motion through water that moves at v_c and is taken as uniform around the hull.
- * These functions do not depend on FMI, and keep no state between calls. Those that a step needs are written with Real, so
- * that they also compile for several vehicles side by side; the others are for one. Functions named _tangent give exact
+ * These functions do not depend on FMI, and keep no state between calls. Functions named _tangent give exact
  * directional derivatives: dx is the tangent of x, and a struct has its tangent in a struct of the same type. At a kink
  * they take the branch of the function itself. */
 #ifndef PLANT_H
 #define PLANT_H
 
-#include "real.h"
+#include <math.h>
+
 #include "vehicle.h" /* generated: N_THRUSTERS and the table of variables */
 
 enum { N_RIGID = 13 };                        /* position 3, quaternion 4, velocity 6 */
@@ -44,90 +44,90 @@ enum { /* standard deviations: several channels share one */
 };
 
 typedef struct {
-    Real mass;                               /* kg */
-    Real inertia[6];                         /* kg m2, about the body origin: elements xx yy zz xy xz yz */
-    Real r_G[3], r_B[3];                     /* m, centres of gravity and of buoyancy */
-    Real weight, buoyancy;                   /* N */
-    Real added_mass[6][6];                   /* upper triangle */
-    Real linear_damping[6];                  /* N s/m, N m s/rad */
-    Real quadratic_damping[6];               /* N s2/m2, N m s2/rad2 */
+    double mass;                               /* kg */
+    double inertia[6];                         /* kg m2, about the body origin: elements xx yy zz xy xz yz */
+    double r_G[3], r_B[3];                     /* m, centres of gravity and of buoyancy */
+    double weight, buoyancy;                   /* N */
+    double added_mass[6][6];                   /* upper triangle */
+    double linear_damping[6];                  /* N s/m, N m s/rad */
+    double quadratic_damping[6];               /* N s2/m2, N m s2/rad2 */
 
-    Real current[3];                         /* m/s, world frame, at the surface */
-    Real current_shear[3];                   /* 1/s, its derivative by depth */
-    Real current_variation[3];               /* m/s, standard deviation of its Gauss-Markov part */
-    Real current_correlation_time;           /* s */
-    Real current_variation_period;           /* s, between the knots of that part */
-    Real hull_radius;                        /* m, of a sphere about r_B for the surface, about the origin for the bottom */
-    Real bottom_depth;                       /* m */
-    Real bottom_friction;                    /* Coulomb's coefficient */
-    Real bottom_time_constant;               /* s, in which the bottom stops the hull */
-    Real gravity;                            /* m/s2, as an accelerometer feels it */
-    Mask free_surface;                       /* true: buoyancy decreases where the hull leaves the water */
+    double current[3];                         /* m/s, world frame, at the surface */
+    double current_shear[3];                   /* 1/s, its derivative by depth */
+    double current_variation[3];               /* m/s, standard deviation of its Gauss-Markov part */
+    double current_correlation_time;           /* s */
+    double current_variation_period;           /* s, between the knots of that part */
+    double hull_radius;                        /* m, of a sphere about r_B for the surface, about the origin for the bottom */
+    double bottom_depth;                       /* m */
+    double bottom_friction;                    /* Coulomb's coefficient */
+    double bottom_time_constant;               /* s, in which the bottom stops the hull */
+    double gravity;                            /* m/s2, as an accelerometer feels it */
+    int free_surface;                       /* true: buoyancy decreases where the hull leaves the water */
 
-    Real thruster_matrix[6][N_THRUSTERS];    /* body wrench of one newton of each thruster */
-    Real thrust_min[N_THRUSTERS];            /* N, most negative force */
-    Real thrust_max[N_THRUSTERS];            /* N */
-    Real thrust_time_constant[N_THRUSTERS];  /* s, 0: no lag */
-    Real thrust_rate_limit[N_THRUSTERS];     /* N/s, 0: none */
-    Real thrust_dead_band[N_THRUSTERS];      /* fraction of the command's range without force */
-    Real thrust_curve[N_THRUSTERS];          /* from 0, force linear in the command, to 1, quadratic */
-    Real thrust_effectiveness[N_THRUSTERS];  /* 1: whole, 0: failed */
-    Real wrench_force_limit;                 /* N, on the norm of the direct force; its direction is kept */
-    Real wrench_time_constant;               /* s, 0: no lag */
+    double thruster_matrix[6][N_THRUSTERS];    /* body wrench of one newton of each thruster */
+    double thrust_min[N_THRUSTERS];            /* N, most negative force */
+    double thrust_max[N_THRUSTERS];            /* N */
+    double thrust_time_constant[N_THRUSTERS];  /* s, 0: no lag */
+    double thrust_rate_limit[N_THRUSTERS];     /* N/s, 0: none */
+    double thrust_dead_band[N_THRUSTERS];      /* fraction of the command's range without force */
+    double thrust_curve[N_THRUSTERS];          /* from 0, force linear in the command, to 1, quadratic */
+    double thrust_effectiveness[N_THRUSTERS];  /* 1: whole, 0: failed */
+    double wrench_force_limit;                 /* N, on the norm of the direct force; its direction is kept */
+    double wrench_time_constant;               /* s, 0: no lag */
 
-    Real sensor_rate[N_SENSORS];             /* Hz, 0: continuous and without noise */
-    Real noise[N_NOISES];                    /* standard deviations, in the channel's unit */
-    Real bias[N_MEASURED];
-    Real velocity_scale_error;               /* of the DVL, as a fraction of the velocity */
-    Real delay[N_SENSORS];                   /* s, from a sample to its delivery */
-    Real loss_probability[N_SENSORS];        /* of each sample */
-    Real outlier_probability[N_SENSORS];     /* of each sample */
-    Real outlier_scale;                      /* standard deviation of an outlier, as a multiple of that of the noise */
+    double sensor_rate[N_SENSORS];             /* Hz, 0: continuous and without noise */
+    double noise[N_NOISES];                    /* standard deviations, in the channel's unit */
+    double bias[N_MEASURED];
+    double velocity_scale_error;               /* of the DVL, as a fraction of the velocity */
+    double delay[N_SENSORS];                   /* s, from a sample to its delivery */
+    double loss_probability[N_SENSORS];        /* of each sample */
+    double outlier_probability[N_SENSORS];     /* of each sample */
+    double outlier_scale;                      /* standard deviation of an outlier, as a multiple of that of the noise */
     int seed;                                /* of all noise and of the current's variation */
-    Real substep;                            /* s, greatest integration step */
+    double substep;                            /* s, greatest integration step */
 } Parameters;
 
 typedef struct { /* constants that follow from the parameters */
-    Real added_mass[6][6];         /* M_A, whole */
-    Real mass_matrix[6][6];        /* M_RB + M_A */
-    Real mass_inverse[6][6];
-    Real contact_mass;             /* kg, lower bound of the mass that a force at the origin accelerates, in any direction */
-    Real contact_time;             /* s, bottom_time_constant, but not below the limit of the substep */
-    Real swing;                    /* rad/s, upper bound of the oscillation by weight, buoyancy and surface */
-    Real thrust_lag[N_THRUSTERS];  /* s, time constants of the thrusters; 0: no lag */
-    Real wrench_lag;               /* s, time constant of the direct wrench */
+    double added_mass[6][6];         /* M_A, whole */
+    double mass_matrix[6][6];        /* M_RB + M_A */
+    double mass_inverse[6][6];
+    double contact_mass;             /* kg, lower bound of the mass that a force at the origin accelerates, in any direction */
+    double contact_time;             /* s, bottom_time_constant, but not below the limit of the substep */
+    double swing;                    /* rad/s, upper bound of the oscillation by weight, buoyancy and surface */
+    double thrust_lag[N_THRUSTERS];  /* s, time constants of the thrusters; 0: no lag */
+    double wrench_lag;               /* s, time constant of the direct wrench */
     int lags;                      /* whether any force follows its command with a delay */
     int water_moves;               /* whether there may be a current */
     int stiffest;                  /* row of mass_inverse from which contact_mass follows */
 } Derived;
 
 typedef struct {
-    Real thrust[N_THRUSTERS]; /* N, commands */
-    Real wrench[6];           /* N, N m, commands in the body frame */
+    double thrust[N_THRUSTERS]; /* N, commands */
+    double wrench[6];           /* N, N m, commands in the body frame */
 } Inputs;
 
 typedef struct {
-    Real thrust[N_THRUSTERS];
-    Real wrench[6];
+    double thrust[N_THRUSTERS];
+    double wrench[6];
 } Actuators; /* forces: targets of the limited commands, or present ones */
 
 typedef struct {
-    Real rigid[N_RIGID];
+    double rigid[N_RIGID];
     Actuators actuators; /* of those that lag; the others follow their command */
 } State;
 
 typedef struct { /* the current's Gauss-Markov part between two knots: value + slope (t - since) */
     double since, until;
-    Real value[3], slope[3];
-    Real deviation[3]; /* of the axis; 0: constant */
+    double value[3], slope[3];
+    double deviation[3]; /* of the axis; 0: constant */
 } Drift;
 
 typedef struct { /* effects of other components on the body, beside its actuators */
     int acts;             /* 0: nothing */
     double since;         /* s, time at which the current is that of the parameters */
-    Real current_rate[3]; /* m/s2, world frame */
-    Real force[3], moment[3], point[3]; /* N, N m, world frame, at a point of the body [m], body frame */
-    Real wrench[6];       /* N, N m, body frame, about the origin */
+    double current_rate[3]; /* m/s2, world frame */
+    double force[3], moment[3], point[3]; /* N, N m, world frame, at a point of the body [m], body frame */
+    double wrench[6];       /* N, N m, body frame, about the origin */
 } External;
 
 typedef struct {
@@ -151,38 +151,38 @@ void plant_mass_matrix(const Parameters *parameters, double M[6][6]);
 #define LEAST_QUATERNION 1e-6 /* length below which a quaternion has no direction */
 
 /* Scales the quaternion to unit length. Returns false, and changes nothing, if its length is 0 or not finite. */
-Mask plant_normalise(Real rigid[N_RIGID]);
+int plant_normalise(double rigid[N_RIGID]);
 
 /* Writes the rotation from body to world (3): a pure rotation for a quaternion of any length, the identity for length 0. */
-void plant_rotation(const Real quaternion[4], Real R[3][3]);
+void plant_rotation(const double quaternion[4], double R[3][3]);
 
 /* Writes the time derivative of the rigid-body state under the body wrench tau. */
-void plant_derivative(const Plant *plant, const Drift *drift, double time, const Real rigid[N_RIGID],
-                      const Real tau[6], Real rate[N_RIGID]);
+void plant_derivative(const Plant *plant, const Drift *drift, double time, const double rigid[N_RIGID],
+                      const double tau[6], double rate[N_RIGID]);
 
 /* Advances the state from `start` to `end` with Runge-Kutta steps of order four and equal length h, at most `substep`; the
  * commands hold, with the actuators' `target`. Returns false if the state is not finite, or steps of h are not stable for
  * damping, oscillation or turning, where results may still look plausible; the state is invalid then. */
-Mask plant_advance(const Plant *plant, const Drift *drift, double start, double end, double substep,
+int plant_advance(const Plant *plant, const Drift *drift, double start, double end, double substep,
                    const Actuators *target, State *state, double *h);
 
 /* ---- environment.c ---- */
 
 /* Writes the velocity of the water at a depth, world frame. */
-void environment_current(const Parameters *parameters, const Drift *drift, double time, Real depth, Real velocity[3]);
+void environment_current(const Parameters *parameters, const Drift *drift, double time, double depth, double velocity[3]);
 
 /* Returns the submerged fraction of the hull's volume, 0 to 1; depth is that of its centre, r_B. */
-Real environment_submerged(const Parameters *parameters, Real depth);
+double environment_submerged(const Parameters *parameters, double depth);
 
 /* Returns the depth of contact of the hull with the bottom; negative above it. */
-Real environment_sunk(const Parameters *parameters, Real depth);
+double environment_sunk(const Parameters *parameters, double depth);
 
 /* Returns the depth x1 at which the bottom's spring has half the force of a linear one: a hull that starts deep in it
  * leaves at some 2 m/s. The spring's force tends to x1 / T^2 per mass, at least 50 m/s2. */
-Real environment_softening(Real contact_time);
+double environment_softening(double contact_time);
 
 /* Writes the force of the bottom on a hull at a depth of contact, world frame: zero without contact. */
-void environment_contact(const Plant *plant, Real sunk, const Real velocity_world[3], Real force[3]);
+void environment_contact(const Plant *plant, double sunk, const double velocity_world[3], double force[3]);
 
 double environment_submerged_tangent(const Parameters *parameters, const Parameters *dparameters, double depth,
                                      double ddepth);
@@ -197,13 +197,13 @@ void environment_contact_tangent(const Plant *plant, const Parameters *dparamete
 /* Writes the steady forces of the commands: limited, and after the thrusters' curves. Sets the flags of limited
  * commands. */
 void actuators_target(const Parameters *parameters, const Inputs *inputs, Actuators *target,
-                      Mask thrust_cut[N_THRUSTERS], Mask *wrench_cut);
+                      int thrust_cut[N_THRUSTERS], int *wrench_cut);
 
 #define LEAST_RATE_LAG 1e-3 /* s: least time constant of a thruster with a rate limit */
 
 /* Return the time constants of thruster i and of the direct wrench; 0: no lag. */
-Real actuators_thrust_lag(const Parameters *parameters, int i);
-Real actuators_wrench_lag(const Parameters *parameters);
+double actuators_thrust_lag(const Parameters *parameters, int i);
+double actuators_wrench_lag(const Parameters *parameters);
 
 /* Writes the forces after those without a lag have followed their commands. */
 void actuators_settle(const Plant *plant, const Actuators *start, const Actuators *target, Actuators *out);
@@ -215,7 +215,7 @@ void actuators_after(const Plant *plant, const Actuators *start, const Actuators
 void actuators_rate(const Plant *plant, const Actuators *now, const Actuators *target, Actuators *rate);
 
 /* Writes the body wrench of all actuators. */
-void actuators_wrench(const Parameters *parameters, const Actuators *now, Real tau[6]);
+void actuators_wrench(const Parameters *parameters, const Actuators *now, double tau[6]);
 
 /* Writes the tangents of the rates, of the present forces and of their wrench. */
 void actuators_tangent(const Parameters *parameters, const Parameters *dparameters, const Inputs *inputs,

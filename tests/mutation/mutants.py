@@ -23,7 +23,7 @@ _C_TOKEN = re.compile(
     re.DOTALL,
 )
 _C_WORDS = {"return", "case", "else", "do", "sizeof"}  # after them a sign is of one operand
-_C_TYPES = {"double", "float", "int", "unsigned", "long", "Real", "Mask"}  # in brackets a cast
+_C_TYPES = {"double", "float", "int", "unsigned", "long"}  # in brackets a cast
 
 
 @dataclass(frozen=True)
