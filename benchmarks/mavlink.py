@@ -20,9 +20,6 @@ from benchmarks.hostile import hostile_datagrams
 from benchmarks.table import Row, compared
 from benchmarks.timing import Timing, time_calls
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
-from cosim.mavlink.conformance.client import Client
-from cosim.mavlink.conformance.connect import qgc_connect
-from cosim.mavlink.conformance.vehicle import own_vehicle
 from cosim.mavlink.messages import MESSAGES
 from cosim.mavlink.thread import LinkThread
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
@@ -35,6 +32,9 @@ from cosim.mavlink.wire.signing import SigningClock
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 from cosim.simulation.signals import Array
+from tests.cosim.mavlink.conformance.client import Client
+from tests.cosim.mavlink.conformance.connect import qgc_connect
+from tests.cosim.mavlink.conformance.vehicle import own_vehicle
 
 STEPS = 20_000
 RATIO = "how many times as long as what it is compared with"

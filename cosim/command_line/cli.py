@@ -161,6 +161,9 @@ def _run(arguments: Sequence[str]) -> int:
     if not arguments:
         parser.print_help(sys.stderr)
         parser.exit(FAULT)
+    verb = next((word for word in arguments if not word.startswith("-")), "")
+    if verb in _REMOVED:
+        parser.error(f"{verb} no longer exists; {_REMOVED[verb]}")
     options = parser.parse_args(arguments)
     _log(options.verbose)
     with contextlib.ExitStack() as stack:
@@ -248,6 +251,8 @@ _ERRORS = {
     "fuzzy_arbiter": "ArbiterError",
     "plant_fmu": "PlantFmuError",
 }
+# verbs of earlier versions, and what replaces them
+_REMOVED = {"mavlink-check": "cosim listen shows what a vehicle sends"}
 _LIGHT = {"completion", "help", "list", "scenes"}  # verbs without slow imports
 _VERBS = {
     "run": run.run,
@@ -274,7 +279,6 @@ _VERBS = {
     "identify": identify.identify,
     "listen": mavlink.listen,
     "stream": mavlink.stream,
-    "mavlink-check": mavlink.mavlink_check,
     "sitl": sitl.sitl,
     "companion": companion.companion,
 }

@@ -1,4 +1,4 @@
-"""``cosim listen``, ``cosim stream`` and ``cosim mavlink-check``."""
+"""``cosim listen`` and ``cosim stream``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from cosim.command_line.link_flags import add_link_flags, links_from
 from cosim.command_line.numbers import number, rate, whole
 from cosim.command_line.process import print_status
 from cosim.command_line.results import say
-from cosim.mavlink.wire.options import PROFILES
 
 _REDRAW, _SNAPSHOT = 0.25, 1.0  # s between pictures, on a terminal and elsewhere
 _ONCE = 2.0  # s of listening, for one picture
@@ -26,7 +25,12 @@ _HIDE, _SHOW, _CLEAR, _HOME, _END_OF_LINE, _BELOW = "\x1b[?25l", "\x1b[?25h", "\
 def add_verbs(verbs: Any) -> None:
     """Add the verbs to the subparsers of the command."""
     listen = verbs.add_parser("listen", help="show any vehicle's MAVLink telemetry as a live table")
-    _add_ground(listen, "such as udpin:127.0.0.1:14550 or tcp:127.0.0.1:5760", None)
+    listen.add_argument("endpoint", metavar="ENDPOINT", help="such as udpin:127.0.0.1:14550 or tcp:127.0.0.1:5760")
+    listen.add_argument("--allow-remote", action="store_true", help="let the link leave this machine")
+    listen.add_argument(
+        "--signing-key", type=Path, metavar="FILE",
+        help="sign with the key in this file, and accept only messages signed with it",
+    )  # fmt: skip
     listen.add_argument("--once", action="store_true", help=f"print one picture, after {_ONCE:g} s, and end")
     listen.add_argument("--seconds", type=number(1e-9, 1e9), metavar="S", help="end after so many seconds")
     listen.add_argument("--count", type=whole(1, 10**12), metavar="N", help="end after so many messages")
@@ -36,29 +40,6 @@ def add_verbs(verbs: Any) -> None:
     add_link_flags(stream, required=True)
     stream.add_argument(
         "--rate", type=rate, default=1.0, metavar="N|max", help="simulated seconds a second (default: 1)"
-    )
-
-    check = verbs.add_parser(
-        "mavlink-check", help="check a MAVLink vehicle against what ground stations need; exit code 1 if anything fails"
-    )
-    _add_ground(check, "endpoint of the vehicle, such as udpin:127.0.0.1:14550; default: a built-in vehicle", "?")
-    check.add_argument(
-        "--commands", action="store_true",
-        help="also arm it, steer it and change its mission and parameters, all restored afterwards; "
-        "the built-in vehicle is always commanded",
-    )  # fmt: skip
-    check.add_argument("--profile", choices=PROFILES, help="profile of the built-in vehicle (default: generic)")
-    check.add_argument("--json", action="store_true", help="print it as JSON")
-
-
-def _add_ground(verb: argparse.ArgumentParser, where: str, number: str | None) -> None:
-    verb.add_argument("endpoint", metavar="ENDPOINT", nargs=number, help=where)
-    verb.add_argument("--allow-remote", action="store_true", help="let the link leave this machine")
-    verb.add_argument(
-        "--signing-key",
-        type=Path,
-        metavar="FILE",
-        help="sign with the key in this file, and accept only messages signed with it",
     )
 
 
@@ -128,28 +109,3 @@ def stream(options: argparse.Namespace) -> int:
     for trouble in done.troubles:
         print_status(trouble)
     return 0
-
-
-# ---- mavlink-check -------------------------------------------------------------------------------------------------
-
-
-def mavlink_check(options: argparse.Namespace) -> int:
-    """Run ``cosim mavlink-check``."""
-    from cosim.errors import TelemetryError
-    from cosim.mavlink.conformance import as_json, as_text, check_vehicle, summary
-    from cosim.mavlink.conformance.vehicle import own_vehicle
-
-    if options.endpoint is not None and options.profile:
-        raise TelemetryError("--profile: sets the built-in vehicle, expected no endpoint with it")
-    results = []
-    with contextlib.ExitStack() as stack:
-        if options.endpoint is None:
-            link = stack.enter_context(own_vehicle(options.profile or "generic"))
-        else:
-            link = stack.enter_context(_ground_link(options))
-        for result in check_vehicle(link, options.commands or options.endpoint is None):
-            results.append(result)
-            if not options.json:
-                print(as_text(result), flush=True)
-    print(as_json(link.name, results) if options.json else summary(results))
-    return int(any(result.outcome.status == "fail" for result in results))

@@ -11,11 +11,11 @@ from benchmarks.sitl_pilot import HEAD, MAGIC, PULSES, RATE
 from cosim.errors import TelemetryError
 from cosim.live.address import parse_live
 from cosim.live.view import LiveView
-from cosim.mavlink.conformance.client import Client
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GroundLink
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
+from tests.cosim.mavlink.conformance.client import Client
 
 _ARM = 400  # MAV_CMD_COMPONENT_ARM_DISARM
 _PAUSE = 0.05  # s

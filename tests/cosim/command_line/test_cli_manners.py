@@ -53,6 +53,7 @@ def test_help_is_a_verb_too(capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
+        (["mavlink-check", "udpin:127.0.0.1:14550"], "cosim: mavlink-check no longer exists; cosim listen shows"),
         (["help", "rum"], "cosim: help: argument VERB: invalid choice: 'rum'"),
         (["run"], "cosim: run: the following arguments are required: scenario; see cosim run --help"),
         (["--frob"], "cosim: the following arguments are required: VERB; see cosim --help"),

@@ -13,12 +13,12 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.command_line.cli import main
 from cosim.errors import RunError
-from cosim.mavlink.conformance import Client
 from cosim.mavlink.replay import replay
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GroundLink
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.results.record import load_record
+from tests.cosim.mavlink.conformance.client import Client
 
 OVERRIDES = ("arbiter.engine=closed", "time.duration=4")
 COMMANDED = (*OVERRIDES, "commands.enabled=true")

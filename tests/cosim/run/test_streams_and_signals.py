@@ -22,11 +22,11 @@ import plant_fmu.__main__
 from cosim.command_line import cli
 from cosim.command_line.cli import main
 from cosim.command_line.process import kills_interrupt
-from cosim.mavlink.conformance.vehicle import running_vehicle
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.results.record import load_record
 from cosim.run.run_folder import report_again
+from tests.cosim.mavlink.conformance.vehicle import running_vehicle
 from tests.docs.peers import flying
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, pipes and devices of POSIX")
@@ -277,7 +277,6 @@ VERBS = {  # {run}: a run folder
     "rerun": ["out", "0", "--out", "again"],
     "listen": ["udpin:127.0.0.1:14571", "--seconds", "0.1"],
     "stream": ["{run}", "--mavlink", "run.tlog", "--rate", "max"],
-    "mavlink-check": [],
     "sitl": ["--port", "9114", "--timeout", "60", "--set", "time.duration=0.02", "--no-report", "--out", "out"],
     "companion": [
         "udpin:127.0.0.1:14572", "--scenario", "pipe-inspection", "--profile", "generic", "--dry-run",
@@ -301,14 +300,12 @@ SLOW = {
     "identify",
     "sweep",
     "rerun",
-    "mavlink-check",
 }
 NEED = {
     "watch": "rich",
     "falsify": "cma",
     "listen": "pymavlink",
     "stream": "pymavlink",
-    "mavlink-check": "pymavlink",
     "companion": "pymavlink",
 }
 

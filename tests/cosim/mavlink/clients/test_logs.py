@@ -9,12 +9,13 @@ import time
 
 import pytest
 
-from cosim.mavlink.conformance import Client, fetch_parameters, qgc_connect
-from cosim.mavlink.conformance.vehicle import running_vehicle
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GroundLink
 from cosim.mavlink.wire.options import PROFILES, MavlinkOptions
 from tests.cosim.mavlink.clients.conftest import HERE
+from tests.cosim.mavlink.conformance.client import Client
+from tests.cosim.mavlink.conformance.connect import fetch_parameters, qgc_connect
+from tests.cosim.mavlink.conformance.vehicle import running_vehicle
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from cosim.mavlink.conformance.client import Client
-from cosim.mavlink.conformance.ftp import download
+from tests.cosim.mavlink.conformance.client import Client
+from tests.cosim.mavlink.conformance.ftp import download
 
 _ACK_TIMEOUT, _ACK_TRIES = 3.0, 3
 _MESSAGE_TIMEOUT = 1.0  # s, from the ack to the message

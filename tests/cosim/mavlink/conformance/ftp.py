@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from typing import Any, NamedTuple
 
-from cosim.mavlink.conformance.client import Client
+from tests.cosim.mavlink.conformance.client import Client
 
 _HEADER = struct.Struct("<HBBBBBxI")  # sequence, session, opcode, size, requested opcode, burst complete, offset
 _DATA = 239  # bytes of data in a packet

@@ -5,8 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any
 
-from cosim.mavlink.conformance.connect import COMPONENT_METADATA
-from cosim.mavlink.conformance.outcome import Check, Outcome, Subject, failed, judged, passed, skipped
+from tests.cosim.mavlink.conformance.connect import COMPONENT_METADATA
+from tests.cosim.mavlink.conformance.outcome import Check, Outcome, Subject, failed, judged, passed, skipped
 
 _LONGEST_SILENCE = 2.2  # s, after which Mission Planner reports a lost link
 _MOST_BETWEEN = 200  # messages between two heartbeats, after which it does too

@@ -7,12 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from cosim.errors import TelemetryError
-from cosim.mavlink.conformance import commands, identity, missions, parameters, streams
-from cosim.mavlink.conformance.baselines import baseline_of
-from cosim.mavlink.conformance.client import Client
-from cosim.mavlink.conformance.connect import qgc_connect
-from cosim.mavlink.conformance.outcome import Check, Outcome, Subject, failed, judged, skipped, speed_of
 from cosim.mavlink.wire.ground_end import GroundLink, Heard
+from tests.cosim.mavlink.conformance import commands, identity, missions, parameters, streams
+from tests.cosim.mavlink.conformance.client import Client
+from tests.cosim.mavlink.conformance.connect import qgc_connect
+from tests.cosim.mavlink.conformance.outcome import Check, Outcome, Subject, failed, judged, speed_of
 
 LISTENING = 6.0  # s of the vehicle's clock, in which its streams are recorded before any request
 _LONGEST = 60.0  # s of the wall clock, for a vehicle whose clock is slow
@@ -60,15 +59,13 @@ CHECKS: tuple[Check, ...] = (
 )
 
 
-def check_vehicle(link: GroundLink, writes: bool) -> Iterator[Result]:
+def check_vehicle(link: GroundLink) -> Iterator[Result]:
     """Check a vehicle, and yield each result when its check ends.
 
     Parameters
     ----------
     link : GroundLink
         Link to the vehicle.
-    writes : bool
-        True to allow arming, steering and mission uploads; the vehicle's state is restored after them.
 
     Yields
     ------
@@ -84,12 +81,10 @@ def check_vehicle(link: GroundLink, writes: bool) -> Iterator[Result]:
     if client.find(_FINDING) is None:
         raise TelemetryError(f"{link.name}: no vehicle was heard in {_FINDING:g} s")
     client.discard_unread()
-    subject = Subject(client, *_listen(client), writes)
-    baseline = baseline_of(subject)
+    subject = Subject(client, *_listen(client))
     for check in CHECKS:
         started = time.monotonic()
-        outcome = check.run(subject) if writes or not check.writes else skipped("only with --commands")
-        outcome = baseline.apply(check.name, outcome)
+        outcome = check.run(subject)
         if time.monotonic() - client.last_heard > _GONE:
             raise TelemetryError(f"{link.name}: the vehicle has gone, in check {check.name}")
         yield Result(check, outcome, time.monotonic() - started)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from cosim.mavlink.conformance.outcome import Check, Outcome, Subject, failed, judged, passed, skipped, speed_of
+from tests.cosim.mavlink.conformance.outcome import Check, Outcome, Subject, failed, judged, passed, skipped, speed_of
 
 # message: least rate by the vehicle's clock [Hz]
 _NEEDED = {
