@@ -10,6 +10,7 @@ from typing import Any
 from benchmarks import (
     autopilot,
     baselines,
+    calibration,
     everything,
     fmu,
     fuzzy,
@@ -59,6 +60,7 @@ def _parser() -> argparse.ArgumentParser:
             verb.add_argument("--peers-python", metavar="PYTHON", help="that has the peers (default: one of their own)")
     verb = verbs.add_parser("page", help=(page.__doc__ or "").splitlines()[0])
     verb.add_argument("files", nargs="*", type=Path, metavar="FILE", help="what --json wrote (default: measure now)")
+    verbs.add_parser("calibration", help=(calibration.__doc__ or "").splitlines()[0])
     verbs.add_parser("peers", help="install the peers, and try those again that could not be")
     for name, benchmark in BENCHMARKS.items():
         verb = add(name, benchmark.__doc__)
@@ -159,6 +161,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             nmpc_search.main(kinds, options.seed, options.count, options.draws, options.peers_python, options.json)
         case "autopilot":
             _autopilot(parser, options)
+        case "calibration":
+            calibration.main()
         case "peers":
             for peer, version in peer_environment.install(again=True).items():
                 print(f"{peer:24} {version}")

@@ -23,7 +23,7 @@ ROWS = (1_000_000, 10_000_000)
 SCENARIO = "paper"
 
 _REPEATED = 20_000  # greatest number of rows of the short run
-_EXPORTS = ("csv", "npz", "mat", "mcap", "rrd", "tlog")
+_EXPORTS = ("csv", "mcap", "rrd", "tlog")
 WORK = {
     "record": ("write",),
     "summary": ("summary",),

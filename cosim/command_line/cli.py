@@ -112,9 +112,6 @@ def _parser() -> argparse.ArgumentParser:
     check.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run")
     check.add_argument("--json", action="store_true", help="print it as JSON")
 
-    calibrate = verbs.add_parser("calibrate", help="fit the force limit and lag that give the paper's overlap window")
-    calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
-
     import_log.add_verb(verbs)
     export.add_verbs(verbs)
     scenes.add_verb(verbs)
@@ -235,16 +232,6 @@ def _check(options: argparse.Namespace) -> int:
     return 0 if found.holds else 1
 
 
-def _calibrate(options: argparse.Namespace) -> int:
-    from cosim.precheck.calibration import calibrate
-    from cosim.scenario.scenario import load_scenario
-
-    fit = calibrate(load_scenario(options.scenario, ["arbiter.engine=closed"]))
-    print(f"limit.force = {fit.force:.1f} N, limit.time_constant = {fit.time_constant:.3f} s")
-    print(f"window {fit.window[0]:.3f} s to {fit.window[1]:.3f} s, least-squares cost {fit.cost:.3e} s2")
-    return 0
-
-
 _ERRORS = {
     "controller": "ControllerError",
     "cosim": "CosimError",
@@ -252,7 +239,10 @@ _ERRORS = {
     "plant_fmu": "PlantFmuError",
 }
 # verbs of earlier versions, and what replaces them
-_REMOVED = {"mavlink-check": "cosim listen shows what a vehicle sends"}
+_REMOVED = {
+    "calibrate": "python -m benchmarks calibration repeats the fit of paper-calibrated",
+    "mavlink-check": "cosim listen shows what a vehicle sends",
+}
 _LIGHT = {"completion", "help", "list", "scenes"}  # verbs without slow imports
 _VERBS = {
     "run": run.run,
@@ -264,7 +254,6 @@ _VERBS = {
     "completion": completion.completion,
     "show": _show,
     "check": _check,
-    "calibrate": _calibrate,
     "import": import_log.import_,
     "export": export.export,
     "package": export.package,

@@ -15,8 +15,7 @@ def add_verbs(verbs: Any) -> None:
     export.add_argument("folder", type=Path, metavar="RUN", help="the run folder")
     export.add_argument(
         "--to", required=True, metavar="FORMAT",
-        help="csv (pandas), npz (NumPy), mat (MATLAB), mcap (Foxglove, PlotJuggler), rrd (Rerun), "
-        "tlog (QGroundControl)",
+        help="csv (spreadsheets), mcap (Foxglove, PlotJuggler), rrd (Rerun), tlog (QGroundControl)",
     )  # fmt: skip
     export.add_argument("--out", type=Path, metavar="FILE", help="file to write (default: RUN.FORMAT here)")
     thinned = export.add_mutually_exclusive_group()

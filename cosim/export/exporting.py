@@ -13,6 +13,11 @@ from cosim.results.record import RECORD
 from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY
 from plant_fmu.installing import install_hint
 
+# formats of earlier versions, and what replaces them
+_REMOVED = {
+    "mat": "MATLAB reads RUN/record.parquet by parquetread",
+    "npz": "pandas.read_parquet and pyarrow read RUN/record.parquet",
+}
 _RUN_FILES = frozenset({RECORD, SCENARIO, SUMMARY, COMMANDS_LOG})
 
 
@@ -33,7 +38,7 @@ def export_run(
     folder : Path
         Folder of a run that was completed, interrupted or killed.
     to : str
-        Name of the format: csv, mat, mcap, npz, rrd or tlog.
+        Name of the format: csv, mcap, rrd or tlog.
     out : Path, optional
         File to write; default: the folder's name with the format as suffix, in the current folder.
     signals : sequence of str
@@ -66,7 +71,8 @@ def export_run(
     ['run.csv', 'run.units.csv']
     """
     if to not in FORMATS:
-        raise ExportError(f"--to {to}: expected one of {', '.join(FORMATS)}")
+        instead = f"; {_REMOVED[to]}" if to in _REMOVED else ""
+        raise ExportError(f"--to {to}: expected one of {', '.join(FORMATS)}{instead}")
     form = FORMATS[to]
     if form.whole and (signals or every != 1 or rate is not None):
         raise ExportError(f"--to {to}: expected no --signals, --every or --rate with it: its messages have their own")

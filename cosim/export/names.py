@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from cosim.simulation.signals import Column
 
 _OF_REGIONS = ("value", "clearance", "shift.x", "shift.y", "shift.z")
-_MAX_LENGTH = 63  # characters of a name in MATLAB
+_MAX_LENGTH = 63  # characters
 _ELEMENT = re.compile(r"(.+)\[(\d+)\]")
 
 

@@ -26,7 +26,6 @@ ZIPS = {
     "plant_fmu/build.py",  # asks whether a file of the cache is one
     "plant_fmu/archive.py",  # writes
     "plant_fmu/compiling/prebuilt.py",  # reads what came with the package
-    "cosim/export/formats/npz.py",  # writes
 }
 
 

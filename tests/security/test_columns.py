@@ -37,8 +37,6 @@ READERS = {
     "replay": lambda folder: replay([folder]),
     "watch": lambda folder: list(looks(str(folder), None)),
     "export csv": lambda folder: export_run(folder, "csv", folder / "it.csv"),
-    "export npz": lambda folder: export_run(folder, "npz", folder / "it.npz"),
-    "export mat": lambda folder: export_run(folder, "mat", folder / "it.mat"),
     "export mcap": lambda folder: export_run(folder, "mcap", folder / "it.mcap"),
     "export tlog": lambda folder: export_run(folder, "tlog", folder / "it.tlog"),
     "stream": lambda folder: stream(

@@ -62,7 +62,6 @@ def test_help_and_version_exit_with_0(capsys, arguments):
         (["run", "paper", "--out", "/dev/null/run"], "/dev/null/run"),
         (["run", "paper", "--mavlink", "udpout:192.0.2.1:14550"], "--allow-remote"),
         (["run", "paper", "--mavlink", ""], "tcp:HOST:PORT"),
-        (["calibrate", "--scenario", "paper-limited", "--scenario", "nowhere"], "nowhere"),
         (["show", "paper", "--set", "x=1"], "x: unknown key"),
     ],
 )

@@ -146,7 +146,7 @@ _COMPLETE = {
 @pytest.mark.parametrize(
     ("words", "last", "expected"),
     [
-        ("cosim", "ca", {"calibrate", "campaign"}),
+        ("cosim", "ca", {"campaign"}),
         ("cosim run", "paper-l", {"paper-limited"}),
         ("cosim run", "mi", {"mine.toml"}),
         ("cosim run", "sce", {"scenes"}),

@@ -259,13 +259,12 @@ VERBS = {  # {run}: a run folder
     "list": [],
     "show": ["paper"],
     "check": ["paper"],
-    "calibrate": [],
     "import": [
         str(Path(__file__).parents[2] / "data" / "logs" / "small.tlog"), "--vehicle", "bluerov2_heavy", "--no-report",
         "--rate", "1", "--out", "out",
     ],
     "excite": ["--vehicle", "odin", "--time", "30", "--out", "out"],
-    "export": ["{run}", "--to", "npz"],
+    "export": ["{run}", "--to", "csv"],
     "package": ["paper", "--set", "arbiter.engine=closed"],
     "scenes": ["--count", "3"],
     "campaign": ["scenes.jsonl", "--law", "ismail_dunnigan", *CAMPAIGN],
@@ -290,7 +289,6 @@ WAITING = {"sitl", "companion"}  # verbs that say on standard error that they wa
 SLOW = {
     "report",
     "check",
-    "calibrate",
     "excite",
     "package",
     "campaign",

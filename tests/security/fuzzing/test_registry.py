@@ -28,7 +28,6 @@ ITS_OWN = {  # what parses nothing that comes from outside: why
     "cosim.campaigns.reruns.repeat:_of_sweep": "a copy of the plan, which was read",
     "cosim.campaigns.store.folder:CampaignFolder._claim": "a copy of its own plan",
     "cosim.campaigns.sweeps.rows:_for_json": "a copy of its own plan",
-    "cosim.export.formats.npz:write": "writes",
     "cosim.mavlink.services.parameters:Parameters._send_hash": "its own hash",
     "cosim.mavlink.services.parameters:_as_float32": "its own number",
     "cosim.mavlink.wire.thrust_body:thrust_body_of": "twelve bytes of a message whose checksum fits, made up to length",

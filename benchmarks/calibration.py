@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 
 from cosim.errors import ScenarioError
 from cosim.results.paper_claims import PAPER_WINDOW
-from cosim.scenario.scenario import Limit, Scenario, Time
+from cosim.scenario.scenario import Limit, Scenario, Time, load_scenario
 from cosim.simulation.master import Master
 from cosim.simulation.signals import Array, Signals
 
@@ -130,3 +130,10 @@ def calibrate(scenario: Scenario) -> Fit:
         raise ScenarioError("no limit and lag within the bounds bring the vehicle through the overlap in time")
     force, time_constant = math.exp(fit.x[0]), float(fit.x[1])
     return Fit(force, time_constant, window(scenario, force, time_constant), float(fit.cost))
+
+
+def main() -> None:
+    """Print the fit of the scenario ``paper``."""
+    fit = calibrate(load_scenario("paper", ["arbiter.engine=closed"]))
+    print(f"limit.force = {fit.force:.1f} N, limit.time_constant = {fit.time_constant:.3f} s")
+    print(f"window {fit.window[0]:.3f} s to {fit.window[1]:.3f} s, least-squares cost {fit.cost:.3e} s2")

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
+from benchmarks.calibration import calibrate, window
 from cosim.errors import ScenarioError
-from cosim.precheck.calibration import calibrate, window
 from cosim.scenario.scenario import load_scenario
 
 PAPER = load_scenario("paper", ["arbiter.engine=closed"])
@@ -32,7 +32,7 @@ def test_thrusters_have_no_limit_to_fit():
 
 @pytest.mark.slow
 def test_a_path_that_misses_the_overlap_has_no_fit(monkeypatch):
-    monkeypatch.setattr("cosim.precheck.calibration._GRID", (4, 3))  # each of them misses it
+    monkeypatch.setattr("benchmarks.calibration._GRID", (4, 3))  # each of them misses it
     with pytest.raises(ScenarioError, match="overlap"):
         calibrate(load_scenario("paper", ["arbiter.engine=closed", "initial.position=[0,3,1]", "time.step=0.01",
                                           "time.control=0.01", "time.arbiter=0.01"]))  # fmt: skip
