@@ -76,7 +76,7 @@ KEYS = {
     ),
     "arbiter.file": Key(
         "", "rules of one's own, beside the file that names it",
-        ": any format of [fuzzy_arbiter](arbiter.md#formats), see [criteria.md](criteria.md#rules-of-ones-own)",
+        ": any format of [fuzzy_arbiter](arbiter.md#formats), see [criteria.md](criteria.md#your-own-rules)",
     ),
     "arbiter.text": Key("", "content of that file", "; runs write it into their folder"),
     "arbiter.inputs": Key("", "signal for each input of these rules", default="none"),
