@@ -13,6 +13,7 @@ from controller.regions.shape import Bounds, Shape
 from cosim.results.wording import describe_task
 from cosim.scenario.colours import colours_of_regions
 from cosim.scenario.scenario import Scenario
+from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Column
 from fuzzy_arbiter import System
 from plant_fmu import Vehicle
@@ -130,7 +131,14 @@ def _region(scenario: Scenario, index: int, limits: Bounds) -> dict[str, Any]:
         "comes": secondary.is_dynamic if secondary else not scenario.has_goal,
         "unit": "rad" if of_attitude(region.shape) else "m",  # of its clearance
         "shape": shape_of(region.shape, limits),
+        **({"places": _goal_places(scenario)} if scenario.goal_then and not secondary else {}),
     }
+
+
+def _goal_places(scenario: Scenario) -> list[list[float]]:
+    """Return the shifts of the goal from its shape's position to each of its places in turn [m, NED]."""
+    center = shape_center(scenario.goal)
+    return [[0.0] * 3, *(np.subtract(place, center).tolist() for place in scenario.goal_then)]
 
 
 def _words(rule: str) -> str:

@@ -16,7 +16,7 @@ from cosim.io.atomic_file import write_atomic
 SCENE_SCRIPTS = (
     "palette.js", "vectors.js", "camera.js", "solids.js", "planes.js", "painter.js", "sights.js",
     "hull.js", "vehicle.js", "forces.js", "trail.js", "shadows.js", "bounds.js", "order.js",
-    "regions.js", "labels.js", "floor.js", "controls.js", "scene.js",
+    "regions.js", "labels.js", "water.js", "floor.js", "controls.js", "scene.js",
 )  # fmt: skip
 _PLAYER = (
     "player.js", "words.js", "curves.js", "axes.js", "plot.js", "charts.js", "board.js", "timeline.js", "panel.js",

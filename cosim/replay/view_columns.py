@@ -15,7 +15,7 @@ from fuzzy_arbiter.engines.firing import Firing
 _DRAWN = (  # prefixes of the columns that a view draws
     "time", "position.", "quaternion.", "velocity.", "attitude.", "membership.", "weight.", "arbiter.", "estimate.",
     "command.", "thruster_force[", "actuation.", "commands.", "target.", "wrench_saturated", "allocation_saturated",
-    "autopilot.", "companion.", "stick.", "velocity_target.",
+    "autopilot.", "companion.", "stick.", "velocity_target.", "water_velocity.", "goal.place",
 )  # fmt: skip
 
 

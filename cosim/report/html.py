@@ -8,6 +8,7 @@ from importlib import resources
 from string import Template
 
 from cosim.report.contents import Contents
+from cosim.report.inline_svg import inline_svg
 from cosim.report.table import Table
 from cosim.results.run_result import REPLAY
 
@@ -75,7 +76,7 @@ def _table(table: Table, name: str) -> str:
 
 
 def _figure(index: int, name: str, caption: str, svg: str) -> str:
-    inline = svg[svg.index("<svg") :].replace("<svg ", f'<svg role="img" aria-label="Figure {index}: {name}" ', 1)
+    inline = inline_svg(svg, caption)
     words = f"<b>Figure {index}.</b> {html.escape(caption)}"
     link = f'<a href="figures/{name}.svg">SVG</a>'
     return f'<figure id="{name}"><div tabindex="0">{inline}</div><figcaption>{words} ({link})</figcaption></figure>'

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 import shutil
 import tempfile
 from collections.abc import Iterable, Sequence
@@ -10,6 +11,7 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
+from cosim.report.inline_svg import inline_svg
 from cosim.report.report import FIGURES
 
 if TYPE_CHECKING:  # importing Matplotlib takes as long as all other imports together
@@ -25,8 +27,7 @@ _PAGE = Template("""<!DOCTYPE html>
 <style>
 :root { --ink: #1a1a1a; --faint: #555; --paper: #fff; --line: #ccc; --block: #f5f5f5; --link: #0062a0; }
 @media (prefers-color-scheme: dark) {
-  :root { --ink: #e6e6e6; --faint: #aaa; --paper: #1a1a1a; --line: #444; --block: #262626; --link: #6cbcf0; }
-  figure svg { filter: invert(.9) hue-rotate(180deg); }
+  :root { --ink: #e6e6e6; --faint: #aaa; --paper: #16181a; --line: #444; --block: #262626; --link: #6cbcf0; }
 }
 body { font: 16px/1.5 Georgia, serif; color: var(--ink); background: var(--paper); }
 body { max-width: 46rem; margin: 2rem auto; padding: 0 1rem; }
@@ -72,8 +73,8 @@ def wall(text: str) -> Html:
 
 
 def number(x: float | None, digits: int = 4) -> str:
-    """Format a number for tables, a dash for None."""
-    if x is None:
+    """Format a number for tables, a dash for None, NaN and infinity."""
+    if x is None or not math.isfinite(x):
         return "–"
     text = f"{x:.0f}" if 10**digits <= abs(x) < 1e9 else f"{x:.{digits}g}"
     return text.replace("-", "−")
@@ -174,10 +175,8 @@ def write_figures(folder: Path, drawings: Iterable[NamedFigure]) -> dict[str, Ht
 
 def inline_figure(drawing: NamedFigure, folder: Path) -> Html:
     """Write a figure into a folder, and return it as HTML with its caption."""
-    svg = drawing.write(folder)
-    caption = html.escape(drawing.caption)
-    inline = svg[svg.index("<svg") :].replace("<svg", f'<svg role="img" aria-label="{caption}"', 1)
-    return Html(f"<figure>{inline}<figcaption>{caption}</figcaption></figure>")
+    inline = inline_svg(drawing.write(folder), drawing.caption)
+    return Html(f"<figure>{inline}<figcaption>{html.escape(drawing.caption)}</figcaption></figure>")
 
 
 def _escaped(text: str) -> str:

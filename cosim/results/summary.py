@@ -79,6 +79,7 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
         "settled": settled,
         "settle_time": visits[-1].start if visits else None,
         "final_position": [last[name] for name in _POSITION],
+        **({"goals": {"reached": int(last["goal.place"]), "of": len(scenario.goal_then) + 1}} if scenario.goal_then else {}),
         "closest_to_goal": -data.greatest["goal.clearance"],
         "weighted_violation": data.violation.total() * period,
         "intersection": [names[i] for i in scenario.intersection],
@@ -115,9 +116,10 @@ class _SummaryData:
         flags = ("wrench_saturated", "allocation_saturated")
         self._flags = [name for name in record.units if name.startswith("thrust_saturated[") or name in flags]
         self._weights = [f"weight.{name}" for name in scenario.criterion_names]
+        self._place = ["goal.place"] if scenario.goal_then else []
         self.signals = [
             "time", "goal.clearance", *self._clearances, *_FORCE, *_ASKED, *_SPEED, *_POSITION, *_ESTIMATE,
-            *self._weights, *self._flags, *(["goal.place"] if scenario.goal_then else []),
+            *self._weights, *self._flags, *self._place,
         ]  # fmt: skip
         self._last_place = len(scenario.goal_then)
         # rows with acting forces that are left: the forces of a complete run's last row do not act
@@ -170,7 +172,7 @@ class _SummaryData:
             **{name: block[name] for name in _ESTIMATE},
         })  # fmt: skip
         self._update_extremes(self.least, np.fmin, {name: block[name] for name in (*self._clearances, *_ESTIMATE)})
-        self.last = {name: float(block[name][-1]) for name in ("time", *_POSITION, *_ESTIMATE)}
+        self.last = {name: float(block[name][-1]) for name in ("time", *_POSITION, *_ESTIMATE, *self._place)}
 
     @staticmethod
     def _update_extremes(known: dict[str, float], extreme: np.ufunc, signals: dict[str, Array]) -> None:

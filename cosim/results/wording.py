@@ -23,8 +23,10 @@ def format_force(force: float) -> str:
     Returns
     -------
     str
-        Number and unit.
+        Number and unit; ``no number`` for NaN and infinity.
     """
+    if not math.isfinite(force):
+        return "no number"
     return f"{force / 1e3:.4g} kN" if force >= 1e3 else f"{force:.4g} N"
 
 
@@ -101,9 +103,11 @@ def verdict(summary: dict[str, Any]) -> str:
     elif summary["reached"]:
         goal = f"The vehicle entered the goal region at {summary['reach_time']:.2f} s but did not settle there"
     else:
-        near = summary["closest_to_goal"]
+        near, goals = summary["closest_to_goal"], summary.get("goals")
         how_near = f"it came within {near:.2f} m of it" if math.isfinite(near) else "how near it came is not recorded"
         goal = f"The vehicle never entered the goal region; {how_near}"
+        if goals and goals["reached"] < goals["of"] - 1:  # the last goal, which counts, was not yet where it had to go
+            goal = f"The vehicle reached {goals['reached']} of {goals['of']} goals in turn"
     violated = [_violation(summary, name) for name, c in summary["min_clearance"].items() if c < 0.0]
     kept = "; it kept every region."
     if violated:

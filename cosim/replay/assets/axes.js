@@ -39,8 +39,8 @@ function tickTexts(values) {
   const shown = kilo ? step / 1000 : step;
   const digits = Math.max(0, Math.min(9, -Math.floor(Math.log10(shown) + 1e-9)));
   return values.map((value) => {
-    const text = Math.abs(kilo ? value / 1000 : value).toFixed(digits);
-    return (value < 0 && Number(text) !== 0 ? "\u2212" : "") + text + (kilo && Number(text) !== 0 ? "k" : "");
+    const text = decimals(kilo ? value / 1000 : value, digits);
+    return text + (kilo && Number(text) !== 0 ? "k" : "");
   });
 }
 

@@ -5,7 +5,7 @@ const ROOM = 0.1; // share of the path's diagonal; regions farther away are not 
 /** Return true if a region is in the scene; an obstacle that is not there yet is parked far above the water. */
 const isThere = (place) => Vec.finite(place) && place[2] > -1e4;
 
-/** Return the corners of boxes about the vehicle at sampled rows, and about the goal at start and end. */
+/** Return the corners of boxes about the vehicle at sampled rows, and about the goal at start and end, or at each place. */
 function placesOf(run) {
   const { radius } = run.header.vehicle;
   const [xs, ys, zs] = ["x", "y", "z"].map((axis) => run.column(`position.${axis}`));
@@ -14,10 +14,10 @@ function placesOf(run) {
   if (run.rows) rows.push(run.rows - 1);
   const places = rows.map((i) => [xs[i], ys[i], zs[i]]).filter(Vec.finite);
   const kept = places.flatMap((p) => cornersOf([p.map((x) => x - radius), p.map((x) => x + radius)]));
-  const { shape } = run.header.regions[0]; // the goal
+  const { shape, places: inTurn } = run.header.regions[0]; // the goal
   const solid = surfaceOf(shape);
-  for (const t of solid && isThere(solid.centre) ? [run.start, run.end] : []) {
-    const at = Vec.add(solid.centre, run.shift(0, t));
+  for (const shift of solid && isThere(solid.centre) ? inTurn ?? [run.start, run.end].map((t) => run.shift(0, t)) : []) {
+    const at = Vec.add(solid.centre, shift);
     if (Vec.finite(at)) kept.push(...cornersOf([at.map((x) => x - solid.radius), at.map((x) => x + solid.radius)]));
   }
   return kept;

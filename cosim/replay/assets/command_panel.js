@@ -135,7 +135,7 @@ class CommandPanel {
     set.hidden = !place;
     if (!place || set.contains(document.activeElement)) return;
     fields.forEach((field, axis) => {
-      const text = field.disabled ? "" : String(Number(place[axis].toFixed(2)));
+      const text = field.disabled ? "" : shortNumber(Number(place[axis].toFixed(2)));
       if (field.value !== text) field.value = text;
     });
   }

@@ -88,9 +88,18 @@ class Run {
     return { position, quaternion };
   }
 
-  /** Return the displacement of a region from its shape's place at a time [s] [m, NED]. */
-  shift(region, t) {
-    const { name, comes } = this.header.regions[region];
+  /** Return the index of the goal's place at a time [s], of those that it has in turn; 0 for a goal with one. */
+  goalPlace(t) {
+    return this.held("goal.place", t) || 0;
+  }
+
+  /**
+   * Return the displacement of a region from its shape's place at a time [s] [m, NED]; with `place`, that of the goal at
+   * one of its places.
+   */
+  shift(region, t, place = null) {
+    const { name, comes, places } = this.header.regions[region];
+    if (places) return places[place ?? this.goalPlace(t)];
     if (!this.has(`${name}.shift.x`)) return [0, 0, 0];
     const names = ["x", "y", "z"].map((axis) => `${name}.shift.${axis}`);
     // do not interpolate between the parked position and the scene
@@ -98,10 +107,16 @@ class Run {
     return names.map((signal) => (leaps ? this.held(signal, t) : this.at(signal, t)));
   }
 
+  /** Return the velocity of the water at the vehicle [m/s, NED] as of a time [s]; null at rest, or if it is not known. */
+  current(t) {
+    const velocity = ["x", "y", "z"].map((axis) => this.held(`water_velocity.${axis}`, t));
+    return Vec.finite(velocity) && Vec.norm(velocity) >= 0.0005 ? velocity : null; // less is shown as 0
+  }
+
   /** Return true if a region moves at a time [s]: between the rows about it, or the last two. */
   moves(region, t) {
     const row = Math.min(this.row(t), this.rows - 2);
-    if (!(row >= 0) || !this.has(`${this.header.regions[region].name}.shift.x`)) return false;
+    if (!(row >= 0) || this.header.regions[region].places || !this.has(`${this.header.regions[region].name}.shift.x`)) return false;
     const [a, b] = [row, row + 1].map((i) => this.shift(region, this.time[i]));
     return this._isThere(region, row) && Vec.norm(Vec.sub(a, b)) > 0;
   }

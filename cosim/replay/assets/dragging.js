@@ -9,7 +9,7 @@ const SETTLES = 250; // ms, for which the ghost stays after the release
 class Dragging {
   /**
    * @param {LiveLink|WhatIf} link with page, run, acceptsCommands; time, for which the regions are shown [s]; refusal, the
-   * reason why nothing can be moved, or ""; canMove(region); move(region, from, to)
+   * reason why nothing can be moved, or ""; canMove(region, place); move(region, from, to, place), with the place of a goal in turn
    */
   constructor(link) {
     this.link = link;
@@ -38,24 +38,24 @@ class Dragging {
     if (this.held?.moved) this.ghost.draw(this.link.page.scene(), this.held);
   }
 
-  /** Return the index of the region at a pixel that may be dragged; null if there is none. */
+  /** Return the region at a pixel that may be dragged, and the place of a goal in turn; null if there is none. */
   _under(x, y) {
     const { link } = this;
     const scene = link.page.scene();
     if (!link.acceptsCommands || !scene) return null;
     const found = scene.pick(x, y);
-    if (!found || !link.canMove(found.region) || isFlat(link.run, found.region)) return null;
+    if (!found || !link.canMove(found.region, found.place) || isFlat(link.run, found.region)) return null;
     // a keep-inside region surrounds the scene, so that its label is the only handle
     const { keep } = link.run.header.regions[found.region];
     const named = scene.labels.nameAt(x, y) !== null; // labels are picked before what is behind them
-    return found.region === 0 || keep === "out" || named ? found.region : null;
+    return found.region === 0 || keep === "out" || named ? found : null;
   }
 
   _take(event) {
     if (event.button !== 0 || !event.isPrimary || event.altKey || event.ctrlKey) return;
     const { offsetX: x, offsetY: y } = event;
-    const region = this._under(x, y);
-    if (region === null) return;
+    const found = this._under(x, y);
+    if (!found) return;
     const { run, page, refusal, time } = this.link;
     if (refusal) {
       page.say(refusal, "info");
@@ -64,8 +64,9 @@ class Dragging {
     event.preventDefault();
     this.canvas.focus();
     this.canvas.setPointerCapture(event.pointerId);
-    const from = placeOf(run, region, time);
-    this.held = { run, region, time, from, to: from, x, y, last: [x, y], upright: null, moved: false };
+    const { region, place } = found;
+    const from = placeOf(run, region, time, place);
+    this.held = { run, region, place, time, from, to: from, x, y, last: [x, y], upright: null, moved: false };
   }
 
   _move(event) {
@@ -108,7 +109,7 @@ class Dragging {
     this.canvas.style.cursor = "";
     if (held.moved && held.run === link.run) {
       const round = held.to.map((x, i) => (x === held.from[i] ? x : Number(x.toFixed(3))));
-      link.move(held.region, held.from, round);
+      link.move(held.region, held.from, round, held.place);
     }
     setTimeout(() => {
       if (!this.held) this.ghost.clear();
@@ -120,7 +121,7 @@ class Dragging {
     this._at = [x, y];
     this._looking ||= setTimeout(() => {
       this._looking = 0;
-      if (!this.held) this.canvas.style.cursor = this._under(...this._at) === null ? "" : "grab";
+      if (!this.held) this.canvas.style.cursor = this._under(...this._at) ? "grab" : "";
     }, 80);
   }
 }

@@ -24,9 +24,9 @@ class Flight {
    * Simulate a flight with other numbers.
    * @param {Map<string, number>} values by key
    * @param {?{thruster: number, time: number}} failure an additional one; thrusters count from 1, time [s]
-   * @returns {Promise<object>} arrays of the worker, or {refused}
+   * @returns {Promise<object>} arrays of the worker, or {refused}; and value(key), the number that was flown
    */
-  fly(values, failure) {
+  async fly(values, failure) {
     const { data } = this;
     const job = { numbers: [], integers: [], gains: [], starts: [], noise: [...data.noise], metrics: data.metrics, sizes: {} };
     for (const [name, width] of Object.entries(data.widths)) job.sizes[name] = width * data.rows;
@@ -35,11 +35,15 @@ class Flight {
       for (const [kind, place] of this.slots.get(key).places) {
         if (kind === "noise") job.noise[place] = value;
         else if (kind === "middle") job.numbers.push([place, (value + (values.get(otherEnd(key)) ?? this.slots.get(otherEnd(key)).value)) / 2]);
-        else to[kind].push([place, value]);
+        else to[kind]?.push([place, value]);
       }
     }
+    const value = (key) => values.get(key) ?? this.slots.get(key)?.value;
+    for (const [i, place] of goalPlaces(data, value).slice(1).entries()) {
+      place.forEach((x, axis) => job.numbers.push([this.slots.get(`goal.then.${i}.${axis}`).places[0][1], x]));
+    }
     if (failure && data.failures) this._fail(job, failure);
-    return this._ask(job);
+    return { ...(await this._ask(job)), value };
   }
 
   /** Add all failures in the order of their steps, and the limits that allocation uses once they are reported. */
@@ -76,6 +80,16 @@ function otherEnd(key) {
   return key.includes(".start.") ? key.replace(".start.", ".end.") : key.replace(".end.", ".start.");
 }
 
+/** Return the shifts of the goal to its places in turn [m, NED], from the numbers of `value(key)`. */
+function goalPlaces(data, value) {
+  const center = data.goal_center.map((x, axis) => {
+    const [middle, start, end] = ["centre", "start", "end"].map((name) => value(`goal.${name}.${axis}`));
+    return middle ?? (start === undefined ? x : (start + end) / 2);
+  });
+  const shift = (i) => center.map((x, axis) => value(`goal.then.${i}.${axis}`) - x);
+  return [[0, 0, 0], ...Array.from({ length: data.goals }, (_, i) => shift(i))];
+}
+
 const MOST_ROWS = 6000; // limit of the rows of a simulated run; more would not be visible
 
 /**
@@ -93,7 +107,7 @@ function runOfFlight(data, result, header, times = []) {
   const even = Array.from({ length: Math.ceil(rows / stride) }, (_, i) => i * stride);
   const kept = [...new Set([...even, ...asked, rows - 1])].sort((a, b) => a - b);
   const signals = header.signals.filter(({ name }) => name in data.signals);
-  const columns = signals.map(({ name }) => Float64Array.from(kept, signalOf(data, data.signals[name], number, header)));
+  const columns = signals.map(({ name }) => Float64Array.from(kept, signalOf(data, data.signals[name], number, result.value)));
   const run = new Run({ ...header, signals }, columns);
   const active = signals.findIndex((signal) => signal.name === "active");
   if (active >= 0) columns[active].set(activeRegions(run, data.criteria));
@@ -101,7 +115,7 @@ function runOfFlight(data, result, header, times = []) {
 }
 
 /** Return a function from row to value of a signal; 0 for the active region, which is computed afterwards. */
-function signalOf(data, [kind, ...rest], number, header) {
+function signalOf(data, [kind, ...rest], number, value) {
   if (kind === "sum") {
     const [array, first, factors] = rest;
     const parts = factors.map((_, i) => number(array, first + i));
@@ -110,9 +124,18 @@ function signalOf(data, [kind, ...rest], number, header) {
   if (kind === "shift") {
     const [region, axis] = rest;
     const [time, place] = [number("trace", 0), number("reasons", data.place)];
+    const places = goalPlaces(data, value);
+    return (row) => data.velocities[region][axis] * time(row) + (region === 0 ? places[place(row)][axis] : 0);
+  }
+  if (kind === "water") {
+    const [axis] = rest;
+    const { surface, shear, period, variation } = data.water;
+    const [time, depth] = [number("trace", 0), number("trace", 3)];
+    const now = value(`plant.current.${axis}`) ?? surface[axis];
     return (row) => {
-      const at = region === 0 ? place(row) : 0;
-      return data.velocities[region][axis] * time(row) + (at > 0 ? data.goal_places[at - 1][axis] : 0);
+      const knot = time(row) / period;
+      const [before, after] = [Math.floor(knot), Math.ceil(knot)].map((k) => variation[k]?.[axis] ?? 0);
+      return now + shear[axis] * Math.max(0, depth(row)) + before + (knot % 1) * (after - before);
     };
   }
   if (kind === "attitude") {

@@ -8,8 +8,8 @@ function roundStep(least) {
 
 /** Return a length [m] as text, with the digits that a step needs. */
 function metres(x, step) {
-  const text = x.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
-  return Number(text) === 0 ? "0" : text.replace("-", "−");
+  const text = decimals(x, Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
+  return Number(text) === 0 ? "0" : text;
 }
 
 /** Return the multiples of a step within two bounds. */

@@ -43,6 +43,19 @@ class Forces {
   }
 }
 
+/** Add an arrow between two pixels to the path; a short one has a smaller head, or none. */
+function addArrow(context, a, b, headLength) {
+  context.moveTo(a[0], a[1]);
+  context.lineTo(b[0], b[1]);
+  const length = Math.hypot(b[0] - a[0], b[1] - a[1]);
+  if (length < 3) return;
+  const head = Math.min(headLength, 0.6 * length);
+  const [ux, uy] = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
+  context.moveTo(b[0] - head * (ux + 0.6 * uy), b[1] - head * (uy - 0.6 * ux));
+  context.lineTo(b[0], b[1]);
+  context.lineTo(b[0] - head * (ux - 0.6 * uy), b[1] - head * (uy + 0.6 * ux));
+}
+
 /** Draw arrows of force: one path of all shafts and heads for the halo, one for the color. */
 function paintForces(painter, pose, forces, size, real, theme) {
   const { camera, context } = painter;
@@ -60,17 +73,7 @@ function paintForces(painter, pose, forces, size, real, theme) {
   const fine = Math.min(1, Math.max(0.6, (size * camera.scaleAt(pose.position)) / 30));
   for (const [colour, width] of [[colours.halo, 5 * fine], [colours.thrust, 2.4 * fine]]) {
     context.beginPath();
-    for (const [a, b] of arrows) {
-      context.moveTo(a[0], a[1]);
-      context.lineTo(b[0], b[1]);
-      const length = Math.hypot(b[0] - a[0], b[1] - a[1]);
-      if (length < 3) continue;
-      const head = Math.min(7 * fine, 0.6 * length);
-      const [ux, uy] = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
-      context.moveTo(b[0] - head * (ux + 0.6 * uy), b[1] - head * (uy - 0.6 * ux));
-      context.lineTo(b[0], b[1]);
-      context.lineTo(b[0] - head * (ux - 0.6 * uy), b[1] - head * (uy + 0.6 * ux));
-    }
+    for (const [a, b] of arrows) addArrow(context, a, b, 7 * fine);
     painter.stroke(colour, width);
   }
   context.lineCap = "butt";

@@ -16,7 +16,7 @@ class Ghost {
   }
 
   /** Draw a dragged region of a run at its new position. */
-  draw(scene, { run, region, time, from, to }) {
+  draw(scene, { run, region, place, time, from, to }) {
     const { context } = this;
     const { clientWidth: width, clientHeight: height } = this.below;
     const ratio = window.devicePixelRatio || 1;
@@ -32,7 +32,7 @@ class Ghost {
     context.lineWidth = 2;
 
     context.setLineDash([6, 4]);
-    const outline = this._outline(scene, run, region, time, Vec.sub(to, placeOf(run, region, time) ?? from));
+    const outline = this._outline(scene, run, region, time, place, Vec.sub(to, placeOf(run, region, time, place) ?? from));
     if (outline.length > 2) {
       this._path(outline);
       context.closePath();
@@ -56,7 +56,7 @@ class Ghost {
 
   _label([north, east, down], x, y, width, ink, card) {
     const { context } = this;
-    const text = `N ${north.toFixed(2)}  E ${east.toFixed(2)}  D ${down.toFixed(2)} m`;
+    const text = `N ${decimals(north, 2)}  E ${decimals(east, 2)}  D ${decimals(down, 2)} m`;
     context.font = "600 12px system-ui, sans-serif";
     const wide = context.measureText(text).width + 12;
     // on the side towards the middle of the canvas
@@ -77,11 +77,11 @@ class Ghost {
   }
 
   /** Return the outline [pixels] of a surface, moved by `by` [m, NED]; empty for a shape without a surface. */
-  _outline(scene, run, region, time, by) {
+  _outline(scene, run, region, time, place, by) {
     const shape = run.shape(region, time);
     const solid = surfaceOf(shape);
     if (!solid) return [];
-    const shift = Vec.add(run.shift(region, time), by);
+    const shift = Vec.add(run.shift(region, time, place), by);
     const { points } = solid;
     const seen = [];
     for (let i = 0; i < points.length; i += 3) seen.push(scene.project([points[i] + shift[0], points[i + 1] + shift[1], points[i + 2] + shift[2]]));

@@ -14,11 +14,14 @@ function outcomeOf(data, result, run, failure) {
 
 function verdictOf(result, run, { reach_time: reach, settle_time: settled, min_clearance: least }) {
   const closest = -result.metrics[5];
-  let goal = `The vehicle never entered the goal region; it came within ${closest.toFixed(2)} m of it`;
-  if (settled !== null) goal = `The vehicle entered the goal region at ${reach.toFixed(2)} s ${settled === reach ? "and stayed" : `and was in for good from ${settled.toFixed(2)} s`}`;
-  else if (reach !== null) goal = `The vehicle entered the goal region at ${reach.toFixed(2)} s but did not settle there`;
+  const [goals, at] = [run.header.regions[0].places?.length ?? 1, run.goalPlace(run.end)];
+  const entered = `The vehicle entered the goal region at ${decimals(reach, 2)} s`;
+  let goal = `The vehicle never entered the goal region; ${Number.isFinite(closest) ? `it came within ${decimals(closest, 2)} m of it` : "how near it came is not recorded"}`;
+  if (settled !== null) goal = `${entered} ${settled === reach ? "and stayed" : `and was in for good from ${decimals(settled, 2)} s`}`;
+  else if (reach !== null) goal = `${entered} but did not settle there`;
+  else if (at < goals - 1) goal = `The vehicle reached ${at} of ${goals} goals in turn`;
   const broken = run.header.regions.slice(1).filter(({ name }) => least[name] < 0);
-  const depth = ({ name, unit }) => (unit === "rad" ? `${((-least[name] * 180) / Math.PI).toFixed(1)}°` : `${(-least[name]).toFixed(3)} m`);
+  const depth = ({ name, unit }) => (unit === "rad" ? `${decimals(-least[name] * DEGREES, 1)}°` : `${decimals(-least[name], 3)} m`);
   const kept = broken.length ? `violated ${broken.map((region) => `${region.name} by ${depth(region)}${region.hard ? "" : " (soft)"}`).join(", ")}` : "kept every region";
   const stopped = result.metrics[12] >= 0 ? ` The flight ended before its time: ${result.said || "the plant refused a step"}.` : "";
   return `${goal}; it ${kept}.${stopped}`;

@@ -21,6 +21,7 @@ const SCENE_THEMES = {
     future: "rgba(29, 43, 54, 0.46)",
     muted: "#a9b4bc",
     thrust: "#A6407A",
+    water: "#0060a8",
     hull: { float: "#E8C81F", frame: "#33424d", tube: "#8fa1ad", dome: "#a5dcf3", skid: "#4a5a66", duct: "#51626e" },
   },
   dark: {
@@ -37,6 +38,7 @@ const SCENE_THEMES = {
     future: "rgba(230, 238, 244, 0.42)",
     muted: "#6f808c",
     thrust: "#F29AC8",
+    water: "#7cc0f5",
     hull: { float: "#F0DC4E", frame: "#5b6b77", tube: "#a5b6c1", dome: "#b5e6fa", skid: "#71828e", duct: "#7d8f9b" },
   },
 };

@@ -86,7 +86,10 @@ class Panel {
     rules.forEach(({ strength }, i) => this.rules[i].update(strength, figure(strength, 2)));
     setText(this.ruled, `${rules.filter(({ strength }) => strength > 0).length} of ${rules.length} fire`);
     this._sort(distancesAt(run, t), active.index);
-    numbersAt(run, t).forEach(([, text], i) => setText(this.numbers[i], text));
+    numbersAt(run, t).forEach(([, text], i) => {
+      setText(this.numbers[i], text);
+      this.numbers[i].hidden = this.numbers[i].previousSibling.hidden = !text;
+    });
     this._passed(t);
   }
 

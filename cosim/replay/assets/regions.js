@@ -26,17 +26,20 @@ class Regions {
     this.runs.forEach((run, r) => {
       const active = run.active(t);
       run.header.regions.forEach((region, i) => {
-        const [shape, shift] = [run.shape(i, t), run.rows ? run.shift(i, t) : [0, 0, 0]];
-        const same = entries.filter((entry) => entry.of.run !== r && sameRegion(entry, region, shape, shift));
-        for (const entry of same) {
-          entry.owners.push([r, i]);
-          if (active === i && !entry.active) dressEntry(entry, true, theme);
-        }
-        if (same.length) return;
-        for (const entry of this._of(shape, shift, region, poses[r], target)) {
-          Object.assign(entry, { of: { run: r, region: i }, region, shape, shift, owners: [[r, i]] });
-          dressEntry(entry, active === i, theme);
-          entries.push(entry);
+        const shape = run.shape(i, t);
+        for (const { place, next, shift } of placesOfRegion(run, i, t)) {
+          const same = entries.filter((entry) => entry.of.run !== r && entry.next === next && sameRegion(entry, region, shape, shift));
+          const isActive = active === i && !next;
+          for (const entry of same) {
+            if (!next) entry.owners.push([r, i]);
+            if (isActive && !entry.active) dressEntry(entry, true, theme);
+          }
+          if (same.length) continue;
+          for (const entry of this._of(shape, shift, region, poses[r], target)) {
+            Object.assign(entry, { of: { run: r, region: i, place }, region, shape, shift, next, owners: next ? [] : [[r, i]] });
+            dressEntry(entry, isActive, theme);
+            entries.push(entry);
+          }
         }
       });
     });
@@ -62,17 +65,26 @@ class Regions {
   }
 }
 
+/** Return where a region is drawn at a time [s]: where it is, and the goal's next place: [{place, next, shift}]. */
+function placesOfRegion(run, index, t) {
+  const { places } = run.header.regions[index];
+  if (!places) return [{ place: null, next: false, shift: run.rows ? run.shift(index, t) : [0, 0, 0] }];
+  const now = run.goalPlace(t);
+  return [now, now + 1].filter((place) => place < places.length).map((place) => ({ place, next: place > now, shift: places[place] }));
+}
+
 /** Return the mean of some points. */
 function middleOf(points) {
   return points.reduce((sum, p) => Vec.along(sum, p, 1 / points.length), [0, 0, 0]);
 }
 
-/** Set color and style of an entry; an active region is drawn in full, and the goal is seen through others. */
+/** Set color and style of an entry; an active region is drawn in full, the goal is seen through others, the next one dotted. */
 function dressEntry(entry, active, theme) {
   entry.active = active;
   entry.colour = regionColour(entry.region, active, theme);
   entry.style = styleOf(entry.region.keep, active, entry.colour);
   if (!entry.region.criterion) Object.assign(entry.style, { filled: true, alpha: 0.1, width: 2.6, hidden: 0.6 });
+  if (entry.next) Object.assign(entry.style, { filled: false, width: 1.6, dash: [2, 5], hidden: 0.35 });
 }
 
 /** Return true if an entry already shows a region of the same name, shape and place. */
@@ -121,10 +133,13 @@ function nameRegions(labels, camera, entries, colours, runs, t) {
   const named = new Set();
   const names = runNames(runs);
   const isTwice = ({ of, region }) => entries.some((other) => other.of.run !== of.run && other.region.name === region.name);
-  const nameOf = (entry) => (entry.solid && isTwice(entry) ? `${entry.region.name}, ${names[entry.of.run]}` : entry.region.name);
+  const nameOf = (entry) => {
+    const name = regionName(entry.region, entry.of.place, entry.next ? "next" : "present");
+    return entry.solid && isTwice(entry) ? `${name}, ${names[entry.of.run]}` : name;
+  };
   const near = new Map(nearestFirst(entries, runs, t).map((entry, place) => [entry, place]));
   for (const entry of entries) {
-    const key = `${entry.of.run}:${entry.of.region}`;
+    const key = `${entry.of.run}:${entry.of.region}:${entry.next}`;
     if (named.has(key)) continue;
     const [x, y, depth] = camera.project(anchorOf(entry, camera));
     if (!(depth > camera.near) || x < 0 || y < 0 || x > camera.width || y > camera.height) continue;
@@ -136,7 +151,7 @@ function nameRegions(labels, camera, entries, colours, runs, t) {
       key, x, y, gap: 6, of: entry.of, size: camera.width < 480 && !active ? 10 : 12,
       text: active ? `▶ ${nameOf(entry)}` : nameOf(entry),
       colour: active ? colours.ink : colours.soft, edge: entry.colour, bold: active, chip: colours.chip,
-      rank: active ? 0 : entry.of.region === 0 ? 1 : 10 + place, far: active || entry.of.region === 0,
+      rank: active ? 0 : entry.of.region === 0 ? 1 + Number(entry.next) : 10 + place, far: active || entry.of.region === 0,
       sides: ["above", "right", "left", "below"],
     });
   }

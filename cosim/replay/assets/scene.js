@@ -71,7 +71,7 @@ class Scene {
     this._later();
   }
 
-  /** Return what the last frame showed: time, and for each run the pose, active region and color of each region. */
+  /** Return what the last frame showed: time, and for each run the pose, active region, current and color of each region. */
   get drawn() {
     return this._drawn;
   }
@@ -91,7 +91,7 @@ class Scene {
     return length > 0 && Number.isFinite(length) ? [eye[0] + length * ray[0], eye[1] + length * ray[1]] : null;
   }
 
-  /** Return the region whose label, feature or surface is at a pixel: {run, region}; null if there is none. */
+  /** Return the region whose label, feature or surface is at a pixel: {run, region, place of a goal in turn}; null if there is none. */
   pick(x, y) {
     const named = this.labels.nameAt(x, y);
     if (named) return named;
@@ -165,6 +165,7 @@ class Scene {
     });
 
     paintCompass(painter, this.labels, colours);
+    paintCurrents(painter, this.labels, colours, this.runs, t);
     paintScale(painter, this.labels, colours, Math.max(1, ...vehicles.map((vehicle) => vehicle?.magnified ?? 1)));
     for (const vehicle of vehicles) if (vehicle) blockVehicle(this.labels, camera, vehicle);
     if (labels) nameRegions(this.labels, camera, regions, colours, this.runs, t);
@@ -320,7 +321,7 @@ class Scene {
         return entry ? entry.colour : null;
       });
       const { position = null, quaternion = null } = poses[r] ?? {};
-      return { position, quaternion, active: run.active(t), colours };
+      return { position, quaternion, active: run.active(t), current: run.current(t), colours };
     });
     this._drawn = { time: t, runs };
   }

@@ -121,10 +121,10 @@ class Stage {
     this.scene.camera[method](...values);
   }
 
-  /** Return the run and the region at a pixel of a view; null if there is none. */
+  /** Return the run, the region and the goal's place at a pixel of a view; null if there is none. */
   under(view, x, y) {
     const found = view.blank ? null : view.scene.pick(x, y);
-    return found ? { run: this.runs[view.indices[found.run]], region: found.region } : null;
+    return found ? { ...found, run: this.runs[view.indices[found.run]] } : null;
   }
 
   _another() {
@@ -154,8 +154,9 @@ function showPointed(stage, view) {
     const found = stage.under(view, x, y);
     tip.hidden = !found;
     if (!found) return;
-    const { name } = found.run.header.regions[found.region];
-    setText(tip, `${name}: ${regionWords(found.run, found.region, stage.time)}`);
+    const { run, region, place } = found;
+    const name = regionName(run.header.regions[region], place, place > run.goalPlace(stage.time) ? "next" : "present");
+    setText(tip, `${name}: ${regionWords(run, region, stage.time)}`);
     const inner = canvas.getBoundingClientRect();
     const outer = tip.offsetParent.getBoundingClientRect();
     const left = Math.min(x + inner.left - outer.left + 14, outer.width - tip.offsetWidth - 6);

@@ -1,11 +1,14 @@
 // Movable regions of a run: the target, and regions with a position.
 
-/** Return the handle of a region at a time [s]: a point of it or of its plane [m, NED]; null if it has none. */
-function placeOf(run, index, t) {
+/**
+ * Return the handle of a region at a time [s]: a point of it or of its plane [m, NED]; null if it has none. With `place`,
+ * that of the goal at one of its places.
+ */
+function placeOf(run, index, t, place = null) {
   if (!run.rows || !run.there(index, t)) return null;
   if (index === 0 && run.has("target.x")) return ["x", "y", "z"].map((axis) => run.held(`target.${axis}`, t));
   const shape = run.shape(index, t);
-  const shift = run.shift(index, t);
+  const shift = run.shift(index, t, place);
   const planes = shape.drawing?.planes;
   const point = surfaceOf(shape)?.centre ?? (planes ? middleOf(planes.map((plane) => plane.point)) : shape.feature);
   return point ? Vec.add(point, shift) : null;

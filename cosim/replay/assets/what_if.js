@@ -26,13 +26,24 @@ class WhatIf {
     return this.page.player.t;
   }
 
-  canMove(region) {
-    return this.flight.data.moves[region] !== null;
+  canMove(region, place) {
+    return this.movable().some((one) => one.region === region && one.place === (place ?? 0));
   }
 
-  /** Move a region from one point to another [m, NED]. */
-  move(region, from, to) {
-    const axes = this.flight.data.moves[region];
+  /** Return what can be moved, each place of the goal by itself: {region, place, name, axes}, with the keys of each axis. */
+  movable() {
+    const { moves, goals } = this.flight.data;
+    return this.recorded.header.regions.flatMap((region, index) =>
+      Array.from({ length: index || !goals ? 1 : goals + 1 }, (_, place) => ({
+        region: index, place, name: regionName(region, place),
+        axes: place ? [0, 1, 2].map((axis) => [`goal.then.${place - 1}.${axis}`]) : moves[index],
+      })).filter(({ axes }) => axes),
+    );
+  }
+
+  /** Move a region, or the goal's later `place`, from one point to another [m, NED]. */
+  move(region, from, to, place) {
+    const { axes } = this.movable().find((one) => one.region === region && one.place === (place ?? 0));
     const by = Vec.sub(to, from);
     axes.forEach((keys, axis) => {
       const values = keys.map((key) => this.value(key));
@@ -46,9 +57,9 @@ class WhatIf {
 
   // ---- numbers ----
 
-  /** Return the current number of a key. */
+  /** Return the current number of a key; undefined for one that the page cannot change. */
   value(key) {
-    return this.values.get(key) ?? this.flight.slots.get(key).value;
+    return this.values.get(key) ?? this.flight.slots.get(key)?.value;
   }
 
   set(key, value) {
@@ -131,7 +142,7 @@ class WhatIf {
       this.page.select(1);
     }
     const repeats = this.repeats === 0 ? "as recorded, to the last bit" : `as recorded, within ${this.repeats?.toExponential(0)} m`;
-    this.panel.say(changed ? `flown in ${(result.took / 1000).toFixed(2)} s` : repeats);
+    this.panel.say(changed ? `flown in ${decimals(result.took / 1000, 2)} s` : repeats);
   }
 
   _asRecorded() {
@@ -172,6 +183,7 @@ class WhatIf {
       const by = (moves[i] ?? []).map((keys) => (keys.length ? this.value(keys[0]) - this.flight.slots.get(keys[0]).value : 0));
       return by.some((x) => x !== 0) ? { ...region, shape: movedShape(region.shape, by) } : region;
     });
+    if (regions[0].places) regions[0] = { ...regions[0], places: goalPlaces(this.flight.data, (key) => this.value(key)) };
     const more = this.flight.slots.has(restoring.key) ? this.value(restoring.key) - this.flight.slots.get(restoring.key).value : 0;
     const truth = { ...header.truth, estimate: restoring.truth.map((phi, i) => phi + more * restoring.slopes[i]) };
     const asked = this.changed ? `With ${this.words().join(", ")}.` : header.asked;
@@ -180,9 +192,9 @@ class WhatIf {
 
   /** Return the changes as texts. */
   words() {
-    const { slots, data: { moves } } = this.flight;
-    const moved = moves.flatMap((axes, i) => (axes?.flat().some((key) => this.values.has(key)) ? [`${this.recorded.header.regions[i].name} moved`] : []));
-    const placed = new Set(moves.flatMap((axes) => axes?.flat() ?? []));
+    const { slots } = this.flight;
+    const moved = this.movable().filter(({ axes }) => axes.flat().some((key) => this.values.has(key))).map(({ name }) => `${name} moved`);
+    const placed = new Set(this.movable().flatMap(({ axes }) => axes.flat()));
     const numbers = [...this.values].filter(([key]) => !placed.has(key)).map(([key, value]) => `${slots.get(key).words} ${shortNumber(value)} ${slots.get(key).unit}`.trim());
     const failed = this.failure ? [`thruster ${this.failure.thruster} failing at ${this.failure.time} s`] : [];
     return [...moved, ...numbers, ...failed];

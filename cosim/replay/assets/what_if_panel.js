@@ -151,21 +151,19 @@ class WhatIfPanel {
     const list = element("div", "command-list");
     list.append(element("p", "hint", "Places in metres:"));
     const { regions } = whatIf.recorded.header;
-    regions.forEach(({ name }, region) => {
-      const axes = whatIf.flight.data.moves[region];
-      if (!axes) return;
+    for (const { region, place, name, axes } of whatIf.movable()) {
       const set = this._set(name);
       axes.forEach((keys, axis) => {
         if (!keys.length) return;
-        const place = () => placeOf(whatIf.run, region, whatIf.run.start)?.[axis] ?? whatIf.value(keys[0]);
+        const now = () => placeOf(whatIf.run, region, whatIf.run.start, place)?.[axis] ?? whatIf.value(keys[0]);
         const said = `${name}, ${["north", "east", "down"][axis]} in metres`;
-        this._number(set, ["N", "E", "D"][axis], said, 0.1, () => shortNumber(place()), (value) => {
-          const from = [0, 0, 0].map((_, i) => (i === axis ? place() : 0));
-          whatIf.move(region, from, from.map((x, i) => (i === axis ? value : x)));
+        this._number(set, ["N", "E", "D"][axis], said, 0.1, () => shortNumber(now()), (value) => {
+          const from = [0, 0, 0].map((_, i) => (i === axis ? now() : 0));
+          whatIf.move(region, from, from.map((x, i) => (i === axis ? value : x)), place);
         });
       });
       list.append(set);
-    });
+    }
     const fixed = regions.filter((_, region) => !whatIf.canMove(region));
     if (fixed.length) list.append(element("p", "hint", wordsOfFixed(fixed)));
     return list;
@@ -184,7 +182,7 @@ function wordsOfFixed(regions) {
   ].filter(Boolean).join(" ");
 }
 
-/** Format a number with at most four decimals. */
+/** Format a number with at most four decimals for an input field, which is empty without one. */
 function shortNumber(x) {
-  return String(Number(x.toFixed(4)));
+  return Number.isFinite(x) ? String(Number(x.toFixed(4))) : "";
 }

@@ -9,16 +9,21 @@ const UNFINISHED = {
   reset: "This run did not complete: it was reset on the way.",
 };
 
-/** Format a number with three significant digits, at most `digits` decimals, and a true minus sign. */
-function figure(x, digits = 3) {
+/** Format a number with some decimals and a true minus sign; "–" for NaN, infinity and null. */
+function decimals(x, digits) {
   if (!Number.isFinite(x)) return "–";
-  const size = Math.abs(x);
-  const after = size >= 100 ? 0 : size >= 10 ? Math.min(1, digits) : size >= 1 ? Math.min(2, digits) : digits;
-  const text = size.toFixed(after);
+  const text = Math.abs(x).toFixed(digits);
   return (x < 0 && Number(text) !== 0 ? "\u2212" : "") + text;
 }
 
-/** Format a quantity with its unit: kilo for large forces, degrees for radians. */
+/** Format a number with three significant digits, and at most `digits` decimals. */
+function figure(x, digits = 3) {
+  const size = Math.abs(x);
+  const after = size >= 100 ? 0 : size >= 10 ? Math.min(1, digits) : size >= 1 ? Math.min(2, digits) : digits;
+  return decimals(x, after);
+}
+
+/** Format a quantity with its unit: kilo for large forces, degrees for radians; "no number" for NaN, infinity and null. */
 function quantity(x, unit, digits = 3) {
   if (!Number.isFinite(x)) return "no number";
   if (unit === "rad") return `${figure(x * DEGREES, 1)}°`;
@@ -34,7 +39,7 @@ function reading(x, unit) {
 
 /** Format a time [s]: 12.34 s below 100 s, else 3:07.5. */
 function clock(t, digits = 2) {
-  if (t < 100) return `${t.toFixed(digits)} s`;
+  if (!(t >= 100) || t === Infinity) return `${decimals(t, digits)} s`;
   const tenths = Math.round(t * 10);
   return `${Math.floor(tenths / 600)}:${((tenths % 600) / 10).toFixed(1).padStart(4, "0")}`;
 }
@@ -57,11 +62,17 @@ function timed(run) {
   return run.has("time") && Number.isFinite(run.start) && Number.isFinite(run.end);
 }
 
+/** Return the name of a region; of the goal at one of its places in turn, with which one that is: "next goal (2 of 3)". */
+function regionName({ name, places }, place, which = "") {
+  return places ? `${which} ${name} (${place + 1} of ${places.length})`.trim() : name;
+}
+
 /** Describe a region at a time [s]: criterion, side, hardness and motion ("obstacle · keep out · hard · moves"). */
 function regionWords(run, index, t) {
   const region = run.header.regions[index];
   const keep = region.keep === "in" ? "keep inside" : "keep out";
-  const criterion = region.criterion ? `${region.criterion} · ${keep} · ${region.hard ? "hard" : "soft"}` : "goal · get inside";
+  const inTurn = region.places ? ` · now ${run.goalPlace(t) + 1} of ${region.places.length}` : "";
+  const criterion = region.criterion ? `${region.criterion} · ${keep} · ${region.hard ? "hard" : "soft"}` : `goal · get inside${inTurn}`;
   return run.moves(index, t) ? `${criterion} · moves` : criterion;
 }
 
@@ -71,6 +82,16 @@ function clearanceWords(clearance, region) {
   const size = quantity(Math.abs(clearance), region.unit);
   if (!region.criterion) return clearance < 0 ? `${size} to go` : `inside by ${size}`;
   return clearance < 0 ? `violated by ${size}` : `${size} clear`;
+}
+
+/** Format a current [m/s, NED]: speed, and where it flows, as a course from north over east. */
+function currentWords([north, east, down]) {
+  const level = Math.hypot(north, east);
+  if (!Number.isFinite(level + down)) return "no number";
+  const course = `${Math.round((Math.atan2(east, north) * DEGREES + 360) % 360) % 360}°`.padStart(4, "0");
+  const upright = `${figure(Math.abs(down), 2)} m/s ${down > 0 ? "down" : "up"}`;
+  if (level < 0.1 * Math.abs(down)) return upright;
+  return `${figure(level, 2)} m/s towards ${course}${Math.abs(down) < 0.1 * level ? "" : `, ${upright}`}`;
 }
 
 /** Return true if the speed at a time is that of a vehicle at rest, as in cosim/replay/activity.py. */
@@ -124,7 +145,7 @@ function sizes(run, names) {
   return Float64Array.from(x, (_, i) => Math.sqrt(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]));
 }
 
-/** Return the values of the vehicle at a time [s]: [name, text] in the order of the panel. */
+/** Return the values of the vehicle at a time [s]: [name, text] in the order of the panel; an empty text is left out. */
 function numbersAt(run, t) {
   const of = (name) => run.held(name, t);
   const size = (names) => Math.hypot(...names.map(of));
@@ -133,6 +154,7 @@ function numbersAt(run, t) {
     ["North, east", `${quantity(of("position.x"), "m")}, ${quantity(of("position.y"), "m")}`],
     ["Depth", quantity(of("position.z"), "m")],
     ["Speed over ground", quantity(size(["velocity.u", "velocity.v", "velocity.w"]), "m/s")],
+    ["Current", run.current(t) ? currentWords(run.current(t)) : ""],
     ["Heading", quantity(of("attitude.yaw"), "rad")],
     ["Roll, pitch", `${quantity(of("attitude.roll"), "rad")}, ${quantity(of("attitude.pitch"), "rad")}`],
     ["Force asked", quantity(size(["command.X", "command.Y", "command.Z"]), "N")],

@@ -14,11 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller import ControllerError
+from controller.regions import Cylinder
 from cosim.errors import ScenarioError
 from cosim.replay.interactive.flight import Flight
 from cosim.scenario.changes import value_at, with_values
 from cosim.scenario.key_names import PARAMETERS, key_name
 from cosim.scenario.scenario import Scenario, validate_scenario
+from cosim.simulation.environment import CENTERED
 from cosim.ssp.memory import Memory
 from plant_fmu import PlantFmuError
 from plant_fmu.variables import variables
@@ -50,7 +52,8 @@ class Slot:
         Value in the scenario.
     places : tuple of (str, int)
         Places: ``number`` or ``gain`` with a place in the module's arrays, ``start`` with a value reference of
-        the plant, ``noise`` with 0 or 1; ``middle`` with the place of the mean of a cylinder's two ends.
+        the plant, ``noise`` with 0 or 1; ``middle`` with the place of the mean of a cylinder's two ends; ``shift`` with
+        the place of the difference to the goal's center.
     """
 
     key: str
@@ -88,8 +91,13 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[tuple[t
     for path, shape in shapes:
         if shape["type"] == "cylinder":
             places |= _ends_of_cylinder(flight, memory, path)
+    then = [f"goal.then.{i}.{axis}" for i in range(len(scenario.goal_then)) for axis in range(3)]
+    first = memory.keep(flight.setup.goal_places)
+    places |= {key: (("shift", first + i),) for i, key in enumerate(then)}
     moves = [axes if any(axes) and all(key in places for keys in axes for key in keys) else None for axes in moving]
-    offered = {key for axes in moves if axes for keys in axes for key in keys}.union(numbers)
+    if then and not isinstance(scenario.goal, (*CENTERED, Cylinder)):
+        moves[0] = None  # the page does not know where its center would be
+    offered = {key for axes in moves if axes for keys in axes for key in keys}.union(numbers, then)
     slots = []
     for key in (key for key in places if key in offered):
         name = key_name(key, table, scenario.vehicle)
@@ -181,6 +189,8 @@ def _places(
         return value in keys
 
     for array, changed in zip(flight.arrays(), other.arrays(), strict=True):
+        if array is flight.setup.goal_places:  # the page computes these from the goal's keys
+            continue
         if array.shape != changed.shape:
             return None
         differs = np.flatnonzero(~_equal(array, changed).ravel())

@@ -20,8 +20,10 @@ from cosim.replay.interactive.signals import signal_sources
 from cosim.results.run_result import Run
 from cosim.results.summary import SETTLED_FOR
 from cosim.scenario.scenario import Scenario
+from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array, Column
 from cosim.ssp.memory import Memory
+from plant_fmu.variables import variables
 
 
 def flight_data(run: Run, columns: Sequence[Column]) -> dict[str, Any]:
@@ -79,7 +81,9 @@ def flight_data(run: Run, columns: Sequence[Column]) -> dict[str, Any]:
         "noise": [scenario.sensing.position_noise, scenario.sensing.velocity_noise],
         "signals": signal_sources(flight, columns),
         "velocities": [list(velocity) for velocity in regions],
-        "goal_places": flight.setup.goal_places.tolist(),
+        "goals": len(scenario.goal_then),  # places of the goal after the first
+        "goal_center": list(shape_center(scenario.goal)),
+        "water": _water(flight, run),
         "criteria": list(scenario.criterion_places),
         "restoring": _restoring(flight),
         "failures": _failures(flight, memory),
@@ -97,6 +101,27 @@ def _restoring(flight: Flight) -> dict[str, Any]:
     )
     weight = scenario.plant.parameters.get("weight", scenario.vehicle.weight)
     return {"key": BUOYANCY, "weight": weight, "truth": truth.tolist(), "slopes": (truth_above - truth).tolist()}
+
+
+def _water(flight: Flight, run: Run) -> dict[str, Any]:
+    """Return the current at the surface, its growth with depth, and its variation at knots a period apart.
+
+    The variation follows from the seed alone, so that it is the recorded one whatever a page changes.
+    """
+    start = {v.name: v.start for v in variables(flight.scenario.vehicle)} | flight.start
+    surface, shear, deviation = (
+        np.array([start[f"{name}.{axis}"] for axis in "xyz"])
+        for name in ("current", "current_shear", "current_variation")
+    )
+    names, period, variation = [f"water_velocity.{axis}" for axis in "xyz"], start["current_variation_period"], []
+    if deviation.any() and len(run.record) > 1 and all(name in run.record.units for name in names):
+        time, below = run.record["time"], np.maximum(run.record["position.z"], 0.0)[:, None]
+        values = run.record.stack(names) - surface - shear * below
+        ahead = values[-1] + (values[-1] - values[-2]) * (period / (time[-1] - time[-2]))  # to the knot after the end
+        time, values = np.append(time, time[-1] + period), np.vstack([values, ahead])
+        knots = np.arange(0.0, time[-1], period)
+        variation = np.column_stack([np.interp(knots, time, of) for of in values.T]).round(6).tolist()
+    return {"surface": surface.tolist(), "shear": shear.tolist(), "period": period, "variation": variation}
 
 
 def _buoyancy(scenario: Scenario) -> float:

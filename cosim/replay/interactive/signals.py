@@ -26,7 +26,8 @@ def signal_sources(flight: Flight, columns: Sequence[Column]) -> dict[str, list[
     dict of str to list
         Sources by name of the signal: ``["trace", place]``, ``["reasons", place]`` or ``["rules", place]`` for an index
         in a row of that array; ``["sum", array, first, coefficients]`` for a weighted sum of neighbouring numbers;
-        ``["shift", region, axis]``, ``["attitude", axis]`` or ``["active"]`` for signals that the page computes.
+        ``["shift", region, axis]``, ``["attitude", axis]``, ``["water", axis]`` or ``["active"]`` for signals that the
+        page computes.
         Signals that a flight does not write are missing.
     """
     known = dict(_known(flight))
@@ -52,6 +53,9 @@ def _known(flight: Flight) -> Iterator[tuple[str, list[Any]]]:
         yield f"{name}.clearance", ["reasons", i]
         for k, letter in enumerate("xyz" if name in scenario.moving else ""):
             yield f"{name}.shift.{letter}", ["shift", i, k]
+    for i, axis in enumerate("xyz"):
+        yield f"water_velocity.{axis}", ["water", i]
+    yield "goal.place", ["reasons", 11 + n + c + m]
     for i, signal in enumerate(scenario.rules.inputs if scenario.arbiter.file else ()):
         yield f"arbiter.{signal.name}", ["reasons", 1 + n + c + i]
     for i in range(4):

@@ -1,8 +1,14 @@
 """The scene in a real browser: it opens from disk alone, and shows the pose and the colours of the record."""
 
+import re
+
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
+from cosim.replay.pages import write_replay
+from cosim.results.run_result import load_run
 from tests.cosim.replay.decoding import active_of
 
 pytestmark = pytest.mark.slow
@@ -94,6 +100,55 @@ def test_active_region_color_matches_the_record(name, browser, shown, request):
             assert is_full == (i == expected), (record["time"][step], region["name"], drawn["colours"][i])
         seen.add(expected)
     assert len(seen) >= {"paper": 4, "docking": 2}[name]
+
+
+SEEN_TEXTS = """
+const { context } = subreach.scene, said = [], { fillText } = context;
+context.fillText = (...all) => { said.push(all[0]); fillText.apply(context, all); };
+subreach.paint();
+delete context.fillText;
+return said"""
+
+
+def test_current_is_drawn_as_recorded_and_nothing_in_still_water(browser, shown, shipped_run, docking, paper):
+    varies = [f"plant.parameters.current_{of}" for of in ("shear.y=-0.05", "variation.x=0.1", "correlation_time=5")]
+    drifting = load_run(shipped_run("depth-transit", *varies, "time.duration=10").folder)
+    for run in (drifting, docking, paper):
+        page, said = shown(run), set()
+        for scheme in ("light", "dark"):
+            browser.open(page.file, scheme=scheme)
+            for time in (0.0, 3.0, run.record["time"][-1] - 0.5):
+                browser.scrub(time)
+                row = browser.js("return subreach.runs[0].row(subreach.player.t)")
+                water = [page.columns[f"water_velocity.{axis}"][row] for axis in "xyz"]
+                drawn = browser.drawn["runs"][0]["current"]
+                assert drawn == (water if any(water) else None)
+                texts = [text for text in browser.js(SEEN_TEXTS) if text.startswith("current")]
+                course = round(np.degrees(np.arctan2(water[1], water[0]))) % 360
+                expected = f"current {np.hypot(*water[:2]):.2f} m/s towards {course:03d}°"
+                assert texts == ([expected] if any(water) else [])
+                in_panel = browser.js("return document.getElementById('panel').innerText")
+                assert ("towards" in in_panel) == any(water)
+                said |= set(texts)
+            browser.shoot(f"current-{run.scenario.name}-{scheme}")
+        assert len(said) == {"depth-transit": 3, "docking": 1, "paper": 0}[run.scenario.name]
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_page_of_a_record_without_numbers_says_so(value, browser, docking, copy_of, tmp_path):
+    folder = copy_of(docking)
+    table = pq.read_table(folder / "record.parquet")
+    for at, field in enumerate(table.schema):
+        if field.name != "time" and pa.types.is_floating(field.type):
+            column = table[field.name].to_numpy().copy()
+            column[200:] = value
+            table = table.set_column(at, field, [column])
+    pq.write_table(table, folder / "record.parquet")
+    browser.open(write_replay(load_run(folder), tmp_path / "page.html"))
+    for time in (0.5, 4.0):
+        browser.scrub(time)
+        text = browser.js("return document.body.innerText") + " ".join(browser.js(SEEN_TEXTS))
+        assert "goal" in text and not re.search(r"NaN|Infinity|undefined|null", text)
 
 
 def test_view_changes_with_time(browser, shown, paper):

@@ -51,9 +51,9 @@ BOUNDED = {
 POSITION, QUATERNION = np.array([1.0, 2.0, 3.0]), np.array([0.9, 0.1, -0.2, 0.3]) / np.sqrt(0.95)
 
 
-def run(code, **given):
-    """Return what JavaScript that knows the scene's scripts returns of some values."""
-    scripts = "\n".join((ASSETS / name).read_text(encoding="utf-8") for name in SCENE_SCRIPTS)
+def run(code, scripts=SCENE_SCRIPTS, **given):
+    """Return what JavaScript that knows some scripts, by default the scene's, returns of some values."""
+    scripts = "\n".join((ASSETS / name).read_text(encoding="utf-8") for name in scripts)
     values = "".join(f"const {name} = {json.dumps(value)};\n" for name, value in given.items())
     program = f'"use strict";\n{scripts}\n{values}console.log(JSON.stringify((() => {{ {code} }})()));'
     done = subprocess.run([NODE, "-"], input=program, capture_output=True, text=True, timeout=240, check=False)

@@ -1,5 +1,6 @@
 """The report: complete, self-contained, and consistent with the numbers."""
 
+import html
 import re
 import tomllib
 from html.parser import HTMLParser
@@ -9,7 +10,10 @@ import numpy as np
 import pytest
 
 from cosim.report.contents import contents_of
+from cosim.report.figures.figures import drawings
+from cosim.report.figures.sampled_rows import make_figure_data
 from cosim.report.figures.style import thin
+from cosim.report.inline_svg import contrast, dark_colour
 from cosim.results.paper_claims import paper_claims
 from cosim.results.run_result import load_run
 from cosim.run.run import run_scenario
@@ -90,6 +94,29 @@ def test_every_figure_is_there_as_a_vector_file_numbered_and_with_a_caption(ship
         assert re.match(rf"Figure {i + 1}\. .{{20,}}", caption)
     for name in names:
         ET.parse(run.folder / "figures" / f"{name}.svg")
+
+
+def test_figures_follow_the_theme_and_are_described(shipped_run):
+    """Without the theme an inline figure is its file; in the dark every color of it contrasts with the ground."""
+    run = load_run(shipped_run("paper", *SHORT, report=True).folder)
+    page, captions = page_of(run), {d.name: d.caption for d in drawings(make_figure_data(run))}
+    for name in FIGURES:
+        file = (run.folder / "figures" / f"{name}.svg").read_text()
+        inline = page.partition(f'<figure id="{name}">')[2].partition("<figcaption>")[0]
+        theme = re.search(r"<style>@media screen and \(prefers-color-scheme:dark\)\{svg\{(.*?)\}\}</style>", inline)
+        plain = re.sub(r"var\(--c\w{6},(#\w{6})\)", r"\1", inline.replace(theme[0], ""))
+        assert plain.partition("<metadata>")[2].removesuffix("</div>") == file.partition("<metadata>")[2]
+        assert f'aria-label="{html.escape(captions[name])}"' in inline
+        dark = dict(re.findall(r"--c(\w{6}):(#\w{6});", theme[1]))
+        assert set(re.findall(r"var\(--c(\w{6})", inline)) == dark.keys()
+        for light, colour in dark.items():
+            on_white = contrast(f"#{light}", "#ffffff")
+            assert contrast(colour, "#16181a") >= min(3.0, on_white) - 0.1, (name, light, colour)
+
+
+@pytest.mark.parametrize(("light", "dark"), [("#000000", "#e6e6e3"), ("#ffffff", "#16181a"), ("#e69f00", "#e69f00")])
+def test_greys_change_places_and_light_hues_stay_in_the_dark(light, dark):
+    assert dark_colour(light) == dark
 
 
 def test_every_link_target_of_the_page_exists(shipped_run):

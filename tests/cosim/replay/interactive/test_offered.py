@@ -16,6 +16,7 @@ from cosim.replay.interactive.module import flight_module
 from cosim.replay.interactive.scenario_template import scenario_template
 from cosim.replay.interactive.sources import flight_sources, tail_draws
 from cosim.scenario.scenario import load_scenario
+from cosim.simulation.environment import shape_center
 from cosim.ssp.memory import Memory
 from cosim.ssp.normal_tables import OUTERMOST, ziggurat
 from plant_fmu.errors import BuildError
@@ -76,6 +77,32 @@ def test_a_cylinder_moves_by_its_middle():
             differs |= set(at.tolist())
             assert (changed.ravel()[at - memory.keep(array)] == sum(changes.values()) / 2.0).all()
     assert differs == places and len(places) >= 1
+
+
+@pytest.mark.parametrize(
+    ("shape", "movable"),
+    [("type='box', centre=[7.1,0.1,4], size=[1,2,1], quaternion=[0.9,0.1,0,0.4]", True),
+     ("type='ellipsoid', centre=[7.1,0.3,4], semi_axes=[0.3,0.7,1.1]", True),
+     ("type='cylinder', start=[7.1,0,3], end=[7.2,0,5], radius=0.7", True),
+     ("type='prism', corners=[[6,-1],[8,-1],[8,1],[6,2]], top=3, bottom=5", False)],
+    ids=["box", "ellipsoid", "cylinder", "prism"],
+)  # fmt: skip
+def test_each_place_of_goals_in_turn_is_offered(shape, movable):
+    """The loop is given differences to the goal's center, which the page computes from both keys to the last bit."""
+    goal = f"goal={{{shape}, then=[[6.1,-2.5,3.2],[5.3,0.7,4.1]]}}"
+    flight, memory = Flight(load_scenario("docking", [goal])), Memory()
+    flight_sources(flight, memory, "token")
+    slots, moves = find_slots(flight, memory)
+    assert (moves[0] is not None) == movable
+    changes = {s.key: s.value + 0.0137 * (i + 1) for i, s in enumerate(slots) if s.key.startswith("goal.")}
+    assert len(changes) == 6 + (sum(map(len, moves[0])) if movable else 0)
+    changed = Flight(changed_scenario(flight.scenario, changes)).setup.goal_places.ravel()
+    ends = [[changes.get(f"goal.{end}.{axis}", 0.0) for axis in range(3)] for end in ("start", "end")]
+    middle = [(a + b) / 2.0 for a, b in zip(*ends, strict=True)] if any(map(any, ends)) else [None] * 3
+    center = [changes.get(f"goal.centre.{axis}", middle[axis]) for axis in range(3)]
+    center = [x if x is not None else y for x, y in zip(center, shape_center(flight.scenario.goal), strict=True)]
+    places = {place: changes[s.key] - center[int(s.key[-1])] for s in slots for kind, place in s.places if kind == "shift"}
+    assert [places[memory.keep(flight.setup.goal_places) + i] for i in range(6)] == changed.tolist()
 
 
 def test_filled_template_equals_the_scenario(docking, tmp_path):

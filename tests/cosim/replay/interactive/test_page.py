@@ -18,6 +18,19 @@ for (let y = 60; y < scene.canvas.clientHeight; y += 3) {
     if (scene.labels.nameAt(x, y)?.region === arguments[0]) return [x, y];
   }
 }"""
+GOALS = """
+const { scene, player } = subreach, said = [];
+const { add } = scene.labels;
+scene.labels.add = (word) => { if (word.of?.region === 0) said.push(word.text.replace("▶ ", "")); add.call(scene.labels, word); };
+subreach.paint();
+scene.labels.add = add;
+return said"""
+GOAL = """
+const { scene } = subreach, { canvas } = scene;
+for (let y = 60; y < canvas.clientHeight; y += 3) for (let x = 0; x < canvas.clientWidth - scene.camera.covered; x += 3) {
+  const of = scene.pick(x, y);
+  if (of?.region === 0 && of.place === arguments[0]) return [x, y];
+}"""
 VIEW = """
 const { azimuth, elevation, distance, target } = subreach.scene.camera;
 return [azimuth, elevation, distance, ...target]"""
@@ -102,6 +115,34 @@ def test_dragged_goal_is_simulated_and_r_resets(browser, page):
     browser.press("r")
     wait_until(browser, "subreach.runs.length === 1")
     assert not browser.js("return subreach.whatIf.changed")
+
+
+def test_each_goal_in_turn_is_labeled_and_dragged(builds, browser, tmp_path):
+    from selenium.webdriver.common.action_chains import ActionChains
+
+    goals = ["goal.then=[[6.0,-2.5,3.0],[4.0,-2.0,3.0]]", "goal.stay=1", "time.duration=60"]
+    run_scenario(load_scenario("docking", goals), tmp_path / "run", report=False)
+    opened(browser, replay([tmp_path / "run"], tmp_path / "page.html", interactive=True))
+    assert browser.js(GOALS) == ["present goal (1 of 3)", "next goal (2 of 3)"]
+    for place, key in ((1, "goal.then.0"), (0, "goal.centre")):
+        before = dict(browser.js("return [...subreach.whatIf.values]"))
+        x, y = browser.js(GOAL, place)
+        width, height = browser.js("const c = subreach.scene.canvas; return [c.clientWidth, c.clientHeight]")
+        scene = browser.driver.find_element("id", "scene")
+        browser.js("subreach.whatIf.took = null")
+        drag = ActionChains(browser.driver).move_to_element_with_offset(scene, x - width / 2, y - height / 2)
+        drag.click_and_hold().move_by_offset(-15, 25).move_by_offset(-10, 10).release().perform()
+        wait_until(browser, FLOWN)
+        moved = dict(browser.js("return [...subreach.whatIf.values]"))
+        changed = {of for of in moved if moved[of] != before.get(of)}
+        assert changed and changed <= {f"{key}.{axis}" for axis in range(3)}
+    browser.shoot("what-if-goals-in-turn")
+    browser.js("subreach.whatIf.reset()")
+    wait_until(browser, "subreach.runs.length === 1")
+    shown = browser.js("return subreach.runs[0].column('goal.place')")
+    last = shown.index(2.0)
+    browser.land(browser.js("return subreach.runs[0].time[arguments[0]]", last))
+    assert browser.js(GOALS) == ["present goal (3 of 3)"]
 
 
 def test_view_follows_the_flight_until_the_reader_turns_it(browser, page):
