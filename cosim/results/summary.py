@@ -79,7 +79,11 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
         "settled": settled,
         "settle_time": visits[-1].start if visits else None,
         "final_position": [last[name] for name in _POSITION],
-        **({"goals": {"reached": int(last["goal.place"]), "of": len(scenario.goal_then) + 1}} if scenario.goal_then else {}),
+        **(
+            {"goals": {"reached": int(last["goal.place"]), "of": len(scenario.goal_then) + 1}}
+            if scenario.goal_then
+            else {}
+        ),
         "closest_to_goal": -data.greatest["goal.clearance"],
         "weighted_violation": data.violation.total() * period,
         "intersection": [names[i] for i in scenario.intersection],

@@ -13,6 +13,24 @@ function element(tag, className = "", text = "") {
   return made;
 }
 
+/** Return a new button that calls `does` when it is pressed. */
+function pressable(className, text, title, does) {
+  const button = element("button", className, text);
+  Object.assign(button, { type: "button", title });
+  button.addEventListener("click", does);
+  return button;
+}
+
+/** Return a label with a number field in it, for screen readers named `said`: [label, field]. */
+function numberField(text, said, step) {
+  const label = element("label", "", text);
+  const field = element("input");
+  Object.assign(field, { type: "number", step: String(step) });
+  field.setAttribute("aria-label", said);
+  label.append(field);
+  return [label, field];
+}
+
 /** Return a short SVG line in the color and dash of a curve; SVG also prints. */
 function swatch(colour, dash) {
   const space = "http://www.w3.org/2000/svg";
@@ -161,18 +179,15 @@ class Chart {
     const faint = this.spec.signals.filter((of) => of.faint);
     this._entries = [];
     const items = this.spec.signals.filter((of) => !of.faint).map((of) => {
-      const button = element("button", "key");
-      button.type = "button";
-      button.setAttribute("aria-pressed", String(!this._off.has(of.name)));
-      button.title = `Put ${of.label} in or out`;
-      const value = element("span", "value");
-      button.append(swatch(hueColour(of.hue, this.theme, of.shade), this._several && !of.context ? [] : of.dash), of.label, value);
-      button.addEventListener("click", () => {
+      const button = pressable("key", "", `Put ${of.label} in or out`, () => {
         if (!this._off.delete(of.name)) this._off.add(of.name);
         button.setAttribute("aria-pressed", String(!this._off.has(of.name)));
         this._collect();
         this.on.changed();
       });
+      button.setAttribute("aria-pressed", String(!this._off.has(of.name)));
+      const value = element("span", "value");
+      button.append(swatch(hueColour(of.hue, this.theme, of.shade), this._several && !of.context ? [] : of.dash), of.label, value);
       this._entries.push({ of, value });
       return button;
     });

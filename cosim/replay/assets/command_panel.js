@@ -59,11 +59,8 @@ class CommandPanel {
     group.setAttribute("role", "group");
     group.setAttribute("aria-label", "Commands");
     const add = (text, title, command, data = {}) => {
-      const button = element("button", "", text);
-      button.type = "button";
-      button.title = title;
+      const button = pressable("", text, title, () => this.link.command(command));
       Object.assign(button.dataset, data);
-      button.addEventListener("click", () => this.link.command(command));
       group.append(button);
     };
     add("Arm", "Let the thrusters work", { command: "arm", armed: true }, { armed: "true" });
@@ -77,11 +74,8 @@ class CommandPanel {
 
   /** Return the reset button, which must be pressed twice. */
   _reset() {
-    const button = element("button", "", "Reset");
-    button.type = "button";
-    button.title = "End this run, and begin it again";
     let sure = 0;
-    button.addEventListener("click", () => {
+    const button = pressable("", "Reset", "End this run, and begin it again", () => {
       if (sure) this.link.command({ command: "reset" });
       clearTimeout(sure);
       setText(button, sure ? "Reset" : "Really reset?");
@@ -108,23 +102,14 @@ class CommandPanel {
     const legend = element("legend", "", name);
     set.append(legend);
     const fields = ["N", "E", "D"].map((letter, axis) => {
-      const label = element("label", "", letter);
-      const field = element("input");
-      Object.assign(field, { type: "number", step: "0.1" });
-      field.setAttribute("aria-label", `${name}, ${["north", "east", "down"][axis]} in metres`);
+      const [label, field] = numberField(letter, `${name}, ${["north", "east", "down"][axis]} in metres`, 0.1);
       field.disabled = axis < 2 && isFlat(this.run, index);
       field.addEventListener("change", () => this._moved(row));
-      label.append(field);
       set.append(label);
       return field;
     });
     const row = { index, set, fields };
-    if (region.comes) {
-      const gone = element("button", "gone", "Remove");
-      gone.type = "button";
-      gone.addEventListener("click", () => this._forget(index));
-      set.append(gone);
-    }
+    if (region.comes) set.append(pressable("gone", "Remove", "", () => this._forget(index)));
     this._rows.push(row);
     return set;
   }
@@ -154,10 +139,7 @@ class CommandPanel {
 
   /** Return the button that adds a spherical obstacle ahead of the vehicle. */
   _adding() {
-    const button = element("button", "", "New obstacle");
-    button.type = "button";
-    button.title = "A sphere to keep out of, ahead of the vehicle";
-    button.addEventListener("click", () => {
+    return pressable("", "New obstacle", "A sphere to keep out of, ahead of the vehicle", () => {
       const { run } = this;
       if (!run.rows) return;
       const { position, quaternion } = run.pose(run.end);
@@ -168,7 +150,6 @@ class CommandPanel {
       const known = run.header.changes.map((change) => change.number ?? 0);
       this.link.command({ command: "add_obstacle", number: Math.max(NEW_OBSTACLES - 1, ...known) + 1, position: place, radius });
     });
-    return button;
   }
 
   _forget(index) {

@@ -98,14 +98,13 @@ function listenToKeys(page) {
 
 /** Fill the help dialog with the table of keys and hints for reading the page. */
 function fillHelp(dialog, keys) {
-  const close = element("button", "close", "Close");
-  close.type = "button";
-  close.addEventListener("click", () => dialog.close());
+  const close = pressable("close", "Close", "", () => dialog.close());
   const title = element("h2", "", "How to read and drive this page");
   title.id = "help-title";
   const hints = [
     "The one cursor is shared: the scene, the charts, the panel and the scrubber show the same moment.",
     "A region is drawn in full colour while the arbiter gives way to it. Vermilion and its shades: obstacles, orange: shapes, blue: depth, green: goal. The ribbon of the scrubber has the same colours; black notches below it are violations, signs above it are events: a triangle the goal, a cross a violation or a failure, an arrow a limit that cuts the force, a line a change of who is active, a diamond a command.",
+    "Of goals in turn, the present one and the next, dotted, are drawn. The arrow beside the compass is the current at the vehicle.",
     "In the charts distances are positive where a region is respected and negative where it is violated; of the goal, negative is the way still to go.",
     "Scene: drag turns, right button or Shift and drag moves, the wheel comes nearer, double click fits. Two fingers pinch and move.",
     "Charts: click or drag seeks, Shift and drag picks a window of time, Ctrl and wheel zooms, double click shows the whole run. A click on a name puts its curve in or out.",

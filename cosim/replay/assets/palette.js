@@ -1,7 +1,5 @@
 // Colors of Okabe and Ito, which color-blind readers can distinguish, on paper and on a dark screen.
 
-const GOAL_COLOUR = "#009E73";
-
 /** Colors of the paths of several runs; first those that no criterion has. */
 const RUN_COLOURS = ["#0072B2", "#CC79A7", "#9A7B00", "#7C8A94", "#009E73", "#E69F00", "#D55E00", "#56B4E9"];
 

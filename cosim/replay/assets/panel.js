@@ -111,12 +111,9 @@ class Panel {
       box.checked = shown[index];
       box.setAttribute("aria-label", `Show ${name}`);
       box.addEventListener("change", () => this.on.show(index, box.checked));
-      const choose = element("button", "choose");
-      choose.type = "button";
+      const choose = pressable("choose", "", `Show ${name} in this panel`, () => this.on.select(index));
       choose.setAttribute("aria-pressed", String(index === selected));
-      choose.title = `Show ${name} in this panel`;
       choose.append(swatch(runColour(index), runDash(index)), name);
-      choose.addEventListener("click", () => this.on.select(index));
       item.append(box, choose);
       list.append(item);
     });
@@ -209,12 +206,10 @@ class Panel {
     const list = element("ol");
     for (const { time, kind, text } of events) {
       const item = element("li");
-      const button = element("button", `event ${kind}`);
-      button.type = "button";
+      const button = pressable(`event ${kind}`, "", "", () => this.player.seek(time));
       const mark = element("span", `mark-at ${kind}`);
       mark.setAttribute("aria-hidden", "true");
       button.append(mark, element("span", "at", clock(time)), element("span", "text", text));
-      button.addEventListener("click", () => this.player.seek(time));
       item.append(button);
       list.append(item);
       this.events.push({ time, item });

@@ -38,29 +38,18 @@ class WhatIfPanel {
 
   _buttons() {
     const group = element("div", "command-buttons of-two");
-    const button = (text, title, does) => {
-      const made = element("button", "", text);
-      Object.assign(made, { type: "button", title });
-      made.addEventListener("click", does);
-      group.append(made);
-      return made;
-    };
-    this.resetting = button("Reset", "Back to the run as it was recorded (R)", () => this.whatIf.reset());
-    button("Save scenario", "A file that “cosim run” repeats (S)", () => saveScenario(this.whatIf));
+    this.resetting = pressable("", "Reset", "Back to the run as it was recorded (R)", () => this.whatIf.reset());
+    group.append(this.resetting, pressable("", "Save scenario", "A file that “cosim run” repeats (S)", () => saveScenario(this.whatIf)));
     return group;
   }
 
   /** Add a number field to a set of fields and return it. */
   _number(set, label, said, step, now, changed) {
-    const holder = element("label", "", label);
-    const field = element("input");
-    Object.assign(field, { type: "number", step: String(step) });
-    field.setAttribute("aria-label", said);
+    const [holder, field] = numberField(label, said, step);
     field.addEventListener("input", () => {
       if (Number.isFinite(field.valueAsNumber)) changed(field.valueAsNumber);
     });
     field.addEventListener("blur", () => this.update());
-    holder.append(field);
     set.append(holder);
     this._fields.push({ field, now });
     return field;

@@ -59,6 +59,7 @@ def test_the_target_is_dragged_with_the_mouse(browser, live, tmp_path):
     )
     where = "return subreach.scene.drawn.runs[0].position"
     first = until(lambda: browser.execute_script(where))
+    assert browser.execute_script("return subreach.scene.drawn.runs[0].current") == [0.05, -0.1, 0]
     browser.execute_script("document.querySelector('#commands [data-armed=true]').click()")
     until(lambda: abs(browser.execute_script(where)[0] - first[0]) > 0.05)
     browser.execute_script('subreach.scene.camera.look("top"); subreach.paint()')

@@ -29,7 +29,6 @@ from controller.regions.shapes import ENTRIES
 from cosim.replay import header
 from cosim.replay.header import ATTITUDE_SHAPES
 from cosim.replay.page import SCENE_SCRIPTS
-from cosim.scenario.colours import GOAL_COLOUR
 
 ASSETS = Path(str(resources.files("cosim.replay"))) / "assets"
 NODE = shutil.which("node")
@@ -92,10 +91,6 @@ def test_page_draws_exactly_the_attitude_shapes():
     assert set(run("return Object.keys(SIGHTS);")) == set(ATTITUDE_SHAPES) == of_attitude
     scripts = "".join(path.read_text(encoding="utf-8") for path in ASSETS.glob("*.js"))
     assert {name for name in ENTRIES if f'"{name}"' in scripts} == {"depth_band"}  # which is dragged up and down alone
-
-
-def test_page_uses_the_common_goal_color():
-    assert run("return GOAL_COLOUR;") == GOAL_COLOUR
 
 
 def test_meshes_are_drawn_unchanged():

@@ -2,7 +2,6 @@
 
 import math
 import re
-from types import SimpleNamespace
 
 import pytest
 
@@ -26,7 +25,8 @@ return Object.entries(formats).flatMap(([name, format]) => numbers.map((x) => [n
 OUTCOME = """
 const column = (values) => Float64Array.from(values, (x) => x ?? NaN);
 const regions = [{ name: "goal", places }, { name: "wall", unit: "m", criterion: "obstacle", hard: true }];
-const columns = { time: column([0, 1]), "goal.place": column([0, at]), "wall.clearance": column([null, null]), active: column([0, 0]) };
+const columns = { time: column([0, 1]), "goal.place": column([0, at]), "wall.clearance": column([null, null]) };
+columns.active = column([0, 0]);
 const header = { regions, signals: Object.keys(columns).map((name) => ({ name })) };
 const metrics = new Float64Array(20).fill(-1);
 metrics[5] = -Infinity;
@@ -47,7 +47,10 @@ def test_no_script_formats_numbers_for_readers_by_itself():
         for line in script.read_text(encoding="utf-8").splitlines():
             uses = line.count(".toFixed(")
             rounded = len(re.findall(r"Number\([^`]*?\.toFixed\(", line))
-            own = any(mark in line for mark in ("style.", "setProperty", "function tomlNumber")) or script.name == "saving.js"
+            own = (
+                any(mark in line for mark in ("style.", "setProperty", "function tomlNumber"))
+                or script.name == "saving.js"
+            )
             assert uses == rounded or own or script.name == "words.js", (script.name, line)
 
 
@@ -63,8 +66,9 @@ def test_verdict_of_a_flight_without_a_distance_to_its_goal(places, at, said):
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_python_formatters_say_what_is_no_number(value):
     summary = {
-        "has_goal": True, "settled": False, "reached": False, "closest_to_goal": value, "min_clearance": {"wall": value},
-        "hard": ["wall"], "hard_violated": [], "violated_at_start": [], "clearance_unit": {"wall": "m"},
+        "has_goal": True, "settled": False, "reached": False, "closest_to_goal": value,
+        "min_clearance": {"wall": value}, "hard": ["wall"], "hard_violated": [], "violated_at_start": [],
+        "clearance_unit": {"wall": "m"},
         "status": "completed", "max_force_asked": value, "max_force": value, "simulated_time": 1.0,
     }  # fmt: skip
     assert number(value) == number(None) == "–" and format_number(value, 3) == format_force(value) == "no number"

@@ -94,7 +94,8 @@ def test_saved_scenario_reproduces_the_run_bit_for_bit(values, failure, fly, shi
 
 @pytest.mark.parametrize(
     ("goal", "then"),
-    [("type='sphere', centre=[7.1,0,4], radius=0.4", 0), ("type='cylinder', start=[7.1,0,3.6], end=[7.1,0.1,4.4], radius=0.4", 1)],
+    [("type='sphere', centre=[7.1,0,4], radius=0.4", 0),
+     ("type='cylinder', start=[7.1,0,3.6], end=[7.1,0.1,4.4], radius=0.4", 1)],
     ids=["a sphere", "a cylinder"],
 )  # fmt: skip
 def test_goals_in_turn_move_each_by_itself(goal, then, fly, tmp_path):

@@ -101,7 +101,9 @@ def test_each_place_of_goals_in_turn_is_offered(shape, movable):
     middle = [(a + b) / 2.0 for a, b in zip(*ends, strict=True)] if any(map(any, ends)) else [None] * 3
     center = [changes.get(f"goal.centre.{axis}", middle[axis]) for axis in range(3)]
     center = [x if x is not None else y for x, y in zip(center, shape_center(flight.scenario.goal), strict=True)]
-    places = {place: changes[s.key] - center[int(s.key[-1])] for s in slots for kind, place in s.places if kind == "shift"}
+    places = {
+        place: changes[s.key] - center[int(s.key[-1])] for s in slots for kind, place in s.places if kind == "shift"
+    }
     assert [places[memory.keep(flight.setup.goal_places) + i] for i in range(6)] == changed.tolist()
 
 

@@ -21,15 +21,20 @@ for (let y = 60; y < scene.canvas.clientHeight; y += 3) {
 GOALS = """
 const { scene, player } = subreach, said = [];
 const { add } = scene.labels;
-scene.labels.add = (word) => { if (word.of?.region === 0) said.push(word.text.replace("▶ ", "")); add.call(scene.labels, word); };
+scene.labels.add = (word) => {
+  if (word.of?.region === 0) said.push(word.text.replace("▶ ", ""));
+  add.call(scene.labels, word);
+};
 subreach.paint();
 scene.labels.add = add;
 return said"""
 GOAL = """
 const { scene } = subreach, { canvas } = scene;
-for (let y = 60; y < canvas.clientHeight; y += 3) for (let x = 0; x < canvas.clientWidth - scene.camera.covered; x += 3) {
-  const of = scene.pick(x, y);
-  if (of?.region === 0 && of.place === arguments[0]) return [x, y];
+for (let y = 60; y < canvas.clientHeight; y += 3) {
+  for (let x = 0; x < canvas.clientWidth - scene.camera.covered; x += 3) {
+    const of = scene.pick(x, y);
+    if (of?.region === 0 && of.place === arguments[0]) return [x, y];
+  }
 }"""
 VIEW = """
 const { azimuth, elevation, distance, target } = subreach.scene.camera;
