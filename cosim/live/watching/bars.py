@@ -29,7 +29,7 @@ class Bars:
     def signed(self, part: float, width: int, style: str) -> Text:
         """Return a bar for a value from -1 to 1 with 0 in the middle; values beyond end in an arrow."""
         half = max(1, (width - 1) // 2)
-        filled = 0 if math.isnan(part) else min(half, math.ceil(abs(part) * half))
+        filled = 0 if math.isnan(part) else math.ceil(min(1.0, abs(part)) * half)
         run = self._full * filled
         left, right = (Text().append(self._empty * half, style="dim") for _ in range(2))
         if part < 0.0:

@@ -92,7 +92,7 @@ def _now(look: Look) -> Text:
     """Return a line of words with the active region, the mode and the arming."""
     line = Text(no_wrap=True, overflow="ellipsis")
     index = look["active"]
-    if math.isnan(index) or not 0 <= int(index) < len(look.header["regions"]):
+    if not math.isfinite(index) or not 0 <= int(index) < len(look.header["regions"]):
         return line
     region = look.header["regions"][int(index)]
     criterion, keep = region["criterion"], "stay within" if region["keep"] == "in" else "keep out"
@@ -132,7 +132,7 @@ def _weights(look: Look, width: int, bars: Bars) -> list[Text]:
         weight, asks = look[f"weight.{name}"], look[f"membership.{name}"]
         line = Text(f"{name[: wide - 1]:<{wide}}")
         line.append_text(bars.part(weight, width - 17 - wide, _style(look, name)))
-        lines.append(line.append(f" {weight:4.2f} asks {asks:4.2f}"))
+        lines.append(line.append(f" {_number(weight, '4.2f')} asks {_number(asks, '4.2f')}"))
     return lines
 
 
@@ -163,14 +163,19 @@ def _distances(look: Look, width: int, bars: Bars, lines_free: int | None) -> li
 def _clearance(clearance: float, region: dict[str, object]) -> Text:
     degrees = region["unit"] == "rad"
     value = math.degrees(clearance) if degrees else clearance
-    number = f" {value:+z7.2f}{'°' if degrees else 'm'}"
-    if math.isnan(clearance):
+    number = f" {_number(value, '+z7.2f')}{'°' if degrees else 'm'}"
+    if not math.isfinite(clearance):
         return Text(" no number")
     if clearance >= 0.0:
         return Text(number)
     if region["criterion"] is None:
         return Text(f"{number} to go")
     return Text().append(number + " !", style="bold reverse")
+
+
+def _number(value: float, form: str = "z.2f") -> str:
+    """Format a number, a hyphen for NaN and infinity."""
+    return f"{value:{form}}" if math.isfinite(value) else "-"
 
 
 def _state(look: Look) -> list[Text]:
@@ -186,10 +191,10 @@ def _state(look: Look) -> list[Text]:
     ]
     lines = [
         _title("Vehicle"),
-        Text(f"north {north:z.2f} east {east:z.2f} m"),
-        Text(f"depth {depth:z.2f} m, speed {speed:.2f} m/s"),
-        Text(f"roll {roll:z.0f}° pitch {pitch:z.0f}° yaw {yaw:z.0f}°"),
-        Text(f"force {asked:.1f} N asked, {acts:.1f} acts" + (", CUT" if saturated else "")),
+        Text(f"north {_number(north)} east {_number(east)} m"),
+        Text(f"depth {_number(depth)} m, speed {_number(speed)} m/s"),
+        Text(f"roll {_number(roll, 'z.0f')}° pitch {_number(pitch, 'z.0f')}° yaw {_number(yaw, 'z.0f')}°"),
+        Text(f"force {_number(asked, '.1f')} N asked, {_number(acts, '.1f')} acts" + (", CUT" if saturated else "")),
     ]
     if violated:
         lines.append(Text(f"VIOLATED: {', '.join(violated)}", style="bold reverse"))
@@ -198,7 +203,10 @@ def _state(look: Look) -> list[Text]:
 
 def _estimates(look: Look) -> list[Text]:
     true_values = look.header["truth"]["estimate"]
-    parts = [f"φ{i + 1} {look[f'estimate.phi{i + 1}']:z.1f} ({true:z.1f})" for i, true in enumerate(true_values)]
+    parts = [
+        f"φ{i + 1} {_number(look[f'estimate.phi{i + 1}'], 'z.1f')} ({_number(true, 'z.1f')})"
+        for i, true in enumerate(true_values)
+    ]
     return [_title("Estimates (true)"), Text("  ".join(parts[:2])), Text("  ".join(parts[2:]))]
 
 
@@ -208,7 +216,7 @@ def _rules(look: Look, width: int, bars: Bars, lines_free: int | None) -> list[T
     shown = fired if lines_free is None or len(fired) <= lines_free else fired[: max(0, lines_free - 1)]
     lines = [_title("Rules that fire")]
     for strength, words in shown:
-        line = bars.part(strength, 5, "magenta").append(f" {strength:4.2f} ")
+        line = bars.part(strength, 5, "magenta").append(f" {_number(strength, '4.2f')} ")
         lines.append(line.append(words))
     if len(fired) > len(shown):
         lines.append(Text(f"{len(fired) - len(shown)} more", style="dim"))

@@ -1,5 +1,6 @@
 """``cosim watch``: a run displayed in the terminal."""
 
+import dataclasses
 import io
 import re
 import shutil
@@ -55,6 +56,15 @@ def test_every_picture_of_a_run_fits_its_terminal(paper, size):
     for frame in (*frames[::20], frames[-1]):
         lines = drawn(frame, *size).rstrip("\n").split("\n")
         assert len(lines) <= size[1] and max(map(len, lines)) <= size[0]
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_picture_of_a_row_without_numbers_says_so(value, paper):
+    *_, frame = looks(str(paper.folder), rate=None)
+    names = [signal["name"] for signal in frame.header["signals"]]
+    row = np.where([name == "time" for name in names], frame.row, value)
+    text = drawn(dataclasses.replace(frame, row=row), 100, 40)
+    assert "no number" in text and not re.search(r"\b(nan|inf)", text.partition("completed")[0])
 
 
 def test_violations_are_readable_without_color(paper):
