@@ -26,6 +26,7 @@ from cosim.results.recorder import Recorder
 from cosim.results.run_result import Run
 from cosim.results.wording import verdict
 from cosim.run.run_folder import claim, conclude
+from cosim.scenario.law_factory import require_builtin_law
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import SecondaryRegion
 from cosim.simulation.commands.command_handler import greatest_wrench
@@ -77,10 +78,11 @@ def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks", profile:
     Raises
     ------
     RunError
-        If it has thruster failures or records the Lyapunov function: a real vehicle offers neither.
+        If it has a custom law, thruster failures, or records the Lyapunov function: a real vehicle offers none of them.
     ScenarioError
         If the converted scenario is invalid.
     """
+    require_builtin_law(scenario)
     for key, asked in (("failures", scenario.failures), ("record.lyapunov", scenario.record.lyapunov)):
         if asked:
             raise RunError(f"{scenario.name}: {key} is set, expected none: the vehicle is a real one")

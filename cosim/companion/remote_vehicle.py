@@ -12,9 +12,9 @@ from cosim.companion.session import AutopilotSession
 from cosim.mavlink.vehicle.layout import euler_of
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
+from cosim.simulation.stepped_plant import vehicle_channels
 from plant_fmu.autopilot import effort_of_pulse
 from plant_fmu.running.channels import Channel, Channels
-from plant_fmu.variables import variables
 
 _NAMES = tuple(condition.name for condition in CONDITIONS)
 _SHIFT = 0.1  # s, delay beyond which the loop shifts its schedule instead of catching up
@@ -61,11 +61,7 @@ class RemoteVehicle:
     def __init__(self, scenario: Scenario, session: AutopilotSession) -> None:
         self._session, self._vehicle = session, scenario.vehicle
         self.name = scenario.vehicle.name
-        table = [v for v in variables(scenario.vehicle) if not v.local]
-        inputs, outputs, flags = (
-            tuple(Channel(v.name, v.quantity.unit, v.description) for v in table if v.role in roles and v.type == kind)
-            for roles, kind in ((("input",), "real"), (("state", "output"), "real"), (("output",), "boolean"))
-        )
+        outputs, flags, inputs = vehicle_channels(scenario.vehicle)
         self.inputs = Channels(inputs, np.zeros(len(inputs)))
         first = [channel.name for channel in outputs].index(_FIRST_SENT)
         all_outputs = (*outputs[:first], *_REPORTED, *outputs[first:], *_SENT)

@@ -160,7 +160,7 @@ def check_commands(
         return ()
     _require(not record.lyapunov, "record.lyapunov", "true", "false with commands.enabled: V is of one target")
     _require(
-        not is_custom_law(law), "commands.enabled", "true", f"false: nothing of {law} can be commanded from outside"
+        not is_custom_law(law), "commands.enabled", "true", f"false with {law}: only built-in laws take commands"
     )
     _require(
         0 <= commands.obstacles <= MAX_OBSTACLES, "commands.obstacles", commands.obstacles, f"0 to {MAX_OBSTACLES}"

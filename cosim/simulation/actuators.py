@@ -43,12 +43,14 @@ class Actuators:
         self._bounded = scenario.commands.enabled
         self.command = signals.view("command.X", 6)
         self._saturated = signals.view("allocation_saturated", 1)
-        inputs = signals.view("thrust[1]", len(plant.inputs))
-        self.thrusts, self._wrench = inputs[: vehicle.n_thrusters], inputs[vehicle.n_thrusters :]
+        inputs, n = signals.view("thrust[1]", len(plant.inputs)), vehicle.n_thrusters + 6
+        self.thrusts, self._wrench = inputs[: vehicle.n_thrusters], inputs[vehicle.n_thrusters : n]
         # memoryviews: copying one takes a third of the time of copying an array
         self._asked, self._given = self.command.data, self._wrench.data
-        self._decided, self._sent = inputs.data, plant.inputs.values.data
-        self._delayed = np.zeros(inputs.size).data if scenario.master.order == "jacobi" else None
+        self._decided, self._sent = inputs[:n].data, plant.inputs.values[:n].data
+        # further inputs, such as those of a coupled plant, are the caller's, and recorded as they are
+        self._further, self._further_sent = inputs[n:].data, plant.inputs.values[n:].data
+        self._delayed = np.zeros(n).data if scenario.master.order == "jacobi" else None
         self._stuck: dict[int, float] = {}  # force [N] of each stuck thruster, from 0
         self.health: Array = np.ones(vehicle.n_thrusters)
         self._limits = {"thrust_min": vehicle.thrust_min.copy(), "thrust_max": vehicle.thrust_max.copy()}
@@ -94,6 +96,8 @@ class Actuators:
             self._delayed[:] = self._decided
         for j, force in self._stuck.items():
             self._plant.inputs.values[j] = force
+        if self._further:
+            self._further[:] = self._further_sent
 
     def _allocate_to_the_healthy(self) -> None:
         actuation = self._scenario.actuation

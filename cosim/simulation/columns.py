@@ -11,9 +11,8 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.commands import MODES
 from cosim.simulation.lyapunov_signals import lyapunov_columns
 from cosim.simulation.signals import Column
-from cosim.simulation.stepped_plant import SteppedPlant
+from cosim.simulation.stepped_plant import SteppedPlant, vehicle_channels
 from plant_fmu.running import Channel
-from plant_fmu.variables import variables
 
 _FORCE_UNITS = ("N",) * 3 + ("N.m",) * 3
 
@@ -58,13 +57,8 @@ def columns_without_plant(scenario: Scenario) -> list[Column]:
     list of Column
         Columns in the order of the row.
     """
-    table = [v for v in variables(scenario.vehicle) if not v.local]
-    outputs, flags, inputs = (
-        [Channel(v.name, v.quantity.unit, v.description) for v in table if v.role in roles and v.type == kind]
-        for roles, kind in ((("state", "output"), "real"), (("output",), "boolean"), (("input",), "real"))
-    )
     law = LAWS.get(scenario.law.name)
-    return _columns(scenario, outputs, flags, inputs, law.diagnostics if law else ())
+    return _columns(scenario, *vehicle_channels(scenario.vehicle), law.diagnostics if law else ())
 
 
 def _columns(

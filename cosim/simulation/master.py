@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from controller import CompiledLaw, FunctionLaw, Law, VehicleState
+from controller import CompiledLaw, Law, VehicleState
 from controller.law import NOTHING_EXPECTED
 from controller.quaternion import from_axis_angle
 from cosim.scenario.law_factory import law_of, with_custom_law
@@ -31,7 +31,7 @@ from cosim.simulation.lyapunov_signals import LyapunovSignals
 from cosim.simulation.pace import Pace
 from cosim.simulation.sensor_navigation import SensorNavigation, make_sensing
 from cosim.simulation.signals import Array, Signals
-from cosim.simulation.stepped_plant import SteppedPlant
+from cosim.simulation.stepped_plant import SteppedPlant, validate_plant
 from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant
 
@@ -59,7 +59,8 @@ class Master:
     law : Law, optional
         Control law; default: the scenario's.
     plant : SteppedPlant, optional
-        Plant, which the master closes; default: the FMU of the scenario's vehicle.
+        Plant with the channels of the vehicle's FMU, which the master closes; default: that FMU. Further inputs, as of a
+        coupled plant, are the caller's to set.
 
     Attributes
     ----------
@@ -72,12 +73,12 @@ class Master:
 
     Raises
     ------
-    PlantError
-        If the FMU refuses the scenario's numbers.
-    BuildError
-        If there is no FMU and none can be built.
+    PlantError, BuildError
+        If the FMU refuses the scenario's numbers, or there is none and none can be built.
     LawError, DefinitionError, ScenarioError
-        If law or arbiter cannot be set up, or the scenario needs a feature that a `FunctionLaw` lacks.
+        If law or arbiter cannot be set up, or the scenario needs a feature that a custom law lacks.
+    RunError
+        If the plant lacks a channel of the vehicle's FMU.
 
     Examples
     --------
@@ -90,8 +91,10 @@ class Master:
     """
 
     def __init__(self, scenario: Scenario, law: Law | None = None, plant: SteppedPlant | None = None) -> None:
-        if isinstance(law, FunctionLaw):
+        if law is not None:
             scenario = with_custom_law(law, scenario)  # raises for keys that such a law does not support
+        if plant is not None:
+            validate_plant(plant, scenario.vehicle)
         self.scenario = scenario
         self.arbiter = Arbiter(system=scenario.rules.system, engine=scenario.arbiter.engine)
         self.law: Law = law_of(scenario) if law is None else law

@@ -52,8 +52,8 @@ class LiveSettings:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        self._law = LAWS[scenario.law.name]
-        self.gains: Any = scenario.law.gains
+        self._law = scenario.law.name
+        self.gains: Any = scenario.law.gains  # none of a custom law
         known = [secondary.region for secondary in scenario.regions if not secondary.is_dynamic]
         self._regions: dict[str, Region] = {region.name: region for region in known}
         self.shapes: dict[str, Shape] = {"goal": scenario.goal, **{region.name: region.shape for region in known}}
@@ -130,7 +130,7 @@ class LiveSettings:
                 name = key.removeprefix("law.gains.")
                 if name not in self.gains._fields:
                     raise CommandError(f"{key} is no setting")
-                self.gains = self._law.validate(self.gains._replace(**{name: value}))
+                self.gains = LAWS[self._law].validate(self.gains._replace(**{name: value}))
             elif key in self._numbers:
                 self._change_number(key, value)
             else:
