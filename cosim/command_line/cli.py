@@ -10,6 +10,7 @@ import contextlib
 import importlib
 import json
 import logging
+import re
 import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
@@ -65,7 +66,11 @@ class _Version(argparse.Action):
 
 
 class _Parser(argparse.ArgumentParser):
-    """Parser that prints its errors in one line, as all other errors."""
+    """Parser that prints its errors in one line, as all other errors, and takes ``-33.8,151.2`` for a value."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self._negative_number_matcher = re.compile(r"-(\d|\.\d|inf|nan)")  # argparse itself knows single numbers alone
 
     def print_help(self, file: Any = None) -> None:
         """Print the help; argparse itself ignores output errors."""

@@ -42,12 +42,11 @@ def add_verb(verbs: Any) -> None:
         "--scene-origin",
         type=origin,
         metavar="LAT,LON",
-        help="latitude and longitude of the scene's origin, in degrees",
+        help="latitude and longitude of the scene's origin, in degrees with seven decimals: the fourth is 11 m",
     )
     where.add_argument(
         "--surveyed-origin", type=_position, metavar="N,E,D",
-        help="position of the autopilot's local origin in the scene, in metres (a negative number as "
-        "--surveyed-origin=-1,0,0)",
+        help="position of the autopilot's local origin in the scene, in meters",
     )  # fmt: skip
     verb.add_argument(
         "--surface-pressure", type=number(500.0, 1200.0), default=1013.25, metavar="HPA",
@@ -130,9 +129,12 @@ def companion(options: argparse.Namespace) -> int:
         link = stack.enter_context(NetworkLink(endpoint, key, (options.system_id, _COMPONENT), options.speedup))
         companion = Companion(scenario, link, chosen)
         live = open_live(options, stack)
-        unprinted = [companion.session.failsafes]
+        unprinted, printed = [companion.session.failsafes], {""}
 
         def show(state: str, missing: str) -> None:
+            if companion.placement not in printed:
+                printed.add(companion.placement)
+                print_status(companion.placement)
             if state != "waiting" and unprinted:
                 for line in unprinted.pop().text():
                     print_status(line)
@@ -147,5 +149,5 @@ def _position(text: str) -> tuple[float, float, float]:
     try:
         north, east, down = (float(part) for part in text.split(","))
     except ValueError as error:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected metres north, east and down, such as 1.5,-2,0") from error
+        raise argparse.ArgumentTypeError(f"{text!r}: expected meters north, east and down, such as 1.5,-2,0") from error
     return north, east, down

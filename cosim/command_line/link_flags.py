@@ -58,8 +58,9 @@ def add_link_flags(parser: argparse.ArgumentParser, commands: bool = False, requ
     )  # fmt: skip
     parser.add_argument(
         "--origin", type=origin, default=usual.origin, metavar="LAT,LON",
-        help=f"latitude and longitude of position 0, in degrees (default: {usual.origin[0]:g},{usual.origin[1]:g}; "
-        "a negative latitude as --origin=-33.9,18.4)",
+        help="latitude and longitude of position 0, in degrees with seven decimals (default: {:.7f},{:.7f})".format(
+            *usual.origin
+        ),
     )  # fmt: skip
     parser.set_defaults(commands=False, await_arm=False, link_loss=None, link_timeout=None)
     if commands:
@@ -132,7 +133,9 @@ def origin(text: str) -> tuple[float, float]:
     except ValueError:
         latitude = longitude = math.nan
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected degrees of latitude and longitude, such as 55.9,-3.3")
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: expected degrees of latitude and longitude, such as 55.9097000,-3.3203000"
+        )
     return latitude, longitude
 
 

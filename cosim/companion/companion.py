@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controller.laws.deployable.gains import SPREADS
-from controller.regions.region_set import of_attitude
 from cosim.companion.link import AutopilotLink
 from cosim.companion.options import CompanionOptions
 from cosim.companion.outputs import SteerBy
+from cosim.companion.placement import FARTHEST, Placement, meters
 from cosim.companion.remote_vehicle import RemoteVehicle
 from cosim.companion.safety import State
 from cosim.companion.session import AutopilotSession
@@ -28,9 +28,7 @@ from cosim.results.wording import verdict
 from cosim.run.run_folder import claim, conclude
 from cosim.scenario.law_factory import require_builtin_law
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.tables import SecondaryRegion
 from cosim.simulation.commands.command_handler import greatest_wrench
-from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.master import Master, Observer
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
@@ -122,10 +120,6 @@ def _speed_with_reserve(vehicle: Vehicle) -> float:
     return 2.0 * float(force) / slope if slope > 0.0 else math.inf
 
 
-def _is_fence(secondary: SecondaryRegion) -> bool:
-    return secondary.region.hard and not of_attitude(secondary.region.shape)
-
-
 class Companion:
     """Steers a vehicle through its autopilot by a scenario's regions, arbiter and law.
 
@@ -144,6 +138,8 @@ class Companion:
         Scenario as it is flown, converted by `scenario_to_steer`.
     session : AutopilotSession
         Message exchange with the autopilot.
+    placement : str
+        Position in the scene, with the distances to goal and nearest hard region; empty until the frame is known.
 
     Raises
     ------
@@ -164,9 +160,9 @@ class Companion:
         self._options = options
         self.session = AutopilotSession(link, self.scenario.vehicle, options)
         self._reported = ("", "")
-        hard = [i for i, secondary in enumerate(self.scenario.regions, 1) if _is_fence(secondary)]
-        self._hard = np.array(hard, dtype=int)
-        self._environment = RegionEnvironment(self.scenario)  # for the dive, before the master's environment exists
+        self.placement = ""
+        self._placed_by: tuple[Array | None, bool] = (None, False)
+        self._scene = Placement(self.scenario)
         self.session.dive.clearance = self._clearance
 
     def run(
@@ -209,6 +205,8 @@ class Companion:
             if on_state is not None:
                 on_state(state, missing)
             if live is not None:
+                if self.placement and state in ("aligning", "dry_run"):
+                    live.say(self.placement)
                 live.say(state.replace("_", " ") + ("" if missing == "nothing" else f", waits for {missing}"))
 
         with Master(self.scenario, plant=RemoteVehicle(self.scenario, self.session)) as master:
@@ -266,7 +264,7 @@ class Companion:
                 for observer in observers:
                     observer.observe(k, master.row)
                 master.environment.inflate_position_uncertainty(self._position_uncertainty() / SPREADS)
-                violated = clearances[self._hard]
+                violated = clearances[self._scene.hard]
                 session.outside = float(max(0.0, -np.nanmin(violated))) if np.isfinite(violated).any() else 0.0
                 self._report(on_state)
         except KeyboardInterrupt:
@@ -276,11 +274,7 @@ class Companion:
 
     def _clearance(self, position: Array) -> float:
         """Return the least clearance of hard regions [m] at a position of the autopilot's local frame."""
-        if not len(self._hard):
-            return math.inf
-        place = self.session.alignment.to_scene(position)
-        found = self._environment.clearances(place, self.session.reported.quaternion)
-        return float(np.min(found[self._hard]))
+        return self._scene.clearance(self.session.alignment.to_scene(position), self.session.reported.quaternion)
 
     def _position_uncertainty(self) -> float:
         """Return the greatest expected position error [m]: undetected error, drift, and dead reckoning."""
@@ -290,7 +284,26 @@ class Companion:
 
     def _report(self, on_state: Callable[[State, str], None] | None) -> None:
         """Call `on_state` if the state, or the text of the conditions it waits for, has changed."""
+        self._place()
         now = self.session.supervisor.state, self.session.missing()
         if on_state is not None and now != self._reported:
             on_state(*now)
         self._reported = now
+
+    def _place(self) -> None:
+        """Describe where the vehicle is once its frame is known; let it be armed and steered near the scene alone."""
+        session, offset = self.session, self.session.alignment.offset
+        if session.supervisor.is_steering and session.is_placed:
+            return
+        position = session.alignment.to_scene(session.reported.position)
+        if not np.isfinite(position).all():
+            session.is_placed, self._placed_by = False, (None, False)
+            return
+        distance = self._scene.distance(position)
+        is_near = distance <= FARTHEST
+        if self._placed_by[0] is not offset or self._placed_by[1] != is_near:
+            self.placement = self._scene.text(position, session.reported.quaternion)
+            session.misplaced = "" if is_near else f"{meters(distance)} from everything in it"
+            self.placement += f"; {session.misplaced}" if session.misplaced else ""
+        self._placed_by = offset, is_near
+        session.is_placed = is_near or self._options.dry_run

@@ -67,6 +67,10 @@ class AutopilotSession:
         Delay of the start of the last step [s].
     outside : float
         Depth by which the vehicle violates hard regions [m]; the caller sets it.
+    is_placed : bool
+        True once the caller has found the vehicle near the scene; before, it is neither armed nor steered.
+    misplaced : str
+        How far off it is if it is not near; the caller sets it.
 
     Raises
     ------
@@ -94,6 +98,7 @@ class AutopilotSession:
         self.failsafes = Failsafes(options.profile)
         self.supervisor = Supervisor(options.dry_run)
         self.lateness = self.outside = 0.0  # s; m
+        self.is_placed, self.misplaced = False, ""
         self._taken_over = self._was_in_mode = False
         self._law_works = False  # value of the last `Arm` for the master
         self._sent_at: dict[str, float] = {}
@@ -186,6 +191,8 @@ class AutopilotSession:
             return "LOCAL_POSITION_NED and ATTITUDE_QUATERNION, or ODOMETRY"
         if not self.failsafes.is_read(now):
             return "its failsafe parameters"
+        if self.alignment.offset is not None and self.misplaced and not self.is_placed:
+            return f"a position near the scene, not {self.misplaced}: check sign and digits of its origin"
         return self.alignment.missing(reported) or {
             "disarmed": "arming", "held": f"somebody to resume after: {self.supervisor.reason}",
             "pilot": f"somebody to resume after: {self.supervisor.reason}", "engaging": f"mode {self._mode}",
@@ -235,7 +242,9 @@ class AutopilotSession:
         }
         if self._dive_mode == "hold" and self.supervisor.state == "diving" and self.dive.is_stuck(reported, now):
             self._dive_mode, self._was_in_mode = "depth_hold", False
-        has_to_dive = alignment.offset is not None and has_state and self.dive.is_needed(reported, now)
+        has_to_dive = (
+            alignment.offset is not None and self.is_placed and has_state and self.dive.is_needed(reported, now)
+        )
         in_mode = reported.mode == (self.profile.numbers[self._dive_mode] if has_to_dive else self._mode)
         self._was_in_mode |= in_mode and self.supervisor.state == "diving"
         is_ours = self.supervisor.state == "steering" or (has_to_dive and self._was_in_mode)
@@ -247,7 +256,7 @@ class AutopilotSession:
                 "refused mode": self.supervisor.waited_for_mode(now),
                 "pilot gain": self._gain_off() if uses_sticks(self._options.profile, self._options.steer_by) else 0.0,
             }
-        is_known = alignment.offset is not None
+        is_known = alignment.offset is not None and self.is_placed
         return Observation(now, has_state, is_known, reported.is_armed, in_mode, values, has_to_dive)
 
     # ---- sending ----
@@ -374,5 +383,6 @@ class AutopilotSession:
             self._taken_over = message.param1 == 0.0
             if not self._taken_over:
                 self.alignment.restart()
+                self.is_placed = False
                 self.supervisor.resume()
         self._link.send(m.MAVLink_command_ack_message(message.command, result, 0, 0, system, component))

@@ -159,9 +159,7 @@ def check_commands(
         _require(not commands.await_arm, "commands.await_arm", "true", "false without commands.enabled: no way to arm")
         return ()
     _require(not record.lyapunov, "record.lyapunov", "true", "false with commands.enabled: V is of one target")
-    _require(
-        not is_custom_law(law), "commands.enabled", "true", f"false with {law}: only built-in laws take commands"
-    )
+    _require(not is_custom_law(law), "commands.enabled", "true", f"false with {law}: only built-in laws take commands")
     _require(
         0 <= commands.obstacles <= MAX_OBSTACLES, "commands.obstacles", commands.obstacles, f"0 to {MAX_OBSTACLES}"
     )

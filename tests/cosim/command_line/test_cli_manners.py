@@ -176,3 +176,42 @@ def test_completion_scripts_cover_every_verb(script):
     for name in ("bash", "zsh", "fish"):
         text = script(name).read_text()
         assert [verb for verb in verbs if verb not in text] == [] and "paper-calibrated" in text
+
+
+def value_flags():
+    """Return each verb with each of its flags that take a value."""
+    verbs = _parser().parse_args(["help"]).verbs
+    flags = [(verb, one) for verb, parser in verbs.items() for one in parser._actions if one.option_strings]
+    return [(verb, one.option_strings[-1]) for verb, one in flags if one.nargs != 0]
+
+
+@pytest.mark.parametrize("value", ["-33.8,151.2", "-1,0,0", "-.5", "-1e-3", "-4:-2", "-inf"])
+def test_every_value_flag_of_every_verb_takes_a_leading_minus(value):
+    flags = value_flags()
+    assert {("companion", "--scene-origin"), ("run", "--origin"), ("sweep", "--vary")} < set(flags)
+    for verb, flag in flags:
+        parser = _parser().parse_args(["help"]).verbs[verb]
+        (chosen,) = (one for one in parser._actions if flag in one.option_strings)
+        for one in parser._actions:
+            one.required, one.type, one.choices = False, None, None
+            one.nargs = one.nargs if one.option_strings else "*"
+        for one in parser._mutually_exclusive_groups:
+            one.required = False
+        values = [value] * (chosen.nargs if isinstance(chosen.nargs, int) else 1)
+        found = getattr(parser.parse_args([flag, *values]), chosen.dest)
+        assert found in (value, values) or values in found, (verb, flag)
+
+
+@pytest.mark.parametrize(
+    ("words", "key", "value"),
+    [
+        (["companion", "udpin:127.0.0.1:14551", "--scenario", "paper", "--scene-origin", "-33.8,151.2"],
+         "scene_origin", (-33.8, 151.2)),
+        (["companion", "--scene-origin", "-33.8,-151.2", "udpin:127.0.0.1:14551", "--scenario", "paper"],
+         "scene_origin", (-33.8, -151.2)),
+        (["companion", "x", "--scenario", "paper", "--surveyed-origin", "-1.5,0,-2"], "surveyed_origin", (-1.5, 0, -2)),
+        (["run", "paper", "--origin", "-33.9,18.4"], "origin", (-33.9, 18.4)),
+    ],
+)  # fmt: skip
+def test_southern_and_negative_origins_need_no_equals_sign(words, key, value):
+    assert getattr(_parser().parse_args(words), key) == value

@@ -199,7 +199,10 @@ class Foreign:
         ({"inputs": lambda names: []}, r"plant.inputs: 'thrust\[1\]' is not the channel 1"),
         ({"outputs": lambda names: ["extra", *names]}, "plant.outputs: 'position.x' is not the channel 1"),
         ({"outputs": lambda names: names[:-1]}, "plant.outputs: 'actuation.N' is not a channel in that order"),
-        ({"outputs": lambda names: names[:20] + names[:19:-1]}, "plant.outputs: 'measured.velocity.u' is not a channel"),
+        (
+            {"outputs": lambda names: names[:20] + names[:19:-1]},
+            "plant.outputs: 'measured.velocity.u' is not a channel",
+        ),
         ({"flags": lambda names: names[::-1]}, "plant.flags: .* is not a channel in that order"),
     ],
 )

@@ -1,0 +1,70 @@
+"""Position of the vehicle in the scene before it is steered: a wrong sign or digit of the scene's origin shows here."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from controller.regions.region_set import of_attitude
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.environment import RegionEnvironment
+from cosim.simulation.signals import Array
+
+FARTHEST = 50.0  # m, horizontal distance from everything in the scene, beyond which nothing is steered
+
+
+class Placement:
+    """Distances between a vehicle and the scene.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Scenario with goal and regions.
+
+    Attributes
+    ----------
+    hard : ndarray of int
+        Indices of the hard regions in space; 0 is the goal.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._environment = RegionEnvironment(scenario)
+        regions = [secondary.region for secondary in scenario.regions]
+        self._names = ["goal", *(region.name for region in regions)]
+        self._has_goal = scenario.has_goal and not of_attitude(scenario.goal)
+        hard = [i for i, region in enumerate(regions, 1) if region.hard and not of_attitude(region.shape)]
+        self.hard = np.array(hard, dtype=int)
+        shapes = [region.shape for region in (*([scenario.goal_region] if scenario.has_goal else []), *regions)]
+        corners = np.array([shape.bounds() for shape in shapes]).reshape(-1, 2, 3)[:, :, :2]
+        bounded = corners[np.isfinite(corners).all(axis=(1, 2))]
+        points = np.array([scenario.initial.position, *scenario.goal_then])[:, None, :2]
+        self._corners: Array = np.concatenate([bounded, np.repeat(points, 2, axis=1)])  # (n, 2, 2) m, NE, low and high
+
+    def distance(self, position: Array) -> float:
+        """Return the least horizontal distance [m] of a position [m, NED] from the start, goal and bounded regions."""
+        outside = np.maximum(self._corners[:, 0] - position[:2], position[:2] - self._corners[:, 1])
+        return float(np.min(np.linalg.norm(np.maximum(outside, 0.0), axis=1)))
+
+    def clearance(self, position: Array, quaternion: Array) -> float:
+        """Return the least clearance of hard regions [m] at a pose; infinite if there are none."""
+        return float(np.min(self._environment.clearances(position, quaternion)[self.hard], initial=math.inf))
+
+    def text(self, position: Array, quaternion: Array) -> str:
+        """Describe a pose by its position, and its distances to the goal and the nearest hard region."""
+        north, east, down = position.tolist()
+        clearances = self._environment.clearances(position, quaternion)
+        parts = [f"in the scene: {north:.2f} m north, {east:.2f} m east, {down:.2f} m down"]
+        if self._has_goal:
+            parts.append("inside the goal" if clearances[0] >= 0.0 else f"goal {meters(-clearances[0])} away")
+        if self.hard.size:
+            nearest = self.hard[np.argmin(clearances[self.hard])]
+            left = clearances[nearest]
+            where = f"{meters(left)} left" if left >= 0.0 else f"violated by {meters(-left)}"
+            parts.append(f"nearest hard region {self._names[nearest]!r}, {where}")
+        return ", ".join(parts)
+
+
+def meters(distance: float) -> str:
+    """Format a distance [m] with its unit, in km from one on."""
+    return f"{distance:.2f} m" if distance < 1e3 else f"{distance / 1e3:.0f} km"

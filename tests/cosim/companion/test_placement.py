@@ -1,0 +1,114 @@
+"""A wrong sign or digit of the scene's origin is shown, and nothing is armed or steered far from the scene."""
+
+import itertools
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cosim.companion.companion import Companion
+from cosim.companion.frame_alignment import SceneOrigin
+from cosim.companion.options import CompanionOptions
+from cosim.companion.placement import FARTHEST, Placement
+from cosim.errors import RunError
+from cosim.mavlink.vehicle.geodesy import LocalFrame
+from cosim.mavlink.wire.options import ORIGIN
+from cosim.scenario.scenario import list_scenarios, load_scenario
+from tests.cosim.companion.stand_in import StandIn
+
+SCENE = load_scenario("pipe-inspection")
+ARM, STEERS = 400, ("MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE", "SET_POSITION_TARGET_LOCAL_NED", "SET_ATTITUDE_TARGET")
+
+
+def fly(link, out, origin, **options):
+    options = {"profile": "generic", "timeout": 5.0, "arm": True} | options
+    companion = Companion(
+        load_scenario("pipe-inspection", ["time.duration=0.2"]), link, CompanionOptions(origin=origin, **options)
+    )
+    notes = []
+
+    def note(state, missing):
+        sent = [message.command for _, message in link.sent if message.get_type() == "COMMAND_LONG"]
+        notes.append((state, missing, companion.placement, ARM in sent))
+
+    try:
+        return companion.run(out, report=False, on_state=note), notes
+    finally:
+        link.notes = notes
+
+
+def wrong_origins():
+    """Yield the origin with signs changed, swapped, and with each digit of a degree's first three decimals wrong."""
+    latitude, longitude = ORIGIN
+    yield from ((-latitude, longitude), (latitude, -longitude), (-latitude, -longitude), (longitude, latitude))
+    for which, place in itertools.product((0, 1), (10.0, 1.0, 0.1, 0.01, 0.001)):
+        for by in (-place, place):
+            yield (latitude + by, longitude) if which == 0 else (latitude, longitude + by)
+
+
+@pytest.mark.parametrize("origin", list(wrong_origins()))
+def test_wrong_sign_or_digit_leaves_the_vehicle_far_from_the_scene(origin):
+    north, east, _ = LocalFrame(*origin).to_local(*ORIGIN, 0.0)
+    here = np.add(SCENE.initial.position, (north, east, 0.0))
+    assert Placement(SCENE).distance(here) > FARTHEST
+
+
+@pytest.mark.parametrize("name", list_scenarios())
+def test_start_and_goal_of_every_shipped_scenario_are_in_its_scene(name):
+    scenario = load_scenario(name)
+    placement = Placement(scenario)
+    assert placement.distance(np.array(scenario.initial.position)) == 0.0
+    assert placement.distance(np.array(scenario.initial.position) + (1e5, 0.0, 0.0)) > 1e4
+
+
+@given(st.tuples(*[st.floats(-300.0, 300.0)] * 3))
+def test_distance_is_that_of_the_nearest_box_about_a_bounded_region(position):
+    regions = [SCENE.goal, *(secondary.region.shape for secondary in SCENE.regions)]
+    boxes = [np.array(shape.bounds())[:, :2] for shape in regions if np.isfinite(shape.bounds()).all()]
+    boxes.append(np.tile(SCENE.initial.position[:2], (2, 1)))
+    nearest = min(np.linalg.norm(np.clip(position[:2], *box) - position[:2]) for box in boxes)
+    assert Placement(SCENE).distance(np.array(position)) == pytest.approx(nearest, abs=1e-9)
+
+
+@pytest.mark.medium(fast=1)
+@pytest.mark.parametrize(
+    "origin",
+    [
+        SceneOrigin(geodetic=(ORIGIN[0], -ORIGIN[1])),
+        SceneOrigin(geodetic=(ORIGIN[0] + 0.001, ORIGIN[1])),
+        SceneOrigin(surveyed=(500.0, 0.0, 0.0)),
+    ],
+)
+@pytest.mark.parametrize("armed", [False, True])
+def test_nothing_is_armed_or_steered_far_from_the_scene(origin, armed, tmp_path):
+    link = StandIn(profile="generic", armed=armed)
+    with pytest.raises(RunError, match=r"waiting for a position near the scene, not [\d.]+ k?m from everything in it"):
+        fly(link, tmp_path / "run", origin)
+    sent = [message for _, message in link.sent]
+    assert not [m for m in sent if m.get_type() in STEERS]
+    assert {m.command for m in sent if m.get_type() == "COMMAND_LONG"} == {511}  # message rates
+    assert any("from everything in it" in placement for *_, placement, _ in link.notes)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.medium
+def test_position_and_distances_are_shown_before_the_vehicle_is_armed(tmp_path):
+    link = StandIn(profile="generic", armed=False)
+    run, notes = fly(link, tmp_path / "run", SceneOrigin(geodetic=ORIGIN))
+    assert run.summary["status"] == "completed"
+    _, _, placement, armed = next(note for note in notes if note[2])
+    assert not armed and any(note[3] for note in notes)
+    shown = [float(number) for number in re.findall(r"(-?[\d.]+) m (?:north|east|down)", placement)]
+    assert shown == pytest.approx(SCENE.initial.position, abs=0.3)
+    assert "goal " in placement and "nearest hard region 'sea bed', " in placement
+    assert "from everything" not in placement
+
+
+@pytest.mark.medium
+def test_dry_run_on_a_bench_elsewhere_goes_on_and_says_so(tmp_path):
+    link = StandIn(profile="generic")
+    run, notes = fly(link, tmp_path / "run", SceneOrigin(geodetic=(51.0, 4.0)), dry_run=True, arm=False)
+    assert run.summary["status"] == "completed"
+    assert "km from everything in it" in notes[-1][2]
